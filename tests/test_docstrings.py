@@ -14,21 +14,23 @@ import docstring_parser
 import isiw
 
 
-def modules() -> Iterator[ModuleType]:
+def modules(*, rooms: bool) -> Iterator[ModuleType]:
+    """The packages, whose exports are the public face, or all the other modules."""
     yield isiw
     for found in pkgutil.walk_packages(isiw.__path__, "isiw."):
-        yield importlib.import_module(found.name)
+        if found.ispkg == rooms:
+            yield importlib.import_module(found.name)
 
 
 def public() -> dict[str, Any]:
     """Public classes and functions by their full names, and the public methods of those classes."""
     named: dict[str, Any] = {}
-    for module in modules():
-        for name in getattr(module, "__all__", ()):
-            thing = getattr(module, name)
-            if (inspect.isclass(thing) or inspect.isfunction(thing)) and thing.__module__ == module.__name__:
-                named[f"{module.__name__}.{name}"] = thing
-                named |= {f"{module.__name__}.{name}.{key}": method for key, method in methods(thing)}
+    for room in modules(rooms=True):
+        for name in getattr(room, "__all__", ()):
+            thing = getattr(room, name)
+            if (inspect.isclass(thing) or inspect.isfunction(thing)) and thing.__module__.startswith("isiw"):
+                named[f"{room.__name__}.{name}"] = thing
+                named |= {f"{room.__name__}.{name}.{key}": method for key, method in methods(thing)}
     return named
 
 
@@ -50,11 +52,12 @@ def explained(function: Callable[..., object]) -> list[str]:
 
 PUBLIC = public()
 FUNCTIONS = {name: thing for name, thing in PUBLIC.items() if inspect.isfunction(thing)}
-PROTOCOLS = {name for name, thing in PUBLIC.items() if inspect.isclass(thing) and getattr(thing, "_is_protocol", False)}
 PROMISED = {  # what a protocol explains is explained for all that keep it
-    (name.rpartition(".")[2], *explained(function))
-    for name, function in FUNCTIONS.items()
-    if name.rpartition(".")[0] in PROTOCOLS
+    (key, *explained(method))
+    for module in modules(rooms=False)
+    for thing in vars(module).values()
+    if getattr(thing, "_is_protocol", False)
+    for key, method in methods(thing)
 }
 
 

@@ -18,28 +18,6 @@ import numpy as np
 from isiw.errors import InvalidValueError, did_you_mean
 from isiw.findings import AMPLITUDE_MV, DELAY_MS, SHARE
 
-__all__ = [
-    "MOST_MEP_MV",
-    "MOST_OF_A_KIND",
-    "amplitude",
-    "ascending",
-    "check_amplitude",
-    "check_choice",
-    "check_flags",
-    "check_numbers",
-    "check_probabilities",
-    "check_texts",
-    "check_wholes",
-    "choice",
-    "deadline",
-    "from_table",
-    "mean_and_sd",
-    "number",
-    "require_sum_of_one",
-    "text",
-    "whole",
-]
-
 _T = TypeVar("_T")
 
 MOST_DELAY_MS = 10_000.0
@@ -62,17 +40,7 @@ class Bounds(TypedDict, total=False):
 
 
 def number(what: str, value: object, *, remedy: str | None = None, **bounds: Unpack[Bounds]) -> float:
-    """A finite number within some bounds.
-
-    Args:
-        what: its name, for the message.
-        value: what was given.
-        remedy: what to do about anything else.
-        **bounds: `above` and `below` exclude the bound itself, `least` and `most` include it.
-
-    Raises:
-        InvalidValueError: anything else.
-    """
+    """A finite number within some bounds."""
     plain = _as_float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
     if not (math.isfinite(plain) and _within(plain, bounds)):
         raise InvalidValueError(f"{what} must be {_described('a finite number', bounds)}", got=value, remedy=remedy)
@@ -80,15 +48,7 @@ def number(what: str, value: object, *, remedy: str | None = None, **bounds: Unp
 
 
 def amplitude(what: str, value: object) -> float:
-    """The amplitude of an MEP, from 0 to what an amplifier can give [mV].
-
-    Args:
-        what: its name, for the message.
-        value: what was given.
-
-    Raises:
-        InvalidValueError: anything else.
-    """
+    """The amplitude of an MEP, from 0 to what an amplifier can give [mV]."""
     plain = number(what, value, least=0)
     if plain > MOST_MEP_MV:
         raise InvalidValueError(
@@ -101,43 +61,17 @@ def amplitude(what: str, value: object) -> float:
 
 
 def check_amplitude(owner: object, name: str, *, optional: bool = False) -> None:
-    """Check a field of a frozen dataclass that is the amplitude of an MEP [mV].
-
-    Args:
-        owner: the instance.
-        name: its field.
-        optional: whether None is allowed.
-
-    Raises:
-        InvalidValueError: a field that is not such an amplitude.
-    """
+    """Check a field of a frozen dataclass that is the amplitude of an MEP [mV]."""
     _check(owner, (name,), amplitude, optional=optional)
 
 
 def deadline(what: str, value: object) -> float | None:
-    """A time of at least 0 s; None and infinity mean that there is no deadline.
-
-    Args:
-        what: its name, for the message.
-        value: what was given.
-
-    Raises:
-        InvalidValueError: anything else.
-    """
+    """A time of at least 0 s; None and infinity mean that there is no deadline."""
     return None if value is None or (isinstance(value, Real) and value == math.inf) else number(what, value, least=0)
 
 
 def whole(what: str, value: object, **bounds: Unpack[Bounds]) -> int:
-    """A whole number within some bounds.
-
-    Args:
-        what: its name, for the message.
-        value: what was given.
-        **bounds: as for `number`.
-
-    Raises:
-        InvalidValueError: anything else, also a float such as 3.0.
-    """
+    """A whole number within some bounds."""
     plain = int(value) if isinstance(value, Integral) and not isinstance(value, bool) else None
     if plain is None or not _within(plain, bounds):
         raise InvalidValueError(f"{what} must be {_described('a whole number', bounds)}", got=value)
@@ -145,15 +79,7 @@ def whole(what: str, value: object, **bounds: Unpack[Bounds]) -> int:
 
 
 def mean_and_sd(what: str, value: object) -> tuple[float, float]:
-    """The mean and the SD of a delay, both positive [ms].
-
-    Args:
-        what: their name, for the message.
-        value: what was given.
-
-    Raises:
-        InvalidValueError: anything else.
-    """
+    """The mean and the SD of a delay, both positive [ms]."""
     pair = tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else ()
     if len(pair) != 2:
         raise InvalidValueError(
@@ -171,29 +97,13 @@ def mean_and_sd(what: str, value: object) -> tuple[float, float]:
 
 
 def require_sum_of_one(what: str, shares: Iterable[float]) -> None:
-    """Raise where probabilities that exclude each other do not sum to 1.
-
-    Args:
-        what: their name, for the message.
-        shares: the probabilities.
-
-    Raises:
-        InvalidValueError: they sum to anything else.
-    """
+    """Raise where probabilities that exclude each other do not sum to 1."""
     if not math.isclose(total := math.fsum(shares), 1.0, abs_tol=1e-6):
         raise InvalidValueError(f"{what} must sum to 1", got=total)
 
 
 def text(what: str, value: object) -> str:
-    """A text.
-
-    Args:
-        what: its name, for the message.
-        value: what was given.
-
-    Raises:
-        InvalidValueError: anything else.
-    """
+    """A text."""
     if not isinstance(value, str):
         remedy = f'Write it in quotes: "{value}".' if isinstance(value, int | float) and abs(value) < 1e15 else None
         raise InvalidValueError(f"{what} must be a text", got=value, remedy=remedy)
@@ -201,16 +111,7 @@ def text(what: str, value: object) -> str:
 
 
 def from_table(kind: type[_T], table: _T | Mapping[str, Any], what: str) -> _T:
-    """An instance of a dataclass.
-
-    Args:
-        kind: the dataclass.
-        table: its fields by name, or the instance itself.
-        what: what the table is, for the message.
-
-    Raises:
-        InvalidValueError: a field that it does not have, or one that is missing.
-    """
+    """An instance of a dataclass."""
     if isinstance(table, kind):
         return table
     if not isinstance(table, Mapping):
@@ -225,16 +126,7 @@ def from_table(kind: type[_T], table: _T | Mapping[str, Any], what: str) -> _T:
 
 
 def choice(what: str, value: Any, known: Iterable[Any]) -> Any:
-    """One of some known values.
-
-    Args:
-        what: its name, for the message.
-        value: what was given.
-        known: the values.
-
-    Raises:
-        InvalidValueError: an unknown value.
-    """
+    """One of some known values."""
     values = tuple(known)
     if not any(type(value) is type(each) and value == each for each in values):
         remedy = did_you_mean(value, values) or None
@@ -243,16 +135,7 @@ def choice(what: str, value: Any, known: Iterable[Any]) -> Any:
 
 
 def ascending(what: str, values: Iterable[object], **bounds: Unpack[Bounds]) -> tuple[float, ...]:
-    """Numbers of which each is larger than the one before.
-
-    Args:
-        what: their name, for the message.
-        values: what was given.
-        **bounds: of each, as for `number`.
-
-    Raises:
-        InvalidValueError: anything else.
-    """
+    """Numbers of which each is larger than the one before."""
     plain = tuple(number(what, value, **bounds) for value in values)
     if any(later <= earlier for earlier, later in itertools.pairwise(plain)):
         raise InvalidValueError(f"{what} must ascend", got=plain)
@@ -260,32 +143,12 @@ def ascending(what: str, values: Iterable[object], **bounds: Unpack[Bounds]) -> 
 
 
 def check_numbers(owner: object, *names: str, optional: bool = False, **bounds: Unpack[Bounds]) -> None:
-    """Check fields of a frozen dataclass that are numbers.
-
-    Args:
-        owner: the instance.
-        *names: its fields.
-        optional: whether None is allowed.
-        **bounds: as for `number`.
-
-    Raises:
-        InvalidValueError: a field that is not such a number.
-    """
+    """Check fields of a frozen dataclass that are numbers."""
     _check(owner, names, lambda what, value: number(what, value, **bounds), optional=optional)
 
 
 def check_probabilities(owner: object, *names: str, optional: bool = False, **bounds: Unpack[Bounds]) -> None:
-    """Check fields of a frozen dataclass that are probabilities or shares; what is in % is told so.
-
-    Args:
-        owner: the instance.
-        *names: its fields.
-        optional: whether None is allowed.
-        **bounds: as for `number`; by default 0 and 1, both included.
-
-    Raises:
-        InvalidValueError: a field that is not a probability.
-    """
+    """Check fields of a frozen dataclass that are probabilities or shares; what is in % is told so."""
     bounds = bounds or {"least": 0.0, "most": 1.0}
 
     def share(what: str, value: object) -> float:
@@ -296,57 +159,22 @@ def check_probabilities(owner: object, *names: str, optional: bool = False, **bo
 
 
 def check_wholes(owner: object, *names: str, optional: bool = False, **bounds: Unpack[Bounds]) -> None:
-    """Check fields of a frozen dataclass that are whole numbers.
-
-    Args:
-        owner: the instance.
-        *names: its fields.
-        optional: whether None is allowed.
-        **bounds: as for `number`.
-
-    Raises:
-        InvalidValueError: a field that is not such a number.
-    """
+    """Check fields of a frozen dataclass that are whole numbers."""
     _check(owner, names, lambda what, value: whole(what, value, **bounds), optional=optional)
 
 
 def check_texts(owner: object, *names: str) -> None:
-    """Check fields of a frozen dataclass that are texts.
-
-    Args:
-        owner: the instance.
-        *names: its fields.
-
-    Raises:
-        InvalidValueError: a field that is none.
-    """
+    """Check fields of a frozen dataclass that are texts."""
     _check(owner, names, text)
 
 
 def check_flags(owner: object, *names: str) -> None:
-    """Check fields of a frozen dataclass that are True or False; a word such as "false" would count as True.
-
-    Args:
-        owner: the instance.
-        *names: its fields.
-
-    Raises:
-        InvalidValueError: a field that is neither.
-    """
+    """Check fields of a frozen dataclass that are True or False; a word such as "false" would count as True."""
     _check(owner, names, _flag)
 
 
 def check_choice(owner: object, name: str, known: Iterable[Any]) -> None:
-    """Check a field of a dataclass that is one of some known values.
-
-    Args:
-        owner: the instance.
-        name: its field.
-        known: the values.
-
-    Raises:
-        InvalidValueError: an unknown value.
-    """
+    """Check a field of a dataclass that is one of some known values."""
     choice(f"{type(owner).__name__}.{name}", getattr(owner, name), known)
 
 

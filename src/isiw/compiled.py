@@ -20,24 +20,6 @@ from typing import Any, Final, TypeVar
 
 import numpy as np
 
-__all__ = [
-    "AVAILABLE",
-    "KERNELS",
-    "LANES",
-    "exp",
-    "exp2",
-    "first_of",
-    "inlined",
-    "kernel",
-    "log",
-    "loop",
-    "ndtr",
-    "per",
-    "per_root",
-    "total",
-    "version",
-]
-
 F = TypeVar("F", bound=Callable[..., Any])
 
 KERNELS: Final = 1
@@ -66,29 +48,17 @@ def version() -> str:
 
 
 def kernel(function: F) -> F:
-    """Have a function compiled when it is first called; without Numba it is left as it is.
-
-    Args:
-        function: a plain function over arrays and numbers.
-    """
+    """Have a function compiled when it is first called; without Numba it is left as it is."""
     return _compiled(function, _SAFE)
 
 
 def loop(function: F) -> F:
-    """As `kernel`, for functions that make no arrays: looking at a part of one costs nothing there.
-
-    Args:
-        function: a plain function over arrays and numbers, which assigns no slices.
-    """
+    """As `kernel`, for functions that make no arrays: looking at a part of one costs nothing there."""
     return _compiled(function, _SAFE, _nrt=False)
 
 
 def inlined(function: F) -> F:
-    """As `loop`, for functions that become a part of those that call them: with many arrays a call is dear.
-
-    Args:
-        function: as for `loop`.
-    """
+    """As `loop`, for functions that become a part of those that call them: with many arrays a call is dear."""
     return _compiled(function, _SAFE, _nrt=False, forceinline=True)
 
 
@@ -118,11 +88,7 @@ def _compiled(function: F, fastmath: set[str], **more: bool) -> F:
 
 @contextmanager
 def first_of(family: str) -> Generator[None, None, None]:
-    """Write a line to standard error if the first call of some kernels takes so long that they are being compiled.
-
-    Args:
-        family: what is called; it is watched once.
-    """
+    """Write a line to standard error if the first call of some kernels takes so long that they are being compiled."""
     if family in _CALLED or not AVAILABLE:
         yield
         return

@@ -14,9 +14,6 @@ from isiw.errors import InvalidValueError, OutOfSpaceError
 from isiw.text.stimuli import TAP, StimulusWords
 from isiw.types import FloatArray, Reference
 
-__all__ = ["IMPACT_SPACE", "VALVE_SPACE", "DesignSpace", "missing_reference", "require_space"]
-
-
 MOST_ISIS = 10_001
 """Of a design space: a second in steps of 0.1 ms."""
 
@@ -160,11 +157,7 @@ def missing_reference() -> InvalidValueError:
 
 
 def require_space(space: object) -> None:
-    """Raise where something else is given for a design space.
-
-    Raises:
-        InvalidValueError: it is none.
-    """
+    """Raise where something else is given for a design space."""
     if not isinstance(space, DesignSpace):
         raise InvalidValueError("a design space is needed", got=space, expected="an isiw.DesignSpace")
 

@@ -30,28 +30,6 @@ import inspect
 import warnings
 from collections.abc import Iterable
 
-__all__ = [
-    "ConfigError",
-    "DamagedLogError",
-    "DeviceError",
-    "DeviceTimeoutError",
-    "ImplausibleDataWarning",
-    "InvalidValueError",
-    "IsiwError",
-    "LimitExceededError",
-    "LogError",
-    "NotDelivered",
-    "OtherVersionsWarning",
-    "OutOfSpaceError",
-    "RequestError",
-    "StillArmedError",
-    "StrategyError",
-    "StudyError",
-    "did_you_mean",
-    "told",
-    "warn",
-]
-
 
 class IsiwError(Exception):
     """The root of everything that isiw raises on purpose.
@@ -173,12 +151,7 @@ def told(error: BaseException) -> str:
 
 
 def warn(text: str, category: type[Warning]) -> None:
-    """Warn at the line that called isiw, however deep inside it the reason was found.
-
-    Args:
-        text: what is wrong, and what to do.
-        category: a warning of this module.
-    """
+    """Warn at the line that called isiw, however deep inside it the reason was found."""
     frame, level = inspect.currentframe(), 1
     while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == __package__:
         frame, level = frame.f_back, level + 1
@@ -186,12 +159,7 @@ def warn(text: str, category: type[Warning]) -> None:
 
 
 def did_you_mean(given: object, known: Iterable[object]) -> str:
-    """The known word that was probably meant, as a question; empty where none is near. Capitals make no difference.
-
-    Args:
-        given: what was given; of what is no text nobody knows what was meant.
-        known: the words that there are.
-    """
+    """The known word that was probably meant, as a question; empty where none is near. Capitals make no difference."""
     words = {word.casefold(): word for word in map(str, known)}
     near = (
         difflib.get_close_matches(given.casefold(), words, n=1)

@@ -22,19 +22,6 @@ from typing import IO, Final
 if sys.platform == "darwin":
     import fcntl
 
-__all__ = [
-    "TEMPORARY",
-    "force",
-    "in_the_way",
-    "is_reserved",
-    "new_file",
-    "opened",
-    "put",
-    "sync_folder",
-    "take_free_place",
-    "written_beside",
-]
-
 TEMPORARY: Final = ".isiw-"
 """What the name of a file begins with until it takes its place; a process that is killed may leave it behind."""
 
@@ -54,11 +41,7 @@ def is_reserved(name: str) -> bool:
 
 
 def in_the_way(path: Path) -> str | None:
-    """What has a file's name and is no file, in words; None where there is a file, or nothing.
-
-    Raises:
-        OSError: its folder may not be read.
-    """
+    """What has a file's name and is no file, in words; None where there is a file, or nothing."""
     try:
         mode = path.stat().st_mode
     except OSError as error:
@@ -71,15 +54,7 @@ def in_the_way(path: Path) -> str | None:
 
 
 def opened(path: Path, *, links: bool = True) -> IO[bytes]:
-    """A regular file, open for reading.
-
-    Args:
-        path: the file.
-        links: whether it may be a link to one.
-
-    Raises:
-        OSError: it cannot be opened, or is no regular file.
-    """
+    """A regular file, open for reading."""
     without_waiting = getattr(os, "O_NONBLOCK", 0) | (0 if links else getattr(os, "O_NOFOLLOW", 0))
     file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | without_waiting))  # noqa: SIM115 - pathlib has no opener; the caller closes it
     if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
@@ -89,25 +64,12 @@ def opened(path: Path, *, links: bool = True) -> IO[bytes]:
 
 
 def new_file(path: Path) -> IO[bytes]:
-    """A file that was not there, open for reading and appending.
-
-    Raises:
-        FileExistsError: there is something of this name, be it a link that leads nowhere.
-        OSError: it cannot be made.
-    """
+    """A file that was not there, open for reading and appending."""
     return open(path, "a+b", opener=lambda name, flags: os.open(name, flags | os.O_EXCL, 0o666))
 
 
 def written_beside(path: Path, content: bytes) -> Path:
-    """A new file beside a path, under a random name; synced.
-
-    Args:
-        path: the path.
-        content: what is in it.
-
-    Raises:
-        OSError: it cannot be written, and is gone.
-    """
+    """A new file beside a path, under a random name; synced."""
     beside = path.with_name(f"{TEMPORARY}{uuid.uuid4().hex}")
     with new_file(beside) as file:
         try:
@@ -121,17 +83,7 @@ def written_beside(path: Path, content: bytes) -> Path:
 
 
 def put(path: Path, content: bytes, *, replacing: bool) -> None:
-    """Put a whole file in its place in one step, for good.
-
-    Args:
-        path: its place.
-        content: what is in it.
-        replacing: whether a file or a link that is there is replaced.
-
-    Raises:
-        FileExistsError: there is a file, which is not to be replaced.
-        OSError: it cannot be written.
-    """
+    """Put a whole file in its place in one step, for good."""
     beside = written_beside(path, content)
     try:
         if replacing:
@@ -150,15 +102,7 @@ def _removed(file: Path) -> None:
 
 
 def take_free_place(file: Path, place: Path) -> None:
-    """Rename a file to a name that nothing has, in one step that replaces nothing.
-
-    Args:
-        file: the file.
-        place: its new name.
-
-    Raises:
-        FileExistsError: there is something of this name.
-    """
+    """Rename a file to a name that nothing has, in one step that replaces nothing."""
     if sys.platform == "win32":
         file.rename(place)  # which Windows itself refuses where the name is taken
         return

@@ -13,8 +13,6 @@ from typing import Final
 
 from isiw.errors import InvalidValueError, IsiwError
 
-__all__ = ["ENOUGH_PAIRS", "MISTRIALS", "Finding", "Kind", "Scale", "Severity", "lacking", "refused"]
-
 ENOUGH_PAIRS: Final = 3
 """With fewer pairs of stimuli nothing was found: rest, a response, and one of them again are the least."""
 
@@ -111,14 +109,7 @@ class Finding:
 def refused(
     finding: Finding, got: object, expected: str | None = None, error: type[IsiwError] = InvalidValueError
 ) -> IsiwError:
-    """The error that refuses a value for what was found.
-
-    Args:
-        finding: what was found.
-        got: the value.
-        expected: what would have been accepted.
-        error: its type.
-    """
+    """The error that refuses a value for what was found."""
     return error(finding.text, got=got, expected=expected, remedy=finding.remedy or None, found=finding.kind)
 
 
@@ -131,12 +122,7 @@ TOO_FEW: Final = Finding(
 
 
 def lacking(pairs: int | None, *, silent: bool) -> Finding | None:
-    """What is missing to speak of a window; None where enough was measured.
-
-    Args:
-        pairs: how many pairs of stimuli count; None where that is not known.
-        silent: whether no trial that counts showed an MEP.
-    """
+    """What is missing to speak of a window; None where enough was measured."""
     if silent:
         return NO_MEP
     return None if pairs is None or pairs >= ENOUGH_PAIRS else TOO_FEW
@@ -169,11 +155,7 @@ class Scale:
         return None
 
     def likely_unit(self, values: Mapping[str, float]) -> str | None:
-        """The unit in which a value would be nearest to the usual one; None where none makes it possible.
-
-        Args:
-            values: what the value would be, were it in each of some units.
-        """
+        """The unit in which a value would be nearest to the usual one; None where none makes it possible."""
         possible = {unit: value for unit, value in values.items() if self.least <= value <= self.most}
         return min(possible, key=lambda unit: abs(math.log(possible[unit] / self.usual)), default=None)
 

@@ -6,8 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-__all__ = ["Later", "WorkedOut"]
-
 T = TypeVar("T")
 
 

@@ -12,37 +12,16 @@ from isiw.errors import InvalidValueError
 from isiw.types import ArrayLike, BoolArray, FloatArray
 from isiw.window import Interval, Window, WindowEstimate
 
-__all__ = ["covers", "edge_error_ms", "edge_ranks", "f1", "f1_of_masks", "trials_to_criterion", "true_edges_ms"]
-
 
 def f1_of_masks(estimated: ArrayLike, true: ArrayLike) -> FloatArray:
-    """F1 of an estimated against a true set of grid points; 1 if both are empty, 0 if one is.
-
-    Args:
-        estimated: membership of each grid point, shape (..., t).
-        true: membership of each grid point, shape (..., t), broadcast against `estimated`.
-
-    Returns:
-        F1, shape (...).
-    """
+    """F1 of an estimated against a true set of grid points; 1 if both are empty, 0 if one is."""
     a, b = np.asarray(estimated, dtype=bool), np.asarray(true, dtype=bool)
     size = a.sum(axis=-1) + b.sum(axis=-1)
     return np.where(size == 0, 1.0, 2.0 * (a & b).sum(axis=-1) / np.maximum(size, 1))
 
 
 def f1(estimate: WindowEstimate | Window | None, truth: Window | None, space: DesignSpace) -> float:
-    """F1 of an estimated window against the truth on the space's grid.
-
-    Args:
-        estimate: the estimate, or the reported window; None is "there is no window". An estimate that has no answer yet
-            has F1 0, whatever is true.
-        truth: the true window; None where there is none.
-        space: the design space whose grid counts. A window that lies between its ISIs counts as the nearest ones; what
-            lies outside the space does not count.
-
-    Raises:
-        InvalidValueError: arguments of another kind, or in another order.
-    """
+    """F1 of an estimated window against the truth on the space's grid."""
     _require(estimate, "the estimate", WindowEstimate, Window, NoneType)
     _require(truth, "the true window", Window, NoneType)
     require_space(space)
@@ -76,15 +55,7 @@ def _on_grid(window: Window | None, space: DesignSpace) -> BoolArray:
 
 
 def true_edges_ms(truth: Window, space: DesignSpace) -> Interval:
-    """Start and end of a true window [ms], ±inf where it runs out of the range.
-
-    Args:
-        truth: the true window.
-        space: the range.
-
-    Raises:
-        InvalidValueError: no window, or no space.
-    """
+    """Start and end of a true window [ms], ±inf where it runs out of the range."""
     _require(truth, "the true window", Window)
     require_space(space)
     start = -math.inf if truth.start_ms <= space.low_ms else truth.start_ms
@@ -95,17 +66,7 @@ def true_edges_ms(truth: Window, space: DesignSpace) -> Interval:
 def covers(
     estimate: WindowEstimate, truth: Window | None, space: DesignSpace, level: float = 0.9
 ) -> tuple[bool, bool] | None:
-    """Whether the credible intervals of start and end hold the true edges; None where there are none of either.
-
-    Args:
-        estimate: the estimate.
-        truth: the true window; None where there is none.
-        space: the design space; an edge at its border counts as beyond the range. The grid's resolution is granted.
-        level: the credible level.
-
-    Raises:
-        InvalidValueError: arguments of another kind or in another order, or a level outside 0–1.
-    """
+    """Whether the credible intervals of start and end hold the true edges; None where there are none of either."""
     _require(estimate, "the estimate", WindowEstimate)
     intervals = estimate.interval(level)
     if intervals is None or truth is None:
@@ -125,15 +86,6 @@ def edge_ranks(
 
     Over people of the model's own prior the ranks of an honest posterior are uniform (simulation-based calibration
     [Talts2018]). Samples equal to the truth, as on a grid, are ranked at random.
-
-    Args:
-        estimate: the estimate; without samples of the edges a rank is uniformly random.
-        truth: the true window.
-        space: the design space; an edge at its border counts as beyond the range.
-        rng: breaks ties.
-
-    Raises:
-        InvalidValueError: arguments of another kind, or in another order.
     """
     _require(estimate, "the estimate", WindowEstimate)
     samples = np.empty((0, 2)) if estimate.edge_samples_ms is None else estimate.edge_samples_ms
@@ -144,15 +96,7 @@ def edge_ranks(
 
 
 def edge_error_ms(estimate: WindowEstimate | Window | None, truth: Window | None) -> tuple[float, float] | None:
-    """Estimated minus true start and end [ms]; None where either has no window.
-
-    Args:
-        estimate: the estimate, or its window.
-        truth: the true window.
-
-    Raises:
-        InvalidValueError: arguments of another kind, or in another order.
-    """
+    """Estimated minus true start and end [ms]; None where either has no window."""
     _require(estimate, "the estimate", WindowEstimate, Window, NoneType)
     _require(truth, "the true window", Window, NoneType)
     window = estimate.window if isinstance(estimate, WindowEstimate) else estimate
@@ -162,12 +106,7 @@ def edge_error_ms(estimate: WindowEstimate | Window | None, truth: Window | None
 
 
 def trials_to_criterion(mean_f1: ArrayLike, criterion: float) -> int | None:
-    """The first trial from which a cohort's mean F1 stays at or above a criterion; None where it never does.
-
-    Args:
-        mean_f1: mean F1 after 1, 2, … trials, shape (n,).
-        criterion: the least F1.
-    """
+    """The first trial from which a cohort's mean F1 stays at or above a criterion; None where it never does."""
     reached = np.asarray(mean_f1, dtype=float) >= criterion  # a NaN has not
     missed = np.flatnonzero(~reached)
     first = 1 if len(missed) == 0 else int(missed[-1]) + 2

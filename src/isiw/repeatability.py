@@ -32,20 +32,6 @@ from isiw.signals.rotation import RotationEvents, detect_rotations
 from isiw.trials import Sweep
 from isiw.types import FloatArray
 
-__all__ = [
-    "STUDY_ISI_MS",
-    "TimingStudy",
-    "error_probabilities",
-    "error_table",
-    "event_table",
-    "hit_delay_ms",
-    "study_preset",
-    "study_session",
-    "study_sweeps",
-    "study_vane",
-    "timing_report",
-]
-
 STUDY_ISI_MS = (10.0, 30.0, 50.0, 51.0, 52.0, 53.0, 54.0, 70.0, 90.0)
 """The ISIs of the precision study [ms] (5.2.1)."""
 
@@ -119,12 +105,7 @@ class TimingStudy:
 
 
 def hit_delay_ms(study: TimingStudy) -> tuple[float, float] | None:
-    """From the valve command to the impact, as a strategy can be told [ms]; None where no impact was found.
-
-    Returns:
-        The mean, and the SD of another person's about it: what two people differ by on the tapping robot, and the
-        standard error of the mean.
-    """
+    """From the valve command to the impact, as a strategy can be told [ms]; None where no impact was found."""
     if not isinstance(study.events, TapEvents):
         return None
     hits_ms = study.events.hit_ms[~np.isnan(study.events.hit_ms)] - VALVE_MS
@@ -135,11 +116,7 @@ def hit_delay_ms(study: TimingStudy) -> tuple[float, float] | None:
 
 
 def event_table(events: TapEvents | RotationEvents) -> pd.DataFrame:
-    """Mean, SD and range of each event that was found at least once.
-
-    Returns:
-        A row an event, in order of occurrence; columns mean_ms, sd_ms, low_ms, high_ms, n.
-    """
+    """Mean, SD and range of each event that was found at least once."""
     rows = {}
     for name, times in events.columns().items():
         found = times[~np.isnan(times)]
@@ -154,13 +131,6 @@ def error_table(commanded_ms: FloatArray, realised_ms: FloatArray) -> pd.DataFra
     """The ISI error, realised minus commanded, by commanded ISI.
 
     Mistrials, with a realised ISI below 0 or none at all, are counted and left out of the statistics (5.3.1).
-
-    Args:
-        commanded_ms: shape (n,); taps without a commanded ISI (NaN) are left out.
-        realised_ms: shape (n,).
-
-    Returns:
-        A row an ISI; columns n (accepted), mean_ms, sd_ms, mistrials.
     """
     trials = pd.DataFrame({"isi_ms": commanded_ms, "error_ms": realised_ms - commanded_ms})
     trials["mistrial"] = ~(realised_ms >= 0)
@@ -175,16 +145,7 @@ def error_table(commanded_ms: FloatArray, realised_ms: FloatArray) -> pd.DataFra
 
 
 def error_probabilities(commanded_ms: FloatArray, realised_ms: FloatArray, sd_ms: float) -> pd.DataFrame:
-    """How probable an ISI error of some magnitude is: by a Gaussian, as in Table 5.1, and as counted.
-
-    Args:
-        commanded_ms: shape (n,).
-        realised_ms: shape (n,); mistrials are left out.
-        sd_ms: pooled SD of the error, each set's mean removed [ms]; where it is not known there is no Gaussian.
-
-    Returns:
-        A row a band; columns from_ms, to_ms, gaussian, counted.
-    """
+    """How probable an ISI error of some magnitude is: by a Gaussian, as in Table 5.1, and as counted."""
     low, high = np.array(ERROR_BANDS_MS[:-1]), np.array(ERROR_BANDS_MS[1:])
     trials = pd.DataFrame({"isi_ms": commanded_ms, "error_ms": realised_ms - commanded_ms})[realised_ms >= 0].dropna()
     size_ms = (trials["error_ms"] - trials.groupby("isi_ms")["error_ms"].transform("mean")).abs().to_numpy()
@@ -202,19 +163,7 @@ def study_preset(
     rate_hz: float = 5000.0,
     pulse_jitter_ms: float = 0.0,
 ) -> TimingStudy:
-    """Run the repeatability study on a preset of the tapping robot, open loop.
-
-    Args:
-        name: the preset.
-        taps: how many for each ISI; without ISIs, how many in all.
-        isi_ms: commanded ISIs [ms]; none for taps without a pulse.
-        seed: seed of the taps and of the sensors' noise.
-        rate_hz: sampling rate [Hz].
-        pulse_jitter_ms: SD by which the pulse misses its time after the valve command [ms] (Fig. 5.9).
-
-    Raises:
-        InvalidValueError: an unknown preset, no taps, a negative seed, or a negative jitter.
-    """
+    """Run the repeatability study on a preset of the tapping robot, open loop."""
     taps, seed = whole("taps", taps, least=1), whole("seed", seed, least=0)
     geometry, rng = preset(name), np.random.default_rng(seed)
     predicted_ms = float(np.nanmedian(_tap(geometry, np.full(CALIBRATION_TAPS, np.nan), rate_hz, rng).hit_ms))
@@ -233,14 +182,6 @@ def study_vane(vane: Vane | None = None, *, rotations: int = 100, seed: int = 0)
     Each rotation goes from one end of the range to the other, with the friction and the reservoir's pressure of that
     stroke. The dissertation leaves this to future work and names a precision of 40–60 ms that a rotation has to begin
     with [Kim2020, 7.1, 7.5].
-
-    Args:
-        vane: the actuator; by default the middle of those that the dissertation recommends.
-        rotations: how many.
-        seed: seed of the strokes and of the sensors' noise.
-
-    Raises:
-        InvalidValueError: no rotations or more than 2000, or a negative seed.
     """
     rotations, seed = whole("rotations", rotations, least=1, most=MOST_ROTATIONS), whole("seed", seed, least=0)
     rng = np.random.default_rng(seed)
@@ -251,16 +192,7 @@ def study_vane(vane: Vane | None = None, *, rotations: int = 100, seed: int = 0)
 
 
 def study_sweeps(name: str, sweeps: Iterable[Sweep], commanded_isi_ms: Iterable[float | None]) -> TimingStudy:
-    """Run the repeatability study on recorded sweeps.
-
-    Args:
-        name: what they are.
-        sweeps: with an acceleration and the valve's time; pressure and EMG where there are any.
-        commanded_isi_ms: from the impact [ms], one for each sweep.
-
-    Raises:
-        InvalidValueError: no sweeps, one without acceleration or valve time, or not one ISI a sweep.
-    """
+    """Run the repeatability study on recorded sweeps."""
     parts, realised = [], []
     for sweep in sweeps:
         events = sweep_events(sweep)  # raises where the valve's time is unknown
@@ -279,14 +211,7 @@ def study_sweeps(name: str, sweeps: Iterable[Sweep], commanded_isi_ms: Iterable[
 
 
 def study_session(record: SessionRecord) -> TimingStudy:
-    """Run the repeatability study on the taps of a logged session.
-
-    Args:
-        record: the session; its trials need an acceleration. Mistrials count, TMS alone does not.
-
-    Raises:
-        InvalidValueError: no trial with an acceleration.
-    """
+    """Run the repeatability study on the taps of a logged session."""
     from_impact = record.header.space.reference == "impact"
     sweeps, commanded = [], []
     for trial in record.table:

@@ -26,16 +26,6 @@ from isiw.subjects.subject import SimulatedSubject
 from isiw.types import ArrayLike, FloatArray
 from isiw.window import Window
 
-__all__ = [
-    "EFFECTIVE_SHARE",
-    "STIMULATION",
-    "CountStudy",
-    "effective_window",
-    "response_counts",
-    "response_threshold_mv",
-    "study_counts",
-]
-
 Segments: TypeAlias = Literal["all", "peak"]
 
 EFFECTIVE_SHARE = 0.40
@@ -117,15 +107,7 @@ def _require_amplitudes(mep_mv: FloatArray) -> None:
 
 
 def response_threshold_mv(alone_mv: ArrayLike, false_share: float = 0.05) -> float:
-    """A person's own threshold: the least of their MEPs of TMS alone that at most a small share of these exceed [mV].
-
-    Args:
-        alone_mv: MEPs of TMS alone [mV], shape (n,).
-        false_share: the share, in 0–1.
-
-    Raises:
-        InvalidValueError: no MEPs, MEPs that are not finite or negative, or a share outside 0–1.
-    """
+    """A person's own threshold [mV]: their least MEP of TMS alone that at most a small share of these exceed."""
     mep = np.asarray(alone_mv, dtype=np.float64)
     false_share = number("the share of false responses", false_share, least=0, below=1)
     if mep.ndim != 1 or not mep.size or not np.isfinite(mep).all() or mep.min() < 0:
@@ -141,16 +123,7 @@ def response_threshold_mv(alone_mv: ArrayLike, false_share: float = 0.05) -> flo
 def effective_window(
     counts: pd.DataFrame, share: float = EFFECTIVE_SHARE, *, segments: Segments = "all"
 ) -> Window | None:
-    """The ISIs at which more than a share of the trials respond; None where there are none.
-
-    Args:
-        counts: as `response_counts` returns it.
-        share: the share that must be exceeded, in 0–1.
-        segments: "all" such ISIs, or the run of them about the "peak" of the shares, the first of equal ones.
-
-    Raises:
-        InvalidValueError: other segments, or a share outside 0–1.
-    """
+    """The ISIs at which more than a share of the trials respond; None where there are none."""
     choice("segments", segments, get_args(Segments))
     share = number("the share of responses", share, least=0, below=1)
     isi_ms, shares = counts.index.to_numpy(), counts["share"].to_numpy()
@@ -171,19 +144,7 @@ def study_counts(
     alone: int = 0,
     seed: int = 0,
 ) -> CountStudy:
-    """Sweep a simulated person over ISIs and count.
-
-    Args:
-        subject: the person; `STIMULATION` has the two of Fig. 3.12.
-        isi_ms: ISIs from the impact or the shock [ms], shape (t,).
-        trials: how many for each ISI; the text has twelve (4.2.1).
-        threshold_mv: a larger MEP is a response [mV]; None: the person's own, from their trials of TMS alone.
-        alone: trials of TMS alone before the sweep.
-        seed: of the trial noise.
-
-    Raises:
-        InvalidValueError: no trials of TMS alone where the threshold comes from them, or an invalid number.
-    """
+    """Sweep a simulated person over ISIs and count."""
     person = subject.begin(seed)
     alone, trials = whole("alone", alone, least=0), whole("trials", trials, least=1)
     alone_mv = np.array([person.respond(None, "impact").mep_mv for _ in range(alone)])

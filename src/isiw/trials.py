@@ -18,18 +18,6 @@ from isiw.lazy import pd
 from isiw.text.stimuli import TAP, StimulusWords
 from isiw.types import FloatArray
 
-__all__ = [
-    "MOST_ISI_SD_MS",
-    "RESPONSE_MV",
-    "Channel",
-    "Measurement",
-    "Status",
-    "Stimulus",
-    "Sweep",
-    "Trial",
-    "TrialTable",
-]
-
 MOST_ISI_SD_MS: Final = 50.0
 """The largest SD of a realised ISI that can be learnt from [ms]: a window is hardly wider than two of them."""
 

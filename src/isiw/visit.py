@@ -14,8 +14,6 @@ from isiw.checks import check_numbers, check_probabilities, check_texts, check_w
 from isiw.errors import InvalidValueError
 from isiw.findings import INTERVAL_S
 
-__all__ = ["Control", "Visit", "VisitProtocol", "different_muscles", "interval_s"]
-
 _ITI_DRAWS, _CONTROL_DRAWS = 1, 2
 """What is drawn, so that the two never share their draws."""
 
@@ -75,11 +73,7 @@ class Visit:
 
 
 def different_muscles(noted: Iterable[str]) -> list[str]:
-    """The muscles that visits note, where these are more than one; else none. Capitals make no difference.
-
-    Args:
-        noted: the muscle of each visit; empty where it is not noted.
-    """
+    """The muscles that visits note, where these are more than one; else none. Capitals make no difference."""
     muscles = {muscle.strip().casefold(): muscle.strip() for muscle in noted if muscle.strip()}
     return list(muscles.values()) if len(muscles) > 1 else []
 
@@ -196,15 +190,7 @@ def _exact(share: float) -> Fraction:
 
 
 def interval_s(what: str, value: object) -> float:
-    """An interval between two stimuli, no longer than anybody waits [s].
-
-    Args:
-        what: its name, for the message.
-        value: what was given.
-
-    Raises:
-        InvalidValueError: anything else.
-    """
+    """An interval between two stimuli, no longer than anybody waits [s]."""
     plain_s = number(what, value, least=0)
     if (slip := INTERVAL_S.slip(plain_s)) is not None:
         raise InvalidValueError(

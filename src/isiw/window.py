@@ -17,25 +17,6 @@ from isiw.later import WorkedOut
 from isiw.text.summary import summary
 from isiw.types import ArrayLike, BoolArray, FloatArray, IntArray
 
-__all__ = [
-    "EDGE_LEVEL",
-    "LEAST_DEPRESSED_MV",
-    "MIN_EXCESS_MV",
-    "MIN_EXCESS_OF_BASELINE",
-    "SURE",
-    "BestISI",
-    "Enhancement",
-    "Interval",
-    "ProfileBand",
-    "Window",
-    "WindowEstimate",
-    "depression",
-    "least_excess_mv",
-    "nothing_found",
-    "rules_out",
-    "window_from_excess",
-]
-
 EDGE_LEVEL = 0.135
 """The share of the largest excess that a window's edge has: two SDs down a Gaussian [Kim2020, 4.3]."""
 
@@ -54,21 +35,12 @@ _NOTHING: Final[Mapping[str, float]] = {}
 
 
 def rules_out(probability: float | None) -> bool:
-    """Whether nothing reported means that there is none; with more probability than this it is undecided.
-
-    Args:
-        probability: that there is a window, or a depression; None where the method has none.
-    """
+    """Whether nothing reported means that there is none; with more probability than this it is undecided."""
     return probability is None or 1 - probability >= SURE
 
 
 def nothing_found(probability: float | None, *, has_answer: bool) -> str:
-    """What is said in short where no window is reported.
-
-    Args:
-        probability: that there is a window; None where the method has none.
-        has_answer: whether the method has one yet.
-    """
+    """What is said in short where no window is reported."""
     if not has_answer:
         return "no answer yet"
     if probability is not None and probability >= 0.5:
@@ -77,12 +49,7 @@ def nothing_found(probability: float | None, *, has_answer: bool) -> str:
 
 
 def depression(depressed: Window | None, probability: float | None) -> tuple[object, float] | None:
-    """Which ISIs depress the MEP, in short, and the probability of any; None where nobody looked.
-
-    Args:
-        depressed: those that are reported.
-        probability: that there are any; None where nobody looked.
-    """
+    """Which ISIs depress the MEP, in short, and the probability of any; None where nobody looked."""
     if probability is None:
         return None
     return depressed or ("nowhere" if rules_out(probability) else "undecided"), probability
@@ -168,11 +135,6 @@ def least_excess_mv(peak_mv: ArrayLike, baseline_mv: ArrayLike, share: float = E
 
     It is a share of the largest excess. Where that is below 10 % of the baseline or below 2 µV nothing is enhanced, and
     the least excess is infinite. `isiw.models.windows.least_excess_mv` is the same rule for tensors.
-
-    Args:
-        peak_mv: largest excess over the baseline in the range [mV], any shape.
-        baseline_mv: expected MEP without a tap [mV], broadcast against it.
-        share: of the largest excess, at the window's edge.
     """
     peak = np.asarray(peak_mv, dtype=float)
     enough_mv = np.maximum(MIN_EXCESS_OF_BASELINE * np.asarray(baseline_mv, dtype=float), MIN_EXCESS_MV)
@@ -180,20 +142,7 @@ def least_excess_mv(peak_mv: ArrayLike, baseline_mv: ArrayLike, share: float = E
 
 
 def window_from_excess(grid_ms: ArrayLike, excess_mv: ArrayLike, baseline_mv: float) -> Window | None:
-    """The window by the least-excess rule, or None where nothing is enhanced.
-
-    Args:
-        grid_ms: ascending ISIs [ms], shape (t,).
-        excess_mv: expected MEP minus the unconditioned baseline [mV], shape (t,).
-        baseline_mv: expected MEP without a tap [mV].
-
-    Returns:
-        All grid points with at least 0.135 of the largest excess; None where the largest excess is below 10 % of the
-        baseline or 2 µV, whichever is more.
-
-    Raises:
-        InvalidValueError: an excess or a baseline that is not finite, or not one excess for each ISI.
-    """
+    """The window by the least-excess rule, or None where nothing is enhanced."""
     excess = np.asarray(excess_mv, dtype=float)
     if not (np.isfinite(excess).all() and math.isfinite(baseline_mv)):
         raise InvalidValueError("the expected MEP must be finite at every ISI", got=(float(excess.max()), baseline_mv))

@@ -9,16 +9,9 @@ from isiw.errors import StrategyError
 from isiw.lazy import torch
 from isiw.models.protocol import Conditions, Posterior, ProposesIsi, SamplesProfiles
 
-__all__ = ["greedy_batch", "own_plan"]
-
 
 def own_plan(posterior: Posterior, acquisition: AcquisitionFunction) -> list[float]:
-    """The ISIs [ms] that the method itself wants next for one person; empty where it is not asked for them.
-
-    Args:
-        posterior: what is believed.
-        acquisition: what chooses; only `OwnProposal` asks the method.
-    """
+    """The ISIs [ms] that the method itself wants next for one person; empty where it is not asked for them."""
     if ProposesIsi in acquisition.needs and isinstance(posterior, ProposesIsi):
         return [float(isi_ms) for isi_ms in posterior.proposed_isis_ms()[0]]
     return []
@@ -35,16 +28,6 @@ def greedy_batch(
 
     A method with a plan of its own keeps to it. For all others the posterior is conditioned on the median MEP that it
     expects at each ISI chosen so far (the kriging believer [Ginsbourger2010]).
-
-    Args:
-        posterior: what is believed before the batch.
-        acquisition: the acquisition function.
-        chosen_ms: the ISIs [ms] that are chosen already, such as all of a method's own plan; they come first.
-        n: how many ISIs in all.
-        choose: from a posterior to the next ISI [ms].
-
-    Raises:
-        StrategyError: the posterior cannot imagine trials, or the method's own plan has fewer ISIs.
     """
     batch = chosen_ms[:n]
     if len(batch) < n and own_plan(posterior, acquisition):

@@ -9,8 +9,6 @@ from typing import Any, ClassVar
 from isiw.lazy import torch
 from isiw.models.protocol import HasBotorchModel, Tensor
 
-__all__ = ["BotorchAcquisition"]
-
 
 @dataclass(frozen=True)
 class BotorchAcquisition:

@@ -13,18 +13,11 @@ from isiw.design import DesignSpace
 from isiw.lazy import scipy, torch
 from isiw.models.protocol import Posterior, ProposesIsi, Tensor
 
-__all__ = ["EvenSpacing", "IncrementalSweep", "OwnProposal", "RandomIsi", "SobolIsi", "golden_index"]
-
 _GOLDEN = (5**0.5 - 1) / 2
 
 
 def golden_index(trial: int, candidates: int) -> int:
-    """The candidate of a trial in an order that fills the range evenly, however long it goes on.
-
-    Args:
-        trial: number of the trial, from 0.
-        candidates: how many candidates there are.
-    """
+    """The candidate of a trial in an order that fills the range evenly, however long it goes on."""
     return int((0.5 + trial * _GOLDEN) % 1.0 * candidates)
 
 

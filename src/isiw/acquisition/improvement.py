@@ -18,17 +18,6 @@ from isiw.checks import check_numbers
 from isiw.lazy import torch
 from isiw.models.protocol import Posterior, PredictsOutcomes, SamplesProfiles, Tensor
 
-__all__ = [
-    "KnowledgeGradient",
-    "LogExpectedImprovement",
-    "Thompson",
-    "UpperConfidenceBound",
-    "knowledge_gradient",
-    "log_expected_improvement",
-    "thompson",
-    "upper_confidence_bound",
-]
-
 
 class _CountedProfiles(Posterior, SamplesProfiles, Protocol):
     """A posterior of profiles that knows how many trials there were."""
@@ -38,11 +27,6 @@ def log_expected_improvement(posterior: SamplesProfiles, isi_ms: Tensor, softnes
     """Log expected improvement of the expected MEP over the best posterior mean [log mV], shape (b, t).
 
     Where no sample improves, a soft hinge still tells near from far.
-
-    Args:
-        posterior: what is believed.
-        isi_ms: candidate ISIs [ms], shape (t,).
-        softness: width of the hinge, as a share of the profiles' posterior SD.
     """
     profiles = posterior.profiles_mv(isi_ms)
     best = profiles.mean(dim=1).amax(dim=-1)[:, None, None]
@@ -55,25 +39,13 @@ def log_expected_improvement(posterior: SamplesProfiles, isi_ms: Tensor, softnes
 
 
 def upper_confidence_bound(posterior: SamplesProfiles, isi_ms: Tensor, width_sd: float = 2.0) -> Tensor:
-    """Posterior mean of the expected MEP and some SDs [mV], shape (b, t).
-
-    Args:
-        posterior: what is believed.
-        isi_ms: candidate ISIs [ms], shape (t,).
-        width_sd: how many SDs.
-    """
+    """Posterior mean of the expected MEP and some SDs [mV], shape (b, t)."""
     profiles = posterior.profiles_mv(isi_ms)
     return profiles.mean(dim=1) + width_sd * profiles.std(dim=1, correction=0)
 
 
 def thompson(posterior: _CountedProfiles, isi_ms: Tensor, seed: int = 0) -> Tensor:
-    """The expected MEP under one posterior sample [mV], shape (b, t).
-
-    Args:
-        posterior: what is believed.
-        isi_ms: candidate ISIs [ms], shape (t,).
-        seed: seed of the choice, with the number of trials.
-    """
+    """The expected MEP under one posterior sample [mV], shape (b, t)."""
     profiles = posterior.profiles_mv(isi_ms)
     people, samples = profiles.shape[:2]
     rng = np.random.default_rng([seed, 1 + posterior.trials])  # [seed, 0] is the stream of seed
@@ -81,12 +53,7 @@ def thompson(posterior: _CountedProfiles, isi_ms: Tensor, seed: int = 0) -> Tens
 
 
 def knowledge_gradient(posterior: ForeseesProfiles, isi_ms: Tensor) -> Tensor:
-    """By how much the next MEP is expected to raise the largest posterior mean [mV], shape (b, t).
-
-    Args:
-        posterior: what is believed.
-        isi_ms: candidate ISIs [ms], shape (t,).
-    """
+    """By how much the next MEP is expected to raise the largest posterior mean [mV], shape (b, t)."""
     profiles = posterior.profiles_mv(isi_ms)
     ahead = lookahead(posterior.outcome_mass(isi_ms), profiles)
     return (ahead.probability * ahead.mean.amax(dim=-1)).sum(-1) - profiles.mean(dim=1).amax(dim=-1, keepdim=True)

@@ -24,16 +24,6 @@ from isiw.models.protocol import (
     Tensor,
 )
 
-__all__ = [
-    "Alternating",
-    "MutualInformation",
-    "WindowGain",
-    "WindowInformation",
-    "mutual_information",
-    "window_gain",
-    "window_information",
-]
-
 
 class _CountedWindows(Posterior, ForeseesWindows, Protocol):
     """A posterior of windows that predicts the next MEP, and knows how many trials there were."""
@@ -46,12 +36,7 @@ def _entropy(mass: Tensor) -> Tensor:
 
 
 def mutual_information(posterior: PredictsOutcomes, isi_ms: Tensor) -> Tensor:
-    """Mutual information of the next MEP and all unknowns [nat], shape (b, t).
-
-    Args:
-        posterior: what is believed.
-        isi_ms: candidate ISIs [ms], shape (t,).
-    """
+    """Mutual information of the next MEP and all unknowns [nat], shape (b, t)."""
     mass = posterior.outcome_mass(isi_ms)
     if _is_for_kernels(mass):
         with first_of("scores"):
@@ -70,11 +55,6 @@ def window_information(posterior: ForeseesWindows, isi_ms: Tensor, cells: int = 
     The window is described as precisely as the samples allow: the quantile cell of its start and of its end, or
     that there is none. Whatever else differs among the samples of a cell is averaged out, as far as a cell has
     many: with few samples the value is too high, by .01 to .04 nat with 192, and good for comparing ISIs only.
-
-    Args:
-        posterior: what is believed.
-        isi_ms: candidate ISIs [ms], shape (t,).
-        cells: into how many cells each edge falls.
     """
     mass, cell = posterior.outcome_mass(isi_ms), _cells(posterior.window_masks(isi_ms), cells)
     members = torch.nn.functional.one_hot(cell, cells * cells + 1).to(mass.dtype)
@@ -105,10 +85,6 @@ def window_gain(posterior: ForeseesWindows, isi_ms: Tensor) -> Tensor:
     """Expected reduction of the summed variance of membership in the window, shape (b, t).
 
     Where a posterior has depressed segments too, membership in them counts as much.
-
-    Args:
-        posterior: what is believed.
-        isi_ms: candidate ISIs [ms], shape (t,).
     """
     masks = posterior.window_masks(isi_ms)
     if isinstance(posterior, SamplesDepression):

@@ -8,19 +8,13 @@ import numpy as np
 
 from isiw.compiled import kernel, log, loop, total
 
-__all__ = ["entropy_reductions", "variance_reductions"]
-
 _f = np.float32
 _NIL, _LEAST, _TINY = _f(0.0), _f(1e-12), _f(1e-30)
 
 
 @kernel
 def entropy_reductions(mass: Any) -> Any:
-    """Entropy of the mean distribution less the mean entropy [nat], shape (b, t).
-
-    Args:
-        mass: probability of each outcome given each sample, shape (b, s, t, y).
-    """
+    """Entropy of the mean distribution less the mean entropy [nat], shape (b, t)."""
     people, _, candidates, outcomes = mass.shape
     found = np.empty((people, candidates), dtype=np.float32)
     mean, room = np.empty((candidates, outcomes), dtype=np.float32), np.empty(outcomes, dtype=np.float32)
@@ -57,10 +51,6 @@ def variance_reductions(mass: Any, masks: Any) -> Any:
     """Variance of each ISI's probability of membership after the next outcome, summed, shape (b, t).
 
     Sampled windows are runs of ISIs, so that what changes from one ISI to the next is summed instead of all of them.
-
-    Args:
-        mass: probability of each outcome given each sample, shape (b, s, t, y).
-        masks: which ISIs each sampled window holds, as 0 or 1, shape (b, s, g).
     """
     people, samples, candidates, outcomes = mass.shape
     points = masks.shape[2]

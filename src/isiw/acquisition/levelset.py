@@ -17,8 +17,6 @@ from isiw.lazy import torch
 from isiw.models.protocol import PredictsOutcomes, SamplesProfiles, Tensor
 from isiw.window import EDGE_LEVEL
 
-__all__ = ["IntegratedFeasibility", "Straddle", "expected_feasibility", "integrated_feasibility_reduction", "straddle"]
-
 _INV_SQRT_2PI = 0.3989422804014327
 
 
@@ -29,25 +27,13 @@ def _margins_mv(posterior: SamplesProfiles, isi_ms: Tensor) -> Tensor:
 
 
 def straddle(posterior: SamplesProfiles, isi_ms: Tensor, width_sd: float = 1.96) -> Tensor:
-    """How far the margin's credible interval reaches across zero [mV], shape (b, t).
-
-    Args:
-        posterior: what is believed.
-        isi_ms: candidate ISIs [ms], shape (t,).
-        width_sd: half the interval's width [SD].
-    """
+    """How far the margin's credible interval reaches across zero [mV], shape (b, t)."""
     margins = _margins_mv(posterior, isi_ms)
     return width_sd * margins.std(dim=1, correction=0) - margins.mean(dim=1).abs()
 
 
 def expected_feasibility(mean: Tensor, sd: Tensor, band_sd: float = 2.0) -> Tensor:
-    """Expected depth inside a band of `band_sd` SDs around the level, of a Gaussian margin.
-
-    Args:
-        mean: of the margin, any shape.
-        sd: of the margin, of the same shape.
-        band_sd: half the band's width [SD].
-    """
+    """Expected depth inside a band of `band_sd` SDs around the level, of a Gaussian margin."""
     z = mean / sd.clamp_min(1e-12)
     low, high = -band_sd - z, band_sd - z
     below, at, above = (torch.special.ndtr(x) for x in (low, -z, high))
@@ -64,13 +50,7 @@ def _density(z: Tensor) -> Tensor:
 
 
 def integrated_feasibility_reduction(posterior: ForeseesProfiles, isi_ms: Tensor, band_sd: float = 2.0) -> Tensor:
-    """By how much the next MEP is expected to reduce the summed expected feasibility [mV], shape (b, t).
-
-    Args:
-        posterior: what is believed.
-        isi_ms: candidate ISIs [ms], shape (t,).
-        band_sd: half the band's width [SD].
-    """
+    """By how much the next MEP is expected to reduce the summed expected feasibility [mV], shape (b, t)."""
     margins = _margins_mv(posterior, isi_ms)
     now = expected_feasibility(margins.mean(dim=1), margins.std(dim=1, correction=0), band_sd).sum(-1, keepdim=True)
     centre = margins.mean(dim=1, keepdim=True)

@@ -6,8 +6,6 @@ from typing import NamedTuple
 
 from isiw.models.protocol import Tensor
 
-__all__ = ["Lookahead", "expected_variance_reduction", "lookahead"]
-
 
 class Lookahead(NamedTuple):
     """Expectations after the next MEP.
@@ -22,13 +20,7 @@ class Lookahead(NamedTuple):
 
 
 def lookahead(mass: Tensor, values: Tensor, weights: Tensor | None = None) -> Lookahead:
-    """Expectations of some quantities after each value of the next MEP.
-
-    Args:
-        mass: probability of each value of the next MEP given each sample, shape (b, s, t, y).
-        values: the quantities under each sample, shape (b, s, g).
-        weights: of the samples, normalised, shape (b, s); equal by default.
-    """
+    """Expectations of some quantities after each value of the next MEP."""
     people, samples, candidates, outcomes = mass.shape
     share = 1.0 / samples if weights is None else weights.unsqueeze(1)
     joint = mass.flatten(2).transpose(1, 2) * share
@@ -43,14 +35,6 @@ def expected_variance_reduction(mass: Tensor, values: Tensor, weights: Tensor | 
     """By how much the next MEP is expected to reduce the summed variance of some quantities.
 
     By the law of total variance it is the variance of their means after the next MEP.
-
-    Args:
-        mass: probability of each value of the next MEP given each sample, shape (b, s, t, y).
-        values: the quantities under each sample, shape (b, s, g).
-        weights: of the samples, normalised, shape (b, s); equal by default.
-
-    Returns:
-        Shape (b, t).
     """
     mean = values.mean(dim=1, keepdim=True) if weights is None else weights.unsqueeze(1) @ values
     # Centred, so that a small reduction is not the difference of two large numbers.

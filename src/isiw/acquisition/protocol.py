@@ -10,16 +10,6 @@ from isiw.errors import StrategyError
 from isiw.lazy import torch
 from isiw.models.protocol import PredictsOutcomes, SamplesProfiles, SamplesWindows, Tensor
 
-__all__ = [
-    "AcquisitionFunction",
-    "FollowsPlan",
-    "ForeseesProfiles",
-    "ForeseesWindows",
-    "best_candidate",
-    "require_acquisition",
-    "require_scores",
-]
-
 
 class ForeseesProfiles(PredictsOutcomes, SamplesProfiles, Protocol):
     """A posterior of profiles that predicts the next MEP."""

@@ -14,8 +14,6 @@ from isiw.acquisition.twostep import TwoStep
 from isiw.acquisition.variance import EdgeVariance, IntegratedVariance, ProfileVariance
 from isiw.checks import choice
 
-__all__ = ["ACQUISITIONS", "acquisition_named"]
-
 ACQUISITIONS: Final[Mapping[str, Callable[[int], AcquisitionFunction]]] = {
     "alternating": lambda _seed: Alternating(),
     "window-gain": lambda _seed: WindowGain(),
@@ -41,13 +39,5 @@ ACQUISITIONS: Final[Mapping[str, Callable[[int], AcquisitionFunction]]] = {
 
 
 def acquisition_named(name: str, seed: int) -> AcquisitionFunction:
-    """The acquisition function of a name.
-
-    Args:
-        name: one of `ACQUISITIONS`.
-        seed: the strategy's seed, for those that draw.
-
-    Raises:
-        InvalidValueError: there is none.
-    """
+    """The acquisition function of a name."""
     return ACQUISITIONS[choice("the acquisition function", name, ACQUISITIONS)](seed)

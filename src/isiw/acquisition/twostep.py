@@ -11,8 +11,6 @@ from isiw.checks import check_wholes
 from isiw.lazy import torch
 from isiw.models.protocol import PredictsOutcomes, SamplesWindows, Tensor
 
-__all__ = ["TwoStep", "two_step_gain"]
-
 
 @dataclass(frozen=True)
 class TwoStep:
@@ -50,13 +48,6 @@ def two_step_gain(mass: Tensor, masks: Tensor, shortlist: int, groups: int, stri
     """Expected reduction of the summed variance of membership by two trials, shape (b, t).
 
     Candidates that are not on the shortlist have their own gain alone, which is less.
-
-    Args:
-        mass: probability of each value of the next MEP given each sample, shape (b, s, t, y).
-        masks: sampled windows as 0 or 1, shape (b, s, t).
-        shortlist: how many candidates are followed to a second trial.
-        groups: into how many groups the first outcome falls.
-        stride: every `stride`-th candidate is considered for the second trial.
     """
     gain = expected_variance_reduction(mass, masks)
     second, total = mass[:, :, ::stride], gain.clone()

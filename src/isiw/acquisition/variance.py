@@ -10,23 +10,9 @@ from isiw.acquisition.protocol import ForeseesProfiles, ForeseesWindows
 from isiw.lazy import torch
 from isiw.models.protocol import PredictsOutcomes, SamplesProfiles, SamplesWindows, Tensor
 
-__all__ = [
-    "EdgeVariance",
-    "IntegratedVariance",
-    "ProfileVariance",
-    "edge_variance_reduction",
-    "integrated_variance_reduction",
-    "profile_variance",
-]
-
 
 def profile_variance(posterior: SamplesProfiles, isi_ms: Tensor) -> Tensor:
-    """Posterior variance of the expected MEP at each ISI [mV²], shape (b, t).
-
-    Args:
-        posterior: what is believed.
-        isi_ms: candidate ISIs [ms], shape (t,).
-    """
+    """Posterior variance of the expected MEP at each ISI [mV²], shape (b, t)."""
     return posterior.profiles_mv(isi_ms).var(dim=1, correction=0)
 
 
@@ -35,10 +21,6 @@ def integrated_variance_reduction(posterior: ForeseesProfiles, isi_ms: Tensor) -
 
     The best ISI is the one of least integrated posterior variance: qNIPV of BoTorch with one point [Seo2000], for any
     posterior.
-
-    Args:
-        posterior: what is believed.
-        isi_ms: candidate ISIs [ms], shape (t,).
     """
     return expected_variance_reduction(posterior.outcome_mass(isi_ms), posterior.profiles_mv(isi_ms))
 
@@ -48,10 +30,6 @@ def edge_variance_reduction(posterior: ForeseesWindows, isi_ms: Tensor) -> Tenso
 
     Edges are counted in candidates, so that the score does not depend on the range; an edge beyond the range counts as
     its last ISI.
-
-    Args:
-        posterior: what is believed.
-        isi_ms: candidate ISIs [ms], shape (t,).
     """
     masks = posterior.window_masks(isi_ms)
     edges = torch.stack((masks.argmax(-1), masks.shape[-1] - 1 - masks.flip(-1).argmax(-1)), dim=-1).to(masks.dtype)

@@ -19,23 +19,6 @@ from isiw.text import plain
 if TYPE_CHECKING:
     from isiw.log.reader import SessionRecord
 
-__all__ = [
-    "DAMAGED",
-    "INTERRUPTED",
-    "LOGS",
-    "NOT_OVER",
-    "NO_DEFAULT",
-    "SESSIONS",
-    "STUDIES",
-    "Overwrite",
-    "errors_reported",
-    "exit_if_damaged",
-    "refuse_ignored",
-    "say_unread",
-    "show",
-    "show_entry",
-]
-
 DAMAGED = 3
 NOT_OVER = 5  # a session that a person should look at, or that its operator ended early
 INTERRUPTED = 130  # what shells report for Ctrl-C
@@ -48,36 +31,18 @@ Overwrite = Annotated[bool, typer.Option(help="Replace an existing file (never a
 
 
 def show(text: str, *, style: str | None = None, stderr: bool = False) -> None:
-    """Print, coloured where the output is a terminal; what the terminal would obey is left out.
-
-    Args:
-        text: what to print.
-        style: one of rich's.
-        stderr: on standard error instead.
-    """
+    """Print, coloured where the output is a terminal; what the terminal would obey is left out."""
     Console(stderr=stderr, highlight=False, soft_wrap=True, emoji=False).print(plain(text), style=style, markup=False)
 
 
 def show_entry(heading: str, text: str) -> None:
-    """Print an entry of a list: its heading, and below it what there is to say, indented and as wide as the terminal.
-
-    Args:
-        heading: on a line of its own.
-        text: what there is to say.
-    """
+    """Print an entry of a list: its heading, and below it the text, indented and as wide as the terminal."""
     show(heading, style="bold")
     Console(highlight=False).print(Padding(Text(text), (0, 0, 0, 4)))
 
 
 def exit_if_damaged(losses: Sequence[str]) -> None:
-    """Print what is lost of a log and end with the exit code of damaged ones; nothing where all is there.
-
-    Args:
-        losses: what is lost.
-
-    Raises:
-        Exit: something is.
-    """
+    """Print what is lost of a log and end with the exit code of damaged ones; nothing where all is there."""
     for loss in losses:
         show(loss, style="red")
     if losses:
@@ -85,11 +50,7 @@ def exit_if_damaged(losses: Sequence[str]) -> None:
 
 
 def say_unread(record: SessionRecord) -> None:
-    """Print which parts of a log's header this version cannot read.
-
-    Args:
-        record: the session.
-    """
+    """Print which parts of a log's header this version cannot read."""
     for sentence in record.told_unread:
         show(sentence, style="yellow", stderr=True)
 
@@ -99,9 +60,6 @@ def errors_reported(interrupted: str = "Interrupted.") -> Iterator[None]:
     """Turn what isiw raises, and what the operating system refuses, into a message and an exit code.
 
     What a lab's own code raises, or a fault of isiw, is shown with its traceback, and its message again at the end.
-
-    Args:
-        interrupted: what to say after Ctrl-C.
     """
     try:
         yield
@@ -128,15 +86,7 @@ def errors_reported(interrupted: str = "Interrupted.") -> Iterator[None]:
 
 
 def refuse_ignored(why: str, **options: object) -> None:
-    """Refuse options that would be ignored.
-
-    Args:
-        why: they would be.
-        **options: what was given for each, by its name; None or an empty list where nothing was.
-
-    Raises:
-        ConfigError: one was given.
-    """
+    """Refuse options that would be ignored."""
     given = [f"--{name.replace('_', '-')}" for name, value in options.items() if value not in (None, [])]
     if given:
         raise isiw.errors.ConfigError(why, got=", ".join(given), remedy="Leave these options out.")

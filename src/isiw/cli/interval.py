@@ -13,8 +13,6 @@ from isiw.cli.console import NO_DEFAULT, SESSIONS, errors_reported, exit_if_dama
 if TYPE_CHECKING:
     from isiw.interval import ProductionRecord
 
-__all__ = ["app"]
-
 app = typer.Typer()
 
 

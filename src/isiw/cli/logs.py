@@ -16,8 +16,6 @@ from isiw.text.numbers import counted
 if TYPE_CHECKING:
     from isiw.log.schema import Event
 
-__all__ = ["app"]
-
 app = typer.Typer()
 
 _MOST_LISTED = 400

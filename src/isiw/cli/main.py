@@ -12,8 +12,6 @@ import isiw
 from isiw.cli import interval, logs, prior, rig, serve, session, strategies, study, threshold, timing
 from isiw.cli.console import SESSIONS, STUDIES, show
 
-__all__ = ["app"]
-
 app = typer.Typer(
     name="isiw",
     no_args_is_help=True,

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from isiw.log.reader import SessionRecord
     from isiw.priors import LabPrior
 
-__all__ = ["app"]
-
 app = typer.Typer(help="Learn from a lab's own people, for isiw run --prior.", no_args_is_help=True)
 
 LabFile = Annotated[Path, typer.Argument(help="A lab's prior (TOML).", **NO_DEFAULT)]

@@ -11,8 +11,6 @@ import isiw
 from isiw.cli.console import SESSIONS, errors_reported, show
 from isiw.text.commands import command
 
-__all__ = ["app", "new"]
-
 app = typer.Typer()
 new = typer.Typer(help="Write a template for your own rig.", no_args_is_help=True)
 

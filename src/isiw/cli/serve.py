@@ -11,8 +11,6 @@ import typer
 import isiw
 from isiw.cli.console import NO_DEFAULT, SESSIONS, errors_reported, show
 
-__all__ = ["app"]
-
 app = typer.Typer()
 
 TOKEN = "ISIW_TOKEN"  # noqa: S105 - the variable's name

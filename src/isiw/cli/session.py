@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from isiw.devices.protocol import Device
     from isiw.session.loop import Session
 
-__all__ = ["app"]
-
 app = typer.Typer()
 
 _INTERRUPTED = "Interrupted: the device is disarmed and the log is closed."

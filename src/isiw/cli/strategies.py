@@ -13,8 +13,6 @@ from isiw.cli.console import NO_DEFAULT, STUDIES, errors_reported, show, show_en
 if TYPE_CHECKING:
     from isiw.strategy.settings.described import DescribedSetting
 
-__all__ = ["app"]
-
 app = typer.Typer()
 
 

@@ -21,8 +21,6 @@ from isiw.text.numbers import read_whole
 if TYPE_CHECKING:
     from isiw.studies import Store, Unit
 
-__all__ = ["app"]
-
 app = typer.Typer(help="Compare strategies on simulated people.", no_args_is_help=True)
 
 Folder = Annotated[Path, typer.Argument(help="The folder of a study.", **NO_DEFAULT)]

@@ -15,8 +15,6 @@ from isiw.text.numbers import counted
 if TYPE_CHECKING:
     from isiw.session import ThresholdRecorder
 
-__all__ = ["app"]
-
 app = typer.Typer()
 
 

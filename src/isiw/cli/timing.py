@@ -14,8 +14,6 @@ from isiw.cli.files import log_exists
 if TYPE_CHECKING:
     from isiw.repeatability import TimingStudy
 
-__all__ = ["app"]
-
 app = typer.Typer()
 
 

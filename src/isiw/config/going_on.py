@@ -19,8 +19,6 @@ from isiw.session.resume import limits_of_log
 from isiw.strategy.catalogue import make_strategy
 from isiw.text.commands import command
 
-__all__ = ["changes_on_resume", "differences_on_resume", "read_to_resume"]
-
 
 def read_to_resume(log: Path, config: Path | None) -> SessionRecord:
     """The session to go on with.

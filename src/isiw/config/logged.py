@@ -19,8 +19,6 @@ from isiw.subjects.cohorts import person_of
 from isiw.text.toml_files import checked
 from isiw.window import Window
 
-__all__ = ["Truth", "device_of_log", "run_of_log", "truth_of"]
-
 
 class _LoggedRun(BaseModel):
     """What is read of a log's run section; everything else in it is for people."""

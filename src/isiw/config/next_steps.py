@@ -12,8 +12,6 @@ from isiw.log.schema import RUN_KEY
 from isiw.session.loop import Session
 from isiw.text.commands import command
 
-__all__ = ["after_end", "after_error"]
-
 
 def after_error(session: Session, config: Path | None, error: BaseException | None, *, delivered: bool) -> list[str]:
     """How to go on with a session that an error has ended, in lines; the command comes last.

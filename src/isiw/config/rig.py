@@ -16,23 +16,12 @@ from isiw.errors import ConfigError
 from isiw.log.outputs import write_output
 from isiw.text.named_code import named_code, require_fitting
 
-__all__ = ["TEMPLATE_FILES", "device_from_factory", "write_rig_template"]
-
 TEMPLATE_FILES = ("rig.py", "session.toml", "test_rig.py")
 """What `write_rig_template` writes."""
 
 
 def device_from_factory(factory: str, settings: Mapping[str, Any], folder: Path | None = None) -> Device:
-    """The device that a factory makes.
-
-    Args:
-        factory: where it is, as `module:function`.
-        settings: its keyword arguments.
-        folder: where the module is looked for before anything else.
-
-    Raises:
-        ConfigError: it cannot be imported, does not take the settings, or makes no device.
-    """
+    """The device that a factory makes."""
     make = named_code(factory, folder, "device.factory")
     require_fitting(make, settings, "device.settings")
     device = make(**settings)

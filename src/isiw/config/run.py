@@ -38,8 +38,6 @@ from isiw.signals.limits import SignalLimits
 from isiw.text.toml_files import checked, read_toml
 from isiw.visit import VisitProtocol
 
-__all__ = ["RunConfig", "limits_for", "load_config"]
-
 
 class RunConfig(Section):
     """The whole configuration of `isiw run`; with a device, nobody is simulated, and a new session needs a space."""

@@ -17,19 +17,6 @@ from isiw.subjects.cohorts import COHORTS
 from isiw.types import Reference
 from isiw.visit import Visit
 
-__all__ = [
-    "TIMEOUT_S",
-    "DeviceConfig",
-    "LimitsConfig",
-    "Section",
-    "SimulatedConfig",
-    "SpaceConfig",
-    "StrategyConfig",
-    "SubjectConfig",
-    "VisitConfig",
-    "require_together",
-]
-
 TIMEOUT_S = 30.0
 """How long a device may take for one delivery [s], where the file does not say."""
 
@@ -171,14 +158,7 @@ class VisitConfig(Section):
 
 
 def require_together(values: Mapping[str, Any]) -> None:
-    """Check that no half of a limit is set, which would limit nothing.
-
-    Args:
-        values: a configuration's sections, as they were given.
-
-    Raises:
-        ConfigError: there is one.
-    """
+    """Check that no half of a limit is set, which would limit nothing."""
     for section, key, other in _TOGETHER:
         table = values.get(section)
         if isinstance(table, Mapping) and key in table and table.get(other) is None:

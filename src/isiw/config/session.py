@@ -24,16 +24,6 @@ from isiw.subjects.cohorts import person_of
 from isiw.subjects.subject import SimulatedSubject
 from isiw.types import Reference
 
-__all__ = [
-    "assumed_space",
-    "device_for",
-    "fresh_log_path",
-    "require_device",
-    "session_for",
-    "simulated_device",
-    "subject_for",
-]
-
 SESSIONS: Final = Path("isiw-sessions")
 """The folder for logs of sessions without a path."""
 
@@ -71,18 +61,7 @@ def device_for(config: RunConfig) -> Device:
 
 
 def simulated_device(seed: int, person: SimulatedConfig, reference: Reference, data: Path | None) -> SimulatedDevice:
-    """The device of a simulated person.
-
-    Args:
-        seed: of the person and the trials.
-        person: who is simulated, and whether in recorded EMG.
-        reference: the event that ISIs count from.
-        data: the folder with the recordings.
-
-    Raises:
-        ConfigError: recorded EMG without its folder.
-        DeviceError: no recordings in the folder.
-    """
+    """The device of a simulated person."""
     subject = person_of(person.cohort, person.number, seed)
     respond = partial(subject.begin(seed).respond, reference=reference)
     hit_delay_ms = subject.stated_hit_delay_ms if reference == "valve" else None

@@ -11,8 +11,6 @@ from typing import Any, Final
 from isiw.errors import ConfigError
 from isiw.findings import INTENSITY_PCT, STOP_WIDTH_MS, Scale
 
-__all__ = ["require_units"]
-
 _SCALES: Final[Mapping[tuple[str, ...], Scale]] = {
     ("visit", "intensity_pct_rmt"): INTENSITY_PCT,
     ("visit", "intensity_pct_mso"): INTENSITY_PCT,
@@ -24,14 +22,7 @@ STOPS_NOTHING_MS: Final = 0.005
 
 
 def require_units(values: Mapping[str, Any]) -> None:
-    """Check that no value looks as if it were in another unit than its key says.
-
-    Args:
-        values: a configuration's sections, as they were given.
-
-    Raises:
-        ConfigError: one does.
-    """
+    """Check that no value looks as if it were in another unit than its key says."""
     for keys, scale in _SCALES.items():
         value = _given(values, *keys)
         slip = None if value is None else scale.slip(value)

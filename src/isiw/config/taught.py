@@ -15,22 +15,9 @@ from isiw.priors import after, read_lab_prior
 from isiw.strategy.catalogue import settings_for
 from isiw.visit import Visit
 
-__all__ = ["learns_from_earlier", "require_same_person", "settings_with_taught"]
-
 
 def settings_with_taught(config: RunConfig, device: DeviceInfo) -> dict[str, Any]:
-    """The strategy's settings, with what earlier sessions taught as its prior.
-
-    Args:
-        config: the configuration.
-        device: what its device says about itself.
-
-    Raises:
-        ConfigError: no prior where the configuration says; earlier sessions of another person, or sessions or a prior
-            of another muscle or intensity, or simulated ones where the device is real.
-        LogError: an earlier session that cannot be read, or has no accepted trial.
-        StrategyError: a strategy that has no prior of this kind.
-    """
+    """The strategy's settings, with what earlier sessions taught as its prior."""
     settings = dict(config.strategy.settings)
     if config.prior is None and not config.after:
         return settings
@@ -48,11 +35,7 @@ def settings_with_taught(config: RunConfig, device: DeviceInfo) -> dict[str, Any
 
 
 def learns_from_earlier(name: str) -> bool:
-    """Whether a strategy has a prior for what earlier sessions teach.
-
-    Args:
-        name: the strategy's.
-    """
+    """Whether a strategy has a prior for what earlier sessions teach."""
     try:
         settings_for(name, prior=Prior())
     except StrategyError:  # no prior, or that of another model

@@ -7,8 +7,6 @@ from collections.abc import Callable
 from isiw.devices.protocol import Answer, DeviceInfo, require_staged
 from isiw.trials import Stimulus
 
-__all__ = ["CallbackDevice"]
-
 
 def _nothing() -> None:
     """Arm or disarm hardware that needs neither."""

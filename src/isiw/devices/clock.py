@@ -10,8 +10,6 @@ from typing import Protocol, runtime_checkable
 from isiw.devices.limits import Limits
 from isiw.errors import LimitExceededError, NotDelivered
 
-__all__ = ["ROUNDING_S", "Clock", "MonotonicClock", "Pacing", "VirtualClock"]
-
 ROUNDING_S = 1e-6
 """Who sleeps for exactly as long as is left may wake up a rounding error early."""
 

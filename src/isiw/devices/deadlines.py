@@ -16,8 +16,6 @@ from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, Reports
 from isiw.errors import DeviceError, DeviceTimeoutError, StillArmedError, told
 from isiw.trials import Stimulus
 
-__all__ = ["Deadlines", "PunctualDevice"]
-
 _T = TypeVar("_T")
 
 _GLANCE_S = 0.05  # Windows lets no signal interrupt a wait, so none is longer
@@ -147,16 +145,6 @@ class PunctualDevice:
     All verbs run in one thread of their own, one after the other. A verb that is given up may still be busy; when it
     ends, the device is disarmed once more, in case it armed it, and until then nobody arms the device. `stop` is tried
     several times, from another thread where the device's own is busy.
-
-    Args:
-        device: the device.
-        deadlines: how long each verb may take.
-        given_up: whether nobody waits any more for a delivery; asked while it lasts.
-        report: is told what went wrong and was overcome, in words; called from any thread.
-        still_armed: is called where the device cannot be disarmed after a verb that was given up, in the verb's thread.
-
-    Raises:
-        DeviceTimeoutError: the device does not say what it is.
     """
 
     def __init__(
@@ -185,12 +173,7 @@ class PunctualDevice:
         return self._info
 
     def stage(self) -> None:
-        """Get ready and arm.
-
-        Raises:
-            DeviceError: a verb that was given up is still busy; the device was not armed.
-            DeviceTimeoutError: not within its deadline.
-        """
+        """Get ready and arm."""
         for call in _abandoned.busy(self._device):
             call.wait(call.age_s + self._deadlines.stop_s)
         with self._stopping:  # else a `stop` that comes meanwhile would take the device for disarmed
@@ -206,26 +189,13 @@ class PunctualDevice:
         self._awaited("stage", call, self._deadlines.stage_s)
 
     def readiness(self) -> Readiness:
-        """What the device says about its state; ready, where it cannot say.
-
-        Raises:
-            DeviceTimeoutError: not within its deadline.
-        """
+        """What the device says about its state; ready, where it cannot say."""
         if not isinstance(self._device, ReportsReadiness):
             return Readiness()
         return self._within("readiness", partial(readiness_of, self._device), self._deadlines.readiness_s)
 
     def deliver(self, stimulus: Stimulus, timeout_s: float) -> Answer:
-        """Deliver one pair of stimuli.
-
-        Args:
-            stimulus: what to deliver.
-            timeout_s: the longest the device may take [s].
-
-        Raises:
-            NotDelivered: it was stopped since it was staged.
-            DeviceTimeoutError: no answer in time; `late_answer` may have it.
-        """
+        """Deliver one pair of stimuli."""
         with self._stopping:
             require_staged(self._name, staged=not self._stopped)
             call = self._begun(partial(self._device.deliver, stimulus, timeout_s))
@@ -233,11 +203,7 @@ class PunctualDevice:
         return self._awaited("deliver", call, timeout_s, self._given_up)
 
     def late_answer(self, wait_s: float) -> Answer | None:
-        """What came of the last delivery after its deadline; None where nothing did.
-
-        Args:
-            wait_s: how long to wait for it from now on [s].
-        """
+        """What came of the last delivery after its deadline; None where nothing did."""
         late = self._late
         if late is None:
             return None
@@ -249,11 +215,7 @@ class PunctualDevice:
             return None
 
     def stop(self) -> None:
-        """Disarm, unless it is disarmed and no other verb is busy.
-
-        Raises:
-            StillArmedError: the device could not be disarmed, however often it was tried.
-        """
+        """Disarm, unless it is disarmed and no other verb is busy."""
         with self._stopping:
             if not self._disarmed:
                 self._stopped, idle = True, self._idle
@@ -278,11 +240,7 @@ class PunctualDevice:
         return not _abandoned.busy(self._device) and (self._worker is None or self._worker.idle)
 
     def unstage(self) -> None:
-        """Let go of what `stage` took.
-
-        Raises:
-            DeviceTimeoutError: not within its deadline.
-        """
+        """Let go of what `stage` took."""
         self._within("unstage", self._device.unstage, self._deadlines.unstage_s)
 
     def release_thread(self) -> None:

@@ -7,8 +7,6 @@ import dataclasses
 from isiw.devices.protocol import Device, DeviceInfo, Readiness, readiness_of, require_staged
 from isiw.trials import Measurement, Stimulus
 
-__all__ = ["DryRun"]
-
 
 class DryRun:
     """A device that is never armed and never fires: every stimulus is answered with an MEP of 0.

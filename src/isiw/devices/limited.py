@@ -12,19 +12,9 @@ from isiw.devices.protocol import Answer, Device, DeviceInfo, readiness_of, requ
 from isiw.errors import DeviceError, LimitExceededError, NotDelivered
 from isiw.trials import Stimulus
 
-__all__ = ["LimitedDevice", "require_real_time"]
-
 
 def require_real_time(info: DeviceInfo, clock: Clock) -> None:
-    """Raise where a device that may stimulate somebody would not wait between its stimuli.
-
-    Args:
-        info: what the device says about itself.
-        clock: tells the time, and waits.
-
-    Raises:
-        DeviceError: a virtual clock for a device that does not declare that it is simulated.
-    """
+    """Raise where a device that may stimulate somebody would not wait between its stimuli."""
     if isinstance(clock, VirtualClock) and not info.simulated:
         raise DeviceError(
             "a virtual clock does not wait between stimuli, so it is for simulated devices only",
@@ -40,19 +30,6 @@ class LimitedDevice:
     before firing does not. The inter-trial interval runs from the moment the last attempt ended. The first delivery
     waits a whole interval, too: nobody knows what came before. Nothing loosens once the device is made: it keeps a copy
     of its limits, and an intensity that is reported at `stage` may not change any more.
-
-    Args:
-        device: the device to guard.
-        limits: what it may deliver.
-        clock: tells the time between deliveries; a virtual one for simulated devices only.
-        delivered: deliveries of this session so far.
-        earlier_s: how long ago each earlier delivery was to the same person [s], as far as they count for a block or a
-            period.
-        dead_man: is called before each delivery; anything but True refuses it.
-        waits_for_nobody: whether a virtual clock may be that of a real device, as where somebody checks one.
-
-    Raises:
-        DeviceError: a virtual clock, which waits for nobody, for a device that is not simulated.
     """
 
     def __init__(
@@ -87,21 +64,11 @@ class LimitedDevice:
         return max(0, self._limits.max_pulses - self._delivered)
 
     def wait_s(self, interval_s: float = 0.0) -> float:
-        """How long until the interval, the rest and the period allow the next delivery [s].
-
-        Args:
-            interval_s: the least since the last delivery that is asked for beside the limits [s].
-        """
+        """How long until the interval, the rest and the period allow the next delivery [s]."""
         return self._pacing.wait_s(interval_s)
 
     def check(self, stimulus: Stimulus) -> None:
-        """Raise where this stimulus must not be delivered now.
-
-        Raises:
-            LimitExceededError: the number of pulses, the ISI, the time since earlier ones, the coil, the intensity, or
-                the dead man's switch.
-            NotDelivered: the device is not ready.
-        """
+        """Raise where this stimulus must not be delivered now."""
         self._limits.require_left(self._delivered)
         if stimulus.isi_ms is not None:
             self._limits.require_isi(stimulus.isi_ms)
@@ -143,17 +110,7 @@ class LimitedDevice:
         self._staged = True
 
     def deliver(self, stimulus: Stimulus, timeout_s: float) -> Answer:
-        """Deliver one pair of stimuli, if the limits allow it.
-
-        Args:
-            stimulus: what to deliver.
-            timeout_s: the longest the device may take [s].
-
-        Raises:
-            LimitExceededError: refused; nothing was delivered.
-            NotDelivered: the device refused before firing; nothing was delivered.
-            DeviceError: not staged, or the device failed.
-        """
+        """Deliver one pair of stimuli, if the limits allow it."""
         with self._one_at_a_time:
             require_staged(self._info.name, staged=self._staged)
             self.check(stimulus)

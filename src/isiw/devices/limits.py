@@ -13,8 +13,6 @@ from isiw.devices.protocol import Readiness
 from isiw.errors import InvalidValueError, LimitExceededError
 from isiw.visit import interval_s
 
-__all__ = ["Limits"]
-
 _GRID_TOLERANCE_MS = 1e-6
 _SAME_PCT_MSO = 0.01
 

@@ -14,23 +14,13 @@ from filelock import FileLock, Timeout
 from isiw.devices.protocol import Device, DeviceInfo
 from isiw.errors import DeviceError
 
-__all__ = ["driven"]
-
 _driven: set[int] = set()
 _guard = threading.Lock()
 
 
 @contextmanager
 def driven(device: Device, info: DeviceInfo) -> Iterator[None]:
-    """Within, no other session drives this device: the same object, or any of the same address on this computer.
-
-    Args:
-        device: the device.
-        info: what it says about itself.
-
-    Raises:
-        DeviceError: another session drives it, or its lock cannot be taken.
-    """
+    """Within, no other session drives this device: the same object, or any of the same address on this computer."""
     with ExitStack() as held:
         held.enter_context(_object_claimed(device, info))
         if info.address:

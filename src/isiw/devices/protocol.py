@@ -11,17 +11,6 @@ from isiw.errors import DeviceError, InvalidValueError, NotDelivered
 from isiw.trials import Measurement, Stimulus, Sweep
 from isiw.types import Conditioning, Reference
 
-__all__ = [
-    "Answer",
-    "Device",
-    "DeviceInfo",
-    "HasMemory",
-    "Readiness",
-    "ReportsReadiness",
-    "readiness_of",
-    "require_staged",
-]
-
 Answer: TypeAlias = Sweep | Measurement
 """What came of a stimulus: waveforms, or the MEP as the device measured it."""
 

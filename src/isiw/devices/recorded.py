@@ -24,8 +24,6 @@ from isiw.signals.mep import MEP_WINDOW_MS
 from isiw.trials import Channel, Stimulus, Sweep
 from isiw.types import BoolArray, Conditioning, FloatArray, Reference
 
-__all__ = ["RecordedPerson", "Recordings", "load_recordings"]
-
 PATTERN = "uef_*_ECR_epochs_uV_3kHz.csv.gz"
 QUIET_MV = 0.02  # recorded floors reach 20 µV peak-to-peak; the smallest recorded MEP here has 80 µV
 CLEAR_MV = 0.2  # a scaled-down MEP brings its own noise along, so only large ones are templates
@@ -72,10 +70,6 @@ class Recordings:
 
         The recorded floor is part of the amplitude and is not counted twice: the MEP is scaled until the *sum* has it.
         An amplitude below the floor is the quiet sweep alone.
-
-        Args:
-            mep_mv: peak-to-peak amplitude, 15–35 ms after the pulse [mV].
-            rng: chooses the two sweeps.
         """
         quiet = self.quiet_mv[rng.integers(len(self.quiet_mv))]
         template = self.mep_mv[rng.integers(len(self.mep_mv))]
@@ -84,15 +78,7 @@ class Recordings:
 
 
 def load_recordings(folder: str | os.PathLike[str]) -> Recordings:
-    """Read the recorded forearm sweeps.
-
-    Args:
-        folder: holds `uef_*_ECR_epochs_uV_3kHz.csv.gz`: a row a sweep [µV], columns named by their time from the
-            pulse [ms].
-
-    Raises:
-        DeviceError: no such file, or no usable one.
-    """
+    """Read the recorded forearm sweeps."""
     files = sorted(Path(folder).glob(PATTERN))
     if not files:
         raise DeviceError(

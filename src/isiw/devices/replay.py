@@ -9,8 +9,6 @@ from isiw.errors import DeviceError
 from isiw.trials import MOST_ISI_SD_MS, Measurement, Stimulus, Trial, TrialTable
 from isiw.types import Reference
 
-__all__ = ["RecordedTrials"]
-
 
 class RecordedTrials:
     """A simulation that answers each stimulus with the recorded trial of the nearest ISI, each trial once.

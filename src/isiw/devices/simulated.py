@@ -11,8 +11,6 @@ from isiw.errors import DeviceError
 from isiw.trials import Measurement, Stimulus
 from isiw.types import Conditioning, Reference
 
-__all__ = ["Outcome", "Respond", "SimulatedDevice", "SimulatedPerson", "Simulation"]
-
 
 class Outcome(Protocol):
     """The outcome of a simulated stimulus."""
@@ -42,11 +40,7 @@ class Simulation(Protocol):
         """What the device says about itself; it is simulated."""
 
     def answer(self, stimulus: Stimulus) -> Answer:
-        """The outcome of the next stimulus.
-
-        Raises:
-            DeviceError: it cannot be delivered.
-        """
+        """The outcome of the next stimulus."""
 
 
 class SimulatedDevice:

@@ -21,8 +21,6 @@ from isiw.log.outputs import write_output
 from isiw.text import one_line
 from isiw.text.stimuli import StimulusWords
 
-__all__ = ["write_bids"]
-
 Columns = Mapping[str, tuple[str, str]]
 
 BIDS_VERSION: Final = "1.11.0"
@@ -49,19 +47,7 @@ What is lacking:
 
 
 def write_bids(parts: Sequence[Part], folder: Path) -> list[str]:
-    """Write a data set.
-
-    Args:
-        parts: the sessions.
-        folder: where to.
-
-    Returns:
-        What of the logs is not in it, a sentence each.
-
-    Raises:
-        ConfigError: there are sweeps, and edfio is not installed.
-        InvalidValueError: people whose codes differ only by signs that the names of files cannot have.
-    """
+    """Write a data set."""
     _require_distinct(parts)
     lacking = [sentence for part in parts for sentence in _write_session(part, folder)]
     columns = session_columns(stimulus_of(parts))

@@ -16,8 +16,6 @@ from isiw.log.reader import SessionRecord, read_salvaged, read_session
 from isiw.log.salvage import salvage_file
 from isiw.text.stimuli import StimulusWords, words_of
 
-__all__ = ["Part", "log_losses", "numbered", "read_logs", "stimulus_of", "told_twice"]
-
 
 @dataclass(frozen=True, eq=False)
 class Part:
@@ -47,12 +45,6 @@ def read_logs(source: str | Path) -> tuple[list[SessionRecord], list[str]]:
 
     Copies of a log, such as those in an earlier export, count once, and so does one that was copied before its end, or
     was damaged: of a session that is there several times the log counts that tells of most.
-
-    Args:
-        source: a log, with or without `.part`, or a folder, whose folders are looked into, too.
-
-    Raises:
-        LogError: there is no such log, no log in the folder, or none of them can be read.
     """
     if not Path(source).is_dir():
         return [read_session(source)], []
@@ -84,9 +76,6 @@ def numbered(records: Iterable[SessionRecord]) -> list[Part]:
     """Sessions with their person's code and their number, in the order in which they were begun.
 
     People without a code cannot be told apart, so each of their sessions is taken for another person's.
-
-    Args:
-        records: the sessions.
     """
     sessions: Counter[str] = Counter()
     unnamed = (f"unnamed{number}" for number in itertools.count(1))
@@ -99,11 +88,7 @@ def numbered(records: Iterable[SessionRecord]) -> list[Part]:
 
 
 def told_twice(parts: Iterable[Part]) -> list[str]:
-    """A sentence for each two sessions that have trials in common.
-
-    Args:
-        parts: the sessions.
-    """
+    """A sentence for each two sessions that have trials in common."""
     of_stimulus: dict[tuple[int, int], Part] = {}
     said = []
     for part in parts:
@@ -118,20 +103,12 @@ def told_twice(parts: Iterable[Part]) -> list[str]:
 
 
 def stimulus_of(parts: Iterable[Part]) -> StimulusWords:
-    """What the conditioning stimulus of some sessions is called.
-
-    Args:
-        parts: the sessions.
-    """
+    """What the conditioning stimulus of some sessions is called."""
     return words_of(part.record.header.conditioning for part in parts)
 
 
 def log_losses(record: SessionRecord) -> list[str]:
-    """What a log lacks, a sentence each.
-
-    Args:
-        record: the session.
-    """
+    """What a log lacks, a sentence each."""
     unknown = [str(intent.trial) for intent in record.unknown]
     timeless = [str(trial.index) for trial in record.table if trial.index not in record.onsets]
     said: Sequence[tuple[object, str]] = (

@@ -13,16 +13,11 @@ from isiw.log.salvage import only_in, salvage_file
 from isiw.log.verdicts import VERDICTS
 from isiw.text.numbers import counted
 
-__all__ = ["once_each", "stimuli"]
-
 
 def once_each(records: Sequence[SessionRecord]) -> tuple[list[SessionRecord], list[str]]:
     """Each session once, from the log that tells of most of it, and a sentence for each log that is left out.
 
     Copies that went on differently are kept: with other stimuli, or, where nothing is lost, with other verdicts.
-
-    Args:
-        records: what the logs tell, each from a file of its own.
     """
     kept: list[SessionRecord] = []
     left_out = []
@@ -123,11 +118,7 @@ def _of_same_stimuli(one: SessionRecord, other: SessionRecord) -> bool:
 
 
 def stimuli(record: SessionRecord) -> dict[int, int]:
-    """When each stimulus with an outcome was about to be delivered [ns since 1970], by its trial's number.
-
-    Args:
-        record: the session.
-    """
+    """When each stimulus with an outcome was about to be delivered [ns since 1970], by its trial's number."""
     return {trial.index: record.onsets[trial.index].at_ns for trial in record.table if trial.index in record.onsets}
 
 

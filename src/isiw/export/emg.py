@@ -25,8 +25,6 @@ from isiw.types import FloatArray
 if TYPE_CHECKING:
     from edfio import BdfSignal
 
-__all__ = ["EMG", "Run", "bdf", "runs"]
-
 EMG: Final = "emg"
 """The channel whose sweeps are exported, with whatever was recorded along with it."""
 
@@ -109,11 +107,7 @@ class Run:
         return meanings(_EVENT_COLUMNS, self.first, valve="valve: the valve command, " if has_valve else "")
 
     def events(self, onsets_s: Mapping[int, float]) -> list[dict[str, Any]]:
-        """The rows of `_events.tsv`, as in `event_columns`.
-
-        Args:
-            onsets_s: when each trial was, since the first one [s].
-        """
+        """The rows of `_events.tsv`, as in `event_columns`."""
         rows = [
             moment | _facts(trial, self.first) | {"session_s": onsets_s.get(trial.index)}
             for number, (trial, start_ms) in enumerate(zip(self.trials, self.starts_ms, strict=True))
@@ -146,11 +140,7 @@ def _facts(trial: Trial, first: StimulusWords) -> dict[str, Any]:
 
 
 def runs(record: SessionRecord) -> tuple[list[Run], list[str]]:
-    """The sweeps of a session by their layout, and a sentence for what is not among them.
-
-    Args:
-        record: the session.
-    """
+    """The sweeps of a session by their layout, and a sentence for what is not among them."""
     trials = {trial.index: trial for trial in record.table}
     of_layout: dict[Layout, list[tuple[Trial, Mapping[str, Channel]]]] = {}
     left_out: dict[tuple[str, bool], list[int]] = {}
@@ -212,14 +202,7 @@ def _sentences(left_out: Mapping[tuple[str, bool], Sequence[int]]) -> list[str]:
 
 
 def bdf(run: Run) -> bytes:
-    """A BDF file of the sweeps, end to end; at its very end the last sample is repeated where a record is to be filled.
-
-    Args:
-        run: the sweeps.
-
-    Raises:
-        ConfigError: edfio is not installed.
-    """
+    """A BDF file of the sweeps, end to end; the last sample is repeated if the last record needs filling."""
     try:
         import edfio  # noqa: PLC0415 - an extra
     except ImportError as error:

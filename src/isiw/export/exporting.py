@@ -15,8 +15,6 @@ from isiw.export.folder import new_folder
 from isiw.export.pseudonyms import pseudonymised
 from isiw.export.tables import write_tables
 
-__all__ = ["FORMATS", "Exported", "export_logs"]
-
 FORMATS: Mapping[str, Callable[[Sequence[Part], Path], Sequence[str] | None]] = MappingProxyType(
     {
         "csv": partial(write_tables, suffix="csv"),

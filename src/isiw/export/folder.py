@@ -10,19 +10,10 @@ from pathlib import Path
 
 from isiw.errors import InvalidValueError
 
-__all__ = ["new_folder"]
-
 
 @contextmanager
 def new_folder(target: str | Path) -> Iterator[Path]:
-    """A folder to write to, which takes its name once everything is in it; where anything fails it is gone.
-
-    Args:
-        target: its name; nothing may have it, unless it is an empty folder.
-
-    Raises:
-        InvalidValueError: there is something already.
-    """
+    """A folder to write to, which takes its name once everything is in it; where anything fails it is gone."""
     place = Path(target)
     _require_free(place)
     place.parent.mkdir(parents=True, exist_ok=True)

@@ -15,8 +15,6 @@ from isiw.log.onsets import Onset
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Event, Header
 
-__all__ = ["pseudonymised"]
-
 _FIRST_DAY: Final = dt.date(1900, 1, 1)
 _DAYS: Final = 20 * 365
 """Shifted dates lie before 1925, by which BIDS knows them as shifted."""
@@ -37,13 +35,6 @@ def pseudonymised(
     People are numbered in a random order. All dates of a person move by one random number of days: the days between
     visits and the time of day stay. Operators, notes and all other texts of events, the configuration, the device's
     address and the log's path are left out. A session without a code is another person's.
-
-    Args:
-        records: the sessions.
-        draws: where the order and the days come from; by default from the operating system.
-
-    Raises:
-        InvalidValueError: a session whose date is none.
     """
     draws = draws or secrets.SystemRandom()
     names = [record.header.subject or f"unnamed session {number}" for number, record in enumerate(records)]

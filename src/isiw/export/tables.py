@@ -15,8 +15,6 @@ from isiw.log.reader import SessionRecord
 from isiw.text import one_line
 from isiw.text.stimuli import TAP, StimulusWords, meanings
 
-__all__ = ["EVENT_COLUMNS", "all_trials", "session_columns", "session_facts", "tidy", "write_tables"]
-
 Columns = Mapping[str, tuple[str, str]]
 
 _WHOSE: Final[Columns] = {
@@ -71,13 +69,7 @@ _ENCODERS: Final[Mapping[str, Callable[[pd.DataFrame, io.BytesIO], None]]] = {
 
 
 def write_tables(parts: Sequence[Part], folder: Path, suffix: str) -> None:
-    """Write the tables `sessions`, `trials` and `events`, and `columns`, which says what is in them.
-
-    Args:
-        parts: the sessions.
-        folder: where to.
-        suffix: csv or parquet.
-    """
+    """Write the tables `sessions`, `trials` and `events`, and `columns`, which says what is in them."""
     first = stimulus_of(parts)
     contents = {"sessions": session_columns(first), "trials": {"trial": ("", "its number"), **trial_columns(first)},
                 "events": EVENT_COLUMNS}  # fmt: skip
@@ -95,11 +87,7 @@ def write_tables(parts: Sequence[Part], folder: Path, suffix: str) -> None:
 
 
 def session_columns(first: StimulusWords) -> dict[str, tuple[str, str]]:
-    """Unit and meaning of what is said about a session; what comes first is said where it is not a tap in all of them.
-
-    Args:
-        first: what the conditioning stimulus of the sessions is called.
-    """
+    """Unit and meaning of the columns of sessions; the conditioning stimulus is one if it is not always a tap."""
     columns = meanings(_SESSION_COLUMNS, first)
     return {name: said for name, said in columns.items() if name != "conditioning" or first != TAP}
 
@@ -119,11 +107,7 @@ def _tidied(value: Any) -> Any:
 
 
 def all_trials(parts: Sequence[Part]) -> pd.DataFrame:
-    """The trials of all sessions, a row a trial, each with its person, session and number.
-
-    Args:
-        parts: the sessions.
-    """
+    """The trials of all sessions, a row a trial, each with its person, session and number."""
     frames = [_led_by(part, part.record.trials.rename_axis("trial").reset_index()) for part in parts]
     return pd.concat(frames, ignore_index=True)
 
@@ -149,11 +133,7 @@ def _events(parts: Iterable[Part]) -> pd.DataFrame:
 
 
 def session_facts(record: SessionRecord) -> dict[str, Any]:
-    """What a session is and found, as in `session_columns`.
-
-    Args:
-        record: the session.
-    """
+    """What a session is and found, as in `session_columns`."""
     return _what_it_is(record) | _what_came_of_it(record) | {"lacks": " ".join(log_losses(record))}
 
 

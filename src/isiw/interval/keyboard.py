@@ -21,8 +21,6 @@ from isiw.log.writer import LogWriter
 from isiw.session.terminal import Keys, Screen, somebody_there
 from isiw.text.numbers import counted
 
-__all__ = ["REST_S", "SHORTEST_MS", "resume_task", "run_task"]
-
 SHORTEST_MS: Final = 20.0
 """Shorter than anybody's two presses; two keys that a stalled terminal hands over together lie closer."""
 

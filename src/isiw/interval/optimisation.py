@@ -20,8 +20,6 @@ from isiw.lazy import botorch, gpytorch, torch
 from isiw.log.production import LONGEST_MS, Block
 from isiw.types import FloatArray
 
-__all__ = ["LightSearch", "search_light"]
-
 LIGHT_VARIANCE: Final = 0.1
 """Of a light about its probability, and of that probability over the range."""
 

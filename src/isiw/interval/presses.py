@@ -9,8 +9,6 @@ from typing import Final
 
 from isiw.log.production import LONGEST_MS
 
-__all__ = ["END", "QUIT", "START", "Presses"]
-
 START: Final = "f"
 END: Final = "j"
 QUIT: Final = "q"
@@ -19,11 +17,7 @@ _GLANCE_S = 0.2
 
 
 class Presses:
-    """Turns key presses into intervals; the thread that reads the keys presses, another one waits.
-
-    Args:
-        clock_s: the monotonic clock [s].
-    """
+    """Turns key presses into intervals; the thread that reads the keys presses, another one waits."""
 
     def __init__(self, clock_s: Callable[[], float] = time.perf_counter) -> None:
         self._clock_s = clock_s
@@ -32,11 +26,7 @@ class Presses:
         self.left, self.resting = False, False
 
     def press(self, key: str) -> None:
-        """Take a key: the first start counts, so that a key that is held down begins one interval only.
-
-        Args:
-            key: a character.
-        """
+        """Take a key: the first start counts, so that a key that is held down begins one interval only."""
         now_s = self._clock_s()
         if key.lower() == QUIT:
             self.left = True

@@ -28,8 +28,6 @@ from isiw.interval.task import score_pct
 from isiw.log.production import LONGEST_MS, Block
 from isiw.types import FloatArray
 
-__all__ = ["Producer", "produce"]
-
 SHORTEST_AIM_MS: Final = 50.0
 SHORTEST_MS: Final = 20.0
 TAIL: Final = 3

@@ -21,8 +21,6 @@ from isiw.log.salvage import Salvage, salvage
 from isiw.log.schema import SCHEMA_VERSION, Event, Header, ThresholdHeader
 from isiw.log.writer import LogWriter
 
-__all__ = ["NEAR_MS", "ProductionRecord", "begin_log", "continue_log", "read_productions"]
-
 NEAR_MS = 20.0
 """Half of the 40 ms in which an interval counts as effective [Kim2020, 6.3.1]."""
 
@@ -85,18 +83,7 @@ def _row(block: Block, produced_ms: list[float]) -> dict[str, float]:
 def begin_log(
     path: str | Path, blocks: tuple[Block, ...], subject: str, seed: int
 ) -> tuple[ProductionRecord, LogWriter]:
-    """A task that begins, and its open log.
-
-    Args:
-        path: the log, without `.part`.
-        blocks: what is to be produced.
-        subject: who produces it.
-        seed: of the lights.
-
-    Raises:
-        InvalidValueError: no blocks, a subject that is no text, or a negative seed.
-        LogError: there is a log already, or it cannot be created.
-    """
+    """A task that begins, and its open log."""
     if not blocks:
         raise InvalidValueError("a task needs at least one block", remedy="Take those of isiw.interval.session_blocks.")
     header = ProductionHeader(
@@ -110,16 +97,7 @@ def begin_log(
 
 
 def continue_log(path: str | Path) -> tuple[ProductionRecord, LogWriter]:
-    """A task that was interrupted, and its log, open again.
-
-    Args:
-        path: the log, with or without `.part`.
-
-    Raises:
-        InvalidValueError: the task is complete.
-        LogError: no such log, one that is still written, or of something else.
-        DamagedLogError: a log of which not even the header can be read.
-    """
+    """A task that was interrupted, and its log, open again."""
     found = salvage(path)
     record = _record_of(found)
     if not record.left:

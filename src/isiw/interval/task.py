@@ -60,18 +60,7 @@ def score_pct(produced_ms: ArrayLike, target_ms: float, scale_pct: float = 100.0
 
 
 def answer(block: Block, index: int, trial: int, produced_ms: float, seed: int) -> Production:
-    """What a produced interval is answered with, as it is logged.
-
-    Args:
-        block: the trial's block.
-        index: the block's number.
-        trial: the trial's number.
-        produced_ms: the interval [ms].
-        seed: of the task; the same trial of the same task has the same luck, however often the task was resumed.
-
-    Raises:
-        InvalidValueError: an interval that is not a positive time, or a negative number.
-    """
+    """What a produced interval is answered with, as it is logged."""
     if not (math.isfinite(produced_ms) and produced_ms > 0):
         raise InvalidValueError("a produced interval must be a positive time in ms", got=produced_ms)
     seed, trial = whole("seed", seed, least=0), whole("trial", trial, least=0)
@@ -81,12 +70,7 @@ def answer(block: Block, index: int, trial: int, produced_ms: float, seed: int) 
 
 
 def feedback(block: Block, production: Production) -> str:
-    """What a person sees after a trial.
-
-    Args:
-        block: the trial's block.
-        production: the trial.
-    """
+    """What a person sees after a trial."""
     target, produced = f"target {block.target_ms:.0f} ms", production.produced_ms
     if block.mode == 1:
         filled = round(_BAR * production.score_pct / 100)

@@ -12,8 +12,6 @@ from isiw.log.verdicts import exclusion, inclusion
 from isiw.log.writer import LogWriter
 from isiw.trials import TrialTable
 
-__all__ = ["exclude", "include"]
-
 
 def exclude(path: str | Path, trial: int, reason: str) -> None:
     """Exclude a trial afterwards: an event is appended to the log, nothing is erased. Resuming learns without it.

@@ -17,8 +17,6 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.stream_reader import breakup_chunk
 
-__all__ = ["UNREADABLE", "LostBlockError", "Unpacking", "marked"]
-
 UNREADABLE: Final = (McapError, zstandard.ZstdError, struct.error, ValueError, KeyError, MemoryError, OverflowError)
 """What the MCAP reader raises on damaged bytes; a failed checksum is a ValueError."""
 
@@ -49,10 +47,6 @@ def marked(data: bytes, size: int) -> Iterator[tuple[int, mcap.Chunk]]:
 
     The index at the end of a file bears the same marks. A mark is taken to be the index's where no packed data follow
     it and no record of the right length holds it; one flipped bit cannot make a block look so.
-
-    Args:
-        data: what to search.
-        size: of the whole file [bytes].
     """
     copied = 0
     for match in re.finditer(re.escape(_MARK), data):
@@ -71,25 +65,13 @@ def marked(data: bytes, size: int) -> Iterator[tuple[int, mcap.Chunk]]:
 
 
 class Unpacking:
-    """Unpacks block after block of a file, as far as a file of its size may go.
-
-    Args:
-        size: of the file [bytes].
-    """
+    """Unpacks block after block of a file, as far as a file of its size may go."""
 
     def __init__(self, size: int) -> None:
         self._bytes_left, self._records_left = _most_unpacked(size), MOST_RECORDS
 
     def records(self, block: mcap.Chunk, offset: int) -> Sequence[mcap.McapRecord]:
-        """What a block holds.
-
-        Args:
-            block: the block.
-            offset: where it is in the file, for the message.
-
-        Raises:
-            LostBlockError: it fails its checksum, or makes the log too large to be one.
-        """
+        """What a block holds."""
         try:
             size = _honest_size(block)
             _require_room(offset, self._bytes_left, size)
@@ -133,11 +115,7 @@ def _most_unpacked(size: int) -> int:
 
 
 def _honest_size(block: mcap.Chunk) -> int:
-    """What a block unpacks to [bytes].
-
-    Raises:
-        McapError: it is packed in another way than isiw's, or unpacks to something else than it says.
-    """
+    """What a block unpacks to [bytes]."""
     packed = {"": len, "zstd": zstandard.frame_content_size}
     if block.compression not in packed or packed[block.compression](block.data) != block.uncompressed_size:
         raise McapError(block.compression)

@@ -8,17 +8,11 @@ from typing import Final
 
 from isiw.errors import LogError
 
-__all__ = ["clock_ns", "log_time_ns", "now"]
-
 _END_NS: Final = 2**64
 
 
 def clock_ns() -> int:
-    """What the computer's clock says [ns since 1970].
-
-    Raises:
-        LogError: it is before 1970 or after 2554.
-    """
+    """What the computer's clock says [ns since 1970]."""
     now_ns = time.time_ns()
     if not 0 <= now_ns < _END_NS:
         raise LogError(
@@ -36,9 +30,5 @@ def log_time_ns() -> int:
 
 
 def now() -> dt.datetime:
-    """The same as date and time, in UTC.
-
-    Raises:
-        LogError: as for `clock_ns`.
-    """
+    """The same as date and time, in UTC."""
     return dt.datetime.fromtimestamp(clock_ns() // 10**9, dt.UTC)

@@ -20,20 +20,6 @@ from isiw.errors import LogError
 from isiw.files import force, new_file, sync_folder, take_free_place
 from isiw.log.locks import lock
 
-__all__ = [
-    "DurableFile",
-    "Fingerprint",
-    "begun",
-    "damaged_of",
-    "disk_errors",
-    "keep_damaged",
-    "kept_for",
-    "log_exists",
-    "log_of",
-    "part_of",
-]
-
-
 _DAMAGED: Final = ".damaged"
 
 
@@ -53,11 +39,7 @@ class Fingerprint(NamedTuple):
 
 
 def part_of(path: Path) -> Path:
-    """Where a log is while it is being written.
-
-    Raises:
-        LogError: the path names no file.
-    """
+    """Where a log is while it is being written."""
     if not path.name:
         raise LogError("a log needs a file's name", got=str(path))
     return path.with_name(f"{path.name}.part")
@@ -74,12 +56,7 @@ def log_exists(log: Path) -> bool:
 
 
 def damaged_of(path: Path, number: int) -> Path:
-    """Where the damaged file of a log is kept when the log goes on.
-
-    Args:
-        path: the log.
-        number: how many are kept already.
-    """
+    """Where the damaged file of a log is kept when the log goes on."""
     return path.with_name(f"{path.name}{_DAMAGED}{number or ''}")
 
 
@@ -91,13 +68,7 @@ def kept_for(path: Path) -> Path | None:
 
 @contextmanager
 def disk_errors(path: Path, what: str, remedy: str) -> Iterator[None]:
-    """Within, an error of the operating system becomes a LogError.
-
-    Args:
-        path: the file, for the message.
-        what: what failed, for the message.
-        remedy: the way out.
-    """
+    """Within, an error of the operating system becomes a LogError."""
     try:
         yield
     except OSError as error:
@@ -105,15 +76,7 @@ def disk_errors(path: Path, what: str, remedy: str) -> Iterator[None]:
 
 
 class DurableFile:
-    """A new binary file that can be renamed while it is written.
-
-    Args:
-        path: where it is; must not exist.
-
-    Raises:
-        LogError: it cannot be locked.
-        OSError: there is something of its name, or it cannot be created.
-    """
+    """A new binary file that can be renamed while it is written."""
 
     def __init__(self, path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -206,17 +169,7 @@ class DurableFile:
         return copy.path
 
     def move_to(self, place: Path, *, replacing: bool, source: IO[bytes] | None = None) -> None:
-        """Take another name in one step, and go on there; the lock goes along.
-
-        Args:
-            place: the new name.
-            replacing: whether the file that has the name is replaced.
-            source: the open file that this one goes on from, which may be the one that is replaced.
-
-        Raises:
-            FileExistsError: there is a file of this name, which is not to be replaced.
-            OSError: the file cannot be renamed.
-        """
+        """Take another name in one step, and go on there; the lock goes along."""
         self.sync()
         if sys.platform == "win32":
             self._file.close()
@@ -250,12 +203,7 @@ class DurableFile:
 
 @contextmanager
 def begun(path: Path) -> Iterator[DurableFile]:
-    """A new file that is removed if its first records fail; once it has taken another file's place, it stays.
-
-    Raises:
-        LogError: it cannot be locked.
-        OSError: there is something of its name, or it cannot be created.
-    """
+    """A new file that is removed if its first records fail; once it has taken another file's place, it stays."""
     file = DurableFile(path)
     try:
         yield file
@@ -266,12 +214,7 @@ def begun(path: Path) -> Iterator[DurableFile]:
 
 
 def keep_damaged(damaged: Path, target: Path) -> None:
-    """Keep a damaged file's bytes under a name of their own.
-
-    Args:
-        damaged: the file.
-        target: the log that it is of.
-    """
+    """Keep a damaged file's bytes under a name of their own."""
     names = (damaged_of(target, number) for number in itertools.count())
     kept = next(name for name in names if not os.path.lexists(name))
     try:

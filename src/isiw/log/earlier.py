@@ -13,8 +13,6 @@ from isiw.findings import Kind
 from isiw.log.schema import Estimate, Event, Record
 from isiw.strategy.stopping import StopKind
 
-__all__ = ["with_kinds"]
-
 _KindT = TypeVar("_KindT", Kind, StopKind)
 
 _KEY_IN_TEXT: Final = re.compile(r" \(key ([A-Za-z0-9_-]{1,64})\)$")

@@ -12,8 +12,6 @@ from isiw.log.schema import Estimate
 from isiw.text.stimuli import TAP, StimulusWords, meanings
 from isiw.trials import Trial, TrialTable
 
-__all__ = ["TRIAL_COLUMNS", "trial_columns", "trial_frame"]
-
 _COLUMNS: Final[Mapping[str, tuple[str, str]]] = {
     "onset_s": ("s", "when it was about to be delivered, since the first stimulus of the log"),
     "intent_utc": ("", "the same by the computer's clock, UTC"),
@@ -45,11 +43,7 @@ _COLUMNS: Final[Mapping[str, tuple[str, str]]] = {
 
 
 def trial_columns(first: StimulusWords) -> dict[str, tuple[str, str]]:
-    """Unit and meaning of each column of `trial_frame`, in their order.
-
-    Args:
-        first: what the conditioning stimulus is called.
-    """
+    """Unit and meaning of each column of `trial_frame`, in their order."""
     return meanings(_COLUMNS, first)
 
 
@@ -63,13 +57,7 @@ _BELIEF: Final = tuple(TRIAL_COLUMNS)[tuple(TRIAL_COLUMNS).index("p_window") :]
 
 
 def trial_frame(table: TrialTable, onsets: Mapping[int, Onset], estimates: Iterable[Estimate]) -> pd.DataFrame:
-    """All trials as a DataFrame, a row a trial, columns as in `TRIAL_COLUMNS`, indexed by `index`.
-
-    Args:
-        table: the trials.
-        onsets: when each was, by its number.
-        estimates: what was believed; of several after one trial the last one counts.
-    """
+    """All trials as a DataFrame, a row a trial, columns as in `TRIAL_COLUMNS`, indexed by `index`."""
     beliefs = {estimate.trial: estimate for estimate in estimates}
     rows = [_timing(onsets.get(trial.index)) | _outcome(trial) | _belief(beliefs.get(trial.index)) for trial in table]
     index = pd.Index([trial.index for trial in table], name="index", dtype=int)

@@ -17,8 +17,6 @@ from isiw.log.schema import ANY_HEADER, AnyHeader, kind_tag, with_reference
 from isiw.signals.limits import SignalLimits
 from isiw.types import Reference
 
-__all__ = ["as_toml", "first_fault", "header_in_parts", "require_read"]
-
 _SPACE: Final[TypeAdapter[DesignSpace]] = TypeAdapter(Annotated[DesignSpace, BeforeValidator(with_reference)])
 
 _STAND_INS: Final[Mapping[str, Callable[[Mapping[str, Any]], object]]] = {
@@ -42,14 +40,7 @@ _STAND_INS: Final[Mapping[str, Callable[[Mapping[str, Any]], object]]] = {
 
 
 def header_in_parts(values: Any) -> tuple[AnyHeader, dict[str, str]]:
-    """A header, and why parts of it cannot be read; something neutral stands in for each of these.
-
-    Args:
-        values: what the log has.
-
-    Raises:
-        ValueError: a part that everything needs cannot be read.
-    """
+    """A header, and why parts of it cannot be read; something neutral stands in for each of these."""
     unread: dict[str, str] = {}
     while True:
         try:
@@ -72,16 +63,7 @@ def _name(strategy: Any) -> str:
 
 
 def require_read(path: Path, unread: Mapping[str, str], parts: Sequence[str] = ()) -> None:
-    """Raise where a part of a header is needed that this version cannot read.
-
-    Args:
-        path: the log.
-        unread: the parts that it cannot read, and why.
-        parts: those that are needed; by default all.
-
-    Raises:
-        LogError: one of them cannot be read.
-    """
+    """Raise where a part of a header is needed that this version cannot read."""
     needed = {part: why for part, why in unread.items() if part in parts or not parts}
     if needed:
         raise LogError(
@@ -92,11 +74,7 @@ def require_read(path: Path, unread: Mapping[str, str], parts: Sequence[str] = (
 
 
 def first_fault(error: ValueError) -> str:
-    """What is wrong with a record, without what pydantic says of where to read more.
-
-    Args:
-        error: what was raised when it was read.
-    """
+    """What is wrong with a record, without what pydantic says of where to read more."""
     if isinstance(error, ValidationError):
         first = error.errors(include_url=False, include_input=False)[0]
         where = first["loc"][first["loc"][:1] in {("session",), ("threshold",), ("production",)} :]  # without the kind
@@ -105,14 +83,7 @@ def first_fault(error: ValueError) -> str:
 
 
 def as_toml(header: AnyHeader) -> bytes:
-    """A header as a log has it once more, as TOML.
-
-    Args:
-        header: the header.
-
-    Raises:
-        LogError: something in it is not a TOML value.
-    """
+    """A header as a log has it once more, as TOML."""
     try:
         return tomli_w.dumps(header.model_dump(mode="json", exclude_none=True)).encode()
     except (TypeError, ValueError) as error:

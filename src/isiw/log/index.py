@@ -12,8 +12,6 @@ from mcap.stream_reader import StreamReader
 
 from isiw.log.blocks import UNREADABLE
 
-__all__ = ["RECORD_HEAD_BYTES", "counted_records"]
-
 RECORD_HEAD_BYTES: Final = 1 + 8
 """What a record is, and its length."""
 

@@ -12,8 +12,6 @@ from isiw.log.durable import log_of
 from isiw.log.schema import RUN_KEY, SERVED_KEY, AnyHeader, Header
 from isiw.text.commands import command
 
-__all__ = ["OWN_LOOP", "LogKind", "continued_by", "kind_of", "of_another_kind"]
-
 OWN_LOOP: Final = "a loop of the lab's own"
 """What the log calls the device of a session whose loop is not isiw's."""
 
@@ -58,26 +56,14 @@ _OF_TAG: Final = {"session": LogKind.SEARCH, "threshold": LogKind.THRESHOLD, "pr
 
 
 def kind_of(header: AnyHeader) -> LogKind:
-    """What a log is of.
-
-    Args:
-        header: the log's.
-    """
+    """What a log is of."""
     return _OF_TAG[header.kind]
 
 
 def continued_by(
     path: Path, header: AnyHeader, config: Path | None = None, *, end_lost: bool = False, changed: bool = False
 ) -> str:
-    """How to continue what a log is of: a command, or the call that a loop of the lab's own was begun with.
-
-    Args:
-        path: the log.
-        header: its header.
-        config: the configuration that it was run with, if it is known.
-        end_lost: whether its end is missing, so that somebody has to say how many stimuli, N, it told of.
-        changed: whether the configuration has to be named, as something in it is to be changed.
-    """
+    """How to continue what a log is of: a command, or the call that a loop of the lab's own was begun with."""
     if not isinstance(header, Header):
         return kind_of(header).continued_by(path)
     if SERVED_KEY in header.config:
@@ -98,13 +84,7 @@ def continued_by(
 
 
 def of_another_kind(path: Path, kind: LogKind, wanted: LogKind) -> LogError:
-    """The error where a log is of something else than is wanted.
-
-    Args:
-        path: the log.
-        kind: what it is of.
-        wanted: what it should be of.
-    """
+    """The error where a log is of something else than is wanted."""
     return LogError(
         f"the log is of {kind}, not of {wanted}", got=str(path), remedy=f"Look at it with: {kind.shown_by(path)}"
     )

@@ -21,18 +21,12 @@ if sys.platform == "win32":
 else:
     import fcntl
 
-__all__ = ["claim", "claimed", "lock", "refuse_if_locked"]
-
 _BUSY = (errno.EACCES, errno.EAGAIN, errno.EDEADLK)
 _BYTE = 0x7FFF_FFF0
 
 
 def claim(file: IO[bytes]) -> bool:
-    """Lock an open file until it is closed; False where another process, or another opening of it, has the lock.
-
-    Raises:
-        OSError: the disk knows no locks.
-    """
+    """Lock an open file until it is closed; False where another process, or another opening of it, has the lock."""
     try:
         _claim(file.fileno())
     except OSError as error:
@@ -59,15 +53,7 @@ else:
 
 
 def lock(file: IO[bytes], path: Path) -> None:
-    """Lock an open log until it is closed.
-
-    Args:
-        file: the open file.
-        path: its path, for the message.
-
-    Raises:
-        LogError: another process has it, or its disk knows no locks.
-    """
+    """Lock an open log until it is closed."""
     try:
         free = claim(file)
     except OSError as error:
@@ -84,11 +70,7 @@ def lock(file: IO[bytes], path: Path) -> None:
 
 @contextmanager
 def claimed(path: Path) -> Iterator[IO[bytes]]:
-    """Within, a log is this process's alone.
-
-    Raises:
-        LogError: another process has it, or it cannot be opened for writing.
-    """
+    """Within, a log is this process's alone."""
     try:
         file = path.open("r+b")  # network disks lock only what is open for writing
     except FileNotFoundError as error:
@@ -107,10 +89,6 @@ def claimed(path: Path) -> Iterator[IO[bytes]]:
 
 
 def refuse_if_locked(path: Path) -> None:
-    """Raise where another process writes to a log.
-
-    Raises:
-        LogError: it does.
-    """
+    """Raise where another process writes to a log."""
     with claimed(path):
         pass

@@ -10,8 +10,6 @@ from isiw.errors import LogError
 from isiw.log.salvage import Message, salvage_file
 from isiw.log.topics import is_of_isiw
 
-__all__ = ["Memory", "found_in"]
-
 _LAST_ONLY: Final = frozenset({"/estimate", "/threshold/belief"})
 """Topics of large records, which follow from the others."""
 
@@ -24,11 +22,7 @@ class Memory:
         self._last: dict[str, int] = {}
 
     def keep(self, message: Message) -> None:
-        """Keep a record, if it is one to be kept.
-
-        Args:
-            message: as it is in the file, with its number.
-        """
+        """Keep a record, if it is one to be kept."""
         if not is_of_isiw(message.topic):
             return
         if message.topic in _LAST_ONLY:
@@ -37,11 +31,7 @@ class Memory:
         self._messages[message.sequence] = message
 
     def completing(self, found: Iterable[Message]) -> list[Message] | None:
-        """What was found and what is known beside it, in order; None where everything that is known was found.
-
-        Args:
-            found: the records that can still be read.
-        """
+        """What was found and what is known beside it, in order; None where everything that is known was found."""
         there = {message.sequence: message for message in found if is_of_isiw(message.topic)}
         if all(there.get(number, message).data == message.data for number, message in self._messages.items()) and (
             there.keys() >= self._messages.keys()
@@ -52,11 +42,7 @@ class Memory:
 
 
 def found_in(file: Path) -> list[Message]:
-    """The records that can still be read in a file; none where it is no log any more.
-
-    Args:
-        file: the file.
-    """
+    """The records that can still be read in a file; none where it is no log any more."""
     try:
         return salvage_file(file).messages
     except LogError:

@@ -6,8 +6,6 @@ from typing import NamedTuple
 
 from isiw.log.schema import Intent
 
-__all__ = ["Onset", "Onsets"]
-
 
 class Onset(NamedTuple):
     """When a stimulus was about to be delivered.
@@ -34,12 +32,7 @@ class Onsets:
         self._clock_s: float | None = None
 
     def take(self, intent: Intent, at_ns: int) -> None:
-        """Take the next intent; one that is told once more for the same trial counts.
-
-        Args:
-            intent: the intent.
-            at_ns: when it was logged [ns since 1970].
-        """
+        """Take the next intent; one that is told once more for the same trial counts."""
         self._last = Onset(self._onset_s(intent.t_s, at_ns), at_ns)
         self._clock_s = intent.t_s
         self.by_trial[intent.trial] = self._last

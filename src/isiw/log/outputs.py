@@ -10,25 +10,12 @@ from typing import Final
 from isiw.errors import InvalidValueError
 from isiw.files import in_the_way, is_reserved, opened, put
 
-__all__ = ["check_output", "is_mcap", "made_folder", "write_output"]
-
 _LOG: Final = b"\x89MCAP"
 """What every log begins with."""
 
 
 def write_output(path: str | Path, content: bytes, *, overwrite: bool = False) -> Path:
-    """Write a file that is no log, as a whole or not at all; its folder is made where it is missing.
-
-    Args:
-        path: where to.
-        content: what is in it.
-        overwrite: whether to replace a file that is there; a log never is.
-
-    Raises:
-        InvalidValueError: there is a file that is not to be replaced, or something else, Windows keeps the name for
-            itself, or no folder can be made for it.
-        OSError: it cannot be written.
-    """
+    """Write a file that is no log, as a whole or not at all; its folder is made where it is missing."""
     target = Path(path)
     check_output(target, overwrite=overwrite)
     made_folder(target.parent)
@@ -42,17 +29,7 @@ def write_output(path: str | Path, content: bytes, *, overwrite: bool = False) -
 
 
 def check_output(path: str | Path, *, overwrite: bool = False) -> None:
-    """Check that `write_output` may write a file; for whoever has long work to do before.
-
-    Args:
-        path: where to.
-        overwrite: whether to replace a file that is there; a log never is.
-
-    Raises:
-        InvalidValueError: there is a file that is not to be replaced, or something else, or Windows keeps the name for
-            itself.
-        PermissionError: its folder is read-only.
-    """
+    """Check that `write_output` may write a file; for whoever has long work to do before."""
     target = Path(path)
     if target.parent.is_dir() and not os.access(target.parent, os.W_OK):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(target))
@@ -67,14 +44,7 @@ def check_output(path: str | Path, *, overwrite: bool = False) -> None:
 
 
 def made_folder(path: str | Path) -> Path:
-    """A folder, made where it is missing.
-
-    Args:
-        path: of the folder.
-
-    Raises:
-        InvalidValueError: there is a file of this name, or it cannot be made.
-    """
+    """A folder, made where it is missing."""
     folder = Path(path)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -95,11 +65,7 @@ def _taken(target: Path) -> InvalidValueError:
 
 
 def is_mcap(path: Path) -> bool:
-    """Whether a file begins as every log does, whatever its name.
-
-    Args:
-        path: the file, or nothing.
-    """
+    """Whether a file begins as every log does, whatever its name."""
     if not path.is_file():
         return False
     with opened(path) as file:

@@ -16,8 +16,6 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from isiw.checks import check_choice, check_numbers, check_wholes
 
-__all__ = ["LONGEST_MS", "MODES", "MOST_BLOCK_TRIALS", "PRODUCTION_VERSION", "Block", "Production", "ProductionHeader"]
-
 PRODUCTION_VERSION: Final = 1
 """Grows only where an older isiw would misread the log."""
 

@@ -16,8 +16,6 @@ from isiw.log.schema import Event, Intent, Record
 from isiw.log.topics import decode
 from isiw.trials import Trial
 
-__all__ = ["earlier_pulses_s", "pulses_s"]
-
 _SUFFIXES = {".mcap", ".part"}
 """Of logs as they are usually named; one that is damaged is no log by its content."""
 
@@ -28,10 +26,6 @@ def pulses_s(salvaged: Salvage, now_ns: int | None = None) -> list[float]:
     """How long ago each stimulus of a log was about to be delivered [s]; refused ones do not count.
 
     A stimulus whose intent is lost counts by the record of its trial.
-
-    Args:
-        salvaged: what was read from the log.
-        now_ns: the time now [ns since 1970].
     """
     return _ages_s(_given(salvaged), now_ns)
 
@@ -67,16 +61,6 @@ def earlier_pulses_s(folder: str | Path, subject: str, period_s: float, *, but: 
     """How long ago each stimulus of a subject was, by the logs of a folder [s]; those of simulations do not count.
 
     Stimuli that several logs tell of, as an exported copy does, count once.
-
-    Args:
-        folder: the folder, whose folders are looked into, too.
-        subject: the person's code.
-        period_s: how far back it matters [s].
-        but: a log that does not count, finished or not; nor do copies of it.
-
-    Raises:
-        LogError: there is no such folder, or a folder or log in it cannot be read, or has lost its end: nobody knows
-            what it told of.
     """
     folder = Path(folder)
     if not folder.is_dir():

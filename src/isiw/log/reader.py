@@ -33,8 +33,6 @@ from isiw.signals.amplitudes import is_silent
 from isiw.strategy.stopping import StopDecision
 from isiw.trials import Channel, Stimulus, Trial, TrialTable
 
-__all__ = ["SessionRecord", "of_production", "read_any", "read_salvaged", "read_session", "require_records"]
-
 
 @dataclass(frozen=True, eq=False)
 class SessionRecord:
@@ -89,14 +87,7 @@ class SessionRecord:
         return tuple(said.format(part, why) for part, why in self.unread.items())
 
     def require_read(self, *parts: str) -> None:
-        """Raise where a part of the header is needed that this version cannot read.
-
-        Args:
-            *parts: their names, as in `Header`; by default all.
-
-        Raises:
-            LogError: one of them cannot be read.
-        """
+        """Raise where a part of the header is needed that this version cannot read."""
         require_read(self.path, self.unread, parts)
 
     @cached_property
@@ -114,11 +105,7 @@ class SessionRecord:
         return trial_frame(self.table, self.onsets, self.estimates)
 
     def require_end(self) -> None:
-        """Raise where nobody knows how many stimuli were given.
-
-        Raises:
-            DamagedLogError: the log's end is missing.
-        """
+        """Raise where nobody knows how many stimuli were given."""
         if self.end_lost:
             raise DamagedLogError(
                 "the log's end is missing, so nobody knows how many stimuli were given",
@@ -209,15 +196,7 @@ def read_session(path: str | Path) -> SessionRecord:
 
 
 def read_salvaged(salvaged: Salvage) -> SessionRecord:
-    """The session in what was salvaged from a log.
-
-    Args:
-        salvaged: what was read.
-
-    Raises:
-        LogError: the log is of something else, or from a newer version.
-        DamagedLogError: not even the header can be read.
-    """
+    """The session in what was salvaged from a log."""
     record = read_any(salvaged)
     if isinstance(record, ThresholdRecord):
         raise of_another_kind(record.path, LogKind.THRESHOLD, LogKind.SEARCH)
@@ -225,16 +204,7 @@ def read_salvaged(salvaged: Salvage) -> SessionRecord:
 
 
 def read_any(salvaged: Salvage, wanted: LogKind = LogKind.SEARCH) -> SessionRecord | ThresholdRecord:
-    """What was salvaged from a log in which a person is stimulated.
-
-    Args:
-        salvaged: what was read.
-        wanted: what the log is hoped to be of, for the error.
-
-    Raises:
-        LogError: the log of an interval production task, or one from a newer version.
-        DamagedLogError: not even the header can be read.
-    """
+    """What was salvaged from a log in which a person is stimulated."""
     if of_production(salvaged):
         raise of_another_kind(salvaged.path, LogKind.PRODUCTION, wanted)
     records = Records.of(salvaged)
@@ -258,23 +228,12 @@ def read_any(salvaged: Salvage, wanted: LogKind = LogKind.SEARCH) -> SessionReco
 
 
 def of_production(salvaged: Salvage) -> bool:
-    """Whether a log is of an interval production task.
-
-    Args:
-        salvaged: what was read.
-    """
+    """Whether a log is of an interval production task."""
     return any(message.topic in {"/production_header", "/production"} for message in salvaged.messages)
 
 
 def require_records(records: Iterable[object]) -> None:
-    """Raise where these are no records of sessions, but the paths of their logs, say.
-
-    Args:
-        records: what should be records of sessions.
-
-    Raises:
-        InvalidValueError: something else.
-    """
+    """Raise where these are no records of sessions, but the paths of their logs, say."""
     for record in records:
         if not isinstance(record, SessionRecord):
             raise InvalidValueError(

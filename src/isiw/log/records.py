@@ -25,8 +25,6 @@ from isiw.text.numbers import counted
 from isiw.text.toml_files import parsed
 from isiw.trials import Channel, Trial
 
-__all__ = ["Records", "unknown_of"]
-
 HeaderKind = TypeVar("HeaderKind", bound=AnyHeader)
 
 MOST_LOSSES: Final = 50
@@ -59,11 +57,7 @@ class Records:
 
     @classmethod
     def of(cls, salvaged: Salvage) -> Records:
-        """The records of a log.
-
-        Args:
-            salvaged: what was read from it.
-        """
+        """The records of a log."""
         records = cls(salvaged, losses=list(salvaged.losses))
         for message in salvaged.messages:
             records.take(message)
@@ -80,16 +74,7 @@ class Records:
         return listed if left <= 0 else (*listed, f"{left} more losses are not listed.")
 
     def header_of(self, kinds: tuple[type[HeaderKind], ...], newest: int) -> HeaderKind:
-        """The log's header, from its records or else from the configuration that is attached.
-
-        Args:
-            kinds: of header that it may be.
-            newest: version that this isiw reads.
-
-        Raises:
-            LogError: the log is from a newer version.
-            DamagedLogError: the header cannot be read.
-        """
+        """The log's header, from its records or else from the configuration that is attached."""
         header = self.header
         if not isinstance(header, kinds) or (self.losses and CONFIGURATION in self.salvaged.attachments):
             # what is lost may have been the last header
@@ -165,13 +150,7 @@ def _concluded(record: Record) -> int | None:
 
 
 def unknown_of(history: Sequence[Record], known: AbstractSet[int], delivered: int) -> tuple[Intent, ...]:
-    """Stimuli that were delivered, or may have been, and whose outcome is not in the log.
-
-    Args:
-        history: the records of the log, in order.
-        known: the numbers of those whose outcome is.
-        delivered: how many there were by the index.
-    """
+    """Stimuli that were delivered, or may have been, and whose outcome is not in the log."""
     intents = _standing(history)
     last = max(itertools.chain(known, intents, [min(delivered, MOST_TRIALS) - 1]))
     return tuple(

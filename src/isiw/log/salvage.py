@@ -23,8 +23,6 @@ from isiw.log.index import RECORD_HEAD_BYTES, counted_records
 from isiw.log.topics import ANNOUNCEMENT, CHANNEL_IDS
 from isiw.text.numbers import counted
 
-__all__ = ["Message", "Salvage", "current_file", "holds", "only_in", "salvage", "salvage_file"]
-
 
 @dataclass(frozen=True)
 class Message:
@@ -73,14 +71,7 @@ class Salvage:
 
 
 def current_file(path: str | Path) -> Path:
-    """The file that holds the most of a log: `FILE.part` where there is one, as it began as a copy of `FILE`.
-
-    Args:
-        path: the log, with or without `.part`.
-
-    Raises:
-        LogError: there is neither.
-    """
+    """The file that holds the most of a log: `FILE.part` where there is one, as it began as a copy of `FILE`."""
     log = log_of(Path(path))
     for candidate in (part_of(log), log):
         if candidate.is_file():
@@ -97,13 +88,6 @@ def salvage(path: str | Path) -> Salvage:
 
     Where there are both `FILE.part` and `FILE`, the first is the second's continuation and is read; where it is not,
     the file that was named is.
-
-    Args:
-        path: the log, with or without `.part`.
-
-    Raises:
-        LogError: no such file, not a log, or one that may not be read.
-        DamagedLogError: a log of which nothing can be read.
     """
     if not isinstance(path, str | os.PathLike):
         raise LogError("a log is named by its path", got=path, expected="text or a path")
@@ -128,33 +112,18 @@ def _continuation(part: Path, closed: Path) -> Salvage:
 
 
 def holds(later: Salvage, earlier: Salvage) -> bool:
-    """Whether a log holds every record of another, as its continuation does.
-
-    Args:
-        later: the log.
-        earlier: the other one.
-    """
+    """Whether a log holds every record of another, as its continuation does."""
     return not only_in(earlier, later)
 
 
 def only_in(found: Salvage, other: Salvage) -> int:
-    """How many records a log has that another one has not.
-
-    Args:
-        found: the log.
-        other: the other one.
-    """
+    """How many records a log has that another one has not."""
     own, others = (Counter((m.topic, m.data) for m in each.messages) for each in (found, other))
     return (own - others).total()
 
 
 def salvage_file(path: Path) -> Salvage:
-    """Read everything that can be read from one file, whatever else is beside it.
-
-    Raises:
-        LogError: no such file, not a log, or one that may not be read.
-        DamagedLogError: a log of which nothing can be read.
-    """
+    """Read everything that can be read from one file, whatever else is beside it."""
     found = Salvage(path)
     with (
         disk_errors(path, "the log cannot be read", "Check its permissions and those of its folder."),

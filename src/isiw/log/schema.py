@@ -53,29 +53,6 @@ from isiw.types import Conditioning, FloatArray
 from isiw.visit import Visit, VisitProtocol
 from isiw.window import Window, WindowEstimate, depression, nothing_found
 
-__all__ = [
-    "ANY_HEADER",
-    "MOST_TRIALS",
-    "RUN_KEY",
-    "SCHEMA_VERSION",
-    "SERVED_KEY",
-    "AnyHeader",
-    "Correction",
-    "Estimate",
-    "Event",
-    "EventKind",
-    "Header",
-    "Intent",
-    "PulseOutcome",
-    "Record",
-    "StrategyRecipe",
-    "ThresholdBelief",
-    "ThresholdHeader",
-    "Waveform",
-    "kind_tag",
-    "with_reference",
-]
-
 SCHEMA_VERSION = 4
 """4 since 0.1.0: control trials, and trials that an operator includes again or accepts. Before came 1 to 3."""
 
@@ -215,12 +192,7 @@ class Intent(_Record):
 
     @classmethod
     def of(cls, stimulus: Stimulus, t_s: float) -> Self:
-        """The intent to deliver a stimulus.
-
-        Args:
-            stimulus: what is to be delivered.
-            t_s: the time [s].
-        """
+        """The intent to deliver a stimulus."""
         return cls(trial=stimulus.trial, isi_ms=stimulus.isi_ms, t_s=t_s, tap_alone=stimulus.tap_alone)
 
 
@@ -256,12 +228,7 @@ class Waveform(_Record):
 
     @classmethod
     def of(cls, trial: int, channel: Channel) -> Self:
-        """The record of a channel.
-
-        Args:
-            trial: the number of the trial.
-            channel: what was recorded.
-        """
+        """The record of a channel."""
         return cls(
             trial=trial,
             t0_ms=channel.t0_ms,
@@ -324,14 +291,7 @@ class Estimate(_Record):
 
     @classmethod
     def of(cls, trial: int, estimate: WindowEstimate, decision: StopDecision, next_isi_ms: float | None) -> Self:
-        """The record of an estimate, with its 90 % intervals.
-
-        Args:
-            trial: the number of the trial.
-            estimate: what is believed after it.
-            decision: whether to stop, and why.
-            next_isi_ms: what is asked next [ms]; None where the session stops, or a control trial comes next.
-        """
+        """The record of an estimate, with its 90 % intervals."""
         start, end = estimate.interval(0.9) or ((None, None), (None, None))
         beyond, excluded = estimate.beyond_probability or (None, None), estimate.largest_excluded
         return cls(

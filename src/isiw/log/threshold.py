@@ -11,8 +11,6 @@ from isiw.log.headers import require_read
 from isiw.log.records import unknown_of
 from isiw.log.schema import Event, Intent, PulseOutcome, Record, ThresholdHeader
 
-__all__ = ["ThresholdRecord"]
-
 
 @dataclass(frozen=True, eq=False)
 class ThresholdRecord:

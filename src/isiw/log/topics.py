@@ -29,19 +29,6 @@ from isiw.log.schema import (
 from isiw.text.json_texts import refuse_doubled
 from isiw.trials import Trial
 
-__all__ = [
-    "ANNOUNCEMENT",
-    "CHANNEL_IDS",
-    "adapter",
-    "announcement",
-    "decode",
-    "encode",
-    "is_of_isiw",
-    "json_schema",
-    "topic_of",
-    "waveform_topic",
-]
-
 _KINDS: dict[str, type[Any]] = {
     "/header": Header,
     "/intent": Intent,
@@ -78,12 +65,7 @@ ANNOUNCEMENT = "channel "
 
 
 def announcement(number: int, topic: str) -> tuple[str, dict[str, str]]:
-    """Name and content of the metadata that say which topic a further channel number has.
-
-    Args:
-        number: the channel's.
-        topic: what it carries.
-    """
+    """Name and content of the metadata that say which topic a further channel number has."""
     return f"{ANNOUNCEMENT}{number}", {"id": str(number), "topic": topic}
 
 
@@ -104,26 +86,14 @@ def is_of_isiw(topic: str) -> bool:
 
 
 def topic_of(record: Record, channel_name: str | None = None) -> str:
-    """The topic of a record.
-
-    Args:
-        record: any record.
-        channel_name: the channel, for a waveform.
-
-    Raises:
-        InvalidValueError: a waveform without a channel's name, or with one that isiw uses for itself.
-    """
+    """The topic of a record."""
     if not isinstance(record, Waveform):
         return _TOPIC_OF_KIND[type(record)]
     return waveform_topic(channel_name or "")
 
 
 def waveform_topic(channel_name: str) -> str:
-    """The topic of a channel's waveforms.
-
-    Raises:
-        InvalidValueError: an empty name, or one that isiw uses for itself.
-    """
+    """The topic of a channel's waveforms."""
     topic = f"/{channel_name}"
     if topic == "/" or topic in _KINDS or not channel_name.isprintable():  # half a surrogate pair is not printable
         raise InvalidValueError(
@@ -133,15 +103,7 @@ def waveform_topic(channel_name: str) -> str:
 
 
 def encode(topic: str, record: Record) -> bytes:
-    """A record as JSON.
-
-    Args:
-        topic: of the record.
-        record: what to write.
-
-    Raises:
-        InvalidValueError: a text in it is none that JSON can hold.
-    """
+    """A record as JSON."""
     try:
         return adapter(topic).dump_json(record)
     except (PydanticSerializationError, UnicodeEncodeError) as error:
@@ -153,15 +115,7 @@ def encode(topic: str, record: Record) -> bytes:
 
 
 def decode(topic: str, data: bytes) -> Record:
-    """The record that was encoded.
-
-    Args:
-        topic: of the record.
-        data: JSON.
-
-    Raises:
-        ValueError: not such a record, or a key that is there twice.
-    """
+    """The record that was encoded."""
     record: Record = adapter(topic).validate_json(data)
     refuse_doubled(data)
     if isinstance(record, Trial) and record.index >= MOST_TRIALS:

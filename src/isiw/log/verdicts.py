@@ -14,18 +14,6 @@ from isiw.log.schema import Correction, Event, EventKind
 from isiw.signals.values import implausible_amplitude
 from isiw.trials import Trial, TrialTable
 
-__all__ = [
-    "LOOKED_AT",
-    "VERDICTS",
-    "acceptance",
-    "correction",
-    "excluded_by",
-    "exclusion",
-    "inclusion",
-    "under",
-    "under_all",
-]
-
 VERDICTS: Final[dict[EventKind, Callable[[Trial, Event], Trial]]] = {
     "exclusion": lambda trial, _: dataclasses.replace(trial, excluded=True),
     "inclusion": lambda trial, _: dataclasses.replace(trial, excluded=False),
@@ -41,23 +29,13 @@ _KEPT: Final = "It remains a mistrial; its waveforms, if any, stay in the log."
 
 
 def under(trial: Trial, event: Event) -> Trial:
-    """A trial as it counts after an event; the same where the event says nothing about it.
-
-    Args:
-        trial: the trial.
-        event: what happened.
-    """
+    """A trial as it counts after an event; the same where the event says nothing about it."""
     verdict = VERDICTS.get(event.kind)
     return trial if verdict is None or event.trial != trial.index else verdict(trial, event)
 
 
 def under_all(trials: TrialTable, events: Iterable[Event]) -> TrialTable:
-    """All trials as they count after some events, in the order in which these happened.
-
-    Args:
-        trials: the trials.
-        events: what happened.
-    """
+    """All trials as they count after some events, in the order in which these happened."""
     for event in events:
         if event.kind in VERDICTS:
             trials = trials.changed(lambda trial, event=event: under(trial, event))  # type: ignore[misc]
@@ -65,11 +43,7 @@ def under_all(trials: TrialTable, events: Iterable[Event]) -> TrialTable:
 
 
 def excluded_by(events: Iterable[Event]) -> list[int]:
-    """The trials that some events leave excluded, the one that was excluded last at the end.
-
-    Args:
-        events: what happened.
-    """
+    """The trials that some events leave excluded, the one that was excluded last at the end."""
     excluded: list[int] = []
     for event in events:
         if event.kind in VERDICTS and event.kind != "correction" and event.trial is not None:
@@ -80,46 +54,19 @@ def excluded_by(events: Iterable[Event]) -> list[int]:
 
 
 def exclusion(trials: TrialTable, number: int, reason: str = "") -> Event:
-    """That a trial does not count from here on.
-
-    Args:
-        trials: all trials.
-        number: the trial's number.
-        reason: why, for whoever reads the log.
-
-    Raises:
-        InvalidValueError: no trial that counts has this number, or a reason that is no text.
-    """
+    """That a trial does not count from here on."""
     _require("exclude", number, [trial.index for trial in trials if trial.counts], "that counts")
     return Event(kind="exclusion", trial=number, text=text("the reason of an exclusion", reason))
 
 
 def inclusion(trials: TrialTable, number: int) -> Event:
-    """That a trial that was excluded counts again.
-
-    Args:
-        trials: all trials.
-        number: the trial's number.
-
-    Raises:
-        InvalidValueError: no excluded trial has this number.
-    """
+    """That a trial that was excluded counts again."""
     _require("include", number, [trial.index for trial in trials if trial.excluded], "that is excluded")
     return Event(kind="inclusion", trial=number, text="Included again by the operator.")
 
 
 def acceptance(trials: TrialTable, number: int, space: DesignSpace) -> Event:
-    """That a mistrial counts all the same, or a trial that was excluded counts again.
-
-    Args:
-        trials: all trials.
-        number: the trial's number.
-        space: what its ISI must have come from.
-
-    Raises:
-        InvalidValueError: no such trial, one that counts already, or one without an amplitude or an ISI to count with,
-            or with an amplitude that no muscle gives.
-    """
+    """That a mistrial counts all the same, or a trial that was excluded counts again."""
     trial = next((trial for trial in trials if trial.index == number), None)
     if trial is not None and trial.excluded:
         return inclusion(trials, number)
@@ -135,17 +82,7 @@ def acceptance(trials: TrialTable, number: int, space: DesignSpace) -> Event:
 
 
 def correction(trials: TrialTable, number: int, why: str, corrected: Correction) -> Event:
-    """That some values of a trial were others than its record says; the record stays as it is.
-
-    Args:
-        trials: all trials.
-        number: the trial's number.
-        why: how that is known, for whoever reads the log.
-        corrected: the right values.
-
-    Raises:
-        InvalidValueError: no trial has this number, or a reason that is no text.
-    """
+    """That some values of a trial were others than its record says; the record stays as it is."""
     _require("correct", number, [trial.index for trial in trials], "of this session")
     why = text("the reason of a correction", why)
     return Event(kind="correction", trial=number, text=why, corrected=corrected)

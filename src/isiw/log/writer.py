@@ -31,8 +31,6 @@ from isiw.log.salvage import Message, Salvage, holds, salvage_file
 from isiw.log.schema import AnyHeader, Event, Record
 from isiw.log.topics import CHANNEL_IDS, announcement, decode, encode, is_of_isiw, json_schema, topic_of
 
-__all__ = ["CONFIGURATION", "LogWriter"]
-
 CONFIGURATION = "configuration.toml"
 """The attachment that holds the header once more, as TOML."""
 
@@ -46,10 +44,6 @@ class LogWriter:
     """One session's log: `FILE.part` while it is written, `FILE` once it is closed.
 
     Use `LogWriter.create` or `LogWriter.continuing`; as a context manager it closes itself.
-
-    Args:
-        path: where the log will be.
-        file: the empty file to write to.
     """
 
     def __init__(self, path: Path, file: DurableFile) -> None:
@@ -69,16 +63,7 @@ class LogWriter:
 
     @classmethod
     def create(cls, path: str | Path, header: AnyHeader) -> Self:
-        """Start a new log with its header.
-
-        Args:
-            path: the log, without `.part`.
-            header: what the session is.
-
-        Raises:
-            LogError: there is one already, finished or not; it is never overwritten. Or it cannot have this name, the
-                header cannot be written, or the computer's clock is wrong.
-        """
+        """Start a new log with its header."""
         target = Path(path)
         with disk_errors(target, "the log cannot be created", "Make room, or choose another path."):
             _require_free(target)
@@ -98,16 +83,6 @@ class LogWriter:
 
         The old file keeps its place until the copy is durable. Where something was lost it is kept for good, as
         `FILE.damaged`.
-
-        Args:
-            path: the log, with or without `.part`.
-            salvage: what was read from it.
-            header: its header.
-            as_resumed: the header that holds from here on, where it is another.
-
-        Raises:
-            LogError: it is still being written, or has changed since it was read, another session's file is at one of
-                its two names, a header cannot be written, or the computer's clock is wrong.
         """
         target = log_of(Path(path))
         with claimed(salvage.path) as source, disk_errors(target, "the log cannot go on", "It stays as it was."):
@@ -138,15 +113,7 @@ class LogWriter:
         self.sync()
 
     def begin(self, header: AnyHeader, configuration: bytes | None = None) -> None:
-        """Write what is not a message: metadata for tools that list files, and the header as TOML.
-
-        Args:
-            header: what the session is.
-            configuration: the header as TOML, where there is one already.
-
-        Raises:
-            LogError: something in the header is not a TOML value, or the computer's clock is wrong.
-        """
+        """Write what is not a message: metadata for tools that list files, and the header as TOML."""
         self._header = header
         facts = {
             "isiw_version": header.isiw_version,
@@ -166,23 +133,14 @@ class LogWriter:
         return not self._file.closed
 
     def append(self, record: Record, channel_name: str | None = None) -> None:
-        """Append a record; it is durable after the next `sync`.
-
-        Args:
-            record: what to append.
-            channel_name: the channel, for a waveform.
-        """
+        """Append a record; it is durable after the next `sync`."""
         topic = topic_of(record, channel_name)
         data = encode(topic, record)
         with self._lock:
             self._copy(Message(topic, data, log_time_ns()))
 
     def sync(self) -> None:
-        """Return when everything appended is on the disk.
-
-        Raises:
-            LogError: the log is closed.
-        """
+        """Return when everything appended is on the disk."""
         with self._lock:
             if not self.is_open:
                 raise LogError(
@@ -192,11 +150,7 @@ class LogWriter:
             self._file.sync()
 
     def require_in_place(self) -> None:
-        """Raise where what was synced is no longer at the log's path; to be called after `sync`.
-
-        Raises:
-            LogError: the file is gone, shorter or longer, or another one is in its place.
-        """
+        """Raise where what was synced is no longer at the log's path; to be called after `sync`."""
         with self._lock:
             displacement = self._file.displacement()
         if displacement is not None:
@@ -218,10 +172,6 @@ class LogWriter:
         """Finish the log and give it its name; what it went on from is the only file that it replaces.
 
         Nothing happens where it is closed already.
-
-        Raises:
-            LogError: somebody has put a file there meanwhile, and the log stays `FILE.part`; or the log is no longer
-                at its path, and the message says where a copy is.
         """
         with self._lock:
             if self.is_open:
@@ -352,11 +302,7 @@ def _require_unchanged(source: IO[bytes], salvage: Salvage) -> None:
 
 
 def _own_file(target: Path, salvage: Salvage) -> Fingerprint | None:
-    """The file at a log's final name, which its continuation may replace; None where there is none.
-
-    Raises:
-        LogError: one of the log's two names has a file with records that the log does not hold.
-    """
+    """The file at a log's final name, which its continuation may replace; None where there is none."""
     if salvage.path == target:
         if part_of(target).exists():
             refuse_if_locked(part_of(target))

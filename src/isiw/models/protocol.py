@@ -20,27 +20,6 @@ from isiw.lazy import torch
 from isiw.types import ArrayLike, FloatArray
 from isiw.window import Window, WindowEstimate
 
-__all__ = [
-    "Conditions",
-    "CountsPairs",
-    "ExpectsTheUsual",
-    "HasBotorchModel",
-    "HasEvidence",
-    "Observation",
-    "Posterior",
-    "PredictsMeps",
-    "PredictsOutcomes",
-    "PriorPerson",
-    "ProposesIsi",
-    "ReportsTrouble",
-    "ResponseModel",
-    "SamplesDepression",
-    "SamplesProfiles",
-    "SamplesWindows",
-    "SimulatesPeople",
-    "Tensor",
-]
-
 Tensor: TypeAlias = "torch.Tensor"
 
 Values: TypeAlias = "Tensor | Sequence[float | None] | Sequence[bool | None]"

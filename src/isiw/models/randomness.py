@@ -9,34 +9,18 @@ import numpy as np
 from isiw.lazy import torch
 from isiw.models.protocol import Tensor
 
-__all__ = ["SIMULATED", "step_generator", "systematic"]
-
 SIMULATED: Final = 2**31
 """The step whose stream simulated people are drawn from: no posterior gets there."""
 
 
 def step_generator(device: str, seed: int, step: int) -> torch.Generator:
-    """A stream of its own for each step, so that a posterior depends on its seed and its trials alone.
-
-    Args:
-        device: torch device.
-        seed: the posterior's.
-        step: how many trials it was told.
-    """
+    """A stream of its own for each step, so that a posterior depends on its seed and its trials alone."""
     state = np.random.SeedSequence((seed, step)).generate_state(1, np.uint64)
     return torch.Generator(device=device).manual_seed(int(state[0] >> np.uint64(1)))
 
 
 def systematic(log_weights: Tensor, size: int) -> Tensor:
-    """Evenly spaced picks of weighted particles, in order.
-
-    Args:
-        log_weights: normalised, shape (b, p).
-        size: how many picks.
-
-    Returns:
-        Indices, shape (b, size).
-    """
+    """Evenly spaced picks of weighted particles, in order."""
     cumulative = log_weights.double().softmax(-1).cumsum(-1)
     points = (torch.arange(size, device=log_weights.device, dtype=torch.double) + 0.5) / size
     picks = torch.searchsorted(cumulative, points.expand(len(cumulative), -1).contiguous())

@@ -24,19 +24,6 @@ from isiw.window import (
     WindowEstimate,
 )
 
-__all__ = [
-    "EXCLUDED_AT",
-    "PROFILE_POINTS",
-    "Runs",
-    "SampledHypotheses",
-    "SampledProfiles",
-    "best_window",
-    "edge_samples",
-    "least_excess_mv",
-    "profile_grid",
-    "sampled_estimate",
-]
-
 PROFILE_POINTS = 101
 """ISIs at which the expected MEP and its band are reported, at least."""
 
@@ -45,12 +32,7 @@ PROFILE_STEP_MS = 4.0
 
 
 def least_excess_mv(peak_mv: Tensor, baseline_mv: Tensor) -> Tensor:
-    """The least-excess rule of `isiw.window.least_excess_mv`, for tensors.
-
-    Args:
-        peak_mv: largest excess over the baseline in the range [mV], any shape.
-        baseline_mv: expected MEP without a tap [mV], of the same shape.
-    """
+    """The least-excess rule of `isiw.window.least_excess_mv`, for tensors."""
     enough_mv = (MIN_EXCESS_OF_BASELINE * baseline_mv).clamp_min(MIN_EXCESS_MV)
     return torch.where(peak_mv >= enough_mv, EDGE_LEVEL * peak_mv, torch.inf)
 
@@ -89,12 +71,7 @@ class Runs:
 
     @classmethod
     def of_pairs(cls, pairs: IntArray, points: int) -> Runs:
-        """The runs of windows given as pairs of indices, shape (s, 2 k): of the first ISI, and behind the last.
-
-        Args:
-            pairs: the indices; where they are equal there is no run.
-            points: how many ISIs there are.
-        """
+        """The runs of windows given as pairs of indices, shape (s, 2 k): of the first ISI, and behind the last."""
         both = pairs.reshape(len(pairs), -1, 2)
         sample, which = np.nonzero(both[..., 0] < both[..., 1])
         first, behind = both[sample, which].T
@@ -117,11 +94,7 @@ class Runs:
         return self.first[self._leads], self.behind[lasts] - 1
 
     def summed(self, values: FloatArray) -> FloatArray:
-        """Sum of what each window has at its runs, shape (..., w).
-
-        Args:
-            values: of the runs, shape (..., r).
-        """
+        """Sum of what each window has at its runs, shape (..., w)."""
         return np.add.reduceat(values, self._leads, axis=-1) if len(self._leads) else values[..., :0]
 
     @cached_property
@@ -137,12 +110,7 @@ class Runs:
 
 
 def best_window(windows: Runs, grid_ms: FloatArray) -> tuple[Window | None, float]:
-    """The window of largest expected F1 among the level sets of the posterior's membership, and that F1.
-
-    Args:
-        windows: sampled windows, at least one of them.
-        grid_ms: their ISIs [ms], shape (t,).
-    """
+    """The window of largest expected F1 among the level sets of the posterior's membership, and that F1."""
     membership = windows.membership
     candidates = membership >= (np.linspace(0.1, 0.9, 17) * membership.max())[:, None]
     below = np.pad(np.cumsum(candidates, axis=-1), ((0, 0), (1, 0)))
@@ -153,12 +121,7 @@ def best_window(windows: Runs, grid_ms: FloatArray) -> tuple[Window | None, floa
 
 
 def edge_samples(windows: Runs, space: DesignSpace) -> FloatArray:
-    """Start and end of sampled windows [ms], ±inf where a window runs out of the range, shape (w, 2).
-
-    Args:
-        windows: the windows.
-        space: the design space.
-    """
+    """Start and end of sampled windows [ms], ±inf where a window runs out of the range, shape (w, 2)."""
     first, last = windows.hulls
     start = np.where(first == 0, -np.inf, space.grid_ms[first])
     end = np.where(last == windows.points - 1, np.inf, space.grid_ms[last])
@@ -207,16 +170,7 @@ def sampled_estimate(
     hypotheses: SampledHypotheses | None = None,
     shift_pct_rmt: Callable[[], float | None] = lambda: None,
 ) -> WindowEstimate:
-    """What equally weighted samples say about the window of one person.
-
-    Args:
-        windows: sampled windows on the space's grid.
-        profiles: gives sampled profiles, of the same or of other samples; they are asked for only if somebody looks at
-            what rests on them.
-        space: the design space.
-        hypotheses: of the sampled windows; None where the model has none.
-        shift_pct_rmt: gives the shift of the input that recruitment curves exclude [% RMT].
-    """
+    """What equally weighted samples say about the window of one person."""
     probability = len(windows.found) / windows.samples
     first, last = windows.hulls
     edges = edge_samples(windows, space)

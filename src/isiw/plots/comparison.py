@@ -15,8 +15,6 @@ from isiw.plots.style import BLUE, FAINT, INK, edge_intervals, explain, save_fig
 from isiw.text import one_line
 from isiw.text.stimuli import words_of
 
-__all__ = ["comparison_figure", "save_comparison_plot"]
-
 _LONGEST_CODE = 24
 
 

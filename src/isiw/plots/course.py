@@ -12,15 +12,9 @@ from isiw.log.reader import SessionRecord
 from isiw.plots.style import BLUE, FAINT, ORANGE, RED, TRIAL_AXIS, saying, tidied
 from isiw.trials import Trial
 
-__all__ = ["course_figure"]
-
 
 def course_figure(record: SessionRecord) -> Figure:
-    """Timing and background by trial, with what each may be at most.
-
-    Args:
-        record: the session.
-    """
+    """Timing and background by trial, with what each may be at most."""
     header = record.header
     figure = Figure(figsize=(7.2, 4.2), layout="constrained")
     timing, background = figure.subplots(2, 1, sharex=True)

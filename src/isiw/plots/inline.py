@@ -13,8 +13,6 @@ from matplotlib.figure import Figure
 
 from isiw.plots.style import BLUE, FAINT, GREEN, INK, ORANGE, RED
 
-__all__ = ["PAGE_COLOURS", "inline_svg"]
-
 PAGE_COLOURS: Final[Mapping[str, str]] = MappingProxyType(
     {
         INK: "ink",
@@ -31,12 +29,7 @@ PAGE_COLOURS: Final[Mapping[str, str]] = MappingProxyType(
 
 
 def inline_svg(figure: Figure, name: str) -> str:
-    """A figure as an SVG element: text stays text, the background is the page's, and no name clashes with another's.
-
-    Args:
-        figure: the figure.
-        name: one word, another one for each picture of a page.
-    """
+    """A figure as an SVG element: text stays text, the background is the page's, and no name clashes with another's."""
     picture = io.StringIO()
     with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
         figure.savefig(picture, format="svg", transparent=True, metadata={"Date": None})

@@ -10,8 +10,6 @@ from matplotlib.figure import Figure
 from isiw.lazy import pd
 from isiw.plots.style import BLUE, FAINT, INK, save_figure, tidied
 
-__all__ = ["prior_figure", "save_prior_plot"]
-
 _COLUMNS = 4
 
 

@@ -33,8 +33,6 @@ from isiw.trials import Trial
 from isiw.types import FloatArray
 from isiw.window import Window
 
-__all__ = ["save_session_plot", "session_figure"]
-
 SMALLEST_UV = 1.0
 
 

@@ -17,8 +17,6 @@ from isiw.checks import choice
 from isiw.lazy import pd
 from isiw.plots.style import FAINT, INK, explain, save_figure, saying, strategy_colours, tidied
 
-__all__ = ["STUDY_PICTURES", "StudyPicture", "draw_curve", "save_study_plot", "study_figure"]
-
 StudyPicture: TypeAlias = Literal["f1", "frontier", "coverage", "latency"]
 
 _MARKERS = "osD^vPX"
@@ -121,14 +119,6 @@ def draw_curve(axes: Axes, curve: pd.DataFrame, name: str, colour: str, marker: 
     """The mean F1 of a strategy by trial with its 95 % band, and a dotted line at what it has before any trial.
 
     A method without a belief is drawn from where it reports a window for anybody.
-
-    Args:
-        axes: where to.
-        curve: the rows of one strategy and cohort, trials ascending: trial, f1, f1_low and f1_high or f1_se, and if
-            known called_none and start_coverage.
-        name: for the legend.
-        colour: of the strategy.
-        marker: of the marked trials.
     """
     curve = _from_first_estimate(curve)
     axes.fill_between(curve["trial"], *_band(curve), color=colour, alpha=0.15, lw=0)

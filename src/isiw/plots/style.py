@@ -19,24 +19,6 @@ from isiw.errors import InvalidValueError
 from isiw.log.outputs import write_output
 from isiw.log.schema import Estimate
 
-__all__ = [
-    "BLUE",
-    "EDGES",
-    "FAINT",
-    "GREEN",
-    "INK",
-    "ORANGE",
-    "RED",
-    "STRATEGY_COLOURS",
-    "TRIAL_AXIS",
-    "edge_intervals",
-    "explain",
-    "save_figure",
-    "saying",
-    "strategy_colours",
-    "tidied",
-]
-
 INK, FAINT, BLUE, ORANGE, GREEN, RED = "#222222", "#8a8a8a", "#0072b2", "#e69f00", "#009e73", "#d55e00"
 _PINK, _SKY, _OLIVE, _BROWN = "#cc79a7", "#56b4e9", "#8f8a00", "#7a4a1f"
 """Colours that remain distinct for colour-blind readers; all but the last two are those of Okabe and Ito."""
@@ -64,11 +46,7 @@ TRIAL_AXIS: Final = "trial (from 0, as in the log)"
 
 
 def strategy_colours(names: Sequence[str]) -> dict[str, str]:
-    """A colour for each strategy: its own where it has one, otherwise one that no other of them has.
-
-    Args:
-        names: the strategies in one picture; beyond ten, colours come again.
-    """
+    """A colour for each strategy: its own where it has one, otherwise one that no other of them has."""
     free = [colour for name, colour in STRATEGY_COLOURS.items() if name not in names] or list(STRATEGY_COLOURS.values())
     others = [name for name in names if name not in STRATEGY_COLOURS]
     given = {name: free[number % len(free)] for number, name in enumerate(others)}
@@ -76,13 +54,7 @@ def strategy_colours(names: Sequence[str]) -> dict[str, str]:
 
 
 def edge_intervals(estimate: Estimate, low_ms: float, high_ms: float) -> list[tuple[str, str, tuple[float, float]]]:
-    """The 90 % intervals of a window's edges, clipped to a range: name, colour and ends [ms] of each that is known.
-
-    Args:
-        estimate: what is believed.
-        low_ms: where the range begins [ms].
-        high_ms: where it ends [ms].
-    """
+    """The 90 % intervals of a window's edges, clipped to a range: name, colour and ends [ms] of each that is known."""
     ends = {name: (getattr(estimate, f"{name}_low_ms"), getattr(estimate, f"{name}_high_ms")) for name in EDGES}
     return [
         (name, EDGES[name], (min(max(low, low_ms), high_ms), min(max(high, low_ms), high_ms)))
@@ -99,13 +71,7 @@ def tidied(*panels: Axes) -> None:
 
 
 def explain(figure: Figure, ncols: int, *, above: bool = False) -> None:
-    """Give a figure one legend, outside its panels, that has each label once; none where nothing has a label.
-
-    Args:
-        figure: the figure.
-        ncols: how many labels stand beside each other.
-        above: whether it stands above the panels, not below.
-    """
+    """Give a figure one legend, outside its panels, that has each label once; none where nothing has a label."""
     labelled = [axes.get_legend_handles_labels() for axes in figure.axes]
     once = {label: handle for handles, labels in labelled for handle, label in zip(handles, labels, strict=True)}
     if once:
@@ -116,26 +82,12 @@ def explain(figure: Figure, ncols: int, *, above: bool = False) -> None:
 
 
 def saying(axes: Axes, text: str) -> None:
-    """Say in the middle of a panel why nothing is drawn there.
-
-    Args:
-        axes: the panel.
-        text: what to say.
-    """
+    """Say in the middle of a panel why nothing is drawn there."""
     axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", fontsize=9, color=FAINT)
 
 
 def save_figure(figure: Figure, path: str | Path, *, overwrite: bool = False) -> Path:
-    """Write a figure into a file, whose folder is made where it is missing; the suffix chooses the format.
-
-    Args:
-        figure: the figure.
-        path: the file.
-        overwrite: whether to replace a file that is there; a log never is.
-
-    Raises:
-        InvalidValueError: a format that matplotlib does not know, or a file that is not to be replaced.
-    """
+    """Write a figure into a file, whose folder is made where it is missing; the suffix chooses the format."""
     target = Path(path)
     known = figure.canvas.get_supported_filetypes()
     suffix = target.suffix.removeprefix(".").lower()

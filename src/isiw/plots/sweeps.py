@@ -17,8 +17,6 @@ from isiw.signals.units import EMG_UNITS_MV
 from isiw.trials import Channel, Trial
 from isiw.types import BoolArray, FloatArray
 
-__all__ = ["sweeps_figure"]
-
 BEFORE_MS, AFTER_MS = 50.0, 80.0
 MOST_LABELS, MOST_POINTS = 30, 100_000
 ROWS_OF_LARGEST = 2.0
@@ -34,14 +32,7 @@ class _Trace(NamedTuple):
 
 
 def sweeps_figure(record: SessionRecord) -> Figure | None:
-    """The EMG of all trials that count, a row a trial, ISIs ascending, TMS alone lowest.
-
-    Args:
-        record: the session.
-
-    Returns:
-        The figure; None where the log has no EMG of a trial that counts.
-    """
+    """The EMG of all trials that count, a row a trial, ISIs ascending, TMS alone lowest."""
     traces = _traces(record)
     if not traces:
         return None

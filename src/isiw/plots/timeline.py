@@ -11,15 +11,9 @@ from isiw.log.reader import SessionRecord
 from isiw.log.schema import Estimate
 from isiw.plots.style import BLUE, FAINT, INK, edge_intervals, explain, tidied
 
-__all__ = ["timeline_figure"]
-
 
 def timeline_figure(record: SessionRecord) -> Figure:
-    """When, within a pair of stimuli, the pulse enhances the MEP.
-
-    Args:
-        record: the session.
-    """
+    """When, within a pair of stimuli, the pulse enhances the MEP."""
     space = record.header.space
     origin = record.header.stimulus.shown(space.reference)
     figure = Figure(figsize=(7.2, 2.2), layout="constrained")

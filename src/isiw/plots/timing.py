@@ -16,8 +16,6 @@ from isiw.text import plain
 if TYPE_CHECKING:
     from isiw.repeatability import TimingStudy
 
-__all__ = ["save_timing_plot", "timing_figure"]
-
 _COLOURS = {"fill": FAINT, "descent": GREEN, "hit": BLUE, "away": ORANGE, "memg": RED, "motion": GREEN, "end": BLUE}
 _NAMES = {
     "fill": "chamber fills",

@@ -14,8 +14,6 @@ from isiw.models.particles.profile import ProfilePrior
 from isiw.priors.lab import LabPrior
 from isiw.types import FloatArray
 
-__all__ = ["compared", "densities"]
-
 PEOPLE: Final = 20_000
 POINTS: Final = 120
 

@@ -16,19 +16,6 @@ from isiw.models.particles.profile import ShapeShares
 from isiw.models.shared.scales import Scale
 from isiw.types import Conditioning, FloatArray, Reference
 
-__all__ = [
-    "LATENT_BLOCKS",
-    "Component",
-    "beside",
-    "columns",
-    "floor",
-    "gain",
-    "mixed",
-    "mixed_shares",
-    "muscle",
-    "place",
-]
-
 LATENT_BLOCKS: Final = {"place": ("start", "width"), "floor": ("floor",), "gain": ("gain",), "muscle": ("recruitment",)}
 """What sessions teach laws of, and the blocks of latents in each."""
 
@@ -50,51 +37,23 @@ def place(
     hit_delay_ms: tuple[float, float] | None = None,
     conditioning: Conditioning = "tap",
 ) -> Place:
-    """A law of start and log width.
-
-    Args:
-        share: its probability.
-        mean: shape (2,).
-        sd: shape (2,).
-        reference: the event that the start counts from.
-        hit_delay_ms: of the rig, where it is stated, mean and SD [ms].
-        conditioning: the conditioning stimulus.
-    """
+    """A law of start and log width."""
     (width,) = _log_scales(mean[1:], sd[1:])
     return Place(share, Scale(float(mean[0]), float(sd[0])), width, reference, hit_delay_ms, conditioning)
 
 
 def floor(share: float, mean: FloatArray, sd: FloatArray) -> Floor:
-    """A law of the floor.
-
-    Args:
-        share: its probability.
-        mean: of the logarithms of both latents, shape (2,).
-        sd: their SDs, shape (2,).
-    """
+    """A law of the floor."""
     return Floor(share, *_log_scales(mean, sd))
 
 
 def gain(share: float, mean: FloatArray, sd: FloatArray) -> Gain:
-    """A law of the gain.
-
-    Args:
-        share: its probability.
-        mean: of the logarithms of both latents, shape (2,).
-        sd: their SDs, shape (2,).
-    """
+    """A law of the gain."""
     return Gain(share, *_log_scales(mean, sd))
 
 
 def muscle(share: float, mean: FloatArray, sd: FloatArray, name: str) -> Muscle:
-    """A law of recruitment curves.
-
-    Args:
-        share: its probability.
-        mean: of the latents, all but the last as logarithms, shape (6,).
-        sd: shape (6,).
-        name: what it is called among the hypotheses.
-    """
+    """A law of recruitment curves."""
     scales = [*_log_scales(mean[:-1], sd[:-1]), Scale(float(mean[-1]), float(sd[-1]))]
     return Muscle(name, share, *scales)
 
@@ -104,35 +63,18 @@ def _log_scales(mean: FloatArray, sd: FloatArray) -> list[Scale]:
 
 
 def beside(usual: tuple[Component, ...], learnt: Sequence[Component]) -> tuple[Component, ...]:
-    """Components that make room for further ones.
-
-    Args:
-        usual: the components that there are.
-        learnt: what stands beside them, with shares of less than 1 together.
-    """
+    """Components that make room for further ones."""
     left = max(0.0, 1.0 - math.fsum(component.share for component in learnt))  # shares of 1 may round to more
     kept: list[Component] = [replace(component, share=left * component.share) for component in usual]
     return tuple(itertools.chain(kept, learnt))
 
 
 def mixed(learnt: float, usual: float, share: float) -> float:
-    """A probability as learnt, with a share of the usual one.
-
-    Args:
-        learnt: as learnt.
-        usual: as in the built-in prior.
-        share: of the usual one.
-    """
+    """A probability as learnt, with a share of the usual one."""
     return (1.0 - share) * learnt + share * usual
 
 
 def mixed_shares(learnt: Sequence[float], usual: _Shares, share: float) -> _Shares:
-    """Shares of kinds as learnt, with a share of the usual ones.
-
-    Args:
-        learnt: as learnt, one a kind.
-        usual: as in the built-in prior.
-        share: of the usual ones.
-    """
+    """Shares of kinds as learnt, with a share of the usual ones."""
     pairs = zip(learnt, astuple(usual), strict=True)
     return type(usual)(*(mixed(float(new), old, share) for new, old in pairs))

@@ -28,8 +28,6 @@ from isiw.priors.recall import recalled, require_whole
 from isiw.types import FloatArray
 from isiw.visit import MOST_APART_PCT_RMT
 
-__all__ = ["DayToDay", "after", "moved"]
-
 _Normal: TypeAlias = tuple[float, FloatArray, FloatArray]
 
 COMPONENTS: Final = {"place": 6, "floor": 1, "gain": 2, "muscle": 4}

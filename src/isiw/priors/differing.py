@@ -15,8 +15,6 @@ from isiw.priors.days import moved
 from isiw.priors.recall import recalled, too_far_apart_ms
 from isiw.types import FloatArray
 
-__all__ = ["Difference", "differences"]
-
 _OTHER_RIG = (
     "The sessions were run on rigs with different hit delays, {:g} and {:g} ms, so their windows, which count from the "
     "valve command, cannot be compared"

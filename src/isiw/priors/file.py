@@ -15,8 +15,6 @@ from isiw.models.particles.prior import Prior
 from isiw.priors.lab import SCHEMA_VERSION, LabPrior
 from isiw.text.toml_files import checked, read_toml
 
-__all__ = ["check_lab_output", "load", "read_lab_prior", "write_lab_prior"]
-
 
 def write_lab_prior(lab: LabPrior, path: str | Path, *, overwrite: bool = False) -> Path:
     """Write a lab's prior as TOML, into a folder that is made where it is missing.

@@ -31,8 +31,6 @@ from isiw.priors.recall import (
 from isiw.types import Conditioning, Reference
 from isiw.visit import MOST_APART_PCT_RMT, different_muscles
 
-__all__ = ["LabPrior", "LearntSession", "learn", "share_of"]
-
 _T = TypeVar("_T")
 
 SCHEMA_VERSION: Final = 2
@@ -272,11 +270,7 @@ def _lab_prior(
 
 
 def share_of(members: float) -> float:
-    """The share of a lab's own law beside what is believed of people in general.
-
-    Args:
-        members: how many people it was learnt from, expected.
-    """
+    """The share of a lab's own law beside what is believed of people in general."""
     return 1.0 - max(LEAST_USUAL, PEOPLE_FOR_HALF / (PEOPLE_FOR_HALF + members))
 
 

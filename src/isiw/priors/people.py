@@ -17,8 +17,6 @@ from isiw.priors.components import LATENT_BLOCKS, columns
 from isiw.priors.population import Block, HyperPrior, People
 from isiw.types import FloatArray, IntArray
 
-__all__ = ["hyper_prior", "people_of", "usual_shares"]
-
 PARTICLES: Final = 500
 HYPER_DRAWS: Final = 20_000
 
@@ -32,11 +30,7 @@ class _Person(NamedTuple):
 
 
 def people_of(posteriors: Sequence[ParticlePosterior]) -> People:
-    """Equally weighted particles of some people.
-
-    Args:
-        posteriors: one a person.
-    """
+    """Equally weighted particles of some people."""
     each = [_person(posterior) for posterior in posteriors]
     blocks = {name: Block(*map(np.stack, zip(*(p.blocks[name] for p in each), strict=True))) for name in each[0].blocks}
     return People(blocks, {name: np.stack([person.kinds[name] for person in each]) for name in each[0].kinds})
@@ -60,12 +54,7 @@ def _person(posterior: ParticlePosterior) -> _Person:
 
 
 def hyper_prior(prior: Prior, space: DesignSpace) -> dict[str, HyperPrior]:
-    """Of the variance between usual people, one part is between labs, and the other between the people of a lab.
-
-    Args:
-        prior: what is believed of people in general.
-        space: the design space of the sessions.
-    """
+    """Of the variance between usual people, one part is between labs, and the other between the people of a lab."""
     drawn = prior.sample(1, HYPER_DRAWS, torch.Generator().manual_seed(0), space).values[0].double().numpy()
     sd = np.sqrt(WITHIN_A_LAB) * prior.spreads.double().numpy()
     mean_sd = np.sqrt(np.maximum(drawn.var(0) - sd**2, sd**2))  # all else by which people in general differ

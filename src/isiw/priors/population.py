@@ -16,8 +16,6 @@ import numpy as np
 
 from isiw.types import BoolArray, FloatArray, IntArray
 
-__all__ = ["Block", "HyperPrior", "Law", "People", "Population", "learnt"]
-
 SWEEPS: Final = 1200
 BURN_IN: Final = 200
 
@@ -106,14 +104,7 @@ _Normal: TypeAlias = tuple[FloatArray, FloatArray]
 def learnt(
     people: People, hyper: Mapping[str, HyperPrior], usual: Mapping[str, FloatArray], rng: np.random.Generator
 ) -> Population:
-    """Learn a law from people.
-
-    Args:
-        people: their particles.
-        hyper: the hyper-prior of each block.
-        usual: the usual shares of each discrete latent's kinds.
-        rng: source of randomness.
-    """
+    """Learn a law from people."""
     laws = {name: (np.median(block.values, axis=(0, 1)), hyper[name].sd) for name, block in people.blocks.items()}
     shares = dict(usual)
     drawn: dict[str, list[tuple[FloatArray, FloatArray, int]]] = {name: [] for name in laws}

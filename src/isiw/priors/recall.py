@@ -15,14 +15,6 @@ from isiw.models.particles.prior import Prior
 from isiw.models.protocol import Observation
 from isiw.text.commands import command
 
-__all__ = [
-    "recalled",
-    "require_meps",
-    "require_whole",
-    "stated_hit_delay_ms",
-    "too_far_apart_ms",
-]
-
 TOLD_LOSSES: Final = 3
 """Losses that an error names; isiw show lists them all."""
 
@@ -52,14 +44,7 @@ def recalled(record: SessionRecord, prior: Prior, *, particles: int = 1000) -> P
 
 
 def require_meps(record: SessionRecord) -> None:
-    """Check that there is something to learn from a session.
-
-    Args:
-        record: the session.
-
-    Raises:
-        LogError: it has no accepted trial, or none with an MEP, or what is known of rig and person cannot be read.
-    """
+    """Check that there is something to learn from a session."""
     record.require_read("seed", "strategy", "device", "visit", "subject")
     if not record.table.told:
         raise LogError(
@@ -74,14 +59,7 @@ def require_meps(record: SessionRecord) -> None:
 
 
 def require_whole(record: SessionRecord) -> None:
-    """Check that nothing is lost of a session that is learnt from: an exclusion may be among it.
-
-    Args:
-        record: the session.
-
-    Raises:
-        DamagedLogError: its log is damaged.
-    """
+    """Check that nothing is lost of a session that is learnt from: an exclusion may be among it."""
     if record.losses:
         raise DamagedLogError(
             "the log is damaged, so that what a person excluded may count as if nobody had",
@@ -92,11 +70,7 @@ def require_whole(record: SessionRecord) -> None:
 
 
 def stated_hit_delay_ms(record: SessionRecord) -> tuple[float, float] | None:
-    """Mean and SD of the hit delay that a session's strategy was told, or its rig states [ms]; None where neither is.
-
-    Args:
-        record: the session.
-    """
+    """Mean and SD of the hit delay stated by a session's strategy or its rig [ms]; None if neither states it."""
     stated = record.header.strategy.settings.get("hit_delay_ms") or record.header.device.hit_delay_ms
     return None if stated is None else mean_and_sd("the session's hit_delay_ms", stated)
 
@@ -105,9 +79,6 @@ def too_far_apart_ms(records: Sequence[SessionRecord]) -> tuple[float, float] | 
     """The least and the largest stated hit delay [ms] where they are further apart than one rig's; else None.
 
     From the valve command, the same window is as much later as a rig's taps are. Of ISIs from the impact it is None.
-
-    Args:
-        records: sessions whose ISIs count from the same event.
     """
     stated_ms = [stated_hit_delay_ms(record) for record in records if record.header.space.reference == "valve"]
     means_ms = [mean_ms for mean_ms, _ in filter(None, stated_ms)]

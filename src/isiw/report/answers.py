@@ -16,8 +16,6 @@ from isiw.report.words import counts_sentence
 from isiw.signals.values import contradicts_its_times, timed_isi_ms
 from isiw.trials import Trial
 
-__all__ = ["Answer", "answers"]
-
 _OF_TIMING: Final = frozenset({Kind.NO_IMPACT, Kind.NO_PULSE, Kind.TMS_BEFORE_IMPACT, Kind.ISI_OFF})
 MOST_NAMED: Final = 8
 """Lost trials that are named one by one."""
@@ -34,11 +32,7 @@ class Answer(NamedTuple):
 
 
 def answers(record: SessionRecord) -> list[Answer]:
-    """Which trials were lost, whether timing was right, whether the muscle was at rest, and why the session stopped.
-
-    Args:
-        record: the session.
-    """
+    """Which trials were lost, whether timing was right, whether the muscle was at rest, and why the session stopped."""
     return [_lost(record), _timing(record), _rest(record), _stopped(record)]
 
 

@@ -15,8 +15,6 @@ from isiw.report.facts import first_facts
 from isiw.report.html import rendered, write_page
 from isiw.report.words import JUDGED_SINCE, counts_sentence, finding_sentences
 
-__all__ = ["comparison_page", "save_comparison"]
-
 
 def save_comparison(
     records: Sequence[SessionRecord],

@@ -12,8 +12,6 @@ from isiw.priors.differing import Difference
 from isiw.report.words import JUDGED_SINCE
 from isiw.text import one_line
 
-__all__ = ["HEADINGS", "comparison_rows", "comparison_sentence", "comparison_table"]
-
 HEADINGS = ("session", "subject", "begun", "told", "P(window)", "window", "start", "end")
 """What the rows of the table hold."""
 
@@ -32,11 +30,7 @@ def comparison_table(records: Sequence[SessionRecord]) -> str:
 
 
 def comparison_rows(records: Sequence[SessionRecord]) -> list[tuple[str, ...]]:
-    """The cells of that table, a row a session; empty where nothing is known.
-
-    Args:
-        records: the sessions.
-    """
+    """The cells of that table, a row a session; empty where nothing is known."""
     return [_row(number, record) for number, record in enumerate(records, start=1)]
 
 

@@ -5,20 +5,11 @@ from __future__ import annotations
 from isiw.log.reader import SessionRecord
 from isiw.window import SURE, rules_out
 
-__all__ = ["depression_sentence"]
-
 THRESHOLD_PCT_RMT = 100.0
 
 
 def depression_sentence(record: SessionRecord) -> str:
-    """Where the MEP is depressed, or that the strategy does not look for it above the motor threshold.
-
-    Args:
-        record: the session, with an estimate.
-
-    Returns:
-        One sentence; empty where the strategy did not look, and the pulse is not known to be above the threshold.
-    """
+    """Where the MEP is depressed, or that the strategy does not look for it above the motor threshold."""
     stimulus = record.header.stimulus.name
     estimate, intensity_pct = record.estimates[-1], record.header.visit.intensity_pct_rmt
     if estimate.depressed_probability is not None:

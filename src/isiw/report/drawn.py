@@ -16,8 +16,6 @@ from isiw.text import plain
 from isiw.trials import Channel, Trial
 from isiw.types import FloatArray
 
-__all__ = ["drawn"]
-
 NEAR_MS: Final = (-60.0, 100.0)
 """Around the pulse, where every sample of the EMG is drawn as long as there are not too many."""
 
@@ -31,11 +29,7 @@ FINE, COARSE = 4, 3
 
 
 def drawn(record: SessionRecord) -> dict[str, Any]:
-    """A session as numbers for the browser.
-
-    Args:
-        record: the session.
-    """
+    """A session as numbers for the browser."""
     header = record.header
     beliefs = {estimate.trial: _belief(record, estimate) for estimate in record.estimates}
     return {

@@ -20,8 +20,6 @@ from isiw.trials import Trial
 from isiw.types import ArrayLike, FloatArray
 from isiw.window import Window
 
-__all__ = ["contradiction", "no_comparison", "nothing_estimated", "nothing_measured", "nothing_stood_out"]
-
 ENOUGH_ON_EACH_SIDE = 4
 NOT_CLEARLY = 0.05
 """From this p-value of a one-sided rank test on, MEPs are not clearly larger, which is said where the method itself
@@ -39,11 +37,7 @@ _WHERE = "Is the time of the pulse right? Does the MEP window fit the muscle?"
 
 
 def nothing_estimated(record: SessionRecord) -> str:
-    """What there is of a session of which no estimate can be read: that nothing was done is said only where it is so.
-
-    Args:
-        record: the session.
-    """
+    """The statement about a session without a readable estimate: "nothing was done" only if nothing was."""
     completed, given = len(record.table), record.given
     pulses = f"{counted(given, 'pulse was', 'pulses were')} given, or may have been"
     if completed:
@@ -59,11 +53,7 @@ def _damage(record: SessionRecord) -> str:
 
 
 def nothing_measured(record: SessionRecord) -> str | None:
-    """That too little was measured to speak of a window, and why; None where there was enough.
-
-    Args:
-        record: the session.
-    """
+    """That too little was measured to speak of a window, and why; None where there was enough."""
     if record.rests_on_data:
         return None
     given, told = record.given, len(record.table.told)
@@ -90,13 +80,7 @@ def _background(lost: Sequence[Trial]) -> str:
 
 
 def contradiction(window: Window | None, trials: Sequence[Trial], *, without_probability: bool = False) -> str | None:
-    """That the MEPs inside a reported window are no larger than those outside; None where they are, or are too few.
-
-    Args:
-        window: the reported window; None where none is.
-        trials: the trials that count.
-        without_probability: whether the method gives none: then it is said too where they are not clearly larger.
-    """
+    """That the MEPs inside a reported window are no larger than those outside; None where they are, or are too few."""
     if window is None:
         return None
     inside, outside = _inside_and_outside(window, trials)
@@ -117,12 +101,7 @@ def contradiction(window: Window | None, trials: Sequence[Trial], *, without_pro
 
 
 def p_of_larger(inside: Sequence[float], outside: Sequence[float]) -> float:
-    """The p-value of a one-sided Mann-Whitney test, by its normal approximation: SciPy would take a second to import.
-
-    Args:
-        inside: amplitudes that may be the larger ones.
-        outside: the others.
-    """
+    """The p-value of a one-sided Mann-Whitney test, by its normal approximation (SciPy takes a second to import)."""
     count, pairs = len(inside) + len(outside), len(inside) * len(outside)
     tied = _tied([*inside, *outside])
     error = math.sqrt(pairs / 12 * (count + 1 - float((tied**3 - tied).sum()) / (count * (count - 1))))
@@ -135,10 +114,6 @@ def changed_with_time(window: Window | None, trials: Sequence[Trial]) -> str | N
 
     A window can be found in that alone, as ISIs are not asked in random order. Kendall's test of amplitude against
     order, within and outside the window, combined by Stouffer's method.
-
-    Args:
-        window: the reported window; None where none is.
-        trials: the trials that count.
     """
     if window is None:
         return None
@@ -159,11 +134,7 @@ def changed_with_time(window: Window | None, trials: Sequence[Trial]) -> str | N
 
 
 def growth(meps_mv: ArrayLike) -> float:
-    """Kendall's statistic of amplitude against order [standard errors], corrected for ties and for continuity.
-
-    Args:
-        meps_mv: amplitudes in their order, not all equal.
-    """
+    """Kendall's statistic of amplitude against order [standard errors], corrected for ties and for continuity."""
     tied, n = _tied(meps_mv), np.size(meps_mv)
     larger_later = float(np.triu(np.sign(np.subtract.outer(meps_mv, meps_mv)).T).sum())
     variance = (n * (n - 1) * (2 * n + 5) - float((tied * (tied - 1) * (2 * tied + 5)).sum())) / 18
@@ -185,10 +156,6 @@ def nothing_stood_out(trials: Sequence[Trial], window_ms: tuple[float, float] | 
 
     A muscle that the pulse alone does not reach looks like this, and so do a stimulator that does not fire and an MEP
     outside the window that it is sought in.
-
-    Args:
-        trials: the trials that count.
-        window_ms: where the MEP was sought [ms after the pulse]; None where the device itself measured it.
     """
     known = [trial for trial in trials if trial.mep_mv is not None and trial.background_rms_uv]
     stood_out = [one.stands_out for one in told_of(known)]
@@ -207,12 +174,7 @@ def _sought(window_ms: tuple[float, float]) -> str:
 
 
 def no_comparison(window: Window | None, trials: Sequence[Trial]) -> str | None:
-    """That hardly a trial shows the MEP outside a reported window; None where some do, or few are inside.
-
-    Args:
-        window: the reported window; None where none is.
-        trials: the trials that count.
-    """
+    """That hardly a trial shows the MEP outside a reported window; None where some do, or few are inside."""
     if window is None:
         return None
     inside, outside = _inside_and_outside(window, trials)

@@ -10,8 +10,6 @@ from typing import Any, NamedTuple
 from isiw.devices.limits import Limits
 from isiw.log.reader import SessionRecord
 
-__all__ = ["Fact", "first_facts", "further_facts", "settings_facts"]
-
 
 class Fact(NamedTuple):
     """One thing that is known of a session."""
@@ -41,11 +39,7 @@ def first_facts(record: SessionRecord) -> list[Fact]:
 
 
 def further_facts(record: SessionRecord) -> list[Fact]:
-    """The rest of what the log's header says: visit, ISIs, judgement, protocol.
-
-    Args:
-        record: the session.
-    """
+    """The rest of what the log's header says: visit, ISIs, judgement, protocol."""
     header = record.header
     groups = {
         "visit": header.visit,
@@ -67,11 +61,7 @@ def further_facts(record: SessionRecord) -> list[Fact]:
 
 
 def settings_facts(record: SessionRecord) -> list[Fact]:
-    """The strategy's settings, those of a group with dots, as a configuration can have them.
-
-    Args:
-        record: the session.
-    """
+    """The strategy's settings, those of a group with dots, as a configuration can have them."""
     return [
         Fact(key, json.dumps(value, ensure_ascii=False))
         for key, value in _flat(record.header.strategy.settings).items()

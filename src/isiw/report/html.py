@@ -14,23 +14,12 @@ from isiw.errors import ConfigError, InvalidValueError
 from isiw.log.outputs import check_output, write_output
 from isiw.text import plain
 
-__all__ = ["asset", "library", "rendered", "write_page"]
-
 _ASSETS: Final = resources.files("isiw.report") / "assets"
 _SUFFIXES: Final = {".html", ".htm"}
 
 
 def write_page(path: str | Path, page: Callable[[], str], *, overwrite: bool = False) -> Path:
-    """Write a page into a file, which is checked before the page is made.
-
-    Args:
-        path: where to, .html or .htm.
-        page: makes the page.
-        overwrite: whether to replace a file that is there; a log never is.
-
-    Raises:
-        InvalidValueError: another suffix, or a file that is not to be replaced.
-    """
+    """Write a page into a file, which is checked before the page is made."""
     if Path(path).suffix.lower() not in _SUFFIXES:
         raise InvalidValueError("a page is for a browser", got=str(path), expected="a path that ends in .html")
     check_output(path, overwrite=overwrite)
@@ -38,16 +27,7 @@ def write_page(path: str | Path, page: Callable[[], str], *, overwrite: bool = F
 
 
 def rendered(template: str, scripts: Sequence[str] = (), **contents: Any) -> str:
-    """A page; its policy lets no script run but these, and nothing be fetched.
-
-    Args:
-        template: the template's file.
-        scripts: what the page runs.
-        **contents: what the template shows.
-
-    Raises:
-        ConfigError: jinja2 is not installed.
-    """
+    """A page; its policy lets no script run but these, and nothing be fetched."""
     jinja2 = library("jinja2")
     environment = jinja2.Environment(
         loader=jinja2.FunctionLoader(asset),
@@ -72,11 +52,7 @@ def asset(name: str) -> str:
 
 
 def library(name: str) -> Any:
-    """A library of the extra `report`.
-
-    Raises:
-        ConfigError: it is not installed.
-    """
+    """A library of the extra `report`."""
     try:
         return importlib.import_module(name)
     except ModuleNotFoundError as error:

@@ -24,8 +24,6 @@ from isiw.report.tables import counted_rows, event_rows, lost_rows, trial_row
 from isiw.report.words import finding_sentences, fit_sentence
 from isiw.window import Window
 
-__all__ = ["report_page", "save_report"]
-
 
 def save_report(
     record: SessionRecord, path: str | Path, *, truth: Window | None = None, overwrite: bool = False

@@ -13,8 +13,6 @@ from isiw.session.progress import asked, outcome
 from isiw.text.stimuli import TAP, StimulusWords
 from isiw.trials import Trial
 
-__all__ = ["Counted", "TrialRow", "counted_rows", "event_rows", "lost_rows", "trial_row"]
-
 
 class TrialRow(NamedTuple):
     """A trial in words."""
@@ -36,12 +34,7 @@ class Counted(NamedTuple):
 
 
 def trial_row(trial: Trial, first: StimulusWords = TAP) -> TrialRow:
-    """One trial of the table of all trials.
-
-    Args:
-        trial: the trial.
-        first: what the conditioning stimulus is called.
-    """
+    """One trial of the table of all trials."""
     return TrialRow(
         trial.index,
         asked(trial, first),
@@ -61,11 +54,7 @@ def _remark(trial: Trial, first: StimulusWords) -> str:
 
 
 def lost_rows(record: SessionRecord) -> list[tuple[int, str, str]]:
-    """Trials that do not count: number, what was asked, and why; those of unknown outcome too.
-
-    Args:
-        record: the session.
-    """
+    """Trials that do not count: number, what was asked, and why; those of unknown outcome too."""
     said = {event.trial: event.text for event in record.events if event.kind == "exclusion"}
     lost = [trial for trial in (*record.table, *record.unknown_trials) if not trial.counts]
     return sorted((t.index, asked(t, record.header.stimulus), _why(t, said.get(t.index, ""))) for t in lost)
@@ -76,20 +65,12 @@ def _why(trial: Trial, said: str) -> str:
 
 
 def event_rows(record: SessionRecord) -> list[tuple[str, str, str]]:
-    """Events in the order in which they were logged: the trial before or about which, the kind, and the text.
-
-    Args:
-        record: the session.
-    """
+    """Events in the order in which they were logged: the trial before or about which, the kind, and the text."""
     return [("–" if event.trial is None else str(event.trial), event.kind, event.text) for event in record.events]
 
 
 def counted_rows(record: SessionRecord) -> list[Counted]:
-    """What was delivered against what the limits allow.
-
-    Args:
-        record: the session.
-    """
+    """What was delivered against what the limits allow."""
     limits, kinds = record.header.limits, Counter(event.kind for event in record.events)
     wanted_ms = [trial.commanded_isi_ms for trial in record.table] + [intent.isi_ms for intent in record.unknown]
     isis_ms = [isi_ms for isi_ms in wanted_ms if isi_ms is not None]

@@ -27,18 +27,6 @@ from isiw.text.commands import command
 from isiw.text.numbers import counted
 from isiw.window import MIN_EXCESS_MV, SURE, Window, rules_out
 
-__all__ = [
-    "JUDGED_SINCE",
-    "TRIAL_HEADINGS",
-    "counts_sentence",
-    "final_statement",
-    "finding_sentence",
-    "finding_sentences",
-    "fit_sentence",
-    "trial_rows",
-    "truth_sentence",
-]
-
 TRIAL_HEADINGS = ("trial", "asked", "outcome", "realised")
 """What `trial_rows` hold."""
 
@@ -93,11 +81,7 @@ def final_statement(record: SessionRecord, config: Path | None = None) -> str:
 
 
 def finding_sentences(record: SessionRecord) -> list[str]:
-    """Whether there is a window, which, and how sure that is.
-
-    Args:
-        record: the session.
-    """
+    """Whether there is a window, which, and how sure that is."""
     if not record.estimates:
         return [nothing_estimated(record)]
     space, nothing, estimate = record.header.space, nothing_measured(record), record.estimates[-1]
@@ -126,12 +110,7 @@ def _mep_window_ms(record: SessionRecord) -> tuple[float, float] | None:
 
 
 def finding_sentence(record: SessionRecord, estimate: Estimate) -> str:
-    """Whether there is a window, and which.
-
-    Args:
-        record: the session.
-        estimate: what is believed at some time of it.
-    """
+    """Whether there is a window, and which."""
     window, probability = estimate.window, estimate.probability
     if probability is None:
         return _without_probability(record, estimate)
@@ -236,11 +215,7 @@ def _between(interval: tuple[float | None, float | None], space: DesignSpace) ->
 
 
 def counts_sentence(record: SessionRecord) -> str:
-    """How many stimuli were delivered, how many count, and why the others do not.
-
-    Args:
-        record: the session.
-    """
+    """How many stimuli were delivered, how many count, and why the others do not."""
     mistrials = Counter(str(trial.reason) for trial in record.table if trial.reason is not None)
     excluded = sum(trial.excluded for trial in record.table)
     unknown = len(record.unknown)
@@ -265,11 +240,7 @@ def _controls(record: SessionRecord) -> str:
 
 
 def fit_sentence(record: SessionRecord) -> str:
-    """In how many trials the fit had trouble; empty where it never had.
-
-    Args:
-        record: the session.
-    """
+    """In how many trials the fit had trouble; empty where it never had."""
     troubled = len({event.trial for event in record.events if event.kind == "fit"})
     return f"The fit had trouble in {troubled} of {len(record.table)} trials; isiw show lists them." if troubled else ""
 

@@ -11,20 +11,6 @@ from isiw.log.schema import Estimate, Number, Numbers
 from isiw.strategy.stopping import StopDecision
 from isiw.trials import Status, Trial
 
-__all__ = [
-    "AskAnswer",
-    "DecisionAnswer",
-    "Error",
-    "ErrorAnswer",
-    "EstimateAnswer",
-    "OkAnswer",
-    "SessionAnswer",
-    "SessionsAnswer",
-    "TrialAnswer",
-    "TrialRow",
-    "TrialsAnswer",
-]
-
 
 class _Answer(BaseModel):
     model_config = ConfigDict(frozen=True, ser_json_inf_nan="strings")
@@ -118,13 +104,7 @@ class TrialAnswer(OkAnswer):
 
     @classmethod
     def of(cls, trial: Trial, decision: StopDecision, doubts: list[str]) -> Self:
-        """The answer about a trial.
-
-        Args:
-            trial: the trial.
-            decision: whether to stop after it.
-            doubts: what looked like a slip.
-        """
+        """The answer about a trial."""
         return cls(
             trial=trial.index,
             status=trial.status,
@@ -183,13 +163,7 @@ class EstimateAnswer(OkAnswer):
 
     @classmethod
     def of(cls, estimate: Estimate, too_little: str | None = None) -> Self:
-        """The answer of an estimate as a log has it.
-
-        Args:
-            estimate: the estimate.
-            too_little: that too little was measured to speak of a window, in words; then it names none, and gives the
-                expected MEP alone.
-        """
+        """The answer of an estimate as a log has it."""
         if too_little is None:
             return cls.model_validate({"text": str(estimate), **estimate.model_dump()})
         profile = {"grid_ms", "profile_mv", "band_low_mv", "band_high_mv"}

@@ -21,8 +21,6 @@ from isiw.server.routes import router
 from isiw.server.sessions import Sessions
 from isiw.text.expected import expected_instead
 
-__all__ = ["guarded", "make_app"]
-
 
 def make_app(folder: str | Path, rules: Rules) -> FastAPI:
     """The application that serves the sessions of a folder.
@@ -49,12 +47,7 @@ def make_app(folder: str | Path, rules: Rules) -> FastAPI:
 
 
 def guarded(app: FastAPI, rules: Rules) -> None:
-    """Put an application behind the guard, and answer every error in words.
-
-    Args:
-        app: the application.
-        rules: who may ask, and how much they may send.
-    """
+    """Put an application behind the guard, and answer every error in words."""
     app.add_middleware(Guard, rules=rules)
     for kind, handler in _HANDLERS.items():
         app.add_exception_handler(kind, handler)

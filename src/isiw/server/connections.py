@@ -23,8 +23,6 @@ from uvicorn.server import ServerState
 from isiw.server.guard import Rules, wants_200
 from isiw.server.refusals import Refusal, answered
 
-__all__ = ["Connection", "Connections"]
-
 TAKING_S: Final = 30.0
 """How long a client may take nothing of what it is sent [s]."""
 
@@ -33,12 +31,7 @@ PIECE: Final = 2**16
 
 
 class Connections:
-    """The open connections of a server; called by uvicorn, it makes the protocol of a new one.
-
-    Args:
-        rules: the token, how many connections there may be, and how long their heads may take.
-        tls: what they are encrypted by; None where they are not.
-    """
+    """The open connections of a server; called by uvicorn, it makes the protocol of a new one."""
 
     def __init__(self, rules: Rules, tls: ssl.SSLContext | None = None) -> None:
         self.rules, self.tls = rules, tls
@@ -67,12 +60,7 @@ class Connections:
         self.known.discard(connection)
 
     def lets_in(self, connection: Connection, path: str) -> bool:
-        """Whether there is room for a connection that has shown the token, or its request is urgent.
-
-        Args:
-            connection: the connection.
-            path: of the request.
-        """
+        """Whether there is room for a connection that has shown the token, or its request is urgent."""
         room = len(self.known) < self.rules.most_known
         if room or path in self.rules.urgent_paths:
             self.leave(connection)
@@ -82,15 +70,7 @@ class Connections:
 
 
 class Connection(H11Protocol):
-    """One connection: uvicorn's protocol for HTTP/1.1, with deadlines, and words where it has none.
-
-    Args:
-        others: all connections.
-        config: uvicorn's.
-        server_state: uvicorn's.
-        app_state: uvicorn's.
-        loop: the event loop.
-    """
+    """One connection: uvicorn's protocol for HTTP/1.1, with deadlines, and words where it has none."""
 
     def __init__(
         self,

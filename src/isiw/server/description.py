@@ -22,8 +22,6 @@ from isiw.server.requests import (
     TellRequest,
 )
 
-__all__ = ["described"]
-
 _BODIES: Final[dict[str, type[BaseModel]]] = {
     "/sessions": CreateRequest,
     "/sessions/{id}/resume": ResumeRequest,
@@ -43,11 +41,7 @@ _ABOUT: Final = (
 
 
 def described(app: FastAPI) -> dict[str, Any]:
-    """The description of an application's routes.
-
-    Args:
-        app: the application.
-    """
+    """The description of an application's routes."""
     if app.openapi_schema is None:
         document = get_openapi(title=app.title, version=app.version, description=_ABOUT, routes=app.routes)
         _, definitions = models_json_schema(

@@ -18,8 +18,6 @@ from isiw.session.recorder import Recorder
 from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.trials import Status, Trial
 
-__all__ = ["DrivenSession", "not_open"]
-
 BUSY_S: Final = 5.0
 """How long a call waits for the one before it."""
 
@@ -28,15 +26,7 @@ _HARMLESS: Final = (Refusal, InvalidValueError, LimitExceededError)
 
 
 class DrivenSession:
-    """An open session; every call is made within `alone`.
-
-    Args:
-        name: its id.
-        subject: the person's code.
-        recorder: the session.
-        doubts: what its recorder doubts is put in here.
-        record: its log, where it goes on.
-    """
+    """An open session; every call is made within `alone`."""
 
     def __init__(
         self, name: str, subject: str, recorder: Recorder, doubts: list[str], record: SessionRecord | None = None
@@ -54,11 +44,7 @@ class DrivenSession:
 
     @contextmanager
     def alone(self) -> Iterator[None]:
-        """Within, no other call drives the session. What fails otherwise than by a wrong value or a limit closes it.
-
-        Raises:
-            Refusal: it is busy, or was closed, or a trial is on disk and could not be learnt.
-        """
+        """Within, no other call drives the session. What fails otherwise than by a wrong value or a limit closes it."""
         if not self._lock.acquire(timeout=BUSY_S):
             raise Refusal(409, "Busy", "the session is busy with another call", got=self.name, retry_s=1.0)
         try:
@@ -117,14 +103,7 @@ class DrivenSession:
         return EstimateAnswer.of(Estimate.of(0, estimate, self.recorder.decision(), None), estimate.too_little)
 
     def require_no_wait(self, most_s: float) -> None:
-        """Raise where the next stimulus is not allowed soon.
-
-        Args:
-            most_s: how long may be waited [s].
-
-        Raises:
-            Refusal: it takes longer.
-        """
+        """Raise where the next stimulus is not allowed soon."""
         wait_s = self.recorder.wait_s()
         if wait_s > most_s:
             raise Refusal(
@@ -136,12 +115,7 @@ class DrivenSession:
             )
 
     def ask(self, request: AskRequest) -> AskAnswer:
-        """The next ISI; that of an open trial only to who names the trial, as it may have been delivered.
-
-        Raises:
-            Refusal: a trial is open, or another one comes next, or it is too early.
-            LimitExceededError: a limit is reached.
-        """
+        """The next ISI; that of an open trial only to who names the trial, as it may have been delivered."""
         asked, comes_next = self.recorder.asked, len(self.recorder.trials)
         if asked is not None and asked.isi_ms is None:
             raise Refusal(
@@ -168,12 +142,7 @@ class DrivenSession:
         return AskAnswer(trial=comes_next, isi_ms=isi_ms, again=asked is not None)
 
     def tell(self, request: TellRequest) -> TrialAnswer:
-        """What came of a trial; told again it is answered as at first.
-
-        Raises:
-            Refusal: the trial has another outcome, or was not asked for.
-            InvalidValueError: a value that cannot be.
-        """
+        """What came of a trial; told again it is answered as at first."""
         if request.trial in self._outcomes:
             return self._known(request.trial, _told(request), f"isi_ms={request.isi_ms} mep_mv={request.mep_mv}")
         self._require_next(request.trial, asked=request.isi_ms is not None)
@@ -186,11 +155,7 @@ class DrivenSession:
         return self._concluded()
 
     def mistrial(self, request: MistrialRequest) -> TrialAnswer:
-        """That a trial is lost; told again it is answered as at first.
-
-        Raises:
-            Refusal: the trial has another outcome, or was not asked for.
-        """
+        """That a trial is lost; told again it is answered as at first."""
         if request.trial in self._outcomes:
             return self._known(request.trial, (Kind.of_mistrial(request.reason),), f"mistrial, {request.reason}")
         self._require_next(request.trial, asked=True)
@@ -208,20 +173,12 @@ class DrivenSession:
         self.recorder.note(request.text, key=request.key)
 
     def exclude(self, request: ExcludeRequest) -> None:
-        """Let a trial not count; one that is excluded already stays so.
-
-        Raises:
-            InvalidValueError: no trial that counts has this number.
-        """
+        """Let a trial not count; one that is excluded already stays so."""
         if not any(trial.index == request.trial and trial.excluded for trial in self.recorder.trials):
             self.recorder.exclude(request.trial, request.reason)
 
     def include(self, trial: int) -> None:
-        """Let a trial count again; one that counts already does so.
-
-        Raises:
-            InvalidValueError: no such trial, or a mistrial.
-        """
+        """Let a trial count again; one that counts already does so."""
         if not any(known.index == trial and known.counts for known in self.recorder.trials):
             self.recorder.include(trial)
 

@@ -16,8 +16,6 @@ from isiw.checks import check_numbers, check_texts, check_wholes
 from isiw.errors import InvalidValueError
 from isiw.server.refusals import Refusal, answered
 
-__all__ = ["LOOPBACK", "Guard", "Rules", "wants_200"]
-
 LOOPBACK: Final = frozenset({"127.0.0.1", "localhost", "::1"})
 """The names under which a computer reaches itself."""
 
@@ -76,12 +74,7 @@ class Rules:
 
 
 class Guard:
-    """Lets through what the rules allow, with its whole body; everything else is answered here.
-
-    Args:
-        app: the routes behind it.
-        rules: what is let through.
-    """
+    """Lets through what the rules allow, with its whole body; everything else is answered here."""
 
     def __init__(self, app: ASGIApp, rules: Rules) -> None:
         self._app, self._rules = app, rules

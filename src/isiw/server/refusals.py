@@ -12,24 +12,11 @@ from isiw.errors import IsiwError, LimitExceededError, LogError, RequestError, t
 from isiw.server.answers import Error, ErrorAnswer
 from isiw.text import plain
 
-__all__ = ["Refusal", "answered", "as_refusal", "failed"]
-
 _LONGEST_VALUE: Final = 200
 
 
 class Refusal(RequestError):  # noqa: N818 - an answer as much as an error
-    """A request that is refused.
-
-    Args:
-        status: the HTTP status of the answer.
-        kind: what kind of refusal, for the client's software.
-        what: what is wrong, as a sentence without a full stop.
-        got: the offending value, if there is one.
-        expected: what would have been accepted.
-        remedy: the way out.
-        field: the field that it is about.
-        retry_s: after which time the same request will be answered [s]; None where time does not help.
-    """
+    """A request that is refused."""
 
     def __init__(
         self,
@@ -48,11 +35,7 @@ class Refusal(RequestError):  # noqa: N818 - an answer as much as an error
 
 
 def as_refusal(error: BaseException) -> Refusal:
-    """Any error as a refusal.
-
-    Args:
-        error: what was raised.
-    """
+    """Any error as a refusal."""
     if isinstance(error, Refusal):
         return error
     if isinstance(error, IsiwError):
@@ -63,11 +46,7 @@ def as_refusal(error: BaseException) -> Refusal:
 
 
 def failed(error: BaseException) -> Refusal:
-    """The answer where the server has failed, and the request is not at fault.
-
-    Args:
-        error: what it failed with.
-    """
+    """The answer where the server has failed, and the request is not at fault."""
     return Refusal(
         500,
         "InternalError",
@@ -77,13 +56,7 @@ def failed(error: BaseException) -> Refusal:
 
 
 def answered(refusal: Refusal, *, as_200: bool = False, headers: Mapping[str, str] | None = None) -> Response:
-    """The answer to a request that is refused.
-
-    Args:
-        refusal: why.
-        as_200: whether the client can read the words of an answer with status 200 only.
-        headers: of the answer.
-    """
+    """The answer to a request that is refused."""
     error = Error(
         type=refusal.kind,
         status=refusal.status,

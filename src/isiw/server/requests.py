@@ -19,22 +19,6 @@ from isiw.server.refusals import Refusal
 from isiw.text.expected import UNKNOWN, expected_instead, first_to_tell, known_keys, meant_instead
 from isiw.visit import VisitProtocol
 
-__all__ = [
-    "FORM",
-    "JSON",
-    "NAME",
-    "AskRequest",
-    "CreateRequest",
-    "ExcludeRequest",
-    "GoOnRequest",
-    "IncludeRequest",
-    "MistrialRequest",
-    "NoteRequest",
-    "ResumeRequest",
-    "TellRequest",
-    "body_of",
-]
-
 FORM: Final = "application/x-www-form-urlencoded"
 JSON: Final = "application/json"
 
@@ -148,11 +132,7 @@ class GoOnRequest(_Request):
 
 
 def body_of(kind: type[_Kind]) -> Callable[[Request], Awaitable[_Kind]]:
-    """A dependency of a route: its body as a request of this kind.
-
-    Args:
-        kind: the kind of request.
-    """
+    """A dependency of a route: its body as a request of this kind."""
 
     async def body(request: Request) -> _Kind:
         return _read(kind, request.headers.get("content-type", ""), await request.body())

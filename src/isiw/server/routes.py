@@ -41,8 +41,6 @@ from isiw.server.requests import (
 )
 from isiw.server.sessions import Sessions
 
-__all__ = ["router"]
-
 POLL_S: Final = 0.1
 QUIET_S: Final = 15.0
 """After so long without a trial, a client that follows is told that the server is still there [s]."""

@@ -21,8 +21,6 @@ from isiw.server.app import make_app
 from isiw.server.connections import Connections
 from isiw.server.guard import LOOPBACK, Rules
 
-__all__ = ["Server", "ServerSettings", "listening", "new_token", "serve", "settings_of"]
-
 PORT: Final = 8473
 
 _LEAVING_S: Final = 2
@@ -145,14 +143,7 @@ class Server(uvicorn.Server):
 def settings_of(
     app: FastAPI, rules: Rules, tls: ssl.SSLContext | None = None, *, log_level: str = "error"
 ) -> uvicorn.Config:
-    """How uvicorn serves an application of isiw.
-
-    Args:
-        app: the application.
-        rules: who may ask.
-        tls: what connections are encrypted by.
-        log_level: from which level on uvicorn's own messages are printed.
-    """
+    """How uvicorn serves an application of isiw."""
     return uvicorn.Config(
         app,
         http=Connections(rules, tls),  # type: ignore[arg-type] # as much a maker of protocols as their class is
@@ -168,15 +159,7 @@ def settings_of(
 
 
 def listening(address: ipaddress.IPv4Address | ipaddress.IPv6Address, port: int) -> socket.socket:
-    """A socket that listens.
-
-    Args:
-        address: where.
-        port: the port; 0 for any that is free.
-
-    Raises:
-        ConfigError: the port is taken, or the address is not this computer's.
-    """
+    """A socket that listens."""
     family = socket.AF_INET6 if address.version == 6 else socket.AF_INET
     try:
         listener = socket.create_server((str(address), port), family=family, backlog=_WAITING)

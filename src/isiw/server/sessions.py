@@ -25,20 +25,11 @@ from isiw.session.operator import alarm
 from isiw.session.replay import strategy_of
 from isiw.strategy.catalogue import make_strategy
 
-__all__ = ["Sessions"]
-
 MOST_OPEN: Final = 20
 
 
 class Sessions:
-    """The sessions of a folder. Safe to use from several threads.
-
-    Args:
-        folder: where their logs are; made where it is missing.
-
-    Raises:
-        InvalidValueError: it cannot be made.
-    """
+    """The sessions of a folder. Safe to use from several threads."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = made_folder(folder).resolve()
@@ -54,14 +45,7 @@ class Sessions:
         return [SessionEntry(id=name, open=name in opened) for name in sorted(found) if re.fullmatch(NAME, name)]
 
     def opened(self, name: str) -> DrivenSession:
-        """An open session.
-
-        Args:
-            name: its id.
-
-        Raises:
-            Refusal: there is none, or it is not open.
-        """
+        """An open session."""
         with self._lock:
             session = self._open.get(name)
         if session is not None:
@@ -71,14 +55,7 @@ class Sessions:
 
     @contextmanager
     def driving(self, name: str) -> Iterator[DrivenSession]:
-        """Within, nobody else drives an open session.
-
-        Args:
-            name: its id.
-
-        Raises:
-            Refusal: there is none, or it is not open, or busy.
-        """
+        """Within, nobody else drives an open session."""
         session = self.opened(name)
         try:
             with session.alone():
@@ -88,15 +65,7 @@ class Sessions:
                 self._forget(session)
 
     def create(self, request: CreateRequest) -> SessionAnswer:
-        """Begin a session; the same request once more is answered as at first, as long as nothing was asked for.
-
-        Args:
-            request: its id, and the sections of its configuration.
-
-        Raises:
-            Refusal: there is another session with this id.
-            IsiwError: its strategy cannot be made, or its log not written.
-        """
+        """Begin a session; the same request once more is answered as at first, as long as nothing was asked for."""
         path = self._path(request.id)
         if log_exists(path):
             self._require_same_beginning(request)
@@ -105,16 +74,7 @@ class Sessions:
             return self._begin(request)
 
     def resume(self, name: str, lost_pulses: int | None = None) -> SessionAnswer:
-        """Go on with a session; what was asked for and has no outcome becomes a mistrial, as nobody knows of it.
-
-        Args:
-            name: its id.
-            lost_pulses: as for `isiw.open_session`.
-
-        Raises:
-            Refusal: there is no such session.
-            IsiwError: its log cannot be read or written, or its strategy not made again.
-        """
+        """Go on with a session; what was asked for and has no outcome becomes a mistrial, as nobody knows of it."""
         if self._is_open(name):
             with self.driving(name) as session:
                 session.give_up()
@@ -126,13 +86,6 @@ class Sessions:
         """Close a session; one that is closed already stays so.
 
         One that was open when its server was killed is resumed first, so that its log is finished, too.
-
-        Args:
-            name: its id.
-
-        Raises:
-            Refusal: there is no such session, or it is busy.
-            IsiwError: its log cannot be closed, or, after a server was killed, not gone on with.
         """
         if not self._is_open(name) and part_of(self._existing(name)).exists():
             self.resume(name)
@@ -151,11 +104,7 @@ class Sessions:
                     alarm(f"The session {name} was not closed ({told(error)}). It can be resumed.")
 
     def stands(self, name: str) -> SessionAnswer:
-        """How a session stands, open or not.
-
-        Args:
-            name: its id.
-        """
+        """How a session stands, open or not."""
         if self._is_open(name):
             with self.driving(name) as session:
                 return session.stands()
@@ -174,25 +123,14 @@ class Sessions:
         )
 
     def trials(self, name: str) -> list[TrialRow]:
-        """The trials of a session, open or not.
-
-        Args:
-            name: its id.
-        """
+        """The trials of a session, open or not."""
         if self._is_open(name):
             with self.driving(name) as session:
                 return session.trials()
         return [TrialRow.of(trial) for trial in self.record(name).table]
 
     def estimate(self, name: str) -> EstimateAnswer:
-        """What is believed about the window, in a session that is open or not.
-
-        Args:
-            name: its id.
-
-        Raises:
-            Refusal: it is not open, and nothing was told.
-        """
+        """What is believed about the window, in a session that is open or not."""
         if self._is_open(name):
             with self.driving(name) as session:
                 return session.estimate()
@@ -202,20 +140,12 @@ class Sessions:
         return EstimateAnswer.of(record.estimates[-1], record.too_little)
 
     def decision(self, name: str) -> DecisionAnswer:
-        """Whether to stop a session, and why.
-
-        Args:
-            name: its id.
-        """
+        """Whether to stop a session, and why."""
         stands = self.stands(name)
         return DecisionAnswer(stop=stands.stop, reason=stands.reason)
 
     def record(self, name: str) -> SessionRecord:
-        """What is in a session's log by now.
-
-        Args:
-            name: its id.
-        """
+        """What is in a session's log by now."""
         return read_session(self._existing(name))
 
     def _is_open(self, name: str) -> bool:
@@ -290,11 +220,7 @@ class Sessions:
                 del self._open[session.name]
 
     def _path(self, name: str) -> Path:
-        """Where the log of a session is, which is in the folder itself whatever its name.
-
-        Raises:
-            Refusal: no possible name, or a link out of the folder.
-        """
+        """Where the log of a session is, which is in the folder itself whatever its name."""
         if not re.fullmatch(NAME, name):
             raise Refusal(404, "NoSuchSession", "there is no such session", got=name)
         path = self._folder / f"{name}.mcap"

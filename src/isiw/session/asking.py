@@ -9,8 +9,6 @@ from typing import Final
 
 from isiw.errors import InvalidValueError
 
-__all__ = ["Asking"]
-
 _NAP_S: Final = 0.05
 
 

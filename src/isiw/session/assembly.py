@@ -27,8 +27,6 @@ from isiw.signals.watch import Watch
 from isiw.strategy.strategy import Strategy
 from isiw.visit import Visit, VisitProtocol
 
-__all__ = ["Options", "Parts", "ResumeOptions"]
-
 
 class ResumeOptions(TypedDict, total=False):
     """What can be said of a session that begins, and otherwise than before of one that is resumed."""

@@ -16,8 +16,6 @@ from isiw.session.terminal import ERASED, ESCAPE, Keys, Screen, is_terminal
 from isiw.session.updates import SessionUpdate
 from isiw.trials import TrialTable
 
-__all__ = ["KEYS", "Desk", "Operated"]
-
 KEYS: Final = (
     "p pause, x exclude the last trial, u undo that, n note, ? these keys,\n"
     "a accept or j reject the last MEP, Ctrl-C pause, Ctrl-C twice end"
@@ -43,12 +41,7 @@ class Operated(Protocol):
         """Log a remark."""
 
     def exclude(self, trial: int, reason: str = "") -> None:
-        """Let a trial not count.
-
-        Args:
-            trial: its number.
-            reason: why.
-        """
+        """Let a trial not count."""
 
     def include(self, trial: int) -> None:
         """Let an excluded trial count again."""
@@ -61,16 +54,7 @@ class Operated(Protocol):
 
 
 class Desk:
-    """Turns keys into what a session does, and answers it when it has paused.
-
-    Args:
-        session: what is operated.
-        asking: whether a paused session goes on; others may answer, too.
-
-    Attributes:
-        shown: the trial whose row the operator saw last, which is what the keys mean, since a later one may have been
-            delivered; None where no row was shown.
-    """
+    """Turns keys into what a session does, and answers it when it has paused."""
 
     def __init__(self, session: Operated, asking: Asking | None = None) -> None:
         self._session, self.screen, self._asking = session, Screen(), asking or Asking()
@@ -106,11 +90,7 @@ class Desk:
         self._left_alone = True
 
     def goes_on(self, reason: str) -> bool:
-        """Wait for the key that says whether a paused session goes on.
-
-        Args:
-            reason: why it has paused.
-        """
+        """Wait for the key that says whether a paused session goes on."""
         self.screen.say(f"{reason} The device is disarmed. r goes on, q ends the session, which can be resumed later.")
         if self.shown is not None and self.shown != (last := self._session.trials[-1].index):
             self.shown = last
@@ -123,21 +103,11 @@ class Desk:
         return self._asking.wait(lambda: self._left_alone)
 
     def show(self, row: str, standing: str) -> None:
-        """Show a row of the table, and below it how the session stands.
-
-        Args:
-            row: the row.
-            standing: how it stands, in a line.
-        """
+        """Show a row of the table, and below it how the session stands."""
         self.screen.say(row, standing)
 
     def count_down(self, left_s: float, text: str) -> None:
-        """Show how long a wait still lasts, where it is worth it.
-
-        Args:
-            left_s: how long [s].
-            text: what is waited for.
-        """
+        """Show how long a wait still lasts, where it is worth it."""
         left = round(left_s)
         if (left_s >= _WORTH_COUNTING_S or self._counted is not None) and left != self._counted:
             self._counted = left
@@ -151,11 +121,7 @@ class Desk:
             self.screen.counted_down()
 
     def press(self, key: str) -> None:
-        """Do what a key stands for, or take it for the note that is being typed.
-
-        Args:
-            key: a character.
-        """
+        """Do what a key stands for, or take it for the note that is being typed."""
         try:
             if self._note is not None:
                 self._type(self._note, key)

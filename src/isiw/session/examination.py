@@ -24,8 +24,6 @@ from isiw.strategy.strategy import Strategy
 from isiw.trials import Trial, TrialTable
 from isiw.types import FloatArray
 
-__all__ = ["WindowExamination", "believed", "learn", "relearned"]
-
 P = ParamSpec("P")
 T = TypeVar("T")
 TrialT = TypeVar("TrialT")
@@ -71,15 +69,7 @@ def _directly(call: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
 
 
 class Examination(Generic[LearnerT, TableT, TrialT]):
-    """The trials so far and what was learnt from them, ahead of which is always the log. Safe in several threads.
-
-    Args:
-        learner: proposes stimuli and learns; it has learnt the earlier trials.
-        trials: what was delivered before.
-        sink: where all goes that happens, the log first.
-        events: what happened before.
-        freely: calls what may be interrupted at any time.
-    """
+    """The trials so far and what was learnt from them, ahead of which is always the log. Safe in several threads."""
 
     def __init__(
         self,
@@ -285,12 +275,7 @@ def learn(strategy: Strategy, trial: Trial) -> None:
 
 
 def relearned(strategy: Strategy, trials: Iterable[Trial]) -> Strategy:
-    """The same strategy, which has learnt all trials from the beginning.
-
-    Args:
-        strategy: the strategy.
-        trials: what it learns.
-    """
+    """The same strategy, which has learnt all trials from the beginning."""
     again = strategy.restarted()
     for trial in trials:
         learn(again, trial)
@@ -298,14 +283,7 @@ def relearned(strategy: Strategy, trials: Iterable[Trial]) -> Strategy:
 
 
 def believed(strategy: Strategy, trial: int, decision: StopDecision, next_isi_ms: float | None) -> Estimate:
-    """The record of what a strategy knows after a trial; scores are those that it has worked out anyway.
-
-    Args:
-        strategy: the strategy.
-        trial: the number of the trial.
-        decision: whether to stop, and why.
-        next_isi_ms: what is asked next [ms]; None if nothing was asked.
-    """
+    """The record of what a strategy knows after a trial; scores are those that it has worked out anyway."""
     record = Estimate.of(trial, strategy.estimate(), decision, next_isi_ms)
     predicted = _predicted(strategy) if record.grid_ms else {}
     return record.model_copy(update=predicted | ({} if next_isi_ms is None else _chosen(strategy)))

@@ -21,8 +21,6 @@ from isiw.log.writer import LogWriter
 from isiw.strategy.strategy import Strategy
 from isiw.trials import TrialTable
 
-__all__ = ["Earlier", "begun", "header_of", "require_parts", "versions"]
-
 BELIEF_VERSION: Final = 1
 ENGINE_VERSION: Final = 1
 """Which belief a session learns by, and which engine computes it, for its header."""
@@ -58,15 +56,7 @@ def versions() -> dict[str, str]:
 
 
 def require_parts(log: object, **parts: tuple[object, type | UnionType]) -> Path:
-    """The log's path; raise where a part of a session is something else than it should be.
-
-    Args:
-        log: where the log will be.
-        **parts: by its name, each part and its class, with `None` where it may be left out.
-
-    Raises:
-        InvalidValueError: a part of another class, or no path.
-    """
+    """The log's path; raise where a part of a session is something else than it should be."""
     for name, (part, kind) in parts.items():
         if not isinstance(part, kind):
             wanted, *_ = get_args(kind) or (kind,)
@@ -78,12 +68,7 @@ def require_parts(log: object, **parts: tuple[object, type | UnionType]) -> Path
 
 
 def header_of(strategy: Strategy, **details: Any) -> Header:
-    """The header of a session that begins now.
-
-    Args:
-        strategy: the session's.
-        **details: the other fields of `Header`.
-    """
+    """The header of a session that begins now."""
     recipe, limit_mv = strategy.recipe, strategy.detection_limit_mv
     # Of a user's own objects nothing else is known; what is learnt from the log later needs to know it.
     known = {} if recipe.name or limit_mv is None else {"detection_limit_mv": limit_mv}
@@ -99,11 +84,7 @@ def header_of(strategy: Strategy, **details: Any) -> Header:
 
 
 def begun(seed: int) -> dict[str, Any]:
-    """What the header of all says that begins now.
-
-    Args:
-        seed: of all its randomness.
-    """
+    """What the header of all says that begins now."""
     return {
         "isiw_version": isiw.__version__,
         "created": now().isoformat(timespec="seconds"),

@@ -12,8 +12,6 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext, supp
 from types import FrameType, TracebackType
 from typing import Any, ParamSpec, Self, TypeVar
 
-__all__ = ["Interrupts"]
-
 P = ParamSpec("P")
 T = TypeVar("T")
 
@@ -36,11 +34,6 @@ class Interrupts:
     a KeyboardInterrupt in the main thread: at once inside `allowed`, else at the next entry into it or at the very end.
     Ctrl-Z suspends the process when the device is disarmed. Outside the main thread, which is where Python delivers
     signals, nothing is heard; what the process ignores, as under nohup, it goes on ignoring.
-
-    Args:
-        disarm: disarms; called in another thread, at every signal.
-        stuck: called in another thread where the main one does not react to a second signal.
-        away: is entered while the process is suspended.
     """
 
     def __init__(
@@ -124,13 +117,7 @@ class Interrupts:
             self._allowed = before
 
     def freely(self, call: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Call what may be interrupted at any time, as no stimulus is in flight and no record half written.
-
-        Args:
-            call: what to call.
-            *args: with which arguments.
-            **kwargs: and which keywords.
-        """
+        """Call what may be interrupted at any time, as no stimulus is in flight and no record half written."""
         with self.allowed():
             return call(*args, **kwargs)
 

@@ -11,8 +11,6 @@ from isiw.session.examination import WindowExamination
 from isiw.strategy.strategy import Strategy
 from isiw.trials import TrialTable
 
-__all__ = ["Judging"]
-
 
 class Judging(ABC):
     """An open session whose trials an operator judges; each verdict is on disk when its call returns."""

@@ -16,8 +16,6 @@ from isiw.log.writer import LogWriter
 from isiw.session.operator import alarm
 from isiw.session.terminal import restore
 
-__all__ = ["INTERRUPTED", "STILL_ARMED", "end_process"]
-
 STILL_ARMED: Final = 4
 """The exit code where a device could not be disarmed."""
 
@@ -29,13 +27,7 @@ _GLANCE_S = 0.02
 
 
 def end_process(reason: str, log: LogWriter | None, code: int) -> Never:
-    """End the process at once, whatever its threads are busy with.
-
-    Args:
-        reason: why, in words.
-        log: the session's log, which stays as it is and can be resumed; None where there is none.
-        code: the exit code.
-    """
+    """End the process at once, whatever its threads are busy with."""
     ends = f"{reason} The process ends."
     end_s = time.monotonic() + _PATIENCE_S
     # Each in a thread of its own: a terminal or a disk that holds one up, or is gone, holds up nothing else.

@@ -31,8 +31,6 @@ from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.trials import TrialTable
 
-__all__ = ["Session"]
-
 
 class Session(Judging):
     """One person's session, from the first ask to the decision.

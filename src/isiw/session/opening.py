@@ -25,8 +25,6 @@ from isiw.signals.limits import SignalLimits
 from isiw.strategy.strategy import Strategy
 from isiw.visit import Visit, VisitProtocol
 
-__all__ = ["open_session"]
-
 
 def open_session(  # noqa: PLR0913 - all but two are keyword-only
     strategy: Strategy,

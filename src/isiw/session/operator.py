@@ -7,15 +7,9 @@ import sys
 from isiw.session.terminal import is_terminal
 from isiw.text import plain
 
-__all__ = ["alarm", "goes_on"]
-
 
 def goes_on(reason: str) -> bool:
-    """Ask in the terminal whether to go on; no, where there is no terminal.
-
-    Args:
-        reason: why the session has paused.
-    """
+    """Ask in the terminal whether to go on; no, where there is no terminal."""
     if not (is_terminal(sys.stdin) and is_terminal(sys.stderr)):
         return False
     alarm(f"\n{reason} The device is disarmed. Go on? [y/N] ", end="")
@@ -23,12 +17,7 @@ def goes_on(reason: str) -> bool:
 
 
 def alarm(text: str, *, end: str = "\n") -> None:
-    """Say something on the screen at once.
-
-    Args:
-        text: what to say.
-        end: what to put behind it.
-    """
+    """Say something on the screen at once."""
     if sys.stderr is not None:  # as under pythonw
         sys.stderr.write(f"{plain(text)}{end}")
         sys.stderr.flush()

@@ -10,8 +10,6 @@ from isiw.session.asking import Asking
 from isiw.session.examination import WindowExamination
 from isiw.session.rig import Rig
 
-__all__ = ["Pause", "Pausing"]
-
 _INTERRUPTED = "Interrupted by the operator."
 
 
@@ -23,13 +21,7 @@ class Pause(NamedTuple):
 
 
 class Pausing:
-    """Whether and why a session is to pause, and how it goes on.
-
-    Args:
-        rig: is disarmed, and armed again.
-        examination: where pauses are logged.
-        asking: the question whether a paused session goes on.
-    """
+    """Whether and why a session is to pause, and how it goes on."""
 
     def __init__(self, rig: Rig, examination: WindowExamination, asking: Asking) -> None:
         self._rig, self._examination, self._asking = rig, examination, asking
@@ -43,32 +35,17 @@ class Pausing:
         return self.reason is not None or self._rig.interrupts.heard
 
     def now(self, reason: str) -> None:
-        """Disarm, and pause before the next stimulus; from any thread.
-
-        Args:
-            reason: why, for the operator and the log.
-        """
+        """Disarm, and pause before the next stimulus; from any thread."""
         self.reason, self.kind = reason, None
         self._rig.disarm()
 
     def end(self, reason: str) -> None:
-        """Disarm, and end before the next stimulus, whatever is answered to a pause; from any thread.
-
-        Args:
-            reason: why, for the log.
-        """
+        """Disarm, and end before the next stimulus, whatever is answered to a pause; from any thread."""
         self._asking.end()
         self.now(reason)
 
     def until_decided(self, decide: Callable[[str], bool]) -> str | None:
-        """Pause until somebody says that the session goes on; if nobody does, the reason that it ends with.
-
-        Args:
-            decide: is called with the reason; whether the session goes on.
-
-        Raises:
-            KeyboardInterrupt: the operator ends the session.
-        """
+        """Pause until somebody says that the session goes on; if nobody does, the reason that it ends with."""
         rig, interrupts = self._rig, self._rig.interrupts
         rig.disarm()
         self._examination.log_faults()

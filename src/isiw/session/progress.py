@@ -17,19 +17,6 @@ from isiw.text.stimuli import TAP, StimulusWords
 from isiw.trials import Trial
 from isiw.window import Interval, WindowEstimate
 
-__all__ = [
-    "PROGRESS_HEADINGS",
-    "PROGRESS_LEGEND",
-    "aligned",
-    "asked",
-    "fitted",
-    "outcome",
-    "progress_row",
-    "show_legend",
-    "show_progress",
-    "standing",
-]
-
 PROGRESS_HEADINGS: Final = ("trial", "ISI", "MEP", "P", "window", "start", "end", "left")
 """What `progress_row` holds; start and end are 90 % intervals, left is what the budget still allows."""
 
@@ -59,11 +46,7 @@ def progress_row(update: SessionUpdate, first: StimulusWords = TAP) -> tuple[str
 
 
 def show_progress(row: Sequence[str]) -> None:
-    """Print a row of the table.
-
-    Args:
-        row: its cells.
-    """
+    """Print a row of the table."""
     sys.stdout.write(f"{fitted(row)}\n")
     sys.stdout.flush()
 
@@ -80,11 +63,7 @@ def aligned(row: Sequence[str]) -> str:
 
 
 def fitted(row: Sequence[str]) -> str:
-    """The same within 80 columns: what is too long for its column is cut short.
-
-    Args:
-        row: its cells.
-    """
+    """The same within 80 columns: what is too long for its column is cut short."""
     return aligned([_short_of(plain(cell), width) for cell, width in zip(row, _WIDTHS, strict=False)])
 
 
@@ -93,12 +72,7 @@ def _short_of(text: str, width: int) -> str:
 
 
 def standing(update: SessionUpdate, space: DesignSpace) -> str:
-    """How a session stands, in a line: the expected MEP over the ISIs, [ ] around the window, what is next and left.
-
-    Args:
-        update: what is known after the last trial.
-        space: the ISIs.
-    """
+    """How a session stands, in a line: the expected MEP over the ISIs, [ ] around the window, what is next and left."""
     following = "" if update.next_isi_ms is None else f"next {update.next_isi_ms:.4g} ms, "
     pace = "" if update.left_s is None else f", ~{_minutes(update.left_s)} min"
     text = f"{_profile(update.estimate, space)}{following}{update.stimuli_left} left{pace}"
@@ -133,12 +107,7 @@ def _bracketed(sparks: Sequence[str], isi_ms: Sequence[float], estimate: WindowE
 
 
 def asked(trial: Trial, first: StimulusWords = TAP) -> str:
-    """What a trial was to be: its ISI, or which control trial.
-
-    Args:
-        trial: the trial.
-        first: what the conditioning stimulus is called.
-    """
+    """What a trial was to be: its ISI, or which control trial."""
     if trial.commanded_isi_ms is not None:
         return f"{trial.commanded_isi_ms:.4g} ms"
     if trial.tap_alone:

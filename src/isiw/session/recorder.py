@@ -30,8 +30,6 @@ from isiw.strategy.strategy import Strategy
 from isiw.trials import Status, Stimulus, Trial, TrialTable
 from isiw.window import WindowEstimate
 
-__all__ = ["Recorder"]
-
 
 class Recorder(Judging):
     """A session whose loop is the lab's own; `isiw.open_session` opens one. As a context manager it closes its log.

@@ -17,8 +17,6 @@ from isiw.strategy.strategy import Strategy
 from isiw.text import plain
 from isiw.trials import Trial, TrialTable
 
-__all__ = ["Replayed", "replay", "strategy_of", "versions_text"]
-
 _COMPARED_AT_EACH_END = 50
 
 _RENAMED: Final = {"zero_below_mv": "threshold_mv"}
@@ -96,12 +94,6 @@ def replay(record: SessionRecord, strategy: Strategy, *, verify: bool = True) ->
 def strategy_of(header: Header) -> Strategy:
     """The strategy of a logged session, before its first trial.
 
-    Args:
-        header: of the log.
-
-    Raises:
-        StrategyError: it was built from a user's own objects.
-
     Warns:
         OtherVersionsWarning: it has settings of an earlier version that this one does not know.
     """
@@ -164,10 +156,6 @@ def _require_other_versions(intent: Intent, asked_ms: float, header: Header) -> 
 
 
 def versions_text(header: Header) -> str:
-    """The versions that a session was logged with.
-
-    Args:
-        header: the log's.
-    """
+    """The versions that a session was logged with."""
     logged = {"isiw": header.isiw_version, **header.versions}
     return plain(", ".join(f"{name} {version}" for name, version in logged.items()))

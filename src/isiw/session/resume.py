@@ -23,8 +23,6 @@ from isiw.session.threshold import ThresholdRecorder, resume_threshold
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Stimulus
 
-__all__ = ["limits_of_log", "resume"]
-
 
 @overload
 def resume(
@@ -129,9 +127,6 @@ def limits_of_log(header: Header) -> Limits:
 
     A loop of the lab's own keeps its intervals itself, and has none by default; a device that takes it over has at
     least the default one.
-
-    Args:
-        header: the log's.
     """
     limits = header.limits
     if header.device.name != OWN_LOOP or limits.min_iti_s >= Limits.min_iti_s:

@@ -19,8 +19,6 @@ from isiw.session.header import Earlier
 from isiw.session.replay import Replayed, replay, strategy_of, versions_text
 from isiw.strategy.strategy import Strategy
 
-__all__ = ["require_as_real", "require_same_person", "taken_up"]
-
 
 def taken_up(
     salvaged: Salvage,
@@ -32,19 +30,6 @@ def taken_up(
     verify: bool = True,
 ) -> tuple[Strategy, Earlier]:
     """The strategy that has learnt a log, and where the log ends.
-
-    Args:
-        salvaged: the log.
-        record: what it holds.
-        strategy: the session's, before its first trial; None to make it as the log says.
-        limits: those that hold from here on.
-        lost_pulses: how many stimuli were given that are not in it any more; None if it has its end.
-        verify: whether to compare what the strategy asks with what it asked then.
-
-    Raises:
-        DamagedLogError: the log's end is missing, and `lost_pulses` is not given.
-        InvalidValueError: `lost_pulses` is no number of stimuli, or the log's end is there.
-        StrategyError: the strategy cannot be made again, or asks something else with the same versions.
 
     Warns:
         OtherVersionsWarning: with other versions than those that were logged it would have asked something else.
@@ -77,15 +62,7 @@ def _with_lost_pulses(record: SessionRecord, lost_pulses: int | None) -> Session
 
 
 def require_as_real(info: DeviceInfo, was: DeviceInfo) -> None:
-    """Raise where the session would go on without waiting or with answers from nobody, or a simulation on a person.
-
-    Args:
-        info: what the session would go on with.
-        was: what it was run with.
-
-    Raises:
-        DeviceError: one of them is simulated, and the other is not.
-    """
+    """Raise where the session would go on without waiting or with answers from nobody, or a simulation on a person."""
     if info.simulated and not was.simulated:
         raise DeviceError(
             "the session was run with a real device, and cannot go on with a simulated one",

@@ -26,24 +26,9 @@ from isiw.trials import Stimulus
 from isiw.types import Reference
 from isiw.visit import VisitProtocol
 
-__all__ = ["Rig", "own_reference", "require_matching"]
-
 
 class Rig:
-    """A device as a session drives it.
-
-    Args:
-        device: the device.
-        limits: what it may deliver.
-        clock: tells the time between stimuli; a virtual one by default where the device is simulated.
-        safeguards: deadlines and the dead man's switch.
-        sink: where faults go, and the log that a process that has to end writes to.
-        away: is entered while the process is suspended.
-        waits_for_nobody: whether a real device may have a virtual clock, as one that is checked.
-
-    Raises:
-        DeviceError: it does not say what it is in time, or is not simulated and has a virtual clock.
-    """
+    """A device as a session drives it."""
 
     def __init__(
         self,
@@ -99,21 +84,12 @@ class Rig:
 
     @contextmanager
     def driven(self) -> Iterator[None]:
-        """Within, no other session drives the device, and every signal disarms it.
-
-        Raises:
-            DeviceError: another session drives it.
-        """
+        """Within, no other session drives the device, and every signal disarms it."""
         with driven(self._raw, self.info), self.interrupts:
             yield
 
     def begin(self, delivered: int, earlier_s: Sequence[float]) -> None:
-        """Count what was delivered before, for the limits.
-
-        Args:
-            delivered: deliveries of this session so far.
-            earlier_s: how long ago each earlier delivery was to the same person [s].
-        """
+        """Count what was delivered before, for the limits."""
         self._limited = self._anew(delivered, earlier_s)
 
     @contextmanager
@@ -150,12 +126,7 @@ class Rig:
             self._limited.check(stimulus)
 
     def deliver(self, stimulus: Stimulus, timeout_s: float) -> Answer:
-        """Deliver one pair of stimuli, as `LimitedDevice.deliver` does.
-
-        Args:
-            stimulus: what to deliver.
-            timeout_s: the longest the device may take [s].
-        """
+        """Deliver one pair of stimuli, as `LimitedDevice.deliver` does."""
         return self._limited.deliver(stimulus, timeout_s)
 
     def late_answer(self) -> Answer | None:
@@ -184,11 +155,7 @@ class Rig:
 
 
 def own_reference(reference: Reference) -> str:
-    """What to do where a device counts ISIs from another event than the design space, in sentences.
-
-    Args:
-        reference: the event that the device counts from.
-    """
+    """What to do where a device counts ISIs from another event than the design space, in sentences."""
     return (
         f'If the device is right, set reference = "{reference}" under [space], or '
         f'DesignSpace(low_ms, high_ms, reference="{reference}"), and count low_ms and high_ms from there. If not, '
@@ -197,17 +164,7 @@ def own_reference(reference: Reference) -> str:
 
 
 def require_matching(info: DeviceInfo, strategy: Strategy, protocol: VisitProtocol) -> None:
-    """Raise where the strategy would misread the device's answers, or the device cannot do what the protocol asks.
-
-    Args:
-        info: what the device says about itself.
-        strategy: the strategy.
-        protocol: which control trials there are.
-
-    Raises:
-        DeviceError: another reference, conditioning stimulus or detection limit, or no tap alone.
-        InvalidValueError: a channel whose name or unit a session cannot use.
-    """
+    """Raise where the strategy would misread the device's answers, or the device cannot do what the protocol asks."""
     if info.reference != strategy.space.reference:
         raise DeviceError(
             "the device and the design space count ISIs from different events",

@@ -9,8 +9,6 @@ from pathlib import Path
 from isiw.checks import check_numbers, check_wholes
 from isiw.devices.deadlines import Deadlines
 
-__all__ = ["Safeguards"]
-
 
 @dataclass(frozen=True)
 class Safeguards:

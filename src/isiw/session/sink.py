@@ -12,26 +12,15 @@ from isiw.log.schema import Record
 from isiw.log.writer import LogWriter
 from isiw.session.updates import SessionUpdate
 
-__all__ = ["Follower"]
-
 
 class Follower(Protocol):
     """Somebody who looks on. Each call has to return at once; `logged` comes from several threads."""
 
     def logged(self, record: Record, channel_name: str | None) -> None:
-        """A record was appended to the log.
-
-        Args:
-            record: the record.
-            channel_name: the channel, of a waveform.
-        """
+        """A record was appended to the log."""
 
     def updated(self, update: SessionUpdate) -> None:
-        """A trial is concluded.
-
-        Args:
-            update: what is known after it.
-        """
+        """A trial is concluded."""
 
     def ended(self) -> None:
         """The session has ended, and its log is closed."""
@@ -49,12 +38,7 @@ class _Screen(Protocol):
 
 
 class Sink:
-    """Takes all that happens. A follower whose call fails gets nothing more, and the session goes on.
-
-    Args:
-        on_trial: called after every trial; what it raises ends the session.
-        log: where it is open already.
-    """
+    """Takes all that happens. A follower whose call fails gets nothing more, and the session goes on."""
 
     def __init__(self, on_trial: Callable[[SessionUpdate], None] | None = None, log: LogWriter | None = None) -> None:
         self.on_trial = on_trial
@@ -66,12 +50,7 @@ class Sink:
 
     @contextmanager
     def writing(self, log: LogWriter, screen: _Screen | None = None) -> Iterator[None]:
-        """Within, the log is open, and the operator sees what happens.
-
-        Args:
-            log: the log.
-            screen: what the operator sees.
-        """
+        """Within, the log is open, and the operator sees what happens."""
         self.writer, self._screen = log, screen
         try:
             yield
@@ -85,11 +64,7 @@ class Sink:
 
     @property
     def log(self) -> LogWriter:
-        """The open log.
-
-        Raises:
-            InvalidValueError: there is none.
-        """
+        """The open log."""
         if self.writer is None:
             raise InvalidValueError(
                 "the session is not running, so nothing can be added to its log",
@@ -99,12 +74,7 @@ class Sink:
         return self.writer
 
     def append(self, record: Record, channel_name: str | None = None) -> None:
-        """Log a record; it is durable after the next `sync`.
-
-        Args:
-            record: the record.
-            channel_name: the channel, of a waveform.
-        """
+        """Log a record; it is durable after the next `sync`."""
         self.log.append(record, channel_name)
         self._each(lambda follower: follower.logged(record, channel_name))
 

@@ -24,8 +24,6 @@ from isiw.text.shown import shown
 from isiw.trials import Measurement, Stimulus, Sweep, Trial
 from isiw.visit import Control
 
-__all__ = ["Pace", "Steps", "ended", "paused"]
-
 _LAST: Final = 20
 
 _NAP_S = 0.25  # how long a pause may go unnoticed between two stimuli
@@ -51,35 +49,17 @@ class Pace:
         self._ends_s: deque[float] = deque(maxlen=_LAST + 1)
 
     def passed(self, now_s: float) -> None:
-        """A stimulus was delivered.
-
-        Args:
-            now_s: the time [s].
-        """
+        """A stimulus was delivered."""
         self._ends_s.append(now_s)
 
     def left_s(self, stimuli: int) -> float | None:
-        """About how long so many stimuli take [s]; None before the second one.
-
-        Args:
-            stimuli: how many.
-        """
+        """About how long so many stimuli take [s]; None before the second one."""
         gaps_s = [after - before for before, after in itertools.pairwise(self._ends_s)]
         return stimuli * statistics.median(gaps_s) if gaps_s else None
 
 
 class Steps:
-    """Takes one step of a session after the other; each is taken once, also where the one after is interrupted.
-
-    Args:
-        examination: what is known, and the trials.
-        rig: waits and delivers.
-        sink: where all goes that happens.
-        pausing: whether the session is to pause.
-        watch: what speaks for a pause.
-        header: what the session is.
-        backoffs_s: how long to wait before a stimulus is tried again that was refused before firing [s].
-    """
+    """Takes one step of a session after the other; each is taken once, also where the one after is interrupted."""
 
     def __init__(
         self,

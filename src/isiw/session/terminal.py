@@ -25,18 +25,6 @@ else:
     import termios
     import tty
 
-__all__ = [
-    "ERASED",
-    "ESCAPE",
-    "Keys",
-    "Screen",
-    "drop_typed_ahead",
-    "is_terminal",
-    "restore",
-    "somebody_there",
-    "typed",
-]
-
 _GLANCE_S = 0.1
 _LAST_WORDS_S = 1.0
 ERASED: Final = "\b \b"
@@ -104,12 +92,7 @@ class Screen:
         self._thread.join(_LAST_WORDS_S)  # a terminal that takes no output must not keep a session open
 
     def say(self, text: str, standing: str | None = None) -> None:
-        """Show a line, above the last one, which stays.
-
-        Args:
-            text: the line.
-            standing: how things stand now, for the last line.
-        """
+        """Show a line, above the last one, which stays."""
         cleared = self._cleared
         if standing is not None:
             self._standing = plain(standing)
@@ -160,14 +143,7 @@ def _writable(text: str) -> str:
 
 
 def typed(text: str) -> tuple[str, str]:
-    """The characters that were typed, without arrows and function keys, whose letters mean nothing of their own.
-
-    Args:
-        text: what a terminal sent.
-
-    Returns:
-        The characters, and an end that may be the beginning of a longer key.
-    """
+    """The characters that were typed, without arrows and function keys, whose letters mean nothing of their own."""
     text = _SEQUENCE.sub("", text)
     begun = _BEGUN.search(text)
     return (text, "") if begun is None else (text[: begun.start()], begun.group())
@@ -178,10 +154,6 @@ class Keys:
 
     Nothing is read while the process is in the background, where reading would stop it. Arrows and function keys are
     passed over.
-
-    Args:
-        press: is called with each character, in a thread of its own.
-        gone: is called there where keys are heard no longer, as the terminal is closed or `press` has failed.
     """
 
     def __init__(self, press: Callable[[str], None], gone: Callable[[], None]) -> None:

@@ -29,8 +29,6 @@ from isiw.strategy.threshold.pulses import Pulse, ThresholdEstimate
 from isiw.strategy.threshold.search import ThresholdSearch, make_threshold_search
 from isiw.visit import interval_s
 
-__all__ = ["ThresholdRecorder", "open_threshold", "read_threshold", "resume_threshold", "search_of"]
-
 UNKNOWN = "outcome unknown"
 BY_HAND = DeviceInfo("a stimulator that is set by hand", "impact")
 

@@ -17,8 +17,6 @@ from isiw.strategy.stopping import StopDecision
 from isiw.strategy.threshold.search import ThresholdSearch
 from isiw.subjects.thresholds import StimulatedPerson, threshold_cohort
 
-__all__ = ["ANSWERS", "amplitude_of", "open_simulated", "run_by_hand", "run_simulated", "simulated_person"]
-
 _SIMULATED = "isiw_threshold"
 """The name under which a log keeps who is simulated."""
 
@@ -184,15 +182,7 @@ def _take_back(recorder: ThresholdRecorder, say: Callable[[str], None]) -> None:
 
 
 def amplitude_of(typed: str) -> float:
-    """An amplitude as somebody types it [mV].
-
-    Args:
-        typed: a number in mV, or with its unit, mV or µV.
-
-    Raises:
-        InvalidValueError: no such number, a large one without its unit, or one in µV whose separator may be that of
-            thousands.
-    """
+    """An amplitude as somebody types it [mV]."""
     found = _AMPLITUDE.fullmatch(text("an amplitude", typed).strip())
     if found is None:
         raise InvalidValueError(

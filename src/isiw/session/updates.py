@@ -9,8 +9,6 @@ from isiw.strategy.stopping import StopDecision
 from isiw.trials import Trial, TrialTable
 from isiw.window import WindowEstimate
 
-__all__ = ["SessionResult", "SessionUpdate"]
-
 
 @dataclass(frozen=True)
 class SessionUpdate:

@@ -9,8 +9,6 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.types import ArrayLike, BoolArray, FloatArray
 
-__all__ = ["is_blanked", "is_saturated"]
-
 FLAT_MS = 1.0
 FAR_OUT = 10.0
 """A limit is farther from the sweep's middle than this many times the median distance from it."""
@@ -84,13 +82,7 @@ def _has_flat_top(emg: FloatArray, counts: FloatArray, level: float, rate_hz: fl
 
 
 def _has_plateau(upright: FloatArray, top: int, rate_hz: float) -> bool:
-    """Whether the EMG stays at its top longer than noise and a rounded top allow.
-
-    Args:
-        upright: EMG about its level, with the top above it [mV], shape (w,).
-        top: the top's sample.
-        rate_hz: sampling rate [Hz].
-    """
+    """Whether the EMG stays at its top longer than noise and a rounded top allow."""
     noise = MAD_TO_SD * float(np.median(np.abs(upright)))
     if noise == 0 or upright[top] <= FAR_OUT_SD * noise:
         return False
@@ -109,14 +101,7 @@ def _width(emg_mv: FloatArray, top: int, depth_mv: float) -> int:
 
 
 def is_blanked(emg_mv: FloatArray, rate_hz: float, pulse_ms: float, span_ms: tuple[float, float]) -> bool:
-    """Whether the amplifier held one value for a part of the MEP's window, much longer than before the pulse.
-
-    Args:
-        emg_mv: EMG of one sweep [mV], shape (w,).
-        rate_hz: sampling rate [Hz].
-        pulse_ms: the magnetic pulse [ms from the first sample].
-        span_ms: the MEP's window [ms from the first sample].
-    """
+    """Whether the amplifier held one value for a part of the MEP's window, much longer than before the pulse."""
     before, first, last = (max(0, math.floor(edge_ms * rate_hz / 1000)) for edge_ms in (pulse_ms, *span_ms))
     filled = int((emg_mv[:before] != emg_mv[0]).argmax())  # a rig may fill up what it did not record
     held = _longest_run(np.diff(emg_mv[first : last + 1]) == 0)

@@ -14,8 +14,6 @@ from isiw.lazy import scipy
 from isiw.signals.evidence import Evidence, Told
 from isiw.trials import RESPONSE_MV
 
-__all__ = ["is_silent", "stopped_after"]
-
 SMALL_MV, LARGE_MV = 8e-4, 4.0
 """Of several in a row, the largest is never smaller, and their geometric mean is hardly ever larger from the start."""
 
@@ -105,12 +103,7 @@ def large(evidence: Evidence) -> Finding | None:
 
 
 def is_silent(meps_mv: Sequence[float], detection_limit_mv: float | None = None) -> bool:
-    """Whether enough amplitudes were told, and each is 0, where the detection limit is too low for that.
-
-    Args:
-        meps_mv: the amplitudes [mV].
-        detection_limit_mv: what an amplitude of 0 is known to be below [mV]; None where nobody has said.
-    """
+    """Whether enough amplitudes were told, and each is 0, where the detection limit is too low for that."""
     enough = len(meps_mv) >= ENOUGH_PAIRS and not _zeros_are_usual(detection_limit_mv)
     return enough and not any(meps_mv)
 
@@ -119,10 +112,6 @@ def stopped_after(isis_ms: Sequence[float | None], answered: Sequence[bool]) -> 
     """After how many pulses there was no answer any more; None where chance may explain those without one.
 
     Only pulses between ISIs that were answered count: what lies beyond may never have been answered.
-
-    Args:
-        isis_ms: the ISI of each pulse so far [ms], in order; None for TMS alone.
-        answered: whether each was answered.
     """
     first = max((index + 1 for index, yes in enumerate(answered) if yes), default=0)
     with_answer = [isi_ms for isi_ms, yes in zip(isis_ms, answered, strict=True) if yes]

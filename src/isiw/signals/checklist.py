@@ -9,8 +9,6 @@ from isiw.findings import Finding
 from isiw.signals import amplitudes, places, rig
 from isiw.signals.evidence import Check, Evidence, of_sweep, of_told, of_trial
 
-__all__ = ["CHECKS", "findings"]
-
 CHECKS: Final[tuple[Check, ...]] = (
     of_sweep(rig.unusable_emg),
     of_sweep(rig.wrong_acceleration),

@@ -18,8 +18,6 @@ from isiw.signals.waveforms import as_waveforms, crossing_before, first_true, is
 from isiw.trials import Channel, Sweep
 from isiw.types import ArrayLike, FloatArray
 
-__all__ = ["TapEvents", "detect_events", "first_rise", "load_cell_times", "sweep_events", "tap_artefact_times"]
-
 MOTION_SD = 3.0
 ARTEFACT_SEARCH_MS = (12.0, 30.0)  # four people: 18 to 23 ms after the impact, SD below 2 (Table 3.2)
 USUAL_ARTEFACT_MS = (12.0, 24.0)
@@ -130,13 +128,7 @@ def _same_samples(channel: Channel | None, other: Channel) -> FloatArray | None:
 
 
 def first_rise(waves: FloatArray, rate_hz: float, valve_ms: float) -> FloatArray:
-    """When each waveform first rises above its noise after the valve command [ms], NaN where it does not, shape (n,).
-
-    Args:
-        waves: shape (n, w).
-        rate_hz: their sampling rate [Hz].
-        valve_ms: the valve command [ms from the first sample].
-    """
+    """When each waveform first rises above its noise after the valve command [ms], NaN if never, shape (n,)."""
     valve = round(valve_ms * rate_hz / 1000)
     level, noise = rest_level(waves, valve, rate_hz)
     risen = waves > level + HYSTERESIS_SD * noise
@@ -195,14 +187,6 @@ def tap_artefact_times(
     """When the tap shows in the EMG [ms from the first sample], NaN where it does not, shape (n,).
 
     What begins 10 to 50 ms after the pulse may be the MEP and is not taken for the tap, unless asked for.
-
-    Args:
-        emg: shape (n, w).
-        rate_hz: sampling rate [Hz].
-        hit_ms: the impacts [ms from the first sample], shape (n,), NaN where there is none.
-        valve_ms: the valve command [ms from the first sample]; the EMG is at rest before it.
-        t_tms_ms: the magnetic pulse [ms from the first sample], shape (n,), whose own artefact is passed over.
-        even_as_mep: take what begins at the tap's usual time for the tap, even where it may be the MEP.
     """
     waves = as_waveforms(emg, rate_hz, "EMG")
     level, noise = rest_level(waves, round(valve_ms * rate_hz / 1000), rate_hz)

@@ -11,9 +11,6 @@ from isiw.signals.hum import Hum
 from isiw.signals.limits import SignalLimits
 from isiw.trials import Measurement, Sweep, Trial
 
-__all__ = ["Check", "Evidence", "Response", "Told", "of_sweep", "of_told", "of_trial", "told_of"]
-
-
 OF_REST: Final = 8.0
 """Peak-to-peak amplitude of EMG at rest over its RMS, at most: some 6 within the window of an MEP. In 330 recorded and
 simulated sweeps without an MEP it was 7.3 outside of it at most."""

@@ -10,8 +10,6 @@ from isiw.signals.mep import PULSE_GUARD_MS
 from isiw.trials import Channel, Trial
 from isiw.types import BoolArray, FloatArray, IntArray
 
-__all__ = ["Hum", "at_rest", "mains_hum"]
-
 MAINS_HZ: Final = (50.0, 60.0)
 REST_S: Final = 0.3
 """The last EMG at rest to which the wave is fitted [s]: longer, and the mains would drift out of phase."""
@@ -36,13 +34,7 @@ class Hum(NamedTuple):
 
 
 def mains_hum(emg_mv: FloatArray, rate_hz: float, at_rest: BoolArray) -> Hum | None:
-    """The hum in a waveform, if it is most of the EMG at rest, and large enough to matter; else None.
-
-    Args:
-        emg_mv: EMG [mV], shape (w,).
-        rate_hz: sampling rate [Hz].
-        at_rest: which samples are at rest, before any stimulus, shape (w,).
-    """
+    """The hum in a waveform, if it is most of the EMG at rest, and large enough to matter; else None."""
     times_s = np.arange(emg_mv.size) / rate_hz
     resting = np.flatnonzero(at_rest)[-max(1, round(REST_S * rate_hz)) :]
     if resting.size < LEAST_S * rate_hz or not np.isfinite(emg_mv[resting]).all():
@@ -53,12 +45,7 @@ def mains_hum(emg_mv: FloatArray, rate_hz: float, at_rest: BoolArray) -> Hum | N
 
 
 def at_rest(emg: Channel, trial: Trial) -> BoolArray:
-    """Which samples of a trial's EMG are before the pulse, and not the tap's, shape (w,).
-
-    Args:
-        emg: the EMG.
-        trial: the trial, with its times.
-    """
+    """Which samples of a trial's EMG are before the pulse, and not the tap's, shape (w,)."""
     times_ms = emg.t0_ms + np.arange(emg.values.size) * 1000 / emg.rate_hz
     resting = times_ms < (-np.inf if trial.t_tms_ms is None else trial.t_tms_ms - PULSE_GUARD_MS)
     begins = [at_ms for at_ms in (trial.t_valve_ms, trial.t_hit_ms) if at_ms is not None]

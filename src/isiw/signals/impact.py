@@ -17,17 +17,6 @@ from isiw.errors import InvalidValueError
 from isiw.signals.waveforms import as_waveforms, rest_level
 from isiw.types import ArrayLike, FloatArray, IntArray
 
-__all__ = [
-    "DETECTION_LATENCY_MS",
-    "FALL_MS",
-    "HYSTERESIS_SD",
-    "MOTION_MS",
-    "VALVE_MS",
-    "impact_time",
-    "impact_times",
-    "last_fall",
-]
-
 VALVE_MS = 500.0
 """The valve command in a trial of 1 s [Kim2020, 4.2]."""
 
@@ -106,11 +95,7 @@ def _samples(waves: FloatArray, rows: IntArray, columns: IntArray, start: int, s
 
 
 def last_fall(fall: FloatArray) -> FloatArray:
-    """Where each row last fell through zero [samples], its last sample being below, its largest above, shape (n,).
-
-    Args:
-        fall: acceleration above its level at rest, shape (n, w).
-    """
+    """Where each row last fell through zero [samples], its last sample being below, its largest above, shape (n,)."""
     last = fall.shape[-1] - 1 - (fall[:, ::-1] > 0).argmax(axis=-1)
     rows = np.arange(len(fall))
     before, after = fall[rows, last], fall[rows, last + 1]

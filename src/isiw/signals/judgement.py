@@ -33,8 +33,6 @@ from isiw.signals.waveforms import MIN_REST_MS, is_recording
 from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial
 from isiw.types import FloatArray
 
-__all__ = ["judge", "judge_measurement", "of_one_length", "wrong_isi"]
-
 
 def judge(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits | None = None) -> Trial:
     """Judge one sweep: the trial that it is, accepted or a mistrial. Its times are on the sweep's clock.
@@ -229,11 +227,7 @@ def _usable(sweep: Sweep, name: str) -> bool:
 
 
 def of_one_length(sweep: Sweep) -> bool:
-    """Whether EMG and acceleration, where there is one, cover the same time to within a sample.
-
-    Args:
-        sweep: one that has EMG.
-    """
+    """Whether EMG and acceleration, where there is one, cover the same time to within a sample."""
     channels = [sweep.channels[name] for name in ("emg", "acceleration") if name in sweep.channels]
     lengths = [channel.values.size / channel.rate_hz for channel in channels]
     return max(lengths) - min(lengths) <= max(1 / channel.rate_hz for channel in channels) + 1e-9  # rounding

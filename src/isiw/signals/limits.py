@@ -13,8 +13,6 @@ from isiw.errors import InvalidValueError
 from isiw.findings import BACKGROUND_LIMIT_UV, WINDOW_END_MS
 from isiw.signals.mep import MEP_WINDOW_MS
 
-__all__ = ["ARTEFACT_MS", "SignalLimits"]
-
 ARTEFACT_MS: Final = 3.0
 """How long after the pulse its own artefact lasts, at least [ms]."""
 

@@ -26,21 +26,6 @@ from isiw.signals.waveforms import (
 )
 from isiw.types import ArrayLike, BoolArray, FloatArray
 
-__all__ = [
-    "EARLIEST_ONSET_MS",
-    "MEP_WINDOWS_MS",
-    "MEP_WINDOW_MS",
-    "MIN_BACKGROUND_MS",
-    "PULSE_GUARD_MS",
-    "TAP_SPAN_MS",
-    "background_rms",
-    "mep_amplitude",
-    "mep_amplitudes",
-    "mep_onset",
-    "mep_onsets",
-    "mep_present",
-]
-
 MEP_WINDOW_MS = (15.0, 35.0)
 """Where the MEP of the forearm is sought [ms after the pulse] [Kim2020, 5.2.3]."""
 

@@ -23,8 +23,6 @@ from isiw.signals.units import EMG_UNITS_MV
 from isiw.trials import Sweep, Trial
 from isiw.types import BoolArray, FloatArray
 
-__all__ = ["told_by"]
-
 SOUGHT_MS = (ARTEFACT_MS, 80.0)
 """Where a response is looked for [ms after the pulse]: behind the pulse's artefact, and before the person moves."""
 
@@ -57,14 +55,7 @@ VARIES = 1.5
 
 
 def told_by(sweep: Sweep, trial: Trial, limits: SignalLimits, before_emg: FloatArray | None = None) -> Told:
-    """A trial as the checks of several trials look at it, with what its sweep shows.
-
-    Args:
-        sweep: the trial's sweep.
-        trial: as it was judged; it counts, and has an amplitude.
-        limits: say where the MEP window is.
-        before_emg: samples of the sweep before; None where there is none.
-    """
+    """A trial as the checks of several trials look at it, with what its sweep shows."""
     rest_uv, emg = trial.background_rms_uv, sweep.channels["emg"].values
     repeats = before_emg is not None and np.array_equal(emg, before_emg)
     told = Told(trial.mep_mv or 0.0, trial.isi_ms, rest_uv, hum=_hum(sweep, trial), repeats=repeats)

@@ -24,8 +24,6 @@ from isiw.signals.values import implausible_amplitude, off_by
 from isiw.signals.waveforms import is_recording, samples
 from isiw.trials import Channel, Sweep, Trial
 
-__all__ = ["EVOKED_SPAN_MS", "remedy_for", "steepest_edge", "tap_span_ms", "too_early_by_chance"]
-
 DRIVEN_MS = 25.0
 """How long a hammer is driven before its impact, at least."""
 
@@ -79,12 +77,7 @@ def remedy_for(reason: Kind) -> str:
 
 
 def too_early_by_chance(trial: Trial, space: DesignSpace) -> bool:
-    """Whether the pulse came before the impact by no more than the tolerance: no rig is to blame for that.
-
-    Args:
-        trial: a trial.
-        space: the design space.
-    """
+    """Whether the pulse came before the impact by no more than the tolerance: no rig is to blame for that."""
     if trial.reason is not Kind.TMS_BEFORE_IMPACT or trial.isi_ms is None or trial.commanded_isi_ms is None:
         return False
     return not off_by(trial.isi_ms, trial.commanded_isi_ms, space)

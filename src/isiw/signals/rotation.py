@@ -12,8 +12,6 @@ from isiw.signals.impact import VALVE_MS
 from isiw.signals.waveforms import as_waveforms, crossing_before, first_true, rest_level
 from isiw.types import ArrayLike, FloatArray
 
-__all__ = ["FULL_RANGE_DEG", "RotationEvents", "detect_rotations"]
-
 FULL_RANGE_DEG = 178.0
 """A turn that counts as the full range of 180°: ten noise SDs of a coarse angle sensor less."""
 
@@ -40,17 +38,7 @@ class RotationEvents:
 def detect_rotations(
     angle_deg: ArrayLike, pressure: ArrayLike, rate_hz: float, valve_ms: float = VALVE_MS
 ) -> RotationEvents:
-    """Find the events of n rotations.
-
-    Args:
-        angle_deg: of the shaft, rising [°], shape (n, w).
-        pressure: of the filled chamber less that of the other, shape (n, w).
-        rate_hz: sampling rate of both [Hz].
-        valve_ms: the command of the actuator's valve [ms from the first sample].
-
-    Raises:
-        InvalidValueError: a waveform that is not a recording, or too little of it at rest.
-    """
+    """Find the events of n rotations."""
     angles = as_waveforms(angle_deg, rate_hz, "angle")
     level, _ = rest_level(angles, round(valve_ms * rate_hz / 1000), rate_hz)
     full = first_true(angles > level + FULL_RANGE_DEG)

@@ -20,8 +20,6 @@ from isiw.signals.impact import DETECTION_LATENCY_MS, FALL_MS, HYSTERESIS_SD, MO
 from isiw.signals.waveforms import REST_MS, rest_level
 from isiw.types import ArrayLike, FloatArray
 
-__all__ = ["Impact", "ImpactDetector"]
-
 
 @dataclass(frozen=True)
 class Impact:
@@ -58,13 +56,7 @@ class _Window(NamedTuple):
 
 
 class _Search:
-    """Looks for one impact after a valve command.
-
-    Args:
-        rate_hz: sampling rate [Hz].
-        valve: number of the sample that the valve command comes with.
-        rest: the samples before it, shape (w,).
-    """
+    """Looks for one impact after a valve command."""
 
     def __init__(self, rate_hz: float, valve: int, rest: FloatArray) -> None:
         level, noise = rest_level(rest[None], len(rest), rate_hz)

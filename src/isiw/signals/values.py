@@ -15,21 +15,6 @@ from isiw.errors import DeviceError, IsiwError
 from isiw.findings import AMPLITUDE_MV, Finding, Kind, Severity, refused
 from isiw.trials import MOST_ISI_SD_MS, Measurement, Stimulus, Trial
 
-__all__ = [
-    "before_impact",
-    "contradicts_its_times",
-    "implausible_amplitude",
-    "implausible_scale",
-    "isi_far",
-    "off_by",
-    "pulse_with_tap_alone",
-    "require_agreement",
-    "require_amplitude",
-    "require_plausible",
-    "tap_with_tms_alone",
-    "timed_isi_ms",
-]
-
 AT_REST_MV = 2e-3
 """EMG at rest has hardly ever less, since the noise of electrodes and amplifier alone has a few µV peak-to-peak; an MEP
 of up to 2 mV in V has less."""
@@ -66,39 +51,19 @@ def implausible_scale(meps_mv: Sequence[float]) -> Finding | None:
 
 
 def require_amplitude(mep_mv: float, besides: Finding | None = None) -> None:
-    """Refuse an amplitude that no muscle gives.
-
-    Args:
-        mep_mv: peak-to-peak amplitude [mV].
-        besides: what else is known to be wrong with it.
-
-    Raises:
-        InvalidValueError: it cannot be an MEP's in mV.
-    """
+    """Refuse an amplitude that no muscle gives."""
     found = implausible_amplitude(mep_mv) or besides
     if found is not None:
         raise refused(found, mep_mv)
 
 
 def off_by(isi_ms: float, asked_ms: float, space: DesignSpace) -> bool:
-    """Whether an ISI [ms] is farther than the space's tolerance from the one that was asked [ms].
-
-    Args:
-        isi_ms: the realised ISI.
-        asked_ms: the one that was asked.
-        space: the design space.
-    """
+    """Whether an ISI [ms] is farther than the space's tolerance from the one that was asked [ms]."""
     return abs(isi_ms - asked_ms) > space.tolerance_ms
 
 
 def isi_far(isi_ms: float | None, asked_ms: float | None, space: DesignSpace) -> Finding | None:
-    """That a realised ISI is far from the one asked, which may be right; None where it is not.
-
-    Args:
-        isi_ms: the realised ISI [ms]; None for TMS alone.
-        asked_ms: the ISI that was asked [ms]; None where none was.
-        space: the design space.
-    """
+    """That a realised ISI is far from the one asked, which may be right; None where it is not."""
     if isi_ms is None or asked_ms is None or not off_by(isi_ms, asked_ms, space):
         return None
     text = f"The realised ISI of {isi_ms:g} ms is far from the {asked_ms:g} ms that were asked"
@@ -112,19 +77,7 @@ def require_plausible(
     space: DesignSpace,
     isi_sd_ms: float = 0.0,
 ) -> None:
-    """Refuse what cannot be true of one trial, or is a mistrial.
-
-    Args:
-        isi_ms: the realised ISI [ms]; None for TMS alone.
-        mep_mv: peak-to-peak amplitude [mV]; None where a response was seen or not.
-        asked_ms: the ISI that was asked [ms]; None where none was.
-        space: the design space.
-        isi_sd_ms: SD of the realised ISI [ms]; the models' three nodes do not stand for a wide spread.
-
-    Raises:
-        InvalidValueError: swapped arguments, seconds for milliseconds, an amplitude that no muscle gives, a pulse that
-            came before the impact, or an ISI that is known too vaguely.
-    """
+    """Refuse what cannot be true of one trial, or is a mistrial."""
     if isi_ms is not None and asked_ms is not None and off_by(isi_ms, asked_ms, space):
         found = _misplaced_value(isi_ms, mep_mv, asked_ms, space)
         if found is not None:
@@ -154,13 +107,7 @@ _VAGUE: Final = Finding(
 
 
 def before_impact(isi_ms: float, commanded_isi_ms: float, space: DesignSpace) -> bool:
-    """Whether a pulse came before the impact that it should have followed; such a trial is a mistrial.
-
-    Args:
-        isi_ms: the realised ISI [ms].
-        commanded_isi_ms: the one that was asked [ms].
-        space: says which event ISIs count from.
-    """
+    """Whether a pulse came before the impact that it should have followed; such a trial is a mistrial."""
     return space.reference == "impact" and isi_ms < 0 <= commanded_isi_ms
 
 
@@ -176,38 +123,19 @@ def _misplaced_value(isi_ms: float, mep_mv: float | None, asked_ms: float, space
 
 
 def timed_isi_ms(told: Measurement | Trial, space: DesignSpace) -> float | None:
-    """The ISI by the times of the pulse and of the event that it counts from [ms]; None where one is not told.
-
-    Args:
-        told: what is told of a trial.
-        space: says which event the ISI counts from.
-    """
+    """The ISI by the times of the pulse and of the event that it counts from [ms]; None where one is not told."""
     start_ms = told.t_hit_ms if space.reference == "impact" else told.t_valve_ms
     return None if start_ms is None or told.t_tms_ms is None else told.t_tms_ms - start_ms
 
 
 def contradicts_its_times(told: Measurement | Trial, space: DesignSpace) -> bool:
-    """Whether the realised ISI is another one than the times say.
-
-    Args:
-        told: what is told of a trial.
-        space: says which event the ISI counts from.
-    """
+    """Whether the realised ISI is another one than the times say."""
     timed_ms = timed_isi_ms(told, space)
     return timed_ms is not None and told.isi_ms is not None and abs(timed_ms - told.isi_ms) >= CUT_OFF_MS
 
 
 def require_agreement(measurement: Measurement, stimulus: Stimulus, space: DesignSpace) -> None:
-    """Refuse a measurement whose times are not those of the trial that was commanded, or of the ISI that it tells.
-
-    Args:
-        measurement: what the device reports.
-        stimulus: what was commanded.
-        space: says which event the ISI counts from.
-
-    Raises:
-        DeviceError: an impact with TMS alone, a pulse with a tap alone, or times that contradict the realised ISI.
-    """
+    """Refuse a measurement whose times are not those of the trial that was commanded, or of the ISI that it tells."""
     alone = stimulus.isi_ms is None
     if alone and not stimulus.tap_alone and measurement.t_hit_ms is not None:
         raise tap_with_tms_alone(measurement.t_hit_ms)

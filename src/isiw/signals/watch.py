@@ -19,8 +19,6 @@ from isiw.signals.rig import remedy_for, too_early_by_chance
 from isiw.trials import Measurement, Sweep, Trial, TrialTable
 from isiw.types import FloatArray
 
-__all__ = ["Doubts", "Watch"]
-
 EARLY_IN_A_ROW: Final = 9
 """By chance a pulse is early at one ISI a few times in a row; after three, strategies that may choose ask elsewhere."""
 
@@ -34,12 +32,7 @@ class Doubts:
 
     @classmethod
     def seen(cls, told: tuple[Told, ...], detection_limit_mv: float | None = None) -> Doubts:
-        """What was odd about amplitudes on their way; whoever goes on with them has seen it.
-
-        Args:
-            told: the trials that count, in order.
-            detection_limit_mv: as for `Evidence`.
-        """
+        """What was odd about amplitudes on their way; whoever goes on with them has seen it."""
         ways = (Evidence(told=told[:n], detection_limit_mv=detection_limit_mv) for n in range(1, len(told) + 1))
         return cls(frozenset(finding.kind for way in ways for finding in findings(way)))
 
@@ -71,12 +64,7 @@ class Watch:
     pause: Finding | None = None
 
     def resumed(self, trials: TrialTable, paused_for: Iterable[Kind]) -> Watch:
-        """The same after earlier trials; whoever resumes the session has seen their doubts and its pauses.
-
-        Args:
-            trials: what was delivered before.
-            paused_for: what it paused for.
-        """
+        """The same after earlier trials; whoever resumes the session has seen their doubts and its pauses."""
         seen, told = frozenset(paused_for), told_of(trials)
         doubts = Doubts.seen(told, self.detection_limit_mv)
         return replace(self, told=told, doubts=Doubts(doubts.raised | seen), paused_for=seen)
@@ -87,12 +75,7 @@ class Watch:
         return replace(self, in_a_row=0, early=0, paused_for=seen, pause=None)
 
     def after(self, trial: Trial, answer: Sweep | Measurement) -> Watch:
-        """The same after one more trial.
-
-        Args:
-            trial: the trial.
-            answer: what the device answered.
-        """
+        """The same after one more trial."""
         before = replace(self, doubts=self.doubts.after(()))
         if too_early_by_chance(trial, self.space):
             return _after_early(before, trial)

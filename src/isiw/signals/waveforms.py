@@ -14,20 +14,6 @@ from isiw.errors import InvalidValueError
 from isiw.findings import RATE_HZ, Kind
 from isiw.types import ArrayLike, BoolArray, FloatArray, IntArray
 
-__all__ = [
-    "REST_MS",
-    "as_waveforms",
-    "crossing_before",
-    "cut",
-    "first_true",
-    "is_recording",
-    "level_and_noise",
-    "per_waveform",
-    "rest_level",
-    "samples",
-]
-
-
 MIN_REST_MS = 20.0
 REST_MS = 200.0
 """The last part of the rest, where a baseline that drifts is nearest to what it will be."""
@@ -39,20 +25,7 @@ MORE_THAN_A_GLITCH = 0.005
 
 
 def as_waveforms(values: ArrayLike, rate_hz: float, name: str = "waveform") -> FloatArray:
-    """Waveforms as a float array, checked to be recordings at all.
-
-    Args:
-        values: samples, shape (..., w).
-        rate_hz: sampling rate [Hz].
-        name: what to call them in an error.
-
-    Returns:
-        The samples, shape (n, w); a single waveform becomes one row.
-
-    Raises:
-        InvalidValueError: no samples, waveforms of different lengths, samples that are not finite, a waveform without
-            any variation, or an impossible rate.
-    """
+    """Waveforms as a float array, checked to be recordings at all."""
     try:
         waves = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -84,15 +57,7 @@ def is_recording(values: FloatArray) -> bool:
 
 
 def per_waveform(value: ArrayLike | None, waves: FloatArray) -> FloatArray:
-    """One number for each waveform, shape (n,); None becomes NaN.
-
-    Args:
-        value: one number for all, one a waveform, or None.
-        waves: the waveforms, shape (n, w).
-
-    Raises:
-        InvalidValueError: neither one number nor one a waveform.
-    """
+    """One number for each waveform, shape (n,); None becomes NaN."""
     number = np.asarray(math.nan if value is None else value, dtype=np.float64)
     if number.size not in {1, len(waves)}:
         raise InvalidValueError(
@@ -102,29 +67,12 @@ def per_waveform(value: ArrayLike | None, waves: FloatArray) -> FloatArray:
 
 
 def samples(duration_ms: float, rate_hz: float) -> int:
-    """How many whole samples a duration holds, whatever its rounding: the one rule for what a sweep must hold.
-
-    Args:
-        duration_ms: the duration [ms].
-        rate_hz: sampling rate [Hz].
-    """
+    """How many whole samples a duration holds, whatever its rounding: the one rule for what a sweep must hold."""
     return math.floor(duration_ms * rate_hz / 1000 + 1e-6)
 
 
 def rest_level(waves: FloatArray, stop: int, rate_hz: float) -> tuple[FloatArray, FloatArray]:
-    """Level and noise SD of each waveform while nothing happens: the reading at rest, robust against outliers.
-
-    Args:
-        waves: shape (n, w).
-        stop: number of samples from the start that are at rest; the last 200 ms of them are read.
-        rate_hz: sampling rate [Hz].
-
-    Returns:
-        Median and noise SD, each of shape (n, 1).
-
-    Raises:
-        InvalidValueError: less than 20 ms of rest.
-    """
+    """Level and noise SD of each waveform while nothing happens: the reading at rest, robust against outliers."""
     stop = min(stop, waves.shape[-1])
     if stop < samples(MIN_REST_MS, rate_hz):
         raise InvalidValueError(
@@ -137,14 +85,7 @@ def rest_level(waves: FloatArray, stop: int, rate_hz: float) -> tuple[FloatArray
 
 
 def level_and_noise(rest: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Level and noise SD of waveforms at rest, robust against outliers.
-
-    Args:
-        rest: shape (n, w); NaN is passed over.
-
-    Returns:
-        Median and noise SD, each of shape (n, 1).
-    """
+    """Level and noise SD of waveforms at rest, robust against outliers."""
     median, mean = (np.nanmedian, np.nanmean) if np.isnan(rest).any() else (np.median, np.mean)
     level = median(rest, axis=-1, keepdims=True)
     size = np.abs(rest - level)
@@ -158,13 +99,7 @@ def level_and_noise(rest: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def cut(waves: FloatArray, start: IntArray, count: int) -> FloatArray:
-    """`count` samples of each waveform from its own `start` on, shape (n, count); ends are held.
-
-    Args:
-        waves: the waveforms, shape (n, w).
-        start: the first sample of each, shape (n,).
-        count: how many samples.
-    """
+    """`count` samples of each waveform from its own `start` on, shape (n, count); ends are held."""
     columns = np.clip(start[:, None] + np.arange(count), 0, waves.shape[-1] - 1)
     return np.take_along_axis(waves, columns, axis=-1)
 
@@ -176,16 +111,7 @@ def first_true(mask: BoolArray) -> IntArray:
 
 
 def crossing_before(waves: FloatArray, level: FloatArray, stop: IntArray) -> FloatArray:
-    """Where each waveform last rose through a level before a sample that is above it.
-
-    Args:
-        waves: shape (n, w).
-        level: shape (n, 1).
-        stop: index of a sample above the level for each row, or -1 for none, shape (n,).
-
-    Returns:
-        The crossing in samples, interpolated linearly; NaN where there is none, shape (n,).
-    """
+    """Where each waveform last rose through a level before a sample that is above it."""
     columns = np.arange(waves.shape[-1])
     below = (waves <= level) & (columns < stop[:, None])
     last = waves.shape[-1] - 1 - first_true(below[:, ::-1])

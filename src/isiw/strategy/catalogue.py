@@ -15,8 +15,6 @@ from isiw.strategy.settings.common import Settings, settings_from, settings_keys
 from isiw.strategy.settings.described import DescribedSetting, described
 from isiw.strategy.strategy import Recipe, Strategy
 
-__all__ = ["known_settings", "list_settings", "list_strategies", "make_strategy", "remade_strategy", "settings_for"]
-
 
 @dataclass(frozen=True)
 class _Entry:
@@ -114,17 +112,7 @@ def list_settings(name: str = "default") -> tuple[DescribedSetting, ...]:
 
 
 def settings_for(name: str, **settings: Any) -> Settings:
-    """Settings of a named strategy, checked.
-
-    Args:
-        name: one of `list_strategies()`.
-        **settings: what differs from what the name stands for, by key; `isiw strategies NAME` lists the keys.
-
-    Raises:
-        StrategyError: an unknown name or setting.
-        ConfigError: a nested key or value that cannot be used.
-        InvalidValueError: an invalid value.
-    """
+    """Settings of a named strategy, checked."""
     if not isinstance(name, str) or name not in _CATALOGUE:
         raise StrategyError(
             "unknown strategy",
@@ -139,15 +127,7 @@ def settings_for(name: str, **settings: Any) -> Settings:
 
 
 def known_settings(name: str, known: Mapping[str, Any]) -> dict[str, Any]:
-    """What is known of a rig or a person, as settings of a strategy: those that it has.
-
-    Args:
-        name: one of `list_strategies()`.
-        known: values by the keys of `isiw.strategy.settings.common.KNOWN`; None for what is not known.
-
-    Raises:
-        StrategyError: an unknown name.
-    """
+    """What is known of a rig or a person, as settings of a strategy: those that it has."""
     keys = settings_keys(type(settings_for(name)))
     return {key: value for key, value in known.items() if value is not None and key in keys}
 
@@ -176,19 +156,7 @@ def make_strategy(name: str = "default", space: DesignSpace = VALVE_SPACE, seed:
 
 
 def remade_strategy(name: str, space: DesignSpace, seed: int, **settings: Any) -> Strategy:
-    """As `make_strategy`, for a log: also with what a new session does not accept any more.
-
-    Args:
-        name: as for `make_strategy`.
-        space: as for `make_strategy`.
-        seed: as for `make_strategy`.
-        **settings: as for `make_strategy`.
-
-    Raises:
-        StrategyError: as for `make_strategy`.
-        ConfigError: as for `make_strategy`.
-        InvalidValueError: as for `make_strategy`.
-    """
+    """As `make_strategy`, for a log: also with what a new session does not accept any more."""
     seed = whole("the seed", seed, least=0)
     chosen = settings_for(name, **settings)
     require_space(space)

@@ -13,8 +13,6 @@ from isiw.design import DesignSpace
 from isiw.lazy import torch
 from isiw.models.protocol import Posterior, Tensor
 
-__all__ = ["Choice", "ChosenBy", "Cost", "best_choices", "candidate_isis", "evenly_spaced", "instead_of_lost"]
-
 ASKED_AGAIN = 2
 """So often a lost trial is asked again at the same ISI; then another ISI stands in for it."""
 
@@ -47,11 +45,7 @@ class Choice:
 
 
 def candidate_isis(space: DesignSpace) -> Tensor:
-    """Evenly spaced ISIs of the design grid to score [ms], both ends included, shape (t,); at most `MAX_CANDIDATES`.
-
-    Args:
-        space: the design space.
-    """
+    """Evenly spaced ISIs of the design grid to score [ms], both ends included, shape (t,); at most `MAX_CANDIDATES`."""
     grid = space.grid_ms
     stride = max(1, math.ceil((len(grid) - 1) / (MAX_CANDIDATES - 1)))
     picked = sorted({*range(0, len(grid), stride), len(grid) - 1})
@@ -67,19 +61,7 @@ def best_choices(
     people: int = 1,
     cost: Cost | None = None,
 ) -> tuple[Choice, ...]:
-    """The ISI of each person that the acquisition function scores best; an evenly spaced one where it scores none.
-
-    Args:
-        posterior: what is believed.
-        acquisition: the acquisition function.
-        space: the design space.
-        told: trials told of each person.
-        people: how many there are.
-        cost: is taken off the scores.
-
-    Raises:
-        StrategyError: no tensor of as many scores as there are ISIs.
-    """
+    """The ISI of each person that the acquisition function scores best; an evenly spaced one where it scores none."""
     candidates = candidate_isis(space)
     given = require_scores(acquisition, acquisition(posterior, candidates), len(candidates), people)
     scores = given.cpu().expand(people, -1)
@@ -94,24 +76,13 @@ def best_choices(
 
 
 def evenly_spaced(space: DesignSpace, told: int) -> float:
-    """The ISI [ms] of this trial in an order that fills the range, whatever is believed.
-
-    Args:
-        space: the ISIs that may be asked.
-        told: how many trials were told.
-    """
+    """The ISI [ms] of this trial in an order that fills the range, whatever is believed."""
     candidates = candidate_isis(space)
     return space.snap(float(candidates[golden_index(told, len(candidates))]))
 
 
 def instead_of_lost(space: DesignSpace, lost: int, delivered: int) -> Choice | None:
-    """What is asked instead of an ISI that was lost again and again; None where it is asked once more.
-
-    Args:
-        space: the ISIs that may be asked.
-        lost: how many trials were lost in a row.
-        delivered: how many stimuli were delivered, mistrials included.
-    """
+    """What is asked instead of an ISI that was lost again and again; None where it is asked once more."""
     if lost <= ASKED_AGAIN:
         return None
     reason = f"The trial was lost {lost} times in a row: an evenly spaced ISI instead."

@@ -17,8 +17,6 @@ from isiw.strategy.choosing import Choice, Cost, best_choices
 from isiw.strategy.stopping import Progress, StopDecision, StoppingRule, looks_back
 from isiw.window import WindowEstimate
 
-__all__ = ["Belief", "Course", "Method"]
-
 
 @dataclass(frozen=True)
 class Method:
@@ -41,12 +39,7 @@ class Method:
     cost: Cost | None = None
 
     def begin(self, seed: int, people: int = 1) -> Course:
-        """The course before the first trial.
-
-        Args:
-            seed: seed of the model's draws.
-            people: how many people are examined side by side.
-        """
+        """The course before the first trial."""
         return Course(self, self.model.begin(self.space, seed, people), people)
 
 
@@ -133,11 +126,7 @@ class Course:
         return self.method.initial_ms[self.paired_trials :]
 
     def ahead_ms(self, n: int) -> list[float]:
-        """The next ISIs [ms] of one person that stand already, whatever will be told; at most n of a design's.
-
-        Args:
-            n: how many are wanted.
-        """
+        """The next ISIs [ms] of one person that stand already, whatever will be told; at most n of a design's."""
         acquisition, space, left = self.method.acquisition, self.method.space, self.initial_left
         if isinstance(acquisition, FollowsPlan):
             pairs = range(self.paired_trials + len(left), self.paired_trials + n)
@@ -170,11 +159,7 @@ class Course:
         return self.planned or self.chosen(self.posterior)
 
     def chosen(self, posterior: Posterior) -> tuple[Choice, ...]:
-        """What the acquisition function chooses for each person, whatever is planned.
-
-        Args:
-            posterior: what is believed, or imagined.
-        """
+        """What the acquisition function chooses for each person, whatever is planned."""
         if isinstance(posterior, ExpectsTheUsual):
             posterior = posterior.as_usual
         method = self.method
@@ -187,13 +172,7 @@ class Course:
         return self.belief.estimate(person)
 
     def decision(self, person: int = 0, mistrials: int = 0, *, silent: bool = False) -> StopDecision:
-        """Whether to stop with one person, and why.
-
-        Args:
-            person: which.
-            mistrials: pairs of stimuli that were delivered to the person and not told.
-            silent: whether no trial of the person showed an MEP; see `WindowEstimate.silent`.
-        """
+        """Whether to stop with one person, and why."""
         past = tuple(belief.estimate(person) for belief in self.past)
         estimate = self.estimate(person).noting(silent=silent)
         progress = Progress(self.paired_trials + mistrials, self.paired_trials, estimate, past=past)

@@ -9,8 +9,6 @@ from typing import Literal
 from isiw.checks import check_choice, check_numbers, check_wholes
 from isiw.strategy.stopping import Progress, StopDecision, StopKind
 
-__all__ = ["EdgeVariance", "ParticleSpread", "SweptPast"]
-
 
 @dataclass(frozen=True)
 class EdgeVariance:

@@ -15,23 +15,6 @@ from isiw.errors import InvalidValueError
 from isiw.text.numbers import counted
 from isiw.window import SURE, WindowEstimate
 
-__all__ = [
-    "AnyOf",
-    "Budget",
-    "CredibleWidth",
-    "ExpectedF1",
-    "HasBudget",
-    "LooksBack",
-    "NoWindow",
-    "Progress",
-    "SmallGain",
-    "StopDecision",
-    "StopKind",
-    "StoppingRule",
-    "looks_back",
-    "stimuli_left",
-]
-
 
 class StopKind(StrEnum):
     """What a decision rests on."""
@@ -340,12 +323,7 @@ class AnyOf:
 
 
 def stimuli_left(rule: StoppingRule, delivered: int) -> int | None:
-    """How many stimuli a rule's budget still allows; None where it sets none.
-
-    Args:
-        rule: the stopping rule.
-        delivered: stimuli delivered so far.
-    """
+    """How many stimuli a rule's budget still allows; None where it sets none."""
     return rule.stimuli_left(delivered) if isinstance(rule, HasBudget) else None
 
 

@@ -29,8 +29,6 @@ from isiw.strategy.stopping import StopDecision, StopKind, StoppingRule
 from isiw.types import FloatArray
 from isiw.window import WindowEstimate
 
-__all__ = ["Recipe", "Strategy"]
-
 _T = TypeVar("_T")
 
 MOST_OF_A_BATCH = 1000

@@ -24,16 +24,9 @@ from isiw.studies.threads import one_torch_thread
 from isiw.subjects.subject import Response
 from isiw.window import WindowEstimate
 
-__all__ = ["simulate_batch"]
-
 
 def simulate_batch(sessions: Sequence[SimulatedSession], device: str = "cpu") -> pd.DataFrame:
-    """Run sessions side by side; columns as in `examine`.
-
-    Args:
-        sessions: sessions of one strategy, alike but for the person; the first gives the seed of the models' draws.
-        device: torch device of the models that have one; the others compute on the CPU.
-    """
+    """Run sessions side by side; columns as in `examine`."""
     with one_torch_thread():
         return examine(sessions, _Batch(sessions, device))
 

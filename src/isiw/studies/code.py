@@ -8,8 +8,6 @@ from pathlib import Path
 
 import isiw
 
-__all__ = ["code_checksum"]
-
 
 @cache
 def code_checksum() -> str:

@@ -29,8 +29,6 @@ from isiw.checks import check_wholes
 from isiw.errors import StudyError
 from isiw.studies.memory import memory_kept
 
-__all__ = ["DaskCluster", "Executor", "Failure", "Processes"]
-
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
 

@@ -10,8 +10,6 @@ import ctypes
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
 
-__all__ = ["memory_kept"]
-
 # Parameters of mallopt(3), from malloc.h, and the value that both begin with.
 _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
 _USUAL_BYTES = 128 * 1024

@@ -23,8 +23,6 @@ from isiw.strategy.strategy import Strategy
 from isiw.studies.players import Player
 from isiw.text.named_code import named_code, require_fitting
 
-__all__ = ["OWN", "OwnCode"]
-
 OWN: Final = "own"
 """The name, in the folder of a study, of a strategy that the operator's own code makes."""
 
@@ -45,15 +43,7 @@ class OwnCode:
 
     @classmethod
     def named(cls, reference: str, folder: Path | None) -> OwnCode:
-        """The code that a study names, with the checksum that it has now.
-
-        Args:
-            reference: where it is, as `module:function`.
-            folder: where the module is looked for first.
-
-        Raises:
-            ConfigError: it cannot be imported.
-        """
+        """The code that a study names, with the checksum that it has now."""
         named_code(reference, folder, "the strategy's function")
         return cls(reference, folder, _checksum(reference.partition(":")[0]))
 
@@ -63,15 +53,6 @@ class OwnCode:
         The function gets the settings, and `space` and `seed` if it has parameters of these names. It returns a
         strategy or anything else with ask, tell and estimate; or a model or an acquisition function, which takes the
         place of the default's.
-
-        Args:
-            space: the ISIs that may be asked.
-            seed: of the session.
-            settings: keyword arguments of the function.
-
-        Raises:
-            ConfigError: the function cannot be imported, does not take the settings, or returns something else.
-            StudyError: the code is not known, or not the one that the study began with.
         """
         if not self.reference:
             raise StudyError(

@@ -31,19 +31,6 @@ from isiw.studies.own import OWN, OwnCode
 from isiw.studies.sessions import OWN_STRATEGY, SimulatedSession, Stopping, require_cohorts, simulate
 from isiw.text.toml_files import checked, read_toml
 
-__all__ = [
-    "Engine",
-    "HitDelay",
-    "Study",
-    "StudyStrategy",
-    "Unit",
-    "begun_study",
-    "load_study",
-    "run_unit",
-    "study_from",
-    "study_values",
-]
-
 _MOST_SEED: Final = 2**62
 """Sums of seeds stay within 64 bits."""
 
@@ -283,15 +270,7 @@ def load_study(path: str | Path) -> Study:
 
 
 def begun_study(values: Mapping[str, Any], source: str) -> Study:
-    """The study of a folder of results; a table of its space without a reference once counted from the impact.
-
-    Args:
-        values: as its TOML file has them.
-        source: where they are from, for the message.
-
-    Raises:
-        ConfigError: an unknown key or a bad value.
-    """
+    """The study of a folder of results; a table of its space without a reference once counted from the impact."""
     plain = {key: value for key, value in values.items() if key not in _OF_THE_FOLDER}
     if isinstance(plain.get("space"), dict):
         plain["space"] = {"reference": "impact", **plain["space"]}
@@ -318,16 +297,7 @@ def _named(strategy: Any) -> StudyStrategy:
 
 
 def study_from(values: Mapping[str, Any], source: str, folder: Path | None = None) -> Study:
-    """A study from TOML values, in which a strategy may be its name alone, and a space `"valve"` or `"impact"`.
-
-    Args:
-        values: the values.
-        source: where they are from, for the message.
-        folder: where modules of the operator's own are; None for the folder of a study, which may name none.
-
-    Raises:
-        ConfigError: an unknown key or a bad value.
-    """
+    """A study from TOML values, in which a strategy may be its name alone, and a space `"valve"` or `"impact"`."""
     plain = dict(values)
     if isinstance(plain.get("strategies"), list):
         plain["strategies"] = [_strategy_values(strategy, source, folder) for strategy in plain["strategies"]]

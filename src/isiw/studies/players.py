@@ -12,8 +12,6 @@ from isiw.strategy.strategy import Strategy
 from isiw.subjects.subject import Response
 from isiw.window import Window, WindowEstimate
 
-__all__ = ["Crowd", "Player", "Reported", "alone"]
-
 Reported: TypeAlias = WindowEstimate | Window | None
 
 
@@ -50,12 +48,7 @@ class Crowd(Protocol):
         """Learn from one trial of each person."""
 
     def count_mistrial(self, person: int, lost: Choice) -> Choice:
-        """Count a pair of stimuli that was delivered in vain, and say what is asked of the person instead.
-
-        Args:
-            person: which one.
-            lost: what was asked.
-        """
+        """Count a pair of stimuli that was delivered in vain, and say what is asked of the person instead."""
 
     def estimate(self, person: int) -> Reported:
         """What is believed about the window of a person."""
@@ -68,11 +61,7 @@ class Crowd(Protocol):
 
 
 def alone(player: Player) -> Crowd:
-    """A player as a crowd of one; a strategy keeps its stopping rule, and says which asks and fits failed.
-
-    Args:
-        player: who proposes the ISIs.
-    """
+    """A player as a crowd of one; a strategy keeps its stopping rule, and says which asks and fits failed."""
     return _StrategyAlone(player) if isinstance(player, Strategy) else _PlayerAlone(player)
 
 

@@ -18,8 +18,6 @@ from isiw.studies.plan import Study, Unit, run_unit
 from isiw.studies.sessions import TIMES, SimulatedSession, simulate
 from isiw.studies.store import Store, begin_store
 
-__all__ = ["Replay", "conduct", "paired_sessions", "replay", "run_study", "unit_of_row"]
-
 
 def conduct(
     study: Study,

@@ -27,17 +27,6 @@ from isiw.subjects.cohorts import COHORTS, person_of
 from isiw.subjects.subject import Response, SimulatedSubject
 from isiw.window import Window, WindowEstimate
 
-__all__ = [
-    "OWN_STRATEGY",
-    "TIMES",
-    "SimulatedSession",
-    "Stopping",
-    "examine",
-    "play",
-    "require_cohorts",
-    "simulate",
-]
-
 TIMES = ("ask_ms", "tell_ms")
 """Columns that differ each time a session is run."""
 
@@ -52,14 +41,7 @@ Stopping: TypeAlias = Literal["ignored", "noted", "ends"]
 
 
 def require_cohorts(names: Iterable[object]) -> None:
-    """Raise where something is not the name of a cohort.
-
-    Args:
-        names: what was given.
-
-    Raises:
-        InvalidValueError: an unknown name, or people in the place of one.
-    """
+    """Raise where something is not the name of a cohort."""
     if unknown := [name for name in names if not (isinstance(name, str) and name in COHORTS)]:
         raise InvalidValueError(
             "unknown cohorts",
@@ -168,25 +150,7 @@ def play(session: SimulatedSession, player: Player) -> pd.DataFrame:
 
 
 def examine(sessions: Sequence[SimulatedSession], crowd: Crowd) -> pd.DataFrame:
-    """Run sessions of equally many trials side by side.
-
-    Args:
-        sessions: one a person.
-        crowd: proposes the ISIs.
-
-    Returns:
-        One row a mark of each session: strategy (its label), cohort, person, seed, trial (the mark); how many pairs had
-        been delivered by then, mistrials among them; F1; whether there is a window, whether the method had an answer
-        yet, whether it reported a window, its edges [ms], its probability, the expected F1, whether the 90 % intervals
-        cover start and end (NaN where there are none); how many asks were fallbacks and how many fits failed (NaN where
-        a batch cannot say whose); after how many pairs the stopping rule fired (NaN where it has not), why, whether
-        that was before the budget was used up (NaN where the rule is ignored), and F1 and coverage at that moment,
-        named `stop_f1` and so on; the time that the last ask and the last tell took for each person [ms]. After the end
-        of a session its last estimate stays.
-
-    Raises:
-        StudyError: a person's realised ISIs are hardly ever near enough to the commanded ones.
-    """
+    """Run sessions of equally many trials side by side."""
     people = [_Person(session, number, crowd) for number, session in enumerate(sessions)]
     for person in people:
         person.note_before()

@@ -35,8 +35,6 @@ from isiw.studies.plan import Study, Unit, begun_study, study_values
 from isiw.text.commands import command
 from isiw.text.toml_files import read_toml
 
-__all__ = ["Store", "begin_store", "open_store"]
-
 _KEYS: Final = ["strategy", "cohort", "person", "trial"]
 
 _OF_STUDY: Final = b"isiw_study"

@@ -12,8 +12,6 @@ from isiw.errors import InvalidValueError, did_you_mean
 from isiw.lazy import pd, scipy
 from isiw.types import FloatArray
 
-__all__ = ["differences", "means_table", "summarise"]
-
 _GROUP: Final = ["cohort", "strategy", "trial"]
 
 LEVEL: Final = 0.95

@@ -7,8 +7,6 @@ from contextlib import contextmanager
 
 from isiw.lazy import torch
 
-__all__ = ["one_torch_thread"]
-
 
 @contextmanager
 def one_torch_thread() -> Generator[None, None, None]:

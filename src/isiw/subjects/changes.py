@@ -15,8 +15,6 @@ from isiw.checks import check_numbers, check_wholes
 from isiw.errors import InvalidValueError
 from isiw.types import FloatArray
 
-__all__ = ["Change", "TapResponse", "amplitude_of_both_mv"]
-
 MEP_WINDOW_MS: Final = (15.0, 35.0)
 """The MEP window [ms after the magnetic pulse] [Kim2020, 5.2.3]."""
 
@@ -122,14 +120,7 @@ class TapResponse:
 
 
 def amplitude_of_both_mv(evoked_mv: float, tap: TapResponse, tap_mv: float, isi_ms: float) -> float:
-    """Peak-to-peak amplitude of what is in the MEP window: the MEP, and what the tap evoked [mV].
-
-    Args:
-        evoked_mv: the MEP's own amplitude [mV].
-        tap: the course of the tap's response.
-        tap_mv: its amplitude in this trial [mV].
-        isi_ms: from the impact to the pulse [ms].
-    """
+    """Peak-to-peak amplitude of what is in the MEP window: the MEP, and what the tap evoked [mV]."""
     both = evoked_mv * _MEP + tap_mv * tap.course(isi_ms + _AFTER_PULSE_MS)
     return float(np.ptp(both))
 

@@ -21,8 +21,6 @@ from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse,
 from isiw.subjects.subject import Drift, SimulatedSubject
 from isiw.subjects.supra import supra_threshold
 
-__all__ = ["COHORTS", "cohort", "person_of"]
-
 _Pair: TypeAlias = tuple[float, float]
 _Shape: TypeAlias = Callable[[np.random.Generator, float, float], Profile]
 
@@ -267,16 +265,7 @@ def cohort(name: str, n: int, seed: int) -> list[SimulatedSubject]:
 
 
 def person_of(name: str, number: int, seed: int) -> SimulatedSubject:
-    """One person of a cohort, without the others.
-
-    Args:
-        name: as for `cohort`.
-        number: which person, from 0.
-        seed: as for `cohort`.
-
-    Raises:
-        InvalidValueError: an unknown name, or a negative number.
-    """
+    """One person of a cohort, without the others."""
     choice("the cohort", name, COHORTS)
     number, seed = whole("number", number, least=0), whole("seed", seed, least=0)
     if name in _ELEVEN:

@@ -11,8 +11,6 @@ from isiw.subjects.profiles import PeakProfile
 from isiw.subjects.responses import RecruitmentResponse
 from isiw.subjects.subject import SimulatedSubject
 
-__all__ = ["P_STAYS", "another_day"]
-
 P_STAYS: Final = 0.7
 """How often the window is the one of the day before, moved as a whole."""
 

@@ -14,8 +14,6 @@ from isiw.subjects.profiles import PeakProfile
 from isiw.subjects.responses import EmgFloor, RecruitmentResponse
 from isiw.subjects.subject import SimulatedSubject
 
-__all__ = ["LABS", "Lab", "lab"]
-
 _Pair: TypeAlias = tuple[float, float]
 
 

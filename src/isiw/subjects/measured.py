@@ -29,8 +29,6 @@ from isiw.subjects.profiles import PeakProfile
 from isiw.subjects.responses import EmgFloor, RecruitmentResponse
 from isiw.subjects.subject import SimulatedSubject
 
-__all__ = ["MEASURED_KIM", "WIDTHS_KIM_MS", "MeasuredPerson"]
-
 PAIRED_PCT_RMT: Final = 90.0
 BASELINE_PCT_RMT: Final = 100.0
 """TMS alone whose MEP a window is above (4.2.1) [% RMT]."""

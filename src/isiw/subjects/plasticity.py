@@ -12,8 +12,6 @@ from dataclasses import dataclass
 
 from isiw.checks import check_numbers
 
-__all__ = ["Plasticity"]
-
 
 @dataclass(frozen=True)
 class Plasticity:

@@ -17,8 +17,6 @@ from isiw.checks import check_numbers, check_probabilities
 from isiw.errors import InvalidValueError
 from isiw.types import ArrayLike, FloatArray
 
-__all__ = ["OpposedProfile", "PeakProfile", "Profile", "TwoPeakProfile"]
-
 
 class Profile(Protocol):
     """Facilitation by ISI: at most 1, and negative where the tap depresses the MEP."""

@@ -15,8 +15,6 @@ import numpy as np
 from isiw.subjects.changes import Change, TapResponse
 from isiw.subjects.subject import SimulatedSubject
 
-__all__ = ["CHANGED"]
-
 _Changed: TypeAlias = Callable[[np.random.Generator, SimulatedSubject], SimulatedSubject]
 
 COARSE_STEPS_MV: Final = (0.005, 0.010, 0.020)

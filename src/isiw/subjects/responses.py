@@ -19,8 +19,6 @@ from isiw.checks import check_numbers
 from isiw.lazy import scipy
 from isiw.types import ArrayLike, FloatArray
 
-__all__ = ["EmgFloor", "GainResponse", "RecruitmentResponse", "ResponseCurve", "TrialNoise"]
-
 _NODES, _NODE_WEIGHTS = np.polynomial.hermite_e.hermegauss(80)
 _NODE_WEIGHTS = _NODE_WEIGHTS / _NODE_WEIGHTS.sum()
 

@@ -30,8 +30,6 @@ from isiw.subjects.responses import RecruitmentResponse, ResponseCurve, TrialNoi
 from isiw.types import Conditioning, FloatArray, Reference
 from isiw.window import LEAST_DEPRESSED_MV, Window, window_from_excess
 
-__all__ = ["OUTLIERS_MV", "Drift", "Responder", "Response", "SimulatedSubject"]
-
 OUTLIERS_MV: Final = (0.1, 0.5)
 """Between these an artefact's amplitude is uniform [mV]."""
 

@@ -10,8 +10,6 @@ from isiw.subjects.profiles import OpposedProfile, PeakProfile
 from isiw.subjects.responses import EmgFloor, RecruitmentResponse
 from isiw.subjects.subject import SimulatedSubject
 
-__all__ = ["INTENSITY_PCT_RMT", "RANGE_MS", "WIDTH_LIMITS_MS", "supra_threshold"]
-
 INTENSITY_PCT_RMT: Final = 120.0
 """Intensity of the pulse [% RMT] [Kim2020, 8.1.3]."""
 
@@ -23,11 +21,7 @@ WIDTH_LIMITS_MS: Final = (10.0, 60.0)
 
 
 def supra_threshold(rng: np.random.Generator) -> SimulatedSubject:
-    """A person of the cohort `supra-threshold`.
-
-    Args:
-        rng: source of randomness.
-    """
+    """A person of the cohort `supra-threshold`."""
     boost_pct, dip_pct = float(rng.uniform(6, 18)), float(rng.uniform(5, 12))
     first, second = _segments(rng)
     if rng.random() < 0.5:

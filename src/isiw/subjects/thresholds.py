@@ -22,8 +22,6 @@ from isiw.subjects.responses import RecruitmentResponse, TrialNoise
 from isiw.trials import RESPONSE_MV
 from isiw.types import FloatArray
 
-__all__ = ["THRESHOLD_COHORTS", "HotSpot", "StimulatedPerson", "StimulatedResponder", "threshold_cohort"]
-
 RMT_PCT_MSO: Final = (30.0, 80.0)
 """Between these the thresholds of simulated people are uniform [% MSO]."""
 

@@ -8,8 +8,6 @@ from isiw.lazy import torch
 from isiw.models.protocol import Posterior
 from isiw.testing.requirements import require, same_estimates
 
-__all__ = ["check_acquisition"]
-
 
 def check_acquisition(acquisition: AcquisitionFunction, posterior: Posterior, space: DesignSpace) -> None:
     """Check that an acquisition function keeps the promises of `isiw.acquisition.protocol`.

@@ -13,8 +13,6 @@ from isiw.signals.limits import SignalLimits
 from isiw.signals.rig import steepest_edge, tap_span_ms
 from isiw.trials import Channel, Stimulus, Sweep, Trial
 
-__all__ = ["NEAR_PULSE_MS", "Delivery", "DeviceTable", "device_table", "edges_ms"]
-
 NEAR_PULSE_MS = 3.0
 """How far from the reported pulse its artefact's steepest edge may be."""
 
@@ -52,13 +50,7 @@ class DeviceTable:
 
 
 def device_table(info: DeviceInfo, deliveries: Sequence[Delivery], limits: SignalLimits) -> DeviceTable:
-    """The table of a check.
-
-    Args:
-        info: what the device says about itself.
-        deliveries: what it delivered.
-        limits: what a session's sweeps must keep.
-    """
+    """The table of a check."""
     trials = [delivery.trial for delivery in deliveries]
     return DeviceTable(
         (
@@ -129,11 +121,7 @@ def _amplitudes(trials: Sequence[Trial]) -> str:
 
 
 def edges_ms(deliveries: Sequence[Delivery]) -> list[float]:
-    """When the steepest edge of each EMG comes, where one stands out and is not the tap's [ms after the pulse].
-
-    Args:
-        deliveries: what was delivered.
-    """
+    """When the steepest edge of each EMG comes, where one stands out and is not the tap's [ms after the pulse]."""
     found = [_edge_ms(delivery.answer, delivery.trial) for delivery in deliveries if isinstance(delivery.answer, Sweep)]
     return [edge_ms for edge_ms in found if edge_ms is not None]
 

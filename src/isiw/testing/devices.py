@@ -27,8 +27,6 @@ from isiw.testing.requirements import broken, require
 from isiw.text.shown import shown
 from isiw.trials import Measurement, Stimulus, Sweep, Trial
 
-__all__ = ["check_device"]
-
 _VERBS: Final = ("describe", "stage", "deliver", "stop", "unstage")
 
 

@@ -21,8 +21,6 @@ from isiw.log.schema import Event, Intent
 from isiw.testing.requirements import require
 from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep
 
-__all__ = ["Fault", "FaultyDevice", "Fired", "check_ledger"]
-
 _HOT_C = 90.0
 _COOL_C = 25.0
 _LONGEST_HANG_S = 600.0

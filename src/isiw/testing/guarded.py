@@ -19,8 +19,6 @@ from isiw.session.sink import Sink
 from isiw.testing.requirements import broken, require
 from isiw.trials import Stimulus
 
-__all__ = ["Guarded", "Pace"]
-
 
 @dataclass(frozen=True)
 class Pace:
@@ -42,12 +40,7 @@ class Pace:
 
 
 class Guarded:
-    """A device that is checked, behind the guards of a session.
-
-    Args:
-        device: the device.
-        pace: how fast deliveries may follow each other, and within which limits.
-    """
+    """A device that is checked, behind the guards of a session."""
 
     def __init__(self, device: Device, pace: Pace) -> None:
         self._device, self._pace, self._delivered = device, pace, 0
@@ -70,11 +63,7 @@ class Guarded:
 
     @contextmanager
     def armed(self, *, kept_disarmed: bool = False) -> Iterator[None]:
-        """Within, the device is staged; behind it, it is disarmed and let go of, whatever happened.
-
-        Args:
-            kept_disarmed: whether `stage` is kept from it, so that stimuli get through the guards to a disarmed device.
-        """
+        """Within, the device is staged; behind it, it is disarmed and let go of, whatever happened."""
         self._kept.now = kept_disarmed
         now_s = self._pace.clock.now_s()
         self._rig.begin(self._delivered, [now_s - given_s for given_s in self._pace.given_s])
@@ -91,9 +80,6 @@ class Guarded:
         """Deliver a stimulus when pace and limits allow it, and say how long the device took [s].
 
         As in a session, one that the device refuses before firing is tried again.
-
-        Args:
-            stimulus: what to deliver.
         """
         for backoff_s in Safeguards().backoffs_s:
             try:
@@ -103,14 +89,7 @@ class Guarded:
         return self._tried(stimulus)
 
     def require_refusal(self, when: str) -> None:
-        """Raise where the disarmed device does not refuse to deliver.
-
-        Args:
-            when: when that is, for the message.
-
-        Raises:
-            AssertionError: it delivers.
-        """
+        """Raise where the disarmed device does not refuse to deliver."""
         try:
             self._tried(Stimulus(0, None))
         except DeviceError:
@@ -118,11 +97,7 @@ class Guarded:
         raise broken(f"deliver raises a DeviceError {when}", "it delivered and raised nothing")
 
     def require_stop(self) -> None:
-        """Raise where `stop` fails before anything is armed; once the device is armed that would be too late.
-
-        Raises:
-            AssertionError: it does.
-        """
+        """Raise where `stop` fails before anything is armed; once the device is armed that would be too late."""
         punctual = PunctualDevice(self._device)
         try:
             punctual.stop()

@@ -22,8 +22,6 @@ import numpy as np
 from isiw.checks import number
 from isiw.testing.faults import Fired
 
-__all__ = ["PEER_COMMANDS", "Lie", "PulsePeer"]
-
 _NUMBERED = r"(?P<sequence>\d+) "
 
 PEER_COMMANDS: Mapping[str, Any] = {

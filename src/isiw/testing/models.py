@@ -32,8 +32,6 @@ from isiw.testing.requirements import (
     usual_trials,
 )
 
-__all__ = ["check_model"]
-
 
 def check_model(
     make: Callable[[], ResponseModel], space: DesignSpace, *, order_tolerance_ms: float | None = 0.0, people: int = 2

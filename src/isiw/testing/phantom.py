@@ -14,8 +14,6 @@ from isiw.signals.units import EMG_UNITS_MV
 from isiw.testing.device_table import NEAR_PULSE_MS, Delivery, edges_ms
 from isiw.trials import RESPONSE_MV, Sweep
 
-__all__ = ["artefact_in_window", "late_artefact"]
-
 FACTOR: Final = 3.0
 """From one stretch of noise to the next of the same length the range differs by less than half; hum adds nothing."""
 
@@ -25,10 +23,6 @@ def artefact_in_window(deliveries: Sequence[Delivery], signals: SignalLimits) ->
 
     An amplitude of less than a response is left to the EMG's noise. Where the coil alone is on a phantom, the reflex of
     a tap may lie in the window, but at one of the ISIs only; a tap's artefact may hide the stimulator's at another.
-
-    Args:
-        deliveries: what was delivered.
-        signals: where the MEP is sought.
     """
     for alone, least, what in ((True, 1, "TMS alone"), (False, 2, "more than one pair")):
         pulses = [d for d in deliveries if not d.stimulus.tap_alone and (d.stimulus.isi_ms is None) is alone]
@@ -48,9 +42,6 @@ def late_artefact(deliveries: Sequence[Delivery]) -> str | None:
 
     One that comes before it, or much later, is the likely fault of each sweep already. Where no edge stands out of the
     EMG, as behind an amplifier that blanks the pulse, nobody can tell.
-
-    Args:
-        deliveries: what was delivered.
     """
     late_ms = edges_ms(deliveries)
     usual_ms = float(np.median(late_ms)) if late_ms else 0.0

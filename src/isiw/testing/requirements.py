@@ -11,16 +11,6 @@ from isiw.design import DesignSpace
 from isiw.text.shown import shown
 from isiw.window import WindowEstimate
 
-__all__ = [
-    "Trials",
-    "broken",
-    "check_estimate",
-    "require",
-    "same_estimates",
-    "trials_that_break_things",
-    "usual_trials",
-]
-
 Trials = tuple[tuple[float | None, float], ...]
 """ISIs [ms] (None is TMS alone) and MEPs [mV], in the order of telling."""
 
@@ -28,27 +18,13 @@ _USUAL_SHARES: Final = (0.0, 0.25, 0.5, 0.75, 1.0, 0.4, 0.6, 0.45, 0.55, 0.5, 0.
 
 
 def require(condition: object, promise: str, seen: str = "") -> None:
-    """Raise where a promise is broken.
-
-    Args:
-        condition: whether it is kept.
-        promise: what must hold, as a clause, for the message.
-        seen: what was found instead.
-
-    Raises:
-        AssertionError: it is; the message says which.
-    """
+    """Raise where a promise is broken."""
     if not condition:
         raise broken(promise, seen)
 
 
 def broken(promise: str, seen: str) -> AssertionError:
-    """That a promise is broken, as an error whose message sets what was found against what must hold.
-
-    Args:
-        promise: what must hold, as a clause.
-        seen: what was found instead; empty where there is nothing to add.
-    """
+    """That a promise is broken, as an error whose message sets what was found against what must hold."""
     return AssertionError(f"check failed. Required: {promise}{f'; found: {seen}' if seen else ''}")
 
 
@@ -60,12 +36,7 @@ def usual_trials(space: DesignSpace) -> Trials:
 
 
 def trials_that_break_things(space: DesignSpace, trials: int = 12) -> Mapping[str, Trials]:
-    """Trials by what is odd about them.
-
-    Args:
-        space: the design space.
-        trials: how long the longer ones are.
-    """
+    """Trials by what is odd about them."""
     low, high = space.low_ms, space.high_ms
     isis_ms = [space.snap(isi_ms) for isi_ms in np.linspace(low, high, trials)]
     middle = isis_ms[trials // 2]
@@ -83,16 +54,7 @@ def trials_that_break_things(space: DesignSpace, trials: int = 12) -> Mapping[st
 
 
 def check_estimate(estimate: object, space: DesignSpace, when: str) -> None:
-    """Check that an estimate of the window can be used.
-
-    Args:
-        estimate: what is called an estimate.
-        space: the ISIs that may be asked.
-        when: when it was made, for the message.
-
-    Raises:
-        AssertionError: it cannot.
-    """
+    """Check that an estimate of the window can be used."""
     require(isinstance(estimate, WindowEstimate), f"an estimate is a WindowEstimate {when}", shown(estimate))
     if not isinstance(estimate, WindowEstimate):
         return
@@ -109,12 +71,7 @@ def check_estimate(estimate: object, space: DesignSpace, when: str) -> None:
 
 
 def same_estimates(one: WindowEstimate, other: WindowEstimate) -> bool:
-    """Whether two estimates are the same to the last bit.
-
-    Args:
-        one: an estimate.
-        other: another.
-    """
+    """Whether two estimates are the same to the last bit."""
     arrays = ("grid_ms", "edge_samples_ms", "profile_quantiles_mv", "hypothesis_samples")
     plain = ("probability", "window", "start_ms", "end_ms", "spread_ms", "expected_f1", "best_isi", "largest_excluded")
     return all(getattr(one, name) == getattr(other, name) for name in plain) and all(

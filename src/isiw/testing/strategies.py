@@ -19,8 +19,6 @@ from isiw.testing.requirements import (
     usual_trials,
 )
 
-__all__ = ["check_strategy"]
-
 
 def check_strategy(make: Callable[[], Strategy], *, trials: int = 12) -> None:
     """Check that a strategy keeps the promises of ask and tell.

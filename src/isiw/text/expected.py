@@ -12,8 +12,6 @@ from pydantic_core import ErrorDetails
 
 from isiw.errors import did_you_mean
 
-__all__ = ["UNKNOWN", "expected_instead", "first_to_tell", "known_keys", "meant_instead"]
-
 UNKNOWN: Final = {"extra_forbidden", "unexpected_keyword_argument"}
 """Pydantic's types of error for a key that there is not."""
 
@@ -33,11 +31,7 @@ _KINDS: Final = {
 
 
 def expected_instead(error: ErrorDetails) -> str:
-    """What should have been there, for after "expected".
-
-    Args:
-        error: as pydantic found it.
-    """
+    """What should have been there, for after "expected"."""
     kind, _, fault = error["type"].partition("_")
     if kind in _KINDS and fault in {"type", "parsing", "from_float", "attributes_type"}:
         return _KINDS[kind]
@@ -45,12 +39,7 @@ def expected_instead(error: ErrorDetails) -> str:
 
 
 def meant_instead(error: ErrorDetails, keys: Sequence[str] = ()) -> str:
-    """What was probably meant, as a question; empty where nothing that there is comes near.
-
-    Args:
-        error: as pydantic found it.
-        keys: those that there are, where the error is about one that there is not.
-    """
+    """What was probably meant, as a question; empty where nothing that there is comes near."""
     if error["type"] in UNKNOWN:
         return did_you_mean(error["loc"][-1], keys)
     if error["type"] == "literal_error":  # pydantic tells the values in quotes
@@ -59,21 +48,12 @@ def meant_instead(error: ErrorDetails, keys: Sequence[str] = ()) -> str:
 
 
 def first_to_tell(errors: Sequence[ErrorDetails]) -> ErrorDetails:
-    """Of several errors the one to tell: a key that was misspelt before the one that is missing because of it.
-
-    Args:
-        errors: as pydantic found them, at least one.
-    """
+    """Of several errors the one to tell: a key that was misspelt before the one that is missing because of it."""
     return next((error for error in errors if error["type"] in UNKNOWN), errors[0])
 
 
 def known_keys(kind: Any, section: Sequence[int | str]) -> list[str]:
-    """The keys that there are in a section.
-
-    Args:
-        kind: the pydantic model or dataclass of the whole.
-        section: the way to the section, by keys and by places in lists.
-    """
+    """The keys that there are in a section."""
     for name in section:
         kind = get_args(kind)[0] if isinstance(name, int) else get_type_hints(kind)[name]
         if isinstance(kind, UnionType):  # a section that may be left out

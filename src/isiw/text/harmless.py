@@ -6,8 +6,6 @@ import re
 import unicodedata
 from typing import Final
 
-__all__ = ["one_line", "plain"]
-
 _SEQUENCES: Final = re.compile(
     r"(?:\x1b[\]PX^_]|[\x9d\x90\x98\x9e\x9f]).*?(?:\x07|\x1b\\|\x9c|$)"  # titles, links, and what a device is told
     r"|(?:\x1b\[|\x9b)[0-?]*[ -/]*[@-~]?"  # colours, and moves of the cursor

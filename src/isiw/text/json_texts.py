@@ -6,18 +6,12 @@ import json
 import re
 from typing import Any, Final
 
-__all__ = ["read_json", "refuse_doubled"]
-
 _NUMBERS: Final = re.compile(rb":\s*\[[^\[\]{}\"]*\]")
 """Lists of numbers: they make up most of a waveform, and have no keys."""
 
 
 def read_json(text: str | bytes) -> Any:
-    """The values of a JSON text.
-
-    Raises:
-        ValueError: it is not JSON, has a key twice, or is nested without end.
-    """
+    """The values of a JSON text."""
     try:
         return json.loads(text, object_pairs_hook=_once_each)
     except RecursionError as error:
@@ -25,14 +19,7 @@ def read_json(text: str | bytes) -> Any:
 
 
 def refuse_doubled(text: bytes) -> None:
-    """Raise where a JSON text has a key twice; quick where it is long because of lists of numbers.
-
-    Args:
-        text: JSON.
-
-    Raises:
-        ValueError: it has a key twice, or is not JSON.
-    """
+    """Raise where a JSON text has a key twice; quick where it is long because of lists of numbers."""
     try:
         read_json(_NUMBERS.sub(b":0", text))
     except ValueError:  # a text may look like such a list

@@ -12,20 +12,9 @@ from typing import Any
 
 from isiw.errors import ConfigError, did_you_mean
 
-__all__ = ["named_code", "require_fitting"]
-
 
 def named_code(reference: str, folder: Path | None, key: str) -> Any:
-    """What a configuration names, imported.
-
-    Args:
-        reference: where it is, as `module:function`.
-        folder: where the module is looked for before anything else; None for the installed packages alone.
-        key: of the configuration, for the message.
-
-    Raises:
-        ConfigError: it cannot be imported.
-    """
+    """What a configuration names, imported."""
     module_name, _, name = reference.partition(":")
     with _importable(folder):
         try:
@@ -49,16 +38,7 @@ def _meant(module_name: str, name: str, folder: Path | None) -> str:
 
 
 def require_fitting(make: Callable[..., object], settings: Mapping[str, Any], key: str) -> None:
-    """Check that a function takes some settings.
-
-    Args:
-        make: the function.
-        settings: its keyword arguments.
-        key: of the configuration, for the message.
-
-    Raises:
-        ConfigError: it does not.
-    """
+    """Check that a function takes some settings."""
     signature = inspect.signature(make)
     try:
         signature.bind(**settings)

@@ -5,21 +5,12 @@ from __future__ import annotations
 import re
 from typing import Final
 
-__all__ = ["counted", "read_number", "read_whole"]
-
 _NUMBER: Final = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _WHOLE: Final = re.compile(r"[0-9]{1,18}")
 
 
 def read_number(text: str) -> float:
-    """The number that a text is, in ASCII digits with a decimal point; Python itself would take 1_0_0 and ١٢, too.
-
-    Args:
-        text: the text.
-
-    Raises:
-        ValueError: anything else, also what is not finite.
-    """
+    """The number that a text is, in ASCII digits with a decimal point; Python itself would take 1_0_0 and ١٢, too."""
     if not _NUMBER.fullmatch(text):
         raise ValueError("no number with a decimal point")
     return float(text)
@@ -31,11 +22,5 @@ def read_whole(text: str) -> int | None:
 
 
 def counted(count: int, one: str, several: str | None = None) -> str:
-    """A number of things in words, such as "1 session" and "2 sessions".
-
-    Args:
-        count: how many.
-        one: what one of them is called; the verb may follow.
-        several: what several are called; by default with an s.
-    """
+    """A number of things in words, such as "1 session" and "2 sessions"."""
     return f"{count} {one if count == 1 else several or f'{one}s'}"

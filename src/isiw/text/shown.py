@@ -6,17 +6,11 @@ from typing import Final
 
 from isiw.text.harmless import one_line
 
-__all__ = ["shown"]
-
 LONGEST: Final = 80
 
 
 def shown(value: object) -> str:
-    """The beginning of what a value prints as, and its type, such as "0.12 (float)"; None is None.
-
-    Args:
-        value: anything; one that fails to print is known by its type alone.
-    """
+    """The beginning of what a value prints as, and its type, such as "0.12 (float)"; None is None."""
     if value is None:
         return "None"
     try:

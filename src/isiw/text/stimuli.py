@@ -9,8 +9,6 @@ from typing import Final
 
 from isiw.types import Conditioning, Reference
 
-__all__ = ["STIMULI", "TAP", "StimulusWords", "meanings", "words_of"]
-
 
 @dataclass(frozen=True)
 class StimulusWords:
@@ -42,27 +40,15 @@ class StimulusWords:
         return f"{self.name} alone"
 
     def origin(self, reference: Reference) -> str:
-        """The event that ISIs count from, behind "the".
-
-        Args:
-            reference: which one it is.
-        """
+        """The event that ISIs count from, behind "the"."""
         return "valve command" if reference == "valve" else self.moment
 
     def isi_axis(self, reference: Reference) -> str:
-        """What the axis of a picture over ISIs is called.
-
-        Args:
-            reference: the event that they count from.
-        """
+        """What the axis of a picture over ISIs is called."""
         return f"ISI after the {self.origin(reference)} [ms]"
 
     def shown(self, reference: Reference) -> str:
-        """The event that ISIs count from, in a picture of a pair of stimuli.
-
-        Args:
-            reference: which one it is.
-        """
+        """The event that ISIs count from, in a picture of a pair of stimuli."""
         return "valve command" if reference == "valve" else self.mark
 
 
@@ -96,11 +82,7 @@ TAP: Final = STIMULI["tap"]
 
 
 def words_of(stimuli: Iterable[Conditioning]) -> StimulusWords:
-    """The words for all stimuli of some sessions; of none of them, those for the tap.
-
-    Args:
-        stimuli: the conditioning stimulus of each.
-    """
+    """The words for all stimuli of some sessions; of none of them, those for the tap."""
     given = set(stimuli)
     several = [words for stimulus, words in STIMULI.items() if stimulus in given] or [TAP]
     joined = {
@@ -112,11 +94,5 @@ def words_of(stimuli: Iterable[Conditioning]) -> StimulusWords:
 
 
 def meanings(columns: Mapping[str, tuple[str, str]], first: StimulusWords, **more: str) -> dict[str, tuple[str, str]]:
-    """Unit and meaning of the columns of a table, of a stimulus.
-
-    Args:
-        columns: their units, and their meanings with words such as `{0.moment}` to be filled in.
-        first: what these are filled in from.
-        more: further words to be filled in.
-    """
+    """Unit and meaning of the columns of a table, of a stimulus."""
     return {name: (unit, meaning.format(first, **more)) for name, (unit, meaning) in columns.items()}

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import TypeAlias
 
-__all__ = ["summary"]
-
 _Edge: TypeAlias = tuple[float | None, float | None, float | None]
 
 
@@ -18,16 +16,7 @@ def summary(
     end: _Edge,
     depressed: tuple[object, float] | None = None,
 ) -> str:
-    """A window in a line, and each of its edges in another, where they are known; and where the MEP is depressed.
-
-    Args:
-        probability: that there is a window.
-        window: the reported decision, which prints as its ISIs.
-        nothing: what is said where it is None.
-        start: median, and lower and upper end of the 90 % interval, of its start [ms]; None where not known.
-        end: those of its end [ms].
-        depressed: which ISIs depress the MEP, and the probability of any; None where nobody looked.
-    """
+    """A window in a line, and each of its edges in another, where they are known; and where the MEP is depressed."""
     chance = "" if probability is None else f" (probability of a window: {probability:.2f})"
     lines = [f"{nothing.capitalize() if window is None else f'Window: {window}'}{chance}"]
     for name, edge in (("Start", start), ("End", end)):

@@ -15,8 +15,6 @@ from pydantic_core import ErrorDetails
 from isiw.errors import ConfigError, IsiwError
 from isiw.text.expected import UNKNOWN, expected_instead, first_to_tell, known_keys, meant_instead
 
-__all__ = ["checked", "parsed", "read_toml"]
-
 _T = TypeVar("_T")
 
 _LARGEST: Final = 2**20
@@ -29,13 +27,7 @@ _MOST_BITS: Final = 256
 
 
 def parsed(text: str) -> dict[str, Any]:
-    """The values of a TOML text.
-
-    Raises:
-        ValueError: it is not TOML, or is more than could be read in a moment: a megabyte, a key of more than a hundred
-            parts, or a whole number of hundreds of bits.
-        RecursionError: it is nested without end.
-    """
+    """The values of a TOML text."""
     if len(text) > _LARGEST:
         raise ValueError(f"it is longer than {_LARGEST} characters")
     if _TOO_MANY_PARTS.search(text):
@@ -59,11 +51,7 @@ def _require_moderate(value: object, key: str = "") -> None:
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
-    """The values of a TOML file.
-
-    Raises:
-        ConfigError: it cannot be read, or is not TOML.
-    """
+    """The values of a TOML file."""
     try:
         with Path(path).open(encoding="utf-8-sig") as file:  # with the mark that Windows puts first
             return parsed(file.read(_LARGEST + 1))
@@ -83,16 +71,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
 
 
 def checked(kind: type[_T], values: Mapping[str, Any], source: str) -> _T:
-    """Values as an instance of a pydantic model or a dataclass.
-
-    Args:
-        kind: the model or dataclass.
-        values: its fields, as TOML has them.
-        source: where they are from, for the message.
-
-    Raises:
-        ConfigError: an unknown key or a bad value; the message names source, key and value.
-    """
+    """Values as an instance of a pydantic model or a dataclass."""
     try:
         return cast("_T", dict(_strict(cast("type", kind)).model_validate({"values": values}))["values"])
     except ValidationError as error:

@@ -21,22 +21,6 @@ from isiw.errors import InvalidValueError
 from isiw.lazy import scipy
 from isiw.types import ArrayLike, FloatArray
 
-__all__ = [
-    "LINE_DELAY_MS",
-    "SEPARATION_RAD",
-    "SUPPLY_KPA",
-    "Event",
-    "Faults",
-    "Geometry",
-    "SensorNoise",
-    "Taps",
-    "draw_taps",
-    "drive",
-    "pressure_kpa",
-    "rebound",
-    "restitution",
-]
-
 SUPPLY_KPA = 413.7
 """60 psi [Kim2020, 3.2.2, where it is printed as 416.7 kPa]."""
 
@@ -229,13 +213,7 @@ class Taps:
 
 
 def draw_taps(geometry: Geometry, n: int, rng: np.random.Generator) -> Taps:
-    """Taps with the variation of a geometry, n of them.
-
-    Args:
-        geometry: the robot and where it stands.
-        n: how many taps.
-        rng: what they are drawn from.
-    """
+    """Taps with the variation of a geometry, n of them."""
     z = rng.standard_normal((4, n))
     fault = rng.uniform(size=(3, n))
     stuck = np.where(fault[2] < geometry.faults.stuck_probability, math.nan, 0.0)
@@ -275,12 +253,7 @@ def pressure_kpa(time_ms: ArrayLike) -> FloatArray:
 
 
 def drive(time_ms: ArrayLike, kinetic_share: float) -> FloatArray:
-    """Acceleration of the moving hammer by the chamber's pressure [m/s²].
-
-    Args:
-        time_ms: time after the valve command [ms], any shape.
-        kinetic_share: kinetic friction, as a share of the supply pressure.
-    """
+    """Acceleration of the moving hammer by the chamber's pressure [m/s²]."""
     return DRIVE_M_S2 * (_pressure_share(time_ms) - kinetic_share)
 
 
@@ -312,11 +285,7 @@ def _arrival(descent_ms: FloatArray, travel_mm: FloatArray, kinetic_share: float
 
 
 def rebound(phase_rad: ArrayLike) -> FloatArray:
-    """Acceleration by a damped spring that a load hits with unit speed, over speed times natural frequency.
-
-    Args:
-        phase_rad: natural frequency times time since contact [rad]; force acts from 0 to `SEPARATION_RAD`.
-    """
+    """Acceleration by a damped spring that a load hits with unit speed, over speed times natural frequency."""
     phase = np.asarray(phase_rad, dtype=np.float64)
     turn = _ROOT * phase
     swing = 2 * DAMPING * np.cos(turn) + (1 - 2 * DAMPING**2) / _ROOT * np.sin(turn)

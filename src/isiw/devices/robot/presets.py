@@ -9,8 +9,6 @@ from typing import Any
 from isiw.checks import choice
 from isiw.devices.robot.mechanism import Event, Faults, Geometry
 
-__all__ = ["PRESETS", "preset"]
-
 
 def _geometry(
     descent_ms: tuple[float, float], hit_ms: tuple[float, float], contact_ms: tuple[float, float], **others: Any
@@ -43,9 +41,5 @@ PRESETS: Mapping[str, Geometry] = MappingProxyType(
 
 
 def preset(name: str) -> Geometry:
-    """A geometry by its name.
-
-    Raises:
-        InvalidValueError: an unknown name.
-    """
+    """A geometry by its name."""
     return PRESETS[choice("the preset of the tapping robot", name, PRESETS)]

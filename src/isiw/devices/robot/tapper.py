@@ -20,8 +20,6 @@ from isiw.signals.impact import DETECTION_LATENCY_MS, VALVE_MS, impact_time
 from isiw.trials import Channel, Stimulus, Sweep
 from isiw.types import FloatArray, Reference
 
-__all__ = ["HitDelay", "Tapper", "TapperSettings", "Trigger"]
-
 Trigger: TypeAlias = Literal["open-loop", "impact"]
 
 SWEEP_MS = 1000.0
@@ -82,11 +80,7 @@ class TapperSettings:
 
 
 class HitDelay:
-    """The running estimate of the delay from the valve command to the impact.
-
-    Args:
-        expected_ms: the delay that is assumed before the first measured hit [ms].
-    """
+    """The running estimate of the delay from the valve command to the impact."""
 
     LAST = 21
 

@@ -16,24 +16,6 @@ from isiw.lazy import scipy
 from isiw.signals.mep import MEP_WINDOW_MS
 from isiw.types import ArrayLike, FloatArray
 
-__all__ = [
-    "ACCELEROMETER_M_S2",
-    "UNITS",
-    "acceleration_m_s2",
-    "chamber_kpa",
-    "emg_noise_uv",
-    "force_n",
-    "mep_mv",
-    "mep_shape",
-    "record_emg",
-    "record_robot",
-    "sample_times_ms",
-    "scale_of_mep",
-    "tap_artefact_mv",
-    "tms_artefact_mv",
-    "valve_v",
-]
-
 UNITS: Mapping[str, str] = MappingProxyType(
     {"valve": "V", "pressure": "kPa", "acceleration": "m/s^2", "force": "N", "emg": "mV"}
 )
@@ -57,24 +39,12 @@ MEP_TURNS = ((-0.60, 21.3, 1.5), (-0.16, 25.3, 1.2), (0.33, 29.9, 1.7), (0.10, 3
 
 
 def sample_times_ms(rate_hz: float, duration_ms: float, valve_ms: float) -> FloatArray:
-    """Times of a sweep's samples after its valve command [ms], shape (w,).
-
-    Args:
-        rate_hz: sampling rate [Hz].
-        duration_ms: length of the sweep [ms].
-        valve_ms: when the valve command comes, after the first sample [ms].
-    """
+    """Times of a sweep's samples after its valve command [ms], shape (w,)."""
     return np.arange(round(duration_ms * rate_hz / 1000), dtype=np.float64) * (1000 / rate_hz) - valve_ms
 
 
 def record_robot(since_valve_ms: FloatArray, taps: Taps, rng: np.random.Generator) -> dict[str, FloatArray]:
-    """What the robot's sensors record of n taps, by channel in the units of `UNITS`, each of shape (n, w).
-
-    Args:
-        since_valve_ms: times of the samples after the valve command [ms], shape (w,).
-        taps: what the robot does.
-        rng: source of the sensors' noise.
-    """
+    """What the robot's sensors record of n taps, by channel in the units of `UNITS`, each of shape (n, w)."""
     noise, shape = taps.geometry.noise, (len(taps.hit_ms), len(since_valve_ms))
     times = np.broadcast_to(since_valve_ms, shape)
     moved = acceleration_m_s2(times, taps) + noise.acceleration_m_s2 * rng.standard_normal(shape)
@@ -97,16 +67,7 @@ def record_emg(
     pulse_ms: FloatArray,
     evoked_mv: FloatArray,
 ) -> FloatArray:
-    """The EMG of n taps and pulses: noise, both artefacts, and the MEP [mV], shape (n, w).
-
-    Args:
-        since_valve_ms: times of the samples after the valve command [ms], shape (w,).
-        rate_hz: their rate [Hz].
-        taps: what the robot does.
-        rng: source of the noise, of the pulse's artefact, and of the MEP's latency and length.
-        pulse_ms: the magnetic pulse [ms after the valve command], NaN for none, shape (n,).
-        evoked_mv: peak-to-peak amplitude 15–35 ms after the pulse, EMG at rest included [mV], shape (n,).
-    """
+    """The EMG of n taps and pulses: noise, both artefacts, and the MEP [mV], shape (n, w)."""
     n = len(taps.hit_ms)
     resting = emg_noise_uv(n, len(since_valve_ms), rate_hz, taps.geometry.noise.emg_uv, rng) / 1000
     artefacts = tap_artefact_mv(since_valve_ms - taps.memg_ms[:, None], taps.geometry.artefact_mv)
@@ -127,11 +88,6 @@ def scale_of_mep(resting_mv: FloatArray, mep_mv: FloatArray, amplitude_mv: float
 
     A person's amplitudes include the EMG floor, which would otherwise count twice. Where the EMG at rest alone has the
     amplitude, there is no MEP.
-
-    Args:
-        resting_mv: EMG at rest in the MEP window [mV], shape (w,).
-        mep_mv: the MEP there [mV], shape (w,).
-        amplitude_mv: peak-to-peak amplitude of the sum [mV].
     """
 
     def missing_mv(scale: float) -> float:
@@ -144,32 +100,17 @@ def scale_of_mep(resting_mv: FloatArray, mep_mv: FloatArray, amplitude_mv: float
 
 
 def valve_v(since_valve_ms: FloatArray, late_ms: FloatArray) -> FloatArray:
-    """Voltage of the valve command [V].
-
-    Args:
-        since_valve_ms: times after the valve command [ms], shape (n, w).
-        late_ms: by how much each valve is late [ms], shape (n,).
-    """
+    """Voltage of the valve command [V]."""
     return np.where(since_valve_ms >= late_ms[:, None], VALVE_V, 0.0)
 
 
 def chamber_kpa(since_valve_ms: FloatArray, taps: Taps) -> FloatArray:
-    """Pressure of the chamber above the room's [kPa].
-
-    Args:
-        since_valve_ms: times after the valve command [ms], shape (n, w).
-        taps: the taps.
-    """
+    """Pressure of the chamber above the room's [kPa]."""
     return pressure_kpa(since_valve_ms - taps.late_ms[:, None])
 
 
 def acceleration_m_s2(since_valve_ms: FloatArray, taps: Taps) -> FloatArray:
-    """Acceleration of the hammer, positive towards the tendon, before its sensor's limits [m/s²].
-
-    Args:
-        since_valve_ms: times after the valve command [ms], shape (n, w).
-        taps: the taps.
-    """
+    """Acceleration of the hammer, positive towards the tendon, before its sensor's limits [m/s²]."""
     late, kinetic = taps.late_ms[:, None], taps.geometry.kinetic_share
     moving = (since_valve_ms >= taps.descent_ms[:, None]) & ~(since_valve_ms >= _rest_ms(taps)[:, None])
     driven = np.where(moving, drive(since_valve_ms - late, kinetic), 0.0)
@@ -177,12 +118,7 @@ def acceleration_m_s2(since_valve_ms: FloatArray, taps: Taps) -> FloatArray:
 
 
 def force_n(since_valve_ms: FloatArray, taps: Taps) -> FloatArray:
-    """Force on the load cell under the hammer [N].
-
-    Args:
-        since_valve_ms: times after the valve command [ms], shape (n, w).
-        taps: the taps.
-    """
+    """Force on the load cell under the hammer [N]."""
     settled = np.maximum(since_valve_ms - _rest_ms(taps)[:, None], 0.0)
     resting = -REST_FORCE_N * np.expm1(-settled / SETTLING_MS)
     return np.where(np.isnan(resting), 0.0, resting) - MOVING_KG * _by_the_tendon(since_valve_ms, taps)
@@ -216,15 +152,7 @@ def _by_the_tendon(since_valve_ms: FloatArray, taps: Taps) -> FloatArray:
 
 
 def emg_noise_uv(n: int, samples: int, rate_hz: float, rms_uv: float, rng: np.random.Generator) -> FloatArray:
-    """EMG at rest: Gaussian noise in the amplifier's band [µV], shape (n, w).
-
-    Args:
-        n: how many sweeps.
-        samples: samples of each, w.
-        rate_hz: sampling rate [Hz].
-        rms_uv: its RMS [µV].
-        rng: what it is drawn from.
-    """
+    """EMG at rest: Gaussian noise in the amplifier's band [µV], shape (n, w)."""
     settle = round(rate_hz / 10)  # the filter starts from zero
     high_hz = min(EMG_BAND_HZ[1], 0.45 * rate_hz)
     band = scipy.signal.butter(2, (EMG_BAND_HZ[0], high_hz), btype="bandpass", fs=rate_hz, output="sos")
@@ -236,24 +164,14 @@ def emg_noise_uv(n: int, samples: int, rate_hz: float, rms_uv: float, rng: np.ra
 
 
 def tap_artefact_mv(since_memg_ms: FloatArray, amplitude_mv: float) -> FloatArray:
-    """The tap in the EMG: a burst that begins at once and has died away after some 8 ms [mV].
-
-    Args:
-        since_memg_ms: times after the begin of the artefact [ms], any shape.
-        amplitude_mv: its amplitude [mV].
-    """
+    """The tap in the EMG: a burst that begins at once and has died away after some 8 ms [mV]."""
     since = np.maximum(since_memg_ms, 0.0)
     burst: FloatArray = np.exp(-since / TAP_ARTEFACT_DECAY_MS) * np.sin(2 * math.pi * TAP_ARTEFACT_HZ * since / 1000)
     return amplitude_mv * np.nan_to_num(burst)
 
 
 def tms_artefact_mv(since_pulse_ms: FloatArray, amplitude_mv: FloatArray) -> FloatArray:
-    """The magnetic pulse in the EMG: biphasic, gone within 1 ms [mV].
-
-    Args:
-        since_pulse_ms: shape (n, w).
-        amplitude_mv: peak-to-peak amplitude with the sign of its first turn, shape (n,).
-    """
+    """The magnetic pulse in the EMG: biphasic, gone within 1 ms [mV]."""
     turn = (since_pulse_ms - 2 * PULSE_ARTEFACT_MS) / PULSE_ARTEFACT_MS
     shape = -turn * np.exp((1 - turn**2) / 2)  # turns of height 1
     return amplitude_mv[:, None] / 2 * np.nan_to_num(shape)
@@ -267,14 +185,7 @@ def mep_shape(since_pulse_ms: ArrayLike) -> FloatArray:
 def mep_mv(
     since_pulse_ms: FloatArray, amplitude_mv: FloatArray, shift_ms: FloatArray, stretch: FloatArray
 ) -> FloatArray:
-    """MEPs of given peak-to-peak amplitudes [mV].
-
-    Args:
-        since_pulse_ms: shape (n, w).
-        amplitude_mv: shape (n,).
-        shift_ms: by how much each is late, shape (n,).
-        stretch: by how much each is longer than the mean about its first turn, as a factor, shape (n,).
-    """
+    """MEPs of given peak-to-peak amplitudes [mV]."""
     first_turn = MEP_TURNS[0][1]
     time = first_turn + (since_pulse_ms - first_turn - shift_ms[:, None]) / stretch[:, None]
     return amplitude_mv[:, None] * np.nan_to_num(mep_shape(time))

@@ -24,8 +24,6 @@ from isiw.devices.transports.reply import Reply
 from isiw.errors import DeviceError, InvalidValueError, NotDelivered
 from isiw.trials import Stimulus
 
-__all__ = ["Carrier", "Exchange", "Request", "Verb", "described"]
-
 _T = TypeVar("_T")
 
 SET_TOLERANCE_MS: Final = 0.5

@@ -26,8 +26,6 @@ from isiw.files import opened, written_beside
 from isiw.trials import Channel, Measurement, Stimulus, Sweep
 from isiw.types import FloatArray
 
-__all__ = ["FolderDevice"]
-
 REQUEST: Final = "request.txt"
 _END: Final = "end"
 _LARGEST_WAVEFORMS: Final = 50_000_000  # bytes
@@ -175,13 +173,7 @@ def _remove(path: Path) -> None:
 
 
 class _Folder:
-    """Carries requests and answers as files.
-
-    Args:
-        place: the folder.
-        poll_s: how often to look for an answer [s].
-        waveforms: whether deliveries are answered with waveforms.
-    """
+    """Carries requests and answers as files."""
 
     def __init__(self, place: Path, poll_s: float, *, waveforms: bool) -> None:
         self._place, self._poll_s, self._waveforms = place, poll_s, waveforms

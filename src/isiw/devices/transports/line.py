@@ -22,8 +22,6 @@ from isiw.devices.transports.line_table import Exchange, LineCommands, isi_ms_of
 from isiw.errors import DeviceError, InvalidValueError, IsiwError, LimitExceededError, NotDelivered, told
 from isiw.trials import Measurement, Stimulus
 
-__all__ = ["LineDevice"]
-
 _SPARE_S = 0.1
 _MOST_TRIES = 10
 

@@ -12,8 +12,6 @@ from urllib.parse import urlsplit
 
 from isiw.errors import ConfigError, InvalidValueError
 
-__all__ = ["Connection", "open_connection", "require_address"]
-
 _TCP = "socket://"
 _MOST_BYTES = 4096
 _GLANCE_S = 0.05
@@ -33,26 +31,12 @@ class Connection(Protocol):
 
 
 def open_connection(address: str, baud: int, timeout_s: float) -> Connection:
-    """Open a connection.
-
-    Args:
-        address: `socket://host:port`, or what pyserial opens, such as COM3 or /dev/ttyUSB0.
-        baud: symbols a second of a serial port [1/s].
-        timeout_s: how long connecting and sending may take [s].
-
-    Raises:
-        OSError: nobody answers there, or the port is in use.
-        ConfigError: pyserial is not installed.
-    """
+    """Open a connection."""
     return _Tcp(address, timeout_s) if address.startswith(_TCP) else _Serial(address, baud, timeout_s)
 
 
 def require_address(address: str) -> None:
-    """Raise where an address cannot be one.
-
-    Raises:
-        InvalidValueError: it is empty, or a socket without host or port.
-    """
+    """Raise where an address cannot be one."""
     if not address or (address.startswith(_TCP) and None in _host_and_port(address)):
         raise InvalidValueError(
             "the address of an instrument is incomplete",

@@ -18,8 +18,6 @@ from isiw.devices.transports.line_table import Exchange, command_values
 from isiw.errors import DeviceError, DeviceTimeoutError
 from isiw.text.numbers import read_whole
 
-__all__ = ["Line", "LineSettings"]
-
 _T = TypeVar("_T")
 
 _LONGEST_LINE = 1000
@@ -68,11 +66,6 @@ class Line:
 
     Answers are told from what came late by their sequence number. Where an instrument has none, what has come before a
     command is thrown away, and a connection whose last answer is missing is not `trusted` any more.
-
-    Args:
-        connection: the open connection.
-        settings: how lines end, and how long an answer may take.
-        refusal: what an answer looks like that refuses; empty where there is none.
     """
 
     def __init__(self, connection: Connection, settings: LineSettings, refusal: str) -> None:
@@ -89,20 +82,7 @@ class Line:
         timeout_s: float,
         given_up: Callable[[], bool] = lambda: False,
     ) -> dict[str, str]:
-        """Send a command and wait for its answer; returns what the answer says by group.
-
-        Args:
-            exchange: the command.
-            trial: the trial's number.
-            isi_ms: the ISI [ms]; None where there is none.
-            timeout_s: how long the answer may take [s].
-            given_up: whether nobody waits any more.
-
-        Raises:
-            DeviceTimeoutError: no answer in time.
-            DeviceError: the instrument refuses, the connection broke, the command cannot be written, or nobody waits
-                any more.
-        """
+        """Send a command and wait for its answer; returns what the answer says by group."""
         number = next(_sequence)
         try:
             command = exchange.command(command_values(number, trial, isi_ms))
@@ -118,11 +98,7 @@ class Line:
         return said
 
     def drain(self) -> None:
-        """Throw away what has come so far, and say so; raises where the connection is broken.
-
-        Raises:
-            DeviceError: it is.
-        """
+        """Throw away what has come so far, and say so; raises where the connection is broken."""
         for _ in range(_MOST_READS):  # an instrument that never stops sending must not hold this up
             data = self._guarded(lambda: self._connection.receive(wait=False))
             if not data:

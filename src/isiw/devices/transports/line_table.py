@@ -18,8 +18,6 @@ from isiw.checks import check_numbers, check_texts, from_table, number
 from isiw.errors import InvalidValueError
 from isiw.text.numbers import read_number
 
-__all__ = ["Exchange", "LineCommands", "command_values", "isi_ms_of", "mep_mv_of", "number_of"]
-
 _MS: Final = {"isi_ms": 1.0, "isi_us": 1e-3, "isi_s": 1e3}
 _MV: Final = {"mep_mv": 1.0, "mep_uv": 1e-3}
 _ISI, _MEP = frozenset(_MS), frozenset(_MV)
@@ -224,13 +222,7 @@ def _require_one(names: frozenset[str], there: frozenset[str], what: str, expect
 
 
 def command_values(sequence: int, trial: int, isi_ms: float | None) -> dict[str, float]:
-    """What may be filled into a command.
-
-    Args:
-        sequence: its number.
-        trial: the trial's number.
-        isi_ms: the ISI [ms]; None where there is none.
-    """
+    """What may be filled into a command."""
     isi = {} if isi_ms is None else {name: _plain(isi_ms / ms) for name, ms in _MS.items()}
     return {"sequence": sequence, "trial": trial, **isi}
 
@@ -242,20 +234,12 @@ def _plain(value: float) -> float:
 
 
 def isi_ms_of(said: Mapping[str, str]) -> float | None:
-    """The ISI that an answer says [ms]; None where it says none.
-
-    Raises:
-        InvalidValueError: it is no finite number.
-    """
+    """The ISI that an answer says [ms]; None where it says none."""
     return _value(said, _MS)
 
 
 def mep_mv_of(said: Mapping[str, str]) -> float | None:
-    """The MEP that an answer says [mV]; None where it says none.
-
-    Raises:
-        InvalidValueError: it is no finite number.
-    """
+    """The MEP that an answer says [mV]; None where it says none."""
     return _value(said, _MV)
 
 
@@ -265,15 +249,7 @@ def _value(said: Mapping[str, str], units: Mapping[str, float]) -> float | None:
 
 
 def number_of(said: Mapping[str, str], name: str) -> float | None:
-    """A number that an answer says; None where it does not.
-
-    Args:
-        said: the answer by group.
-        name: the group.
-
-    Raises:
-        InvalidValueError: it is no finite number.
-    """
+    """A number that an answer says; None where it does not."""
     if name not in said:
         return None
     try:

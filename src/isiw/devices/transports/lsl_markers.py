@@ -12,8 +12,6 @@ from isiw.devices.transports.reply import LONGEST_REPLY, Reply
 from isiw.errors import DeviceError, DeviceTimeoutError, NotDelivered
 from isiw.text.json_texts import read_json
 
-__all__ = ["Markers"]
-
 _GLANCE_S: Final = 0.02
 _MOST_KEPT: Final = 8
 

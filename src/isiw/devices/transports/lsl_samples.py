@@ -19,8 +19,6 @@ from isiw.checks import check_numbers, check_texts, check_wholes
 from isiw.errors import DeviceError, NotDelivered
 from isiw.types import FloatArray
 
-__all__ = ["Inlet", "LslChannel", "SampleStream", "check_timing"]
-
 LATE_S: Final = 1.0
 """How late samples may arrive [s]; what comes later is late, and what does not come is lost."""
 
@@ -58,29 +56,14 @@ class Inlet(Protocol):
     """What is used of a `pylsl.StreamInlet` of numbers."""
 
     def pull_chunk(self, timeout: float, max_samples: int, *, as_numpy: bool) -> tuple[FloatArray, FloatArray]:
-        """Samples, shape (w, channels), and their timestamps [s], shape (w,).
-
-        Args:
-            timeout: how long to wait for them [s].
-            max_samples: the most of them.
-            as_numpy: whether they come as arrays.
-        """
+        """Samples, shape (w, channels), and their timestamps [s], shape (w,)."""
 
     def time_correction(self, timeout: float) -> float:
         """What has to be added to the sender's timestamps to be on the local clock [s]."""
 
 
 class SampleStream:
-    """The newest samples of a stream.
-
-    Args:
-        inlet: where they come from.
-        name: the stream's name, for messages.
-        rate_hz: its sampling rate [Hz].
-        max_jitter_ms: how far a timestamp may be from where the rate puts it [ms].
-        kept_s: how much is kept [s].
-        lost: what the inlet raises when the stream is lost.
-    """
+    """The newest samples of a stream."""
 
     def __init__(
         self,
@@ -98,15 +81,7 @@ class SampleStream:
         self._correction_s = 0.0
 
     def require_live(self, clock: Callable[[], float], history_s: float) -> None:
-        """Raise where the stream is not running before anything is delivered.
-
-        Args:
-            clock: the local clock [s].
-            history_s: how much must have come before [s]; it is awaited.
-
-        Raises:
-            NotDelivered: it is lost, silent or late.
-        """
+        """Raise where the stream is not running before anything is delivered."""
         try:
             if not self._update(LATE_S):
                 raise self._silent()
@@ -126,19 +101,7 @@ class SampleStream:
             )
 
     def cut(self, start_s: float, end_s: float, until_s: float) -> tuple[float, FloatArray]:
-        """The samples between two times, once they have come.
-
-        Args:
-            start_s: the beginning, on the local clock [s].
-            end_s: the end, on the local clock [s].
-            until_s: how long to wait while some still come, on Python's monotonic clock [s].
-
-        Returns:
-            The time of the first sample on the local clock [s], and the samples, shape (w, channels).
-
-        Raises:
-            DeviceError: they are late or lost, some of them were dropped, or they have another rate.
-        """
+        """The samples between two times, once they have come."""
         self._await(end_s, until_s)
         times_s = self._stamps_s + self._correction_s
         first, last = np.searchsorted(times_s, (start_s, end_s))
@@ -200,17 +163,7 @@ class SampleStream:
 
 
 def check_timing(name: str, times_s: FloatArray, rate_hz: float, max_jitter_ms: float) -> None:
-    """Raise where samples are missing, or do not come at their rate.
-
-    Args:
-        name: the stream's name, for messages.
-        times_s: when they were taken [s], shape (w,).
-        rate_hz: their rate [Hz].
-        max_jitter_ms: how far a timestamp may be from where the rate puts it [ms]. A shorter gap is not seen.
-
-    Raises:
-        DeviceError: samples were dropped, the clock jumped back, or the rate is another.
-    """
+    """Raise where samples are missing, or do not come at their rate."""
     if times_s.size < 2:
         raise DeviceError(f"the stream {name} has no samples in the sweep")
     steps_ms = 1e3 * (np.diff(times_s) - 1 / rate_hz)

@@ -11,8 +11,6 @@ from isiw.errors import DeviceError, InvalidValueError
 from isiw.text import plain
 from isiw.text.numbers import read_number
 
-__all__ = ["LONGEST_REPLY", "Reply"]
-
 LONGEST_REPLY: Final = 65_536
 """The longest answer that is read [bytes]; waveforms are not part of it."""
 
@@ -33,23 +31,12 @@ class Reply:
     source: str
 
     def broken(self, what: str, *, got: object = None, expected: str | None = None, remedy: str = "") -> DeviceError:
-        """The error of an answer that cannot be used; whether the pulse was given is not known then.
-
-        Args:
-            what: what is wrong with it.
-            got: the offending value.
-            expected: what would have been accepted.
-            remedy: the way out.
-        """
+        """The error of an answer that cannot be used; whether the pulse was given is not known then."""
         shown = plain(got) if isinstance(got, str) else got
         return DeviceError(f"{self.source}: {what}", got=shown, expected=expected, remedy=remedy or None)
 
     def require_known(self, keys: Iterable[str]) -> None:
-        """Raise where there is a key that nobody asked for, such as one that was misspelt.
-
-        Raises:
-            DeviceError: an unknown key.
-        """
+        """Raise where there is a key that nobody asked for, such as one that was misspelt."""
         known = sorted(keys)
         for key in self.values:
             if key not in known:
@@ -64,15 +51,7 @@ class Reply:
         return plain(str(self.values.get(key, "")))[:_LONGEST_SHOWN]
 
     def number(self, key: str, **bounds: Unpack[Bounds]) -> float:
-        """The number of a key.
-
-        Args:
-            key: the key.
-            **bounds: as for `isiw.checks.number`.
-
-        Raises:
-            DeviceError: it is missing, not a number, not finite, or out of bounds.
-        """
+        """The number of a key."""
         value = self.values.get(key)
         if value is None:
             raise self.broken(f"{key} is missing", remedy="Every answer of this kind must have it.")
@@ -87,23 +66,11 @@ class Reply:
             raise self.broken(error.what, got=error.got) from error
 
     def optional_number(self, key: str, **bounds: Unpack[Bounds]) -> float | None:
-        """The number of a key; None where there is none.
-
-        Args:
-            key: the key.
-            **bounds: as for `isiw.checks.number`.
-
-        Raises:
-            DeviceError: it is not a number, not finite, or out of bounds.
-        """
+        """The number of a key; None where there is none."""
         return self.number(key, **bounds) if self.has(key) else None
 
     def whole(self, key: str) -> int:
-        """The whole number of a key, at least 0.
-
-        Raises:
-            DeviceError: it is missing, or no such number.
-        """
+        """The whole number of a key, at least 0."""
         value = self.number(key, least=0)
         if value != int(value):
             raise self.broken(f"{key} is not a whole number", got=self.values[key])

@@ -24,29 +24,17 @@ from isiw.models.shared.history import AmplitudeHistory
 from isiw.types import BoolArray, FloatArray, IntArray
 from isiw.window import Window, WindowEstimate
 
-__all__ = ["BootstrapFilter", "BootstrapPosterior", "WindowKind", "normalised", "resampled"]
-
 WindowKind = Literal["expectation", "fit", "particles"]
 
 
 def normalised(weights: FloatArray) -> FloatArray:
-    """Weights that sum to 1; equal ones where all are 0.
-
-    Args:
-        weights: not negative, shape (b, p).
-    """
+    """Weights that sum to 1; equal ones where all are 0."""
     total = weights.sum(axis=-1, keepdims=True)
     return np.asarray(np.where(total > 0, weights, 1.0) / np.where(total > 0, total, weights.shape[-1]))
 
 
 def resampled(particles: FloatArray, weights: FloatArray, uniform: FloatArray) -> FloatArray:
-    """Particles drawn in proportion to their weights, with replacement.
-
-    Args:
-        particles: shape (b, p).
-        weights: normalised, shape (b, p).
-        uniform: uniform draws in 0–1, shape (b, p).
-    """
+    """Particles drawn in proportion to their weights, with replacement."""
     cumulative = weights.cumsum(axis=-1)
     cumulative[:, -1] = 1.0  # whatever rounding made of it
     picks = (uniform[:, :, None] >= cumulative[:, None, :]).sum(axis=-1)

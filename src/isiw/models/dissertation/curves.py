@@ -12,8 +12,6 @@ from isiw.lazy import scipy
 from isiw.types import BoolArray, FloatArray
 from isiw.window import EDGE_LEVEL, least_excess_mv
 
-__all__ = ["FittedCurve", "Segments", "curve_masks"]
-
 Segments = Literal["peak", "all"]
 
 
@@ -59,17 +57,7 @@ class FittedCurve:
 def curve_masks(
     curves_mv: FloatArray, floor_mv: float, segments: Segments = "peak", level: float = EDGE_LEVEL
 ) -> BoolArray:
-    """Which grid points lie in the windows of some curves, by the rule of `isiw.window.window_from_excess`.
-
-    Args:
-        curves_mv: expected MEPs above the floor [mV], shape (s, t).
-        floor_mv: expected MEP without a tap [mV].
-        segments: `"all"` of them, or the one that holds the `"peak"`.
-        level: the share of the largest excess that an edge has.
-
-    Returns:
-        Shape (s, t); all False where there is no window.
-    """
+    """Which grid points lie in the windows of some curves, by the rule of `isiw.window.window_from_excess`."""
     peak = curves_mv.max(axis=-1, keepdims=True)
     masks: BoolArray = curves_mv >= least_excess_mv(peak, floor_mv, level)
     if segments == "all":

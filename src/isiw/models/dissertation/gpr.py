@@ -19,8 +19,6 @@ from isiw.lazy import scipy, sklearn
 from isiw.models.dissertation.curves import FittedCurve
 from isiw.types import FloatArray
 
-__all__ = ["GaussianProcessRegression"]
-
 LEAST_SCALE_MV = 1e-3
 """Amplitudes are fitted in units of the largest excess, or of this where that is smaller [mV]."""
 

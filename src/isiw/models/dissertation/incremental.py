@@ -20,8 +20,6 @@ from isiw.models.shared.history import AmplitudeHistory, PersonTrials
 from isiw.types import FloatArray
 from isiw.window import EDGE_LEVEL, Window, WindowEstimate
 
-__all__ = ["SweepModel", "SweepPosterior", "SweepRule"]
-
 SweepRule = Literal["baseline", "share"]
 
 

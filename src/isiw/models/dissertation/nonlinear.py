@@ -15,8 +15,6 @@ from isiw.lazy import scipy
 from isiw.models.dissertation.curves import FittedCurve
 from isiw.types import FloatArray
 
-__all__ = ["NonlinearRegression", "Start", "gaussians_mv", "gradient_mv"]
-
 Start = Literal["even", "unequal", "random"]
 
 LEAST_AMPLITUDE_MV = 1e-3
@@ -30,26 +28,13 @@ MAX_CONDITION = 1e10
 
 
 def gaussians_mv(isi_ms: FloatArray, parameters: FloatArray) -> FloatArray:
-    """A sum of Gaussians.
-
-    Args:
-        isi_ms: ISIs [ms], shape (t,).
-        parameters: amplitude [mV], mean [ms] and SD [ms] of each, shape (..., 3 k).
-
-    Returns:
-        Shape (..., t).
-    """
+    """A sum of Gaussians."""
     amplitude, mean, sd = (parameters[..., i::3, None] for i in range(3))
     return np.asarray((amplitude * np.exp(-0.5 * ((isi_ms - mean) / sd) ** 2)).sum(axis=-2))
 
 
 def gradient_mv(isi_ms: FloatArray, parameters: FloatArray) -> FloatArray:
-    """Derivatives of a sum of Gaussians with respect to its parameters, shape (t, 3 k).
-
-    Args:
-        isi_ms: ISIs [ms], shape (t,).
-        parameters: amplitude [mV], mean [ms] and SD [ms] of each, shape (3 k,).
-    """
+    """Derivatives of a sum of Gaussians with respect to its parameters, shape (t, 3 k)."""
     amplitude, mean, sd = (parameters[i::3] for i in range(3))
     z = (isi_ms[:, None] - mean) / sd
     bell = np.exp(-0.5 * z**2)

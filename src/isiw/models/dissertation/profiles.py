@@ -22,8 +22,6 @@ from isiw.models.dissertation.nonlinear import gaussians_mv, gradient_mv
 from isiw.text.numbers import counted
 from isiw.types import ArrayLike, FloatArray
 
-__all__ = ["MOST_GAUSSIANS", "Normality", "ProfileFit", "best_fit", "normality", "profile_fits"]
-
 MOST_GAUSSIANS: Final = 5
 """As many Gaussians as Figure 8.2 tries."""
 
@@ -75,15 +73,7 @@ class Normality(NamedTuple):
 
 
 def normality(values: ArrayLike, level: float = 0.05) -> Normality:
-    """Whether some values could be drawn from a normal law, by the test of Shapiro and Wilk [Kim2020, Tables 4.1, 8.1].
-
-    Args:
-        values: such as the mean MEP at each ISI, shape (n,).
-        level: of the test, in 0–1.
-
-    Raises:
-        InvalidValueError: fewer than three values, values that are not finite or all the same, or an invalid level.
-    """
+    """Could the values come from a normal law? By the test of Shapiro and Wilk [Kim2020, Tables 4.1 and 8.1]."""
     level = number("the level of the test", level, above=0, below=1)
     sample = np.asarray(values, dtype=np.float64)
     if sample.ndim != 1 or len(sample) < 3:
@@ -97,19 +87,7 @@ def normality(values: ArrayLike, level: float = 0.05) -> Normality:
 
 
 def profile_fits(isi_ms: ArrayLike, mep_mv: ArrayLike, most: int = MOST_GAUSSIANS) -> tuple[ProfileFit, ...]:
-    """Sums of one and more Gaussians on a baseline, and a smoothing spline, through the mean MEP at each ISI.
-
-    Args:
-        isi_ms: ISI of each trial [ms], shape (n,).
-        mep_mv: its MEP [mV], shape (n,).
-        most: how many Gaussians at most.
-
-    Returns:
-        The sums in the order of their Gaussians, and the spline last.
-
-    Raises:
-        InvalidValueError: shapes that differ, values that are not finite, too few ISIs, or no Gaussian.
-    """
+    """Sums of one and more Gaussians on a baseline, and a smoothing spline, through the mean MEP at each ISI."""
     most = whole("the number of Gaussians", most, least=1, most=20)
     isi, mep = np.asarray(isi_ms, dtype=np.float64), np.asarray(mep_mv, dtype=np.float64)
     if isi.shape != mep.shape or isi.ndim != 1:
@@ -128,11 +106,7 @@ def profile_fits(isi_ms: ArrayLike, mep_mv: ArrayLike, most: int = MOST_GAUSSIAN
 
 
 def best_fit(fits: tuple[ProfileFit, ...]) -> ProfileFit:
-    """The curve for which the profile speaks most: the one of the smallest AICc.
-
-    Args:
-        fits: as `profile_fits` returns them.
-    """
+    """The curve for which the profile speaks most: the one of the smallest AICc."""
     return min(fits, key=lambda fit: fit.aicc)
 
 

@@ -22,8 +22,6 @@ from isiw.models.shared.history import AmplitudeHistory
 from isiw.types import FloatArray
 from isiw.window import Window, WindowEstimate
 
-__all__ = ["RegressionMethod", "RegressionModel", "RegressionPosterior"]
-
 OUTCOMES = 24
 """Values of the next MEP on which predictive distributions live."""
 
@@ -34,14 +32,7 @@ class RegressionMethod(Protocol):
     def fit(
         self, isi_ms: FloatArray, excess_mv: FloatArray, space: DesignSpace, rng: np.random.Generator
     ) -> FittedCurve:
-        """Fit the MEPs of one person; a fit that fails says so and answers with what stands in for it.
-
-        Args:
-            isi_ms: realised ISIs [ms], shape (n,); n may be 0.
-            excess_mv: what their MEPs have above the floor [mV], shape (n,).
-            space: the design space.
-            rng: all randomness of the fit.
-        """
+        """Fit the MEPs of one person; a fit that fails says so and answers with what stands in for it."""
 
 
 @dataclass(frozen=True)
@@ -164,15 +155,7 @@ class RegressionPosterior:
         return self.model.update(self, Observation.of(isi_ms, mep_mv))
 
     def prediction_mv(self, level: float = 0.95, person: int = 0) -> tuple[FloatArray, FloatArray]:
-        """The interval that holds the next MEP with this probability [mV], at each ISI of the grid (4.3).
-
-        Args:
-            level: the probability.
-            person: which person.
-
-        Returns:
-            Its low and its high end, each of shape (t,).
-        """
+        """The interval that holds the next MEP with this probability [mV], at each ISI of the grid (4.3)."""
         low, high = self.curves[person].prediction_mv(level)
         return low + self.floors_mv[person], high + self.floors_mv[person]
 

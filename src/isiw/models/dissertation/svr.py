@@ -12,8 +12,6 @@ from isiw.lazy import sklearn
 from isiw.models.dissertation.curves import FittedCurve
 from isiw.types import FloatArray
 
-__all__ = ["SupportVectorRegression"]
-
 LEAST_SCALE_MV = 1e-3
 """Amplitudes are fitted in units of the largest excess, or of this where that is smaller [mV]."""
 

@@ -25,8 +25,6 @@ from isiw.models.protocol import Tensor
 from isiw.models.shared.history import PersonTrials
 from isiw.types import FloatArray
 
-__all__ = ["Fit", "Trials", "fit", "fixed_fit"]
-
 LEAST_PIVOT = 1e-6
 """A covariance in standardised units whose Cholesky factor has smaller pivots is singular but for rounding."""
 
@@ -95,12 +93,7 @@ class Fit:
         return int(torch.where(self.processes.amplitude > 0, self.log_joint, -torch.inf).argmax())
 
     def log_marginal(self, processes: Hyperparameters, log_variance: Tensor) -> Tensor:
-        """Log marginal likelihood of the standardised trials, shape (q,); -inf where their covariance is singular.
-
-        Args:
-            processes: hyperparameters, shape (q,).
-            log_variance: relative log variance of the noise at the trials, shape (n,).
-        """
+        """Log marginal likelihood of the standardised trials, shape (q,); -inf where their covariance is singular."""
         values = torch.cat((self.trials.values, self.trials.alone))
         factor, failed = torch.linalg.cholesky_ex(self._covariance(processes, log_variance))
         pivots = factor.diagonal(dim1=-2, dim2=-1)
@@ -139,11 +132,7 @@ class Fit:
         return _sound(replace(self, told=told))
 
     def regression(self, picks: Tensor) -> botorch.models.SingleTaskGP:
-        """Some of the processes as BoTorch models, from ISIs [ms] to standardised MEPs.
-
-        Args:
-            picks: which, each with an amplitude; of the models' batch shape.
-        """
+        """Some of the processes as BoTorch models, from ISIs [ms] to standardised MEPs."""
         chosen, trials = self.processes.picked(picks), self.trials
         level, level_variance = self.level(chosen.noise)
         process = Process(chosen.length_ms, chosen.amplitude, level, level_variance, chosen.noise.square())
@@ -160,17 +149,7 @@ def fit(
     max_evaluations: int | None = None,
     noise_by_isi: bool = False,
 ) -> Fit:
-    """Weigh processes by one person's trials.
-
-    Args:
-        prior: of the hyperparameters.
-        kernel: the kernel's name.
-        scale: the scale of amplitudes.
-        told: the trials.
-        max_evaluations: of the search for the most likely process, which stands for all that have an amplitude; None to
-            marginalise over all of the grid.
-        noise_by_isi: whether the noise depends on the ISI.
-    """
+    """Weigh processes by one person's trials."""
     found = _sound(Fit(prior, kernel, scale, told, *prior.grid()))
     if found.trouble:
         return found
@@ -183,15 +162,7 @@ def fit(
 def fixed_fit(
     prior: HyperparameterPrior, kernel: KernelName, scale: Scale, told: PersonTrials, fixed: FixedProcess
 ) -> Fit:
-    """One process of given hyperparameters, and the same without an amplitude.
-
-    Args:
-        prior: of the hyperparameters.
-        kernel: the covariance.
-        scale: what the process is of.
-        told: the trials of one person.
-        fixed: the hyperparameters.
-    """
+    """One process of given hyperparameters, and the same without an amplitude."""
     present = torch.tensor([[fixed.length_ms, fixed.amplitude, fixed.noise]], dtype=torch.float64)
     both = torch.cat((present, present * torch.tensor([1.0, 0.0, 1.0], dtype=torch.float64)))
     return _sound(Fit(prior, kernel, scale, told, Hyperparameters(*both.unbind(-1)), prior.log_hypotheses))

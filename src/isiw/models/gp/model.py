@@ -28,8 +28,6 @@ from isiw.models.shared.history import AmplitudeHistory, PersonTrials
 from isiw.models.windows import Runs, SampledProfiles, profile_grid, sampled_estimate
 from isiw.window import WindowEstimate
 
-__all__ = ["GaussianProcess", "GaussianProcessPosterior", "NoiseKind", "ProcessSettings"]
-
 NoiseKind: TypeAlias = Literal["equal", "by-isi"]
 
 PATH_STEP_MS = 4.0

@@ -12,8 +12,6 @@ from dataclasses import dataclass
 from isiw.lazy import torch
 from isiw.models.protocol import Tensor
 
-__all__ = ["NoiseProfile", "equal_noise", "leave_one_out", "noise_profile"]
-
 LOG_VARIANCE_SD = 0.6
 """Prior SD of the log variance about its mean: the noise SD varies by a factor of e^0.3 either way."""
 
@@ -71,22 +69,13 @@ def leave_one_out(covariance: Tensor, residuals: Tensor) -> Tensor:
     """How far each value is from what all others predict, in SDs of that prediction, shape (n,).
 
     [Rasmussen2006, equations 5.10–5.12]
-
-    Args:
-        covariance: of the values, noise included, shape (n, n).
-        residuals: values minus their prior mean, shape (n,).
     """
     inverse = torch.cholesky_inverse(torch.linalg.cholesky(covariance))
     return (inverse @ residuals) / inverse.diagonal().sqrt()
 
 
 def noise_profile(isi_ms: Tensor, surprise_at: Callable[[Tensor], Tensor]) -> NoiseProfile:
-    """The most likely noise profile, found in turns with the leave-one-out residuals that it leads to.
-
-    Args:
-        isi_ms: ISIs of the trials [ms], shape (n,).
-        surprise_at: from relative log variances to leave-one-out residuals [SD], both of shape (n,).
-    """
+    """The most likely noise profile, found in turns with the leave-one-out residuals that it leads to."""
     covariance = _covariance(isi_ms, isi_ms)
     profile = NoiseProfile(isi_ms, torch.zeros_like(isi_ms))
     for _ in range(ROUNDS):

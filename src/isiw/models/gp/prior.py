@@ -12,8 +12,6 @@ from isiw.lazy import torch
 from isiw.models.protocol import Tensor
 from isiw.models.shared.scales import Scale, check_scales
 
-__all__ = ["FixedProcess", "HyperparameterPrior", "Hyperparameters"]
-
 GRID_SD = 2.25
 GRID_POINTS = (7, 5, 7)
 """Of length, amplitude and noise, from -GRID_SD to GRID_SD prior SDs."""

@@ -7,8 +7,6 @@ from typing import Literal, NamedTuple, TypeAlias
 from isiw.lazy import botorch, gpytorch
 from isiw.models.protocol import Tensor
 
-__all__ = ["KernelName", "Process", "correlations", "regression"]
-
 KernelName: TypeAlias = Literal["rbf", "matern"]
 
 
@@ -31,16 +29,7 @@ class Process(NamedTuple):
 
 
 def correlations(kernel: KernelName, length_ms: Tensor, isi_ms: Tensor) -> Tensor:
-    """Correlation of a profile's values at some ISIs.
-
-    Args:
-        kernel: the kernel's name.
-        length_ms: over which the profile varies [ms], shape (l,).
-        isi_ms: the ISIs [ms], shape (n,).
-
-    Returns:
-        Shape (l, n, n).
-    """
+    """Correlation of a profile's values at some ISIs."""
     matrices: Tensor = _kernel(kernel, length_ms)(isi_ms.unsqueeze(-1)).to_dense().detach()
     return matrices
 
@@ -48,15 +37,7 @@ def correlations(kernel: KernelName, length_ms: Tensor, isi_ms: Tensor) -> Tenso
 def regression(
     kernel: KernelName, process: Process, isi_ms: Tensor, values: Tensor, relative_variance: Tensor
 ) -> botorch.models.SingleTaskGP:
-    """Processes given some trials, as a BoTorch model whose batch shape is theirs.
-
-    Args:
-        kernel: the kernel's name.
-        process: the processes, fields of shape (...).
-        isi_ms: ISIs of the trials [ms], shape (n,).
-        values: what was seen there, shape (n,).
-        relative_variance: of the noise there, shape (n,).
-    """
+    """Processes given some trials, as a BoTorch model whose batch shape is theirs."""
     inputs = isi_ms.unsqueeze(-1).expand(*process.length_ms.shape, -1, 1)
     variance = process.noise_variance[..., None, None] * relative_variance.unsqueeze(-1)
     return botorch.models.SingleTaskGP(

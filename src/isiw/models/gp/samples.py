@@ -16,8 +16,6 @@ from isiw.models.randomness import systematic
 from isiw.models.shared.floor import FloorKind
 from isiw.models.windows import least_excess_mv
 
-__all__ = ["Paths", "ProfileSample", "draw_paths"]
-
 FLOOR_SHARE = 0.15
 """A path is lowest up to this quantile; of a range of 320 ms, at least 28 % lie outside the widest window."""
 
@@ -59,14 +57,7 @@ class Paths(NamedTuple):
 
 
 def draw_paths(fit: Fit, isi_ms: Tensor, size: int, rng: np.random.Generator) -> Paths:
-    """Draw sample paths, from each process as many as it is believable.
-
-    Args:
-        fit: the processes.
-        isi_ms: ISIs of the paths' grid [ms], shape (m,).
-        size: how many paths.
-        rng: random generator.
-    """
+    """Draw sample paths, from each process as many as it is believable."""
     picks = systematic(torch.log_softmax(fit.log_joint, 0).unsqueeze(0), size)[0]
     chosen = fit.processes.picked(picks)
     present = chosen.amplitude > 0

@@ -12,8 +12,6 @@ from isiw.lazy import torch
 from isiw.models.protocol import Tensor
 from isiw.types import FloatArray
 
-__all__ = ["Scale", "Transform", "expected_mep_mv", "scale_of", "transformed"]
-
 Transform: TypeAlias = Literal["log", "sqrt", "none"]
 
 USUAL_MEP_MV = 0.02
@@ -51,13 +49,7 @@ class Scale:
 
 
 def transformed(mep_mv: FloatArray, transform: Transform, least_mv: float) -> FloatArray:
-    """Transformed amplitudes, same shape.
-
-    Args:
-        mep_mv: amplitudes [mV].
-        transform: natural logarithm, square root, or none.
-        least_mv: amplitudes below are taken for this [mV].
-    """
+    """Transformed amplitudes, same shape."""
     known = np.maximum(mep_mv, least_mv)
     if transform == "none":
         return known
@@ -68,11 +60,6 @@ def scale_of(mep_mv: FloatArray, transform: Transform, least_mv: float) -> Scale
     """The scale on which amplitudes have mean 0 and SD 1, as if one more of them had had the usual spread.
 
     That one keeps amplitudes apart that are few, or all equal.
-
-    Args:
-        mep_mv: amplitudes [mV], shape (n,).
-        transform: what they are transformed by.
-        least_mv: amplitudes below are taken for this [mV].
     """
     values = transformed(mep_mv if len(mep_mv) else np.array([USUAL_MEP_MV]), transform, least_mv)
     centre = float(values.mean())
@@ -81,13 +68,7 @@ def scale_of(mep_mv: FloatArray, transform: Transform, least_mv: float) -> Scale
 
 
 def expected_mep_mv(level: Tensor, noise_sd: Tensor, transform: Transform) -> Tensor:
-    """Expected MEP [mV] where transformed MEPs are Gaussian, broadcast shape.
-
-    Args:
-        level: mean of the transformed MEP.
-        noise_sd: its SD from trial to trial.
-        transform: what MEPs were transformed by.
-    """
+    """Expected MEP [mV] where transformed MEPs are Gaussian, broadcast shape."""
     if transform == "log":
         return torch.exp(level + 0.5 * noise_sd.square())
     # A path may run below zero where amplitudes do not.

@@ -8,8 +8,6 @@ from typing import Final, NamedTuple
 from isiw.lazy import torch
 from isiw.models.protocol import Tensor
 
-__all__ = ["LogDensity", "Modes", "find_modes"]
-
 LogDensity = Callable[[Tensor], Tensor]
 """Unnormalised log density of latents (m, d), shape (m,)."""
 
@@ -44,13 +42,7 @@ class Modes(NamedTuple):
 
 
 def find_modes(log_density: LogDensity, starts: Tensor, steps: int) -> Modes:
-    """Climb from each start.
-
-    Args:
-        log_density: of a posterior whose prior is a standard normal.
-        starts: shape (k, d).
-        steps: at most this many steps of each ascent.
-    """
+    """Climb from each start."""
     tops = _climb(log_density, starts, steps)
     heights, curvatures = _curvatures(log_density, tops)
     eigenvalues, vectors = torch.linalg.eigh(curvatures)

@@ -17,8 +17,6 @@ from isiw.lazy import torch
 from isiw.models.parametric.ascent import LogDensity, Modes, find_modes
 from isiw.models.protocol import Tensor
 
-__all__ = ["Effort", "Mixture", "WeightedDraws", "importance_sample", "worth"]
-
 T_DEGREES: Final = 6.0
 """Degrees of freedom of the components: tails heavier than a normal's."""
 
@@ -124,23 +122,13 @@ class Mixture:
         return torch.cat((prior.unsqueeze(0), student)) + self.shares.log().unsqueeze(-1)
 
     def joined(self, other: Mixture, share: float) -> Mixture:
-        """This mixture and the components of another one.
-
-        Args:
-            other: the other mixture; its prior is left out, for there is one already.
-            share: of the other's components in all.
-        """
+        """This mixture and the components of another one."""
         theirs = other.shares[1:] / other.shares[1:].sum()
         shares = torch.cat(((1.0 - share) * self.shares, share * theirs))
         return Mixture(shares, torch.cat((self.means, other.means)), torch.cat((self.factors, other.factors)))
 
     def draw(self, size: int, generator: torch.Generator) -> Tensor:
-        """Draws, each part in proportion to its share, shape (size, d).
-
-        Args:
-            size: how many.
-            generator: what they are drawn from.
-        """
+        """Draws, each part in proportion to its share, shape (size, d)."""
         d = self.means.shape[-1]
         ends = (self.shares.cumsum(0) / self.shares.sum() * size).round().long()
         part = torch.searchsorted(ends, torch.arange(size), right=True).clamp_max(len(self.means))
@@ -152,12 +140,7 @@ class Mixture:
         return torch.where((part == 0).unsqueeze(-1), normal, student)
 
     def fitted(self, points: Tensor, log_weights: Tensor) -> Mixture:
-        """The mixture after one step towards the weighted points, its scatter held to what they can tell.
-
-        Args:
-            points: draws, shape (m, d).
-            log_weights: their log importance weights, shape (m,).
-        """
+        """The mixture after one step towards the weighted points, its scatter held to what they can tell."""
         d = points.shape[-1]
         belongs = torch.softmax(self.log_parts(points), dim=0) * log_weights.exp()
         shares = belongs.sum(-1)
@@ -181,11 +164,7 @@ class _Round(NamedTuple):
 
 
 def worth(log_weights: Tensor) -> float:
-    """Effective sample size: how many independent draws weighted ones are worth.
-
-    Args:
-        log_weights: normalised, shape (m,).
-    """
+    """Effective sample size: how many independent draws weighted ones are worth."""
     return float(torch.exp(-torch.logsumexp(2.0 * log_weights, dim=0)))
 
 
@@ -199,14 +178,7 @@ def _defensive(shares: Tensor) -> Tensor:
 def importance_sample(
     log_density: LogDensity, scouting: Mixture, generator: torch.Generator, effort: Effort
 ) -> WeightedDraws:
-    """Sample a posterior whose prior is a standard normal.
-
-    Args:
-        log_density: log of prior times likelihood.
-        scouting: where to look first: the prior, or the modes of a simpler model that is a part of this one.
-        generator: source of randomness.
-        effort: how much work it is worth.
-    """
+    """Sample a posterior whose prior is a standard normal."""
     scouts = _drawn(log_density, scouting, effort.scouts, generator)
     modes = find_modes(log_density, _best_of_each_part(scouts, effort.starts), effort.steps)
     mixture = Mixture.at(modes).joined(scouting, SCOUTED_SHARE)

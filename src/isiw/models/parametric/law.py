@@ -16,8 +16,6 @@ from isiw.lazy import torch
 from isiw.models.parametric.prior import Likelihood, Unknowns
 from isiw.models.protocol import Tensor
 
-__all__ = ["draw_log_mep", "levels", "log_likelihood"]
-
 NODES: Final = 12
 NODE_REACH: Final = 2.6
 OUTLIER_FLOORS: Final = 12.0
@@ -37,12 +35,7 @@ class _Components(NamedTuple):
 
 
 def levels(unknowns: Unknowns, isi_ms: Tensor) -> Tensor:
-    """Share of the largest excess at each ISI, 0 for TMS alone (NaN), shape (m, n).
-
-    Args:
-        unknowns: fields of shape (m,).
-        isi_ms: ISIs [ms], shape (n,).
-    """
+    """Share of the largest excess at each ISI, 0 for TMS alone (NaN), shape (m, n)."""
     share = (isi_ms.nan_to_num() - unknowns.start_ms.unsqueeze(-1)) / unknowns.width_ms.unsqueeze(-1) - 0.5
     return torch.where(isi_ms.isnan(), 0.0, torch.exp(-_EXPONENT * share.square()))
 
@@ -103,17 +96,7 @@ def _below(parts: _Components, log_mep: Tensor, likelihood: Likelihood) -> Tenso
 
 
 def log_likelihood(unknowns: Unknowns, level: Tensor, log_mep: Tensor, likelihood: Likelihood) -> Tensor:
-    """Log likelihood of MEPs, trial by trial: a density of the log MEP, or the probability of an interval.
-
-    Args:
-        unknowns: fields of shape (m,).
-        level: share of the largest excess at each trial, shape (m, n), or (m, 1) where all are alike.
-        log_mep: both ends of what is known of the natural log of the MEP [mV], shape (n, 2).
-        likelihood: the likelihood.
-
-    Returns:
-        Shape (m, n).
-    """
+    """Log likelihood of MEPs, trial by trial: a density of the log MEP, or the probability of an interval."""
     low, high = log_mep.unbind(-1)
     known = low == high
     parts = _components(unknowns, level, likelihood)
@@ -151,14 +134,7 @@ def _log_outlier_between(unknowns: Unknowns, low: Tensor, high: Tensor) -> Tenso
 def draw_log_mep(
     unknowns: Unknowns, level: Tensor, likelihood: Likelihood, generator: torch.Generator | None = None
 ) -> Tensor:
-    """Draw natural logs of MEPs [mV], shape (m, n).
-
-    Args:
-        unknowns: fields of shape (m,).
-        level: share of the largest excess at each trial, shape (m, n).
-        likelihood: the likelihood.
-        generator: source of randomness; None is torch's own.
-    """
+    """Draw natural logs of MEPs [mV], shape (m, n)."""
     parts = _components(unknowns, level, likelihood)
     if likelihood == "input-noise":
         weights = _nodes(level)[1].exp().expand(level.numel(), -1)

@@ -15,8 +15,6 @@ from isiw.models.parametric.prior import Likelihood, Unknowns
 from isiw.models.protocol import Tensor
 from isiw.models.shared.tables import ISI_NODES
 
-__all__ = ["MepLaw"]
-
 
 class MepLaw(TorchDistribution):
     """Distribution of the natural logs of one person's MEPs [mV], as intervals that are points where one is known.

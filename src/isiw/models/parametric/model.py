@@ -30,8 +30,6 @@ from isiw.models.windows import Runs, SampledProfiles, least_excess_mv, profile_
 from isiw.types import ArrayLike
 from isiw.window import Window, WindowEstimate
 
-__all__ = ["ParametricModel", "ParametricPosterior"]
-
 
 @dataclass(frozen=True)
 class ParametricModel:

@@ -17,8 +17,6 @@ from isiw.models.protocol import Tensor
 from isiw.models.shared.scales import Scale, check_scales
 from isiw.models.shared.start import Span, StartPrior
 
-__all__ = ["OUTPUT_CV", "Likelihood", "Unknowns", "WindowPrior", "latent_names"]
-
 Likelihood = Literal["gamma", "log-normal", "input-noise"]
 """Families of the MEP around its expectation."""
 

@@ -16,8 +16,6 @@ from isiw.models.parametric.prior import Likelihood, Unknowns, WindowPrior, late
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
 
-__all__ = ["WindowProgram", "nuts_sample"]
-
 TREE_DEPTH: Final = 6
 """Latents are of the order of one: 63 leaps reach far enough, and a chain between two modes stays affordable."""
 
@@ -48,11 +46,7 @@ class WindowProgram:
         return replace(self, present=False)
 
     def __call__(self, trials: History) -> Unknowns:
-        """Run the program.
-
-        Args:
-            trials: of one person, columns of shape (1, n); their MEPs are observed.
-        """
+        """Run the program."""
         latents = pyro.sample("latents", self._latents())
         unknowns = self.unknowns(latents)
         for name in ("start_ms", "width_ms", "baseline_mv", "amplitude_mv"):
@@ -62,22 +56,12 @@ class WindowProgram:
         return unknowns
 
     def log_density(self, latents: Tensor, trials: History) -> Tensor:
-        """What the trace of the program sums to for each of many latents (m, d), shape (m,).
-
-        Args:
-            latents: the latents, shape (m, d).
-            trials: of one person.
-        """
+        """What the trace of the program sums to for each of many latents (m, d), shape (m,)."""
         prior: Tensor = self._latents().log_prob(latents)
         return prior + self.log_likelihood(latents, trials)
 
     def log_likelihood(self, latents: Tensor, trials: History) -> Tensor:
-        """Log likelihood of the trials under each of many latents (m, d), shape (m,).
-
-        Args:
-            latents: the latents, shape (m, d).
-            trials: of one person.
-        """
+        """Log likelihood of the trials under each of many latents (m, d), shape (m,)."""
         return self._meps(self.unknowns(latents), trials).log_prob(_ends(trials)).sum(-1)
 
     def unknowns(self, latents: Tensor) -> Unknowns:
@@ -100,19 +84,7 @@ def _ends(trials: History) -> Tensor:
 def nuts_sample(
     program: WindowProgram, trials: History, starts: Tensor, draws: int, warmup: int, generator: torch.Generator
 ) -> Tensor:
-    """Draw from the posterior of a program by the no-U-turn sampler: slow, for reference.
-
-    Args:
-        program: the model.
-        trials: of one person, columns of shape (1, n).
-        starts: a chain begins at each of these latents, shape (c, d).
-        draws: kept draws of each chain.
-        warmup: draws before them, for adaptation.
-        generator: source of randomness.
-
-    Returns:
-        Latents, shape (c, draws, d).
-    """
+    """Draw from the posterior of a program by the no-U-turn sampler: slow, for reference."""
     chains = []
     with torch.random.fork_rng(devices=[]):
         # Pyro draws from torch's global stream.

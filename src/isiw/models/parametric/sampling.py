@@ -16,8 +16,6 @@ from isiw.models.protocol import Tensor
 from isiw.models.randomness import systematic
 from isiw.models.shared.history import History
 
-__all__ = ["Chains", "PersonDraws", "sample_person"]
-
 WITHOUT_WINDOW: Final = Effort(scouts=256, starts=2, steps=15, draws=300, enough=200.0)
 """Without a window few latents matter, and there is one mode."""
 
@@ -75,16 +73,7 @@ def sample_person(
     generator: torch.Generator,
     chains: Chains | None = None,
 ) -> PersonDraws:
-    """Draw from the posterior of one person.
-
-    Args:
-        program: the model, with a window.
-        trials: columns of shape (1, n).
-        samples: how many draws.
-        effort: how much work the importance sample with a window is worth.
-        generator: source of randomness.
-        chains: where the draws with a window come from Pyro's no-U-turn sampler; None to keep those of the sample.
-    """
+    """Draw from the posterior of one person."""
     everywhere = Mixture.prior(program.latents)
     log_density = partial(program.log_density, trials=trials)
     log_density_without = partial(program.without_window().log_density, trials=trials)

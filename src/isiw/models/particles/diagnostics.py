@@ -7,8 +7,6 @@ from typing import NamedTuple
 from isiw.lazy import torch
 from isiw.models.protocol import Tensor
 
-__all__ = ["Health", "distinct_share", "ess_share", "trouble_of"]
-
 LEAST_ESS = 0.01
 """Effective sample size before resampling, as a share of the particles: below it a trial contradicted the belief."""
 
@@ -36,31 +34,19 @@ class Health(NamedTuple):
 
 
 def ess_share(log_weights: Tensor) -> Tensor:
-    """Effective sample size as a share of the particles, shape (b,).
-
-    Args:
-        log_weights: normalised, shape (b, p).
-    """
+    """Effective sample size as a share of the particles, shape (b,)."""
     share: Tensor = torch.exp(-torch.logsumexp(2.0 * log_weights, dim=-1)) / log_weights.shape[-1]
     return share
 
 
 def distinct_share(log_likelihood: Tensor) -> Tensor:
-    """Share of the particles that differ, shape (b,); equal ones have the same likelihood of the history.
-
-    Args:
-        log_likelihood: of the history under each particle, shape (b, p).
-    """
+    """Share of the particles that differ, shape (b,); equal ones have the same likelihood of the history."""
     changes = log_likelihood.sort(dim=-1).values.diff(dim=-1) != 0
     return (1.0 + changes.sum(-1, dtype=torch.float32)) / log_likelihood.shape[-1]
 
 
 def trouble_of(health: Health) -> str | None:
-    """What is wrong with the particles of any of the people, in sentences; None where nothing is.
-
-    Args:
-        health: how the particles took the last trial.
-    """
+    """What is wrong with the particles of any of the people, in sentences; None where nothing is."""
     ess, shifts, distinct = (float(x.nan_to_num(1.0).min()) for x in (health.ess, health.shifts, health.distinct))
     said = []
     if ess < LEAST_ESS:

@@ -21,8 +21,6 @@ from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
 from isiw.types import FloatArray, IntArray
 
-__all__ = ["Compiled", "Engine", "EngineName", "TabledTarget", "TorchEngine", "engine_for"]
-
 EngineName: TypeAlias = Literal["compiled", "torch"]
 
 
@@ -30,19 +28,10 @@ class Engine(Protocol[L]):
     """What particles are weighed and moved by."""
 
     def meaning(self, latents: L) -> tuple[Person, FloatArray | None]:
-        """What particles mean, and the same as kernels have it; None where torch computes.
-
-        Args:
-            latents: the particles, fields of shape (b, p).
-        """
+        """What particles mean, and the same as kernels have it; None where torch computes."""
 
     def log_likelihood(self, latents: L, history: History) -> Tensor:
-        """Log likelihood of a history under each particle, shape (b, p).
-
-        Args:
-            latents: the particles, fields of shape (b, p).
-            history: trials of b people.
-        """
+        """Log likelihood of a history under each particle, shape (b, p)."""
 
     def log_places(self, latents: L) -> Tensor:
         """Log prior density of start and width of each particle but for a constant, shape (b, p)."""
@@ -50,15 +39,7 @@ class Engine(Protocol[L]):
     def sweeps(
         self, number: int, latents: L, log_likelihood: Tensor, history: History, generator: torch.Generator
     ) -> Moved[L]:
-        """Move every particle some times under the posterior of a history.
-
-        Args:
-            number: how often.
-            latents: particles, fields of shape (b, p); whatever weights they have, they keep.
-            log_likelihood: of the history under each of them, shape (b, p).
-            history: trials of b people.
-            generator: source of randomness.
-        """
+        """Move every particle some times under the posterior of a history."""
 
 
 class TabledTarget(Target[L], Protocol):
@@ -71,22 +52,11 @@ class TabledTarget(Target[L], Protocol):
         """The kinds of particles, integers of shape (b, p, k)."""
 
     def latents(self, values: Tensor, kinds: Tensor) -> L:
-        """Particles as the target has them.
-
-        Args:
-            values: their latents, shape (b, p, d).
-            kinds: their kinds, integers of shape (b, p, k).
-        """
+        """Particles as the target has them."""
 
 
 def engine_for(name: EngineName, target: TabledTarget[L], device: str = "cpu") -> Engine[L]:
-    """The engine that is wanted, where it can be had; else torch.
-
-    Args:
-        name: which is wanted.
-        target: whose posterior particles move under.
-        device: torch device; kernels compute on the CPU alone.
-    """
+    """The engine that is wanted, where it can be had; else torch."""
     if name == "torch" or not AVAILABLE or device != "cpu":
         return TorchEngine(target)
     return Compiled(target, target.tables())

@@ -22,8 +22,6 @@ from isiw.models.particles.places import mixture_of
 from isiw.models.particles.prior import Person, Prior
 from isiw.models.protocol import Tensor
 
-__all__ = ["WindowTarget"]
-
 JUMPS: Final = {"form": 0.25, "noise": 0.2, "window": 0.35, "place": 0.12, "response": 0.08}
 """Shares of the jumps. They draw anew: the profile's kind and form; the noise's kind and all that belongs to it;
 whether there is a window, and all of it; where and how wide it is; what belongs to the noise's kind."""

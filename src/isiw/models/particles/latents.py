@@ -10,8 +10,6 @@ from isiw.lazy import torch
 from isiw.models.particles.noise import NoiseKind
 from isiw.models.protocol import Tensor
 
-__all__ = ["BLOCKS", "LATENTS", "PROFILE_BLOCKS", "RECTIFIED", "RESPONSE_BLOCKS", "Latents", "latents_of", "used_by"]
-
 _CURVE: Final = ("log_ceiling", "log_slope", "log_input_sd", "log_sigma_y", "log_boost", "rest")
 
 RECTIFIED: Final = {name: f"rectified_{name}" for name in _CURVE}
@@ -49,26 +47,13 @@ _USED: Final = {
 
 @cache
 def latents_of(*blocks: str, device: torch.device) -> Tensor:
-    """Which latents belong to some of `BLOCKS`, shape (d,); one tensor for all callers, who leave it as it is.
-
-    Args:
-        *blocks: names of the blocks.
-        device: torch device.
-    """
+    """Which latents belong to some of `BLOCKS`, shape (d,); one tensor for all callers, who leave it as it is."""
     chosen = {latent for block in blocks for latent in BLOCKS[block]}
     return torch.tensor([latent in chosen for latent in LATENTS], device=device)
 
 
 def used_by(noise: Tensor, present: Tensor) -> Tensor:
-    """Which latents mean anything to particles of some kinds; all others are as the prior draws them.
-
-    Args:
-        noise: one of `NoiseKind`, shape (b, p).
-        present: whether there is any facilitation, shape (b, p).
-
-    Returns:
-        Shape (b, p, d).
-    """
+    """Which latents mean anything to particles of some kinds; all others are as the prior draws them."""
     of_profile = latents_of(*PROFILE_BLOCKS, device=noise.device)
     return _used_by_kind(noise.device)[noise] | (present.unsqueeze(-1) & of_profile)
 

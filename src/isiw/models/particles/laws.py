@@ -11,46 +11,16 @@ from typing import Final
 from isiw.checks import check_numbers, check_probabilities, require_sum_of_one
 from isiw.models.shared.scales import Scale, check_scales
 
-__all__ = [
-    "FOREARM",
-    "HAND",
-    "OTHER_MUSCLE",
-    "Floor",
-    "Gain",
-    "Muscle",
-    "NoiseShares",
-    "RectifiedPrior",
-    "SessionPrior",
-    "SwitchPrior",
-    "check_laws",
-    "check_shares",
-]
-
 
 def check_shares(shares: object) -> None:
-    """Check a dataclass all of whose fields are probabilities that sum to 1.
-
-    Args:
-        shares: the instance.
-
-    Raises:
-        InvalidValueError: they are no probabilities, or do not sum to 1.
-    """
+    """Check a dataclass all of whose fields are probabilities that sum to 1."""
     names = [f.name for f in fields(shares)]  # type: ignore[arg-type] # a dataclass
     check_probabilities(shares, *names)
     require_sum_of_one(f"the probabilities of {type(shares).__name__}", [getattr(shares, name) for name in names])
 
 
 def check_laws(owner: object, *names: str) -> None:
-    """Check fields of a dataclass that are several laws, each with a share.
-
-    Args:
-        owner: the instance.
-        *names: its fields.
-
-    Raises:
-        InvalidValueError: a field whose shares do not sum to 1, as where there is no law.
-    """
+    """Check fields of a dataclass that are several laws, each with a share."""
     for name in names:
         require_sum_of_one(f"the shares of {type(owner).__name__}.{name}", [law.share for law in getattr(owner, name)])
 

@@ -13,19 +13,12 @@ from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
 from isiw.models.shared.tables import ISI_NODES
 
-__all__ = ["in_pieces", "levels", "total_log_likelihood"]
-
 CHUNK_ELEMENTS = 1 << 20
 """On a CPU the likelihood is worked through in pieces of this many nodes: few calls, and bounded memory."""
 
 
 def levels(person: Person, isi_ms: Tensor) -> Tensor:
-    """Facilitation of each particle, negative where the tap depresses, shape (b, p, n).
-
-    Args:
-        person: particles, fields of shape (b, p).
-        isi_ms: ISIs [ms], shape (b or 1, n); NaN is TMS alone.
-    """
+    """Facilitation of each particle, negative where the tap depresses, shape (b, p, n)."""
     level = facilitation(person.shape, isi_ms.unsqueeze(-2)).mul_(person.present.unsqueeze(-1))
     if person.depression is not None:
         shape, depth, present = person.depression
@@ -37,10 +30,6 @@ def total_log_likelihood(person: Person, history: History) -> Tensor:
     """Log likelihood of a history under each particle, shape (b, p).
 
     An ISI that is known with an SD only is integrated out on three Gauss-Hermite nodes.
-
-    Args:
-        person: particles, fields of shape (b, p).
-        history: trials of b people.
     """
     if not bool((history.isi_sd_ms > 0).any()):
         return _by_trial(person, history, history.isi_ms).sum(-1)
@@ -59,14 +48,7 @@ def _by_trial(person: Person, history: History, isi_ms: Tensor) -> Tensor:
 
 
 def in_pieces(function: Callable[..., Tensor], response: Response, others: tuple[Tensor, ...], elements: int) -> Tensor:
-    """Apply a function of particles piece by piece on a CPU, so that its intermediate values stay small.
-
-    Args:
-        function: maps a response (fields (b, p)) and the others to a tensor of shape (b, p, ...).
-        response: response parameters, fields of shape (b, p).
-        others: tensors of shape (b, p or 1, ...).
-        elements: size of the intermediate values for one particle.
-    """
+    """Apply a function of particles piece by piece on a CPU, so that its intermediate values stay small."""
     people, particles = response.log_floor.shape
     if response.log_floor.is_cuda or people * particles * elements <= CHUNK_ELEMENTS:
         return function(response, *others)

@@ -11,8 +11,6 @@ from typing import NamedTuple
 from isiw.lazy import torch
 from isiw.models.protocol import Tensor
 
-__all__ = ["JointMixture", "Mixture", "drawn"]
-
 
 @dataclass(frozen=True, eq=False)
 class Mixture:
@@ -30,12 +28,7 @@ class Mixture:
 
     @classmethod
     def of(cls, components: list[tuple[float, list[tuple[float, float]]]], device: torch.device | str) -> Mixture:
-        """A mixture of components.
-
-        Args:
-            components: of each its share, and the (mean, SD) of every latent.
-            device: torch device.
-        """
+        """A mixture of components."""
         shares = torch.tensor([share for share, _ in components], dtype=torch.float32, device=device)
         laws = torch.tensor([latents for _, latents in components], dtype=torch.float32, device=device)
         return cls(shares / shares.sum(), laws[..., 0], laws[..., 1])
@@ -62,11 +55,7 @@ class Mixture:
 
 
 class JointMixture:
-    """Independent mixtures of several blocks of latents, computed at once.
-
-    Args:
-        blocks: one mixture a block; their latents follow each other.
-    """
+    """Independent mixtures of several blocks of latents, computed at once."""
 
     def __init__(self, blocks: Sequence[Mixture]) -> None:
         most = max(len(block.shares) for block in blocks)
@@ -88,12 +77,7 @@ class JointMixture:
         self._tables = {torch.device("cpu"): tables}
 
     def sample(self, size: tuple[int, ...], generator: torch.Generator) -> Tensor:
-        """Draws, shape (*size, d).
-
-        Args:
-            size: how many.
-            generator: source of randomness.
-        """
+        """Draws, shape (*size, d)."""
         tables = self._on(generator.device)
         uniform = torch.rand(
             (*size, len(tables.below)), generator=generator, dtype=torch.float32, device=generator.device
@@ -143,12 +127,7 @@ class _Tables(NamedTuple):
 
 
 def drawn(shares: tuple[float, ...], quantile: Tensor) -> Tensor:
-    """Which of some alternatives is drawn at each quantile, same shape.
-
-    Args:
-        shares: their probabilities, summing to 1.
-        quantile: uniform draws from 0 to 1, any shape.
-    """
+    """Which of some alternatives is drawn at each quantile, same shape."""
     return torch.bucketize(quantile, _inner_edges(shares, quantile.device))
 
 

@@ -26,8 +26,6 @@ from isiw.models.windows import EXCLUDED_AT, SampledHypotheses, SampledProfiles,
 from isiw.types import ArrayLike, FloatArray
 from isiw.window import Window, WindowEstimate
 
-__all__ = ["ParticleModel", "ParticlePosterior"]
-
 LEAST_SAMPLES = 20
 """Of fewer samples no quantile is told."""
 

@@ -17,8 +17,6 @@ from isiw.models.particles.prior import Person
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
 
-__all__ = ["Fields", "Moved", "Mover", "Target"]
-
 JUMP_PROBABILITY = 0.3
 PART_PROBABILITY = (0.35, 0.35, 0.30)
 """How often a difference moves all latents, those of the profile alone, and those of the response alone."""
@@ -63,20 +61,10 @@ class Target(Protocol[L]):
         """Log prior density of where and how wide their windows are but for a constant, shape (b, p)."""
 
     def shifted(self, latents: L, part: Tensor) -> Tensor:
-        """Which latents a difference moves: those of a part that mean anything to the particle, shape (b, p, d).
-
-        Args:
-            latents: particles, fields of shape (b, p).
-            part: 0 for all latents, 1 for the profile's, 2 for the response's, shape (b, p).
-        """
+        """Which latents a difference moves: those of a part that mean anything to the particle, shape (b, p, d)."""
 
     def jumped(self, latents: L, generator: torch.Generator) -> L:
-        """Particles some of whose kinds and latents are drawn anew from the prior.
-
-        Args:
-            latents: the particles that jump, fields of shape (n,).
-            generator: source of randomness.
-        """
+        """Particles some of whose kinds and latents are drawn anew from the prior."""
 
 
 class Moved(NamedTuple, Generic[L]):
@@ -122,13 +110,7 @@ class Mover(Generic[L]):
     generator: torch.Generator
 
     def sweeps(self, number: int, latents: L, log_likelihood: Tensor) -> Moved[L]:
-        """Move every particle some times.
-
-        Args:
-            number: how often.
-            latents: particles, fields of shape (b, p); whatever weights they have, they keep.
-            log_likelihood: of the history under each of them, shape (b, p).
-        """
+        """Move every particle some times."""
         if not number:
             return Moved(latents, log_likelihood, *log_likelihood.new_full((2, len(log_likelihood)), torch.nan))
         half = log_likelihood.shape[-1] // 2

@@ -23,17 +23,6 @@ from typing import NamedTuple
 from isiw.lazy import torch
 from isiw.models.protocol import Tensor
 
-__all__ = [
-    "NoiseKind",
-    "Response",
-    "draw_log_mep",
-    "evoked_mean",
-    "log_gain",
-    "log_likelihood",
-    "outcome_density",
-    "recruits",
-]
-
 NODES = 8
 NODE_REACH = 2.6
 BETWEEN_NODES = 0.4 * 2.0 * NODE_REACH / (NODES - 1)
@@ -72,11 +61,7 @@ class NoiseKind(IntEnum):
 
 
 def recruits(kind: Tensor) -> Tensor:
-    """Which particles have a recruitment curve, with a threshold or without, same shape.
-
-    Args:
-        kind: one of `NoiseKind`, any shape.
-    """
+    """Which particles have a recruitment curve, with a threshold or without, same shape."""
     return (kind == NoiseKind.RECRUITMENT) | (kind == NoiseKind.RECTIFIED)
 
 
@@ -118,15 +103,7 @@ class Response(NamedTuple):
 
 
 def log_gain(response: Response, order: Tensor) -> Tensor:
-    """By how much a trial's evoked MEP differs because of when it came, natural log.
-
-    Args:
-        response: response parameters, fields of shape (..., p).
-        order: how many trials were told before each, shape (..., 1 or p, n).
-
-    Returns:
-        Shape (..., p, n).
-    """
+    """By how much a trial's evoked MEP differs because of when it came, natural log."""
     startle = torch.zeros_like(order)
     for trial, excess in enumerate(STARTUP):
         startle = torch.where(order == trial, excess, startle)
@@ -222,15 +199,7 @@ def _response_probability(response: Response, level: Tensor) -> Tensor:
 
 
 def evoked_mean(response: Response, level: Tensor) -> Tensor:
-    """Expected MEP above the floor, in multiples of the median floor.
-
-    Args:
-        response: response parameters, fields of shape (..., p).
-        level: facilitation in 0–1, shape (..., p, t).
-
-    Returns:
-        Shape (..., p, t).
-    """
+    """Expected MEP above the floor, in multiples of the median floor."""
     # The expectation is smooth in the input noise: nodes that have all of its variance are enough.
     spread = response.spread.unsqueeze(-1) * _nodes(level) / ON_NODES
     onset = response.onset[..., None, None]
@@ -258,14 +227,7 @@ def _components(response: Response, level: Tensor, gain: Tensor | float = 0.0) -
 
 
 def _rectify(share: Tensor, kernel: Tensor, between: Tensor, onset: Tensor) -> None:
-    """Let the curves that have a threshold start there, in place; what lies between the nodes rounds the corner.
-
-    Args:
-        share: the sigmoid at each node, shape (..., p, q, t).
-        kernel: variance of its log between the nodes, same shape.
-        between: variance of the drive between the nodes, shape (..., p, q).
-        onset: the sigmoid at the threshold, shape (..., p); 0 where there is none.
-    """
+    """Let the curves that have a threshold start there, in place; what lies between the nodes rounds the corner."""
     rectified = onset > 0
     if not bool(rectified.any()):
         return
@@ -297,18 +259,7 @@ def _mix(response: Response, level: Tensor, log_relative: Tensor, evoked: Tensor
 def log_likelihood(
     response: Response, level: Tensor, log_mep: Tensor, log_mep_high: Tensor, gain: Tensor | float = 0.0
 ) -> Tensor:
-    """Log likelihood of MEPs, trial by trial: a density of the log MEP, or the probability of an interval.
-
-    Args:
-        response: response parameters, fields of shape (..., p).
-        level: facilitation of each trial, shape (..., p, n).
-        log_mep: natural log of the MEPs [mV], or the lower end of what is known of them, shape (..., 1 or p, n).
-        log_mep_high: the upper end; equal to `log_mep` where the amplitude is known, same shape.
-        gain: `log_gain` of each trial, shape (..., p, n).
-
-    Returns:
-        Shape (..., p, n).
-    """
+    """Log likelihood of MEPs, trial by trial: a density of the log MEP, or the probability of an interval."""
     low, high = (end - response.log_floor.unsqueeze(-1) for end in (log_mep, log_mep_high))
     mean, inverse_sd = _components(response, level, gain)
     censored = log_mep != log_mep_high
@@ -338,16 +289,7 @@ def _interval_likelihood(
 
 
 def outcome_density(response: Response, level: Tensor, log_mep: Tensor) -> Tensor:
-    """Density of log MEPs at given levels of facilitation, for every combination.
-
-    Args:
-        response: response parameters, fields of shape (..., p).
-        level: facilitation, shape (..., p, t).
-        log_mep: natural log of MEPs [mV], shape (..., 1, y).
-
-    Returns:
-        Shape (..., p, t, y).
-    """
+    """Density of log MEPs at given levels of facilitation, for every combination."""
     log_relative = log_mep - response.log_floor.unsqueeze(-1)
     mean, inverse_sd = _components(response, level)
     mean, inverse_sd = mean.unsqueeze(-1), inverse_sd.unsqueeze(-1)
@@ -358,17 +300,7 @@ def outcome_density(response: Response, level: Tensor, log_mep: Tensor) -> Tenso
 
 
 def draw_log_mep(response: Response, level: Tensor, generator: torch.Generator, gain: Tensor | float = 0.0) -> Tensor:
-    """Draw natural logs of MEPs [mV] from the distribution that `log_likelihood` is of.
-
-    Args:
-        response: response parameters, fields of shape (..., p).
-        level: facilitation of each trial, shape (..., p, n).
-        generator: source of randomness.
-        gain: `log_gain` of each trial, shape (..., p, n).
-
-    Returns:
-        Shape (..., p, n).
-    """
+    """Draw natural logs of MEPs [mV] from the distribution that `log_likelihood` is of."""
     mean, inverse_sd = _components(response, level, gain)
     node = torch.multinomial(_node_weights(level), level.numel(), replacement=True, generator=generator)
     picks = node.view(level.shape).unsqueeze(-2)

@@ -11,8 +11,6 @@ from isiw.models.particles.mixture import Mixture
 from isiw.models.shared.scales import Scale, check_scales
 from isiw.types import Conditioning, Reference
 
-__all__ = ["MOST_APART_MS", "Place", "mixture_of"]
-
 MOST_APART_MS = 10.0
 """Hit delays of one rig are not further apart from one measurement to the next."""
 
@@ -50,11 +48,7 @@ class Place:
             object.__setattr__(self, "hit_delay_ms", mean_and_sd("Place.hit_delay_ms", self.hit_delay_ms))
 
     def is_of_rig(self, hit_delay_ms: tuple[float, float] | None) -> bool:
-        """Whether it can be of a rig: from the valve command, starts are as late as its taps.
-
-        Args:
-            hit_delay_ms: the rig's hit delay, as for a place.
-        """
+        """Whether it can be of a rig: from the valve command, starts are as late as its taps."""
         if self.reference != "valve" or self.hit_delay_ms is None or hit_delay_ms is None:
             return True
         return abs(self.hit_delay_ms[0] - hit_delay_ms[0]) <= MOST_APART_MS

@@ -16,8 +16,6 @@ from isiw.models.particles.swarm import Swarm
 from isiw.models.protocol import Observation, Tensor
 from isiw.models.shared.history import observed
 
-__all__ = ["SwarmPosterior"]
-
 
 class _Model(Protocol):
     """What is asked of a model's settings."""

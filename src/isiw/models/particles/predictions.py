@@ -16,8 +16,6 @@ from isiw.models.shared.tables import LEVELS, OUTCOMES, interpolated
 from isiw.models.windows import Runs, least_excess_mv
 from isiw.types import FloatArray, IntArray
 
-__all__ = ["PersonSample"]
-
 FINE_MS = 1.0
 """Between the points of such a grid facilitation hardly changes."""
 
@@ -81,12 +79,7 @@ class PersonSample:
         return torch.from_numpy(compiled.masks_of(self._pairs(isi_ms), len(isi_ms)))
 
     def runs(self, isi_ms: Tensor, person: int = 0) -> Runs:
-        """Sampled windows of one person, as runs of some ascending ISIs [ms] (t,).
-
-        Args:
-            isi_ms: ISIs [ms], shape (t,).
-            person: which one.
-        """
+        """Sampled windows of one person, as runs of some ascending ISIs [ms] (t,)."""
         if self.records is None:
             return Runs.of_masks(self.window_masks(isi_ms)[person])
         return Runs.of_pairs(self._pairs(isi_ms)[person], len(isi_ms))
@@ -120,12 +113,7 @@ class PersonSample:
         return self._tables.at(self._outcome_table, self._tables.levels(isi_ms))
 
     def mep_quantiles_mv(self, isi_ms: Tensor, shares: Tensor) -> Tensor:
-        """Quantiles of the next MEP [mV], shape (b, t, q).
-
-        Args:
-            isi_ms: ISIs [ms], shape (t,).
-            shares: which quantiles, shape (q,).
-        """
+        """Quantiles of the next MEP [mV], shape (b, t, q)."""
         below = torch.nn.functional.pad(self.outcome_mass(isi_ms).mean(1).cumsum(-1), (1, 0))
         wanted = shares.expand(*below.shape[:-1], -1).contiguous()
         right = torch.searchsorted(below, wanted).clamp(1, OUTCOMES)

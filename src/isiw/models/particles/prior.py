@@ -37,8 +37,6 @@ from isiw.models.particles.shapes import Shape
 from isiw.models.protocol import Tensor
 from isiw.models.shared.scales import Scale
 
-__all__ = ["Depression", "Person", "Prior"]
-
 MOST_ONSET: Final = 0.9
 """A threshold further up a recruitment curve would leave nothing of it."""
 

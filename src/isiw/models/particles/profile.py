@@ -21,8 +21,6 @@ from isiw.models.shared.start import TAP_SPANS, Span, StartPrior
 from isiw.text.stimuli import STIMULI
 from isiw.types import Conditioning
 
-__all__ = ["ProfilePrior", "ShapeShares", "Width"]
-
 
 @dataclass(frozen=True)
 class ShapeShares:

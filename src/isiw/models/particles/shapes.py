@@ -12,8 +12,6 @@ from typing import NamedTuple
 from isiw.lazy import torch
 from isiw.models.protocol import Tensor
 
-__all__ = ["Shape", "ShapeKind", "facilitation", "highest_facilitation"]
-
 PEAKS_AT = (0.27, 0.73)
 PEAK_SD = 1 / 7.5
 APART_SD = 1 / 12.0
@@ -50,15 +48,7 @@ class Shape(NamedTuple):
 
 
 def facilitation(shape: Shape, isi_ms: Tensor) -> Tensor:
-    """Facilitation in 0–1.
-
-    Args:
-        shape: profiles, fields of shape (..., p).
-        isi_ms: ISIs [ms], shape (..., 1 or p, t).
-
-    Returns:
-        Facilitation, shape (..., p, t).
-    """
+    """Facilitation in 0–1."""
     peak_at = _peak_at(shape)
     rise_ms, fall_ms = peak_at * shape.width_ms, (1.0 - peak_at) * shape.width_ms
     offset_ms = isi_ms - (shape.start_ms + rise_ms).unsqueeze(-1)
@@ -74,16 +64,7 @@ def facilitation(shape: Shape, isi_ms: Tensor) -> Tensor:
 
 
 def reaches(shape: Shape, level: Tensor, isi_ms: Tensor) -> Tensor:
-    """Whether facilitation is at least a level: profiles of one peak are where they cross it, and are not worked out.
-
-    Args:
-        shape: profiles, fields of shape (..., p).
-        level: facilitation, shape (..., p); nothing reaches one above 1.
-        isi_ms: ISIs [ms], shape (t,).
-
-    Returns:
-        Booleans, shape (..., p, t).
-    """
+    """Where facilitation reaches a level: profiles of one peak are solved for the crossings, not evaluated."""
     peak_at = _peak_at(shape)
     peak_ms = shape.start_ms + peak_at * shape.width_ms
     away = (-0.5 * level.log()).sqrt()  # of the crossings from the peak, in flanks; NaN where no ISI reaches the level
@@ -96,16 +77,7 @@ def reaches(shape: Shape, level: Tensor, isi_ms: Tensor) -> Tensor:
 
 
 def highest_facilitation(shape: Shape, low_ms: float, high_ms: float) -> Tensor:
-    """Largest facilitation in a range of ISIs; profiles fall off on both sides of their peaks.
-
-    Args:
-        shape: profiles, fields of shape (..., p).
-        low_ms: shortest ISI [ms].
-        high_ms: longest ISI [ms].
-
-    Returns:
-        Facilitation in 0–1, shape (..., p).
-    """
+    """Largest facilitation in a range of ISIs; profiles fall off on both sides of their peaks."""
     peaks_ms = torch.stack([shape.start_ms + at * shape.width_ms for at in (_peak_at(shape), *PEAKS_AT)], dim=-1)
     return facilitation(shape, peaks_ms.clamp(low_ms, high_ms)).amax(-1).clamp_max(1.0)
 

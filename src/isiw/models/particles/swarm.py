@@ -19,8 +19,6 @@ from isiw.models.protocol import Tensor
 from isiw.models.randomness import systematic
 from isiw.models.shared.history import History
 
-__all__ = ["Moving", "Swarm", "taken"]
-
 
 @dataclass(frozen=True)
 class Moving:
@@ -97,20 +95,11 @@ class Swarm(Generic[L]):
         return None if self.health is None else trouble_of(self.health)
 
     def times(self, log_ratio: Tensor) -> Swarm[L]:
-        """The same particles under another prior.
-
-        Args:
-            log_ratio: log of its density over that of the prior so far, shape (b, p).
-        """
+        """The same particles under another prior."""
         return replace(self, log_weights=torch.log_softmax(self.log_weights + log_ratio, dim=-1))
 
     def told(self, trial: History, engine: Engine[L]) -> Swarm[L]:
-        """The same particles, weighted by one more trial as well.
-
-        Args:
-            trial: the trial of each person.
-            engine: what computes their likelihood.
-        """
+        """The same particles, weighted by one more trial as well."""
         gain = engine.log_likelihood(self.latents, trial)
         log_weights = self.log_weights + gain
         return replace(
@@ -122,13 +111,7 @@ class Swarm(Generic[L]):
         )
 
     def moved(self, engine: Engine[L], moves: Moving, generator: torch.Generator) -> Swarm[L]:
-        """The particles after the moves that follow a trial, resampled where too few carried the posterior.
-
-        Args:
-            engine: what moves them.
-            moves: how often they move, and when they are resampled.
-            generator: source of randomness.
-        """
+        """The particles after the moves that follow a trial, resampled where too few carried the posterior."""
         ess = ess_share(self.log_weights)
         worn = ess < moves.min_ess
         fresh = self._resampled(worn, generator)
@@ -144,11 +127,7 @@ class Swarm(Generic[L]):
         return replace(self, latents=latents, log_weights=self.log_weights[one])
 
     def picked(self, size: int) -> L:
-        """Equally weighted particles that represent the same posterior, fields of shape (b, s).
-
-        Args:
-            size: how many of each person.
-        """
+        """Equally weighted particles that represent the same posterior, fields of shape (b, s)."""
         picks = systematic(self.log_weights, size)
         return self.latents.remade(taken(field, picks) for field in self.latents)
 
@@ -171,11 +150,6 @@ class Swarm(Generic[L]):
 
 
 def taken(values: Tensor, picks: Tensor) -> Tensor:
-    """Some of the particles, in any order and as often as picked, shape (b, s, ...).
-
-    Args:
-        values: of all particles, shape (b, p) or (b, p, d).
-        picks: their indices, shape (b, s).
-    """
+    """Some of the particles, in any order and as often as picked, shape (b, s, ...)."""
     index = picks.unsqueeze(-1).expand(-1, -1, values.shape[-1]) if values.dim() > picks.dim() else picks
     return torch.gather(values, 1, index)

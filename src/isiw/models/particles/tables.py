@@ -15,8 +15,6 @@ from isiw.models.protocol import Tensor
 from isiw.models.shared.tables import LEVELS, OUTCOMES, interpolated, table_levels
 from isiw.types import FloatArray
 
-__all__ = ["FacilitationTables", "cell_ends", "log_ends"]
-
 
 @dataclass(frozen=True, eq=False)
 class FacilitationTables:
@@ -54,15 +52,7 @@ class FacilitationTables:
         return evoked_mean(self.person.response, self.rows)
 
     def at(self, table: Tensor, level: Tensor) -> Tensor:
-        """What lies between the rows of a table.
-
-        Args:
-            table: shape (b, s, l, y).
-            level: facilitations, shape (b, s, t).
-
-        Returns:
-            Shape (b, s, t, y).
-        """
+        """What lies between the rows of a table."""
         if self.records is not None:
             return torch.from_numpy(compiled.rows_between(self.records, table.numpy(), level.numpy()))
         if self._depth is None:
@@ -77,11 +67,7 @@ class FacilitationTables:
         return levels(self.person, isi_ms.unsqueeze(0))
 
     def outcomes(self, order: int) -> Tensor:
-        """Probability of each outcome of the next trial in each row, shape (b, s, l, y).
-
-        Args:
-            order: how many trials came before.
-        """
+        """Probability of each outcome of the next trial in each row, shape (b, s, l, y)."""
         response = self.person.response
         low, high = log_ends(response, self.evoked)
         ends = cell_ends(low.device)
@@ -99,12 +85,7 @@ class FacilitationTables:
 
 
 def log_ends(response: Response, evoked: Tensor) -> tuple[Tensor, Tensor]:
-    """Between which log MEPs outcomes lie, each of shape (b,).
-
-    Args:
-        response: response parameters, fields of shape (b, s).
-        evoked: expected MEP above the floor by facilitation, in floors, shape (b, s, l).
-    """
+    """Between which log MEPs outcomes lie, each of shape (b,)."""
     top = response.log_floor + torch.log1p(evoked.amax(-1))
     low = torch.quantile(response.log_floor, 0.05, dim=-1) - 1.0
     return low, torch.quantile(top, 0.95, dim=-1) + 1.5

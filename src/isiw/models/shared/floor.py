@@ -11,8 +11,6 @@ from isiw.checks import check_choice, check_numbers
 from isiw.models.shared.history import PersonTrials
 from isiw.types import FloatArray
 
-__all__ = ["FloorKind", "FloorTreatment"]
-
 FloorKind: TypeAlias = Literal["subtracted", "lowest", "zeroed", "raw"]
 
 GUESSED_AT: Final = {"subtracted": 0.5, "lowest": 0.1}

@@ -13,8 +13,6 @@ from isiw.lazy import torch
 from isiw.models.protocol import Observation, Tensor
 from isiw.types import FloatArray
 
-__all__ = ["AmplitudeHistory", "Circumstances", "History", "PersonTrials", "observed"]
-
 
 class Circumstances(NamedTuple):
     """What else is known to bear on the amplitude of a trial; neutral by default, and nothing sets it yet.
@@ -57,12 +55,7 @@ class History:
 
     @classmethod
     def empty(cls, people: int, device: torch.device) -> History:
-        """No trials.
-
-        Args:
-            people: how many, b.
-            device: torch device.
-        """
+        """No trials."""
         return cls(*(torch.empty((people, 0), dtype=torch.float32, device=device) for _ in range(5)))
 
     @property
@@ -71,12 +64,7 @@ class History:
         return self.isi_ms, self.isi_sd_ms, self.log_mep, self.log_mep_high, self.order
 
     def to(self, device: torch.device | str, dtype: torch.dtype) -> History:
-        """The same on another device, or in another precision.
-
-        Args:
-            device: torch device.
-            dtype: the precision.
-        """
+        """The same on another device, or in another precision."""
         return History(*(column.to(device, dtype) for column in self.columns))
 
     def appended(self, trial: History) -> History:
@@ -95,14 +83,7 @@ class History:
 
 
 def observed(observation: Observation, detection_limit_mv: float, response_threshold_mv: float, order: int) -> History:
-    """One trial of each person as a history.
-
-    Args:
-        observation: the trial.
-        detection_limit_mv: what an amplitude of 0 is known to be below [mV].
-        response_threshold_mv: what a response is known to be above, and no response below [mV].
-        order: how many trials came before.
-    """
+    """One trial of each person as a history."""
     seen, unseen = observation.response == 1, observation.response == 0
     log_mep = torch.log(observation.mep_mv)
     limit, threshold = math.log(detection_limit_mv), math.log(response_threshold_mv)
@@ -156,11 +137,7 @@ class AmplitudeHistory:
         return int(self.isi_ms.shape[0])
 
     def appended(self, observation: Observation) -> AmplitudeHistory:
-        """These and one more trial.
-
-        Raises:
-            StrategyError: a response without an amplitude, which a fit to amplitudes cannot learn from.
-        """
+        """These and one more trial."""
         isi_ms, mep_mv = (x.detach().cpu().double().numpy()[:, None] for x in (observation.isi_ms, observation.mep_mv))
         if np.isnan(mep_mv).any():
             raise StrategyError(

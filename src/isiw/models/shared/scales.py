@@ -9,8 +9,6 @@ from isiw.errors import InvalidValueError
 from isiw.lazy import torch
 from isiw.models.protocol import Tensor
 
-__all__ = ["Scale", "check_scales"]
-
 _MOST_MEDIAN: Final = 1e5
 """In any unit that is used [ms, mV, % RMT, ratios]; nothing that is believed of a person is as large."""
 
@@ -55,17 +53,7 @@ class Scale(NamedTuple):
 
 
 def check_scales(owner: object, *names: str, positive: bool = True, tailed: bool = True) -> None:
-    """Check fields of a frozen dataclass that are scales, and make scales of tuples and lists.
-
-    Args:
-        owner: the instance.
-        *names: its fields.
-        positive: whether the quantities are positive.
-        tailed: whether they may have a tail; where not, another than 0 is refused.
-
-    Raises:
-        InvalidValueError: a field that is not a scale.
-    """
+    """Check fields of a frozen dataclass that are scales, and make scales of tuples and lists."""
     for name in names:
         value = tuple(getattr(owner, name))
         if not _is_scale(value, positive=positive) or (any(value[2:]) and not tailed):

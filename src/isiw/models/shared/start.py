@@ -12,8 +12,6 @@ from isiw.design import DesignSpace
 from isiw.lazy import torch
 from isiw.models.protocol import Tensor
 
-__all__ = ["TAP_SPANS", "Span", "StartPrior"]
-
 BEFORE_MS: Final = 100.0
 """How far before the range a window may start."""
 

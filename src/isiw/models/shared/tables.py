@@ -7,8 +7,6 @@ import math
 from isiw.lazy import torch
 from isiw.models.protocol import Tensor
 
-__all__ = ["ISI_NODES", "LEVELS", "OUTCOMES", "interpolated", "table_levels"]
-
 ISI_NODES = ((-math.sqrt(3.0), 1 / 6), (0.0, 2 / 3), (math.sqrt(3.0), 1 / 6))
 """Gauss–Hermite nodes [SD] and weights of an ISI that is known with an SD only."""
 
@@ -25,15 +23,7 @@ def table_levels(device: torch.device) -> Tensor:
 
 
 def interpolated(table: Tensor, level: Tensor) -> Tensor:
-    """What lies between the rows of a table.
-
-    Args:
-        table: a row for each of `table_levels`, shape (b, s, l, y).
-        level: facilitations, shape (b, s, t).
-
-    Returns:
-        Shape (b, s, t, y).
-    """
+    """What lies between the rows of a table."""
     position = level.clamp(0.0, 1.0).sqrt() * (LEVELS - 1)
     below = position.floor().clamp_max(LEVELS - 2)
     first = LEVELS * torch.arange(table.shape[0] * table.shape[1], device=level.device).view(*table.shape[:2], 1)

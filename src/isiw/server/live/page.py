@@ -19,20 +19,12 @@ from isiw.server.live.view import View
 from isiw.server.serving import Server, listening, new_token, settings_of
 from isiw.session.loop import Session
 
-__all__ = ["LivePage", "make_live_app", "watch"]
-
 _ADDRESS: Final = ipaddress.IPv4Address("127.0.0.1")
 _LEAVING_S: Final = 5.0
 
 
 def make_live_app(session: Session, view: View, rules: Rules) -> FastAPI:
-    """The application that serves a session's page.
-
-    Args:
-        session: the session.
-        view: what is shown of it.
-        rules: who may look on and press its buttons.
-    """
+    """The application that serves a session's page."""
     app = FastAPI(title="isiw", version=isiw.__version__, docs_url=None, redoc_url=None, openapi_url=None)
     app.state.session, app.state.view = session, view
     app.include_router(router)

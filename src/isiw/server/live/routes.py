@@ -20,8 +20,6 @@ from isiw.server.refusals import Refusal
 from isiw.server.requests import ExcludeRequest, GoOnRequest, IncludeRequest, NoteRequest, body_of
 from isiw.session.loop import Session
 
-__all__ = ["FILES", "URGENT", "file_of", "router"]
-
 GLANCE_S, MOST_S = 0.05, 0.5
 """How often is looked for news, and how long at most where none is put together for a while [s]."""
 
@@ -71,11 +69,7 @@ class _File(NamedTuple):
 
 @cache
 def file_of(path: str) -> _File:
-    """A file of the page.
-
-    Args:
-        path: its path.
-    """
+    """A file of the page."""
     kind, text = FILES[path]
     content = text().encode()
     tag = f'"{hashlib.sha256(content).hexdigest()}"'
@@ -102,11 +96,7 @@ async def _view(request: Request) -> View:
 
 
 async def _session(request: Request, view: Annotated[View, Depends(_view)]) -> Session:
-    """The session, while it runs.
-
-    Raises:
-        Refusal: it does not.
-    """
+    """The session, while it runs."""
     session: Session = request.app.state.session
     view.seen()
     if not session.running:

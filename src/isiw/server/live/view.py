@@ -20,8 +20,6 @@ from isiw.session.updates import SessionUpdate
 from isiw.text import plain
 from isiw.trials import Trial
 
-__all__ = ["View"]
-
 MOST_EVENTS: Final = 100
 """Events that the page lists; the log has all."""
 
@@ -46,9 +44,6 @@ class View:
     """Follows one session. It keeps the last sweep, the last estimate and the last events, and no others.
 
     The session's threads call what a follower is told, the server's thread everything else.
-
-    Args:
-        session: the session.
     """
 
     def __init__(self, session: Session) -> None:

@@ -25,8 +25,6 @@ from isiw.models.protocol import ResponseModel
 from isiw.strategy.stopping import AnyOf, Budget, CredibleWidth, ExpectedF1, NoWindow, SmallGain, StoppingRule
 from isiw.text.toml_files import checked
 
-__all__ = ["Asking", "Setting", "Settings", "Stopping", "settings_from", "settings_keys", "settings_values"]
-
 _S = TypeVar("_S", bound="Settings")
 
 KNOWN: Final = {
@@ -159,11 +157,7 @@ class Setting:
 
 
 def settings_keys(kind: type[Settings]) -> dict[str, Setting]:
-    """What can be set about a family of strategies, by key.
-
-    Args:
-        kind: the family's settings class.
-    """
+    """What can be set about a family of strategies, by key."""
     defaults = kind()
     parts = ((part.name, getattr(defaults, part.name)) for part in fields(kind))  # type: ignore[arg-type] # a dataclass
     keys = {setting.path[-1]: setting for name, part in parts for setting in _settings_of(part, (name,))}
@@ -201,18 +195,7 @@ def settings_values(settings: Settings) -> dict[str, Any]:
 
 
 def settings_from(kind: type[_S], values: Mapping[str, Any], name: str) -> _S:
-    """Settings of a family, by key; what is not given is as by default.
-
-    Args:
-        kind: the family's settings class.
-        values: settings by key, as TOML values or as the objects that they stand for; of nested ones a part is enough.
-        name: of the strategy, for messages.
-
-    Raises:
-        StrategyError: a key that the family does not have, or an object of another family.
-        ConfigError: a nested key or value that cannot be used, or a path where values are wanted.
-        InvalidValueError: an invalid value.
-    """
+    """Settings of a family, by key; what is not given is as by default."""
     known = settings_keys(kind)
     for key in values:
         if key not in known:

@@ -14,8 +14,6 @@ import docstring_parser
 
 from isiw.strategy.settings.common import Settings, settings_keys
 
-__all__ = ["DescribedSetting", "described"]
-
 _UNITS: Final = {"ms": "ms", "ms2": "ms²", "mv": "mV", "uv": "µV", "s": "s", "hz": "Hz"}
 
 
@@ -45,11 +43,7 @@ class DescribedSetting:
 
 
 def described(settings: Settings) -> tuple[DescribedSetting, ...]:
-    """All that can be set about a strategy, groups before their members.
-
-    Args:
-        settings: what its name stands for.
-    """
+    """All that can be set about a strategy, groups before their members."""
     return tuple(
         entry
         for key, setting in settings_keys(type(settings)).items()

@@ -22,8 +22,6 @@ from isiw.models.shared.floor import FloorTreatment
 from isiw.strategy.settling import EdgeVariance, ParticleSpread, SweptPast
 from isiw.strategy.stopping import AnyOf, Budget, StoppingRule
 
-__all__ = ["GPRSettings", "NRSettings", "PFSettings", "SVMRSettings", "SweepSettings"]
-
 
 @dataclass(frozen=True)
 class EvenStart:

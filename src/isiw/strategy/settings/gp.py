@@ -7,8 +7,6 @@ from dataclasses import dataclass, field
 from isiw.models.gp import GaussianProcess
 from isiw.strategy.settings.common import Asking, Stopping
 
-__all__ = ["GPSettings"]
-
 
 @dataclass(frozen=True)
 class GPSettings:

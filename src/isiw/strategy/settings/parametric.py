@@ -7,8 +7,6 @@ from dataclasses import dataclass, field
 from isiw.models.parametric import ParametricModel
 from isiw.strategy.settings.common import Asking, Stopping
 
-__all__ = ["ParametricSettings"]
-
 
 @dataclass(frozen=True)
 class ParametricSettings:

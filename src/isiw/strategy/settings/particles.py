@@ -7,8 +7,6 @@ from dataclasses import dataclass, field
 from isiw.models.particles import ParticleModel
 from isiw.strategy.settings.common import Asking, Stopping
 
-__all__ = ["ParticleSettings"]
-
 
 @dataclass(frozen=True)
 class ParticleSettings:

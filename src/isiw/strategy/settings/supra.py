@@ -9,8 +9,6 @@ from isiw.models.particles.supra import SupraModel
 from isiw.strategy.settings.common import Asking
 from isiw.strategy.stopping import Budget, StoppingRule
 
-__all__ = ["SupraSettings", "SupraStopping"]
-
 
 @dataclass(frozen=True)
 class SupraStopping:

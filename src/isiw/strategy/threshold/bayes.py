@@ -16,8 +16,6 @@ from isiw.strategy.threshold.pulses import IntensityRange, Pulse, ThresholdEstim
 from isiw.strategy.threshold.recruitment import DISTANCES_PCT, RecruitmentBelief, log_likelihood
 from isiw.types import FloatArray
 
-__all__ = ["THRESHOLDS_PCT_MSO", "BayesThreshold"]
-
 THRESHOLDS_PCT_MSO: Final = np.arange(10.0, 130.5, 0.5)
 """Thresholds that are believed possible; those above 100 are beyond any stimulator."""
 

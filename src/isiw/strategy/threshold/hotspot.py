@@ -20,8 +20,6 @@ from isiw.strategy.threshold.recruitment import DISTANCES_PCT, RecruitmentBelief
 from isiw.trials import RESPONSE_MV
 from isiw.types import FloatArray
 
-__all__ = ["BayesHotSpot", "CoilPulse", "HotSpotEstimate", "WalkedHotSpot"]
-
 INTENSITIES_PCT: Final = (95.0, 105.0, 115.0, 125.0, 135.0, 150.0)
 """What the intensity may be at the hot spot [% of the threshold there], which nobody knows yet."""
 

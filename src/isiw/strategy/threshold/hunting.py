@@ -15,8 +15,6 @@ from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.strategy.threshold.pulses import IntensityRange, Pulse, ThresholdEstimate
 from isiw.types import FloatArray
 
-__all__ = ["MaximumLikelihood"]
-
 _DROP: Final = 0.5 * NormalDist().inv_cdf(0.95) ** 2  # of the log-likelihood at the ends of a 90 % interval
 
 

@@ -17,17 +17,6 @@ from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.trials import RESPONSE_MV
 from isiw.types import FloatArray
 
-__all__ = [
-    "HasPulseBudget",
-    "IntensityRange",
-    "Pulse",
-    "ThresholdEstimate",
-    "ThresholdMethod",
-    "hardly_larger",
-    "not_growing",
-    "one_sided",
-]
-
 ENOUGH_AT_THE_END: Final = 6
 NEAR_THE_END_PCT_MSO: Final = 3.0
 """After so many pulses so near to the end of the range, none of which changed anything, the range is wrong."""
@@ -220,12 +209,7 @@ class HasPulseBudget(Protocol):
 
 
 def one_sided(pulses: Sequence[Pulse], space: IntensityRange) -> StopDecision | None:
-    """That pulses of one kind only give no number, and whether the range can still change that; None with both kinds.
-
-    Args:
-        pulses: what was told so far.
-        space: the intensities that may be asked.
-    """
+    """The warning that responses all alike give no number, and whether the range can change that; else None."""
     kinds = {pulse.responded for pulse in pulses}
     if len(kinds) == 2:
         return None
@@ -251,11 +235,7 @@ def one_sided(pulses: Sequence[Pulse], space: IntensityRange) -> StopDecision | 
 
 
 def not_growing(pulses: Sequence[Pulse]) -> str | None:
-    """That no pulse was answered at a higher intensity than one that was not, in words; None where one was.
-
-    Args:
-        pulses: what was told so far, of both kinds.
-    """
+    """That no pulse was answered at a higher intensity than one that was not, in words; None where one was."""
     answered = max(pulse.intensity_pct_mso for pulse in pulses if pulse.responded)
     missed = min(pulse.intensity_pct_mso for pulse in pulses if not pulse.responded)
     if answered > missed:
@@ -266,11 +246,7 @@ def not_growing(pulses: Sequence[Pulse]) -> str | None:
 
 
 def hardly_larger(pulses: Sequence[Pulse]) -> str | None:
-    """That the amplitudes of answered pulses are about those of the others, in words; None where they are larger.
-
-    Args:
-        pulses: what was told so far, of both kinds.
-    """
+    """That the amplitudes of answered pulses are about those of the others, in words; None where they are larger."""
     answered_mv = [pulse.mep_mv for pulse in pulses if pulse.responded and pulse.mep_mv is not None]
     missed_mv = [pulse.mep_mv for pulse in pulses if not pulse.responded and pulse.mep_mv is not None]
     if not (answered_mv and missed_mv):

@@ -18,8 +18,6 @@ from isiw.lazy import scipy
 from isiw.trials import RESPONSE_MV
 from isiw.types import FloatArray
 
-__all__ = ["DISTANCES_PCT", "RecruitmentBelief", "log_likelihood"]
-
 DISTANCES_PCT: Final = np.arange(-70.0, 91.0)
 """Of an intensity from the threshold [% of it]; beyond these ends nothing changes any more."""
 
@@ -66,13 +64,7 @@ class RecruitmentBelief:
 
 @lru_cache(maxsize=256)
 def log_likelihood(belief: RecruitmentBelief, mep_mv: float | None, *, responded: bool) -> FloatArray:
-    """Logarithm of the probability of what came of a pulse, by `DISTANCES_PCT` and recruitment curve, shape (t, c).
-
-    Args:
-        belief: which curves there may be.
-        mep_mv: the amplitude [mV]; None where it was only seen whether there was a response.
-        responded: whether there was one.
-    """
+    """Logarithm of the probability of what came of a pulse, by `DISTANCES_PCT` and recruitment curve, shape (t, c)."""
     if mep_mv is not None and mep_mv >= belief.visible_mv:
         density = _with_input_noise(belief, _density(belief, mep_mv))
         return np.asarray(np.log((1 - ODD) * density + ODD * _ODD_DENSITY))

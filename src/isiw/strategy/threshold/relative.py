@@ -10,8 +10,6 @@ from isiw.checks import check_numbers, check_wholes
 from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.strategy.threshold.pulses import IntensityRange, Pulse, ThresholdEstimate
 
-__all__ = ["FiveOfTen"]
-
 
 @dataclass(frozen=True)
 class FiveOfTen:

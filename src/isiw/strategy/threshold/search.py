@@ -24,8 +24,6 @@ from isiw.strategy.threshold.pulses import (
 from isiw.strategy.threshold.relative import FiveOfTen
 from isiw.text.toml_files import checked
 
-__all__ = ["METHODS", "ThresholdSearch", "list_threshold_methods", "make_threshold_search"]
-
 METHODS: Final[Mapping[str, type[BayesThreshold | MaximumLikelihood | FiveOfTen]]] = {
     "bayes": BayesThreshold,
     "maximum-likelihood": MaximumLikelihood,

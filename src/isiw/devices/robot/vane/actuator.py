@@ -15,8 +15,6 @@ from dataclasses import dataclass, field
 from isiw.checks import check_numbers
 from isiw.errors import InvalidValueError
 
-__all__ = ["ATMOSPHERE_BAR", "SOUND_M_S", "Load", "Rotor", "Supply", "Vane"]
-
 ATMOSPHERE_BAR = 1.0
 """Pressure of the room, in which both chambers begin (Table 7.1), and the one that ISO 6358 refers flows to [bar]."""
 

@@ -13,8 +13,6 @@ from isiw.devices.robot.vane.actuator import Vane
 from isiw.devices.robot.vane.rotation import rotate
 from isiw.types import FloatArray
 
-__all__ = ["Performance", "performance"]
-
 
 @dataclass(frozen=True, eq=False)
 class Performance:
@@ -36,16 +34,6 @@ def performance(
 
     The text's "square wave excitation of 1 sec duration" is taken as one with a period of 1 s: a rotation there and
     back within the second that its 7.1 allows for a full cycle.
-
-    Args:
-        vanes: the actuators, n of them.
-        period_s: of the square wave [s].
-        periods: how many of them are run, as in Fig. 7.11 by default; the range is that of the last, since sizes near
-            the limit take several to settle.
-        step_ms: step of the solver [ms].
-
-    Raises:
-        InvalidValueError: no actuator, a period that is not positive, or no period at all.
     """
     period_s, periods = number("period_s", period_s, above=0), whole("periods", periods, least=1)
     sample_ms = step_ms * max(1, round(2.0 / step_ms))

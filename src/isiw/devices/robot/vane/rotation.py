@@ -29,8 +29,6 @@ from isiw.devices.robot.vane.actuator import ATMOSPHERE_BAR, PA_PER_BAR, Vane
 from isiw.errors import InvalidValueError
 from isiw.types import ArrayLike, FloatArray, IntArray
 
-__all__ = ["Rotations", "orifice_flow", "rotate"]
-
 ROOM_PA = ATMOSPHERE_BAR * PA_PER_BAR
 LITRE_PER_S_BAR = 1e-3  # a flow of 1 l/s of free air in J/s of P V, for each Pa: 1e-3 m³ · 1e5 Pa / 1e5 Pa
 LONGEST_STEP_MS = 1.0
@@ -71,14 +69,7 @@ class Rotations:
 
 
 def orifice_flow(conductance: ArrayLike, critical_ratio: ArrayLike, from_pa: ArrayLike, to_pa: ArrayLike) -> FloatArray:
-    """Flow from one side of an orifice to the other by ISO 6358 (7.1, 7.2), as P V in unit time [J/s].
-
-    Args:
-        conductance: sonic conductance [l/(s bar)].
-        critical_ratio: of the pressures, below which the flow is choked.
-        from_pa: pressure on one side [Pa].
-        to_pa: pressure on the other [Pa].
-    """
+    """Flow from one side of an orifice to the other by ISO 6358 (7.1, 7.2), as P V in unit time [J/s]."""
     one, other = np.asarray(from_pa, dtype=np.float64), np.asarray(to_pa, dtype=np.float64)
     high, low = np.maximum(one, other), np.minimum(one, other)
     ratio = np.asarray(critical_ratio, dtype=np.float64)
@@ -99,17 +90,6 @@ def rotate(
     """Command actuators by a square wave: chamber 1 is filled and chamber 2 emptied, then the other way round.
 
     All chambers and lines begin at the room's pressure, all vanes at rest.
-
-    Args:
-        vanes: the actuators, n of them.
-        duration_s: for how long they are followed [s].
-        half_wave_s: half a period of the square wave [s].
-        start_rad: where the vanes begin, from 0 to π [rad].
-        step_ms: step of the solver [ms].
-        sample_ms: time between the samples that are kept, a multiple of the step [ms].
-
-    Raises:
-        InvalidValueError: no actuator, a start outside the range, or a time that is not positive or too long.
     """
     duration_s = number("duration_s", duration_s, above=0, most=LONGEST_S)
     half_wave_s = number("half_wave_s", half_wave_s, above=0)

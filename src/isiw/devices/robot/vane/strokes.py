@@ -12,8 +12,6 @@ from isiw.devices.robot.vane.rotation import Rotations, rotate
 from isiw.signals.impact import VALVE_MS
 from isiw.types import FloatArray
 
-__all__ = ["RATE_HZ", "STROKE_S", "UNITS", "Variation", "draw_strokes", "record_strokes"]
-
 RATE_HZ = 1000.0
 STROKE_S = 1.0
 """What the text allows for the full range [s]."""
@@ -49,17 +47,7 @@ class Variation:
 
 
 def draw_strokes(vane: Vane, n: int, rng: np.random.Generator, variation: Variation | None = None) -> Rotations:
-    """Strokes from one end of the range to the other, n of them.
-
-    Args:
-        vane: the actuator.
-        n: how many strokes.
-        rng: what they are drawn from.
-        variation: how they differ.
-
-    Raises:
-        InvalidValueError: no strokes.
-    """
+    """Strokes from one end of the range to the other, n of them."""
     varied = variation or Variation()
     z = rng.standard_normal((2, whole("n", n, least=1)))
     friction = np.maximum(1 + varied.friction_cv * z[0], LEAST_SHARE)
@@ -80,14 +68,7 @@ def _varied(vane: Vane, friction: float, reservoir: float) -> Vane:
 def record_strokes(
     strokes: Rotations, rng: np.random.Generator, variation: Variation | None = None, *, rest_ms: float = VALVE_MS
 ) -> dict[str, FloatArray]:
-    """What the sensors record of n strokes, by channel in the units of `UNITS`, at `RATE_HZ`, each of shape (n, w).
-
-    Args:
-        strokes: what the actuator does, sampled at `RATE_HZ`.
-        rng: source of the sensors' noise.
-        variation: how much noise they have.
-        rest_ms: how long they record before the actuator's valve opens [ms].
-    """
+    """What the sensors record of n strokes, by channel in the units of `UNITS`, at `RATE_HZ`, each of shape (n, w)."""
     varied, rest = variation or Variation(), round(rest_ms * RATE_HZ / 1000)
     clean = {
         "angle": np.degrees(strokes.angle_rad),

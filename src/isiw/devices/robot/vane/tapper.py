@@ -17,8 +17,6 @@ from isiw.signals.impact import VALVE_MS, impact_time
 from isiw.signals.mep import MEP_WINDOWS_MS
 from isiw.trials import Channel, Stimulus, Sweep
 
-__all__ = ["RotatingTapper"]
-
 STROKES = 32
 STILL_MS = 1000.0  # as long as a usual sweep
 LATEST_MEP_MS = max(end for _, end in MEP_WINDOWS_MS.values())

@@ -16,8 +16,6 @@ from isiw.models.particles.moves import PART_PROBABILITY
 from isiw.models.protocol import Tensor
 from isiw.models.shared.start import StartPrior
 
-__all__ = ["prior_tables"]
-
 _NOT_REACHED: Final = 2.0
 """No uniform draw is above it."""
 
@@ -33,19 +31,7 @@ def prior_tables(
     spreads: Tensor,
     moves: dict[str, Any],
 ) -> Tables:
-    """The tables of a prior.
-
-    Args:
-        space: the design space.
-        start: where windows start.
-        mixtures: of the latents that follow, block by block; the first is the width.
-        starts: how many starts there are.
-        places: the share of all places, and their mixture; None where none are expected.
-        at: where the latents of the default are among the model's, from the first on; -1 for those that it lacks.
-        spreads: usual SD of each latent.
-        moves: the tables that say what moves may do: `apart`, `states`, `shifted`, `jumps` (shares), `redrawn`,
-            `renewed`, `of_profile` and `kinds` (shares of the values of each kind).
-    """
+    """The tables of a prior."""
     latents, most = len(spreads), max(len(mixture.shares) for mixture in mixtures)
     sizes = [mixture.means.shape[-1] for mixture in mixtures]
     first = [*range(starts), *(starts + np.cumsum([0, *sizes[:-1]]))]

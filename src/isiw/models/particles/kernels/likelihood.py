@@ -64,8 +64,6 @@ from isiw.models.particles.noise import (
 from isiw.models.particles.shapes import APART_SD, PEAK_SD, PEAKS_AT, TOGETHER, ShapeKind
 from isiw.models.shared.tables import ISI_NODES
 
-__all__ = ["ROOM", "curve_of", "facilitations", "history_likelihood", "is_curved", "likelihoods"]
-
 ROOM: Final = 14
 """Rows of numbers that the likelihood of a history needs in between; the last three are of the nodes."""
 
@@ -102,14 +100,7 @@ def is_curved(particle: Any) -> Any:
 
 @loop
 def facilitations(particle: Any, isi_ms: Any, level: Any, count: int) -> None:
-    """Write the facilitation of a particle at some ISIs, in 0–1; negative where the tap depresses.
-
-    Args:
-        particle: its record.
-        isi_ms: the ISIs [ms], shape (n,).
-        level: where it is written, shape (n,).
-        count: of how many.
-    """
+    """Write the facilitation of a particle at some ISIs, in 0–1; negative where the tap depresses."""
     kind, form = particle[SHAPE], particle[FORM]
     start, width = particle[START], particle[WIDTH]
     if particle[PRESENT] == _NIL:
@@ -152,14 +143,7 @@ def facilitations(particle: Any, isi_ms: Any, level: Any, count: int) -> None:
 
 @loop
 def curve_of(particle: Any, spread: Any, between: Any, room: Any) -> None:
-    """Write the noise on a particle's input at each node, and the variance of what lies between; see `noise._curve`.
-
-    Args:
-        particle: its record.
-        spread: where the nodes are written, in logits, shape (q,).
-        between: where the variance is written, shape (q,).
-        room: for as many numbers.
-    """
+    """Write the noise on a particle's input at each node, and the variance of what lies between; see `noise._curve`."""
     width = particle[SPREAD]
     if is_curved(particle):
         for q in range(NODES):
@@ -198,16 +182,7 @@ def _gains(particle: Any, trials: Any, count: int, work: Any) -> None:
 
 @loop
 def _inputs(particle: Any, trials: Any, count: int, node: Any, work: Any) -> None:
-    """Write what the nodes of each trial have in common: drive, scale, and the probability of a response.
-
-    Args:
-        particle: its record.
-        trials: their records, shape (TRIAL, PIECE).
-        count: how many there are.
-        node: by how many SDs the ISIs are later than told.
-        work: where it is written: rows 0 facilitation, 1 drive, 2 scale, 3 probability, 4 the known part and 5 its
-            variance, in floors.
-    """
+    """Write what the nodes of each trial have in common: drive, scale, and the probability of a response."""
     level, drive, responds = work[0], work[1], work[3]
     isi, isi_sd, factor, shift = trials[ISI], trials[ISI_SD], trials[FACTOR], trials[SHIFT]
     for i in range(count):
@@ -233,16 +208,7 @@ def _inputs(particle: Any, trials: Any, count: int, node: Any, work: Any) -> Non
 
 @loop
 def _density(particle: Any, trials: Any, count: int, curve: Any, work: Any, likelihood: Any) -> None:
-    """Write the density of each trial's log MEP, shape (n,).
-
-    Args:
-        particle: its record.
-        trials: their records, shape (TRIAL, PIECE).
-        count: how many there are.
-        curve: nodes, and the variance between them, shape (2, q).
-        work: what `_inputs` has written; rows 6 and 7 are free.
-        likelihood: where it is written.
-    """
+    """Write the density of each trial's log MEP, shape (n,)."""
     drive, scale, responds, known, varies = work[1], work[2], work[3], work[4], work[5]
     relative, evoked = work[6], work[7]
     low, floor = trials[LOW], particle[LOG_FLOOR]
@@ -357,16 +323,7 @@ def _total(particle: Any, trials: Any, count: int, censored: Any, curve: Any, wo
 
 @loop
 def history_likelihood(particle: Any, known: Any, sizes: Any, censored: Any, more_sizes: Any, room: Any) -> float:
-    """Log likelihood of one person's history under a particle.
-
-    Args:
-        particle: its record.
-        known: the trials whose amplitude is known, as `trial_records` has them.
-        sizes: how many are in each piece.
-        censored: those that are censored.
-        more_sizes: how many are in each piece.
-        room: for what is in between, shape (ROOM, PIECE).
-    """
+    """Log likelihood of one person's history under a particle."""
     curve, nodes = room[ROOM - 3 :], NODES
     curve_of(particle, curve[0, :nodes], curve[1, :nodes], curve[2])
     summed = 0.0
@@ -386,12 +343,7 @@ def _all(particles: Any, known: Any, sizes: Any, censored: Any, more_sizes: Any,
 
 @kernel
 def likelihoods(particles: Any, history: Any) -> Any:
-    """Log likelihood of each person's history under each particle, shape (b, p).
-
-    Args:
-        particles: records, shape (b, p, PARTICLE).
-        history: shape (b, n, columns).
-    """
+    """Log likelihood of each person's history under each particle, shape (b, p)."""
     found, room = np.zeros(particles.shape[:2], dtype=np.float32), np.empty((ROOM, PIECE), dtype=np.float32)
     for person in range(particles.shape[0]):
         known, sizes = trial_records(history[person], False)  # noqa: FBT003

@@ -16,8 +16,6 @@ from isiw.models.particles.kernels.records import PARTICLE, PIECE, trial_records
 from isiw.models.particles.kernels.target import KINDS, fresh_values, log_block, meant
 from isiw.models.particles.moves import BLUR, JUMP_PROBABILITY
 
-__all__ = ["OWN_DRAWS", "log_places", "records", "sweep"]
-
 OWN_DRAWS: Final = 7 + KINDS
 """Uniform draws of a move besides those that fresh latents take: acceptance, jump or not, which, and so on."""
 
@@ -127,18 +125,7 @@ def _proposed(tables: Any, theirs: Any, kinds: Any, u: Any, n: Any, chosen: Any,
 def _move_half(
     tables: Any, state: Any, mine: Any, theirs: Any, draws: Any, trials: Any, rooms: Any, counts: Any
 ) -> None:
-    """Move half of the particles of one person once, in place.
-
-    Args:
-        tables: of the prior and the moves.
-        state: values, kinds and log likelihoods of all particles, and room for the kinds of one.
-        mine: the first of those that move, and the one behind the last.
-        theirs: latents of the others, by whose differences they move, shape (o, d).
-        draws: uniform and standard normal ones.
-        trials: as `history_likelihood` has them.
-        rooms: for the likelihood, shape (ROOM, PIECE); for latents, a record and parts of a density, shape (5, 64).
-        counts: shifts, accepted ones, jumps, accepted ones; shape (4,).
-    """
+    """Move half of the particles of one person once, in place."""
     values, kinds, log_likelihood, chosen = state
     (uniform, normal), (room, scratch) = draws, rooms
     known, sizes, censored, more_sizes = trials
@@ -165,20 +152,7 @@ def _move_half(
 
 @kernel
 def sweep(tables: Any, history: Any, values: Any, kinds: Any, log_likelihood: Any, uniform: Any, normal: Any) -> Any:
-    """Move every particle once, in place, one half by differences within the other.
-
-    Args:
-        tables: of the prior and the moves.
-        history: shape (b, n, columns).
-        values: latents of the particles, shape (b, p, d).
-        kinds: their kinds, shape (b, p, k).
-        log_likelihood: of the history under each, shape (b, p).
-        uniform: uniform draws, shape (b, p, u).
-        normal: standard normal draws, shape (b, p, d).
-
-    Returns:
-        How many shifts there were, how many were accepted, and the same of jumps, shape (b, 4).
-    """
+    """Move every particle once, in place, one half by differences within the other."""
     people, size = values.shape[:2]
     counts, chosen = np.zeros((people, 4), dtype=np.float32), np.zeros(KINDS, dtype=np.int64)
     room, scratch = np.empty((ROOM, PIECE), dtype=np.float32), np.zeros((5, 64), dtype=np.float32)
@@ -196,13 +170,7 @@ def sweep(tables: Any, history: Any, values: Any, kinds: Any, log_likelihood: An
 
 @kernel
 def records(tables: Any, values: Any, kinds: Any) -> Any:
-    """Records of particles, shape (b, p, PARTICLE).
-
-    Args:
-        tables: of the prior.
-        values: their latents, shape (b, p, d).
-        kinds: their kinds, shape (b, p, k).
-    """
+    """Records of particles, shape (b, p, PARTICLE)."""
     people, size, latents = values.shape
     found, z = np.empty((people, size, PARTICLE), dtype=np.float32), np.zeros(latents + 1, dtype=np.float32)
     for person in range(people):
@@ -214,12 +182,7 @@ def records(tables: Any, values: Any, kinds: Any) -> Any:
 
 @kernel
 def log_places(tables: Any, values: Any) -> Any:
-    """Log prior density of start and width but for a constant, shape (b, p).
-
-    Args:
-        tables: of the prior.
-        values: the particles' latents, shape (b, p, d).
-    """
+    """Log prior density of start and width but for a constant, shape (b, p)."""
     people, size = values.shape[:2]
     found, parts = np.empty((people, size), dtype=np.float32), np.empty(64, dtype=np.float32)
     for person in range(people):

@@ -42,15 +42,6 @@ from isiw.models.particles.noise import (
     NoiseKind,
 )
 
-__all__ = [
-    "evoked_means",
-    "facilitation_rows",
-    "outcome_tables",
-    "position_of",
-    "rows_between",
-    "table_rows",
-]
-
 _f = np.float32
 _NIL, _HALF, _ONE = _f(0.0), _f(0.5), _f(1.0)
 _PER_NODE, _FAR, _CORNER = _f(1.0 / ON_NODES), _f(FAR_BELOW), _f(CORNER)
@@ -109,12 +100,7 @@ def _evoked(particle: Any, levels: Any, means: Any) -> None:
 
 @kernel
 def evoked_means(particles: Any, levels: Any) -> Any:
-    """Expected MEP above the floor, in floors, shape (b, s, l).
-
-    Args:
-        particles: records, shape (b, s, PARTICLE).
-        levels: facilitations, shape (b, s, l).
-    """
+    """Expected MEP above the floor, in floors, shape (b, s, l)."""
     means = np.empty(levels.shape, dtype=np.float32)
     for person in range(particles.shape[0]):
         for i in range(particles.shape[1]):
@@ -142,16 +128,7 @@ def _components(particle: Any, drive: Any, scale: Any, at: Any, between: Any, me
 
 @loop
 def _outcomes(particle: Any, levels: Any, gain: Any, lines: Any, cells: Any, table: Any) -> None:
-    """Write the probability of each outcome at some facilitations, shape (l, y).
-
-    Args:
-        particle: its record.
-        levels: the facilitations, shape (l,).
-        gain: of the next trial.
-        lines: log MEP of each outcome, width of its cell, and five more lines of whole lanes that are free.
-        cells: room for as many lines as there are facilitations.
-        table: where they are written.
-    """
+    """Write the probability of each outcome at some facilitations, shape (l, y)."""
     relative, width, drive, mean, inverse_sd, spread, between = (
         lines[0],
         lines[1],
@@ -195,15 +172,7 @@ def _outcomes(particle: Any, levels: Any, gain: Any, lines: Any, cells: Any, tab
 
 @kernel
 def outcome_tables(particles: Any, levels: Any, order: int, log_mep: Any, width: Any) -> Any:
-    """Probability of each outcome of the next trial at some facilitations, shape (b, s, l, y).
-
-    Args:
-        particles: records, shape (b, s, PARTICLE).
-        levels: facilitations, shape (b, s, l).
-        order: how many trials came before.
-        log_mep: middles of the outcomes' cells, shape (b, y).
-        width: of the cells, up to a constant, shape (y,).
-    """
+    """Probability of each outcome of the next trial at some facilitations, shape (b, s, l, y)."""
     people, size, rows = levels.shape
     outcomes = log_mep.shape[1]
     padded = (max(outcomes, rows) + LANES - 1) // LANES * LANES
@@ -242,13 +211,7 @@ def _between_rows(table: Any, level: Any, depth: Any, found: Any) -> None:
 
 @kernel
 def rows_between(particles: Any, table: Any, levels: Any) -> Any:
-    """What lies between the rows of a table, shape (b, s, t, y).
-
-    Args:
-        particles: records, shape (b, s, PARTICLE).
-        table: a row for each of `table_rows`, shape (b, s, l, y).
-        levels: facilitations, shape (b, s, t).
-    """
+    """What lies between the rows of a table, shape (b, s, t, y)."""
     people, size, count = levels.shape
     found = np.empty((people, size, count, table.shape[3]), dtype=np.float32)
     for person in range(people):

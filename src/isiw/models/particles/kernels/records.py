@@ -19,8 +19,6 @@ from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
 from isiw.types import FloatArray
 
-__all__ = ["columns_of", "gain_of", "people_of", "person_of", "trial_records"]
-
 # Of a particle.
 NOISE, SHAPE, PRESENT, START, WIDTH, FORM, LOG_FLOOR, FLOOR_SD, LOG_RATIO, SPREAD, OUTPUT_SD = range(11)
 BOOST, REST, ONSET, MOST, LEAST, DRIFT, STARTLED, SLOPE, LOW_START, LOW_WIDTH, DEPTH = range(11, 22)
@@ -40,11 +38,7 @@ _ONE, _NIL = np.float32(1.0), np.float32(0.0)
 
 
 def person_of(records: FloatArray) -> Person:
-    """What particles mean, as views of their records (b, p, PARTICLE).
-
-    Args:
-        records: the particles; a depression is there where they have one.
-    """
+    """What particles mean, as views of their records (b, p, PARTICLE)."""
     column = torch.from_numpy(records).unbind(-1)
     shape = Shape(column[SHAPE], column[START], column[WIDTH], column[FORM])
     response = Response(column[NOISE], *column[LOG_FLOOR : SLOPE + 1])
@@ -54,11 +48,7 @@ def person_of(records: FloatArray) -> Person:
 
 
 def people_of(person: Person) -> FloatArray:
-    """Particles as records, shape (b, p, PARTICLE).
-
-    Args:
-        person: what they mean, fields of shape (b, p).
-    """
+    """Particles as records, shape (b, p, PARTICLE)."""
     shape, response = person.shape, person.response
     low = person.depression
     nothing = torch.zeros_like(response.log_floor)
@@ -91,16 +81,7 @@ def gain_of(order: Any) -> Any:
 
 @kernel
 def trial_records(columns: Any, censored: bool) -> Any:  # noqa: FBT001 - kernels know no keywords
-    """The trials of one person whose amplitude is known, or those that are censored.
-
-    Args:
-        columns: the history of the person, shape (n, columns).
-        censored: which of them.
-
-    Returns:
-        Pieces, each of which fits into the fastest memory, shape (pieces, TRIAL, PIECE), and how many trials are in
-        each, shape (pieces,): whole lanes, padded by trials that are none. TMS alone has an enhancement factor of 0.
-    """
+    """The trials of one person whose amplitude is known, or those that are censored."""
     count = 0
     for n in range(columns.shape[0]):
         count += (columns[n, LOW] != columns[n, HIGH]) == censored

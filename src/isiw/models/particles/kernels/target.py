@@ -39,8 +39,6 @@ from isiw.models.particles.noise import NoiseKind
 from isiw.models.particles.prior import MOST_ONSET
 from isiw.types import FloatArray, IntArray
 
-__all__ = ["KINDS", "MEANINGS", "Tables", "fresh_values", "log_block", "meant"]
-
 KINDS: Final = 4
 """Of a particle: its profile's shape, its noise, whether there is an enhancement, and whether there is a depression."""
 
@@ -114,14 +112,7 @@ class Tables(NamedTuple):
 
 @loop
 def meant(z: Any, kinds: Any, at: Any, particle: Any) -> None:
-    """Write what latents mean, as `Prior.person` says.
-
-    Args:
-        z: the latents and a 0 behind them, which stands for those that a model does not have, shape (d + 1,).
-        kinds: the particle's kinds, shape (k,).
-        at: where each latent is; see `Tables`.
-        particle: its record, which is written.
-    """
+    """Write what latents mean, as `Prior.person` says."""
     shape, noise, present, depressed = kinds[0], kinds[1], kinds[2], kinds[3]
     particle[SHAPE], particle[NOISE], particle[PRESENT] = _f(shape), _f(noise), _f(present)
     particle[START], particle[WIDTH] = z[at[0]], exp(z[at[1]])
@@ -192,14 +183,7 @@ def _log_sum(parts: Any, count: int) -> Any:
 
 @inlined
 def log_block(z: Any, block: int, tables: Any, parts: Any) -> float:
-    """Log density of the latents of a block but for a constant; -inf where there can be none.
-
-    Args:
-        z: all latents, shape (d + 1,).
-        block: its number.
-        tables: the prior's.
-        parts: room for the components, shape (c + places,).
-    """
+    """Log density of the latents of a block but for a constant; -inf where there can be none."""
     first, size, components = tables.first[block], tables.size[block], tables.components[block]
     if components <= 0:
         density = _start_density(z[first], tables.start_ms, tables.density)
@@ -226,15 +210,7 @@ def log_block(z: Any, block: int, tables: Any, parts: Any) -> float:
 
 @inlined
 def fresh_values(block: int, tables: Any, uniform: Any, normal: Any, z: Any) -> None:
-    """Draw the latents of a block from the prior.
-
-    Args:
-        block: its number.
-        tables: the prior's.
-        uniform: uniform draws: one a block, then two of the places, and two of a second start.
-        normal: standard normal draws, one a latent.
-        z: where the latents are written, shape (d + 1,).
-    """
+    """Draw the latents of a block from the prior."""
     first, size, components = tables.first[block], tables.size[block], tables.components[block]
     blocks = len(tables.first)
     if components <= 0:

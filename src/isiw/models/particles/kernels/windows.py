@@ -14,8 +14,6 @@ from isiw.models.particles.kernels.records import FLOOR_SD, FORM, LOG_FLOOR, PRE
 from isiw.models.particles.shapes import PEAKS_AT, ShapeKind
 from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE
 
-__all__ = ["edge_levels", "masks_of", "window_runs"]
-
 _f = np.float32
 _NIL, _HALF, _ONE, _LEAST_REACH = _f(0.0), _f(0.5), _f(1.0), _f(1e-12)
 _PLATEAU, _SKEWED, _TWO_PEAK = (_f(kind) for kind in (ShapeKind.PLATEAU, ShapeKind.SKEWED, ShapeKind.TWO_PEAK))
@@ -70,14 +68,7 @@ def _edge_level(particle: Any, evoked: Any, highest: Any) -> Any:
 
 @kernel
 def edge_levels(particles: Any, evoked: Any, isi_ms: Any, fine: bool) -> Any:  # noqa: FBT001 - kernels know no keywords
-    """Facilitation at each window's edge, shape (b, s); 2 where there is no window.
-
-    Args:
-        particles: records, shape (b, s, PARTICLE).
-        evoked: expected MEP above the floor at the squares of equal steps, in floors, shape (b, s, l).
-        isi_ms: the design grid [ms], shape (t,).
-        fine: whether it is so fine that the peak lies on it.
-    """
+    """Facilitation at each window's edge, shape (b, s); 2 where there is no window."""
     people, size = particles.shape[:2]
     found, room = np.empty((people, size), dtype=np.float32), np.empty((2, max(3, len(isi_ms))), dtype=np.float32)
     for person in range(people):
@@ -135,13 +126,7 @@ def _runs(particle: Any, level: Any, isi_ms: Any, room: Any, runs: Any) -> None:
 
 @kernel
 def window_runs(particles: Any, levels: Any, isi_ms: Any) -> Any:
-    """Which ISIs are in each particle's window, as two runs of indices (first, behind the last), shape (b, s, 4).
-
-    Args:
-        particles: records, shape (b, s, PARTICLE).
-        levels: facilitation at the edge, shape (b, s).
-        isi_ms: ascending ISIs [ms], shape (t,).
-    """
+    """Which ISIs are in each particle's window, as two runs of indices (first, behind the last), shape (b, s, 4)."""
     people, size = levels.shape
     runs, room = np.empty((people, size, 4), dtype=np.int32), np.empty(len(isi_ms), dtype=np.float32)
     for person in range(people):

@@ -20,8 +20,6 @@ from isiw.models.particles.shapes import ShapeKind
 from isiw.models.particles.supra.prior import BLOCKS, LATENTS, SupraLatents, SupraPrior
 from isiw.models.protocol import Tensor
 
-__all__ = ["SupraTarget"]
-
 JUMPS: Final = {
     "enhanced": 0.2,
     "depressed": 0.25,

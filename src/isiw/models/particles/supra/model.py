@@ -24,8 +24,6 @@ from isiw.models.randomness import step_generator
 from isiw.models.windows import Runs, SampledProfiles, best_window, profile_grid, sampled_estimate
 from isiw.window import WindowEstimate
 
-__all__ = ["SupraModel", "SupraPosterior"]
-
 
 @dataclass(frozen=True)
 class SupraModel:

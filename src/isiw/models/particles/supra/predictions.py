@@ -14,8 +14,6 @@ from isiw.models.windows import least_excess_mv
 from isiw.types import FloatArray
 from isiw.window import LEAST_DEPRESSED_MV
 
-__all__ = ["SupraSample"]
-
 MOST_RANGE_POINTS = 241
 """ISIs at which the largest enhancement and the deepest depression in the range are looked for, at most."""
 

@@ -26,8 +26,6 @@ from isiw.models.protocol import Tensor
 from isiw.models.shared.scales import Scale, check_scales
 from isiw.models.shared.start import Span, StartPrior
 
-__all__ = ["BLOCKS", "LATENTS", "Curve", "Segment", "SupraLatents", "SupraPrior"]
-
 LATENTS: Final = (
     "start_ms",
     "depressed_start_ms",
