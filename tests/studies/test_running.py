@@ -183,12 +183,12 @@ def test_what_cannot_be_replayed_is_told(tmp_path: Path) -> None:
 
 
 def workers_of(process: psutil.Process) -> list[psutil.Process]:
-    """The processes that joblib has started for it."""
+    """The processes that loky has started for it."""
     return [child for child in process.children() if any("LokyProcess" in part for part in child.cmdline())]
 
 
 @posix
-@pytest.mark.long  # once in ten runs joblib's pool waited for ever for a worker killed between two sessions
+@pytest.mark.slow
 def test_the_death_of_a_worker_in_mid_study_loses_no_row(tmp_path: Path) -> None:
     study, killed = tiny(people=6), list[int]()
     keys: list[str] = []

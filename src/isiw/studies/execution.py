@@ -13,17 +13,16 @@ import signal
 import threading
 import time
 import traceback
-import warnings
 from collections import Counter
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from concurrent.futures import CancelledError
+from collections.abc import Callable, Generator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
-from functools import cache
+from itertools import islice
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
-from joblib import Parallel, delayed, parallel_config
+from loky import ProcessPoolExecutor
 
 from isiw.checks import check_wholes
 from isiw.errors import StudyError
@@ -31,6 +30,11 @@ from isiw.studies.memory import memory_kept
 
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
+
+_ONE_THREAD = dict.fromkeys(
+    ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMEXPR_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
+)
+"""The environment of a worker, which has a core of its own."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +66,7 @@ class Executor(Protocol):
 
 @dataclass(frozen=True)
 class Processes:
-    """This machine: one worker is this process itself; several are processes of joblib's, of one torch thread each.
+    """This machine: one worker is this process itself; several are processes of loky's, of one torch thread each.
 
     A worker that dies takes the pool with it. What was running then is run again, each item alone so that the one to
     blame is known; the others go on in a new pool.
@@ -106,25 +110,22 @@ class Processes:
     def _pool(
         self, run: Callable[[_Item], _Result], items: dict[int, _Item], numbers: Sequence[int], begun: list[int]
     ) -> Generator[tuple[int, _Result | Failure], None, None]:
-        def work() -> Iterator[Any]:
-            for number in numbers:
-                begun.append(number)
-                yield delayed(_numbered)(run, number, items[number], os.getpid())
-
-        with parallel_config(backend="loky", inner_max_num_threads=1):
-            # No more are handed out than run at once, so that few are under suspicion when a worker dies.
-            pool = Parallel(
-                n_jobs=self.workers, return_as="generator_unordered", batch_size=1, pre_dispatch=self.workers
-            )
-        results = pool(work())
+        waiting, running = iter(numbers), dict[Future[_Result | Failure], int]()
+        # The pool hears of a dead worker at the next submission or result: both happen in this thread.
+        pool = ProcessPoolExecutor(self.workers, initializer=_serve, initargs=(os.getpid(),), env=_ONE_THREAD)
         try:
-            for result in results:  # noqa: UP028 - `yield from` would close it before the finally
-                yield result
+            while True:
+                # No more are handed out than run at once, so that few are under suspicion when a worker dies.
+                for number in islice(waiting, self.workers - len(running)):
+                    running[pool.submit(_attempt, run, items[number])] = number
+                    begun.append(number)
+                if not running:
+                    return
+                finished = wait(running, return_when=FIRST_COMPLETED).done
+                for future in sorted(finished, key=lambda future: future.exception() is not None):
+                    yield running.pop(future), future.result()
         finally:
-            with warnings.catch_warnings():
-                # Whoever stops early knows that work is lost.
-                warnings.filterwarnings("ignore", message=".*have been cancelled", category=UserWarning)
-                results.close()
+            pool.shutdown(kill_workers=True)
 
 
 @dataclass(frozen=True)
@@ -239,12 +240,6 @@ def _attempt(run: Callable[[_Item], _Result], item: _Item) -> _Result | Failure:
         return Failure(_line(error), traceback.format_exc())
 
 
-def _numbered(run: Callable[[_Item], _Result], number: int, item: _Item, parent: int) -> tuple[int, _Result | Failure]:
-    _serve(parent)
-    return number, _attempt(run, item)
-
-
-@cache
 def _serve(parent: int) -> None:
     """Make this worker end with its parent, which runs the study, and not before it.
 
