@@ -29,7 +29,7 @@ from benchmarks.quick import understood
 from isiw.models.protocol import Observation
 from isiw.strategy.course import Course
 
-PROFILED = 12
+PROFILED = 10
 """The number of the trial; by then the initial ISIs of the default are over."""
 
 SCIENCE = ("isiw.models", "isiw.acquisition")

@@ -12,11 +12,12 @@ import torch
 
 from isiw.design import DesignSpace
 from isiw.devices.protocol import DeviceInfo
+from isiw.estimate import WindowEstimate
 from isiw.models.protocol import Observation, Tensor
 from isiw.strategy.stopping import Budget
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Measurement, Stimulus
-from isiw.window import Window, WindowEstimate
+from isiw.window import Window
 from known import instance
 
 SPACE = DesignSpace(0, 200, reference="valve")

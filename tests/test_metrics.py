@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
+from isiw.estimate import WindowEstimate
 from isiw.metrics import covers, edge_error_ms, edge_ranks, f1, f1_of_masks, trials_to_criterion, true_edges_ms
 from isiw.types import ArrayLike
-from isiw.window import Window, WindowEstimate
+from isiw.window import Window
 from known import known
 
 SPACE = DesignSpace(0, 40, step_ms=1, reference="impact")

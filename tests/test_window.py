@@ -12,8 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from isiw.errors import InvalidValueError
+from isiw.estimate import WindowEstimate
 from isiw.types import FloatArray
-from isiw.window import EDGE_LEVEL, Window, WindowEstimate, window_from_excess
+from isiw.window import EDGE_LEVEL, Window, window_from_excess
 from known import known
 
 GRID_MS = np.arange(0.0, 100.0, 2.0)
@@ -193,7 +194,8 @@ def test_an_estimate_is_printed_with_its_probability_medians_and_intervals() -> 
 def test_an_estimate_is_printed_without_what_it_does_not_have() -> None:
     assert str(WindowEstimate(None, Window(10, 40))) == "Window: 10–40 ms"
     assert str(WindowEstimate(None, None)) == "No answer yet"
-    assert str(WindowEstimate(None, None, grid_ms=np.array([10.0, 40.0]))) == "No window"
+    measured = WindowEstimate(None, None, grid_ms=np.array([10.0, 40.0]), profile_quantiles_mv=np.full((3, 2), 0.05))
+    assert str(measured) == "No window"
     no_window = WindowEstimate(0.2, None, 10.0, 40.0, edge_samples_ms=np.array([[10.0, 40.0]]))
     assert str(no_window) == "Undecided (probability of a window: 0.20)"
     assert str(replace(no_window, probability=0.03)) == "No window (probability of a window: 0.03)"

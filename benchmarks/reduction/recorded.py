@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 
 from isiw.design import DesignSpace
+from isiw.estimate import WindowEstimate
 from isiw.models.dissertation.incremental import SweepModel, SweepPosterior, SweepRule
 from isiw.models.shared.history import AmplitudeHistory
 from isiw.strategy.settings.dissertation import SweepSettings
@@ -21,7 +22,7 @@ from isiw.strategy.stopping import Progress
 from isiw.subjects.responses import RecruitmentResponse
 from isiw.subjects.subject import Responder, SimulatedSubject
 from isiw.types import FloatArray
-from isiw.window import Window, WindowEstimate
+from isiw.window import Window
 
 STEP_MS = 5.0
 TRIALS_PER_ISI = 12

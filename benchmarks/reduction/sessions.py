@@ -17,11 +17,12 @@ from benchmarks.reduction.guess import FIXED, UNRELATED, guessing, unrelated
 from benchmarks.reduction.readings import BASE, Reading
 from benchmarks.reduction.recorded import BASELINES, STEP_MS, SWEPT, TRIALS_PER_ISI, RecordedSweep, record, stops_inside
 from isiw.design import VALVE_SPACE, DesignSpace
+from isiw.estimate import WindowEstimate
 from isiw.signals import wrong_isi
 from isiw.strategy.stopping import stimuli_left
 from isiw.subjects.cohorts import cohort
 from isiw.types import BoolArray, FloatArray
-from isiw.window import Window, WindowEstimate
+from isiw.window import Window
 
 NEAR_MS = 25.0
 """How far before the true window an experimenter begins who expects it [ms]."""

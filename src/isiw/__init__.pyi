@@ -44,6 +44,7 @@ from .devices.transports.folder import FolderDevice as FolderDevice
 from .devices.transports.line import LineDevice as LineDevice
 from .devices.transports.lsl import LslChannel as LslChannel
 from .devices.transports.lsl import LslDevice as LslDevice
+from .estimate import WindowEstimate as WindowEstimate
 from .log.amending import exclude as exclude
 from .log.amending import include as include
 from .log.reader import read_session as read_session
@@ -67,6 +68,5 @@ from .trials import TrialTable as TrialTable
 from .visit import Visit as Visit
 from .visit import VisitProtocol as VisitProtocol
 from .window import Window as Window
-from .window import WindowEstimate as WindowEstimate
 
 __version__: str

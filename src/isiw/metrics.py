@@ -9,8 +9,9 @@ import numpy as np
 
 from isiw.design import DesignSpace, require_space
 from isiw.errors import InvalidValueError
+from isiw.estimate import WindowEstimate
 from isiw.types import ArrayLike, BoolArray, FloatArray
-from isiw.window import Interval, Window, WindowEstimate
+from isiw.window import Interval, Window
 
 
 def f1_of_masks(estimated: ArrayLike, true: ArrayLike) -> FloatArray:

@@ -10,12 +10,13 @@ Shapes in docstrings use one alphabet throughout:
 
 from __future__ import annotations
 
-from typing import Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import WithJsonSchema
 
-__all__ = ["ArrayLike", "BoolArray", "Conditioning", "FloatArray", "IntArray", "Reference"]
+__all__ = ["ArrayLike", "BoolArray", "Conditioning", "FloatArray", "IntArray", "Number", "Numbers", "Reference"]
 
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int64]
@@ -24,3 +25,9 @@ BoolArray: TypeAlias = NDArray[np.bool_]
 Reference: TypeAlias = Literal["impact", "valve"]
 
 Conditioning: TypeAlias = Literal["tap", "electrical"]
+
+Number: TypeAlias = Annotated[float, WithJsonSchema({"type": ["number", "string"]})]
+Numbers: TypeAlias = Annotated[
+    tuple[float, ...], WithJsonSchema({"type": "array", "items": {"type": ["number", "string"]}})
+]
+"""As JSON has them, which knows no infinity: in its place are the strings "Infinity", "-Infinity" and "NaN"."""

@@ -9,8 +9,8 @@ from typing import TypeAlias
 import numpy as np
 import torch
 
+from isiw.estimate import WindowEstimate
 from isiw.models.protocol import Tensor
-from isiw.window import WindowEstimate
 
 Score: TypeAlias = Callable[["HandMadePosterior", Tensor], Tensor]
 """Scores ISIs [ms] (shape (t,)) for each person, shape (b, t)."""

@@ -16,8 +16,8 @@ from isiw.acquisition.fixed import EvenSpacing, IncrementalSweep, OwnProposal, R
 from isiw.acquisition.protocol import AcquisitionFunction, FollowsPlan, best_candidate
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
+from isiw.estimate import WindowEstimate
 from isiw.models.protocol import ProposesIsi, Tensor
-from isiw.window import WindowEstimate
 
 CANDIDATES = 101
 ISIS_MS = torch.linspace(0.0, 500.0, CANDIDATES)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from isiw.findings import Kind
-from isiw.log.schema import Estimate, Event, Intent, Record, Waveform
+from isiw.log.schema import EstimateRecord, Event, Intent, Record, Waveform
 from isiw.log.writer import LogWriter
 from isiw.trials import Channel, Status, Trial
 from isiw.visit import Visit
@@ -44,7 +44,7 @@ def write_sweeps(
                 log.append(Waveform.of(trial, channel), name)
             if trial != lost:
                 log.append(_trial(trial))
-            log.append(Estimate(trial=trial, probability=0.8, segments_ms=(20.0, 60.0), end_high_ms=float("inf")))
+            log.append(EstimateRecord(trial=trial, probability=0.8, segments_ms=(20.0, 60.0), end_high_ms=float("inf")))
             log.sync()
         for record in more:
             log.append(record)

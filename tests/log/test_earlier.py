@@ -6,7 +6,7 @@ import pytest
 
 from isiw.findings import Kind
 from isiw.log.earlier import with_kinds
-from isiw.log.schema import Estimate, Event, EventKind, Record
+from isiw.log.schema import EstimateRecord, Event, EventKind, Record
 from isiw.log.topics import decode, encode
 from isiw.strategy.stopping import StopKind
 
@@ -33,8 +33,8 @@ def earlier(topic: str, record: Record, lacking: str) -> Record:
     ],
 )  # fmt: skip
 def test_a_decision_that_was_logged_as_a_sentence_has_the_kind_that_it_said(reason: str, kind: StopKind) -> None:
-    record = earlier("/estimate", Estimate(trial=1, probability=0.5, reason=reason), "stop_kind")
-    assert isinstance(record, Estimate)
+    record = earlier("/estimate", EstimateRecord(trial=1, probability=0.5, reason=reason), "stop_kind")
+    assert isinstance(record, EstimateRecord)
     assert record.decision.kind is kind
 
 
@@ -57,7 +57,7 @@ def test_a_doubt_or_a_pause_that_was_logged_as_a_sentence_has_the_kind_that_it_s
 
 
 def test_of_a_log_with_kinds_no_sentence_is_read() -> None:
-    decided = Estimate(trial=1, probability=0.5, reason="The window is known.", stop_kind=StopKind.OWN)
+    decided = EstimateRecord(trial=1, probability=0.5, reason="The window is known.", stop_kind=StopKind.OWN)
     assert with_kinds(decode("/estimate", encode("/estimate", decided))) == decided
     paused = Event(kind="pause", text="The last 4 amplitudes are exactly equal (0.12 mV).")
     assert with_kinds(decode("/event", encode("/event", paused))) == paused

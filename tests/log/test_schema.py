@@ -8,16 +8,27 @@ import numpy as np
 import pytest
 
 from isiw.errors import InvalidValueError
+from isiw.estimate import WindowEstimate
 from isiw.findings import Kind
 from isiw.log.production import Production
 from isiw.log.salvage import salvage
-from isiw.log.schema import Correction, Estimate, Event, Header, Intent, PulseOutcome, Record, ThresholdBelief, Waveform
+from isiw.log.schema import (
+    Correction,
+    EstimateRecord,
+    Event,
+    Header,
+    Intent,
+    PulseOutcome,
+    Record,
+    ThresholdBelief,
+    Waveform,
+)
 from isiw.log.topics import CHANNEL_IDS, decode, encode, json_schema, topic_of
 from isiw.log.writer import LogWriter
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.threshold import ThresholdEstimate
 from isiw.trials import Channel, Status, Trial
-from isiw.window import Window, WindowEstimate
+from isiw.window import Window
 from known import instance
 from log.written import make_header
 
@@ -29,7 +40,7 @@ from log.written import make_header
         Intent(trial=3, isi_ms=None),
         Trial(0, Status.ACCEPTED, 12.0, isi_ms=12.345678901234567, mep_mv=1e-17, background_rms_uv=3.0),
         Trial(1, Status.MISTRIAL, None, Kind.OUTCOME_UNKNOWN),
-        Estimate(trial=1, probability=None, start_ms=-math.inf, end_ms=math.inf, stop=True, reason="µ"),
+        EstimateRecord(trial=1, probability=None, start_ms=-math.inf, end_ms=math.inf, stop=True, reason="µ"),
         Event(kind="fault", text="line one\nline two"),
         Event(kind="correction", trial=3, text="the amplifier's gain", corrected=Correction(mep_mv=0.2)),
         Trial(2, Status.ACCEPTED, 12.0, isi_ms=12.0, mep_mv=0.3, mep_sd_mv=0.02),
@@ -72,7 +83,7 @@ def test_a_header_from_before_the_times_allowed_were_logged_can_be_read(header: 
 
 
 def test_what_is_not_finite_is_written_as_a_string() -> None:
-    written = json.loads(encode("/estimate", Estimate(trial=0, probability=0.9, end_ms=math.inf)))
+    written = json.loads(encode("/estimate", EstimateRecord(trial=0, probability=0.9, end_ms=math.inf)))
     assert written["end_ms"] == "Infinity"
 
 
@@ -125,8 +136,8 @@ def test_an_estimate_keeps_window_intervals_and_profile() -> None:
         profile_quantiles_mv=np.stack([grid, grid + 1, grid + 2]),
         split_probability=0.25,
     )
-    written = encode("/estimate", Estimate.of(4, estimate, StopDecision(stop=False, reason="r"), 7.0))
-    record = instance(Estimate, decode("/estimate", written))
+    written = encode("/estimate", EstimateRecord.after(4, estimate, StopDecision(stop=False, reason="r"), 7.0))
+    record = instance(EstimateRecord, decode("/estimate", written))
     assert record.window == estimate.window
     assert (record.start_low_ms, record.start_high_ms, record.end_low_ms, record.end_high_ms) == (9, 11, 38, math.inf)
     assert (record.start_beyond, record.split) == (0.0, 0.25)
@@ -138,21 +149,21 @@ def test_an_estimate_keeps_window_intervals_and_profile() -> None:
 
 def test_an_estimate_keeps_the_isis_that_depress_the_mep() -> None:
     estimate = WindowEstimate(0.9, Window(50, 80), depressed=Window(10, 35), depressed_probability=0.7)
-    written = encode("/estimate", Estimate.of(4, estimate, StopDecision(stop=False, reason="r"), 7.0))
-    record = instance(Estimate, decode("/estimate", written))
+    written = encode("/estimate", EstimateRecord.after(4, estimate, StopDecision(stop=False, reason="r"), 7.0))
+    record = instance(EstimateRecord, decode("/estimate", written))
     assert (record.depressed, record.depressed_probability) == (Window(10, 35), 0.7)
     assert str(record) == str(estimate)
     assert "Depressed: 10–35 ms (probability of it: 0.70)" in str(record)
 
 
 def test_an_estimate_of_a_strategy_that_looks_for_enhancement_alone_says_nothing_of_depression() -> None:
-    record = Estimate.of(4, WindowEstimate(0.9, Window(50, 80)), StopDecision(stop=False, reason="r"), 7.0)
+    record = EstimateRecord.after(4, WindowEstimate(0.9, Window(50, 80)), StopDecision(stop=False, reason="r"), 7.0)
     assert (record.depressed, record.depressed_probability) == (None, None)
     assert "epressed" not in str(record)
 
 
 def test_an_estimate_of_a_method_without_posterior_has_gaps() -> None:
-    record = Estimate.of(0, WindowEstimate(None, Window(1, 2)), StopDecision(stop=True, reason=""), None)
+    record = EstimateRecord.after(0, WindowEstimate(None, Window(1, 2)), StopDecision(stop=True, reason=""), None)
     assert record.window == Window(1, 2)
     assert record.start_low_ms is None
     assert record.grid_ms == ()

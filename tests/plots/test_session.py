@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from isiw.errors import InvalidValueError
 from isiw.log.amending import exclude
 from isiw.log.reader import SessionRecord, read_session
-from isiw.log.schema import Estimate
+from isiw.log.schema import EstimateRecord
 from isiw.plots.session import save_session_plot, session_figure
 from isiw.session.loop import Session
 from isiw.strategy.catalogue import make_strategy
@@ -94,7 +94,7 @@ def test_a_session_without_a_window_is_drawn(record: SessionRecord) -> None:
     ):
         profile = {} if grid_ms else {"grid_ms": (), "profile_mv": (), "band_low_mv": (), "band_high_mv": ()}
         update = {"segments_ms": (), "probability": probability, **profile}
-        entries = [e.model_copy(update=update) if isinstance(e, Estimate) else e for e in record.history]
+        entries = [e.model_copy(update=update) if isinstance(e, EstimateRecord) else e for e in record.history]
         none = type(record)(record.path, record.header, tuple(entries), {}, (), True)
         assert session_figure(none).axes[0].get_title(loc="left").startswith(said)
         assert "window" not in labels(session_figure(none))

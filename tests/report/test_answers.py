@@ -9,7 +9,7 @@ import pytest
 
 from isiw.findings import Kind
 from isiw.log.reader import SessionRecord, read_session
-from isiw.log.schema import Estimate, Event, Intent, Record
+from isiw.log.schema import EstimateRecord, Event, Intent, Record
 from isiw.report.answers import Answer, answers
 from isiw.session.loop import Session
 from isiw.trials import Status, Trial
@@ -143,8 +143,8 @@ def test_a_control_trial_from_which_nothing_is_learnt_is_not_lost(record: Sessio
 
 
 def test_a_session_that_broke_off_says_by_what(record: SessionRecord) -> None:
-    going_on = [e.model_copy(update={"stop": False, "reason": "2 stimuli are left."}) if isinstance(e, Estimate) else e
-                for e in record.history]  # fmt: skip
+    changed = {"stop": False, "reason": "2 stimuli are left."}
+    going_on = [e.model_copy(update=changed) if isinstance(e, EstimateRecord) else e for e in record.history]
     assert answer(with_history(record, going_on), "stop")[1:] == ("it has not stopped", "2 stimuli are left.")
     doubt = Event(kind="doubt", trial=3, text="What is said twice is said once.")
     fault = Event(kind="fault", trial=3, text="Interrupted by the operator.")

@@ -18,7 +18,7 @@ from playwright.sync_api import Page, ViewportSize
 from browsing import IN_CHROMIUM, broken_rules, chromium, screenshots
 from isiw.log.reader import SessionRecord, read_session
 from isiw.priors import Difference
-from isiw.report.compared import save_comparison
+from isiw.report.comparison import save_comparison
 from isiw.report.page import save_report
 from isiw.session.opening import open_session
 from report.sessions import HOSTILE, tapped

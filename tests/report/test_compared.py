@@ -9,7 +9,7 @@ from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.log.reader import SessionRecord, read_session
 from isiw.priors import Difference
-from isiw.report.compared import comparison_page, save_comparison
+from isiw.report.comparison import comparison_page, save_comparison
 from isiw.session.loop import Session
 from report.sessions import HOSTILE, Page
 from scripted import ScriptedDevice, scripted_strategy

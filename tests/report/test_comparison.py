@@ -6,13 +6,12 @@ import pytest
 
 from isiw.log.amending import exclude
 from isiw.log.reader import SessionRecord, read_session
-from isiw.log.schema import Estimate
+from isiw.log.schema import EstimateRecord
 from isiw.plots.comparison import comparison_figure
 from isiw.plots.session import session_figure
 from isiw.priors import Difference
-from isiw.report.compared import comparison_page
-from isiw.report.comparison import comparison_sentence, comparison_table
-from isiw.report.words import JUDGED_SINCE
+from isiw.report.comparison import comparison_page, comparison_sentence, comparison_table
+from isiw.sentences import JUDGED_SINCE
 from isiw.session.loop import Session
 from scripted import ScriptedDevice, scripted_strategy
 
@@ -36,7 +35,7 @@ def test_where_no_window_is_reported_it_may_still_be_undecided(
     record: SessionRecord, probability: float | None, said: str
 ) -> None:
     update = {"segments_ms": (), "probability": probability}
-    entries = tuple(e.model_copy(update=update) if isinstance(e, Estimate) else e for e in record.history)
+    entries = tuple(e.model_copy(update=update) if isinstance(e, EstimateRecord) else e for e in record.history)
     open_still = type(record)(record.path, record.header, entries, {}, (), True)
     chance, column = (f" (P(window) = {probability})", probability) if probability else ("", "–   ")
     assert comparison_table([open_still]).splitlines()[1].endswith(f"{column}       {said}")

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from isiw.log.reader import SessionRecord, read_session
-from isiw.log.schema import Estimate
-from isiw.report.depression import depression_sentence
+from isiw.log.schema import EstimateRecord
 from isiw.report.words import final_statement
+from isiw.sentences import depression
 from isiw.session.loop import Session
 from isiw.trials import Measurement
 from isiw.visit import Visit
@@ -29,7 +29,7 @@ def session(folder: Path, intensity_pct_rmt: float | None) -> SessionRecord:
 
 def with_estimate(record: SessionRecord, **changes: Any) -> SessionRecord:
     entries = list(record.history)
-    entries[-1] = instance(Estimate, entries[-1]).model_copy(update=changes)
+    entries[-1] = instance(EstimateRecord, entries[-1]).model_copy(update=changes)
     return type(record)(record.path, record.header, tuple(entries), {}, (), True)
 
 
@@ -39,7 +39,7 @@ def test_above_the_threshold_it_says_that_only_enhancement_was_looked_for(tmp_pa
 
 @pytest.mark.parametrize("intensity_pct_rmt", [None, 90.0, 100.0])
 def test_below_the_threshold_it_says_nothing_of_depression(tmp_path: Path, intensity_pct_rmt: float | None) -> None:
-    assert depression_sentence(session(tmp_path, intensity_pct_rmt)) == ""
+    assert depression(session(tmp_path, intensity_pct_rmt).estimates[-1], "tap", intensity_pct_rmt) == ""
 
 
 @pytest.mark.parametrize(("probability", "depresses"), [(0.87, "probably depresses"), (0.96, "depresses")])

@@ -11,7 +11,7 @@ import pytest
 
 from isiw.findings import TOO_FEW
 from isiw.log.reader import SessionRecord
-from isiw.log.schema import Estimate
+from isiw.log.schema import EstimateRecord
 from isiw.report.drawn import MOST_NEAR, MOST_WHOLE, drawn
 from isiw.trials import Channel
 from report.sessions import pulsed, tapped
@@ -68,7 +68,7 @@ def test_what_is_not_finite_is_left_open_and_the_rest_is_json(record: SessionRec
     (wave,) = sweep(record, force=Channel(np.array([1.0, math.nan, math.inf, 2.0]), 1000.0, "N"))
     assert wave["values"] == [1.0, None, None, 2.0]
     odd = {"next_isi_ms": math.inf, "profile_mv": (math.nan,) * 3, "grid_ms": (math.nan, 0, 5)}
-    history = tuple(e.model_copy(update=odd) if isinstance(e, Estimate) else e for e in record.history)
+    history = tuple(e.model_copy(update=odd) if isinstance(e, EstimateRecord) else e for e in record.history)
     tiny = {key: Channel(np.full(9, 1e-300), 1e-306, "mV") for key in record.waveforms}
     text = json.dumps(drawn(replace(record, history=history, waveforms=tiny)), allow_nan=False)
     assert json.loads(text)["beliefs"]["0"]["end"][1] == "high"

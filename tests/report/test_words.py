@@ -11,7 +11,7 @@ import pytest
 from isiw.design import DesignSpace
 from isiw.log.amending import exclude
 from isiw.log.reader import SessionRecord, read_session
-from isiw.log.schema import Estimate, Event, Intent, StrategyRecipe
+from isiw.log.schema import EstimateRecord, Event, Intent, StrategyRecipe
 from isiw.report.words import TRIAL_HEADINGS, counts_sentence, final_statement, trial_rows, truth_sentence
 from isiw.session.loop import Session
 from isiw.strategy.stopping import StopKind
@@ -30,7 +30,7 @@ def record(tmp_path: Path) -> SessionRecord:
 
 def with_estimate(record: SessionRecord, **changes: Any) -> SessionRecord:
     entries = list(record.history)
-    entries[-1] = instance(Estimate, entries[-1]).model_copy(update=changes)
+    entries[-1] = instance(EstimateRecord, entries[-1]).model_copy(update=changes)
     return type(record)(record.path, record.header, tuple(entries), {}, (), True)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from isiw.log.reader import SessionRecord, read_session
-from isiw.log.schema import Estimate
+from isiw.log.schema import EstimateRecord
 from isiw.log.topics import decode, encode
 from isiw.session.examination import believed
 from isiw.session.loop import Session
@@ -90,7 +90,7 @@ def test_an_estimate_from_before_there_were_scores_is_read(record: SessionRecord
     written = json.loads(encode("/estimate", record.estimates[3]))
     for name in ("predicted_low_mv", "predicted_high_mv", "chosen_by", "scored_ms", "scores"):
         del written[name]
-    old = instance(Estimate, decode("/estimate", json.dumps(written).encode()))
+    old = instance(EstimateRecord, decode("/estimate", json.dumps(written).encode()))
     assert (old.scores, old.chosen_by, old.predicted_low_mv) == ((), "", ())
 
 
@@ -102,4 +102,4 @@ def test_a_score_that_is_not_finite_is_kept_as_such() -> None:
     scores = candidate_isis(SPACE) * float("nan")
     asked._choice = replace(choice, by="acquisition", scores=scores)  # noqa: SLF001 - no acquisition function gives one here
     written = encode("/estimate", believed(asked, 0, asked.decision(), choice.isi_ms))
-    assert np.isnan(instance(Estimate, decode("/estimate", written)).scores).all()
+    assert np.isnan(instance(EstimateRecord, decode("/estimate", written)).scores).all()

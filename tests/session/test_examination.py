@@ -55,7 +55,7 @@ def test_what_was_interrupted_after_it_was_learnt_is_learnt_once_and_logged_late
         assert examined.conclude() is not None
         assert examined.conclude() is None
     assert told_to(examined.learner.strategy) == ((40.0, 0.125),)
-    assert kinds(tmp_path / "s.mcap") == ["Intent", "Trial", "Estimate"]
+    assert kinds(tmp_path / "s.mcap") == ["Intent", "Trial", "EstimateRecord"]
 
 
 def test_after_a_verdict_nothing_is_delivered_before_all_trials_are_learnt_again(tmp_path: Path) -> None:
@@ -67,7 +67,7 @@ def test_after_a_verdict_nothing_is_delivered_before_all_trials_are_learnt_again
         examined.conclude()
         assert examined.intend(Intent.of(Stimulus(1, 41.0), 1.0))
     assert told_to(examined.learner.strategy) == ()
-    assert kinds(tmp_path / "s.mcap") == ["Intent", "Trial", "Estimate", "Event", "Estimate", "Intent"]
+    assert kinds(tmp_path / "s.mcap") == ["Intent", "Trial", "EstimateRecord", "Event", "EstimateRecord", "Intent"]
 
 
 def test_one_call_continues_whatever_a_log_is_of(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, LogError, StrategyError
 from isiw.findings import Kind
 from isiw.log.reader import SessionRecord, read_session
-from isiw.log.schema import Estimate, Intent
+from isiw.log.schema import EstimateRecord, Intent
 from isiw.models.particles import ParticleModel
 from isiw.session.loop import Session
 from isiw.session.updates import SessionUpdate
@@ -65,7 +65,7 @@ def test_a_result_and_its_record_are_printed_in_a_few_lines(log: Path) -> None:
 
 def test_each_trial_is_logged_as_intent_then_trial_then_estimate(log: Path) -> None:
     Session(ScriptedDevice(), scripted_strategy(2), log=log).run()
-    assert [type(entry) for entry in read_session(log).history] == [Intent, Trial, Estimate] * 2
+    assert [type(entry) for entry in read_session(log).history] == [Intent, Trial, EstimateRecord] * 2
 
 
 def test_the_intent_is_on_disk_before_the_device_is_called(log: Path) -> None:

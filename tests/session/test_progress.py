@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from isiw.estimate import WindowEstimate
 from isiw.findings import Kind
 from isiw.log.reader import read_session
 from isiw.session.loop import Session
@@ -17,7 +18,7 @@ from isiw.session.updates import SessionUpdate
 from isiw.strategy.stopping import StopDecision
 from isiw.text.stimuli import STIMULI
 from isiw.trials import Status, Trial
-from isiw.window import Window, WindowEstimate
+from isiw.window import Window
 from scripted import SPACE, ScriptedDevice, scripted_strategy
 
 

@@ -30,7 +30,7 @@ from isiw.errors import (
 from isiw.findings import Kind
 from isiw.log.amending import exclude
 from isiw.log.reader import read_session
-from isiw.log.schema import Estimate, Intent
+from isiw.log.schema import EstimateRecord, Intent
 from isiw.log.writer import LogWriter
 from isiw.report import final_statement
 from isiw.session import examination
@@ -92,7 +92,7 @@ def test_a_loop_of_ones_own_leaves_the_log_of_a_session(log: Path) -> None:
         while not session.decision().stop:
             run(session, 1)
     record = read_session(log)
-    assert [type(entry) for entry in record.history] == [Intent, Trial, Estimate] * 3
+    assert [type(entry) for entry in record.history] == [Intent, Trial, EstimateRecord] * 3
     assert record.finished
     assert (record.header.subject, len(record.table.told)) == ("P1", 3)
     assert "The budget of 3 stimuli is used up." in final_statement(record)

@@ -19,7 +19,7 @@ from isiw.errors import InvalidValueError
 from isiw.findings import Kind
 from isiw.log.amending import exclude, include
 from isiw.log.reader import read_session
-from isiw.log.schema import Estimate, Event, Intent
+from isiw.log.schema import EstimateRecord, Event, Intent
 from isiw.log.verdicts import LOOKED_AT
 from isiw.report import final_statement
 from isiw.session.loop import Session
@@ -80,7 +80,7 @@ def test_the_estimate_behind_a_verdict_is_without_the_trial(log: Path) -> None:
     session_that({4: lambda session: session.exclude(2)}, log).run()
     history = read_session(log).history
     place = next(place for place, entry in enumerate(history) if isinstance(entry, Event))
-    assert [type(entry) for entry in history[place : place + 3]] == [Event, Estimate, Intent]
+    assert [type(entry) for entry in history[place : place + 3]] == [Event, EstimateRecord, Intent]
 
 
 def test_including_undoes_an_exclusion(log: Path, tmp_path: Path) -> None:

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from isiw.errors import InvalidValueError
+from isiw.estimate import WindowEstimate
 from isiw.strategy.settling import EdgeVariance, ParticleSpread, SweptPast
 from isiw.strategy.stopping import AnyOf, Budget, Progress, looks_back
-from isiw.window import Window, WindowEstimate
+from isiw.window import Window
 
 
 def after_windows(*edges_ms: tuple[float, float] | None) -> Progress:

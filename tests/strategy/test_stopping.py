@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from isiw.errors import InvalidValueError
+from isiw.estimate import WindowEstimate
 from isiw.findings import NO_MEP
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.settling import EdgeVariance, ParticleSpread, SweptPast
@@ -28,7 +29,6 @@ from isiw.strategy.stopping import (
     stimuli_left,
 )
 from isiw.strategy.strategy import Strategy
-from isiw.window import WindowEstimate
 
 
 def progress(delivered: int = 3, probability: float | None = 0.95, edges_ms: object = None) -> Progress:

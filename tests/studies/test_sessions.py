@@ -10,6 +10,7 @@ import torch
 
 from isiw.design import IMPACT_SPACE
 from isiw.errors import InvalidValueError, StrategyError, StudyError
+from isiw.estimate import WindowEstimate
 from isiw.metrics import f1
 from isiw.signals.judgement import wrong_isi
 from isiw.strategy.catalogue import make_strategy
@@ -19,7 +20,7 @@ from isiw.studies.batch import simulate_batch
 from isiw.subjects import SimulatedSubject, cohort
 from isiw.subjects.subject import Responder, Response
 from isiw.types import Reference
-from isiw.window import Window, WindowEstimate
+from isiw.window import Window
 from known import instance, known
 
 TIMES = ["ask_ms", "tell_ms"]

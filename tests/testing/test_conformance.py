@@ -16,6 +16,7 @@ from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.acquisition.registry import ACQUISITIONS
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import StrategyError
+from isiw.estimate import WindowEstimate
 from isiw.models.particles import ParticleModel, ParticlePosterior
 from isiw.models.protocol import Observation, Posterior, ProposesIsi, Tensor
 from isiw.strategy.catalogue import list_strategies, make_strategy
@@ -24,7 +25,7 @@ from isiw.subjects.cohorts import cohort
 from isiw.testing import check_acquisition, check_model, check_strategy
 from isiw.testing.requirements import Trials, trials_that_break_things, usual_trials
 from isiw.types import FloatArray
-from isiw.window import Window, WindowEstimate
+from isiw.window import Window
 
 FEW: dict[str, Any] = {"particles": 100}
 NAMES = sorted(list_strategies())

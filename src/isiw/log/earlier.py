@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Final, TypeVar
 
 from isiw.findings import Kind
-from isiw.log.schema import Estimate, Event, Record
+from isiw.log.schema import EstimateRecord, Event, Record
 from isiw.strategy.stopping import StopKind
 
 _KindT = TypeVar("_KindT", Kind, StopKind)
@@ -49,7 +49,7 @@ _FINDINGS: Final[Mapping[Kind, tuple[str, ...]]] = {
 
 def with_kinds(record: Record) -> Record:
     """A record of a log with the kinds that an earlier version left to its sentences."""
-    if isinstance(record, Estimate) and "stop_kind" not in record.model_fields_set:
+    if isinstance(record, EstimateRecord) and "stop_kind" not in record.model_fields_set:
         return record.model_copy(update={"stop_kind": _kind(record.reason, _DECISIONS) or StopKind.OWN})
     if isinstance(record, Event) and record.kind in {"doubt", "pause"} and "finding" not in record.model_fields_set:
         return record.model_copy(update={"finding": _kind(record.text, _FINDINGS)})

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from isiw.lazy import pd
 from isiw.log.onsets import Onset
-from isiw.log.schema import Estimate
+from isiw.log.schema import EstimateRecord
 from isiw.text.stimuli import TAP, StimulusWords, meanings
 from isiw.trials import Trial, TrialTable
 
@@ -56,7 +56,7 @@ _NUMBERS: Final = tuple(name for name in TRIAL_COLUMNS if name not in {*_TEXTS, 
 _BELIEF: Final = tuple(TRIAL_COLUMNS)[tuple(TRIAL_COLUMNS).index("p_window") :]
 
 
-def trial_frame(table: TrialTable, onsets: Mapping[int, Onset], estimates: Iterable[Estimate]) -> pd.DataFrame:
+def trial_frame(table: TrialTable, onsets: Mapping[int, Onset], estimates: Iterable[EstimateRecord]) -> pd.DataFrame:
     """All trials as a DataFrame, a row a trial, columns as in `TRIAL_COLUMNS`, indexed by `index`."""
     beliefs = {estimate.trial: estimate for estimate in estimates}
     rows = [_timing(onsets.get(trial.index)) | _outcome(trial) | _belief(beliefs.get(trial.index)) for trial in table]
@@ -75,7 +75,7 @@ def _outcome(trial: Trial) -> dict[str, Any]:
     return values | {name: None if values[name] is None else str(values[name]) for name in _TEXTS}
 
 
-def _belief(estimate: Estimate | None) -> dict[str, Any]:
+def _belief(estimate: EstimateRecord | None) -> dict[str, Any]:
     if estimate is None:
         return {}
     window = estimate.window

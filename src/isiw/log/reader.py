@@ -20,7 +20,7 @@ from isiw.log.records import Records, unknown_of
 from isiw.log.salvage import Salvage, salvage
 from isiw.log.schema import (
     SCHEMA_VERSION,
-    Estimate,
+    EstimateRecord,
     Event,
     Header,
     Intent,
@@ -29,6 +29,7 @@ from isiw.log.schema import (
 )
 from isiw.log.threshold import ThresholdRecord
 from isiw.log.verdicts import VERDICTS, under_all
+from isiw.sentences import JUDGED_SINCE
 from isiw.signals.amplitudes import is_silent
 from isiw.strategy.stopping import StopDecision
 from isiw.trials import Channel, Stimulus, Trial, TrialTable
@@ -77,7 +78,7 @@ class SessionRecord:
                 f"{'Ended' if last.stop else 'Not over'}: {last.reason}",
             ]
             if self.is_judged_since:
-                lines.append("Trials were judged anew after this estimate.")
+                lines.append(JUDGED_SINCE)
         return "\n".join([*lines, *self.told_unread, *(f"Lost: {loss}" for loss in self.losses), f"Log: {self.path}"])
 
     @property
@@ -139,7 +140,7 @@ class SessionRecord:
     @property
     def is_judged_since(self) -> bool:
         """Whether trials were judged anew after the last estimate, so that it does not know of it."""
-        since = itertools.takewhile(lambda entry: not isinstance(entry, Estimate), reversed(self.history))
+        since = itertools.takewhile(lambda entry: not isinstance(entry, EstimateRecord), reversed(self.history))
         return any(isinstance(entry, Event) and entry.kind in VERDICTS for entry in since)
 
     @property
@@ -148,9 +149,14 @@ class SessionRecord:
         return tuple(r for r in self.history if isinstance(r, Intent))
 
     @property
-    def estimates(self) -> tuple[Estimate, ...]:
+    def estimates(self) -> tuple[EstimateRecord, ...]:
         """What was believed, trial by trial."""
-        return tuple(r for r in self.history if isinstance(r, Estimate))
+        return tuple(r for r in self.history if isinstance(r, EstimateRecord))
+
+    @property
+    def found(self) -> EstimateRecord | None:
+        """The last estimate; None if there is none, or it rests on too little to speak of a window."""
+        return self.estimates[-1] if self.estimates and self.rests_on_data else None
 
     @property
     def events(self) -> tuple[Event, ...]:

@@ -17,7 +17,6 @@ JSON knows no infinity: where a number is not finite it is one of the strings "I
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal, Self, TypeAlias
 
@@ -31,7 +30,6 @@ from pydantic import (
     FiniteFloat,
     Tag,
     TypeAdapter,
-    WithJsonSchema,
     field_validator,
     model_validator,
 )
@@ -41,17 +39,16 @@ from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import InvalidValueError
+from isiw.estimate import Estimate, WindowEstimate
 from isiw.findings import Kind
 from isiw.log.production import Production, ProductionHeader
 from isiw.signals.limits import SignalLimits
 from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.strategy.threshold.pulses import IntensityRange, ThresholdEstimate
 from isiw.text.stimuli import STIMULI, StimulusWords
-from isiw.text.summary import summary
 from isiw.trials import Channel, Stimulus, Trial
-from isiw.types import Conditioning, FloatArray
+from isiw.types import Conditioning, Numbers
 from isiw.visit import Visit, VisitProtocol
-from isiw.window import Window, WindowEstimate, depression, nothing_found
 
 SCHEMA_VERSION = 4
 """4 since 0.1.0: control trials, and trials that an operator includes again or accepts. Before came 1 to 3."""
@@ -59,13 +56,7 @@ SCHEMA_VERSION = 4
 MOST_TRIALS: Final = 100_000
 """More than any session delivers; a record of a later trial makes no sense."""
 
-PROFILE_DECIMALS = 6  # a nanovolt; the profile is a picture of the posterior, not a measurement
-
 TrialNumber: TypeAlias = Annotated[int, Field(ge=0, lt=MOST_TRIALS)]
-Number: TypeAlias = Annotated[float, WithJsonSchema({"type": ["number", "string"]})]
-Numbers: TypeAlias = Annotated[
-    tuple[float, ...], WithJsonSchema({"type": "array", "items": {"type": ["number", "string"]}})
-]
 
 
 class _Record(BaseModel):
@@ -242,43 +233,18 @@ class Waveform(_Record):
         return Channel(np.asarray(self.values), self.rate_hz, self.unit, self.t0_ms)
 
 
-class Estimate(_Record):
-    """What was believed after a trial, whether to stop, and what is asked next.
+class EstimateRecord(Estimate):
+    """What was known after a trial, whether to stop, and what is asked next.
 
-    `start_beyond`, `end_beyond` and `split` are probabilities given a window: that an edge lies beyond the range, and
-    that there is more than one segment. `hypotheses` and `unusual` are probabilities by name, `best_isi_ms` is the
-    median and the ends of the 90 % interval; `excluded_mv` and `excluded_pct_rmt` are the largest enhancement that is
-    excluded with 90 % probability. Nine of ten next MEPs lie between `predicted_low_mv` and `predicted_high_mv`, at the
-    ISIs of the profile. `stop_kind` says what the decision rests on, `chosen_by` what chose the next ISI
+    Nine of ten next MEPs lie between `predicted_low_mv` and `predicted_high_mv`, at the ISIs of the profile.
+    `stop_kind` says what the decision rests on, `chosen_by` what chose the next ISI
     (`isiw.strategy.choosing.ChosenBy`), and `scores` are those of the acquisition function at `scored_ms`; both are
-    empty where nothing is asked next. `depressed_ms` are the segments in which the tap depresses the MEP, and
-    `depressed_probability` is that there are any; None where nobody looked for them.
+    empty where nothing is asked next.
     """
 
+    model_config = ConfigDict(title="Estimate")  # as its schema is called in every log
+
     trial: TrialNumber
-    probability: float | None
-    segments_ms: tuple[float, ...] = ()
-    start_ms: Number | None = None
-    end_ms: Number | None = None
-    start_low_ms: Number | None = None
-    start_high_ms: Number | None = None
-    end_low_ms: Number | None = None
-    end_high_ms: Number | None = None
-    start_beyond: float | None = None
-    end_beyond: float | None = None
-    split: float | None = None
-    hypotheses: dict[str, float] = Field(default_factory=dict)
-    unusual: dict[str, float] = Field(default_factory=dict)
-    expected_f1: float | None = None
-    best_isi_ms: tuple[float, ...] = ()
-    excluded_mv: float | None = None
-    excluded_pct_rmt: float | None = None
-    depressed_ms: tuple[float, ...] = ()
-    depressed_probability: float | None = None
-    grid_ms: tuple[float, ...] = ()
-    profile_mv: Numbers = ()
-    band_low_mv: Numbers = ()
-    band_high_mv: Numbers = ()
     predicted_low_mv: Numbers = ()
     predicted_high_mv: Numbers = ()
     chosen_by: str = ""
@@ -290,93 +256,15 @@ class Estimate(_Record):
     stop_kind: StopKind = StopKind.OWN
 
     @classmethod
-    def of(cls, trial: int, estimate: WindowEstimate, decision: StopDecision, next_isi_ms: float | None) -> Self:
-        """The record of an estimate, with its 90 % intervals."""
-        start, end = estimate.interval(0.9) or ((None, None), (None, None))
-        beyond, excluded = estimate.beyond_probability or (None, None), estimate.largest_excluded
-        return cls(
-            trial=trial,
-            probability=estimate.probability,
-            segments_ms=_edges(estimate.window),
-            start_ms=estimate.start_ms,
-            end_ms=estimate.end_ms,
-            start_low_ms=start[0],
-            start_high_ms=start[1],
-            end_low_ms=end[0],
-            end_high_ms=end[1],
-            start_beyond=beyond[0],
-            end_beyond=beyond[1],
-            split=estimate.split_probability,
-            hypotheses=estimate.hypotheses or {},
-            unusual=dict(estimate.unusual),
-            expected_f1=estimate.expected_f1,
-            best_isi_ms=tuple(estimate.best_isi or ()),
-            excluded_mv=None if excluded is None else excluded.mep_mv,
-            excluded_pct_rmt=None if excluded is None else excluded.shift_pct_rmt,
-            depressed_ms=_edges(estimate.depressed),
-            depressed_probability=estimate.depressed_probability,
-            next_isi_ms=next_isi_ms,
-            stop=decision.stop,
-            reason=decision.reason,
-            stop_kind=decision.kind,
-            **_profile(estimate),
-        )
-
-    def __str__(self) -> str:
-        start = (self.start_ms, self.start_low_ms, self.start_high_ms)
-        end = (self.end_ms, self.end_low_ms, self.end_high_ms)
-        depressed = depression(self.depressed, self.depressed_probability)
-        return summary(self.probability, self.window, self.nothing, start, end, depressed)
-
-    @property
-    def has_answer(self) -> bool:
-        """Whether the method has one: some have none before they have measured enough."""
-        return self.probability is not None or self.window is not None or bool(self.grid_ms)
-
-    @property
-    def nothing(self) -> str:
-        """What is said in short where no window is reported."""
-        return nothing_found(self.probability, has_answer=self.has_answer)
-
-    @property
-    def window(self) -> Window | None:
-        """The reported window."""
-        return _window(self.segments_ms)
-
-    @property
-    def depressed(self) -> Window | None:
-        """The reported ISIs that depress the MEP."""
-        return _window(self.depressed_ms)
+    def after(cls, trial: int, estimate: WindowEstimate, decision: StopDecision, next_isi_ms: float | None) -> Self:
+        """The record of an estimate."""
+        stops = {"stop": decision.stop, "reason": decision.reason, "stop_kind": decision.kind}
+        return cls.of(estimate, trial=trial, next_isi_ms=next_isi_ms, **stops)
 
     @property
     def decision(self) -> StopDecision:
         """Whether the session stops here, and why."""
         return StopDecision(self.stop, self.reason, self.stop_kind)
-
-
-def _edges(window: Window | None) -> tuple[float, ...]:
-    return () if window is None else tuple(itertools.chain(*window.segments))
-
-
-def _window(edges_ms: tuple[float, ...]) -> Window | None:
-    pairs = tuple(zip(edges_ms[::2], edges_ms[1::2], strict=True))
-    return Window(edges_ms[0], edges_ms[-1], pairs) if pairs else None
-
-
-def _profile(estimate: WindowEstimate) -> Mapping[str, Any]:
-    band = None if estimate.grid_ms is None else estimate.profile(estimate.grid_ms)
-    if band is None or estimate.grid_ms is None:
-        return {}
-    return {
-        "grid_ms": tuple(estimate.grid_ms.tolist()),
-        "profile_mv": _rounded(band.median_mv),
-        "band_low_mv": _rounded(band.low_mv),
-        "band_high_mv": _rounded(band.high_mv),
-    }
-
-
-def _rounded(values: FloatArray) -> tuple[float, ...]:
-    return tuple(np.asarray(values, dtype=np.float64).round(PROFILE_DECIMALS).tolist())
 
 
 EventKind: TypeAlias = Literal[
@@ -444,5 +332,5 @@ ANY_HEADER: Final[TypeAdapter[AnyHeader]] = TypeAdapter(
 """What turns a header into JSON and back, by its kind."""
 
 Record: TypeAlias = (
-    AnyHeader | Intent | Trial | Waveform | Estimate | Event | PulseOutcome | ThresholdBelief | Production
+    AnyHeader | Intent | Trial | Waveform | EstimateRecord | Event | PulseOutcome | ThresholdBelief | Production
 )

@@ -16,7 +16,7 @@ from isiw.log.production import Production, ProductionHeader
 from isiw.log.schema import (
     ANY_HEADER,
     MOST_TRIALS,
-    Estimate,
+    EstimateRecord,
     Event,
     Header,
     Intent,
@@ -33,7 +33,7 @@ _KINDS: dict[str, type[Any]] = {
     "/header": Header,
     "/intent": Intent,
     "/trial": Trial,
-    "/estimate": Estimate,
+    "/estimate": EstimateRecord,
     "/event": Event,
     "/threshold/pulse": PulseOutcome,
     "/threshold/belief": ThresholdBelief,
@@ -132,4 +132,4 @@ def json_schema(topic: str) -> tuple[str, bytes]:
 def _json_schema(topic: str) -> tuple[str, bytes]:
     kind = _KINDS.get(topic, Waveform)
     schema = {"type": "object"} | adapter(topic).json_schema(mode="serialization")
-    return f"isiw.{kind.__name__}", json.dumps(schema).encode()
+    return f"isiw.{schema.get('title', kind.__name__)}", json.dumps(schema).encode()

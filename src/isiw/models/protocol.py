@@ -16,9 +16,10 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 from isiw.design import DesignSpace
+from isiw.estimate import WindowEstimate
 from isiw.lazy import torch
 from isiw.types import ArrayLike, FloatArray
-from isiw.window import Window, WindowEstimate
+from isiw.window import Window
 
 Tensor: TypeAlias = "torch.Tensor"
 

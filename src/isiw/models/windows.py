@@ -10,19 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from isiw.design import DesignSpace
+from isiw.estimate import BestISI, Enhancement, WindowEstimate
 from isiw.later import Later
 from isiw.lazy import torch
 from isiw.models.protocol import Tensor
 from isiw.types import FloatArray, IntArray
-from isiw.window import (
-    EDGE_LEVEL,
-    MIN_EXCESS_MV,
-    MIN_EXCESS_OF_BASELINE,
-    BestISI,
-    Enhancement,
-    Window,
-    WindowEstimate,
-)
+from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE, Window
 
 PROFILE_POINTS = 101
 """ISIs at which the expected MEP and its band are reported, at least."""

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 from isiw.errors import InvalidValueError
 from isiw.log.reader import SessionRecord
-from isiw.log.schema import Estimate
 from isiw.plots.style import BLUE, FAINT, INK, edge_intervals, explain, save_figure, tidied
+from isiw.sentences import TOO_LITTLE, chance_text, in_short
 from isiw.text import one_line
 from isiw.text.stimuli import words_of
 
@@ -62,9 +62,10 @@ def comparison_figure(records: Sequence[SessionRecord], names: Sequence[str] | N
 
 
 def _draw(axes: Axes, line: int, record: SessionRecord) -> None:
-    last = record.estimates[-1] if record.estimates and record.rests_on_data else None
+    last = record.found
+    chance = "" if last is None else chance_text(last.probability)
     if last is None or last.window is None:
-        said = "too little was measured" if last is None else _nothing(last)
+        said = TOO_LITTLE if last is None else f"{in_short(last)} ({chance})" if chance else in_short(last)
         axes.annotate(said, (0.02, line), xycoords=("axes fraction", "data"), va="center", fontsize=8, color=FAINT)
         return
     for start_ms, end_ms in last.window.segments:
@@ -74,18 +75,9 @@ def _draw(axes: Axes, line: int, record: SessionRecord) -> None:
         label = f"90 % interval of its {edge}"
         axes.plot(pair, (line, line), color=colour, lw=4, solid_capstyle="butt", label=label)
     axes.annotate(
-        _chance(last), (1.01, line), xycoords=("axes fraction", "data"), va="center", fontsize=8, color=INK,
+        chance, (1.01, line), xycoords=("axes fraction", "data"), va="center", fontsize=8, color=INK,
         annotation_clip=False,
     )  # fmt: skip
-
-
-def _nothing(estimate: Estimate) -> str:
-    chance = _chance(estimate)
-    return f"{estimate.nothing} ({chance})" if chance else estimate.nothing
-
-
-def _chance(estimate: Estimate) -> str:
-    return "" if estimate.probability is None else f"P(window) = {estimate.probability:.2f}"
 
 
 def _name(record: SessionRecord) -> str:

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from isiw.log.reader import SessionRecord
-from isiw.log.schema import Estimate
+from isiw.log.schema import EstimateRecord
 from isiw.plots.style import (
     BLUE,
     EDGES,
@@ -29,6 +29,7 @@ from isiw.plots.style import (
     saying,
     tidied,
 )
+from isiw.sentences import titled
 from isiw.trials import Trial
 from isiw.types import FloatArray
 from isiw.window import Window
@@ -65,7 +66,7 @@ def session_figure(record: SessionRecord, *, truth: Window | None = None) -> Fig
     tidied(profile, edges, chance)
     edges.sharex(chance)
     edges.tick_params(labelbottom=False)
-    last = record.estimates[-1] if record.estimates and record.rests_on_data else None
+    last = record.found
     _draw_window(profile, last, truth)
     _draw_profile(profile, last)
     _draw_trials(profile, record)
@@ -86,7 +87,7 @@ def _say_what_is_missing(profile: Axes, edges: Axes, chance: Axes, record: Sessi
         saying(axes, "no estimate that rests on trials")
 
 
-def _draw_window(axes: Axes, estimate: Estimate | None, truth: Window | None) -> None:
+def _draw_window(axes: Axes, estimate: EstimateRecord | None, truth: Window | None) -> None:
     segments = estimate.window.segments if estimate and estimate.window else ()
     for number, (start, end) in enumerate(segments):
         axes.axvspan(start, end, color=BLUE, alpha=0.10, lw=0, label="window" if number == 0 else None)
@@ -101,7 +102,7 @@ def _draw_window(axes: Axes, estimate: Estimate | None, truth: Window | None) ->
         axes.axvline(edge, color=INK, lw=1, ls=(0, (4, 3)), label="true window (simulated)" if number == 0 else None)
 
 
-def _draw_profile(axes: Axes, estimate: Estimate | None) -> None:
+def _draw_profile(axes: Axes, estimate: EstimateRecord | None) -> None:
     if estimate is None or not estimate.grid_ms:
         return
     low_mv, high_mv = estimate.predicted_low_mv, estimate.predicted_high_mv
@@ -152,12 +153,10 @@ def _title(record: SessionRecord) -> str:
         return "No MEP was seen"
     if not record.rests_on_data:
         return f"Too little was measured (pairs that count: {record.pairs})"
-    if not record.estimates:
+    if record.found is None:
         return "No estimate"
-    last = record.estimates[-1]
-    found = f"Window {last.window}" if last.window else last.nothing.capitalize()
     since = ", before trials were judged anew," if record.is_judged_since else ""
-    return f"{found}{since}"
+    return f"{titled(record.found)}{since}"
 
 
 def _draw_edges(axes: Axes, record: SessionRecord, truth: Window | None) -> None:
@@ -192,7 +191,7 @@ def _draw_probability(axes: Axes, record: SessionRecord) -> None:
     axes.set_xlabel(TRIAL_AXIS, fontsize=9)
 
 
-def _column(estimates: Sequence[Estimate], name: str) -> FloatArray:
+def _column(estimates: Sequence[EstimateRecord], name: str) -> FloatArray:
     """One figure by trial; NaN where a method does not have it."""
     return np.asarray([np.nan if (v := getattr(e, name)) is None else v for e in estimates], dtype=np.float64)
 

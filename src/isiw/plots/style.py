@@ -16,8 +16,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from isiw.errors import InvalidValueError
+from isiw.estimate import Estimate
 from isiw.log.outputs import write_output
-from isiw.log.schema import Estimate
+from isiw.window import Interval
 
 INK, FAINT, BLUE, ORANGE, GREEN, RED = "#222222", "#8a8a8a", "#0072b2", "#e69f00", "#009e73", "#d55e00"
 _PINK, _SKY, _OLIVE, _BROWN = "#cc79a7", "#56b4e9", "#8f8a00", "#7a4a1f"
@@ -53,14 +54,10 @@ def strategy_colours(names: Sequence[str]) -> dict[str, str]:
     return {name: STRATEGY_COLOURS.get(name) or given[name] for name in names}
 
 
-def edge_intervals(estimate: Estimate, low_ms: float, high_ms: float) -> list[tuple[str, str, tuple[float, float]]]:
+def edge_intervals(estimate: Estimate, low_ms: float, high_ms: float) -> list[tuple[str, str, Interval]]:
     """The 90 % intervals of a window's edges, clipped to a range: name, colour and ends [ms] of each that is known."""
-    ends = {name: (getattr(estimate, f"{name}_low_ms"), getattr(estimate, f"{name}_high_ms")) for name in EDGES}
-    return [
-        (name, EDGES[name], (min(max(low, low_ms), high_ms), min(max(high, low_ms), high_ms)))
-        for name, (low, high) in ends.items()
-        if low is not None and high is not None
-    ]
+    ends = zip(EDGES.items(), (estimate.start, estimate.end), strict=True)
+    return [(name, colour, edge.within(low_ms, high_ms)) for (name, colour), edge in ends if edge.is_known]
 
 
 def tidied(*panels: Axes) -> None:

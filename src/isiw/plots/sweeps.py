@@ -75,7 +75,7 @@ def _largest_mv(traces: Sequence[_Trace], span_ms: tuple[float, float]) -> float
 
 def _inside(record: SessionRecord, traces: Sequence[_Trace]) -> BoolArray:
     """Which traces lie in the window that was found."""
-    window = record.estimates[-1].window if record.estimates and record.rests_on_data else None
+    window = None if record.found is None else record.found.window
     isis = [np.nan if trace.trial.isi_ms is None else trace.trial.isi_ms for trace in traces]
     return np.zeros(len(traces), dtype=bool) if window is None else window.mask(isis)
 

@@ -7,8 +7,8 @@ import statistics
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from isiw.estimate import Estimate
 from isiw.log.reader import SessionRecord
-from isiw.log.schema import Estimate
 from isiw.plots.style import BLUE, FAINT, INK, edge_intervals, explain, tidied
 
 
@@ -25,8 +25,8 @@ def timeline_figure(record: SessionRecord) -> Figure:
     for name, place_ms in events.items():
         axes.axvline(place_ms, ymax=0.72, color=INK, lw=1.6)
         axes.text(place_ms, 0.76, name, ha="center", va="bottom", fontsize=8, color=INK)
-    if record.estimates and record.rests_on_data:
-        _draw_window(axes, record.estimates[-1], (space.low_ms, space.high_ms))
+    if record.found is not None:
+        _draw_window(axes, record.found, (space.low_ms, space.high_ms))
     low, high = min(space.low_ms, *events.values()), max(space.high_ms, *events.values())
     margin = 0.06 * (high - low)
     axes.axvspan(
@@ -58,7 +58,7 @@ def _draw_window(axes: Axes, estimate: Estimate, span_ms: tuple[float, float]) -
         if segments:
             label = f"90 % interval of its {name}"
             axes.plot(pair, (height, height), color=colour, lw=5, solid_capstyle="butt", label=label)
-    if segments and estimate.best_isi_ms:
-        best, low, high = estimate.best_isi_ms
+    if segments and estimate.best_isi is not None:
+        best, low, high = estimate.best_isi
         axes.plot((low, high), (0.2, 0.2), color=INK, lw=1.5)
         axes.plot(best, 0.2, "D", ms=5, color=INK, label="best ISI, 90 % interval")

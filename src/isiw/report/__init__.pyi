@@ -1,7 +1,7 @@
-from .compared import comparison_page as comparison_page
-from .compared import save_comparison as save_comparison
+from .comparison import comparison_page as comparison_page
 from .comparison import comparison_sentence as comparison_sentence
 from .comparison import comparison_table as comparison_table
+from .comparison import save_comparison as save_comparison
 from .facts import first_facts as first_facts
 from .page import report_page as report_page
 from .page import save_report as save_report

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 from isiw.findings import Kind
 from isiw.log.reader import SessionRecord
-from isiw.log.schema import Estimate, Event, EventKind
+from isiw.log.schema import EstimateRecord, Event, EventKind
 from isiw.report.tables import lost_rows
 from isiw.report.words import counts_sentence
 from isiw.signals.values import contradicts_its_times, timed_isi_ms
@@ -144,5 +144,5 @@ def _stopped(record: SessionRecord) -> Answer:
 
 def _ending(record: SessionRecord) -> str:
     """What happened last after the last estimate that can end a session, in the log's words."""
-    since = itertools.takewhile(lambda entry: not isinstance(entry, Estimate), reversed(record.history))
+    since = itertools.takewhile(lambda entry: not isinstance(entry, EstimateRecord), reversed(record.history))
     return next((entry.text for entry in since if isinstance(entry, Event) and entry.kind in _ENDING), "")

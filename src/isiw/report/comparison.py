@@ -1,15 +1,21 @@
-"""Several sessions beside each other, in words."""
+"""Several sessions beside each other: as a table, in words, and as a page."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
+from isiw import sentences
+from isiw.estimate import Edge, Estimate
 from isiw.log.reader import SessionRecord
-from isiw.log.schema import Estimate
+from isiw.plots.comparison import comparison_figure
+from isiw.plots.inline import inline_svg
 from isiw.priors.days import DayToDay
 from isiw.priors.differing import Difference
-from isiw.report.words import JUDGED_SINCE
+from isiw.report.facts import first_facts
+from isiw.report.page import rendered, write_page
+from isiw.report.words import counts_sentence, finding_sentences
 from isiw.text import one_line
 
 HEADINGS = ("session", "subject", "begun", "told", "P(window)", "window", "start", "end")
@@ -25,7 +31,7 @@ def comparison_table(records: Sequence[SessionRecord]) -> str:
     rows = [HEADINGS, *comparison_rows(records)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
-    since = [f"{_whose(r)}: {JUDGED_SINCE}" for r in records if r.estimates and r.is_judged_since]
+    since = [f"{_whose(r)}: {sentences.JUDGED_SINCE}" for r in records if r.estimates and r.is_judged_since]
     return "\n".join([*lines, *since])
 
 
@@ -42,25 +48,20 @@ def _row(number: int, record: SessionRecord) -> tuple[str, ...]:
         header.created[:16].replace("T", " "),
         str(len(record.table.told)),
     )
-    if not (record.estimates and record.rests_on_data):
-        return (*who, "–", "too little was measured", "", "")
-    return (*who, *_found(record.estimates[-1]))
+    if record.found is None:
+        return (*who, "–", sentences.TOO_LITTLE, "", "")
+    return (*who, *_found(record.found))
 
 
 def _found(last: Estimate) -> tuple[str, ...]:
     chance = "–" if last.probability is None else f"{last.probability:.2f}"
-    if last.window is None:
-        return chance, last.nothing, "", ""
-    edges = (_edge(last.start_low_ms, last.start_high_ms), _edge(last.end_low_ms, last.end_high_ms))
-    return chance, str(last.window), *edges
+    return chance, sentences.in_short(last), *(_cell(last, edge) for edge in (last.start, last.end))
 
 
-def _edge(low_ms: float | None, high_ms: float | None) -> str:
-    if low_ms is None or high_ms is None:
-        return "–"
-    if math.isinf(low_ms) and math.isinf(high_ms):
-        return "beyond the range"
-    return f"{'<' if math.isinf(low_ms) else f'{low_ms:.0f}'}–{'>' if math.isinf(high_ms) else f'{high_ms:.0f}'} ms"
+def _cell(estimate: Estimate, edge: Edge) -> str:
+    if estimate.window is None:
+        return ""
+    return f"{sentences.interval_cell(edge)} ms" if edge.is_known else "–"
 
 
 def comparison_sentence(difference: Difference) -> str:
@@ -70,33 +71,70 @@ def comparison_sentence(difference: Difference) -> str:
         difference: between the sessions.
     """
     kind = "the same person" if difference.same_person else "two people, or not known to be one"
-    sentences = [
+    said = [
         f"{_whose(difference.second)} against {_whose(difference.first)}, {kind}:",
-        _moved(difference),
-        _later(difference),
+        sentences.moved(difference.moved, 1.0 - DayToDay().p_stays),
+        sentences.later(difference.starts_later, difference.ends_later),
         f"{difference.obstacle.removesuffix('.')}." if difference.obstacle else "",
     ]
-    return " ".join(sentence for sentence in sentences if sentence)
+    return " ".join(sentence for sentence in said if sentence)
 
 
 def _whose(record: SessionRecord) -> str:
     return f"{one_line(record.header.subject) or 'unnamed'} ({record.path.name})"
 
 
-def _moved(difference: Difference) -> str:
-    if difference.moved is None:
-        return ""
-    before = 1.0 - DayToDay().p_stays
-    return (
-        f"with probability {difference.moved:.2f} ({before:g} where nothing is known) the window moved beyond the "
-        "usual shift from day to day;"
+def save_comparison(
+    records: Sequence[SessionRecord],
+    differences: Sequence[Difference],
+    path: str | Path,
+    *,
+    overwrite: bool = False,
+) -> Path:
+    """Write a page that compares sessions into a file.
+
+    Args:
+        records: the sessions.
+        differences: as `isiw.priors.differences` finds them.
+        path: where to, such as `comparison.html`.
+        overwrite: whether to replace a file that is there; a log never is.
+
+    Raises:
+        ConfigError: jinja2 is not installed.
+        InvalidValueError: ISIs that count from different events, a path that is none of a page, or a file that is not
+            to be replaced.
+    """
+    return write_page(path, lambda: comparison_page(records, differences), overwrite=overwrite)
+
+
+def comparison_page(records: Sequence[SessionRecord], differences: Sequence[Difference]) -> str:
+    """A page of HTML that compares sessions; it needs no network and no JavaScript.
+
+    Args:
+        records: the sessions.
+        differences: as `isiw.priors.differences` finds them.
+
+    Raises:
+        ConfigError: jinja2 is not installed.
+        InvalidValueError: no sessions, or ISIs that count from different events.
+    """
+    numbers = [str(number) for number in range(1, len(records) + 1)]
+    return rendered(
+        "comparison.html",
+        sentences=[comparison_sentence(difference) for difference in differences],
+        picture=inline_svg(comparison_figure(records, numbers), "comparison"),
+        headings=HEADINGS,
+        rows=comparison_rows(records),
+        sessions=[_session(record) for record in records],
+        losses=[f"{record.path.name}: {loss}" for record in records for loss in (*record.told_unread, *record.losses)],
     )
 
 
-def _later(difference: Difference) -> str:
-    if difference.starts_later is None or difference.ends_later is None:
-        return ""
-    return (
-        f"it starts later with probability {difference.starts_later:.2f} and ends later with probability "
-        f"{difference.ends_later:.2f} (0.5 where nothing is known)."
-    )
+def _session(record: SessionRecord) -> dict[str, Any]:
+    return {
+        "subject": record.header.subject or "an unnamed subject",
+        "log": record.path.name,
+        "findings": [*finding_sentences(record), *([sentences.JUDGED_SINCE] if record.is_judged_since else [])],
+        "counts": counts_sentence(record),
+        "facts": first_facts(record),
+    }

@@ -7,11 +7,12 @@ from typing import Any, Final
 
 import numpy as np
 
+from isiw.estimate import Edge
 from isiw.findings import lacking
 from isiw.log.reader import SessionRecord
-from isiw.log.schema import Estimate
+from isiw.log.schema import EstimateRecord
 from isiw.report.tables import trial_row
-from isiw.report.words import finding_sentence
+from isiw.sentences import finding
 from isiw.text import plain
 from isiw.trials import Channel, Trial
 from isiw.types import FloatArray
@@ -72,11 +73,11 @@ def _trial(record: SessionRecord, trial: Trial) -> dict[str, Any]:
     }
 
 
-def _belief(record: SessionRecord, estimate: Estimate) -> dict[str, Any]:
+def _belief(record: SessionRecord, estimate: EstimateRecord) -> dict[str, Any]:
     pairs = sum(trial.index <= estimate.trial and trial.isi_ms is not None for trial in record.table.told)
     nothing = lacking(pairs, silent=record.is_silent)
     window = estimate.window if nothing is None else None
-    found = finding_sentence(record, estimate) if nothing is None else f"{nothing}"
+    found = finding(estimate, record.header.stimulus, record.header.space) if nothing is None else f"{nothing}"
     kept = slice(None, None, max(1, math.ceil(len(estimate.grid_ms) / MOST_ISIS)))
     bands = {
         "profile": estimate.profile_mv,
@@ -88,8 +89,8 @@ def _belief(record: SessionRecord, estimate: Estimate) -> dict[str, Any]:
     return {
         "found": found,
         "window": [list(segment) for segment in window.segments] if window else [],
-        "start": [_edge(edge) for edge in (estimate.start_low_ms, estimate.start_high_ms)],
-        "end": [_edge(edge) for edge in (estimate.end_low_ms, estimate.end_high_ms)],
+        "start": _drawn_edge(estimate.start),
+        "end": _drawn_edge(estimate.end),
         "nextMs": _number(estimate.next_isi_ms),
         "chosenBy": plain(estimate.chosen_by),
         "scoredMs": [_number(isi_ms) for isi_ms in estimate.scored_ms],
@@ -155,8 +156,7 @@ def _number(value: float | None) -> float | None:
     return value if value is not None and math.isfinite(value) else None
 
 
-def _edge(edge_ms: float | None) -> float | str | None:
-    """An edge as JSON can hold it; of one beyond the range, on which side."""
-    if edge_ms is None or math.isnan(edge_ms):
-        return None
-    return edge_ms if math.isfinite(edge_ms) else "low" if edge_ms < 0 else "high"
+def _drawn_edge(edge: Edge) -> list[float | str | None]:
+    """The ends of an edge's interval as JSON can hold them; of one beyond the range, on which side."""
+    ends = (edge.low_ms, edge.high_ms)
+    return [("low" if end < 0 else "high") if end is not None and math.isinf(end) else _number(end) for end in ends]

@@ -11,11 +11,11 @@ from typing import Final
 
 import numpy as np
 
+from isiw import sentences
 from isiw.findings import NO_MEP
 from isiw.log.reader import SessionRecord
 from isiw.signals.amplitudes import stopped_after
 from isiw.signals.evidence import told_of
-from isiw.text.numbers import counted
 from isiw.trials import Trial
 from isiw.types import ArrayLike, FloatArray
 from isiw.window import Window
@@ -32,25 +32,6 @@ CHANGES: Final = MappingProxyType({"grew": 1.0, "shrank": -1.0})
 
 ENOUGH_TO_STAND_OUT = 10
 
-_LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high enough?"
-_WHERE = "Is the time of the pulse right? Does the MEP window fit the muscle?"
-
-
-def nothing_estimated(record: SessionRecord) -> str:
-    """The statement about a session without a readable estimate: "nothing was done" only if nothing was."""
-    completed, given = len(record.table), record.given
-    pulses = f"{counted(given, 'pulse was', 'pulses were')} given, or may have been"
-    if completed:
-        known = f"{counted(completed, 'has', 'have')} an outcome"
-        return f"No estimate can be read{_damage(record)}: {pulses}, {known}."
-    if given:
-        return f"No outcome can be read{_damage(record)}: {pulses}, none has an outcome."
-    return f"No trial can be read{_damage(record)}." if record.losses else "No trial has been completed."
-
-
-def _damage(record: SessionRecord) -> str:
-    return ", and the log is damaged" if record.losses else ""
-
 
 def nothing_measured(record: SessionRecord) -> str | None:
     """That too little was measured to speak of a window, and why; None where there was enough."""
@@ -58,25 +39,13 @@ def nothing_measured(record: SessionRecord) -> str | None:
         return None
     given, told = record.given, len(record.table.told)
     if record.is_silent:
-        return f"{NO_MEP} The amplitudes of all {told} trials that count are 0. {_LOOK}"
+        return sentences.all_silent(told, NO_MEP.text)
     if told:
-        count = counted(record.pairs, "pair of stimuli counts", "pairs of stimuli count")
-        return f"Too little was measured to speak of a window: {count}, of {given} trials."
+        return sentences.few_pairs(record.pairs, given)
     lost = [trial for trial in record.table if trial.reason is not None]
-    if not lost:
-        return f"Nothing was measured: none of {given} trials counts."
-    reasons = Counter(str(trial.reason) for trial in lost)
-    why = ", ".join(f"{count} {reason}" for reason, count in reasons.items())
-    return f"Nothing was measured: {len(lost)} of {given} trials were rejected ({why}{_background(lost)})."
-
-
-def _background(lost: Sequence[Trial]) -> str:
     levels_uv = [trial.background_rms_uv for trial in lost if trial.background_rms_uv is not None]
-    if not levels_uv:
-        return ""
-    usual_uv = statistics.median(levels_uv)
-    text = f"{usual_uv / 1000:.2g} mV" if usual_uv >= 1000 else f"{usual_uv:.2g} µV"
-    return f"; background EMG {text} RMS"
+    usual_uv = statistics.median(levels_uv) if levels_uv else None
+    return sentences.all_lost(Counter(str(trial.reason) for trial in lost), given, usual_uv)
 
 
 def contradiction(window: Window | None, trials: Sequence[Trial], *, without_probability: bool = False) -> str | None:
@@ -87,17 +56,10 @@ def contradiction(window: Window | None, trials: Sequence[Trial], *, without_pro
     if min(len(inside), len(outside)) < ENOUGH_ON_EACH_SIDE:
         return None
     p = p_of_larger(inside, outside)
-    medians_uv = tuple(1e3 * statistics.median(meps_mv) for meps_mv in (inside, outside))
-    figures = f"medians {medians_uv[0]:.0f} and {medians_uv[1]:.0f} µV"
+    medians_uv = 1e3 * statistics.median(inside), 1e3 * statistics.median(outside)
     if p >= 0.5:
-        said = f" ({figures})" if medians_uv[0] <= medians_uv[1] else ""
-        return f"The data do not bear this out: the MEPs inside are no larger than those outside{said}."
-    if without_probability and p >= NOT_CLEARLY:
-        return (
-            "The data hardly bear this out: the MEPs inside are not clearly larger than those outside "
-            f"({figures}, p = {p:.2f})."
-        )
-    return None
+        return sentences.not_larger(medians_uv)
+    return sentences.not_clearly_larger(medians_uv, p) if without_probability and p >= NOT_CLEARLY else None
 
 
 def p_of_larger(inside: Sequence[float], outside: Sequence[float]) -> float:
@@ -125,11 +87,7 @@ def changed_with_time(window: Window | None, trials: Sequence[Trial]) -> str | N
         found = np.array([growth(sign * np.array(meps_mv)) for meps_mv in strata])
         p = _beyond(float(np.sqrt(n) @ found) / math.sqrt(n.sum()))
         if p < BY_CHANCE and _beyond(float(found.min())) < IN_EACH:
-            return (
-                f"The amplitudes {word} during the session, within the window and outside it (Kendall's test, "
-                f"p = {p:.1g}), and a window may be due to that. Was the intensity changed, did the coil move, or did "
-                "the person tire?"
-            )
+            return sentences.changed(word, p)
     return None
 
 
@@ -159,18 +117,10 @@ def nothing_stood_out(trials: Sequence[Trial], window_ms: tuple[float, float] | 
     """
     known = [trial for trial in trials if trial.mep_mv is not None and trial.background_rms_uv]
     stood_out = [one.stands_out for one in told_of(known)]
-    sought = "after the pulse" if window_ms is None else _sought(window_ms)
-    look = _LOOK if window_ms is None else f"{_LOOK} {_WHERE}"
     if len(known) >= ENOUGH_TO_STAND_OUT and not any(stood_out):
-        return f"In no trial was the EMG {sought} larger than at rest. {look}"
+        return sentences.at_rest(window_ms, None)
     first = stopped_after([trial.isi_ms for trial in known], stood_out)
-    if first is None:
-        return None
-    return f"From trial {known[first].index} on, the EMG {sought} was never larger than at rest. {look}"
-
-
-def _sought(window_ms: tuple[float, float]) -> str:
-    return f"in the MEP window, {window_ms[0]:g}–{window_ms[1]:g} ms after the pulse,"
+    return None if first is None else sentences.at_rest(window_ms, known[first].index)
 
 
 def no_comparison(window: Window | None, trials: Sequence[Trial]) -> str | None:
@@ -181,12 +131,7 @@ def no_comparison(window: Window | None, trials: Sequence[Trial]) -> str | None:
     alone = sum(trial.isi_ms is None for trial in trials)
     if len(inside) < ENOUGH_ON_EACH_SIDE or len(outside) + alone >= ENOUGH_ON_EACH_SIDE:
         return None
-    pairs = len(outside) + len(inside)
-    return (
-        f"Hardly anything shows how large MEPs are without enhancement: {len(outside)} of {pairs} pairs are outside, "
-        f"and the number of pulses of TMS alone was {alone}. In the next session add TMS alone (in a configuration: "
-        "[protocol] tms_alone), or widen the range of ISIs."
-    )
+    return sentences.few_outside(len(outside), len(outside) + len(inside), alone)
 
 
 def _inside_and_outside(window: Window, trials: Sequence[Trial]) -> tuple[list[float], list[float]]:

@@ -1,15 +1,23 @@
 """The report of a session: one page that needs no network, no server, and for reading it no JavaScript.
 
+What comes from a log is text in a page, whatever it holds.
+
 The pictures that are read and printed are drawn by `isiw.plots`; what is moved and clicked is drawn by plotly in the
 browser, from the numbers of `isiw.report.drawn`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import base64
+import hashlib
+import importlib
+from collections.abc import Callable, Mapping, Sequence
+from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
+from isiw.errors import ConfigError, InvalidValueError
+from isiw.log.outputs import check_output, write_output
 from isiw.log.reader import SessionRecord, require_records
 from isiw.plots.course import course_figure
 from isiw.plots.inline import inline_svg
@@ -19,10 +27,14 @@ from isiw.plots.timeline import timeline_figure
 from isiw.report.answers import answers
 from isiw.report.drawn import drawn
 from isiw.report.facts import first_facts, further_facts, settings_facts
-from isiw.report.html import asset, library, rendered, write_page
 from isiw.report.tables import counted_rows, event_rows, lost_rows, trial_row
 from isiw.report.words import finding_sentences, fit_sentence
+from isiw.sentences import JUDGED_SINCE
+from isiw.text import plain
 from isiw.window import Window
+
+_ASSETS: Final = resources.files("isiw.report") / "assets"
+_SUFFIXES: Final = {".html", ".htm"}
 
 
 def save_report(
@@ -90,7 +102,7 @@ def _states(record: SessionRecord) -> list[str]:
         last = f"trial {record.table[-1].index}" if len(record.table) else "its beginning"
         said.append(f"The log is not closed: the session is running, or was interrupted. It is shown up to {last}.")
     if record.estimates and record.is_judged_since:
-        said.append("Trials were judged anew after the last estimate, which does not know of it; resume the session.")
+        said.append(JUDGED_SINCE)
     return said
 
 
@@ -103,3 +115,52 @@ def _pictures(record: SessionRecord, truth: Window | None) -> Mapping[str, str]:
         "course": course_figure(record),
     }
     return {name: inline_svg(figure, name) for name, figure in figures.items() if figure is not None}
+
+
+def write_page(path: str | Path, page: Callable[[], str], *, overwrite: bool = False) -> Path:
+    """Write a page into a file, which is checked before the page is made."""
+    if Path(path).suffix.lower() not in _SUFFIXES:
+        raise InvalidValueError("a page is for a browser", got=str(path), expected="a path that ends in .html")
+    check_output(path, overwrite=overwrite)
+    return write_output(path, page().encode(), overwrite=overwrite)
+
+
+def rendered(template: str, scripts: Sequence[str] = (), **contents: Any) -> str:
+    """A page; its policy lets no script run but these, and nothing be fetched."""
+    jinja2 = library("jinja2")
+    environment = jinja2.Environment(
+        loader=jinja2.FunctionLoader(asset),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        finalize=lambda value: plain(value) if type(value) is str else value,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    page: str = environment.get_template(template).render(
+        contents,
+        style=asset("page.css"),
+        scripts=scripts,
+        hashes=" ".join(map(_hash, scripts)) or "'none'",
+    )
+    return page
+
+
+def asset(name: str) -> str:
+    """A file of `assets`."""
+    return (_ASSETS / name).read_text(encoding="utf-8")
+
+
+def library(name: str) -> Any:
+    """A library of the extra `report`."""
+    try:
+        return importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        missing = name.partition(".")[0]
+        raise ConfigError(
+            f"{missing} is not installed", remedy='Install it with: pip install "isiw[report]"'
+        ) from error
+
+
+def _hash(script: str) -> str:
+    """What the page's policy knows a script by, so that no other is run."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from isiw.findings import Kind
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Event, Intent
-from isiw.session.progress import asked, outcome
+from isiw.sentences import asked, outcome
 from isiw.text.stimuli import TAP, StimulusWords
 from isiw.trials import Trial
 

@@ -6,8 +6,8 @@ from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from isiw.estimate import Estimate, Reported
 from isiw.findings import Kind
-from isiw.log.schema import Estimate, Number, Numbers
 from isiw.strategy.stopping import StopDecision
 from isiw.trials import Status, Trial
 
@@ -141,31 +141,18 @@ class TrialsAnswer(OkAnswer):
     trials: list[TrialRow]
 
 
-class EstimateAnswer(OkAnswer):
+class EstimateAnswer(Reported, OkAnswer):
     """What is believed about the window; the names are those of the log's `/estimate`."""
 
+    model_config = ConfigDict(json_schema_serialization_defaults_required=True)
+
     text: str = Field(description="In words.")
-    probability: float | None = Field(description="That there is a window.")
-    segments_ms: list[float] = Field(description="The reported window: starts and ends in turn; empty where none.")
-    start_ms: Number | None
-    start_low_ms: Number | None
-    start_high_ms: Number | None
-    end_ms: Number | None
-    end_low_ms: Number | None
-    end_high_ms: Number | None
-    expected_f1: float | None
-    best_isi_ms: list[float]
-    hypotheses: dict[str, float]
-    grid_ms: list[float]
-    profile_mv: Numbers
-    band_low_mv: Numbers
-    band_high_mv: Numbers
 
     @classmethod
-    def of(cls, estimate: Estimate, too_little: str | None = None) -> Self:
-        """The answer of an estimate as a log has it."""
+    def about(cls, estimate: Estimate, too_little: str | None = None) -> Self:
+        """The answer of an estimate; if too little was measured, without what is said of a window."""
+        known = estimate.model_dump(include={*Reported.model_fields})
         if too_little is None:
-            return cls.model_validate({"text": str(estimate), **estimate.model_dump()})
-        profile = {"grid_ms", "profile_mv", "band_low_mv", "band_high_mv"}
-        nothing = Estimate(trial=estimate.trial, probability=None).model_dump(exclude=profile)
-        return cls.model_validate({"text": too_little, **nothing, **estimate.model_dump(include=profile)})
+            return cls(text=str(estimate), **known)
+        profile = ("grid_ms", "profile_mv", "band_low_mv", "band_high_mv")
+        return cls(text=too_little, probability=None, **{name: known[name] for name in profile})

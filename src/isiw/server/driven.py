@@ -8,9 +8,9 @@ from contextlib import contextmanager
 from typing import Final
 
 from isiw.errors import InvalidValueError, LimitExceededError, LogError
+from isiw.estimate import Estimate
 from isiw.findings import Kind
 from isiw.log.reader import SessionRecord
-from isiw.log.schema import Estimate
 from isiw.server.answers import AskAnswer, EstimateAnswer, SessionAnswer, TrialAnswer, TrialRow
 from isiw.server.refusals import Refusal, failed
 from isiw.server.requests import AskRequest, ExcludeRequest, MistrialRequest, NoteRequest, TellRequest
@@ -40,7 +40,6 @@ class DrivenSession:
             for trial in recorder.trials
             if trial.index not in self._outcomes
         }
-        self._notes = set() if record is None else {event.text for event in record.events if event.kind == "note"}
 
     @contextmanager
     def alone(self) -> Iterator[None]:
@@ -100,7 +99,7 @@ class DrivenSession:
     def estimate(self) -> EstimateAnswer:
         """What is believed about the window now."""
         estimate = self.recorder.estimate()
-        return EstimateAnswer.of(Estimate.of(0, estimate, self.recorder.decision(), None), estimate.too_little)
+        return EstimateAnswer.about(Estimate.of(estimate), estimate.too_little)
 
     def require_no_wait(self, most_s: float) -> None:
         """Raise where the next stimulus is not allowed soon."""
@@ -203,10 +202,9 @@ class DrivenSession:
         if told == _recorded(trial):
             return self._outcomes[number]
         late = trial.reason is Kind.OUTCOME_UNKNOWN
-        text = f"An outcome of trial {number} came too late and is not used: {words}"
-        if late and text not in self._notes:
-            self.recorder.note(text)
-            self._notes.add(text)
+        if late:
+            text = f"An outcome of trial {number} came too late and is not used: {words}"
+            self.recorder.note(text, key=f"late {number}: {words}")
         raise Refusal(
             409,
             "Late" if late else "OtherOutcome",

@@ -17,6 +17,7 @@ from isiw.errors import IsiwError
 from isiw.log.schema import MOST_TRIALS
 from isiw.server.refusals import Refusal
 from isiw.text.expected import UNKNOWN, expected_instead, first_to_tell, known_keys, meant_instead
+from isiw.text.json_texts import DoubledKeyError, once_each, read_json
 from isiw.visit import VisitProtocol
 
 FORM: Final = "application/x-www-form-urlencoded"
@@ -154,8 +155,8 @@ def _read(kind: type[_Kind], content_type: str, body: bytes) -> _Kind:
     except ValidationError as error:
         raise _refused(kind, first_to_tell(error.errors())) from error
     try:
-        sent = _parsed(body)  # a request does not know which of its fields were sent
-    except (ValueError, RecursionError) as error:
+        sent = read_json(body)  # a request does not know which of its fields were sent
+    except ValueError as error:
         raise Refusal(400, "MalformedBody", f"the body cannot be read: {error}") from error
     require_units(sent)
     require_together(sent)
@@ -166,10 +167,10 @@ def _form_as_json(kind: type[BaseModel], body: bytes) -> bytes:
     """A form as JSON: texts as they are, all other fields as JSON has them; an empty one is null."""
     try:
         pairs = parse_qsl(body.decode(), keep_blank_values=True, errors="strict", max_num_fields=MOST_FIELDS)
+        fields = once_each(pairs)
+        values = {name: value if _is_text(kind, name, value) else _value(value) for name, value in fields.items()}
     except ValueError as error:
         raise Refusal(400, "MalformedBody", f"the form cannot be read: {error}") from error
-    fields = _once_each(pairs)
-    values = {name: value if _is_text(kind, name, value) else _value(value) for name, value in fields.items()}
     return json.dumps(values).encode(errors="replace")
 
 
@@ -180,21 +181,11 @@ def _is_text(kind: type[BaseModel], name: str, value: str) -> bool:
 
 def _value(text: str) -> Any:
     try:
-        return _parsed(text) if text else None
-    except (ValueError, RecursionError):
+        return read_json(text) if text else None
+    except DoubledKeyError:
+        raise
+    except ValueError:
         return text
-
-
-def _parsed(text: str | bytes) -> Any:
-    return json.loads(text, object_pairs_hook=_once_each)
-
-
-def _once_each(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    fields = dict(pairs)
-    if len(fields) < len(pairs):
-        names = sorted(name for name, _ in pairs)
-        raise Refusal(400, "MalformedBody", "a field is there twice", got=names)
-    return fields
 
 
 def _refused(kind: type[BaseModel], error: ErrorDetails) -> Refusal:

@@ -137,7 +137,7 @@ class Sessions:
         record = self.record(name)
         if not record.estimates:
             raise not_open(name)
-        return EstimateAnswer.of(record.estimates[-1], record.too_little)
+        return EstimateAnswer.about(record.estimates[-1], record.too_little)
 
     def decision(self, name: str) -> DecisionAnswer:
         """Whether to stop a session, and why."""

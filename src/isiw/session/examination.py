@@ -15,7 +15,7 @@ from typing import Any, Generic, NamedTuple, ParamSpec, Protocol, TypeAlias, Typ
 from isiw import checks
 from isiw.errors import LimitExceededError, told
 from isiw.findings import Kind
-from isiw.log.schema import Estimate, Event, EventKind, Intent, Record
+from isiw.log.schema import EstimateRecord, Event, EventKind, Intent, Record
 from isiw.log.verdicts import excluded_by, under_all
 from isiw.session.sink import Sink
 from isiw.strategy.choosing import candidate_isis
@@ -239,7 +239,7 @@ class _Window:
     def decision(self) -> StopDecision:
         return self.strategy.decision()
 
-    def belief(self, trial: int, decision: StopDecision, next_isi_ms: float | None) -> Estimate:
+    def belief(self, trial: int, decision: StopDecision, next_isi_ms: float | None) -> EstimateRecord:
         return believed(self.strategy, trial, decision, next_isi_ms)
 
 
@@ -282,9 +282,9 @@ def relearned(strategy: Strategy, trials: Iterable[Trial]) -> Strategy:
     return again
 
 
-def believed(strategy: Strategy, trial: int, decision: StopDecision, next_isi_ms: float | None) -> Estimate:
+def believed(strategy: Strategy, trial: int, decision: StopDecision, next_isi_ms: float | None) -> EstimateRecord:
     """The record of what a strategy knows after a trial; scores are those that it has worked out anyway."""
-    record = Estimate.of(trial, strategy.estimate(), decision, next_isi_ms)
+    record = EstimateRecord.after(trial, strategy.estimate(), decision, next_isi_ms)
     predicted = _predicted(strategy) if record.grid_ms else {}
     return record.model_copy(update=predicted | ({} if next_isi_ms is None else _chosen(strategy)))
 

@@ -11,11 +11,11 @@ from typing import Final
 import numpy as np
 
 from isiw.design import DesignSpace
+from isiw.estimate import WindowEstimate
+from isiw.sentences import asked, interval_cell, outcome
 from isiw.session.updates import SessionUpdate
 from isiw.text import plain
 from isiw.text.stimuli import TAP, StimulusWords
-from isiw.trials import Trial
-from isiw.window import Interval, WindowEstimate
 
 PROGRESS_HEADINGS: Final = ("trial", "ISI", "MEP", "P", "window", "start", "end", "left")
 """What `progress_row` holds; start and end are 90 % intervals, left is what the budget still allows."""
@@ -106,36 +106,12 @@ def _bracketed(sparks: Sequence[str], isi_ms: Sequence[float], estimate: WindowE
     return "".join(itertools.chain(*zip(marks, [*sparks, ""], strict=True)))
 
 
-def asked(trial: Trial, first: StimulusWords = TAP) -> str:
-    """What a trial was to be: its ISI, or which control trial."""
-    if trial.commanded_isi_ms is not None:
-        return f"{trial.commanded_isi_ms:.4g} ms"
-    if trial.tap_alone:
-        return first.alone
-    return "TMS alone" if trial.is_control else "–"
-
-
-def outcome(trial: Trial) -> str:
-    """What came of a trial."""
-    if trial.reason is not None:
-        return f"mistrial: {trial.reason}"
-    text = "–" if trial.mep_mv is None else f"{1e3 * trial.mep_mv:.0f} µV"
-    return f"{text} (excluded)" if trial.excluded else text
-
-
 def _found(estimate: WindowEstimate) -> tuple[str, ...]:
     """Probability, window, start and end; where too little was measured to speak of them, they are not said."""
-    start, end = estimate.interval(0.9) or (None, None)
+    start, end = estimate.edges
     return (
         "" if estimate.probability is None else f"{estimate.probability:.2f}",
         "none" if estimate.window is None else str(estimate.window),
-        _short(start),
-        _short(end),
+        interval_cell(start),
+        interval_cell(end),
     )
-
-
-def _short(interval: Interval | None) -> str:
-    if interval is None:
-        return ""
-    low, high = interval
-    return f"{'<' if math.isinf(low) else f'{low:.0f}'}–{'>' if math.isinf(high) else f'{high:.0f}'}"

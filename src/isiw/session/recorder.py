@@ -13,6 +13,7 @@ from isiw.checks import number
 from isiw.devices.clock import ROUNDING_S, Clock, Pacing
 from isiw.devices.protocol import Readiness
 from isiw.errors import ImplausibleDataWarning, InvalidValueError, warn
+from isiw.estimate import WindowEstimate
 from isiw.findings import Finding, Kind, Severity
 from isiw.log.schema import Event, Header, Intent
 from isiw.log.writer import LogWriter
@@ -28,7 +29,6 @@ from isiw.signals.watch import Doubts
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Status, Stimulus, Trial, TrialTable
-from isiw.window import WindowEstimate
 
 
 class Recorder(Judging):

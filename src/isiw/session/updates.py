@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from isiw.estimate import WindowEstimate
 from isiw.strategy.stopping import StopDecision
 from isiw.trials import Trial, TrialTable
-from isiw.window import WindowEstimate
 
 
 @dataclass(frozen=True)

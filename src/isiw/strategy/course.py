@@ -12,10 +12,10 @@ from functools import cached_property
 from isiw.acquisition.batch import own_plan
 from isiw.acquisition.protocol import AcquisitionFunction, FollowsPlan
 from isiw.design import DesignSpace
+from isiw.estimate import WindowEstimate
 from isiw.models.protocol import ExpectsTheUsual, Observation, Posterior, ProposesIsi, ResponseModel
 from isiw.strategy.choosing import Choice, Cost, best_choices
 from isiw.strategy.stopping import Progress, StopDecision, StoppingRule, looks_back
-from isiw.window import WindowEstimate
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from isiw.acquisition.protocol import AcquisitionFunction, require_acquisition
 from isiw.checks import amplitude, deadline, number, whole
 from isiw.design import DesignSpace, require_space
 from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError, warn
+from isiw.estimate import WindowEstimate
 from isiw.findings import NO_MEP
 from isiw.models.protocol import Observation, Posterior, PredictsMeps, ReportsTrouble, ResponseModel
 from isiw.signals.amplitudes import is_silent
@@ -27,7 +28,6 @@ from isiw.strategy.choosing import Choice, Cost, evenly_spaced, instead_of_lost
 from isiw.strategy.course import Method
 from isiw.strategy.stopping import StopDecision, StopKind, StoppingRule
 from isiw.types import FloatArray
-from isiw.window import WindowEstimate
 
 _T = TypeVar("_T")
 

@@ -12,6 +12,7 @@ from typing import Any
 
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.errors import StudyError
+from isiw.estimate import WindowEstimate
 from isiw.lazy import pd, torch
 from isiw.models.protocol import Observation, Posterior, ReportsTrouble, ResponseModel, Tensor
 from isiw.strategy.choosing import Choice, instead_of_lost
@@ -22,7 +23,6 @@ from isiw.studies.players import Player
 from isiw.studies.sessions import SimulatedSession, examine
 from isiw.studies.threads import one_torch_thread
 from isiw.subjects.subject import Response
-from isiw.window import WindowEstimate
 
 
 def simulate_batch(sessions: Sequence[SimulatedSession], device: str = "cpu") -> pd.DataFrame:

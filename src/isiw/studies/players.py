@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol, TypeAlias
 
+from isiw.estimate import WindowEstimate
 from isiw.strategy.choosing import Choice
 from isiw.strategy.stopping import StopDecision, StopKind, StoppingRule
 from isiw.strategy.strategy import Strategy
 from isiw.subjects.subject import Response
-from isiw.window import Window, WindowEstimate
+from isiw.window import Window
 
 Reported: TypeAlias = WindowEstimate | Window | None
 

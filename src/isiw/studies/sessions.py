@@ -14,6 +14,7 @@ from typing import Any, Literal, TypeAlias, get_args
 from isiw.checks import check_choice, check_numbers, check_wholes, whole
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, StudyError
+from isiw.estimate import WindowEstimate
 from isiw.lazy import pd
 from isiw.metrics import covers, f1
 from isiw.signals import wrong_isi
@@ -25,7 +26,7 @@ from isiw.studies.players import Crowd, Player, Reported, alone
 from isiw.studies.threads import one_torch_thread
 from isiw.subjects.cohorts import COHORTS, person_of
 from isiw.subjects.subject import Response, SimulatedSubject
-from isiw.window import Window, WindowEstimate
+from isiw.window import Window
 
 TIMES = ("ask_ms", "tell_ms")
 """Columns that differ each time a session is run."""

@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 
 from isiw.design import DesignSpace
+from isiw.estimate import WindowEstimate
 from isiw.text.shown import shown
-from isiw.window import WindowEstimate
 
 Trials = tuple[tuple[float | None, float], ...]
 """ISIs [ms] (None is TMS alone) and MEPs [mV], in the order of telling."""

@@ -10,10 +10,14 @@ _NUMBERS: Final = re.compile(rb":\s*\[[^\[\]{}\"]*\]")
 """Lists of numbers: they make up most of a waveform, and have no keys."""
 
 
+class DoubledKeyError(ValueError):
+    """A key is there twice."""
+
+
 def read_json(text: str | bytes) -> Any:
     """The values of a JSON text."""
     try:
-        return json.loads(text, object_pairs_hook=_once_each)
+        return json.loads(text, object_pairs_hook=once_each)
     except RecursionError as error:
         raise ValueError("it is nested without end") from error
 
@@ -26,10 +30,11 @@ def refuse_doubled(text: bytes) -> None:
         read_json(text)
 
 
-def _once_each(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def once_each(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """The values by their keys, none of which may be there twice."""
     values = dict(pairs)
     if len(values) < len(pairs):
         keys = [key for key, _ in pairs]
         twice = next(key for key in keys if keys.count(key) > 1)
-        raise ValueError(f"the key {twice[:80]!r} is there twice")
+        raise DoubledKeyError(f"the key {twice[:80]!r} is there twice")
     return values

@@ -21,8 +21,9 @@ from benchmarks.reduction.sessions import (
     searched,
 )
 
+from isiw.estimate import WindowEstimate
 from isiw.strategy.strategy import Strategy
-from isiw.window import Window, WindowEstimate
+from isiw.window import Window
 
 BARE = Session("nr", "gaussian", 0, 3)
 HIT = replace(BARE, accelerometer=True)

@@ -14,6 +14,7 @@ from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, StrategyError
+from isiw.estimate import WindowEstimate
 from isiw.models.gp.model import GaussianProcess, GaussianProcessPosterior, ProcessSettings
 from isiw.models.gp.prior import FixedProcess
 from isiw.models.protocol import (
@@ -31,7 +32,6 @@ from isiw.studies import SimulatedSession, run_study
 from isiw.subjects.cohorts import cohort
 from isiw.testing import check_model
 from isiw.testing.requirements import usual_trials
-from isiw.window import WindowEstimate
 from known import known
 
 FEW = GaussianProcess(samples=64)

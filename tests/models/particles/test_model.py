@@ -9,6 +9,7 @@ import torch
 from isiw.acquisition.information import mutual_information
 from isiw.design import VALVE_SPACE
 from isiw.errors import InvalidValueError
+from isiw.estimate import WindowEstimate
 from isiw.metrics import covers
 from isiw.models.particles.engine import EngineName, engine_for
 from isiw.models.particles.jumps import WindowTarget
@@ -33,7 +34,7 @@ from isiw.models.randomness import systematic
 from isiw.models.shared.history import History
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.subject import SimulatedSubject
-from isiw.window import Window, WindowEstimate
+from isiw.window import Window
 from known import known
 
 GRID = torch.arange(0.0, 501.0, 5.0)

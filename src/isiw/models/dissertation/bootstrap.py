@@ -15,6 +15,7 @@ import numpy as np
 
 from isiw.checks import check_choice, check_numbers, check_wholes
 from isiw.design import DesignSpace
+from isiw.estimate import WindowEstimate
 from isiw.lazy import torch
 from isiw.models.dissertation.curves import FittedCurve, curve_masks
 from isiw.models.dissertation.nonlinear import NonlinearRegression
@@ -22,7 +23,7 @@ from isiw.models.protocol import Observation, Tensor
 from isiw.models.shared.floor import FloorTreatment
 from isiw.models.shared.history import AmplitudeHistory
 from isiw.types import BoolArray, FloatArray, IntArray
-from isiw.window import Window, WindowEstimate
+from isiw.window import Window
 
 WindowKind = Literal["expectation", "fit", "particles"]
 

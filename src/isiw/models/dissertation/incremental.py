@@ -12,13 +12,14 @@ import numpy as np
 from isiw.checks import check_choice, check_numbers, check_wholes
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
+from isiw.estimate import WindowEstimate
 from isiw.lazy import torch
 from isiw.models.dissertation.curves import curve_masks
 from isiw.models.protocol import Observation, Tensor
 from isiw.models.shared.floor import FloorTreatment
 from isiw.models.shared.history import AmplitudeHistory, PersonTrials
 from isiw.types import FloatArray
-from isiw.window import EDGE_LEVEL, Window, WindowEstimate
+from isiw.window import EDGE_LEVEL, Window
 
 SweepRule = Literal["baseline", "share"]
 

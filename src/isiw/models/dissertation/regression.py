@@ -14,13 +14,14 @@ import numpy as np
 
 from isiw.checks import check_choice
 from isiw.design import DesignSpace
+from isiw.estimate import WindowEstimate
 from isiw.lazy import torch
 from isiw.models.dissertation.curves import FittedCurve, Segments, curve_masks
 from isiw.models.protocol import Observation, Tensor
 from isiw.models.shared.floor import FloorTreatment
 from isiw.models.shared.history import AmplitudeHistory
 from isiw.types import FloatArray
-from isiw.window import Window, WindowEstimate
+from isiw.window import Window
 
 OUTCOMES = 24
 """Values of the next MEP on which predictive distributions live."""

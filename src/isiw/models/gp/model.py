@@ -16,6 +16,7 @@ import numpy as np
 from isiw.checks import check_choice, check_numbers, check_wholes
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
+from isiw.estimate import WindowEstimate
 from isiw.lazy import botorch, torch
 from isiw.models.gp.fit import Fit, fit, fixed_fit
 from isiw.models.gp.prior import FixedProcess, HyperparameterPrior
@@ -26,7 +27,6 @@ from isiw.models.protocol import Observation, Tensor
 from isiw.models.shared.floor import FloorTreatment
 from isiw.models.shared.history import AmplitudeHistory, PersonTrials
 from isiw.models.windows import Runs, SampledProfiles, profile_grid, sampled_estimate
-from isiw.window import WindowEstimate
 
 NoiseKind: TypeAlias = Literal["equal", "by-isi"]
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from isiw.checks import check_choice, check_numbers, check_wholes
 from isiw.design import DesignSpace
+from isiw.estimate import WindowEstimate
 from isiw.lazy import torch
 from isiw.models.parametric.importance import Effort
 from isiw.models.parametric.law import draw_log_mep, levels, log_likelihood
@@ -28,7 +29,7 @@ from isiw.models.shared.history import History, observed
 from isiw.models.shared.tables import OUTCOMES, interpolated, table_levels
 from isiw.models.windows import Runs, SampledProfiles, least_excess_mv, profile_grid, sampled_estimate
 from isiw.types import ArrayLike
-from isiw.window import Window, WindowEstimate
+from isiw.window import Window
 
 
 @dataclass(frozen=True)

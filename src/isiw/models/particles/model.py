@@ -9,6 +9,7 @@ from typing import get_args
 from isiw.checks import MOST_OF_A_KIND, check_choice, check_numbers, check_probabilities, check_wholes
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
+from isiw.estimate import WindowEstimate
 from isiw.later import Later
 from isiw.lazy import torch
 from isiw.models.particles.engine import Engine, EngineName, engine_for
@@ -24,7 +25,7 @@ from isiw.models.protocol import Observation, PriorPerson
 from isiw.models.randomness import SIMULATED, step_generator
 from isiw.models.windows import EXCLUDED_AT, SampledHypotheses, SampledProfiles, profile_grid, sampled_estimate
 from isiw.types import ArrayLike, FloatArray
-from isiw.window import Window, WindowEstimate
+from isiw.window import Window
 
 LEAST_SAMPLES = 20
 """Of fewer samples no quantile is told."""

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from typing import Any, Final, NamedTuple
 
 from isiw.log.reader import SessionRecord
-from isiw.log.schema import Estimate, Event, Intent, Record, Waveform
+from isiw.log.schema import EstimateRecord, Event, Intent, Record, Waveform
 from isiw.report.drawn import drawn
 from isiw.report.facts import first_facts
 from isiw.session.loop import Session
@@ -48,7 +48,7 @@ class View:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._estimate: Estimate | None = None
+        self._estimate: EstimateRecord | None = None
         self._events: deque[Event] = deque(maxlen=MOST_EVENTS)
         self._coming: dict[tuple[int, str], Waveform] = {}
         self._sweep: dict[tuple[int, str], Waveform] = {}
@@ -69,7 +69,7 @@ class View:
             return
         if isinstance(record, Trial):
             self._sweep, self._coming = self._coming, {}
-        elif isinstance(record, Estimate):
+        elif isinstance(record, EstimateRecord):
             self._estimate = record
         elif isinstance(record, Event):
             self._events.append(record)

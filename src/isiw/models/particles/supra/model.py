@@ -12,6 +12,7 @@ from typing import get_args
 
 from isiw.checks import MOST_OF_A_KIND, check_choice, check_numbers, check_wholes
 from isiw.design import DesignSpace
+from isiw.estimate import WindowEstimate
 from isiw.lazy import torch
 from isiw.models.particles.engine import EngineName, engine_for
 from isiw.models.particles.posterior import SwarmPosterior
@@ -22,7 +23,6 @@ from isiw.models.particles.swarm import Moving, Swarm
 from isiw.models.protocol import Observation, Tensor
 from isiw.models.randomness import step_generator
 from isiw.models.windows import Runs, SampledProfiles, best_window, profile_grid, sampled_estimate
-from isiw.window import WindowEstimate
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,398 @@
+"""What is known about one person's window: as a model knows it, with samples, and as it is logged, drawn and said."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, Final, NamedTuple, Self
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from isiw import sentences
+from isiw.checks import check_probabilities, number
+from isiw.errors import InvalidValueError
+from isiw.findings import lacking
+from isiw.later import WorkedOut
+from isiw.types import ArrayLike, FloatArray, IntArray, Number, Numbers
+from isiw.window import Interval, Window
+
+_NOTHING: Final[Mapping[str, float]] = {}
+
+PROFILE_DECIMALS: Final = 6  # a nanovolt; the profile is a picture of the posterior, not a measurement
+
+
+class Edge(NamedTuple):
+    """An edge of a window, given that there is one: median, 90 % interval [ms], and how probably it is out of range.
+
+    Beyond the range it is ±inf; what a method does not have is None.
+    """
+
+    median_ms: float | None = None
+    low_ms: float | None = None
+    high_ms: float | None = None
+    beyond: float | None = None
+
+    @property
+    def is_known(self) -> bool:
+        """Whether it has an interval."""
+        return self.low_ms is not None and self.high_ms is not None
+
+    def within(self, low_ms: float, high_ms: float) -> Interval:
+        """The ends of its interval, those beyond a range at the range's ends [ms]."""
+        low, high = np.clip(np.array([self.low_ms, self.high_ms], dtype=float), low_ms, high_ms).tolist()
+        return low, high
+
+
+class ProfileBand(NamedTuple):
+    """The expected MEP by ISI: median and a credible band [mV], each of shape (t,)."""
+
+    median_mv: FloatArray
+    low_mv: FloatArray
+    high_mv: FloatArray
+
+
+class BestISI(NamedTuple):
+    """The ISI of the largest expected MEP, given that there is a window: posterior median and 90 % interval [ms]."""
+
+    isi_ms: float
+    low_ms: float
+    high_ms: float
+
+
+class Enhancement(NamedTuple):
+    """By how much the expected MEP is larger than without a tap [mV].
+
+    The shift of a recruitment curve's input that does so [% RMT] is None where the model has no such curve.
+    """
+
+    mep_mv: float
+    shift_pct_rmt: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class WindowEstimate:
+    """What is believed about one person's window. What a non-Bayesian method does not have is None.
+
+    A stopping rule needs the probability, the edges and the F1 only; bands, the best ISI, what is excluded and what is
+    unusual may be given as `Later`.
+
+    Args:
+        probability: probability that there is a window.
+        window: the reported decision; None where the probability is below one half.
+        start_ms: posterior median of the hull's start, given a window [ms]; -inf where it lies before the range.
+        end_ms: posterior median of the hull's end, given a window [ms]; +inf where it lies beyond the range.
+        grid_ms: the ISIs of `profile_quantiles_mv`, shape (t,).
+        edge_samples_ms: posterior samples of (start, end) given a window, ±inf beyond the range, shape (s, 2).
+        profile_quantiles_mv: the 0.05, 0.5 and 0.95 quantiles of the expected MEP by ISI [mV], shape (3, t).
+        spread_ms: SD of the ISIs that a particle search has narrowed itself down to [ms].
+        split_probability: probability that the window has more than one segment, given that there is one.
+        hypothesis_samples: which of the model's hypotheses, such as the kind of noise, each of `edge_samples_ms`
+            belongs to, as an index of `hypothesis_names`, shape (s,).
+        hypothesis_names: what the hypotheses are called.
+        expected_f1: posterior mean of the F1 of the reported decision.
+        best_isi: the ISI of the largest expected MEP.
+        largest_excluded: an enhancement that, with 90 % probability, is larger than the largest at any ISI of the
+            space; its shift is that of the window's peak, wherever it lies.
+        unusual: how probable it is that parts of this person are of another law than the usual one, by their names.
+        pairs: how many pairs of stimuli it rests on; None where that is not known.
+        silent: whether no trial that it rests on showed an MEP, so that nothing is known about a window.
+        depressed: the ISIs that depress the MEP, as far as they are reported; None where there are none, or where
+            nobody looked for them.
+        depressed_probability: probability that there are any; None where nobody looked for them.
+
+    Raises:
+        InvalidValueError: a probability outside 0–1, a window or a depression reported against it, not one hypothesis a
+            sample, or one without a name.
+    """
+
+    probability: float | None
+    window: Window | None
+    start_ms: float | None = None
+    end_ms: float | None = None
+    grid_ms: FloatArray | None = field(default=None, repr=False)
+    edge_samples_ms: FloatArray | None = field(default=None, repr=False)
+    profile_quantiles_mv: WorkedOut[FloatArray | None] = field(
+        default=WorkedOut("profile_quantiles_mv", None), repr=False
+    )
+    spread_ms: float | None = None
+    split_probability: float | None = None
+    hypothesis_samples: IntArray | None = field(default=None, repr=False)
+    hypothesis_names: tuple[str, ...] = field(default=(), repr=False)
+    expected_f1: float | None = None
+    best_isi: WorkedOut[BestISI | None] = field(default=WorkedOut("best_isi", None))
+    largest_excluded: WorkedOut[Enhancement | None] = field(default=WorkedOut("largest_excluded", None))
+    unusual: WorkedOut[Mapping[str, float]] = field(default=WorkedOut("unusual", _NOTHING), repr=False)
+    pairs: int | None = None
+    silent: bool = False
+    depressed: Window | None = None
+    depressed_probability: float | None = None
+
+    def noting(self, **facts: Any) -> WindowEstimate:
+        """The same with other `pairs`, `silent` or `unusual`; what is still to be worked out remains so."""
+        noted = object.__new__(type(self))
+        noted.__dict__.update(self.__dict__ | facts)
+        return noted
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {each.name: getattr(self, each.name) for each in fields(self)}
+
+    def __post_init__(self) -> None:
+        self._check_hypotheses()
+        check_probabilities(self, "expected_f1", "depressed_probability", optional=True)
+        if self.depressed is not None and (self.depressed_probability or 0.0) < 0.5:
+            raise InvalidValueError(
+                "a depression is reported although none is more probable", got=self.depressed_probability
+            )
+        if self.probability is None:
+            return
+        check_probabilities(self, "probability")
+        if self.window is not None and self.probability < 0.5:
+            raise InvalidValueError("a window is reported although 'no window' is more probable", got=self.probability)
+
+    def _check_hypotheses(self) -> None:
+        kinds = self.hypothesis_samples
+        if kinds is None:
+            return
+        samples = 0 if self.edge_samples_ms is None else len(self.edge_samples_ms)
+        if len(kinds) != samples:
+            raise InvalidValueError(
+                "every sample of the edges has one hypothesis", got=len(kinds), expected=str(samples)
+            )
+        if samples and not 0 <= kinds.min() <= kinds.max() < len(self.hypothesis_names):
+            raise InvalidValueError(
+                "every hypothesis has a name", got=int(kinds.max()), expected=f"an index of {self.hypothesis_names}"
+            )
+
+    @property
+    def hypotheses(self) -> dict[str, float] | None:
+        """Probability of each of the model's hypotheses by name, given a window; None where it has none."""
+        if self.hypothesis_samples is None or not len(self.hypothesis_samples):
+            return None
+        counts = np.bincount(self.hypothesis_samples, minlength=len(self.hypothesis_names))
+        shares = (counts / counts.sum()).tolist()
+        return dict(zip(self.hypothesis_names, shares, strict=True))
+
+    def __str__(self) -> str:
+        return self.too_little or str(Estimate.of(self))
+
+    @property
+    def has_answer(self) -> bool:
+        """Whether anything is said about a window; not where a method waits for more trials, nor without any MEP."""
+        says = self.window is not None or self.probability is not None or self.grid_ms is not None
+        return says and not self.silent
+
+    @property
+    def rests_on_data(self) -> bool:
+        """Whether enough was measured to speak of a window; with less it is what was believed beforehand."""
+        return self.too_little is None
+
+    @property
+    def too_little(self) -> str | None:
+        """What is said where too little was measured to speak of a window; None where enough was."""
+        found = lacking(self.pairs, silent=self.silent)
+        return None if found is None else f"{found}"
+
+    def interval(self, level: float = 0.9) -> tuple[Interval, Interval] | None:
+        """Credible intervals of start and end, given that there is a window [ms].
+
+        Args:
+            level: the credible level, in 0–1.
+
+        Returns:
+            ((start low, start high), (end low, end high)), an edge beyond the range being ±inf; None where the method
+            has no posterior of the edges.
+
+        Raises:
+            InvalidValueError: a level outside 0–1.
+        """
+        level = number("a credible level", level, above=0, below=1)
+        if self.edge_samples_ms is None or not len(self.edge_samples_ms):
+            return None
+        (start_low, end_low), (start_high, end_high) = _central(self.edge_samples_ms, level).tolist()
+        return (start_low, start_high), (end_low, end_high)
+
+    @property
+    def edges(self) -> tuple[Edge, Edge]:
+        """Start and end."""
+        intervals = self.interval(0.9)
+        if intervals is None:
+            return Edge(self.start_ms), Edge(self.end_ms)
+        (start, end), (before, beyond) = intervals, self.beyond_probability or (None, None)
+        return Edge(self.start_ms, start[0], start[1], before), Edge(self.end_ms, end[0], end[1], beyond)
+
+    def robust_interval(self, level: float = 0.9, min_share: float = 0.02) -> tuple[Interval, Interval] | None:
+        """Intervals of start and end that hold whichever hypothesis is true: the hull of those given each [ms].
+
+        Args:
+            level: the credible level, in 0–1.
+            min_share: the least probability of a hypothesis that is taken into account, given that there is a window.
+
+        Returns:
+            As `interval` does; the same where the method has no hypotheses.
+
+        Raises:
+            InvalidValueError: a level or a share outside 0–1.
+        """
+        min_share = number("the least share of a hypothesis", min_share, least=0, most=1)
+        whole = self.interval(level)
+        if whole is None or self.hypothesis_samples is None or self.edge_samples_ms is None:
+            return whole
+        counts = np.bincount(self.hypothesis_samples)
+        probable = np.flatnonzero(counts >= max(1.0, min_share * len(self.hypothesis_samples)))
+        given = [_central(self.edge_samples_ms[self.hypothesis_samples == kind], level) for kind in probable]
+        lows, highs = np.stack([np.transpose(whole), *given], axis=1)
+        (start_low, end_low), (start_high, end_high) = lows.min(0).tolist(), highs.max(0).tolist()
+        return (start_low, start_high), (end_low, end_high)
+
+    @property
+    def beyond_probability(self) -> tuple[float, float] | None:
+        """Probability that the window starts before the range, and that it ends beyond it, given that there is one."""
+        if self.edge_samples_ms is None or not len(self.edge_samples_ms):
+            return None
+        start, end = np.isinf(self.edge_samples_ms).mean(axis=0).tolist()
+        return start, end
+
+    def profile(self, isi_ms: ArrayLike) -> ProfileBand | None:
+        """Median and 90 % band of the expected MEP at some ISIs.
+
+        Args:
+            isi_ms: ISIs [ms], shape (t,). Beyond `grid_ms`, as where a sweep has not come yet, the values at its ends
+                are repeated: there they are no estimate.
+
+        Returns:
+            The band [mV], or None where the method has none.
+        """
+        if self.grid_ms is None or self.profile_quantiles_mv is None:
+            return None
+        isi = np.atleast_1d(np.asarray(isi_ms, dtype=float))
+        low, median, high = (np.interp(isi, self.grid_ms, row) for row in self.profile_quantiles_mv)
+        return ProfileBand(median, low, high)
+
+
+def _central(edges_ms: FloatArray, level: float) -> FloatArray:
+    """Lower and upper quantile of start and end, shape (2, 2)."""
+    tail = (1.0 - level) / 2.0
+    # An order statistic never averages a finite edge with an infinite one; of two as near, that of an even index.
+    picks = np.rint((len(edges_ms) - 1) * np.array([tail, 1.0 - tail])).astype(int)
+    central_ms: FloatArray = np.sort(edges_ms, axis=0)[picks]
+    return central_ms
+
+
+class Reported(BaseModel):
+    """What is reported of a window: `segments_ms` are starts and ends in turn, `best_isi_ms` median and 90 % interval.
+
+    `hypotheses` are probabilities by name, given a window; the band is that of the expected MEP at `grid_ms`.
+    """
+
+    model_config = ConfigDict(frozen=True, ser_json_inf_nan="strings", extra="ignore")
+
+    probability: float | None = Field(description="That there is a window.")
+    segments_ms: tuple[float, ...] = Field(
+        default=(), description="The reported window: starts and ends in turn; empty where none."
+    )
+    start_ms: Number | None = None
+    start_low_ms: Number | None = None
+    start_high_ms: Number | None = None
+    end_ms: Number | None = None
+    end_low_ms: Number | None = None
+    end_high_ms: Number | None = None
+    expected_f1: float | None = None
+    best_isi_ms: tuple[float, ...] = ()
+    hypotheses: dict[str, float] = Field(default_factory=dict)
+    grid_ms: tuple[float, ...] = ()
+    profile_mv: Numbers = ()
+    band_low_mv: Numbers = ()
+    band_high_mv: Numbers = ()
+
+
+class Estimate(Reported):
+    """What is known about a window, in figures: what logs keep, and what pictures and sentences are made of.
+
+    `start_beyond`, `end_beyond` and `split` are probabilities given a window: that an edge lies beyond the range, and
+    that there is more than one segment. `unusual` are probabilities by name; `excluded_mv` and `excluded_pct_rmt` are
+    the largest enhancement that is excluded with 90 % probability. `depressed_ms` are the segments in which the tap
+    depresses the MEP, and `depressed_probability` is that there are any; None where nobody looked for them.
+    """
+
+    start_beyond: float | None = None
+    end_beyond: float | None = None
+    split: float | None = None
+    unusual: dict[str, float] = Field(default_factory=dict)
+    excluded_mv: float | None = None
+    excluded_pct_rmt: float | None = None
+    depressed_ms: tuple[float, ...] = ()
+    depressed_probability: float | None = None
+
+    @classmethod
+    def of(cls, estimate: WindowEstimate, **more: Any) -> Self:
+        """The figures of an estimate, with its 90 % intervals."""
+        edges: dict[str, Any] = {
+            f"{name}_{part}": value
+            for name, edge in zip(("start", "end"), estimate.edges, strict=True)
+            for part, value in zip(("ms", "low_ms", "high_ms", "beyond"), edge, strict=True)
+        }
+        excluded = estimate.largest_excluded
+        figures: dict[str, Any] = {
+            "probability": estimate.probability,
+            "segments_ms": () if estimate.window is None else estimate.window.edges_ms,
+            "split": estimate.split_probability,
+            "hypotheses": estimate.hypotheses or {},
+            "unusual": dict(estimate.unusual),
+            "expected_f1": estimate.expected_f1,
+            "best_isi_ms": tuple(estimate.best_isi or ()),
+            "excluded_mv": None if excluded is None else excluded.mep_mv,
+            "excluded_pct_rmt": None if excluded is None else excluded.shift_pct_rmt,
+            "depressed_ms": () if estimate.depressed is None else estimate.depressed.edges_ms,
+            "depressed_probability": estimate.depressed_probability,
+        }
+        return cls(**figures, **edges, **_profile(estimate), **more)
+
+    def __str__(self) -> str:
+        return sentences.summary(self)
+
+    @property
+    def has_answer(self) -> bool:
+        """Whether the method has one: some have none before they have measured enough."""
+        return self.probability is not None or self.window is not None or bool(self.grid_ms)
+
+    @property
+    def window(self) -> Window | None:
+        """The reported window."""
+        return Window.of_edges(self.segments_ms)
+
+    @property
+    def depressed(self) -> Window | None:
+        """The reported ISIs that depress the MEP."""
+        return Window.of_edges(self.depressed_ms)
+
+    @property
+    def start(self) -> Edge:
+        """The start of the window's hull."""
+        return Edge(self.start_ms, self.start_low_ms, self.start_high_ms, self.start_beyond)
+
+    @property
+    def end(self) -> Edge:
+        """The end of the window's hull."""
+        return Edge(self.end_ms, self.end_low_ms, self.end_high_ms, self.end_beyond)
+
+    @property
+    def best_isi(self) -> BestISI | None:
+        """The ISI of the largest expected MEP."""
+        return BestISI(*self.best_isi_ms) if self.best_isi_ms else None
+
+
+def _profile(estimate: WindowEstimate) -> Mapping[str, Any]:
+    band = None if estimate.grid_ms is None else estimate.profile(estimate.grid_ms)
+    if band is None or estimate.grid_ms is None:
+        return {}
+    return {
+        "grid_ms": tuple(estimate.grid_ms.tolist()),
+        "profile_mv": _rounded(band.median_mv),
+        "band_low_mv": _rounded(band.low_mv),
+        "band_high_mv": _rounded(band.high_mv),
+    }
+
+
+def _rounded(values: FloatArray) -> tuple[float, ...]:
+    return tuple(np.asarray(values, dtype=np.float64).round(PROFILE_DECIMALS).tolist())

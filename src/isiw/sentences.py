@@ -1,0 +1,361 @@
+"""Sentences about a result: each is written here once, for the terminal, reports, pages, pictures and comparisons.
+
+A sentence takes figures and values, and decides nothing but its words; one that does not apply is empty.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Final
+
+from isiw.design import DesignSpace
+from isiw.text.numbers import counted
+from isiw.text.stimuli import TAP, StimulusWords
+from isiw.trials import Trial
+from isiw.window import MIN_EXCESS_MV, SURE, Window, rules_out
+
+if TYPE_CHECKING:  # an estimate prints itself in these words
+    from isiw.estimate import Edge, Estimate
+
+WORTH_SAYING: Final = 0.1
+"""Probability from which on an unusual window is mentioned."""
+
+A_GUESS: Final = 0.5
+"""Expected F1 below which the reported ISIs are a guess: most of them are as probably outside."""
+
+MOST_OF_THE_RANGE: Final = 0.9
+"""The share of the range from which on a sweep has covered it."""
+
+UNUSUAL: Final = 0.9
+"""Probability from which on a person is said to be unlike most."""
+
+THRESHOLD_PCT_RMT: Final = 100.0
+"""Above this intensity a pulse evokes an MEP that can be depressed."""
+
+TOO_LITTLE: Final = "too little was measured"
+"""In the place of a window."""
+
+JUDGED_SINCE: Final = "Trials were judged anew after this estimate; resume the session to have it with what counts now."
+
+_LOOK: Final = "Did the stimulator fire? Was the EMG recorded? Was the intensity high enough?"
+_PLACED: Final = "Is the time of the pulse right? Does the MEP window fit the muscle?"
+
+
+def edge_text(edge_ms: float) -> str:
+    """An edge, or on which side of the range it lies."""
+    if math.isinf(edge_ms):
+        return "before the range" if edge_ms < 0 else "beyond the range"
+    return f"{edge_ms:.0f} ms"
+
+
+def interval_cell(edge: Edge) -> str:
+    """The 90 % interval of an edge [ms] in a cell: < is before the range, and > beyond it; empty if not known."""
+    if edge.low_ms is None or edge.high_ms is None:
+        return ""
+    if math.isinf(edge.low_ms) and edge.low_ms == edge.high_ms:
+        return "<" if edge.low_ms < 0 else ">"
+    low = "<" if math.isinf(edge.low_ms) else f"{edge.low_ms:.0f}"
+    return f"{low}–{'>' if math.isinf(edge.high_ms) else f'{edge.high_ms:.0f}'}"
+
+
+def _between(edge: Edge, space: DesignSpace) -> str:
+    """The same for after "starts" or "ends"."""
+    low, high = edge.low_ms or 0.0, edge.high_ms or 0.0
+    if math.isinf(low) and math.isinf(high):
+        return f"before {space.low_ms:g} ms" if low < 0 else f"after {space.high_ms:g} ms"
+    if math.isinf(low):
+        return f"before {high:.0f} ms"
+    return f"after {low:.0f} ms" if math.isinf(high) else f"between {low:.0f} and {high:.0f} ms"
+
+
+def in_short(estimate: Estimate) -> str:
+    """The reported window, or what there is in its place."""
+    if estimate.window is not None:
+        return str(estimate.window)
+    if not estimate.has_answer:
+        return "no answer yet"
+    if estimate.probability is not None and estimate.probability >= 0.5:
+        return "window not reported"
+    return "no window" if rules_out(estimate.probability) else "undecided"
+
+
+def titled(estimate: Estimate) -> str:
+    """The same for the head of a picture or a summary."""
+    return f"Window {estimate.window}" if estimate.window else in_short(estimate).capitalize()
+
+
+def chance_text(probability: float | None) -> str:
+    """How probable a window is, in a picture."""
+    return "" if probability is None else f"P(window) = {probability:.2f}"
+
+
+def summary(estimate: Estimate) -> str:
+    """A window in a line, each of its edges in another where they are known, and where the MEP is depressed."""
+    chance = "" if estimate.probability is None else f" (probability of a window: {estimate.probability:.2f})"
+    found = in_short(estimate)
+    lines = [f"{found.capitalize() if estimate.window is None else f'Window: {found}'}{chance}"]
+    for name, edge in (("Start", estimate.start), ("End", estimate.end)):
+        if estimate.window is not None and edge.low_ms is not None and edge.high_ms is not None:
+            median = "" if edge.median_ms is None else edge_text(edge.median_ms)
+            lines.append(f"{name}: {median}, 90 % interval {edge_text(edge.low_ms)} to {edge_text(edge.high_ms)}")
+    if (depressed := estimate.depressed_probability) is not None:
+        nothing = "nowhere" if rules_out(depressed) else "undecided"
+        lines.append(f"Depressed: {estimate.depressed or nothing} (probability of it: {depressed:.2f})")
+    return "\n".join(lines)
+
+
+def finding(estimate: Estimate, first: StimulusWords, space: DesignSpace) -> str:
+    """Whether there is a window, and which."""
+    window, probability = estimate.window, estimate.probability
+    after = f"after the {first.origin(space.reference)}"
+    if probability is None:
+        return _without_probability(estimate, first, after, space)
+    chance = f" (probability of a window: {probability:.2f})"
+    if window is None:
+        is_none = rules_out(probability)
+        return f"No window was found{chance}." if is_none else f"It is undecided whether there is a window{chance}."
+    enhances = f"The {first.name} {'' if probability >= SURE else 'probably '}enhances the MEP"
+    isis = f"{window} {after}{chance}"
+    if estimate.expected_f1 is not None and estimate.expected_f1 < A_GUESS:
+        return f"{enhances}, but at which ISIs is not known well; the best guess is {isis}."
+    return f"{enhances} at ISIs of {isis}."
+
+
+def _without_probability(estimate: Estimate, first: StimulusWords, after: str, space: DesignSpace) -> str:
+    """The same, of a method that gives none."""
+    if estimate.window is not None:
+        isis = f"{estimate.window} {after}"
+        return f"By this method, which gives no probability, the {first.name} enhances the MEP at ISIs of {isis}."
+    if not estimate.has_answer:
+        return "The method has no answer yet: it has not measured enough for one."
+    first_ms, last_ms = estimate.grid_ms[0], estimate.grid_ms[-1]
+    if last_ms - first_ms < MOST_OF_THE_RANGE * (space.high_ms - space.low_ms):
+        return f"No window was found at the ISIs measured so far, {first_ms:g}–{last_ms:g} ms."
+    return "No window was found."
+
+
+def edges(estimate: Estimate, space: DesignSpace) -> str:
+    """Between which ISIs a reported window starts and ends, and what is unusual about that."""
+    start, end = estimate.start, estimate.end
+    if estimate.window is None or not (start.is_known and end.is_known):
+        return ""
+    given = (
+        "With 90 % probability each, it"
+        if _is_sure(estimate)
+        else "If there is a window, with 90 % probability each it"
+    )
+    said = f"{given} starts {_between(start, space)} and ends {_between(end, space)}."
+    unusual = {
+        "starts before the range": start.beyond,
+        "ends beyond the range": end.beyond,
+        "has more than one segment": estimate.split,
+    }
+    more = [f"it {what} with probability {p:.2f}" for what, p in unusual.items() if p is not None and p >= WORTH_SAYING]
+    return f"{said} Given a window, {', '.join(more)}." if more else said
+
+
+def best_isi(estimate: Estimate) -> str:
+    """At which ISI the largest MEP is expected, given a reported window."""
+    best = estimate.best_isi
+    if estimate.window is None or best is None:
+        return ""
+    given = "The" if _is_sure(estimate) else "If there is a window, the"
+    interval = f"between {best.low_ms:.0f} and {best.high_ms:.0f} ms"
+    return f"{given} largest MEP is expected at {best.isi_ms:.0f} ms, with 90 % probability {interval}."
+
+
+def _is_sure(estimate: Estimate) -> bool:
+    """Whether a reported window goes without saying "if there is one"."""
+    return estimate.probability is None or estimate.probability >= SURE
+
+
+def excluded(estimate: Estimate) -> str:
+    """Which enhancement is excluded if no window is reported."""
+    if estimate.window is not None or estimate.excluded_mv is None:
+        return ""
+    # Less is no window, and says nothing of the input: below the threshold it can shift without any MEP.
+    told = estimate.excluded_pct_rmt is not None and estimate.excluded_mv > MIN_EXCESS_MV
+    share = f" ({_figure(estimate.excluded_pct_rmt or 0.0)} % of RMT)" if told else ""
+    enhancement = f"An enhancement of more than {_figure(1e3 * max(estimate.excluded_mv, MIN_EXCESS_MV))} µV{share}"
+    return f"{enhancement} is excluded with 90 % probability."
+
+
+def _figure(value: float) -> str:
+    return f"{value:.0f}" if value >= 10 else f"{value:.2g}"
+
+
+def expected_f1(estimate: Estimate) -> str:
+    """How good the reported decision is expected to be."""
+    if estimate.expected_f1 is None:
+        return ""
+    return f"The expected F1 of this result is {estimate.expected_f1:.2f} (1 is the true window, 0 no overlap)."
+
+
+def unusual(estimate: Estimate) -> str:
+    """In what a person is unlike most."""
+    said = [f"{what} (probability {p:.2f})" for what, p in estimate.unusual.items() if p >= UNUSUAL]
+    return f"This person is unlike most in {', '.join(said)}." if said else ""
+
+
+def depression(estimate: Estimate, stimulus: str, intensity_pct: float | None) -> str:
+    """Where the MEP is depressed, or that the strategy does not look for it above the motor threshold."""
+    if (probability := estimate.depressed_probability) is not None:
+        chance = f" (probability that it does so anywhere: {probability:.2f})"
+        if estimate.depressed is not None:
+            likely = "" if probability >= SURE else "probably "
+            return f"The {stimulus} {likely}depresses the MEP at ISIs of {estimate.depressed}{chance}."
+        if rules_out(probability):
+            return f"No ISIs were found at which the {stimulus} depresses the MEP{chance}."
+        return f"It is undecided whether the {stimulus} depresses the MEP at any ISI{chance}."
+    if intensity_pct is None or intensity_pct <= THRESHOLD_PCT_RMT:
+        return ""
+    return (
+        f"This strategy looks for enhancement alone. At {intensity_pct:g} % of RMT the {stimulus} may depress "
+        "the MEP too: the strategy supra-threshold looks for both."
+    )
+
+
+def nothing_estimated(completed: int, given: int, *, damaged: bool) -> str:
+    """That there is no readable estimate: "nothing was done" only if nothing was."""
+    damage = ", and the log is damaged" if damaged else ""
+    pulses = f"{counted(given, 'pulse was', 'pulses were')} given, or may have been"
+    if completed:
+        return f"No estimate can be read{damage}: {pulses}, {counted(completed, 'has', 'have')} an outcome."
+    if given:
+        return f"No outcome can be read{damage}: {pulses}, none has an outcome."
+    return f"No trial can be read{damage}." if damaged else "No trial has been completed."
+
+
+def all_silent(told: int, found: str) -> str:
+    """That no MEP was seen in any trial."""
+    return f"{found}. The amplitudes of all {told} trials that count are 0. {_LOOK}"
+
+
+def few_pairs(pairs: int, given: int) -> str:
+    """That some trials count, and too few pairs of stimuli."""
+    count = counted(pairs, "pair of stimuli counts", "pairs of stimuli count")
+    return f"Too little was measured to speak of a window: {count}, of {given} trials."
+
+
+def all_lost(reasons: Mapping[str, int], given: int, background_uv: float | None) -> str:
+    """That no trial counts, and why."""
+    if not reasons:
+        return f"Nothing was measured: none of {given} trials counts."
+    why = ", ".join(f"{count} {reason}" for reason, count in reasons.items())
+    if background_uv is not None:
+        level = f"{background_uv / 1000:.2g} mV" if background_uv >= 1000 else f"{background_uv:.2g} µV"
+        why += f"; background EMG {level} RMS"
+    return f"Nothing was measured: {sum(reasons.values())} of {given} trials were rejected ({why})."
+
+
+def not_larger(medians_uv: tuple[float, float]) -> str:
+    """That the MEPs inside a reported window are no larger than those outside."""
+    said = f" (medians {medians_uv[0]:.0f} and {medians_uv[1]:.0f} µV)" if medians_uv[0] <= medians_uv[1] else ""
+    return f"The data do not bear this out: the MEPs inside are no larger than those outside{said}."
+
+
+def not_clearly_larger(medians_uv: tuple[float, float], p: float) -> str:
+    """The same, if it is possible that they are."""
+    return (
+        "The data hardly bear this out: the MEPs inside are not clearly larger than those outside "
+        f"(medians {medians_uv[0]:.0f} and {medians_uv[1]:.0f} µV, p = {p:.2f})."
+    )
+
+
+def changed(word: str, p: float) -> str:
+    """That amplitudes "grew" or "shrank" from trial to trial, whatever the ISI."""
+    return (
+        f"The amplitudes {word} during the session, within the window and outside it (Kendall's test, "
+        f"p = {p:.1g}), and a window may be due to that. Was the intensity changed, did the coil move, or did "
+        "the person tire?"
+    )
+
+
+def at_rest(window_ms: tuple[float, float] | None, since: int | None) -> str:
+    """That no MEP was larger than EMG at rest, or none since a trial; `window_ms` is where it was sought."""
+    sought = f"in the MEP window, {window_ms[0]:g}–{window_ms[1]:g} ms after the pulse," if window_ms else ""
+    emg = f"the EMG {sought or 'after the pulse'}"
+    look = f"{_LOOK} {_PLACED}" if window_ms else _LOOK
+    if since is None:
+        return f"In no trial was {emg} larger than at rest. {look}"
+    return f"From trial {since} on, {emg} was never larger than at rest. {look}"
+
+
+def few_outside(outside: int, pairs: int, alone: int) -> str:
+    """That hardly a trial shows the MEP outside a reported window."""
+    return (
+        f"Hardly anything shows how large MEPs are without enhancement: {outside} of {pairs} pairs are outside, "
+        f"and the number of pulses of TMS alone was {alone}. In the next session add TMS alone (in a configuration: "
+        "[protocol] tms_alone), or widen the range of ISIs."
+    )
+
+
+def counts(given: int, told: int, controls: Mapping[str, int], mistrials: Mapping[str, int], unwanted: int) -> str:
+    """How many stimuli were delivered, how many count, and why the others do not."""
+    pairs = counted(given, "pair of stimuli was delivered", "pairs of stimuli were delivered")
+    if controls:
+        kinds = " and ".join(f"{count} of {kind}" for kind, count in sorted(controls.items(), reverse=True))
+        pairs = f"{given} stimuli were delivered, {kinds} among them"
+    parts = [f"{pairs}; {counted(told, 'counts', 'count')}"]
+    if mistrials:
+        parts.append("mistrials: " + ", ".join(f"{count} {reason}" for reason, count in mistrials.items()))
+    if unwanted:
+        parts.append(f"{unwanted} excluded")
+    return "; ".join(parts) + "."
+
+
+def fit(troubled: int, trials: int) -> str:
+    """In how many trials the fit had trouble."""
+    return f"The fit had trouble in {troubled} of {trials} trials; isiw show lists them." if troubled else ""
+
+
+def doubt(trial: int | None, text: str) -> str:
+    """What was doubted while the session ran."""
+    return f"Doubt since trial {trial}: {text}"
+
+
+def truth(true: Window | None, found: Window | None, f1: float | None) -> str:
+    """How close the reported window is to a simulated person's true one; `f1` is None if nothing was found out."""
+    said = "has no window" if true is None else f"has the window {true}"
+    if f1 is None:
+        return f"This simulated person in fact {said}."
+    share = f"none was reported (F1 {f1:.2f})" if found is None else f"the F1 of the reported one is {f1:.2f}"
+    return f"This simulated person in fact {said}; {share}."
+
+
+def moved(probability: float | None, before: float) -> str:
+    """How probable it is that a window moved more than it does from day to day."""
+    if probability is None:
+        return ""
+    return (
+        f"with probability {probability:.2f} ({before:g} where nothing is known) the window moved beyond the "
+        "usual shift from day to day;"
+    )
+
+
+def later(starts_later: float | None, ends_later: float | None) -> str:
+    """How probable it is that a window starts later, and ends later, than another one."""
+    if starts_later is None or ends_later is None:
+        return ""
+    return (
+        f"it starts later with probability {starts_later:.2f} and ends later with probability {ends_later:.2f} "
+        "(0.5 where nothing is known)."
+    )
+
+
+def asked(trial: Trial, first: StimulusWords = TAP) -> str:
+    """What a trial was to be: its ISI, or which control trial."""
+    if trial.commanded_isi_ms is not None:
+        return f"{trial.commanded_isi_ms:.4g} ms"
+    if trial.tap_alone:
+        return first.alone
+    return "TMS alone" if trial.is_control else "–"
+
+
+def outcome(trial: Trial) -> str:
+    """What came of a trial."""
+    if trial.reason is not None:
+        return f"mistrial: {trial.reason}"
+    text = "–" if trial.mep_mv is None else f"{1e3 * trial.mep_mv:.0f} µV"
+    return f"{text} (excluded)" if trial.excluded else text
