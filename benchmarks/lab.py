@@ -41,8 +41,7 @@ from isiw.models.shared.scales import Scale
 from isiw.priors import LabPrior
 from isiw.priors.components import place
 from isiw.priors.lab import share_of
-from isiw.priors.people import hyper_prior
-from isiw.priors.population import Block, People
+from isiw.priors.population import Block, People, hyper_prior
 from isiw.priors.population import learnt as law_of
 from isiw.studies import SimulatedSession, simulate
 from isiw.subjects import LABS, Lab, SimulatedSubject, cohort, lab

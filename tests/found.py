@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from isiw.findings import Finding
-from isiw.signals.checklist import findings
 from isiw.signals.evidence import Evidence, Told
+from isiw.signals.watch import findings
 from isiw.trials import Measurement, Sweep, Trial
 
 

@@ -26,7 +26,6 @@ from .devices.callback import CallbackDevice as CallbackDevice
 from .devices.clock import MonotonicClock as MonotonicClock
 from .devices.clock import VirtualClock as VirtualClock
 from .devices.deadlines import Deadlines as Deadlines
-from .devices.dry_run import DryRun as DryRun
 from .devices.limits import Limits as Limits
 from .devices.protocol import Device as Device
 from .devices.protocol import DeviceInfo as DeviceInfo
@@ -38,6 +37,7 @@ from .devices.robot.tapper import TapperSettings as TapperSettings
 from .devices.robot.vane.actuator import Rotor as Rotor
 from .devices.robot.vane.actuator import Vane as Vane
 from .devices.robot.vane.tapper import RotatingTapper as RotatingTapper
+from .devices.simulated import DryRun as DryRun
 from .devices.simulated import SimulatedDevice as SimulatedDevice
 from .devices.simulated import SimulatedPerson as SimulatedPerson
 from .devices.transports.folder import FolderDevice as FolderDevice
@@ -53,7 +53,7 @@ from .session.loop import Session as Session
 from .session.opening import open_session as open_session
 from .session.recorder import Recorder as Recorder
 from .session.resume import resume as resume
-from .session.safeguards import Safeguards as Safeguards
+from .session.rig import Safeguards as Safeguards
 from .strategy.catalogue import list_settings as list_settings
 from .strategy.catalogue import list_strategies as list_strategies
 from .strategy.catalogue import make_strategy as make_strategy

@@ -19,7 +19,7 @@ from isiw.checks import choice, number, whole
 from isiw.errors import InvalidValueError
 from isiw.findings import AMPLITUDE_MV
 from isiw.lazy import pd
-from isiw.signals.values import require_amplitude
+from isiw.signals.limits import require_amplitude
 from isiw.subjects.profiles import PeakProfile
 from isiw.subjects.responses import EmgFloor, RecruitmentResponse
 from isiw.subjects.subject import SimulatedSubject

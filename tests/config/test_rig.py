@@ -10,7 +10,7 @@ import pytest
 
 from isiw import priors
 from isiw.config import device_for, load_config, session_for
-from isiw.config.rig import TEMPLATE_FILES, device_from_factory, write_rig_template
+from isiw.config.session import TEMPLATE_FILES, device_from_factory, write_rig_template
 from isiw.design import IMPACT_SPACE
 from isiw.errors import ConfigError, LimitExceededError
 from isiw.log.reader import read_session

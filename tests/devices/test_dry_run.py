@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from isiw.design import DesignSpace
-from isiw.devices.dry_run import DryRun
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Readiness
+from isiw.devices.simulated import DryRun
 from isiw.errors import LimitExceededError
 from isiw.log.reader import read_session
 from isiw.session.loop import Session

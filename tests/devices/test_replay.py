@@ -14,7 +14,7 @@ from isiw.findings import Kind
 from isiw.log.reader import SessionRecord, read_session
 from isiw.metrics import f1
 from isiw.session.loop import Session
-from isiw.session.updates import SessionResult
+from isiw.session.sink import SessionResult
 from isiw.strategy.catalogue import make_strategy
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.subject import SimulatedSubject

@@ -11,7 +11,7 @@ import pytest
 from export.recorded import note, sweep, write_sweeps
 from isiw.devices.protocol import DeviceInfo
 from isiw.export import export_logs
-from isiw.export.pseudonyms import pseudonymised
+from isiw.export.collection import pseudonymised
 from isiw.log.reader import read_session
 
 SECRETS = ("Meier", "Anna", "cough", "2026", "COM3", "ward 7", "meier_monday")

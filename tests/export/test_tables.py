@@ -17,9 +17,8 @@ from isiw.errors import InvalidValueError, LogError
 from isiw.export import export_logs
 from isiw.export.tables import session_facts
 from isiw.log.amending import exclude
-from isiw.log.frames import TRIAL_COLUMNS
-from isiw.log.reader import read_session
-from isiw.log.schema import StrategyRecipe
+from isiw.log.headers import StrategyRecipe
+from isiw.log.reader import TRIAL_COLUMNS, read_session
 from isiw.session.loop import Session
 from isiw.session.opening import open_session
 from isiw.visit import Visit

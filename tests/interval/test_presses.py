@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from isiw.interval.presses import Presses
+from isiw.interval.task import Presses
 
 
 class Times:

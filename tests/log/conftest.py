@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from isiw.log.schema import Header
+from isiw.log.headers import Header
 from isiw.log.writer import LogWriter
 from log.written import make_header, write_trials
 

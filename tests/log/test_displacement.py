@@ -13,9 +13,9 @@ import pytest
 
 from isiw.errors import LogError
 from isiw.log.durable import DurableFile
+from isiw.log.headers import Header
 from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
-from isiw.log.schema import Header
 from isiw.log.writer import LogWriter
 from known import known
 from log.written import write_trials

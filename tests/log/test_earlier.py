@@ -5,9 +5,8 @@ import json
 import pytest
 
 from isiw.findings import Kind
-from isiw.log.earlier import with_kinds
-from isiw.log.schema import EstimateRecord, Event, EventKind, Record
-from isiw.log.topics import decode, encode
+from isiw.log.records import with_kinds
+from isiw.log.schema import EstimateRecord, Event, EventKind, Record, decode, encode
 from isiw.strategy.stopping import StopKind
 
 

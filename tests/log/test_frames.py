@@ -8,10 +8,10 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from isiw.log.frames import TRIAL_COLUMNS
-from isiw.log.onsets import Onsets
-from isiw.log.reader import read_session
-from isiw.log.schema import Header, Intent
+from isiw.log.headers import Header
+from isiw.log.reader import TRIAL_COLUMNS, read_session
+from isiw.log.records import Onsets
+from isiw.log.schema import Intent
 from isiw.log.writer import LogWriter
 from isiw.session.loop import Session
 from isiw.session.resume import resume

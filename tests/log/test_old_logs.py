@@ -17,7 +17,7 @@ from isiw.findings import Kind
 from isiw.plots import save_session_plot
 from isiw.report import final_statement
 from isiw.session.replay import strategy_of
-from isiw.session.updates import SessionUpdate
+from isiw.session.sink import SessionUpdate
 
 FOLDER = Path(__file__).parents[1] / "data" / "logs"
 LOGS = sorted(path.name for path in FOLDER.glob("*.mcap*"))

@@ -10,9 +10,10 @@ import pytest
 
 from isiw.devices.limits import Limits
 from isiw.errors import LogError
+from isiw.log.headers import SCHEMA_VERSION, Header
 from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
-from isiw.log.schema import SCHEMA_VERSION, Event, Header, Intent, Waveform
+from isiw.log.schema import Event, Intent, Waveform
 from isiw.log.writer import LogWriter
 from isiw.trials import Channel
 from log.written import write_trials

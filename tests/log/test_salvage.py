@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from isiw.errors import DamagedLogError, LogError
+from isiw.log.headers import Header
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.salvage import current_file, holds, only_in, salvage
-from isiw.log.schema import Header, Intent, Waveform
+from isiw.log.schema import Intent, Waveform
 from isiw.log.writer import LogWriter
 from isiw.trials import Channel, Status, Trial
 from log.written import write_trials

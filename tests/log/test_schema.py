@@ -10,20 +10,24 @@ import pytest
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
 from isiw.findings import Kind
+from isiw.log.headers import Header
 from isiw.log.production import Production
 from isiw.log.salvage import salvage
 from isiw.log.schema import (
+    CHANNEL_IDS,
     Correction,
     EstimateRecord,
     Event,
-    Header,
     Intent,
     PulseOutcome,
     Record,
     ThresholdBelief,
     Waveform,
+    decode,
+    encode,
+    json_schema,
+    topic_of,
 )
-from isiw.log.topics import CHANNEL_IDS, decode, encode, json_schema, topic_of
 from isiw.log.writer import LogWriter
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.threshold import ThresholdEstimate

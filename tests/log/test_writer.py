@@ -11,9 +11,10 @@ import pytest
 from mcap.reader import make_reader
 
 from isiw.errors import LogError
+from isiw.log.headers import Header
 from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
-from isiw.log.schema import Event, Header, Waveform
+from isiw.log.schema import Event, Waveform
 from isiw.log.writer import LogWriter
 from isiw.session.opening import open_session
 from isiw.trials import Channel

@@ -10,7 +10,8 @@ import numpy as np
 from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
-from isiw.log.schema import Header, Intent, StrategyRecipe, Waveform
+from isiw.log.headers import Header, StrategyRecipe
+from isiw.log.schema import Intent, Waveform
 from isiw.log.writer import LogWriter
 from isiw.signals.limits import SignalLimits
 from isiw.trials import Channel, Status, Trial

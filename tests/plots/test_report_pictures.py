@@ -13,10 +13,9 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from isiw.log.reader import SessionRecord
-from isiw.plots.course import course_figure
-from isiw.plots.inline import inline_svg
+from isiw.plots.style import inline_svg
 from isiw.plots.sweeps import sweeps_figure
-from isiw.plots.timeline import timeline_figure
+from isiw.plots.timeline import course_figure, timeline_figure
 from known import instance, known
 from report.sessions import pulsed, tapped
 

@@ -9,7 +9,7 @@ import numpy as np
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
-from isiw.log.schema import Header, StrategyRecipe
+from isiw.log.headers import Header, StrategyRecipe
 from isiw.log.writer import LogWriter
 from isiw.signals.limits import SignalLimits
 from isiw.subjects.cohorts import cohort

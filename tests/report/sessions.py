@@ -12,7 +12,7 @@ from isiw.devices.robot.tapper import Tapper, TapperSettings
 from isiw.devices.simulated import SimulatedDevice
 from isiw.log.reader import SessionRecord, read_session
 from isiw.session.loop import Session
-from isiw.session.updates import SessionUpdate
+from isiw.session.sink import SessionUpdate
 from isiw.trials import Status, Trial
 from isiw.visit import Visit, VisitProtocol
 from scripted import scripted_strategy

@@ -7,7 +7,7 @@ import pytest
 
 from isiw.devices.limits import Limits
 from isiw.log.reader import SessionRecord, read_session
-from isiw.report.facts import first_facts, further_facts, settings_facts
+from isiw.report.tables import first_facts, further_facts, settings_facts
 from isiw.session.loop import Session
 from isiw.visit import Visit
 from scripted import ScriptedDevice, scripted_strategy

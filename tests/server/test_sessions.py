@@ -15,10 +15,9 @@ from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError, LogError
 from isiw.findings import TOO_FEW, Kind
 from isiw.log.reader import read_session
-from isiw.log.schema import Record
-from isiw.log.topics import encode
+from isiw.log.schema import Record, encode
+from isiw.server.answers import Refusal
 from isiw.server.driven import DrivenSession
-from isiw.server.refusals import Refusal
 from isiw.server.requests import AskRequest, CreateRequest, TellRequest
 from isiw.server.sessions import Sessions
 from isiw.session.examination import Examination

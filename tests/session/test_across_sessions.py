@@ -13,7 +13,7 @@ from isiw.errors import InvalidValueError, LimitExceededError, LogError
 from isiw.log.reader import read_session
 from isiw.session.loop import Session
 from isiw.session.resume import resume
-from isiw.session.safeguards import Safeguards
+from isiw.session.rig import Safeguards
 from scripted import FakeRealClock, ScriptedDevice, scripted_strategy
 
 LIMITS = Limits(0, 200, 5.0, 100, max_period_pulses=5, period_s=3600.0)

@@ -20,8 +20,8 @@ from isiw.log.amending import exclude
 from isiw.log.reader import read_session
 from isiw.session.loop import Session
 from isiw.session.resume import resume
-from isiw.session.safeguards import Safeguards
-from isiw.session.updates import SessionUpdate
+from isiw.session.rig import Safeguards
+from isiw.session.sink import SessionUpdate
 from isiw.testing import Fired, check_ledger
 from isiw.trials import Measurement, Stimulus
 from known import known

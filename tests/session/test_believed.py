@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 
 from isiw.log.reader import SessionRecord, read_session
-from isiw.log.schema import EstimateRecord
-from isiw.log.topics import decode, encode
+from isiw.log.schema import EstimateRecord, decode, encode
 from isiw.session.examination import believed
 from isiw.session.loop import Session
 from isiw.session.opening import open_session
 from isiw.strategy.catalogue import make_strategy
-from isiw.strategy.choosing import candidate_isis
+from isiw.strategy.course import candidate_isis
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Measurement
 from known import instance, known

@@ -9,8 +9,8 @@ from contextlib import contextmanager
 import pytest
 
 from isiw.errors import InvalidValueError, LogError
-from isiw.session.asking import Asking
 from isiw.session.desk import Desk
+from isiw.session.steps import Asking
 from isiw.trials import Status, Trial, TrialTable
 
 

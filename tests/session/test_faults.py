@@ -18,10 +18,10 @@ from isiw.findings import Kind
 from isiw.log.pulses import pulses_s
 from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
-from isiw.session.lastresort import STILL_ARMED
+from isiw.session.interrupts import STILL_ARMED
 from isiw.session.loop import Session
 from isiw.session.resume import resume
-from isiw.session.safeguards import Safeguards
+from isiw.session.rig import Safeguards
 from isiw.trials import Channel, Measurement, Stimulus, Sweep
 from known import known
 from scripted import ScriptedDevice, scripted_strategy, told_to
@@ -237,7 +237,7 @@ sys.path.insert(0, {tests!r})
 from scripted import ScriptedDevice, scripted_strategy
 from isiw.devices.deadlines import Deadlines
 from isiw.session.loop import Session
-from isiw.session.safeguards import Safeguards
+from isiw.session.rig import Safeguards
 
 device = ScriptedDevice()
 def stop():

@@ -11,13 +11,11 @@ import pytest
 from isiw.errors import InvalidValueError
 from isiw.log.reader import read_session
 from isiw.log.schema import Intent, Record
-from isiw.session.asking import Asking
 from isiw.session.interrupts import Interrupts
 from isiw.session.loop import Session
-from isiw.session.safeguards import Safeguards
-from isiw.session.sink import Sink
-from isiw.session.steps import Pace
-from isiw.session.updates import SessionUpdate
+from isiw.session.rig import Safeguards
+from isiw.session.sink import SessionUpdate, Sink
+from isiw.session.steps import Asking, Pace
 from isiw.trials import Trial
 from scripted import ScriptedDevice, scripted_strategy
 

@@ -22,7 +22,7 @@ from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import EstimateRecord, Intent
 from isiw.models.particles import ParticleModel
 from isiw.session.loop import Session
-from isiw.session.updates import SessionUpdate
+from isiw.session.sink import SessionUpdate
 from isiw.signals import SignalLimits
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Recipe, Strategy

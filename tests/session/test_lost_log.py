@@ -15,8 +15,8 @@ from isiw.log.reader import read_session
 from isiw.session.loop import Session
 from isiw.session.opening import open_session
 from isiw.session.resume import resume
+from isiw.session.sink import SessionUpdate
 from isiw.session.threshold import open_threshold
-from isiw.session.updates import SessionUpdate
 from isiw.strategy.threshold import IntensityRange, make_threshold_search
 from isiw.trials import Measurement, Stimulus
 from scripted import ScriptedDevice, scripted_strategy

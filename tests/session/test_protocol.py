@@ -20,7 +20,7 @@ from isiw.log.reader import read_session
 from isiw.session.loop import Session
 from isiw.session.opening import open_session
 from isiw.session.resume import resume
-from isiw.session.updates import SessionUpdate
+from isiw.session.sink import SessionUpdate
 from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep
 from isiw.visit import Control, Visit, VisitProtocol
 from scripted import ALONE_MS, FakeRealClock, ScriptedDevice, scripted_strategy, told_to

@@ -15,12 +15,11 @@ import pytest
 
 from forked import Forked
 from isiw.log.reader import read_session
-from isiw.session.interrupts import Interrupts
-from isiw.session.lastresort import INTERRUPTED
+from isiw.session.interrupts import INTERRUPTED, Interrupts
 from isiw.session.loop import Session
 from isiw.session.resume import resume
-from isiw.session.safeguards import Safeguards
-from isiw.session.updates import SessionUpdate
+from isiw.session.rig import Safeguards
+from isiw.session.sink import SessionUpdate
 from isiw.strategy.stopping import StopKind
 from isiw.trials import Measurement, Stimulus
 from scripted import ScriptedDevice, scripted_strategy

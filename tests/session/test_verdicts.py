@@ -25,8 +25,8 @@ from isiw.report import final_statement
 from isiw.session.loop import Session
 from isiw.session.opening import open_session
 from isiw.session.resume import resume
-from isiw.session.safeguards import Safeguards
-from isiw.session.updates import SessionUpdate
+from isiw.session.rig import Safeguards
+from isiw.session.sink import SessionUpdate
 from isiw.strategy.catalogue import make_strategy
 from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep
 from scripted import ScriptedDevice, scripted_strategy, told_to

@@ -21,7 +21,7 @@ from isiw.report import final_statement
 from isiw.session import progress_row
 from isiw.session.loop import Session
 from isiw.session.resume import resume
-from isiw.session.safeguards import Safeguards
+from isiw.session.rig import Safeguards
 from isiw.signals import SignalLimits
 from isiw.signals.watch import Watch
 from isiw.strategy.catalogue import make_strategy

@@ -6,7 +6,7 @@ import pytest
 from found import doubt_of
 from isiw.design import IMPACT_SPACE, DesignSpace
 from isiw.findings import Finding, Kind, Severity
-from isiw.signals.values import isi_far, require_plausible
+from isiw.signals.limits import isi_far, require_plausible
 from isiw.signals.watch import Doubts
 
 

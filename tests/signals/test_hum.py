@@ -8,10 +8,10 @@ import pytest
 from isiw.design import DesignSpace
 from isiw.findings import Kind, Severity
 from isiw.signals import SignalLimits, judge
-from isiw.signals.checklist import findings
 from isiw.signals.evidence import Evidence
-from isiw.signals.hum import at_rest, mains_hum
 from isiw.signals.places import told_by
+from isiw.signals.watch import findings
+from isiw.signals.waveforms import at_rest, mains_hum
 from isiw.trials import Channel, Stimulus, Sweep, Trial
 from known import known
 

@@ -13,8 +13,7 @@ from isiw.models.dissertation.bootstrap import BootstrapPosterior
 from isiw.models.particles import ParticlePosterior
 from isiw.models.protocol import Observation, Posterior, Tensor
 from isiw.strategy.catalogue import make_strategy
-from isiw.strategy.choosing import Choice, evenly_spaced
-from isiw.strategy.course import Course, Method
+from isiw.strategy.course import Choice, Course, Method, evenly_spaced
 from isiw.strategy.settling import EdgeVariance
 from isiw.strategy.stopping import Budget
 from known import instance

@@ -16,8 +16,7 @@ from scipy import stats
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.subjects.cohorts import COHORTS, cohort, person_of
-from isiw.subjects.days import another_day
+from isiw.subjects.cohorts import COHORTS, another_day, cohort, person_of
 from isiw.subjects.labs import LABS, lab
 from isiw.subjects.profiles import OpposedProfile, PeakProfile, TwoPeakProfile
 from isiw.subjects.realities import CHANGED

@@ -11,8 +11,8 @@ from scipy import stats
 
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
+from isiw.subjects.changes import Plasticity
 from isiw.subjects.cohorts import cohort
-from isiw.subjects.plasticity import Plasticity
 from isiw.subjects.profiles import OpposedProfile, PeakProfile
 from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse
 from isiw.subjects.subject import SimulatedSubject

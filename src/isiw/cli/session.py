@@ -12,7 +12,7 @@ import typer
 import isiw
 from isiw.cli.console import NO_DEFAULT, NOT_OVER, SESSIONS, errors_reported, show
 from isiw.cli.files import free_beside, log_exists
-from isiw.text.commands import command
+from isiw.text.harmless import command
 
 if TYPE_CHECKING:
     from isiw.devices.protocol import Device

@@ -1,19 +1,18 @@
 """Configuration files, and the sessions that they describe."""
 
-from isiw.config.going_on import changes_on_resume, differences_on_resume, read_to_resume
+from isiw.config.going_on import after_end, after_error, changes_on_resume, differences_on_resume, read_to_resume
 from isiw.config.logged import Truth, device_of_log, run_of_log, truth_of
-from isiw.config.next_steps import after_end, after_error
-from isiw.config.rig import write_rig_template
 from isiw.config.run import RunConfig, limits_for, load_config
 from isiw.config.session import (
     assumed_space,
     device_for,
     fresh_log_path,
     require_device,
+    require_same_person,
     session_for,
     subject_for,
+    write_rig_template,
 )
-from isiw.config.taught import require_same_person
 
 __all__ = [
     "RunConfig",

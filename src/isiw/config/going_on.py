@@ -10,14 +10,16 @@ from typing import Any
 from isiw.config.logged import run_of_log
 from isiw.config.run import RunConfig
 from isiw.config.sections import SimulatedConfig
+from isiw.config.session import learns_from_earlier
 from isiw.devices.limits import Limits
-from isiw.errors import ConfigError, LogError
+from isiw.errors import ConfigError, IsiwError, LimitExceededError, LogError
+from isiw.log.headers import RUN_KEY, Header
 from isiw.log.kinds import continued_by
 from isiw.log.reader import SessionRecord, read_session
-from isiw.log.schema import Header
+from isiw.session.loop import Session
 from isiw.session.resume import limits_of_log
 from isiw.strategy.catalogue import make_strategy
-from isiw.text.commands import command
+from isiw.text.harmless import command
 
 
 def read_to_resume(log: Path, config: Path | None) -> SessionRecord:
@@ -165,3 +167,63 @@ def _told(value: object) -> object:
     if isinstance(value, dict):
         return "another one"
     return "not set" if value in (None, "") else value
+
+
+def after_error(session: Session, config: Path | None, error: BaseException | None, *, delivered: bool) -> list[str]:
+    """How to go on with a session that an error has ended, in lines; the command comes last.
+
+    A session that was over when the error came, as where the device could not be let go of, has nothing to go on with.
+
+    Args:
+        session: the session.
+        config: the configuration that it was run with; None where there was none.
+        error: what ended it.
+        delivered: whether it had delivered anything since it was begun or resumed.
+    """
+    if _is_over(session.log_path):
+        seen = command("show", session.log_path)
+        return [f"The session is over, and its log is complete. See what was found with: {seen}"]
+    limited = config is not None and isinstance(error, LimitExceededError)
+    lines = (
+        [f"The limits are under [limits] in {config}; they are read again when the session is resumed."]
+        if limited
+        else []
+    )
+    safe = "The session ended early. Its log is safe" if delivered else "No stimulus was delivered. The log is kept"
+    return [*lines, f"{safe}; go on with: {continued_by(session.log_path, session.header, config, changed=limited)}"]
+
+
+def _is_over(log: Path) -> bool:
+    """Whether the log's last decision was to stop, so that nothing is missing in it."""
+    try:
+        decision = read_session(log).decision
+    except IsiwError:
+        return False
+    return decision is not None and decision.stop
+
+
+def after_end(session: Session, config: Path | None, *, delivered: bool) -> str | None:
+    """How more can be delivered to the same person after a session is over; None where nobody has asked for that.
+
+    Args:
+        session: the session, after a decision that stops.
+        config: the configuration that it was run with; None where there was none.
+        delivered: whether it has delivered anything since it was begun or resumed.
+    """
+    if not session.strategy.decision().stop:  # so that it was the limits
+        where = f"in {config}" if config is not None else "of a configuration"
+        way_on = continued_by(session.log_path, session.header, config, changed=True)
+        return f"For more pulses set a higher max_pulses under [limits] {where}, then go on with: {way_on}"
+    if delivered:
+        return None
+    same = "" if config else ", with the same configuration if there was one"
+    more = f"For more trials with this person begin a new session{same}: {_anew(session, config)}"
+    return f"The session is over, so no stimulus was delivered. {more}"
+
+
+def _anew(session: Session, config: Path | None) -> str:
+    """The command that begins a session of the same person, from what this one has found where its strategy can."""
+    header = session.header
+    seed = ["--seed", header.seed] if RUN_KEY in header.config else []
+    after = ["--after", session.log_path] if learns_from_earlier(header.strategy.name) else []
+    return command("run", *([config] if config else []), *seed, *after)

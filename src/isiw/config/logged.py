@@ -12,9 +12,9 @@ from isiw.config.sections import SimulatedConfig
 from isiw.config.session import simulated_device
 from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import ConfigError
+from isiw.log.headers import RUN_KEY
 from isiw.log.kinds import continued_by
 from isiw.log.reader import SessionRecord
-from isiw.log.schema import RUN_KEY
 from isiw.subjects.cohorts import person_of
 from isiw.text.toml_files import checked
 from isiw.window import Window

@@ -29,8 +29,8 @@ from isiw.config.sections import (
     SubjectConfig,
     VisitConfig,
     require_together,
+    require_units,
 )
-from isiw.config.slips import require_units
 from isiw.design import DesignSpace, missing_reference
 from isiw.devices.limits import Limits
 from isiw.errors import ConfigError, did_you_mean

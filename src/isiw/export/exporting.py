@@ -2,18 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import shutil
+import uuid
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 
 from isiw.checks import choice
+from isiw.errors import InvalidValueError
 from isiw.export.bids import write_bids
-from isiw.export.collection import Part, log_losses, numbered, read_logs, told_twice
-from isiw.export.folder import new_folder
-from isiw.export.pseudonyms import pseudonymised
+from isiw.export.collection import Part, log_losses, numbered, pseudonymised, read_logs, told_twice
 from isiw.export.tables import write_tables
+
+
+@contextmanager
+def new_folder(target: str | Path) -> Iterator[Path]:
+    """A folder to write to, which takes its name once everything is in it; where anything fails it is gone."""
+    place = Path(target)
+    _require_free(place)
+    place.parent.mkdir(parents=True, exist_ok=True)
+    beside = place.with_name(f".{place.name}.{uuid.uuid4().hex}")
+    beside.mkdir()
+    try:
+        yield beside
+        _require_free(place)
+        if place.exists():
+            place.rmdir()
+        beside.rename(place)
+    except BaseException:
+        shutil.rmtree(beside, ignore_errors=True)
+        raise
+
+
+def _require_free(place: Path) -> None:
+    if place.is_symlink() or (place.exists() and not (place.is_dir() and not any(place.iterdir()))):
+        raise InvalidValueError(
+            "an export goes into a new folder, and replaces nothing", got=str(place), remedy="Choose another one."
+        )
+
 
 FORMATS: Mapping[str, Callable[[Sequence[Part], Path], Sequence[str] | None]] = MappingProxyType(
     {

@@ -9,9 +9,8 @@ from typing import Any, Final
 
 from isiw.export.collection import Part, log_losses, stimulus_of
 from isiw.lazy import pd
-from isiw.log.frames import trial_columns
 from isiw.log.outputs import write_output
-from isiw.log.reader import SessionRecord
+from isiw.log.reader import SessionRecord, trial_columns
 from isiw.text import one_line
 from isiw.text.stimuli import TAP, StimulusWords, meanings
 

@@ -12,9 +12,8 @@ from typing import Final
 
 from isiw.checks import number
 from isiw.errors import DeviceError
-from isiw.interval.presses import END, QUIT, START, Presses
 from isiw.interval.record import ProductionRecord, begin_log, continue_log, read_productions
-from isiw.interval.task import answer, feedback
+from isiw.interval.task import END, QUIT, START, Presses, answer, feedback
 from isiw.log.production import LONGEST_MS, MODES, Block
 from isiw.log.schema import Event
 from isiw.log.writer import LogWriter

@@ -13,13 +13,13 @@ import isiw
 from isiw.checks import text, whole
 from isiw.errors import InvalidValueError
 from isiw.lazy import pd
-from isiw.log.clock import now
+from isiw.log.headers import SCHEMA_VERSION, Header, ThresholdHeader
 from isiw.log.kinds import LogKind, kind_of, of_another_kind
 from isiw.log.production import PRODUCTION_VERSION, Block, Production, ProductionHeader
 from isiw.log.records import Records
 from isiw.log.salvage import Salvage, salvage
-from isiw.log.schema import SCHEMA_VERSION, Event, Header, ThresholdHeader
-from isiw.log.writer import LogWriter
+from isiw.log.schema import Event
+from isiw.log.writer import LogWriter, now
 
 NEAR_MS = 20.0
 """Half of the 40 ms in which an interval counts as effective [Kim2020, 6.3.1]."""

@@ -1,21 +1,24 @@
 """The blocks of records in a log's file: found by their marks where nothing else leads to them, unpacked within limits.
 
-A log may come from anywhere, so what it unpacks to is limited by its own size, and so is the number of its records.
+A log may come from anywhere, so what it unpacks to is limited by its own size, and so is the number of its records. The
+index at the end of a closed log counts them.
 """
 
 from __future__ import annotations
 
+import io
 import re
 import struct
+import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Final
+from typing import IO, Final
 
 import zstandard
 from mcap import records as mcap
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.stream_reader import breakup_chunk
+from mcap.stream_reader import StreamReader, breakup_chunk
 
 UNREADABLE: Final = (McapError, zstandard.ZstdError, struct.error, ValueError, KeyError, MemoryError, OverflowError)
 """What the MCAP reader raises on damaged bytes; a failed checksum is a ValueError."""
@@ -120,3 +123,28 @@ def _honest_size(block: mcap.Chunk) -> int:
     if block.compression not in packed or packed[block.compression](block.data) != block.uncompressed_size:
         raise McapError(block.compression)
     return block.uncompressed_size
+
+
+RECORD_HEAD_BYTES: Final = 1 + 8
+"""What a record is, and its length."""
+
+_FOOTER_BYTES = 1 + 8 + 8 + 8 + 4
+_MAGIC = b"\x89MCAP0\r\n"
+
+
+def counted_records(file: IO[bytes]) -> mcap.Statistics | None:
+    """What the index of a file counts, if it agrees with its checksum, which the library leaves unchecked."""
+    file.seek(0)
+    data = file.read()
+    footer_at = len(data) - len(_MAGIC) - _FOOTER_BYTES
+    if footer_at < 0 or not data.endswith(_MAGIC):
+        return None
+    index_at, _, checksum = struct.unpack_from("<QQI", data, footer_at + RECORD_HEAD_BYTES)
+    index = data[index_at : len(data) - len(_MAGIC)]
+    if zlib.crc32(index[:-4]) != checksum:
+        return None
+    try:
+        records = list(StreamReader(io.BytesIO(index + _MAGIC), skip_magic=True).records)
+    except UNREADABLE:
+        return None
+    return next((record for record in records if isinstance(record, mcap.Statistics)), None)

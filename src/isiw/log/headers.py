@@ -1,21 +1,172 @@
-"""The header of a log of another version: what this one can read of it, and which parts it cannot, and why."""
+"""The header of a log: what a session or a search for a threshold is, and what can be read of another version's."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Literal, TypeAlias
 
 import tomli_w
-from pydantic import BeforeValidator, TypeAdapter, ValidationError
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    TypeAdapter,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 
+from isiw.checks import mean_and_sd, number
 from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
-from isiw.errors import LogError
-from isiw.log.schema import ANY_HEADER, AnyHeader, kind_tag, with_reference
+from isiw.errors import InvalidValueError, LogError
+from isiw.log.production import ProductionHeader
 from isiw.signals.limits import SignalLimits
-from isiw.types import Reference
+from isiw.strategy.threshold.pulses import IntensityRange
+from isiw.text.stimuli import STIMULI, StimulusWords
+from isiw.types import Conditioning, Reference
+from isiw.visit import Visit, VisitProtocol
+
+SCHEMA_VERSION = 4
+"""4 since 0.1.0: control trials, and trials that an operator includes again or accepts. Before came 1 to 3."""
+
+
+class LogRecord(BaseModel):
+    """A frozen record; keys that a newer version added are ignored."""
+
+    model_config = ConfigDict(
+        frozen=True,
+        ser_json_inf_nan="strings",
+        extra="ignore",
+        coerce_numbers_to_str=True,  # an earlier version wrote a device's version as the number that it was given
+    )
+
+
+class StrategyRecipe(LogRecord):
+    """How the strategy was made; an empty name means from a user's own objects."""
+
+    name: str
+    seed: int
+    settings: dict[str, Any] = Field(default_factory=dict)
+
+    @field_validator("settings")
+    @classmethod
+    def _readable(cls, settings: dict[str, Any]) -> dict[str, Any]:
+        """What a header is read by, whatever the strategy."""
+        if settings.get("conditioning", "tap") not in STIMULI:
+            raise InvalidValueError("the conditioning stimulus is unknown", got=settings["conditioning"])
+        if (limit_mv := settings.get("detection_limit_mv")) is not None:
+            number("detection_limit_mv", limit_mv, above=0)
+        if (delay_ms := settings.get("hit_delay_ms")) is not None:
+            mean_and_sd("hit_delay_ms", delay_ms)
+        return settings
+
+
+RUN_KEY: Final = "isiw_run"
+SERVED_KEY: Final = "isiw_serve"
+"""Where `isiw run` and `isiw serve` keep in `Header.config` what they were asked for; other software has names of its
+own."""
+
+
+def with_reference(space: object) -> object:
+    """A logged space; where it says no reference, its ISIs count from the impact, which once was the default."""
+    return {"reference": "impact", **space} if isinstance(space, dict) else space
+
+
+class _Header(LogRecord):
+    """What the header of a log says in which a person is stimulated; its tag is `kind`, which older logs lack."""
+
+    schema_version: int = SCHEMA_VERSION
+    isiw_version: str
+    created: str
+    subject: str = ""
+    seed: int
+    device: DeviceInfo
+    versions: dict[str, str] = Field(default_factory=dict)
+    config: dict[str, Any] = Field(default_factory=dict)
+
+
+class Header(_Header):
+    """What a session is, written before anything else, and again before it goes on: the last one holds.
+
+    `asks_from` is the first trial that was asked with these versions. `belief_version` and `engine_version` grow where
+    the same settings come to believe something else, or compute it otherwise; 1 is what older logs mean.
+    """
+
+    kind: Literal["session"] = "session"
+    strategy: StrategyRecipe
+    space: Annotated[DesignSpace, BeforeValidator(with_reference)]
+    limits: Limits
+    signals: SignalLimits
+    timeout_s: float = 30.0
+    ask_deadline_s: float | None = None
+    visit: Visit = Visit()
+    protocol: VisitProtocol = VisitProtocol()
+    asks_from: int = 0
+    belief_version: int = 1
+    engine_version: int = 1
+
+    @property
+    def conditioning(self) -> Conditioning:
+        """The conditioning stimulus, as the strategy was told, or as the device says."""
+        told: Conditioning = self.strategy.settings.get("conditioning", self.device.conditioning)
+        return told
+
+    @property
+    def stimulus(self) -> StimulusWords:
+        """What the conditioning stimulus is called."""
+        return STIMULI[self.conditioning]
+
+    @property
+    def detection_limit_mv(self) -> float | None:
+        """What an amplitude of 0 is known to be below [mV]: as the device states it, or as the strategy was told."""
+        told = self.strategy.settings.get("detection_limit_mv")
+        return self.device.detection_limit_mv if told is None else float(told)
+
+
+class ThresholdHeader(_Header):
+    """What a search for a motor threshold is: every pulse is TMS alone, at an intensity of a range."""
+
+    kind: Literal["threshold"] = "threshold"
+    search: StrategyRecipe
+    intensities: IntensityRange
+    min_iti_s: float
+    max_pulses: int
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_before(cls, values: Any) -> Any:
+        """An older header is a session's, whose space and signals have no meaning."""
+        recipe, limits = (values.get(key) if isinstance(values, dict) else None for key in ("strategy", "limits"))
+        if not isinstance(recipe, dict) or not isinstance(limits, dict):
+            return values
+        search = {**recipe, "name": str(recipe.get("name", "")).removeprefix("threshold/")}
+        return {**limits, **values, "search": search}
+
+
+def kind_tag(header: Any) -> str | None:
+    """The kind of a header, be it a value or what was read of one; without a tag its fields say which."""
+    if not isinstance(header, Mapping):
+        return getattr(header, "kind", None)
+    untagged = "threshold" if header.get("intensities") else "production" if "blocks" in header else "session"
+    return str(header.get("kind", untagged))
+
+
+AnyHeader: TypeAlias = Header | ThresholdHeader | ProductionHeader
+ANY_HEADER: Final[TypeAdapter[AnyHeader]] = TypeAdapter(
+    Annotated[
+        Annotated[Header, Tag("session")]
+        | Annotated[ThresholdHeader, Tag("threshold")]
+        | Annotated[ProductionHeader, Tag("production")],
+        Discriminator(kind_tag),
+    ]
+)
+"""What turns a header into JSON and back, by its kind."""
 
 _SPACE: Final[TypeAdapter[DesignSpace]] = TypeAdapter(Annotated[DesignSpace, BeforeValidator(with_reference)])
 

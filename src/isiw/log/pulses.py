@@ -11,9 +11,8 @@ from isiw.errors import DamagedLogError, LogError
 from isiw.log.durable import kept_for, log_exists, log_of
 from isiw.log.outputs import is_mcap
 from isiw.log.reader import of_production, read_any
-from isiw.log.salvage import Message, Salvage, holds, salvage
-from isiw.log.schema import Event, Intent, Record
-from isiw.log.topics import decode
+from isiw.log.salvage import Salvage, holds, salvage
+from isiw.log.schema import Event, Intent, Message, Record, decode
 from isiw.trials import Trial
 
 _SUFFIXES = {".mcap", ".part"}

@@ -3,27 +3,125 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import Final, NamedTuple, TypeVar
 
 from pydantic import ValidationError
 
 from isiw.errors import DamagedLogError, LogError
-from isiw.log.earlier import with_kinds
-from isiw.log.headers import first_fault, header_in_parts
-from isiw.log.onsets import Onsets
+from isiw.findings import Kind
+from isiw.log.headers import AnyHeader, first_fault, header_in_parts
 from isiw.log.production import Production
-from isiw.log.salvage import Message, Salvage
-from isiw.log.schema import MOST_TRIALS, AnyHeader, Event, Intent, PulseOutcome, Record, Waveform
-from isiw.log.topics import decode
+from isiw.log.salvage import Salvage
+from isiw.log.schema import MOST_TRIALS, EstimateRecord, Event, Intent, Message, PulseOutcome, Record, Waveform, decode
 from isiw.log.writer import CONFIGURATION
+from isiw.strategy.stopping import StopKind
 from isiw.text.json_texts import read_json
 from isiw.text.numbers import counted
 from isiw.text.toml_files import parsed
 from isiw.trials import Channel, Trial
+
+
+class Onset(NamedTuple):
+    """When a stimulus was about to be delivered.
+
+    Args:
+        onset_s: since the first one of the log, by the session's clock [s].
+        at_ns: when its intent was logged [ns since 1970].
+    """
+
+    onset_s: float
+    at_ns: int
+
+
+class Onsets:
+    """The onsets of a log whose intents are told one after the other.
+
+    A session's clock begins anew where the session is resumed, so the time between the stimuli before and after that is
+    the log's, as it is where the session's clock stood still.
+    """
+
+    def __init__(self) -> None:
+        self.by_trial: dict[int, Onset] = {}
+        self._last: Onset | None = None
+        self._clock_s: float | None = None
+
+    def take(self, intent: Intent, at_ns: int) -> None:
+        """Take the next intent; one that is told once more for the same trial counts."""
+        self._last = Onset(self._onset_s(intent.t_s, at_ns), at_ns)
+        self._clock_s = intent.t_s
+        self.by_trial[intent.trial] = self._last
+
+    def refused(self) -> None:
+        """Take note that the last stimulus was not given: where nothing was given before, the next is the first one."""
+        if len(self.by_trial) == 1:
+            self.by_trial.clear()
+            self._last = None
+
+    def resumed(self) -> None:
+        """Take note that the session was resumed."""
+        self._clock_s = None
+
+    def _onset_s(self, clock_s: float, at_ns: int) -> float:
+        if self._last is None:
+            return 0.0
+        if self._clock_s is not None and clock_s > self._clock_s:
+            return self._last.onset_s + clock_s - self._clock_s
+        return self._last.onset_s + max(0.0, (at_ns - self._last.at_ns) / 1e9)
+
+
+_KindT = TypeVar("_KindT", Kind, StopKind)
+
+_KEY_IN_TEXT: Final = re.compile(r" \(key ([A-Za-z0-9_-]{1,64})\)$")
+"""Before notes had a key, their text ended with it."""
+
+_DECISIONS: Final[Mapping[StopKind, tuple[str, ...]]] = {
+    StopKind.PAUSED: ("The session is paused", "The session was ended before its time"),
+    StopKind.ABSENT: ("There is no window", "There is probably no window", "The probability "),
+    StopKind.KNOWN: ("The window is ", "The window as it is known so far", "The F1 to be expected is not known"),
+    StopKind.SMALL_GAIN: ("to the expected F1",),
+    StopKind.SETTLED: ("windows in a row yet", "The window has", "The particles have", "No generation of particles",
+                       "The scan of ISIs has"),
+    StopKind.TOO_LITTLE: ("too few to speak of a window", "so nothing is known about a window"),
+    StopKind.BUDGET: ("stimuli is used up", "stimuli are left", "stimulus is left"),
+    StopKind.LIMIT: ("pulses is reached",),
+}  # fmt: skip
+
+_FINDINGS: Final[Mapping[Kind, tuple[str, ...]]] = {
+    Kind.STRAY_EDGE: ("the steepest edge of the EMG is at",),
+    Kind.LOUD: ("RMS, more than any muscle's at rest",),
+    Kind.QUIET: ("RMS, less than any amplifier's noise",),
+    Kind.REPEATED: ("is that of the one before, sample by sample",),
+    Kind.MISPLACED: ("after the pulse, outside the MEP window of",),
+    Kind.ARTEFACT: ("the EMG is much larger just before the MEP window",),
+    Kind.EQUAL: ("amplitudes are exactly equal", "amplitudes are almost equal"),
+    Kind.SILENT: ("pulses evoked an MEP: every amplitude is 0",),
+    Kind.STOPPED: ("pulses evoked an MEP, though earlier ones did",),
+    Kind.SMALL: ("µV, less than EMG at rest has",),
+    Kind.LARGE: ("more than most muscles give",),
+    Kind.JUMP: ("times as large as those before",),
+    Kind.ISI_FAR: ("ms is far from the",),
+}
+
+
+def with_kinds(record: Record) -> Record:
+    """A record of a log with the kinds that an earlier version left to its sentences."""
+    if isinstance(record, EstimateRecord) and "stop_kind" not in record.model_fields_set:
+        return record.model_copy(update={"stop_kind": _kind(record.reason, _DECISIONS) or StopKind.OWN})
+    if isinstance(record, Event) and record.kind in {"doubt", "pause"} and "finding" not in record.model_fields_set:
+        return record.model_copy(update={"finding": _kind(record.text, _FINDINGS)})
+    if isinstance(record, Event) and record.kind == "note" and "key" not in record.model_fields_set:
+        return record.model_copy(update={"key": (found := _KEY_IN_TEXT.search(record.text)) and found[1]})
+    return record
+
+
+def _kind(text: str, table: Mapping[_KindT, tuple[str, ...]]) -> _KindT | None:
+    return next((kind for kind, said in table.items() if any(words in text for words in said)), None)
+
 
 HeaderKind = TypeVar("HeaderKind", bound=AnyHeader)
 

@@ -17,28 +17,10 @@ from mcap.stream_reader import CRCValidationError, StreamReader
 
 from isiw.errors import DamagedLogError, LogError
 from isiw.files import opened
-from isiw.log.blocks import UNREADABLE, LostBlockError, Unpacking, marked
+from isiw.log.blocks import RECORD_HEAD_BYTES, UNREADABLE, LostBlockError, Unpacking, counted_records, marked
 from isiw.log.durable import Fingerprint, disk_errors, log_of, part_of
-from isiw.log.index import RECORD_HEAD_BYTES, counted_records
-from isiw.log.topics import ANNOUNCEMENT, CHANNEL_IDS
+from isiw.log.schema import ANNOUNCEMENT, CHANNEL_IDS, Message
 from isiw.text.numbers import counted
-
-
-@dataclass(frozen=True)
-class Message:
-    """One record, still as bytes.
-
-    Args:
-        topic: its topic.
-        data: its JSON.
-        log_time_ns: when it was logged [ns since 1970].
-        sequence: its number in the file, from 0.
-    """
-
-    topic: str
-    data: bytes
-    log_time_ns: int
-    sequence: int = 0
 
 
 @dataclass

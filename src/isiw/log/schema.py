@@ -17,41 +17,33 @@ JSON knows no infinity: where a number is not finite it is one of the strings "I
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from types import MappingProxyType
 from typing import Annotated, Any, Final, Literal, Self, TypeAlias
 
 import numpy as np
 from pydantic import (
-    BaseModel,
-    BeforeValidator,
     ConfigDict,
-    Discriminator,
     Field,
     FiniteFloat,
-    Tag,
     TypeAdapter,
-    field_validator,
-    model_validator,
 )
+from pydantic_core import PydanticSerializationError
 
-from isiw.checks import MOST_MEP_MV, mean_and_sd, number
-from isiw.design import DesignSpace
-from isiw.devices.limits import Limits
-from isiw.devices.protocol import DeviceInfo
-from isiw.errors import InvalidValueError
+from isiw.checks import MOST_MEP_MV
+from isiw.errors import InvalidValueError, told
 from isiw.estimate import Estimate, WindowEstimate
 from isiw.findings import Kind
+from isiw.log.headers import ANY_HEADER, AnyHeader, Header, LogRecord, ThresholdHeader
 from isiw.log.production import Production, ProductionHeader
-from isiw.signals.limits import SignalLimits
 from isiw.strategy.stopping import StopDecision, StopKind
-from isiw.strategy.threshold.pulses import IntensityRange, ThresholdEstimate
-from isiw.text.stimuli import STIMULI, StimulusWords
+from isiw.strategy.threshold.pulses import ThresholdEstimate
+from isiw.text.json_texts import refuse_doubled
 from isiw.trials import Channel, Stimulus, Trial
-from isiw.types import Conditioning, Numbers
-from isiw.visit import Visit, VisitProtocol
-
-SCHEMA_VERSION = 4
-"""4 since 0.1.0: control trials, and trials that an operator includes again or accepts. Before came 1 to 3."""
+from isiw.types import Numbers
 
 MOST_TRIALS: Final = 100_000
 """More than any session delivers; a record of a later trial makes no sense."""
@@ -59,120 +51,7 @@ MOST_TRIALS: Final = 100_000
 TrialNumber: TypeAlias = Annotated[int, Field(ge=0, lt=MOST_TRIALS)]
 
 
-class _Record(BaseModel):
-    """A frozen record; keys that a newer version added are ignored."""
-
-    model_config = ConfigDict(
-        frozen=True,
-        ser_json_inf_nan="strings",
-        extra="ignore",
-        coerce_numbers_to_str=True,  # an earlier version wrote a device's version as the number that it was given
-    )
-
-
-class StrategyRecipe(_Record):
-    """How the strategy was made; an empty name means from a user's own objects."""
-
-    name: str
-    seed: int
-    settings: dict[str, Any] = Field(default_factory=dict)
-
-    @field_validator("settings")
-    @classmethod
-    def _readable(cls, settings: dict[str, Any]) -> dict[str, Any]:
-        """What a header is read by, whatever the strategy."""
-        if settings.get("conditioning", "tap") not in STIMULI:
-            raise InvalidValueError("the conditioning stimulus is unknown", got=settings["conditioning"])
-        if (limit_mv := settings.get("detection_limit_mv")) is not None:
-            number("detection_limit_mv", limit_mv, above=0)
-        if (delay_ms := settings.get("hit_delay_ms")) is not None:
-            mean_and_sd("hit_delay_ms", delay_ms)
-        return settings
-
-
-RUN_KEY: Final = "isiw_run"
-SERVED_KEY: Final = "isiw_serve"
-"""Where `isiw run` and `isiw serve` keep in `Header.config` what they were asked for; other software has names of its
-own."""
-
-
-def with_reference(space: object) -> object:
-    """A logged space; where it says no reference, its ISIs count from the impact, which once was the default."""
-    return {"reference": "impact", **space} if isinstance(space, dict) else space
-
-
-class _Header(_Record):
-    """What the header of a log says in which a person is stimulated; its tag is `kind`, which older logs lack."""
-
-    schema_version: int = SCHEMA_VERSION
-    isiw_version: str
-    created: str
-    subject: str = ""
-    seed: int
-    device: DeviceInfo
-    versions: dict[str, str] = Field(default_factory=dict)
-    config: dict[str, Any] = Field(default_factory=dict)
-
-
-class Header(_Header):
-    """What a session is, written before anything else, and again before it goes on: the last one holds.
-
-    `asks_from` is the first trial that was asked with these versions. `belief_version` and `engine_version` grow where
-    the same settings come to believe something else, or compute it otherwise; 1 is what older logs mean.
-    """
-
-    kind: Literal["session"] = "session"
-    strategy: StrategyRecipe
-    space: Annotated[DesignSpace, BeforeValidator(with_reference)]
-    limits: Limits
-    signals: SignalLimits
-    timeout_s: float = 30.0
-    ask_deadline_s: float | None = None
-    visit: Visit = Visit()
-    protocol: VisitProtocol = VisitProtocol()
-    asks_from: int = 0
-    belief_version: int = 1
-    engine_version: int = 1
-
-    @property
-    def conditioning(self) -> Conditioning:
-        """The conditioning stimulus, as the strategy was told, or as the device says."""
-        told: Conditioning = self.strategy.settings.get("conditioning", self.device.conditioning)
-        return told
-
-    @property
-    def stimulus(self) -> StimulusWords:
-        """What the conditioning stimulus is called."""
-        return STIMULI[self.conditioning]
-
-    @property
-    def detection_limit_mv(self) -> float | None:
-        """What an amplitude of 0 is known to be below [mV]: as the device states it, or as the strategy was told."""
-        told = self.strategy.settings.get("detection_limit_mv")
-        return self.device.detection_limit_mv if told is None else float(told)
-
-
-class ThresholdHeader(_Header):
-    """What a search for a motor threshold is: every pulse is TMS alone, at an intensity of a range."""
-
-    kind: Literal["threshold"] = "threshold"
-    search: StrategyRecipe
-    intensities: IntensityRange
-    min_iti_s: float
-    max_pulses: int
-
-    @model_validator(mode="before")
-    @classmethod
-    def _of_before(cls, values: Any) -> Any:
-        """An older header is a session's, whose space and signals have no meaning."""
-        recipe, limits = (values.get(key) if isinstance(values, dict) else None for key in ("strategy", "limits"))
-        if not isinstance(recipe, dict) or not isinstance(limits, dict):
-            return values
-        search = {**recipe, "name": str(recipe.get("name", "")).removeprefix("threshold/")}
-        return {**limits, **values, "search": search}
-
-
-class Intent(_Record):
+class Intent(LogRecord):
     """What is about to be delivered: a pair of stimuli, or without an ISI TMS alone or a tap alone."""
 
     trial: TrialNumber
@@ -187,7 +66,7 @@ class Intent(_Record):
         return cls(trial=stimulus.trial, isi_ms=stimulus.isi_ms, t_s=t_s, tap_alone=stimulus.tap_alone)
 
 
-class PulseOutcome(_Record):
+class PulseOutcome(LogRecord):
     """What came of a pulse on the way to a motor threshold; with a `reason`, nothing was learnt from it.
 
     The intensity is None where the log has lost it.
@@ -200,7 +79,7 @@ class PulseOutcome(_Record):
     reason: str = ""
 
 
-class ThresholdBelief(_Record):
+class ThresholdBelief(LogRecord):
     """What was believed of a motor threshold after a pulse, and whether to stop."""
 
     trial: TrialNumber
@@ -208,7 +87,7 @@ class ThresholdBelief(_Record):
     decision: StopDecision
 
 
-class Waveform(_Record):
+class Waveform(LogRecord):
     """One waveform of one trial."""
 
     trial: TrialNumber
@@ -238,7 +117,7 @@ class EstimateRecord(Estimate):
 
     Nine of ten next MEPs lie between `predicted_low_mv` and `predicted_high_mv`, at the ISIs of the profile.
     `stop_kind` says what the decision rests on, `chosen_by` what chose the next ISI
-    (`isiw.strategy.choosing.ChosenBy`), and `scores` are those of the acquisition function at `scored_ms`; both are
+    (`isiw.strategy.course.ChosenBy`), and `scores` are those of the acquisition function at `scored_ms`; both are
     empty where nothing is asked next.
     """
 
@@ -285,7 +164,7 @@ EventKind: TypeAlias = Literal[
 ]
 
 
-class Correction(_Record):
+class Correction(LogRecord):
     """The values of a trial that were others than its record says; None for those that stay."""
 
     isi_ms: FiniteFloat | None = None
@@ -295,7 +174,7 @@ class Correction(_Record):
     background_rms_uv: FiniteFloat | None = Field(default=None, ge=0)
 
 
-class Event(_Record):
+class Event(LogRecord):
     """Something that happened to a session.
 
     `trial` is the one that was judged by an operator, refused or answered late, and otherwise the last one before the
@@ -312,25 +191,129 @@ class Event(_Record):
     corrected: Correction | None = None
 
 
-def kind_tag(header: Any) -> str | None:
-    """The kind of a header, be it a value or what was read of one; without a tag its fields say which."""
-    if not isinstance(header, Mapping):
-        return getattr(header, "kind", None)
-    untagged = "threshold" if header.get("intensities") else "production" if "blocks" in header else "session"
-    return str(header.get("kind", untagged))
-
-
-AnyHeader: TypeAlias = Header | ThresholdHeader | ProductionHeader
-ANY_HEADER: Final[TypeAdapter[AnyHeader]] = TypeAdapter(
-    Annotated[
-        Annotated[Header, Tag("session")]
-        | Annotated[ThresholdHeader, Tag("threshold")]
-        | Annotated[ProductionHeader, Tag("production")],
-        Discriminator(kind_tag),
-    ]
-)
-"""What turns a header into JSON and back, by its kind."""
-
 Record: TypeAlias = (
     AnyHeader | Intent | Trial | Waveform | EstimateRecord | Event | PulseOutcome | ThresholdBelief | Production
 )
+
+
+_KINDS: dict[str, type[Any]] = {
+    "/header": Header,
+    "/intent": Intent,
+    "/trial": Trial,
+    "/estimate": EstimateRecord,
+    "/event": Event,
+    "/threshold/pulse": PulseOutcome,
+    "/threshold/belief": ThresholdBelief,
+    "/production_header": ProductionHeader,
+    "/production": Production,
+}
+_TOPIC_OF_KIND = {kind: topic for topic, kind in _KINDS.items()} | {ThresholdHeader: "/header"}
+
+CHANNEL_IDS: Final[Mapping[str, int]] = MappingProxyType(
+    {
+        "/header": 1,
+        "/intent": 2,
+        "/trial": 3,
+        "/estimate": 4,
+        "/event": 5,
+        "/emg": 6,
+        "/acceleration": 7,
+        "/pressure": 8,
+        "/force": 9,
+        "/valve": 10,
+    }
+)
+"""The channel numbers of the topics that every log has. They are frozen: a damaged log is read by them.
+
+Any other topic takes the next free number in its file, and announces it there (`announcement`).
+"""
+
+ANNOUNCEMENT = "channel "
+
+
+def announcement(number: int, topic: str) -> tuple[str, dict[str, str]]:
+    """Name and content of the metadata that say which topic a further channel number has."""
+    return f"{ANNOUNCEMENT}{number}", {"id": str(number), "topic": topic}
+
+
+_ADAPTERS: dict[str, TypeAdapter[Any]] = {topic: TypeAdapter(kind) for topic, kind in _KINDS.items()} | {
+    "/header": ANY_HEADER
+}
+_WAVEFORM: TypeAdapter[Any] = TypeAdapter(Waveform)
+
+
+def adapter(topic: str) -> TypeAdapter[Any]:
+    """What turns a topic's records into JSON and back; any topic that is not isiw's own holds waveforms."""
+    return _ADAPTERS.get(topic, _WAVEFORM)
+
+
+def is_of_isiw(topic: str) -> bool:
+    """Whether a topic carries records of isiw's own, and not the waveforms of a channel."""
+    return topic in _KINDS
+
+
+def topic_of(record: Record, channel_name: str | None = None) -> str:
+    """The topic of a record."""
+    if not isinstance(record, Waveform):
+        return _TOPIC_OF_KIND[type(record)]
+    return waveform_topic(channel_name or "")
+
+
+def waveform_topic(channel_name: str) -> str:
+    """The topic of a channel's waveforms."""
+    topic = f"/{channel_name}"
+    if topic == "/" or topic in _KINDS or not channel_name.isprintable():  # half a surrogate pair is not printable
+        raise InvalidValueError(
+            "a waveform's channel cannot have this name", got=channel_name, remedy="Rename it in the device."
+        )
+    return topic
+
+
+def encode(topic: str, record: Record) -> bytes:
+    """A record as JSON."""
+    try:
+        return adapter(topic).dump_json(record)
+    except (PydanticSerializationError, UnicodeEncodeError) as error:
+        raise InvalidValueError(
+            f"a record of {topic} cannot be written as JSON",
+            got=told(error),
+            remedy="Look at the names, units and texts that the device gives.",
+        ) from error
+
+
+def decode(topic: str, data: bytes) -> Record:
+    """The record that was encoded."""
+    record: Record = adapter(topic).validate_json(data)
+    refuse_doubled(data)
+    if isinstance(record, Trial) and record.index >= MOST_TRIALS:
+        raise InvalidValueError("no session has so many trials", got=record.index, expected=f"below {MOST_TRIALS}")
+    return record
+
+
+def json_schema(topic: str) -> tuple[str, bytes]:
+    """Name and JSON schema of a topic's records; the root is an object."""
+    return _json_schema(topic if topic in _KINDS else "")
+
+
+@cache
+def _json_schema(topic: str) -> tuple[str, bytes]:
+    kind = _KINDS.get(topic, Waveform)
+    schema = {"type": "object"} | adapter(topic).json_schema(mode="serialization")
+    return f"isiw.{schema.get('title', kind.__name__)}", json.dumps(schema).encode()
+
+
+@dataclass(frozen=True)
+class Message:
+    """One record, still as bytes.
+
+    Args:
+        topic: its topic.
+        data: its JSON.
+        log_time_ns: when it was logged [ns since 1970].
+        sequence: its number in the file, from 0.
+    """
+
+    topic: str
+    data: bytes
+    log_time_ns: int
+    sequence: int = 0

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
-from isiw.log.headers import require_read
+from isiw.log.headers import ThresholdHeader, require_read
 from isiw.log.records import unknown_of
-from isiw.log.schema import Event, Intent, PulseOutcome, Record, ThresholdHeader
+from isiw.log.schema import Event, Intent, PulseOutcome, Record
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.findings import Kind
 from isiw.log.schema import Correction, Event, EventKind
-from isiw.signals.values import implausible_amplitude
+from isiw.signals.limits import implausible_amplitude
 from isiw.trials import Trial, TrialTable
 
 VERDICTS: Final[dict[EventKind, Callable[[Trial, Event], Trial]]] = {

@@ -2,34 +2,71 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import threading
-from collections.abc import Sequence
+import time
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Self, cast
+from typing import IO, Final, Self, cast
 
 from mcap.writer import Writer
 
 from isiw.errors import LogError
 from isiw.files import in_the_way, is_reserved, sync_folder
-from isiw.log.clock import clock_ns, log_time_ns
 from isiw.log.durable import (
     DurableFile,
     Fingerprint,
     begun,
+    claimed,
     disk_errors,
     keep_damaged,
     log_of,
     part_of,
+    refuse_if_locked,
 )
-from isiw.log.headers import as_toml
+from isiw.log.headers import AnyHeader, as_toml
 from isiw.log.kinds import continued_by
-from isiw.log.locks import claimed, refuse_if_locked
-from isiw.log.memory import Memory, found_in
-from isiw.log.salvage import Message, Salvage, holds, salvage_file
-from isiw.log.schema import AnyHeader, Event, Record
-from isiw.log.topics import CHANNEL_IDS, announcement, decode, encode, is_of_isiw, json_schema, topic_of
+from isiw.log.salvage import Salvage, holds, salvage_file
+from isiw.log.schema import (
+    CHANNEL_IDS,
+    Event,
+    Message,
+    Record,
+    announcement,
+    decode,
+    encode,
+    is_of_isiw,
+    json_schema,
+    topic_of,
+)
+
+_END_NS: Final = 2**64
+
+
+def clock_ns() -> int:
+    """What the computer's clock says [ns since 1970]."""
+    now_ns = time.time_ns()
+    if not 0 <= now_ns < _END_NS:
+        raise LogError(
+            "the computer's clock is wrong: no log can hold its time",
+            got=f"{now_ns // 10**9} s from the beginning of 1970",
+            expected="a time from 1970 to 2554",
+            remedy="Set the clock, then begin again.",
+        )
+    return now_ns
+
+
+def log_time_ns() -> int:
+    """The same for a record; 0 where the clock of a running session has been set to a time that no log can hold."""
+    return now_ns if 0 <= (now_ns := time.time_ns()) < _END_NS else 0
+
+
+def now() -> dt.datetime:
+    """The same as date and time, in UTC."""
+    return dt.datetime.fromtimestamp(clock_ns() // 10**9, dt.UTC)
+
 
 CONFIGURATION = "configuration.toml"
 """The attachment that holds the header once more, as TOML."""
@@ -325,3 +362,42 @@ def _foreign(path: Path, salvage: Salvage) -> LogError:
         got=str(path),
         remedy=f"Give {salvage.path.name} or {path.name} another name or folder, and go on from there.",
     )
+
+
+_LAST_ONLY: Final = frozenset({"/estimate", "/threshold/belief"})
+"""Topics of large records, which follow from the others."""
+
+
+class Memory:
+    """The records of a log that is being written, without waveforms, and of estimates the last."""
+
+    def __init__(self) -> None:
+        self._messages: dict[int, Message] = {}
+        self._last: dict[str, int] = {}
+
+    def keep(self, message: Message) -> None:
+        """Keep a record, if it is one to be kept."""
+        if not is_of_isiw(message.topic):
+            return
+        if message.topic in _LAST_ONLY:
+            self._messages.pop(self._last.get(message.topic, -1), None)
+            self._last[message.topic] = message.sequence
+        self._messages[message.sequence] = message
+
+    def completing(self, found: Iterable[Message]) -> list[Message] | None:
+        """What was found and what is known beside it, in order; None where everything that is known was found."""
+        there = {message.sequence: message for message in found if is_of_isiw(message.topic)}
+        if all(there.get(number, message).data == message.data for number, message in self._messages.items()) and (
+            there.keys() >= self._messages.keys()
+        ):
+            return None
+        records = {message.sequence: message for message in found} | self._messages
+        return [records[number] for number in sorted(records)]
+
+
+def found_in(file: Path) -> list[Message]:
+    """The records that can still be read in a file; none where it is no log any more."""
+    try:
+        return salvage_file(file).messages
+    except LogError:
+        return []

@@ -6,6 +6,7 @@ Everything is drawn with matplotlib's object interface, so no display is needed 
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
@@ -44,6 +45,20 @@ EDGES: Final[Mapping[str, str]] = MappingProxyType({"start": GREEN, "end": ORANG
 """The colours of a window's edges."""
 
 TRIAL_AXIS: Final = "trial (from 0, as in the log)"
+
+PAGE_COLOURS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        INK: "ink",
+        FAINT: "faint",
+        BLUE: "blue",
+        ORANGE: "orange",
+        GREEN: "green",
+        RED: "red",
+        "#ffffff": "paper",
+        "#000000": "ink",
+    }
+)
+"""By what is drawn, the name of the page's own colour (the CSS variable `--ink` and so on)."""
 
 
 def strategy_colours(names: Sequence[str]) -> dict[str, str]:
@@ -94,3 +109,17 @@ def save_figure(figure: Figure, path: str | Path, *, overwrite: bool = False) ->
     with mpl.rc_context({"svg.hashsalt": "isiw"}):  # so that the same picture is the same file
         figure.savefig(picture, dpi=200, format=suffix, metadata={"Date": None} if suffix == "svg" else None)
     return write_output(target, picture.getvalue(), overwrite=overwrite)
+
+
+def inline_svg(figure: Figure, name: str) -> str:
+    """A figure as an SVG element: text stays text, the background is the page's, and no name clashes with another's."""
+    picture = io.StringIO()
+    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
+        figure.savefig(picture, format="svg", transparent=True, metadata={"Date": None})
+    text = picture.getvalue()
+    text = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
+    text = re.sub(r"(<(?:g|svg|defs)\b[^>]*?) id=\"[^\"]*\"", r"\1", text)
+    text = re.sub(r"font: ([\d.]+)px [^;\"]*", r"font-size: \1px", text)
+    for drawn, named in PAGE_COLOURS.items():
+        text = text.replace(drawn, f"var(--{named})")
+    return text

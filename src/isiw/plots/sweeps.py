@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from isiw.log.reader import SessionRecord
 from isiw.plots.style import BLUE, FAINT, GREEN, INK, ORANGE, tidied
-from isiw.signals.units import EMG_UNITS_MV
+from isiw.signals.limits import EMG_UNITS_MV
 from isiw.trials import Channel, Trial
 from isiw.types import BoolArray, FloatArray
 

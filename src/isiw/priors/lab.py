@@ -19,8 +19,7 @@ from isiw.models.particles.places import MOST_APART_MS, Place
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.profile import ProfilePrior, ShapeShares
 from isiw.priors.components import beside, floor, gain, mixed, mixed_shares, muscle, place
-from isiw.priors.people import hyper_prior, people_of, usual_shares
-from isiw.priors.population import Law, Population, learnt
+from isiw.priors.population import Law, Population, hyper_prior, learnt, people_of, usual_shares
 from isiw.priors.recall import (
     recalled,
     require_meps,

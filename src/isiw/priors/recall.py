@@ -13,7 +13,7 @@ from isiw.models.particles import ParticleModel, ParticlePosterior
 from isiw.models.particles.places import MOST_APART_MS
 from isiw.models.particles.prior import Prior
 from isiw.models.protocol import Observation
-from isiw.text.commands import command
+from isiw.text.harmless import command
 
 TOLD_LOSSES: Final = 3
 """Losses that an error names; isiw show lists them all."""

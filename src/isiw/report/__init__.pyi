@@ -2,9 +2,9 @@ from .comparison import comparison_page as comparison_page
 from .comparison import comparison_sentence as comparison_sentence
 from .comparison import comparison_table as comparison_table
 from .comparison import save_comparison as save_comparison
-from .facts import first_facts as first_facts
 from .page import report_page as report_page
 from .page import save_report as save_report
+from .tables import first_facts as first_facts
 from .words import TRIAL_HEADINGS as TRIAL_HEADINGS
 from .words import final_statement as final_statement
 from .words import trial_rows as trial_rows

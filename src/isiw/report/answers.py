@@ -13,7 +13,7 @@ from isiw.log.reader import SessionRecord
 from isiw.log.schema import EstimateRecord, Event, EventKind
 from isiw.report.tables import lost_rows
 from isiw.report.words import counts_sentence
-from isiw.signals.values import contradicts_its_times, timed_isi_ms
+from isiw.signals.limits import contradicts_its_times, timed_isi_ms
 from isiw.trials import Trial
 
 _OF_TIMING: Final = frozenset({Kind.NO_IMPACT, Kind.NO_PULSE, Kind.TMS_BEFORE_IMPACT, Kind.ISI_OFF})

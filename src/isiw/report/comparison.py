@@ -10,11 +10,11 @@ from isiw import sentences
 from isiw.estimate import Edge, Estimate
 from isiw.log.reader import SessionRecord
 from isiw.plots.comparison import comparison_figure
-from isiw.plots.inline import inline_svg
+from isiw.plots.style import inline_svg
 from isiw.priors.days import DayToDay
 from isiw.priors.differing import Difference
-from isiw.report.facts import first_facts
 from isiw.report.page import rendered, write_page
+from isiw.report.tables import first_facts
 from isiw.report.words import counts_sentence, finding_sentences
 from isiw.text import one_line
 

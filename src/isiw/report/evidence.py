@@ -14,8 +14,7 @@ import numpy as np
 from isiw import sentences
 from isiw.findings import NO_MEP
 from isiw.log.reader import SessionRecord
-from isiw.signals.amplitudes import stopped_after
-from isiw.signals.evidence import told_of
+from isiw.signals.evidence import stopped_after, told_of
 from isiw.trials import Trial
 from isiw.types import ArrayLike, FloatArray
 from isiw.window import Window

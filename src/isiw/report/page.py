@@ -19,15 +19,21 @@ from typing import Any, Final
 from isiw.errors import ConfigError, InvalidValueError
 from isiw.log.outputs import check_output, write_output
 from isiw.log.reader import SessionRecord, require_records
-from isiw.plots.course import course_figure
-from isiw.plots.inline import inline_svg
 from isiw.plots.session import session_figure
+from isiw.plots.style import inline_svg
 from isiw.plots.sweeps import sweeps_figure
-from isiw.plots.timeline import timeline_figure
+from isiw.plots.timeline import course_figure, timeline_figure
 from isiw.report.answers import answers
 from isiw.report.drawn import drawn
-from isiw.report.facts import first_facts, further_facts, settings_facts
-from isiw.report.tables import counted_rows, event_rows, lost_rows, trial_row
+from isiw.report.tables import (
+    counted_rows,
+    event_rows,
+    first_facts,
+    further_facts,
+    lost_rows,
+    settings_facts,
+    trial_row,
+)
 from isiw.report.words import finding_sentences, fit_sentence
 from isiw.sentences import JUDGED_SINCE
 from isiw.text import plain

@@ -12,7 +12,7 @@ from isiw.metrics import f1
 from isiw.report.evidence import changed_with_time, contradiction, no_comparison, nothing_measured, nothing_stood_out
 from isiw.strategy.catalogue import known_settings, list_strategies
 from isiw.strategy.stopping import OF_THE_WINDOW
-from isiw.text.commands import command
+from isiw.text.harmless import command
 from isiw.window import Window
 
 TRIAL_HEADINGS = ("trial", "asked", "outcome", "realised")

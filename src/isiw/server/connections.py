@@ -20,8 +20,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.server import ServerState
 
+from isiw.server.answers import Refusal, answered
 from isiw.server.guard import Rules, wants_200
-from isiw.server.refusals import Refusal, answered
 
 TAKING_S: Final = 30.0
 """How long a client may take nothing of what it is sent [s]."""

@@ -11,8 +11,7 @@ from isiw.errors import InvalidValueError, LimitExceededError, LogError
 from isiw.estimate import Estimate
 from isiw.findings import Kind
 from isiw.log.reader import SessionRecord
-from isiw.server.answers import AskAnswer, EstimateAnswer, SessionAnswer, TrialAnswer, TrialRow
-from isiw.server.refusals import Refusal, failed
+from isiw.server.answers import AskAnswer, EstimateAnswer, Refusal, SessionAnswer, TrialAnswer, TrialRow, failed
 from isiw.server.requests import AskRequest, ExcludeRequest, MistrialRequest, NoteRequest, TellRequest
 from isiw.session.recorder import Recorder
 from isiw.strategy.stopping import StopDecision, StopKind

@@ -14,7 +14,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from isiw.checks import check_numbers, check_texts, check_wholes
 from isiw.errors import InvalidValueError
-from isiw.server.refusals import Refusal, answered
+from isiw.server.answers import Refusal, answered
 
 LOOPBACK: Final = frozenset({"127.0.0.1", "localhost", "::1"})
 """The names under which a computer reaches itself."""

@@ -11,13 +11,12 @@ from fastapi import Request
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
 
-from isiw.config.sections import LimitsConfig, SpaceConfig, StrategyConfig, VisitConfig, require_together
-from isiw.config.slips import require_units
+from isiw.config.sections import LimitsConfig, SpaceConfig, StrategyConfig, VisitConfig, require_together, require_units
 from isiw.errors import IsiwError
 from isiw.log.schema import MOST_TRIALS
-from isiw.server.refusals import Refusal
-from isiw.text.expected import UNKNOWN, expected_instead, first_to_tell, known_keys, meant_instead
+from isiw.server.answers import Refusal
 from isiw.text.json_texts import DoubledKeyError, once_each, read_json
+from isiw.text.toml_files import UNKNOWN, expected_instead, first_to_tell, known_keys, meant_instead
 from isiw.visit import VisitProtocol
 
 FORM: Final = "application/x-www-form-urlencoded"

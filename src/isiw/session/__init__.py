@@ -6,9 +6,9 @@ from isiw.session.opening import open_session
 from isiw.session.progress import PROGRESS_HEADINGS, aligned, progress_row
 from isiw.session.recorder import Recorder
 from isiw.session.resume import resume
+from isiw.session.sink import SessionResult, SessionUpdate
 from isiw.session.threshold import ThresholdRecorder, open_threshold, read_threshold, resume_threshold, search_of
 from isiw.session.threshold_loops import open_simulated, run_by_hand, run_simulated, simulated_person
-from isiw.session.updates import SessionResult, SessionUpdate
 
 __all__ = [
     "PROGRESS_HEADINGS",

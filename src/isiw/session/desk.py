@@ -9,11 +9,11 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Final, Protocol
 
 from isiw.errors import InvalidValueError, LogError, told
-from isiw.log.schema import Header
-from isiw.session.asking import Asking
+from isiw.log.headers import Header
 from isiw.session.progress import fitted, progress_row, show_legend, show_progress, standing
+from isiw.session.sink import SessionUpdate
+from isiw.session.steps import Asking
 from isiw.session.terminal import ERASED, ESCAPE, Keys, Screen, is_terminal
-from isiw.session.updates import SessionUpdate
 from isiw.trials import TrialTable
 
 KEYS: Final = (

@@ -18,7 +18,7 @@ from isiw.findings import Kind
 from isiw.log.schema import EstimateRecord, Event, EventKind, Intent, Record
 from isiw.log.verdicts import excluded_by, under_all
 from isiw.session.sink import Sink
-from isiw.strategy.choosing import candidate_isis
+from isiw.strategy.course import candidate_isis
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Trial, TrialTable

@@ -14,19 +14,16 @@ from typing import Unpack
 
 from isiw.devices.protocol import Device
 from isiw.errors import NotDelivered, StrategyError
+from isiw.log.headers import Header
 from isiw.log.pulses import earlier_pulses_s
-from isiw.log.schema import Event, Header
+from isiw.log.schema import Event
 from isiw.log.writer import LogWriter
-from isiw.session.assembly import Options, assembled
+from isiw.session.assembly import Earlier, Options, assembled
 from isiw.session.desk import Table
-from isiw.session.header import Earlier
 from isiw.session.judging import Judging
-from isiw.session.operator import goes_on
-from isiw.session.pausing import Pause
-from isiw.session.sink import Follower
-from isiw.session.steps import ended, paused
-from isiw.session.terminal import is_terminal, somebody_there
-from isiw.session.updates import SessionResult
+from isiw.session.sink import Follower, SessionResult
+from isiw.session.steps import Pause, ended, paused
+from isiw.session.terminal import goes_on, is_terminal, somebody_there
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.trials import TrialTable

@@ -12,15 +12,15 @@ from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import InvalidValueError, StrategyError
 from isiw.log.durable import log_exists
+from isiw.log.headers import Header
 from isiw.log.kinds import OWN_LOOP
 from isiw.log.reader import SessionRecord, read_salvaged
 from isiw.log.salvage import Salvage, salvage
-from isiw.log.schema import Header
 from isiw.log.writer import LogWriter
+from isiw.session.assembly import header_of, require_parts
 from isiw.session.examination import believed
-from isiw.session.header import header_of, require_parts
 from isiw.session.recorder import Recorder
-from isiw.session.resumption import require_same_person, taken_up
+from isiw.session.replay import require_same_person, taken_up
 from isiw.signals.limits import SignalLimits
 from isiw.strategy.strategy import Strategy
 from isiw.visit import Visit, VisitProtocol

@@ -13,7 +13,7 @@ import numpy as np
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
 from isiw.sentences import asked, interval_cell, outcome
-from isiw.session.updates import SessionUpdate
+from isiw.session.sink import SessionUpdate
 from isiw.text import plain
 from isiw.text.stimuli import TAP, StimulusWords
 

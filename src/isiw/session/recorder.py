@@ -15,17 +15,17 @@ from isiw.devices.protocol import Readiness
 from isiw.errors import ImplausibleDataWarning, InvalidValueError, warn
 from isiw.estimate import WindowEstimate
 from isiw.findings import Finding, Kind, Severity
-from isiw.log.schema import Event, Header, Intent
+from isiw.log.headers import Header
+from isiw.log.schema import Event, Intent
 from isiw.log.writer import LogWriter
+from isiw.session.assembly import Earlier
 from isiw.session.examination import examination_of
-from isiw.session.header import Earlier
 from isiw.session.judging import Judging
 from isiw.session.sink import Sink
-from isiw.signals.checklist import findings
 from isiw.signals.evidence import Evidence, told_of
+from isiw.signals.limits import isi_far, require_plausible
 from isiw.signals.rig import remedy_for
-from isiw.signals.values import isi_far, require_plausible
-from isiw.signals.watch import Doubts
+from isiw.signals.watch import Doubts, findings
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Status, Stimulus, Trial, TrialTable

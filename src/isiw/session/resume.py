@@ -9,16 +9,16 @@ from typing import Unpack, overload
 from isiw.devices.clock import MonotonicClock
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device, HasMemory
+from isiw.log.headers import Header
 from isiw.log.kinds import OWN_LOOP, LogKind, of_another_kind
 from isiw.log.reader import read_any
 from isiw.log.salvage import salvage
-from isiw.log.schema import Header
 from isiw.log.threshold import ThresholdRecord
 from isiw.session.assembly import Options, ResumeOptions
 from isiw.session.loop import Session
 from isiw.session.opening import own_loop_resumed
 from isiw.session.recorder import Recorder
-from isiw.session.resumption import require_as_real, taken_up
+from isiw.session.replay import require_as_real, taken_up
 from isiw.session.threshold import ThresholdRecorder, resume_threshold
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Stimulus

@@ -5,26 +5,61 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Never
 
-from isiw.checks import choice
+from isiw.checks import check_numbers, check_wholes, choice
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
-from isiw.devices.deadlines import PunctualDevice
+from isiw.devices.deadlines import Deadlines, PunctualDevice
 from isiw.devices.limited import LimitedDevice
 from isiw.devices.limits import Limits
 from isiw.devices.lock import driven
 from isiw.devices.protocol import Answer, Device, DeviceInfo
 from isiw.errors import DeviceError, StillArmedError, told
-from isiw.log.topics import waveform_topic
-from isiw.session.interrupts import Interrupts
-from isiw.session.lastresort import INTERRUPTED, STILL_ARMED, end_process
-from isiw.session.safeguards import Safeguards
+from isiw.log.schema import waveform_topic
+from isiw.session.interrupts import INTERRUPTED, STILL_ARMED, Interrupts, end_process
 from isiw.session.sink import Sink
-from isiw.signals.units import EMG_UNITS_MV
+from isiw.signals.limits import EMG_UNITS_MV
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Stimulus
 from isiw.types import Reference
 from isiw.visit import VisitProtocol
+
+
+@dataclass(frozen=True)
+class Safeguards:
+    """How a session keeps a person safe besides its limits.
+
+    Args:
+        deadlines: how long each verb of the device may take.
+        retries: how often a stimulus is tried again that the device refused before firing.
+        backoff_s: how long to wait before the first of these [s]; twice as long before each further one.
+        on_pause: is called with the reason when the session has paused and the device is disarmed; True goes on, and
+            arms again. Without it the operator is asked in the terminal, and where there is none the session ends.
+        dead_man: is called before each stimulus; anything but True refuses it and ends the session.
+        earlier_logs: a folder of logs, whose folders are looked into, too; the same subject's stimuli in it count for
+            the limits' period and block. A log that cannot be read refuses the session.
+
+    Raises:
+        InvalidValueError: a number of retries or a time that is negative.
+    """
+
+    deadlines: Deadlines = field(default_factory=Deadlines)
+    retries: int = 3
+    backoff_s: float = 1.0
+    on_pause: Callable[[str], bool] | None = None
+    dead_man: Callable[[], bool] | None = None
+    earlier_logs: str | Path | None = None
+
+    def __post_init__(self) -> None:
+        check_wholes(self, "retries", least=0)
+        check_numbers(self, "backoff_s", least=0)
+
+    @property
+    def backoffs_s(self) -> tuple[float, ...]:
+        """How long to wait before each retry [s]."""
+        return tuple(self.backoff_s * 2**retry for retry in range(self.retries))
 
 
 class Rig:

@@ -1,28 +1,162 @@
-"""The steps of a session: ask, wait, log the intent, deliver, judge, log the trial, and conclude it."""
+"""The steps of a session: ask, wait, log the intent, deliver, judge, log the trial, and conclude it; and its pauses.
+
+A pause disarms at once; whoever answers it first decides, and only an answer arms again.
+"""
 
 from __future__ import annotations
 
 import itertools
 import statistics
+import threading
+import time
 from collections import deque
-from typing import Final
+from collections.abc import Callable
+from typing import Final, NamedTuple
 
 from isiw.devices.protocol import Answer
-from isiw.errors import DeviceError, DeviceTimeoutError, LimitExceededError, NotDelivered, told
-from isiw.findings import Finding
-from isiw.log.schema import Event, Header, Intent, Waveform
+from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, LimitExceededError, NotDelivered, told
+from isiw.findings import Finding, Kind
+from isiw.log.headers import Header
+from isiw.log.schema import Event, Intent, Waveform
 from isiw.session.examination import WindowExamination
-from isiw.session.pausing import Pausing
 from isiw.session.rig import Rig
-from isiw.session.sink import Sink
-from isiw.session.updates import SessionUpdate
+from isiw.session.sink import SessionUpdate, Sink
 from isiw.signals.judgement import judge, judge_measurement
 from isiw.signals.watch import Watch
 from isiw.strategy.stopping import StopDecision, StopKind, stimuli_left
 from isiw.strategy.strategy import Strategy
-from isiw.text.shown import shown
+from isiw.text.harmless import shown
 from isiw.trials import Measurement, Stimulus, Sweep, Trial
 from isiw.visit import Control
+
+_INTERRUPTED = "Interrupted by the operator."
+
+
+class Pause(NamedTuple):
+    """A pause that waits to be decided: its number in the session, from 1, and why."""
+
+    number: int
+    reason: str
+
+
+class Pausing:
+    """Whether and why a session is to pause, and how it goes on."""
+
+    def __init__(self, rig: Rig, examination: WindowExamination, asking: Asking) -> None:
+        self._rig, self._examination, self._asking = rig, examination, asking
+        self.reason: str | None = None
+        self.kind: Kind | None = None
+        self.waiting: Pause | None = None
+
+    @property
+    def due(self) -> bool:
+        """Whether the session is to pause before the next stimulus."""
+        return self.reason is not None or self._rig.interrupts.heard
+
+    def now(self, reason: str) -> None:
+        """Disarm, and pause before the next stimulus; from any thread."""
+        self.reason, self.kind = reason, None
+        self._rig.disarm()
+
+    def end(self, reason: str) -> None:
+        """Disarm, and end before the next stimulus, whatever is answered to a pause; from any thread."""
+        self._asking.end()
+        self.now(reason)
+
+    def until_decided(self, decide: Callable[[str], bool]) -> str | None:
+        """Pause until somebody says that the session goes on; if nobody does, the reason that it ends with."""
+        rig, interrupts = self._rig, self._rig.interrupts
+        rig.disarm()
+        self._examination.log_faults()
+        interrupts.acknowledge()
+        if interrupts.ending:
+            raise KeyboardInterrupt
+        reason, kind, self.reason, self.kind = self.reason or _INTERRUPTED, self.kind, None, None
+        self._examination.event("pause", reason, finding=kind, durable=True)
+        if not self._goes_on(reason, decide):
+            if interrupts.heard:
+                raise KeyboardInterrupt
+            return self._last(reason)
+        interrupts.settle()
+        self._examination.event("pause", "The operator goes on.")
+        if not self.due:
+            rig.stage()
+        return None
+
+    def _last(self, reason: str) -> str:
+        """Why a paused session ends: what it has paused for, or what somebody said meanwhile."""
+        if self.reason is not None:
+            reason, self.reason = self.reason, None
+            self._examination.event("pause", reason)
+        return reason
+
+    def _goes_on(self, reason: str, decide: Callable[[str], bool]) -> bool:
+        if self._asking.over:
+            return False
+        self.waiting = Pause(self._asking.next(), reason)
+        try:
+            return self._rig.interrupts.freely(decide, reason) is True and not self._asking.over
+        finally:
+            self.waiting = None
+
+
+_POLL_S: Final = 0.05
+
+
+class Asking:
+    """A question that is answered from another thread: by a key, or a button. No is never taken back."""
+
+    def __init__(self) -> None:
+        self.asked = self.over = False
+        self._number = 0
+        self._answer: bool | None = None
+        self._lock = threading.Lock()
+
+    def next(self) -> int:
+        """The number of the question that comes next."""
+        self._number += 1
+        return self._number
+
+    def wait(self, nobody: Callable[[], bool]) -> bool:
+        """Wait for an answer; where nobody is left who could give one, it is no.
+
+        Args:
+            nobody: whether nobody is left.
+        """
+        with self._lock:  # an answer that came too late for the last question is none to this one
+            self._answer, self.asked = None, True
+        try:
+            while self._answer is None and not self.over and not nobody():
+                time.sleep(_POLL_S)
+        finally:
+            with self._lock:
+                self.asked = False
+        return bool(self._answer) and not self.over
+
+    def answer(self, *, goes_on: bool, number: int | None = None) -> None:
+        """Answer; from any thread.
+
+        Args:
+            goes_on: whether the session goes on.
+            number: the question that is answered; None for whichever is asked.
+
+        Raises:
+            InvalidValueError: nobody asks, or another question is asked.
+        """
+        with self._lock:
+            if not self.asked or (goes_on and (self.over or self._answer is False)):
+                raise InvalidValueError("the session does not wait for an answer", remedy="Pause it first.")
+            if number not in {None, self._number}:
+                raise InvalidValueError(
+                    "the session has paused again since", got=number, expected=f"pause {self._number}",
+                    remedy="Read why it is paused now, then answer that pause.",
+                )  # fmt: skip
+            self._answer = goes_on
+
+    def end(self) -> None:
+        """Let this question and all that follow be answered with no; from any thread."""
+        self.over = True
+
 
 _LAST: Final = 20
 

@@ -14,15 +14,16 @@ from isiw.devices.limited import require_real_time
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DamagedLogError, InvalidValueError, LimitExceededError
+from isiw.log.headers import StrategyRecipe, ThresholdHeader
 from isiw.log.kinds import LogKind, of_another_kind
 from isiw.log.pulses import pulses_s
 from isiw.log.reader import SessionRecord, read_any
 from isiw.log.salvage import salvage
-from isiw.log.schema import Event, Intent, PulseOutcome, StrategyRecipe, ThresholdBelief, ThresholdHeader
+from isiw.log.schema import Event, Intent, PulseOutcome, ThresholdBelief
 from isiw.log.threshold import ThresholdRecord
 from isiw.log.writer import LogWriter
+from isiw.session.assembly import begun, require_parts
 from isiw.session.examination import Examination
-from isiw.session.header import begun, require_parts
 from isiw.session.sink import Sink
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.threshold.pulses import Pulse, ThresholdEstimate

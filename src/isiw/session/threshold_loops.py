@@ -11,7 +11,7 @@ from typing import Any, Final
 from isiw.checks import text
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import ConfigError, InvalidValueError, LimitExceededError
-from isiw.log.schema import ThresholdHeader
+from isiw.log.headers import ThresholdHeader
 from isiw.session.threshold import ThresholdRecorder, open_threshold
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.threshold.search import ThresholdSearch

@@ -1,6 +1,5 @@
 """From waveforms to numbers: impact, MEP, background, and the judgement of a trial."""
 
-from isiw.signals.amplifier import is_saturated
 from isiw.signals.events import TapEvents, detect_events, load_cell_times, sweep_events
 from isiw.signals.impact import impact_time, impact_times
 from isiw.signals.judgement import judge, judge_measurement, wrong_isi
@@ -15,6 +14,7 @@ from isiw.signals.mep import (
     mep_present,
 )
 from isiw.signals.stream import Impact, ImpactDetector
+from isiw.signals.waveforms import is_saturated
 
 __all__ = [
     "MEP_WINDOWS_MS",

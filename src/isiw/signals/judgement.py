@@ -15,21 +15,20 @@ from isiw.checks import MOST_MEP_MV, choice
 from isiw.design import DesignSpace
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.findings import MISTRIALS, Kind
-from isiw.signals.amplifier import is_blanked, is_saturated
 from isiw.signals.events import tap_artefact_times
-from isiw.signals.hum import at_rest, mains_hum
 from isiw.signals.impact import impact_time
-from isiw.signals.limits import SignalLimits
-from isiw.signals.mep import background_rms, mep_amplitudes
-from isiw.signals.units import ACCELERATION_UNITS, EMG_UNITS_MV
-from isiw.signals.values import (
+from isiw.signals.limits import (
+    ACCELERATION_UNITS,
+    EMG_UNITS_MV,
+    SignalLimits,
     before_impact,
     implausible_amplitude,
     pulse_with_tap_alone,
     require_agreement,
     tap_with_tms_alone,
 )
-from isiw.signals.waveforms import MIN_REST_MS, is_recording
+from isiw.signals.mep import background_rms, mep_amplitudes
+from isiw.signals.waveforms import MIN_REST_MS, at_rest, is_blanked, is_recording, is_saturated, mains_hum
 from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial
 from isiw.types import FloatArray
 

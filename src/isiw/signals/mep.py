@@ -16,6 +16,7 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.findings import Kind
 from isiw.signals.waveforms import (
+    PULSE_GUARD_MS,
     as_waveforms,
     crossing_before,
     cut,
@@ -40,9 +41,6 @@ MIN_BACKGROUND_MS = 40.0
 
 TAP_SPAN_MS = 50.0
 """How long after an impact the EMG may show it: the artefact, begun within 30 ms, and its end."""
-
-PULSE_GUARD_MS = 1.0
-"""How long before the nominal pulse its artefact may begin."""
 
 SURE_SHARE = 0.2
 SURE_SD = 6.0

@@ -16,10 +16,9 @@ import numpy as np
 
 from isiw.findings import Finding, Kind, Severity
 from isiw.signals.evidence import OF_REST, Evidence, Response, Told
-from isiw.signals.hum import Hum, at_rest, mains_hum
-from isiw.signals.limits import ARTEFACT_MS, SignalLimits
+from isiw.signals.limits import ARTEFACT_MS, EMG_UNITS_MV, SignalLimits
 from isiw.signals.rig import tap_span_ms
-from isiw.signals.units import EMG_UNITS_MV
+from isiw.signals.waveforms import Hum, at_rest, mains_hum
 from isiw.trials import Sweep, Trial
 from isiw.types import BoolArray, FloatArray
 

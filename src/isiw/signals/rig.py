@@ -18,10 +18,9 @@ from isiw.findings import REST_UV, Finding, Kind, Severity
 from isiw.signals.evidence import Evidence
 from isiw.signals.impact import impact_time
 from isiw.signals.judgement import of_one_length
-from isiw.signals.mep import MIN_BACKGROUND_MS, PULSE_GUARD_MS
-from isiw.signals.units import EMG_UNITS_MV
-from isiw.signals.values import implausible_amplitude, off_by
-from isiw.signals.waveforms import is_recording, samples
+from isiw.signals.limits import EMG_UNITS_MV, implausible_amplitude, off_by
+from isiw.signals.mep import MIN_BACKGROUND_MS
+from isiw.signals.waveforms import PULSE_GUARD_MS, is_recording, samples
 from isiw.trials import Channel, Sweep, Trial
 
 DRIVEN_MS = 25.0

@@ -5,19 +5,60 @@ A finding in one trial counts only after several in a row; each kind of doubt ab
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Final
 
 from isiw.design import DesignSpace
 from isiw.findings import Finding, Kind, Severity
-from isiw.signals.checklist import findings
-from isiw.signals.evidence import Evidence, Told, told_of
+from isiw.signals import places, rig
+from isiw.signals.evidence import (
+    Check,
+    Evidence,
+    Told,
+    equal,
+    large,
+    of_sweep,
+    of_told,
+    of_trial,
+    silent,
+    small,
+    stopped,
+    told_of,
+)
 from isiw.signals.limits import SignalLimits
 from isiw.signals.places import told_by
 from isiw.signals.rig import remedy_for, too_early_by_chance
 from isiw.trials import Measurement, Sweep, Trial, TrialTable
 from isiw.types import FloatArray
+
+CHECKS: Final[tuple[Check, ...]] = (
+    of_sweep(rig.unusable_emg),
+    of_sweep(rig.wrong_acceleration),
+    of_sweep(rig.no_origin),
+    of_sweep(rig.stray_edge),
+    of_trial(rig.wrong_level),
+    of_trial(rig.lost_trial),
+    of_told(places.repeated),
+    of_told(equal),
+    of_told(silent),
+    of_told(stopped),
+    of_told(small),
+    of_told(large),
+    of_told(places.hum),
+    of_told(places.misplaced),
+    of_told(places.cut_off),
+    of_told(places.artefact),
+    of_told(places.decay),
+)
+"""The surest first: of one trial, the first finding explains the others."""
+
+
+def findings(evidence: Evidence) -> Iterator[Finding]:
+    """What is found in some evidence, in the order of the list."""
+    found = (check(evidence) for check in CHECKS)
+    return (finding for finding in found if finding is not None)
+
 
 EARLY_IN_A_ROW: Final = 9
 """By chance a pulse is early at one ISI a few times in a row; after three, strategies that may choose ask elsewhere."""

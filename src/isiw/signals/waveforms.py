@@ -1,18 +1,24 @@
-"""What every detector needs: checked waveforms, level and noise at rest, crossings to a fraction of a sample.
+"""Waveforms: checked, their level and noise at rest, crossings to a fraction of a sample; saturation, and mains hum.
 
-All of it works on many sweeps at once, one waveform a row, shape (n, w).
+What detectors need works on many sweeps at once, one a row, shape (n, w). An amplifier runs into its limits, or
+blanks the pulse's artefact and more; the mains add a wave of 50 or 60 Hz to every MEP.
 """
 
 from __future__ import annotations
 
 import math
 from numbers import Real
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from isiw.errors import InvalidValueError
 from isiw.findings import RATE_HZ, Kind
+from isiw.trials import Channel, Trial
 from isiw.types import ArrayLike, BoolArray, FloatArray, IntArray
+
+PULSE_GUARD_MS = 1.0
+"""How long before the nominal pulse its artefact may begin."""
 
 MIN_REST_MS = 20.0
 REST_MS = 200.0
@@ -122,3 +128,161 @@ def crossing_before(waves: FloatArray, level: FloatArray, stop: IntArray) -> Flo
     rise = after - before
     share = np.divide(level[:, 0] - before, rise, out=np.zeros_like(rise), where=rise > 0)
     return np.where(known, at + share, math.nan)
+
+
+FLAT_MS = 1.0
+FAR_OUT = 10.0
+"""A limit is farther from the sweep's middle than this many times the median distance from it."""
+
+FAR_OUT_STEPS = 30.0
+"""And farther than this many steps of the converter: of EMG at rest, a coarse one shows a few codes only."""
+
+PLATEAU_MS, PLATEAU_SAMPLES = 2.0, 6
+PLATEAU_SD, FLANK_SD = 1.5, 6.0
+STEEPNESS = 1.5
+"""On the limit of an amplifier that saturates before the converter there is the converter's noise alone, less than EMG
+at rest has. The top of an MEP is within 1.5 SD of that for less than 1.4 ms, and rounded: within 6 SD it lasts twice as
+long."""
+
+FAR_OUT_SD = 60.0
+"""Nearer to the sweep's middle the noise at rest hides whether a top is rounded."""
+
+BLANKED_MS = 5.0
+BLANKED_TIMES = 3
+"""An amplifier that blanks the pulse's artefact holds one value; a coarse converter repeats one at rest as well."""
+
+NEARLY_FULL = 0.999
+"""The largest code of a converter lies below its full scale: by a step of one in 2,048 where it has 12 bits."""
+
+
+def is_saturated(
+    emg_mv: ArrayLike,
+    rate_hz: float,
+    full_scale_mv: float | None = None,
+    *,
+    span_ms: tuple[float, float] = (0.0, math.inf),
+) -> bool:
+    """Whether the EMG of one sweep ran into a limit of its amplifier.
+
+    Args:
+        emg_mv: EMG [mV], shape (w,).
+        rate_hz: sampling rate [Hz].
+        full_scale_mv: the largest value that the amplifier can show [mV]. With and without it, a top that stays at
+            exactly one value for 1 ms or longer, far out of the sweep's usual range, is taken for a limit; so is one
+            that stays there for 2 ms or longer with less noise than the EMG has, between steep flanks.
+        span_ms: the part of the sweep that counts [ms from the first sample]; artefacts may run into limits elsewhere.
+
+    Raises:
+        InvalidValueError: no EMG in that part.
+    """
+    emg = np.asarray(emg_mv, dtype=np.float64)
+    first, last = (min(max(edge * rate_hz / 1000, 0.0), emg.size) for edge in span_ms)
+    counts = emg[math.floor(first) : math.ceil(last) + 1]
+    if not counts.size:
+        raise InvalidValueError("there is no EMG in the part that counts", got=span_ms, expected="a part of the sweep")
+    if full_scale_mv is not None and np.abs(counts).max() >= NEARLY_FULL * full_scale_mv:
+        return True
+    level = float(np.median(emg))
+    return _has_flat_top(emg, counts, level, rate_hz) or any(
+        _has_plateau(sign * (emg - level), math.floor(first) + int((sign * counts).argmax()), rate_hz)
+        for sign in (1.0, -1.0)
+    )
+
+
+def _has_flat_top(emg: FloatArray, counts: FloatArray, level: float, rate_hz: float) -> bool:
+    """Whether a top stays at exactly one value, as at the converter's own limit."""
+    samples = max(3, round(FLAT_MS * rate_hz / 1000))
+    tops = (float(counts.max()), float(counts.min()))
+    flat = [top for top in tops if top != level and _longest_run(counts == top) >= samples]
+    if not flat:
+        return False
+    usual, step = np.median(np.abs(emg - level)), np.diff(np.unique(emg)).min()
+    return any(abs(top - level) > max(FAR_OUT * usual, FAR_OUT_STEPS * step) for top in flat)
+
+
+def _has_plateau(upright: FloatArray, top: int, rate_hz: float) -> bool:
+    """Whether the EMG stays at its top longer than noise and a rounded top allow."""
+    noise = MAD_TO_SD * float(np.median(np.abs(upright)))
+    if noise == 0 or upright[top] <= FAR_OUT_SD * noise:
+        return False
+    plateau = _width(upright, top, PLATEAU_SD * noise)
+    least = max(PLATEAU_SAMPLES, PLATEAU_MS * rate_hz / 1000)
+    return plateau >= least and _width(upright, top, FLANK_SD * noise) <= STEEPNESS * plateau
+
+
+def _width(emg_mv: FloatArray, top: int, depth_mv: float) -> int:
+    """For how many samples about its top the EMG stays within so much of it; the top of a part may be on a flank."""
+    away = np.flatnonzero(np.abs(emg_mv - emg_mv[top]) > depth_mv)
+    after = int(np.searchsorted(away, top))
+    first = int(away[after - 1]) + 1 if after else 0
+    last = int(away[after]) if after < away.size else emg_mv.size
+    return last - first
+
+
+def is_blanked(emg_mv: FloatArray, rate_hz: float, pulse_ms: float, span_ms: tuple[float, float]) -> bool:
+    """Whether the amplifier held one value for a part of the MEP's window, much longer than before the pulse."""
+    before, first, last = (max(0, math.floor(edge_ms * rate_hz / 1000)) for edge_ms in (pulse_ms, *span_ms))
+    filled = int((emg_mv[:before] != emg_mv[0]).argmax())  # a rig may fill up what it did not record
+    held = _longest_run(np.diff(emg_mv[first : last + 1]) == 0)
+    at_rest = _longest_run(np.diff(emg_mv[filled:before]) == 0)
+    return held * 1000 / rate_hz >= BLANKED_MS and held > BLANKED_TIMES * at_rest
+
+
+def _longest_run(mask: BoolArray) -> int:
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
+    return int((edges[1::2] - edges[::2]).max(initial=0))
+
+
+MAINS_HZ: Final = (50.0, 60.0)
+REST_S: Final = 0.3
+"""The last EMG at rest to which the wave is fitted [s]: longer, and the mains would drift out of phase."""
+
+LEAST_S: Final = 0.06
+"""Three periods: in fewer, slow drift looks like hum."""
+
+TAP_MS: Final = 150.0
+"""How long after the hit the tap may move the EMG, its reflexes included [ms]."""
+
+LEAST_MV: Final = 0.01
+LEAST_SHARE: Final = 0.6
+"""Share of the variance at rest. In 49 ms of 262 recorded sweeps a few have more, with a wave of 7 µV at most."""
+
+
+class Hum(NamedTuple):
+    """The wave: its frequency, its peak-to-peak amplitude [mV], and its course over a whole waveform [mV]."""
+
+    frequency_hz: float
+    size_mv: float
+    course_mv: FloatArray
+
+
+def mains_hum(emg_mv: FloatArray, rate_hz: float, at_rest: BoolArray) -> Hum | None:
+    """The hum in a waveform, if it is most of the EMG at rest, and large enough to matter; else None."""
+    times_s = np.arange(emg_mv.size) / rate_hz
+    resting = np.flatnonzero(at_rest)[-max(1, round(REST_S * rate_hz)) :]
+    if resting.size < LEAST_S * rate_hz or not np.isfinite(emg_mv[resting]).all():
+        return None
+    fits = (_fitted(emg_mv, times_s, resting, frequency_hz) for frequency_hz in MAINS_HZ)
+    hum, left = min(fits, key=lambda fit: fit[1])
+    return hum if hum.size_mv >= LEAST_MV and left <= 1 - LEAST_SHARE else None
+
+
+def at_rest(emg: Channel, trial: Trial) -> BoolArray:
+    """Which samples of a trial's EMG are before the pulse, and not the tap's, shape (w,)."""
+    times_ms = emg.t0_ms + np.arange(emg.values.size) * 1000 / emg.rate_hz
+    resting = times_ms < (-np.inf if trial.t_tms_ms is None else trial.t_tms_ms - PULSE_GUARD_MS)
+    begins = [at_ms for at_ms in (trial.t_valve_ms, trial.t_hit_ms) if at_ms is not None]
+    if begins:
+        ends_ms = np.inf if trial.t_hit_ms is None else trial.t_hit_ms + TAP_MS
+        resting &= (times_ms < min(begins) - PULSE_GUARD_MS) | (times_ms > ends_ms)
+    return resting
+
+
+def _fitted(emg_mv: FloatArray, times_s: FloatArray, resting: IntArray, frequency_hz: float) -> tuple[Hum, float]:
+    """The wave of a frequency, and the share of the variance at rest that it leaves."""
+    phase = 2 * np.pi * frequency_hz * times_s
+    waves = np.stack([np.cos(phase), np.sin(phase), np.ones_like(phase)], axis=-1)
+    weights, *_ = np.linalg.lstsq(waves[resting], emg_mv[resting], rcond=None)
+    course_mv = waves[:, :2] @ weights[:2]
+    left = np.var(emg_mv[resting] - course_mv[resting]) / max(float(np.var(emg_mv[resting])), 1e-30)
+    return Hum(frequency_hz, 2 * float(np.hypot(*weights[:2])), course_mv), float(left)

@@ -1,5 +1,4 @@
 from . import catalogue as catalogue
-from . import choosing as choosing
 from . import settings as settings
 from . import stopping as stopping
 from . import threshold as threshold

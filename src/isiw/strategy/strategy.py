@@ -19,13 +19,10 @@ from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError
 from isiw.estimate import WindowEstimate
 from isiw.findings import NO_MEP
 from isiw.models.protocol import Observation, Posterior, PredictsMeps, ReportsTrouble, ResponseModel
-from isiw.signals.amplitudes import is_silent
-from isiw.signals.checklist import findings
-from isiw.signals.evidence import Evidence, Told
-from isiw.signals.values import isi_far, off_by, require_plausible
-from isiw.signals.watch import Doubts
-from isiw.strategy.choosing import Choice, Cost, evenly_spaced, instead_of_lost
-from isiw.strategy.course import Method
+from isiw.signals.evidence import Evidence, Told, is_silent
+from isiw.signals.limits import isi_far, off_by, require_plausible
+from isiw.signals.watch import Doubts, findings
+from isiw.strategy.course import Choice, Cost, Method, evenly_spaced, instead_of_lost
 from isiw.strategy.stopping import StopDecision, StopKind, StoppingRule
 from isiw.types import FloatArray
 

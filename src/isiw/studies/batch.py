@@ -15,13 +15,12 @@ from isiw.errors import StudyError
 from isiw.estimate import WindowEstimate
 from isiw.lazy import pd, torch
 from isiw.models.protocol import Observation, Posterior, ReportsTrouble, ResponseModel, Tensor
-from isiw.strategy.choosing import Choice, instead_of_lost
-from isiw.strategy.course import Method
+from isiw.strategy.course import Choice, Method, instead_of_lost
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
+from isiw.studies.execution import one_torch_thread
 from isiw.studies.players import Player
 from isiw.studies.sessions import SimulatedSession, examine
-from isiw.studies.threads import one_torch_thread
 from isiw.subjects.subject import Response
 
 

@@ -7,6 +7,7 @@ down with it again and again, comes back as a `Failure` among the results: nothi
 from __future__ import annotations
 
 import asyncio
+import ctypes
 import importlib
 import os
 import signal
@@ -17,7 +18,7 @@ from collections import Counter
 from collections.abc import Callable, Generator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
 from itertools import islice
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
@@ -26,7 +27,43 @@ from loky import ProcessPoolExecutor
 
 from isiw.checks import check_wholes
 from isiw.errors import StudyError
-from isiw.studies.memory import memory_kept
+from isiw.lazy import torch
+
+
+@contextmanager
+def one_torch_thread() -> Generator[None, None, None]:
+    """Have torch compute with one thread, without which the same session may come to other numbers, until the end."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
+
+
+# Parameters of mallopt(3), from malloc.h, and the value that both begin with.
+_TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
+_USUAL_BYTES = 128 * 1024
+
+
+@contextmanager
+def memory_kept() -> Generator[None, None, None]:
+    """Have this process keep what it frees, and give it back at the end; does nothing without glibc."""
+    _set_thresholds(1 << 30)
+    try:
+        yield
+    finally:
+        _set_thresholds(_USUAL_BYTES)
+        with suppress(AttributeError, OSError, TypeError):
+            ctypes.CDLL(None).malloc_trim(0)
+
+
+def _set_thresholds(size_bytes: int) -> None:
+    with suppress(AttributeError, OSError, TypeError):  # another C library has no such settings
+        mallopt = ctypes.CDLL(None).mallopt
+        mallopt(_MMAP_THRESHOLD, size_bytes)
+        mallopt(_TRIM_THRESHOLD, size_bytes)
+
 
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")

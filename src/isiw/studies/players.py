@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol, TypeAlias
 
 from isiw.estimate import WindowEstimate
-from isiw.strategy.choosing import Choice
+from isiw.strategy.course import Choice
 from isiw.strategy.stopping import StopDecision, StopKind, StoppingRule
 from isiw.strategy.strategy import Strategy
 from isiw.subjects.subject import Response

@@ -12,11 +12,10 @@ from pathlib import Path
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, StudyError
 from isiw.lazy import pd
-from isiw.studies.code import code_checksum
 from isiw.studies.execution import Executor, Failure, Processes
 from isiw.studies.plan import Study, Unit, run_unit
 from isiw.studies.sessions import TIMES, SimulatedSession, simulate
-from isiw.studies.store import Store, begin_store
+from isiw.studies.store import Store, begin_store, code_checksum
 
 
 def conduct(

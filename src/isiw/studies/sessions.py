@@ -19,11 +19,11 @@ from isiw.lazy import pd
 from isiw.metrics import covers, f1
 from isiw.signals import wrong_isi
 from isiw.strategy.catalogue import known_settings, make_strategy
-from isiw.strategy.choosing import Choice
+from isiw.strategy.course import Choice
 from isiw.strategy.stopping import stimuli_left
+from isiw.studies.execution import one_torch_thread
 from isiw.studies.own import OwnCode
 from isiw.studies.players import Crowd, Player, Reported, alone
-from isiw.studies.threads import one_torch_thread
 from isiw.subjects.cohorts import COHORTS, person_of
 from isiw.subjects.subject import Response, SimulatedSubject
 from isiw.window import Window

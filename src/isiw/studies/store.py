@@ -17,7 +17,7 @@ import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, Final
 
@@ -28,12 +28,22 @@ import isiw
 from isiw.errors import StudyError
 from isiw.files import TEMPORARY, opened, put
 from isiw.lazy import pa, parquet, pd, torch
-from isiw.log.locks import claim
-from isiw.studies.code import code_checksum
+from isiw.log.durable import claim
 from isiw.studies.execution import Failure
 from isiw.studies.plan import Study, Unit, begun_study, study_values
-from isiw.text.commands import command
+from isiw.text.harmless import command
 from isiw.text.toml_files import read_toml
+
+
+@cache
+def code_checksum() -> str:
+    """The CRC-32 of isiw's modules, whatever their line endings."""
+    root, checksum = Path(isiw.__file__).parent, 0
+    for path in sorted(root.rglob("*.py")):
+        checksum = zlib.crc32(path.relative_to(root).as_posix().encode(), checksum)
+        checksum = zlib.crc32(path.read_bytes().replace(b"\r\n", b"\n"), checksum)
+    return f"{checksum:08x}"
+
 
 _KEYS: Final = ["strategy", "cohort", "person", "trial"]
 

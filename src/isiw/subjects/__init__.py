@@ -1,11 +1,9 @@
 """Simulated people: the cohorts on which strategies are compared, and the truth about each person."""
 
-from isiw.subjects.changes import Change, TapResponse
-from isiw.subjects.cohorts import COHORTS, cohort
-from isiw.subjects.days import another_day
+from isiw.subjects.changes import Change, Plasticity, TapResponse
+from isiw.subjects.cohorts import COHORTS, another_day, cohort
 from isiw.subjects.labs import LABS, Lab, lab
 from isiw.subjects.measured import MEASURED_KIM, WIDTHS_KIM_MS, MeasuredPerson
-from isiw.subjects.plasticity import Plasticity
 from isiw.subjects.profiles import OpposedProfile, PeakProfile, Profile, TwoPeakProfile
 from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse, ResponseCurve, TrialNoise
 from isiw.subjects.subject import Drift, Responder, Response, SimulatedSubject

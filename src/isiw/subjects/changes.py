@@ -6,6 +6,7 @@ change the enhancement; and the tap itself may evoke a response in the muscle th
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -14,6 +15,35 @@ import numpy as np
 from isiw.checks import check_numbers, check_wholes
 from isiw.errors import InvalidValueError
 from isiw.types import FloatArray
+
+
+@dataclass(frozen=True)
+class Plasticity:
+    """How a person's gain depends on the pairs that they have had.
+
+    Args:
+        limit: change of the log gain after very many pairs, natural log; above 0 the MEPs grow, below 0 they shrink.
+        pairs: after so many pairs at the best ISI, 63 % of the change has come.
+
+    Raises:
+        InvalidValueError: a limit that is not finite, or pairs that are not positive.
+    """
+
+    limit: float
+    pairs: float = 100.0
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "limit")
+        check_numbers(self, "pairs", above=0)
+
+    def log_gain(self, dose: float) -> float:
+        """What is added to the log gain.
+
+        Args:
+            dose: the facilitation, in 0–1, of all pairs so far, summed.
+        """
+        return -self.limit * math.expm1(-dose / self.pairs)
+
 
 MEP_WINDOW_MS: Final = (15.0, 35.0)
 """The MEP window [ms after the magnetic pulse] [Kim2020, 5.2.3]."""

@@ -23,8 +23,7 @@ from isiw.checks import (
 )
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.subjects.changes import Change, TapResponse, amplitude_of_both_mv
-from isiw.subjects.plasticity import Plasticity
+from isiw.subjects.changes import Change, Plasticity, TapResponse, amplitude_of_both_mv
 from isiw.subjects.profiles import OpposedProfile, Profile
 from isiw.subjects.responses import RecruitmentResponse, ResponseCurve, TrialNoise
 from isiw.types import Conditioning, FloatArray, Reference

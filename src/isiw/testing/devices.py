@@ -14,17 +14,17 @@ from isiw.devices.limits import Limits
 from isiw.devices.protocol import Answer, Device, DeviceInfo, HasMemory
 from isiw.errors import IsiwError
 from isiw.findings import Kind
-from isiw.log.topics import waveform_topic
+from isiw.log.schema import waveform_topic
 from isiw.session.rig import own_reference
 from isiw.signals import SignalLimits, judge, judge_measurement
-from isiw.signals.checklist import findings
 from isiw.signals.evidence import Evidence, Told
 from isiw.signals.rig import too_early_by_chance
+from isiw.signals.watch import findings
 from isiw.testing.device_table import Delivery, DeviceTable, device_table
 from isiw.testing.guarded import Guarded, Pace
 from isiw.testing.phantom import artefact_in_window, late_artefact
 from isiw.testing.requirements import broken, require
-from isiw.text.shown import shown
+from isiw.text.harmless import shown
 from isiw.trials import Measurement, Stimulus, Sweep, Trial
 
 _VERBS: Final = ("describe", "stage", "deliver", "stop", "unstage")

@@ -13,8 +13,7 @@ from isiw.devices.limits import Limits
 from isiw.devices.lock import driven
 from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, readiness_of
 from isiw.errors import DeviceError, DeviceTimeoutError, NotDelivered, StillArmedError, told
-from isiw.session.rig import Rig
-from isiw.session.safeguards import Safeguards
+from isiw.session.rig import Rig, Safeguards
 from isiw.session.sink import Sink
 from isiw.testing.requirements import broken, require
 from isiw.trials import Stimulus

@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 
 from isiw.signals import SignalLimits
+from isiw.signals.limits import EMG_UNITS_MV
 from isiw.signals.rig import EVOKED_SPAN_MS
-from isiw.signals.units import EMG_UNITS_MV
 from isiw.testing.device_table import NEAR_PULSE_MS, Delivery, edges_ms
 from isiw.trials import RESPONSE_MV, Sweep
 

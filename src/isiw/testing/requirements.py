@@ -9,7 +9,7 @@ import numpy as np
 
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
-from isiw.text.shown import shown
+from isiw.text.harmless import shown
 
 Trials = tuple[tuple[float | None, float], ...]
 """ISIs [ms] (None is TMS alone) and MEPs [mV], in the order of telling."""

@@ -1,10 +1,36 @@
-"""Text from elsewhere, made harmless: what a terminal, a page or a picture would obey is taken out."""
+"""Text from elsewhere, made harmless, values in a few words, and commands as one types them.
+
+What a terminal, a page or a picture would obey is taken out.
+"""
 
 from __future__ import annotations
 
+import os
 import re
+import shlex
+import subprocess
 import unicodedata
 from typing import Final
+
+LONGEST: Final = 80
+
+
+def shown(value: object) -> str:
+    """The beginning of what a value prints as, and its type, such as "0.12 (float)"; None is None."""
+    if value is None:
+        return "None"
+    try:
+        text = one_line(repr(value))
+    except Exception:  # noqa: BLE001 - an object of somebody else's may fail in any way
+        return f"an object of the type {type(value).__name__}"
+    return f"{text if len(text) <= LONGEST else f'{text[:LONGEST]}…'} ({type(value).__name__})"
+
+
+def command(*words: object) -> str:
+    """A command of isiw, its words quoted as this system's shell needs it."""
+    line = ["isiw", *map(str, words)]
+    return subprocess.list2cmdline(line) if os.name == "nt" else shlex.join(line)
+
 
 _SEQUENCES: Final = re.compile(
     r"(?:\x1b[\]PX^_]|[\x9d\x90\x98\x9e\x9f]).*?(?:\x07|\x1b\\|\x9c|$)"  # titles, links, and what a device is told

@@ -6,8 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from isiw.devices.transports.exchange import Exchange, Request, Verb
-from isiw.devices.transports.reply import Reply
+from isiw.devices.transports.exchange import Exchange, Reply, Request, Verb
 from isiw.errors import DeviceError, DeviceTimeoutError, NotDelivered
 from isiw.trials import Stimulus
 

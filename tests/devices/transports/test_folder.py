@@ -20,7 +20,7 @@ from hostile import IN_THE_WAY, at_once
 from isiw.config import load_config, session_for
 from isiw.errors import ConfigError, DeviceError, DeviceTimeoutError, InvalidValueError, NotDelivered
 from isiw.findings import Kind
-from isiw.session.updates import SessionResult
+from isiw.session.sink import SessionResult
 from isiw.testing import check_device
 from isiw.trials import Measurement, Stimulus, Sweep
 from known import instance

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from isiw.devices.protocol import DeviceInfo
+from isiw.devices.transports.exchange import Reply
 from isiw.devices.transports.line_table import number_of
-from isiw.devices.transports.reply import Reply
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.trials import Channel, Sweep
 

@@ -19,8 +19,7 @@ import numpy as np
 
 from isiw.checks import number
 from isiw.devices.protocol import Answer, DeviceInfo
-from isiw.devices.transports.exchange import Exchange, Request, Verb, described
-from isiw.devices.transports.reply import LONGEST_REPLY, Reply
+from isiw.devices.transports.exchange import LONGEST_REPLY, Exchange, Reply, Request, Verb, described
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError
 from isiw.files import opened, written_beside
 from isiw.trials import Channel, Measurement, Stimulus, Sweep

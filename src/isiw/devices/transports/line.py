@@ -16,9 +16,16 @@ from typing import Any
 from isiw.checks import from_table, text
 from isiw.devices.protocol import Answer, DeviceInfo, Readiness, require_staged
 from isiw.devices.transports.exchange import described
-from isiw.devices.transports.line_connection import open_connection, require_address
 from isiw.devices.transports.line_exchange import Line, LineSettings
-from isiw.devices.transports.line_table import Exchange, LineCommands, isi_ms_of, mep_mv_of, number_of
+from isiw.devices.transports.line_table import (
+    Exchange,
+    LineCommands,
+    isi_ms_of,
+    mep_mv_of,
+    number_of,
+    open_connection,
+    require_address,
+)
 from isiw.errors import DeviceError, InvalidValueError, IsiwError, LimitExceededError, NotDelivered, told
 from isiw.trials import Measurement, Stimulus
 

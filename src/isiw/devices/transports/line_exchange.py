@@ -13,8 +13,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from isiw.checks import check_choice, check_numbers, check_texts, check_wholes
-from isiw.devices.transports.line_connection import Connection
-from isiw.devices.transports.line_table import Exchange, command_values
+from isiw.devices.transports.line_table import Connection, Exchange, command_values
 from isiw.errors import DeviceError, DeviceTimeoutError
 from isiw.text.numbers import read_whole
 

@@ -14,9 +14,8 @@ from fastapi.responses import StreamingResponse
 from plotly.offline import get_plotlyjs
 
 from isiw.errors import InvalidValueError
-from isiw.server.answers import OkAnswer
+from isiw.server.answers import OkAnswer, Refusal
 from isiw.server.live.view import View
-from isiw.server.refusals import Refusal
 from isiw.server.requests import ExcludeRequest, GoOnRequest, IncludeRequest, NoteRequest, body_of
 from isiw.session.loop import Session
 

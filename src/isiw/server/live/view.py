@@ -13,10 +13,10 @@ from typing import Any, Final, NamedTuple
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import EstimateRecord, Event, Intent, Record, Waveform
 from isiw.report.drawn import drawn
-from isiw.report.facts import first_facts
+from isiw.report.tables import first_facts
 from isiw.session.loop import Session
-from isiw.session.pausing import Pause
-from isiw.session.updates import SessionUpdate
+from isiw.session.sink import SessionUpdate
+from isiw.session.steps import Pause
 from isiw.text import plain
 from isiw.trials import Trial
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
+from statistics import NormalDist
 from typing import Final
 
 import numpy as np
@@ -15,6 +17,158 @@ from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.strategy.threshold.pulses import IntensityRange, Pulse, ThresholdEstimate
 from isiw.strategy.threshold.recruitment import DISTANCES_PCT, RecruitmentBelief, log_likelihood
 from isiw.types import FloatArray
+
+_DROP: Final = 0.5 * NormalDist().inv_cdf(0.95) ** 2  # of the log-likelihood at the ends of a 90 % interval
+
+
+@dataclass(frozen=True)
+class MaximumLikelihood:
+    """Uses only whether there was a response, whose probability is a cumulative normal of the intensity.
+
+    When it asks it takes a response at the highest intensity and none at the lowest for granted, so that there is a
+    maximum from the first pulse on; when it estimates it does not.
+
+    Args:
+        relative_spread: SD of the cumulative normal, as a share of the threshold.
+        pulses: stop after so many; usual are 12 to 20.
+
+    Raises:
+        InvalidValueError: a spread that is not positive, or no pulse.
+    """
+
+    relative_spread: float = 0.07
+    pulses: int = 17
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "relative_spread", above=0, most=1)
+        check_wholes(self, "pulses", least=1)
+
+    @property
+    def budget(self) -> int:
+        """How many pulses; see `HasPulseBudget`."""
+        return self.pulses
+
+    def ask(self, pulses: Sequence[Pulse], space: IntensityRange) -> float:
+        """The most likely threshold, on the grid."""
+        granted = [Pulse(space.low_pct_mso, response=False), Pulse(space.high_pct_mso, response=True)]
+        return space.snap(_best(*self._log_likelihood([*granted, *pulses])))
+
+    def estimate(self, pulses: Sequence[Pulse], space: IntensityRange) -> ThresholdEstimate:
+        """The most likely threshold, and what the likelihood ratio does not exclude."""
+        thresholds, log_likelihood = self._log_likelihood(pulses)
+        likely = thresholds[log_likelihood >= log_likelihood.max() - _DROP]
+        best = _best(thresholds, log_likelihood)
+        return ThresholdEstimate(best, float(likely[0]), float(likely[-1])).within(space)
+
+    def decision(self, pulses: Sequence[Pulse], space: IntensityRange) -> StopDecision:
+        """Stop after a fixed number of pulses."""
+        del space
+        reason = f"{len(pulses)} of {self.pulses} pulses are given."
+        return StopDecision(len(pulses) >= self.pulses, reason, StopKind.BUDGET)
+
+    def _log_likelihood(self, pulses: Sequence[Pulse]) -> tuple[FloatArray, FloatArray]:
+        """Thresholds [% MSO], also some beyond any stimulator, and the logarithm of their likelihoods."""
+        thresholds = np.arange(10.0, 130.05, 0.1)
+        intensity = np.array([pulse.intensity_pct_mso for pulse in pulses])[:, None]
+        side = np.where([pulse.responded for pulse in pulses], 1.0, -1.0)[:, None]
+        z = (intensity - thresholds) / (self.relative_spread * thresholds)
+        return thresholds, np.asarray(scipy.special.log_ndtr(side * z).sum(axis=0))
+
+
+def _best(thresholds: FloatArray, log_likelihood: FloatArray) -> float:
+    """The maximum; where it is flat, its middle."""
+    best = thresholds[log_likelihood >= log_likelihood.max() - 1e-9]
+    return float(best.mean())
+
+
+@dataclass(frozen=True)
+class FiveOfTen:
+    """Goes in large steps until one intensity suffices and the next lower one does not, then down in single steps.
+
+    At each intensity it goes on until the verdict is certain: with five responses, or six pulses without one. Once no
+    pulse is needed any more, it asks for the threshold again.
+
+    Args:
+        start_pct_mso: the first intensity [% MSO].
+        large_step_pct_mso: the large step [% MSO]; the small one is that of the range, which it is never below.
+        of: pulses at each intensity.
+        enough: responses that suffice.
+
+    Raises:
+        InvalidValueError: steps that are not positive, or more responses than pulses.
+    """
+
+    start_pct_mso: float = 40.0
+    large_step_pct_mso: float = 5.0
+    of: int = 10
+    enough: int = 5
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "start_pct_mso", above=0, most=100)
+        check_numbers(self, "large_step_pct_mso", above=0)
+        check_wholes(self, "of", least=1)
+        check_wholes(self, "enough", least=1, most=self.of)
+
+    def ask(self, pulses: Sequence[Pulse], space: IntensityRange) -> float:
+        """The intensity whose verdict is still open."""
+        return self._course(pulses, space)[0]
+
+    def estimate(self, pulses: Sequence[Pulse], space: IntensityRange) -> ThresholdEstimate:
+        """The lowest intensity that suffices, once the next lower one does not; there is no interval."""
+        asked, decision = self._course(pulses, space)
+        if not decision.stop or self._verdicts(pulses).get(asked) is not True or asked == space.low_pct_mso:
+            return ThresholdEstimate(None, reason=decision.reason)
+        return ThresholdEstimate(asked)
+
+    def decision(self, pulses: Sequence[Pulse], space: IntensityRange) -> StopDecision:
+        """Stop when the threshold is found, or the range has no more intensities."""
+        return self._course(pulses, space)[1]
+
+    def _verdicts(self, pulses: Sequence[Pulse]) -> dict[float, bool]:
+        """Whether an intensity suffices, for those whose verdict is certain."""
+        told = Counter((pulse.intensity_pct_mso, pulse.responded) for pulse in pulses)
+        suffices = {at: True for (at, responded), n in told.items() if responded and n >= self.enough}
+        return suffices | {at: False for (at, yes), n in told.items() if not yes and n > self.of - self.enough}
+
+    def _course(self, pulses: Sequence[Pulse], space: IntensityRange) -> tuple[float, StopDecision]:
+        """What is asked next, and whether that is needed."""
+        verdicts = self._verdicts(pulses)
+        enough = min((at for at, suffices in verdicts.items() if suffices), default=None)
+        short = max((at for at in verdicts if not verdicts[at] and (enough is None or at < enough)), default=None)
+        if enough is None:
+            return self._upwards(short, space)
+        if enough == space.low_pct_mso:
+            return enough, _over(
+                f"{enough:g} % MSO is high enough (at least {self.enough} of {self.of} pulses evoke an MEP), "
+                "and it is the lowest intensity of the range: begin a new search lower."
+            )
+        if short is None:
+            return space.snap(enough - max(self.large_step_pct_mso, space.step_pct_mso)), _on(
+                f"{enough:g} % MSO is high enough."
+            )
+        if enough - short > 1.5 * space.step_pct_mso:
+            return space.snap(enough - space.step_pct_mso), _on(
+                f"The threshold is between {short:g} and {enough:g} % MSO."
+            )
+        return enough, _over(f"{enough:g} % MSO is high enough, and {short:g} % MSO is not.")
+
+    def _upwards(self, short: float | None, space: IntensityRange) -> tuple[float, StopDecision]:
+        if short is None:
+            return space.snap(self.start_pct_mso), _on("No intensity tested so far is high enough.")
+        if short == space.high_pct_mso:
+            return short, _over(f"{short:g} % MSO, the highest intensity of the range, is not high enough.")
+        return space.snap(short + max(self.large_step_pct_mso, space.step_pct_mso)), _on(
+            f"{short:g} % MSO is not high enough."
+        )
+
+
+def _over(reason: str) -> StopDecision:
+    return StopKind.THRESHOLD.stop(reason)
+
+
+def _on(reason: str) -> StopDecision:
+    return StopKind.THRESHOLD.go_on(reason)
+
 
 THRESHOLDS_PCT_MSO: Final = np.arange(10.0, 130.5, 0.5)
 """Thresholds that are believed possible; those above 100 are beyond any stimulator."""

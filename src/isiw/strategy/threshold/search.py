@@ -7,10 +7,9 @@ from dataclasses import asdict, is_dataclass
 from typing import Any, Final
 
 from isiw.checks import choice, number
-from isiw.signals.values import implausible_scale, require_amplitude
+from isiw.signals.limits import implausible_scale, require_amplitude
 from isiw.strategy.stopping import StopDecision, StopKind
-from isiw.strategy.threshold.bayes import BayesThreshold
-from isiw.strategy.threshold.hunting import MaximumLikelihood
+from isiw.strategy.threshold.bayes import BayesThreshold, FiveOfTen, MaximumLikelihood
 from isiw.strategy.threshold.pulses import (
     HasPulseBudget,
     IntensityRange,
@@ -21,7 +20,6 @@ from isiw.strategy.threshold.pulses import (
     not_growing,
     one_sided,
 )
-from isiw.strategy.threshold.relative import FiveOfTen
 from isiw.text.toml_files import checked
 
 METHODS: Final[Mapping[str, type[BayesThreshold | MaximumLikelihood | FiveOfTen]]] = {

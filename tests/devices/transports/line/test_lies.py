@@ -10,7 +10,7 @@ import isiw
 from devices.transports.line.parts import HASTY, PAIR, TIMEOUT_S, made, staged
 from isiw.errors import DeviceError, DeviceTimeoutError, NotDelivered
 from isiw.findings import Kind
-from isiw.session.safeguards import Safeguards
+from isiw.session.rig import Safeguards
 from isiw.signals.judgement import judge_measurement
 from isiw.testing import Lie, PulsePeer, check_ledger
 from isiw.trials import Measurement, Status, Stimulus
