@@ -122,7 +122,7 @@ def test_a_space_is_printed_with_the_event_that_its_isis_count_from() -> None:
 
 
 def test_a_space_in_seconds_is_named() -> None:
-    with pytest.raises(InvalidValueError, match=r"In seconds\? Then low_ms=0, high_ms=320"):
+    with pytest.raises(InvalidValueError, match=r"low_ms=0, high_ms=320"):
         DesignSpace(0, 0.32, reference="impact")
 
 
@@ -138,7 +138,7 @@ def test_the_two_ready_spaces_are_those_of_the_dissertation() -> None:
 
 @pytest.mark.parametrize("space", [(0, 1e6, 1.0), (0, 500, 1e-3), (0, 1e15, 1e-9), (-1.7e308, 1.7e308, 1.0)])
 def test_a_space_with_more_isis_than_anybody_needs_is_refused(space: tuple[float, float, float]) -> None:
-    with pytest.raises(InvalidValueError, match=r"too many ISIs.*larger step_ms"):
+    with pytest.raises(InvalidValueError, match=r"too many ISIs"):
         DesignSpace(*space, reference="impact")
 
 

@@ -79,7 +79,7 @@ def test_a_channel_that_is_not_a_waveform_is_refused(values: list[object], rate_
 
 
 def test_the_unit_of_a_channel_is_a_text() -> None:
-    with pytest.raises(InvalidValueError, match=r"Channel\.unit must be a text$"):
+    with pytest.raises(InvalidValueError, match=r"Channel\.unit must"):
         Channel(np.array([1.0]), 1000.0, None)  # type: ignore[arg-type]
 
 
@@ -156,7 +156,7 @@ def test_the_frame_of_no_trials_has_the_same_columns() -> None:
 
 
 def test_an_amplitude_in_microvolts_is_no_measurement_and_no_trial() -> None:
-    with pytest.raises(InvalidValueError, match=r"more than any amplifier gives.*Divide by 1000"):
+    with pytest.raises(InvalidValueError, match=r"Divide by 1000"):
         Measurement(2000.0, 50.0)
     with pytest.raises(InvalidValueError, match=r"more than any amplifier gives"):
         Trial(0, Status.ACCEPTED, 50.0, isi_ms=50.0, mep_mv=2000.0)

@@ -87,7 +87,7 @@ def test_a_rest_that_is_no_longer_than_the_longest_interval_is_refused_where_it_
 ) -> None:
     for rest_s in (2.0, 7.0, 8.0):
         protocol = VisitProtocol(iti_s=iti_s, block_trials=3, rest_s=rest_s)
-        with pytest.raises(InvalidValueError, match=r"no longer than.*rest_s above 8"):
+        with pytest.raises(InvalidValueError, match=r"rest_s above 8"):
             protocol.require_effect(min_iti_s)
     VisitProtocol(iti_s=iti_s, block_trials=3, rest_s=8.1).require_effect(min_iti_s)
     VisitProtocol(iti_s=iti_s, rest_s=2.0).require_effect(min_iti_s)

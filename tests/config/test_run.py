@@ -159,7 +159,7 @@ def test_the_command_line_wins_over_the_file(config_file: WriteFile) -> None:
 
 
 def test_a_bad_value_on_the_command_line_is_named() -> None:
-    with pytest.raises(ConfigError, match=r"the command line.*subject.kind.*'reel'"):
+    with pytest.raises(ConfigError, match=r"subject.kind.*'reel'"):
         RunConfig().with_overrides(subject="reel")
 
 
@@ -181,7 +181,7 @@ def test_what_a_strategys_name_stands_for_is_not_kept_with_another(config_file: 
 
 @pytest.mark.parametrize(("section", "block"), [("protocol", "block_trials"), ("limits", "max_block_pulses")])
 def test_a_length_of_rests_needs_blocks(config_file: WriteFile, section: str, block: str) -> None:
-    with pytest.raises(ConfigError, match=rf"{section}.rest_s does nothing.*Set {section}.{block}"):
+    with pytest.raises(ConfigError, match=rf"{section}.rest_s.*{section}.{block}"):
         load_config(config_file(f"[{section}]\nrest_s = 300.0\n"))
     config = load_config(config_file(f"[{section}]\nrest_s = 300.0\n{block} = 10\n"))
     assert getattr(config, section).rest_s == 300.0
@@ -203,7 +203,7 @@ def test_a_period_needs_a_number_of_pulses_also_where_it_is_the_usual_one(config
     ],
 )
 def test_a_rest_or_a_period_that_limits_nothing_is_refused(config_file: WriteFile, text: str) -> None:
-    with pytest.raises(InvalidValueError, match=r"it would have no effect|the period limit has no effect"):
+    with pytest.raises(InvalidValueError, match=r"no effect"):
         load_config(config_file(text))
 
 
@@ -216,19 +216,19 @@ def test_who_asks_for_a_simulated_person_does_not_get_the_real_rig(
 ) -> None:
     config = load_config(config_file(RIG))
     assert config.with_overrides(seed=8, day=2).device is not None
-    with pytest.raises(ConfigError, match="device and subject exclude each other"):
+    with pytest.raises(ConfigError, match="device and subject"):
         config.with_overrides(**given)
 
 
 def test_a_file_with_a_device_names_no_subject_not_even_the_usual_one(config_file: WriteFile) -> None:
-    with pytest.raises(ConfigError, match="device and subject exclude each other"):
+    with pytest.raises(ConfigError, match="device and subject"):
         load_config(config_file(f'{RIG}[subject]\nkind = "simulated"\n'))
 
 
 @pytest.mark.parametrize("name", ["nr", "gp-ei", "parametric-mi", "supra-threshold"])
 def test_a_prior_for_a_strategy_that_learns_nothing_from_it_is_refused(tmp_path: Path, name: str) -> None:
     config = RunConfig(log=tmp_path / "s.mcap").with_overrides(strategy=name, prior=tmp_path / "lab.toml")
-    with pytest.raises(StrategyError, match=f"the strategy {name} learns nothing from earlier sessions"):
+    with pytest.raises(StrategyError, match=f"{name} learns nothing"):
         session_for(config)
 
 
@@ -275,7 +275,7 @@ def test_a_log_holds_the_configuration_it_was_run_with(tmp_path: Path, config_fi
 @pytest.mark.parametrize("config", [{}, {"rig": "A"}, {"seed": 3}])
 def test_a_log_of_other_software_has_no_configuration(tmp_path: Path, config: dict[str, Any]) -> None:
     Session(ScriptedDevice(), scripted_strategy(1), log=tmp_path / "s.mcap", config=config).run()
-    with pytest.raises(ConfigError, match=r"device is not known here.*isiw.resume"):
+    with pytest.raises(ConfigError, match=r"device.*isiw.resume"):
         run_of_log(read_session(tmp_path / "s.mcap"))
 
 
@@ -308,7 +308,7 @@ def test_the_strategy_is_told_what_the_device_delivers_first(config_file: WriteF
 
 def test_a_device_of_ones_own_needs_a_space_before_it_is_made(config_file: WriteFile) -> None:
     config = load_config(config_file('[device]\nfactory = "nowhere:make"\n'))
-    with pytest.raises(ConfigError, match=r"needs a section \[space\].*\"impact\", the.*\"valve\", the"):
+    with pytest.raises(ConfigError, match=r"\[space\].*\"impact\".*\"valve\""):
         session_for(config)
 
 

@@ -118,12 +118,12 @@ def test_the_suite_finds_a_device_that_cannot_resume(space: DesignSpace) -> None
 
 
 def test_the_suite_finds_a_device_with_wrong_timing(space: DesignSpace) -> None:
-    with pytest.raises(AssertionError, match=r"ISI off .* was 20 ms, not the commanded 0 ms"):
+    with pytest.raises(AssertionError, match=r"ISI off .* 20 ms.* 0 ms"):
         check_device(lambda: Inaccurate(SimulatedPerson(responder(), "valve")), space)
 
 
 def test_the_suite_finds_a_device_on_another_reference(space: DesignSpace) -> None:
-    with pytest.raises(AssertionError, match=r'Required: .*, valve; found: impact\. .*reference = "impact"'):
+    with pytest.raises(AssertionError, match=r", valve; found: impact\."):
         check_device(lambda: SimulatedDevice(SimulatedPerson(responder("impact"), "impact")), space)
 
 
@@ -214,7 +214,7 @@ def test_an_invalid_interval_is_an_error(space: DesignSpace, iti_s: float) -> No
 
 def test_the_suite_finds_what_is_no_device(space: DesignSpace) -> None:
     nothing: Any = object()
-    with pytest.raises(AssertionError, match=r"describe, stage.*; found: .*\(object\) without describe, stage"):
+    with pytest.raises(AssertionError, match=r"; found: .*without describe, stage"):
         check_device(lambda: nothing, space)
 
 
@@ -227,7 +227,7 @@ def test_the_suite_says_what_is_required_of_an_answer_and_what_was_seen(
             super().deliver(stimulus, timeout_s)
             return answer
 
-    with pytest.raises(AssertionError, match=f"Required: deliver returns a Sweep .*; found: {seen}$"):
+    with pytest.raises(AssertionError, match=f"deliver returns.*; found: {seen}$"):
         check_device(Wrong, space, clock=VirtualClock())
 
 
@@ -241,7 +241,7 @@ class Slow(Hardware):
 
 
 def test_the_suite_finds_a_device_that_ignores_its_timeout(space: DesignSpace) -> None:
-    with pytest.raises(AssertionError, match=r"within its timeout of 0.05 s; found: "):
+    with pytest.raises(AssertionError, match=r"timeout of 0.05 s; found: "):
         check_device(Slow, space, clock=VirtualClock(), timeout_s=0.05)
 
 
@@ -302,7 +302,7 @@ def test_the_suite_finds_a_rig_that_gives_a_pulse_with_a_tap_alone(space: Design
         def describe(self) -> DeviceInfo:
             return dataclasses.replace(super().describe(), tap_alone=True)
 
-    with pytest.raises(AssertionError, match="a tap alone has no pulse"):
+    with pytest.raises(AssertionError, match="has no pulse"):
         check_device(Unaware, space, clock=VirtualClock())
 
 
@@ -421,7 +421,7 @@ class HangingHardware(Hardware):
 def test_a_delivery_that_hangs_is_given_up_and_the_device_disarmed(space: DesignSpace) -> None:
     device = HangingHardware()
     began_s = time.monotonic()
-    with pytest.raises(AssertionError, match=r"timeout of 0.2 s; found: nothing after .* timed out and was disarmed"):
+    with pytest.raises(AssertionError, match=r"timeout of 0.2 s.* was disarmed"):
         check_device(lambda: device, space, clock=VirtualClock(), timeout_s=0.2)
     assert time.monotonic() - began_s < 10.0
     assert len(device.fired_s) == 2
@@ -455,7 +455,7 @@ def test_the_suite_finds_a_stop_that_fails_before_anything_is_armed(space: Desig
             raise RuntimeError("no port")
 
     device = Unstoppable()
-    with pytest.raises(AssertionError, match=r"stop works in any state; found: .*no port"):
+    with pytest.raises(AssertionError, match=r"any state; found: .*no port"):
         check_device(lambda: device, space, clock=VirtualClock())
     assert not device.taken
 
@@ -493,9 +493,7 @@ class PhantomRig(Hardware):
 
 @pytest.mark.parametrize("unit", ["mV", "uV"])
 def test_the_suite_finds_an_artefact_in_the_mep_window_of_a_phantom(unit: str) -> None:
-    with pytest.raises(
-        AssertionError, match=r"a phantom has no muscle, and TMS alone .* Is the reported time of the pulse right\?"
-    ):
+    with pytest.raises(AssertionError, match=r"phantom.* TMS alone .* time of the pulse"):
         check_device(lambda: PhantomRig(15.0, unit=unit), RIG_SPACE, clock=VirtualClock())
     check_device(lambda: PhantomRig(unit=unit), RIG_SPACE, clock=VirtualClock())
 
@@ -504,7 +502,7 @@ def test_the_suite_finds_an_artefact_that_pairs_alone_have() -> None:
     def is_pair(stimulus: Stimulus) -> bool:
         return stimulus.isi_ms is not None
 
-    with pytest.raises(AssertionError, match="a phantom has no muscle, and more than one pair"):
+    with pytest.raises(AssertionError, match=r"phantom .* more than one pair"):
         check_device(lambda: PhantomRig(15.0, only=is_pair), RIG_SPACE, clock=VirtualClock())
     reflex = PhantomRig(15.0, only=lambda stimulus: stimulus.trial == 0)  # what one ISI alone shows may be the tap's
     check_device(lambda: reflex, RIG_SPACE, clock=VirtualClock())
@@ -520,7 +518,7 @@ def test_the_suite_finds_a_pulse_away_from_its_reported_time_on_a_phantom(early_
     if early_ms <= 12.0:
         check_device(lambda: simulated, RIG_SPACE)
         return
-    with pytest.raises(AssertionError, match=f"the device reports the pulse at -{early_ms:.0f} ms"):
+    with pytest.raises(AssertionError, match=f"at -{early_ms:.0f} ms"):
         check_device(lambda: simulated, RIG_SPACE)
 
 

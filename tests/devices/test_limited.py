@@ -267,7 +267,7 @@ def test_a_device_that_is_not_ready_delivers_nothing_and_may_be_tried_again(
 def test_a_state_that_is_none_delivers_nothing(inner: ScriptedDevice, clock: VirtualClock, state: Any) -> None:
     device, limited = reporting(inner, clock, Readiness())
     device.state = state
-    with pytest.raises(DeviceError, match=r"readiness\(\) did not return an isiw.Readiness"):
+    with pytest.raises(DeviceError, match=r"readiness\(\).*isiw.Readiness"):
         limited.deliver(Stimulus(0, 10), 1.0)
     assert inner.delivered == []
 
@@ -344,7 +344,7 @@ def test_a_virtual_clock_is_for_simulated_devices_only() -> None:
 
 
 def test_a_word_is_neither_simulated_nor_ready() -> None:
-    with pytest.raises(InvalidValueError, match=r"DeviceInfo.simulated must be True or False; got 'false'"):
+    with pytest.raises(InvalidValueError, match=r"DeviceInfo.simulated.*got 'false'"):
         DeviceInfo("rig", "impact", simulated=cast("bool", "false"))
-    with pytest.raises(InvalidValueError, match=r"Readiness.ready must be True or False"):
+    with pytest.raises(InvalidValueError, match=r"Readiness.ready"):
         Readiness(ready=cast("bool", "no"))

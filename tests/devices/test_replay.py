@@ -58,7 +58,7 @@ def test_tms_alone_is_answered_by_tms_alone(device: SimulatedDevice) -> None:
 
 def test_each_trial_answers_once(device: SimulatedDevice) -> None:
     meps(device, 10.0, 50.0, 50.0)
-    with pytest.raises(DeviceError, match=r"no recorded trial is left.*max_pulses"):
+    with pytest.raises(DeviceError, match=r"no recorded trial.*max_pulses"):
         device.deliver(Stimulus(3, 50.0), 1.0)
 
 

@@ -93,15 +93,15 @@ def test_a_complete_task_is_not_resumed(tmp_path: Path) -> None:
 
 def test_a_log_is_never_overwritten_and_the_way_on_is_named(tmp_path: Path) -> None:
     written(tmp_path / "a.mcap", 2)
-    with pytest.raises(LogError, match=r"never overwritten.*isiw interval .*a\.mcap --resume"):
+    with pytest.raises(LogError, match=r"never overwritten.*a\.mcap --resume"):
         begin_log(tmp_path / "a.mcap", BLOCKS, "P07", 5)
 
 
 def test_readers_of_sessions_refuse_it_and_say_what_reads_it(tmp_path: Path) -> None:
     log = written(tmp_path / "a.mcap", 1)
-    with pytest.raises(LogError, match=r"interval production task, not .* window(.|\n)*isiw interval .* --show"):
+    with pytest.raises(LogError, match=r"not .* window(.|\n)*interval .* --show"):
         read_session(log)
-    with pytest.raises(LogError, match=r"interval production task, not .* threshold(.|\n)*isiw interval .* --show"):
+    with pytest.raises(LogError, match=r"not .* threshold(.|\n)*interval .* --show"):
         read_threshold(log)
 
 

@@ -82,9 +82,9 @@ def test_a_log_that_is_not_as_it_was_written_is_an_error(
     log: LogWriter, path: Path, happen: Callable[[Path], None]
 ) -> None:
     happen(path.with_name("s.mcap.part"))
-    with pytest.raises(LogError, match="no longer as it was written"):
+    with pytest.raises(LogError, match="as it was written"):
         log.require_in_place()
-    with pytest.raises(LogError, match="no longer as it was written"):
+    with pytest.raises(LogError, match="as it was written"):
         log.close()
 
 
@@ -114,7 +114,7 @@ def test_of_a_log_that_was_shortened_header_trials_and_events_are_saved_from_mem
 ) -> None:
     os.truncate(path.with_name("s.mcap.part"), left)
     write_trials(log, [5])
-    with pytest.raises(LogError, match="Header, trials and events are written from memory") as caught:
+    with pytest.raises(LogError, match="written from memory") as caught:
         log.close()
     saved = read_session(kept(caught.value))
     assert saved.header == header
@@ -157,7 +157,7 @@ def test_a_log_that_cannot_be_renamed_says_where_it_is(
 ) -> None:
     for way in ("hardlink_to", "rename"):
         monkeypatch.setattr(Path, way, no_rename)
-    with pytest.raises(LogError, match=r"the finished log cannot be renamed.*s\.mcap\.part"):
+    with pytest.raises(LogError, match=r"cannot be renamed.*s\.mcap\.part"):
         log.close()
     assert read_session(path).finished
     assert len(read_session(path).table) == 5
@@ -169,7 +169,7 @@ def test_a_log_that_cannot_go_on_for_its_name_stays_as_it_was(
     before = finished_log.read_bytes()
     with monkeypatch.context() as patched:
         patched.setattr(Path, "replace", no_rename)
-        with pytest.raises(LogError, match=r"cannot go on.*stays as it was"):
+        with pytest.raises(LogError, match=r"cannot go on.*as it was"):
             LogWriter.continuing(finished_log, salvage(finished_log), header)
     assert finished_log.read_bytes() == before
     assert list(finished_log.parent.iterdir()) == [finished_log]

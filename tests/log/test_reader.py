@@ -112,5 +112,5 @@ def test_a_damaged_configuration_is_said_and_not_believed(broken_log: Path, head
 
 @pytest.mark.parametrize("path", [None, 5, b"s.mcap", ["s.mcap"]])
 def test_what_is_no_path_is_an_error_of_its_own(path: Path) -> None:
-    with pytest.raises(LogError, match=r"named by its path.*text or a path"):
+    with pytest.raises(LogError, match=r"named by its path"):
         read_session(path)

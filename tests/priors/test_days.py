@@ -68,9 +68,9 @@ def test_another_day_on_a_rig_with_another_hit_delay_is_refused(tmp_path: Path) 
     for compared in (priors.after, priors.moved):
         with pytest.raises(InvalidValueError, match=r"another hit delay.*80\.0.*180\.0"):
             compared(first, elsewhere)
-    with pytest.raises(InvalidValueError, match="learnt on a rig with another hit delay"):
+    with pytest.raises(InvalidValueError, match="another hit delay"):
         make_strategy(prior=both, hit_delay_ms=(80.0, 5.0), particles=50)
-    with pytest.raises(LogError, match=r"from 80 to 180 ms.*Learn a prior for each rig"):
+    with pytest.raises(LogError, match=r"80 to 180 ms"):
         priors.learn([paths[0], paths[2]], again=True)
 
 
@@ -141,7 +141,7 @@ def test_a_day_whose_log_is_damaged_is_refused_unless_told(tmp_path: Path) -> No
     exclude(log, 2, "sneezed")
     damage(log)
     record = read_session(log)
-    with pytest.raises(DamagedLogError, match=r"s\.mcap: .*lost.*Leave it out.*damaged=True"):
+    with pytest.raises(DamagedLogError, match=r"s\.mcap: .*lost.*damaged=True"):
         priors.after(record)
     assert priors.after(record, damaged=True).profile.places
 

@@ -90,7 +90,7 @@ def test_sessions_on_different_clocks_are_refused(logs: Any, tmp_path: Path) -> 
 
 def test_simulated_sessions_are_not_mixed_with_people(logs: Any, tmp_path: Path) -> None:
     other = write_log(tmp_path / "simulated.mcap", subject="Q", trials=4, simulated=True)
-    with pytest.raises(LogError, match=r"some of the sessions are simulated.*simulated\.mcap"):
+    with pytest.raises(LogError, match=r"are simulated.*simulated\.mcap"):
         priors.learn([logs[0], other])
     file = priors.write_lab_prior(priors.learn([other]), tmp_path / "simulated.toml")
     assert priors.read_lab_prior(file).simulated
@@ -99,7 +99,7 @@ def test_simulated_sessions_are_not_mixed_with_people(logs: Any, tmp_path: Path)
 def test_nothing_is_learnt_from_nobody(tmp_path: Path) -> None:
     with pytest.raises(LogError, match="no session"):
         priors.learn([])
-    with pytest.raises(LogError, match=r"a list of paths.*\[\"a\.mcap\"\]"):
+    with pytest.raises(LogError, match=r"\[\"a\.mcap\"\]"):
         priors.learn("a.mcap")
     with pytest.raises(LogError, match="no accepted trial"):
         priors.learn([write_log(tmp_path / "empty.mcap", trials=0)])
@@ -109,7 +109,7 @@ def test_of_a_damaged_log_nothing_is_learnt_unless_told(tmp_path: Path) -> None:
     log = write_log(tmp_path / "s.mcap", trials=4)
     isiw.exclude(log, 2, "sneezed")
     damage(log)
-    with pytest.raises(DamagedLogError, match=r"s\.mcap: .*lost.*Leave it out.*damaged=True"):
+    with pytest.raises(DamagedLogError, match=r"s\.mcap: .*lost.*damaged=True"):
         priors.learn([log])
     assert priors.learn([log], damaged=True).sessions[0].trials == 4  # the exclusion is lost
 
@@ -173,7 +173,7 @@ def test_a_strategy_with_another_model_does_not_take_a_lab_prior(path: Path) -> 
 
 def test_a_lab_prior_is_joined_with_the_usual_one_before_a_strategy_takes_it(path: Path) -> None:
     learnt = priors.read_lab_prior(path)
-    with pytest.raises(StrategyError, match=r"another kind of model.*given as its \.joined\(\)"):
+    with pytest.raises(StrategyError, match=r"another kind of model.*joined\(\)"):
         make_strategy(prior=learnt)
     assert make_strategy(prior=learnt.joined(), particles=100).ask() >= 0
 

@@ -124,7 +124,7 @@ def test_a_resumption_that_cannot_be_staged_leaves_its_log(log: Path, monkeypatc
 def test_a_delivery_past_its_deadline_ends_the_session_disarmed(log: Path, released: threading.Event) -> None:
     device = ScriptedDevice(lambda stimulus: released.wait(60) and Measurement(0.1, stimulus.isi_ms))
     guards = Safeguards(deadlines=Deadlines(stop_s=0.2))
-    with pytest.raises(DeviceTimeoutError, match="did not answer in time: deliver"):
+    with pytest.raises(DeviceTimeoutError, match="in time: deliver"):
         Session(device, scripted_strategy(), log=log, timeout_s=0.05, safeguards=guards).run()
     assert device.calls[:2] == ["stage", "stop"]
     record = read_session(log)
@@ -207,7 +207,7 @@ def test_a_channel_that_json_cannot_hold_is_an_error_and_the_log_stays_whole(log
         channels = {"emg": Channel(np.zeros(300), 3000.0, "mV", -50.0), name: Channel(np.zeros(3), 100.0, unit)}
         return Sweep(channels, t_valve_ms=-known(stimulus.isi_ms), t_tms_ms=0.0)
 
-    with pytest.raises(InvalidValueError, match=r"cannot have this name|cannot be written as JSON"):
+    with pytest.raises(InvalidValueError, match=r"this name|as JSON"):
         Session(ScriptedDevice(answer), scripted_strategy(), log=log).run()
     record = read_session(log)
     assert record.losses == ()

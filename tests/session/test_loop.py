@@ -121,7 +121,7 @@ def session_with_detection_limits(
 
 
 def test_another_detection_limit_than_the_strategys_is_refused(log: Path) -> None:
-    with pytest.raises(DeviceError, match=r"0.05 mV.*0.005 mV.*make_strategy\(..., detection_limit_mv=0.05\)"):
+    with pytest.raises(DeviceError, match=r"0.05 mV.*0.005 mV"):
         session_with_detection_limits(ScriptedDevice(), scripted_strategy(), log, device_mv=0.05, strategy_mv=0.005)
     assert not log.exists()
 
@@ -169,7 +169,7 @@ def test_the_interval_between_trials_is_waited_for_before_the_first_one_too(log:
 
 
 def test_a_virtual_clock_is_refused_where_somebody_may_be_stimulated(log: Path) -> None:
-    with pytest.raises(DeviceError, match=r"does not wait between stimuli.*simulated=True"):
+    with pytest.raises(DeviceError, match=r"does not wait.*simulated=True"):
         Session(ScriptedDevice(simulated=False), scripted_strategy(3), log=log, clock=VirtualClock())
 
 
@@ -309,7 +309,7 @@ def test_a_device_on_another_reference_is_refused_and_the_space_is_to_be_given_t
 ) -> None:
     device, strategy = ScriptedDevice(), scripted_strategy(space=dataclasses.replace(IMPACT_SPACE, reference=space_s))
     object.__setattr__(device.info, "reference", device_s)
-    with pytest.raises(DeviceError, match=rf'different events.*set reference = "{device_s}" under \[space\]'):
+    with pytest.raises(DeviceError, match=rf'different events.*reference = "{device_s}"'):
         Session(device, strategy, log=log)
 
 
@@ -385,7 +385,7 @@ def test_a_strategy_that_knows_of_other_trials_is_refused_before_anything_is_del
 ) -> None:
     strategy, device = scripted_strategy(3), ScriptedDevice()
     Session(ScriptedDevice(), strategy, log=tmp_path / "another.mcap").run()
-    with pytest.raises(StrategyError, match=r"not this session's; got '3 trials'; expected 0 .*restarted"):
+    with pytest.raises(StrategyError, match=r"got '3 trials'.* 0 .*restarted"):
         Session(device, strategy, log=log).run()
     assert not device.delivered
     assert not list(tmp_path.glob("s.mcap*"))
@@ -405,7 +405,7 @@ def test_channels_that_cannot_be_judged_or_logged_are_refused_before_anything_is
     device = ScriptedDevice()
     info = dataclasses.replace(device.describe(), channels=channels)
     monkeypatch.setattr(device, "describe", lambda: info)
-    with pytest.raises(InvalidValueError, match=r"unit of the channel|cannot have this name"):
+    with pytest.raises(InvalidValueError, match=r"unit of the channel|this name"):
         Session(device, scripted_strategy(3), log=log)
 
 

@@ -142,7 +142,7 @@ def test_a_slip_is_refused_and_can_be_put_right(log: Path) -> None:
 def test_a_pulse_before_the_impact_is_a_mistrial(log: Path) -> None:
     with open_session(scripted_strategy(3, space=DesignSpace(0, 200, reference="impact")), log) as session:
         session.ask()
-        with pytest.raises(InvalidValueError, match=r'came before the impact.*session.mistrial\("TMS before impact"\)'):
+        with pytest.raises(InvalidValueError, match=r'session.mistrial\("TMS before impact"\)'):
             session.tell(-0.5, 0.02)
         session.mistrial("TMS before impact")
     assert [trial.reason for trial in read_session(log).table] == [Kind.TMS_BEFORE_IMPACT]
@@ -150,7 +150,7 @@ def test_a_pulse_before_the_impact_is_a_mistrial(log: Path) -> None:
 
 def test_an_isi_that_nobody_knows_is_not_learnt_from(log: Path) -> None:
     with open_session(scripted_strategy(3), log) as session:
-        with pytest.raises(InvalidValueError, match=r"too uncertain to learn from.*at most 50 ms"):
+        with pytest.raises(InvalidValueError, match=r"too uncertain.*50 ms"):
             session.tell(session.ask(), 0.02, isi_sd_ms=100.0)
         session.tell(session.ask(), 0.02, isi_sd_ms=50.0)
     assert len(read_session(log).table.told) == 1
@@ -223,9 +223,9 @@ def test_it_says_what_is_open_and_how_long_the_next_ask_would_wait(log: Path, sp
 
 def test_nothing_can_be_told_that_was_not_asked(log: Path) -> None:
     with open_session(scripted_strategy(3), log) as session:
-        with pytest.raises(InvalidValueError, match="no trial is waiting for an outcome"):
+        with pytest.raises(InvalidValueError, match="waiting for an outcome"):
             session.tell(50.0, 0.02)
-        with pytest.raises(InvalidValueError, match="no trial is waiting for an outcome"):
+        with pytest.raises(InvalidValueError, match="waiting for an outcome"):
             session.mistrial("no impact")
 
 
@@ -233,7 +233,7 @@ def test_tms_alone_is_told_without_being_asked(log: Path) -> None:
     with open_session(scripted_strategy(9), log) as session:
         session.tell(None, 0.01)
         session.ask()
-        with pytest.raises(InvalidValueError, match="not of the kind of trial that was asked for"):
+        with pytest.raises(InvalidValueError, match="kind of trial"):
             session.tell(None, 0.01)
     assert read_session(log).table[0].commanded_isi_ms is None
 
@@ -435,9 +435,9 @@ def test_an_excluded_trial_is_unlearnt_and_stays_so(log: Path) -> None:
 def test_what_is_said_about_a_session_is_a_text(log: Path, nothing: Any) -> None:
     with open_session(scripted_strategy(9), log) as session:
         run(session, 1)
-        with pytest.raises(InvalidValueError, match="a note must be a text"):
+        with pytest.raises(InvalidValueError, match="a note must"):
             session.note(nothing)
-        with pytest.raises(InvalidValueError, match="the reason of an exclusion must be a text"):
+        with pytest.raises(InvalidValueError, match="reason of an exclusion"):
             session.exclude(0, nothing)
     record = read_session(log)
     assert not record.events

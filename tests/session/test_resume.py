@@ -229,16 +229,16 @@ def test_rests_that_limit_nothing_are_refused_where_they_are_stated_and_go_on_fr
     log: Path, part: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     own = {"limits": Limits.of_space(scripted_strategy().space)} | part
-    with pytest.raises(InvalidValueError, match="so it would have no effect"):
+    with pytest.raises(InvalidValueError, match="no effect"):
         Session(ScriptedDevice(), scripted_strategy(4), log=log, **part).run()
-    with pytest.raises(InvalidValueError, match="so it would have no effect"):
+    with pytest.raises(InvalidValueError, match="no effect"):
         open_session(scripted_strategy(4), log, **own)
     assert not list(log.parent.iterdir())
     monkeypatch.setattr(Session, "_require_effect", lambda _: None)
     with pytest.raises(KeyboardInterrupt):
         Session(ScriptedDevice(), scripted_strategy(4), log=log, on_trial=stop_after(2), **part).run()
     monkeypatch.undo()
-    with pytest.raises(InvalidValueError, match="so it would have no effect"):
+    with pytest.raises(InvalidValueError, match="no effect"):
         resume(log, ScriptedDevice(), scripted_strategy(4), limits=IDLE[0])
     resume(log, ScriptedDevice(), scripted_strategy(4)).run()
     header = read_session(log).header
@@ -254,7 +254,7 @@ def test_the_first_stimulus_after_resuming_waits_a_whole_interval(
 
 def test_another_strategy_is_refused_before_anything_happens(interrupted: Path) -> None:
     before = interrupted.read_bytes()
-    with pytest.raises(StrategyError, match="does not ask again what was asked in trial 0"):
+    with pytest.raises(StrategyError, match="asked in trial 0"):
         resume(interrupted, ScriptedDevice(), scripted_strategy(10, seed=1))
     assert interrupted.read_bytes() == before
 
@@ -430,7 +430,7 @@ def test_a_stimulus_of_which_nothing_is_left_is_compared_with_nothing(
 
 def test_what_was_asked_and_never_answered_is_compared_as_well(interrupted: Path) -> None:
     kill_during_trial_4(interrupted, 199.0)
-    with pytest.raises(StrategyError, match="does not ask again what was asked in trial 4"):
+    with pytest.raises(StrategyError, match="asked in trial 4"):
         resume(interrupted, ScriptedDevice(), scripted_strategy(10))
 
 
@@ -439,7 +439,7 @@ def test_a_session_with_a_real_device_does_not_go_on_with_a_simulated_one(log: P
     with pytest.raises(KeyboardInterrupt):
         Session(real, scripted_strategy(10), log=log, clock=clock, on_trial=stop_after(4)).run()
     before = log.read_bytes()
-    with pytest.raises(DeviceError, match=r"run with a real device.*set simulated = false"):
+    with pytest.raises(DeviceError, match=r"real device.*simulated = false"):
         resume(log, ScriptedDevice(), scripted_strategy(10))
     assert log.read_bytes() == before
     assert len(resume(log, real, scripted_strategy(10), clock=clock).run().trials) == 10
@@ -447,7 +447,7 @@ def test_a_session_with_a_real_device_does_not_go_on_with_a_simulated_one(log: P
 
 def test_a_simulated_session_does_not_go_on_with_a_real_device(interrupted: Path) -> None:
     real, before = ScriptedDevice(simulated=False), interrupted.read_bytes()
-    with pytest.raises(DeviceError, match=r"run with a simulated device.*Start a new session: isiw run CONFIG"):
+    with pytest.raises(DeviceError, match=r"simulated device.*isiw run CONFIG"):
         resume(interrupted, real, scripted_strategy(10))
     assert interrupted.read_bytes() == before
     assert real.delivered == []
@@ -458,7 +458,7 @@ def test_of_two_resumptions_of_one_log_the_second_is_refused(interrupted: Path) 
     device = ScriptedDevice()
     second = resume(interrupted, device, scripted_strategy(10))
     first.run()
-    with pytest.raises(LogError, match="has changed since it was read"):
+    with pytest.raises(LogError, match="has changed"):
         second.run()
     assert device.delivered == []
     assert len(read_session(interrupted).table) == 10
@@ -564,7 +564,7 @@ def cut(log: Path) -> Any:
 
 def test_a_log_without_its_end_does_not_go_on_before_somebody_says_how_many_stimuli_it_lost(cut: Path) -> None:
     before = cut.read_bytes()
-    with pytest.raises(DamagedLogError, match=r"end is missing.*stimulator's counter.*--lost-pulses"):
+    with pytest.raises(DamagedLogError, match=r"end is missing.*--lost-pulses"):
         resume(cut, ScriptedDevice(), scripted_strategy(10))
     with pytest.raises(DamagedLogError, match="end is missing"):
         exclude(cut, 1, "sneezed")
@@ -614,7 +614,7 @@ def test_a_session_that_is_over_arms_nothing_when_it_is_resumed(tmp_path: Path) 
 def test_a_session_that_would_not_be_accepted_any_more_goes_on_as_it_was(tmp_path: Path) -> None:
     space = DesignSpace(0, 100, reference="valve")
     settings: dict[str, Any] = {"hit_delay_ms": (150.0, 5.0), "particles": 50}
-    with pytest.raises(InvalidValueError, match="would hit after the last ISI"):
+    with pytest.raises(InvalidValueError, match="after the last ISI"):
         make_strategy(space=space, **settings)
     log = tmp_path / "s.mcap"
     with open_session(remade_strategy("default", space, 0, **settings), log) as session:

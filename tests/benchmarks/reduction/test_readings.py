@@ -56,5 +56,5 @@ def test_unknown_words_are_refused(wrong: dict[str, Any]) -> None:
 
 
 def test_live_trials_have_no_recorded_outside() -> None:
-    with pytest.raises(InvalidValueError, match="only a recorded sweep has an outside"):
+    with pytest.raises(InvalidValueError, match="has an outside"):
         Reading(observation="live", outside="zero")

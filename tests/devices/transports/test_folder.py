@@ -225,7 +225,7 @@ def test_a_sweep_has_its_channels_and_times(tmp_path: Path) -> None:
 
 def test_without_anybody_there_staging_fails_in_time_and_stopping_is_harmless(tmp_path: Path) -> None:
     made = device(tmp_path, stage_timeout_s=0.2, stop_timeout_s=0.2)
-    with pytest.raises(DeviceTimeoutError, match=r"nobody answered to disarm in the folder.*Does the software run"):
+    with pytest.raises(DeviceTimeoutError, match=r"nobody answered to disarm"):
         made.stage()
     made.stop()
     made.unstage()
@@ -239,7 +239,7 @@ def test_without_the_folder_staging_fails(tmp_path: Path) -> None:
 def test_what_does_not_arm_is_not_staged(tmp_path: Path) -> None:
     with rig(tmp_path, {"arm": "cannot arm"}):
         made = device(tmp_path)
-        with pytest.raises(DeviceError, match="failed to arm: the relay is stuck"):
+        with pytest.raises(DeviceError, match="the relay is stuck"):
             made.stage()
         with pytest.raises(NotDelivered, match="not staged"):
             made.deliver(Stimulus(0, 50.0), 1.0)
@@ -336,7 +336,7 @@ def test_a_misspelt_setting_is_told(tmp_path: Path) -> None:
     config = tmp_path / "session.toml"
     device = f'[device]\nfactory = "isiw:FolderDevice"\n[device.settings]\nfolder = "{tmp_path}"\ninf = {{}}\n'
     config.write_text(f'{device}[space]\nreference = "impact"\n')
-    with pytest.raises(ConfigError, match=r"do not fit the function.*inf"):
+    with pytest.raises(ConfigError, match=r"function.*inf"):
         session_for(load_config(config))
 
 

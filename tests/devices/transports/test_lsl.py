@@ -80,7 +80,7 @@ def test_a_sweep_is_where_its_timestamps_are_and_what_cannot_confirm_it_counts_a
         with pytest.raises(NotDelivered, match=r"refused to deliver: no air$"):
             made.deliver(Stimulus(1, 50.0), 5.0)
         assert made.deliver(Stimulus(2, None), 5.0).t_hit_ms is None
-    with pytest.raises(DeviceError, match=r"stream rig-\w+-echo is lost|nobody listens"):
+    with pytest.raises(DeviceError, match=r"-echo is lost|nobody listens"):
         made.stop()
     emg, force = sweep.channels["emg"], sweep.channels["force"]
     assert (sweep.t_tms_ms, sweep.t_hit_ms, emg.unit, emg.rate_hz) == (0.0, -50.0, "mV", RATE_HZ)
@@ -149,10 +149,10 @@ def test_a_fault_is_told_as_what_it_is_and_disarms(
 def test_what_is_not_as_configured_is_not_staged() -> None:
     with rig({"arm": "cannot arm"}) as name:
         emg = {"stream": f"{name}-emg", "unit": "mV", "rate_hz": 5000.0, "column": 2}
-        with pytest.raises(DeviceError, match=r"got '2 channels at 2000 Hz'; expected at least 3 at 5000 Hz"):
+        with pytest.raises(DeviceError, match=r"'2 channels at 2000 Hz'.* 3 at 5000 Hz"):
             device(name, channels={"emg": emg}).stage()
         made = device(name)
-        with pytest.raises(DeviceError, match="failed to arm: the relay is stuck"):
+        with pytest.raises(DeviceError, match="the relay is stuck"):
             made.stage()
         made.stop()
         info = pylsl.StreamInfo(f"{name}-echo", "Markers", 1, 0, "string", "left over")
@@ -164,7 +164,7 @@ def test_what_is_not_as_configured_is_not_staged() -> None:
 
 def test_without_its_streams_staging_fails_in_time_and_says_which_are_missing() -> None:
     made = device("nobody", stage_timeout_s=0.1)
-    with pytest.raises(DeviceTimeoutError, match=r"streams are missing.*got 'nobody-echo, nobody-emg'"):
+    with pytest.raises(DeviceTimeoutError, match=r"got 'nobody-echo, nobody-emg'"):
         made.stage()
     made.stop()
     made.unstage()
@@ -195,7 +195,7 @@ def test_channels_must_make_sense() -> None:
     with pytest.raises(InvalidValueError, match="needs its EMG"):
         device("rig", channels={})
     emg = {"stream": "a", "unit": "mV", "rate_hz": 2000.0}
-    with pytest.raises(InvalidValueError, match="the stream a has two rates"):
+    with pytest.raises(InvalidValueError, match="a has two rates"):
         device("rig", channels={"emg": emg, "force": emg | {"rate_hz": 1000.0}})
     with pytest.raises(InvalidValueError, match="column"):
         device("rig", channels={"emg": emg | {"column": -1}})

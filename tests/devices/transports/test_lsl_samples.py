@@ -65,7 +65,7 @@ def test_jitter_of_chunks_averages_out() -> None:
 
 def test_only_the_newest_samples_are_kept() -> None:
     made = stream(FakeInlet(stamps(0, 4096), stamps(4096, 6000)), kept_s=1.0)
-    with pytest.raises(DeviceError, match=r"begin after the sweep does; got '4.75 s later'"):
+    with pytest.raises(DeviceError, match=r"got '4.75 s later'"):
         made.cut(250.25, 250.5, np.inf)
 
 
@@ -108,8 +108,8 @@ def test_nothing_is_delivered_while_samples_are_late_or_ahead(now_s: float, word
 
 def test_nothing_is_delivered_while_a_stream_is_lost_or_silent() -> None:
     inlet = FakeInlet()
-    with pytest.raises(NotDelivered, match=r"the stream emg has fallen silent.*This stimulus was not delivered"):
+    with pytest.raises(NotDelivered, match=r"emg has fallen silent.* not delivered"):
         stream(inlet).require_live(lambda: 0.0, 0.5)
     inlet.lost = True
-    with pytest.raises(NotDelivered, match=r"the stream emg is lost.*This stimulus was not delivered"):
+    with pytest.raises(NotDelivered, match=r"emg is lost.* not delivered"):
         stream(inlet).require_live(lambda: 0.0, 0.5)

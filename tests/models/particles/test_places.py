@@ -75,9 +75,7 @@ def test_places_count_from_one_event_and_that_of_the_space() -> None:
     of_the_impact = replace(HERE, reference="impact", hit_delay_ms=None)
     for place, other, space in ((HERE, "impact", IMPACT_SPACE), (of_the_impact, "valve command", VALVE_SPACE)):
         reference = place.reference
-        with pytest.raises(
-            InvalidValueError, match=rf'set reference = "{reference}".*sessions that count from the {other}'
-        ):
+        with pytest.raises(InvalidValueError, match=rf'reference = "{reference}".*from the {other}'):
             ParticleModel(prior_with(place), particles=10).begin(space, 0)
 
 

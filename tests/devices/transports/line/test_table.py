@@ -43,7 +43,7 @@ def test_a_command_that_cannot_work_is_named(name: str, exchange: Any, words: st
 
 def test_what_an_instrument_must_understand_cannot_be_left_out() -> None:
     commands = {name: each for name, each in PEER_COMMANDS.items() if name != "disarm"}
-    with pytest.raises(InvalidValueError, match=r"the table commands: missing a required argument: 'disarm'"):
+    with pytest.raises(InvalidValueError, match=r"commands: .*'disarm'"):
         isiw.LineDevice("socket://127.0.0.1:5000", {"name": "bench", "reference": "impact"}, commands)
 
 
