@@ -1,4 +1,7 @@
-"""The sections of a configuration file."""
+"""The sections of a configuration file, and the values in it that are probably in another unit.
+
+These are refused where somebody states them; a log that was made with them is read, and continues.
+"""
 
 from __future__ import annotations
 

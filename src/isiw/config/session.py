@@ -1,4 +1,4 @@
-"""The session that a configuration describes: its device, its simulated person, and its log."""
+"""The session that a configuration describes: its device, its simulated person, its prior, and its log."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from isiw.log.durable import log_exists
 from isiw.log.headers import RUN_KEY
 from isiw.log.outputs import write_output
 from isiw.log.reader import SessionRecord, read_session
-from isiw.log.writer import now
+from isiw.log.schema import now
 from isiw.models.particles.prior import Prior
 from isiw.priors import after, read_lab_prior
 from isiw.session.loop import Session

@@ -1,4 +1,4 @@
-"""Which sessions are exported: the logs, whose they are, and which visit of the person each is."""
+"""Which sessions are exported: the logs, copies of one session, pseudonyms, and which visit of the person each is."""
 
 from __future__ import annotations
 

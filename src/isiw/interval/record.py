@@ -18,8 +18,8 @@ from isiw.log.kinds import LogKind, kind_of, of_another_kind
 from isiw.log.production import PRODUCTION_VERSION, Block, Production, ProductionHeader
 from isiw.log.records import Records
 from isiw.log.salvage import Salvage, salvage
-from isiw.log.schema import Event
-from isiw.log.writer import LogWriter, now
+from isiw.log.schema import Event, now
+from isiw.log.writer import LogWriter
 
 NEAR_MS = 20.0
 """Half of the 40 ms in which an interval counts as effective [Kim2020, 6.3.1]."""

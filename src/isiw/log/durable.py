@@ -1,5 +1,8 @@
 """Files that survive a crash: synced, locked while they are written, and renamed in one step over nothing else.
 
+A lock ends with its process, whatever ends that: on POSIX it is an advisory one of the open file, on Windows one of a
+byte far behind every log's end, since nobody else may read a byte that is locked there.
+
 On Windows an open file can neither be renamed nor replaced, so files are let go of for that moment. These branches have
 been type-checked, and have not been run.
 """

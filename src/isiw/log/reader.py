@@ -1,4 +1,4 @@
-"""Reading a log: a session as values, whatever state its file is in."""
+"""Reading a log: a session as values and its trials as a table, whatever state its file is in."""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""The records of a log by their kind, of whatever it is, and what of it makes no sense."""
+"""The records of a log by their kind, with their times, and what makes no sense; those of earlier versions, too.
+
+Earlier versions wrote sentences alone where there are kinds now. Nothing else reads meaning out of a text; the words
+are those of these versions, and are never to be changed.
+"""
 
 from __future__ import annotations
 

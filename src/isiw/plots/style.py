@@ -1,4 +1,4 @@
-"""What all pictures have in common: colours, axes, and how they are written.
+"""What all pictures have in common: colours, axes, and how they are written, also into a page.
 
 Everything is drawn with matplotlib's object interface, so no display is needed and no global state is touched.
 """

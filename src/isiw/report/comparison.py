@@ -61,7 +61,9 @@ def _found(last: Estimate) -> tuple[str, ...]:
 def _cell(estimate: Estimate, edge: Edge) -> str:
     if estimate.window is None:
         return ""
-    return f"{sentences.interval_cell(edge)} ms" if edge.is_known else "–"
+    if edge.low_ms is None or edge.high_ms is None:
+        return "–"
+    return sentences.edge_text(edge.low_ms) if edge.low_ms == edge.high_ms else f"{sentences.interval_cell(edge)} ms"
 
 
 def comparison_sentence(difference: Difference) -> str:

@@ -1,4 +1,4 @@
-"""The tables of a report: trials, what was lost, events, and what was counted for safety."""
+"""The tables of a report: trials, what was lost, events, what was counted for safety, and what the session is."""
 
 from __future__ import annotations
 

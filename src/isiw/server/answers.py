@@ -1,4 +1,4 @@
-"""What is answered: each a JSON object, whose `ok` says whether it was done."""
+"""What is answered, and what is refused: each a JSON object, whose `ok` says whether it was done."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The server as an ASGI application: its routes behind the guard, and every error as words."""
+"""The server as an ASGI application: its routes behind the guard, every error as words, and all calls described."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Assembling a session: from a device, a strategy and options to parts that have what they need when they are made."""
+"""Assembling a session, and its header: from a device, a strategy and options to parts that have what they need."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from isiw.devices.protocol import Device
 from isiw.errors import InvalidValueError
 from isiw.log.durable import log_of
 from isiw.log.headers import Header, StrategyRecipe
-from isiw.log.schema import Event, Record
-from isiw.log.writer import LogWriter, now
+from isiw.log.schema import Event, Record, now
+from isiw.log.writer import LogWriter
 from isiw.session.desk import Desk, Operated
 from isiw.session.examination import WindowExamination, examination_of
 from isiw.session.rig import Rig, Safeguards, require_matching

@@ -1,4 +1,8 @@
-"""Signals of the operator and the system: each disarms at once, and interrupts where nothing is in flight."""
+"""Signals of the operator and the system: each disarms at once, and interrupts where nothing is in flight.
+
+If nothing else helps the process ends, with the reason on the screen and in the log. What it holds open, such as a
+serial port, is closed by that; a rig with an interlock disarms then.
+"""
 
 from __future__ import annotations
 

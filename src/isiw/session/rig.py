@@ -1,4 +1,4 @@
-"""A session's device: driven by this session alone, limited, punctual, and disarmed whatever happens."""
+"""A session's device and safeguards: driven by this session alone, limited, punctual, disarmed whatever happens."""
 
 from __future__ import annotations
 

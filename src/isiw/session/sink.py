@@ -1,4 +1,4 @@
-"""The sink of a session: what happens goes to its log first, then to all who look on, the screen, and the caller."""
+"""The sink of a session: what it reports goes to its log first, then to all who look on, the screen, and the caller."""
 
 from __future__ import annotations
 
