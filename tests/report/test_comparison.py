@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ from isiw.plots.comparison import comparison_figure
 from isiw.plots.session import session_figure
 from isiw.priors import Difference
 from isiw.report.comparison import comparison_page, comparison_sentence, comparison_table
-from isiw.sentences import JUDGED_SINCE
+from isiw.sentences import JUDGED_SINCE, later, moved
 from isiw.session.loop import Session
 from scripted import ScriptedDevice, scripted_strategy
 
@@ -28,6 +29,13 @@ def test_the_table_has_a_line_a_session_with_its_window_and_intervals(record: Se
     assert "P07" in first
     assert first.endswith("4     0.90       34–94 ms  29–39 ms  150–> ms")
     assert second.startswith("2 ")
+
+
+def test_an_edge_that_lies_before_the_range_for_certain_is_said_to_do_so(record: SessionRecord) -> None:
+    update = {"start_low_ms": -math.inf, "start_high_ms": -math.inf}
+    entries = tuple(e.model_copy(update=update) if isinstance(e, EstimateRecord) else e for e in record.history)
+    early = type(record)(record.path, record.header, entries, {}, (), True)
+    assert "before the range  150–> ms" in comparison_table([early])
 
 
 @pytest.mark.parametrize(("probability", "said"), [(0.03, "no window"), (0.25, "undecided"), (None, "no window")])
@@ -50,11 +58,8 @@ def test_a_session_in_which_too_little_was_measured_says_so(record: SessionRecor
 
 def test_of_the_same_person_it_is_said_whether_the_window_moved(record: SessionRecord) -> None:
     difference = Difference(record, record, same_person=True, starts_later=0.97, ends_later=0.6, moved=0.91)
-    assert comparison_sentence(difference) == (
-        "P07 (s.mcap) against P07 (s.mcap), the same person: with probability 0.91 (0.3 where nothing is known) the "
-        "window moved beyond the usual shift from day to day; it starts later with probability 0.97 and ends later "
-        "with probability 0.60 (0.5 where nothing is known)."
-    )
+    who = "P07 (s.mcap) against P07 (s.mcap), the same person:"
+    assert comparison_sentence(difference) == f"{who} {moved(0.91, 0.3)} {later(0.97, 0.6)}"
 
 
 def test_where_nothing_can_be_said_it_is_said_why(record: SessionRecord) -> None:
