@@ -65,6 +65,26 @@ def test_the_offset_of_an_amplifier_moves_no_trace(record: SessionRecord) -> Non
         np.testing.assert_allclose(moved, there, atol=1e-6)
 
 
+def test_an_artefact_is_left_out_of_the_stacked_sweeps_and_an_mep_is_not(record: SessionRecord) -> None:
+    def segments(artefact_mv: float) -> list[Any]:
+        waves = {}
+        for (trial, name), channel in record.waveforms.items():
+            after_ms = channel.t0_ms + 1e3 * np.arange(len(channel.values)) / channel.rate_hz
+            is_artefact = np.abs(after_ms - known(record.table[trial].t_tms_ms)) < 1
+            added = artefact_mv * is_artefact if name == "emg" else 0.0
+            waves[trial, name] = replace(channel, values=channel.values + added)
+        (axes,) = known(sweeps_figure(replace(record, waveforms=waves))).axes
+        return [segment for item in axes.collections for segment in instance(LineCollection, item).get_segments()]
+
+    def points(segment: Any, low_ms: float, high_ms: float) -> Any:
+        return segment[(segment[:, 0] > low_ms) & (segment[:, 0] < high_ms)]
+
+    for with_one, without in zip(segments(50.0), segments(0.0), strict=True):
+        assert len(points(with_one, -0.9, 0.9)) == 0
+        np.testing.assert_allclose(points(with_one, 15, 35), points(without, 15, 35), atol=2e-3)
+        assert len(points(without, 15, 35)) > 30
+
+
 def test_without_emg_there_are_no_sweeps_to_draw(record: SessionRecord) -> None:
     assert sweeps_figure(replace(record, waveforms={})) is None
     unknown = {key: replace(channel, unit="counts") for key, channel in record.waveforms.items()}

@@ -14,6 +14,7 @@ from isiw.log.reader import SessionRecord
 from isiw.log.schema import EstimateRecord
 from isiw.report.drawn import MOST_NEAR, MOST_WHOLE, drawn
 from isiw.trials import Channel
+from known import known
 from report.sessions import pulsed, tapped
 
 
@@ -53,6 +54,23 @@ def test_an_offset_costs_no_digits(record: SessionRecord) -> None:
     emg = record.waveforms[record.table[0].index, "emg"]
     plain, moved = (sweep(record, emg=replace(emg, values=emg.values + offset))[0]["values"] for offset in (0.0, 100.0))
     assert np.asarray(moved) - 100.0 == pytest.approx(plain, abs=1e-3 * np.abs(plain).max())
+
+
+def test_an_emg_has_the_axis_of_its_mep_which_the_artefact_of_the_pulse_leaves(record: SessionRecord) -> None:
+    pulse_ms = known(record.table[0].t_tms_ms)
+    since_ms = np.arange(3000) / 2.0 - pulse_ms
+    mep = 0.025 * np.sin((since_ms - 20) * np.pi / 5) * ((since_ms > 20) & (since_ms < 30))
+    for unit, per_mv in (("mV", 1.0), ("V", 1e-3), ("uV", 1e3)):
+        emg = Channel(per_mv * (7.0 + mep + 5.0 * (np.abs(since_ms) < 1)), 2000.0, unit)
+        near, whole = sweep(record, emg=emg)
+        for wave in (near, whole):
+            low, high = (end / per_mv for end in wave["axis"])
+            assert low < 6.975 < 7.025 < high
+            assert 0.05 >= 0.2 * (high - low)
+        assert np.ptp([v / per_mv for v in near["values"] if v < 7.1 * per_mv]) == pytest.approx(0.05, abs=5e-4)
+    quiet = sweep(record, emg=Channel(0.001 * np.sin(since_ms), 2000.0, "mV"))[0]["axis"]
+    assert np.ptp(quiet) > 0.05
+    assert [wave["axis"] for wave in sweep(record, force=emg)] == [None]
 
 
 def test_axis_and_lines_are_named_after_the_stimulus_that_was_given(record: SessionRecord) -> None:

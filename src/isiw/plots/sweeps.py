@@ -21,6 +21,8 @@ BEFORE_MS, AFTER_MS = 50.0, 80.0
 MOST_LABELS, MOST_POINTS = 30, 100_000
 ROWS_OF_LARGEST = 2.0
 """As many rows the largest deflection is high; with many trials a sixteenth of them, so that it remains visible."""
+AT_REST_ROWS = 0.25
+"""A deflection ends where the trace is back within so many rows of its own."""
 
 
 class _Trace(NamedTuple):
@@ -90,12 +92,19 @@ def _draw_traces(
     most, width = _rows_of_largest(traces), 0.6 if len(traces) < 100 else 0.35
     kept = slice(None, None, -(-sum(len(trace.times_ms) for trace in traces) // MOST_POINTS))
     lines = [
-        np.column_stack([trace.times_ms, row + np.clip(rows_per_mv * trace.emg_mv, -most, most)])[kept]
+        np.column_stack([trace.times_ms, row + _within(rows_per_mv * trace.emg_mv, most)])[kept]
         for row, trace in enumerate(traces)
         if chosen[row]
     ]
     if lines:
         axes.add_collection(LineCollection(lines, colors=colour, linewidths=width, label=label), autolim=False)
+
+
+def _within(rows: FloatArray, most: float) -> FloatArray:
+    """A trace without the deflections that are higher than this, such as artefacts: they would hide other rows."""
+    is_away = np.abs(rows) > AT_REST_ROWS
+    runs = np.cumsum(np.diff(is_away, prepend=False))
+    return np.where(is_away & np.isin(runs, runs[np.abs(rows) > most]), np.nan, rows)
 
 
 def _draw_hits(axes: Axes, traces: Sequence[_Trace], label: str) -> None:

@@ -13,6 +13,7 @@ from isiw.log.reader import SessionRecord
 from isiw.log.schema import EstimateRecord
 from isiw.report.tables import trial_row
 from isiw.sentences import finding
+from isiw.signals.limits import EMG_UNITS_MV
 from isiw.text import plain
 from isiw.trials import Channel, Trial
 from isiw.types import FloatArray
@@ -27,6 +28,12 @@ _MOST_DECIMALS: Final = 12
 
 FINE, COARSE = 4, 3
 """Digits of the largest to which the EMG near the pulse and profiles, and whole waveforms, are rounded."""
+
+LEAST_UV: Final = 50.0
+"""The axis of an EMG has room for this amplitude at least, so that noise alone does not look like an MEP."""
+
+_ROOM: Final = 0.35
+"""Above and below what the MEP window holds, as a share of it."""
 
 
 def drawn(record: SessionRecord) -> dict[str, Any]:
@@ -69,7 +76,7 @@ def _trial(record: SessionRecord, trial: Trial) -> dict[str, Any]:
         "tmsMs": trial.t_tms_ms,
         "hitMs": trial.t_hit_ms,
         "valveMs": trial.t_valve_ms,
-        "sweep": _sweep(record.sweep(trial.index), trial),
+        "sweep": _sweep(record.sweep(trial.index), trial, record.header.signals.mep_window_ms),
     }
 
 
@@ -102,30 +109,42 @@ def _belief(record: SessionRecord, estimate: EstimateRecord) -> dict[str, Any]:
     }
 
 
-def _sweep(channels: dict[str, Channel], trial: Trial) -> list[dict[str, Any]]:
+def _sweep(channels: dict[str, Channel], trial: Trial, mep_window_ms: tuple[float, float]) -> list[dict[str, Any]]:
     """The waveforms of a trial: the EMG near the pulse first, then every channel as a whole."""
-    waves = [_wave(name, channel, MOST_WHOLE, COARSE) for name, channel in sorted(channels.items())]
-    emg = channels.get("emg")
-    near = None if emg is None or trial.t_tms_ms is None else _near(emg, trial.t_tms_ms)
-    return waves if near is None else [_wave("emg near the pulse", near, MOST_NEAR, FINE), *waves]
+    emg, pulse_ms = channels.get("emg"), trial.t_tms_ms
+    axes = {} if emg is None or pulse_ms is None else {"emg": _emg_axis(_around(emg, pulse_ms, mep_window_ms))}
+    waves = [_wave(name, channel, MOST_WHOLE, COARSE, axes.get(name)) for name, channel in sorted(channels.items())]
+    near = None if emg is None or pulse_ms is None else _around(emg, pulse_ms, NEAR_MS)
+    return waves if near is None else [_wave("emg near the pulse", near, MOST_NEAR, FINE, axes["emg"]), *waves]
 
 
-def _near(channel: Channel, pulse_ms: float) -> Channel | None:
-    ends = (pulse_ms + np.asarray(NEAR_MS) - channel.t0_ms) * (channel.rate_hz / 1e3)
+def _around(channel: Channel, pulse_ms: float, span_ms: tuple[float, float]) -> Channel | None:
+    ends = (pulse_ms + np.asarray(span_ms) - channel.t0_ms) * (channel.rate_hz / 1e3)
     first, last = np.clip(np.round(ends), 0, len(channel.values)).astype(int).tolist()
     values = channel.values[first:last]
     t0_ms = channel.t0_ms + 1e3 * first / channel.rate_hz
     return Channel(values, channel.rate_hz, channel.unit, t0_ms) if len(values) else None
 
 
-def _wave(name: str, channel: Channel, most: int, digits: int) -> dict[str, Any]:
+def _emg_axis(inside: Channel | None) -> list[float] | None:
+    """The ends of an axis for what the MEP window holds, which the artefact of the pulse is free to leave."""
+    values = np.zeros(0) if inside is None else inside.values[np.isfinite(inside.values)]
+    if inside is None or inside.unit not in EMG_UNITS_MV or not len(values):
+        return None
+    least = LEAST_UV / (1e3 * EMG_UNITS_MV[inside.unit])
+    middle, reach = float(values.min() + values.max()) / 2, (0.5 + _ROOM) * max(float(np.ptp(values)), least)
+    return [middle - reach, middle + reach]
+
+
+def _wave(name: str, channel: Channel, most: int, digits: int, axis: list[float] | None) -> dict[str, Any]:
     values, samples = _thinned(channel.values, most)
     return {
         "name": plain(name),
         "unit": plain(channel.unit),
         "t0": round(channel.t0_ms, 3),
         "step": _number(1e3 * samples / channel.rate_hz),
-        "values": _rounded(values, digits),
+        "values": _rounded(values, digits, axis[1] - axis[0] if axis else None),
+        "axis": axis,
     }
 
 
@@ -141,11 +160,11 @@ def _thinned(values: FloatArray, most: int) -> tuple[FloatArray, float]:
     return pairs.ravel(), stretch / 2
 
 
-def _rounded(values: FloatArray, digits: int) -> list[float | None]:
-    """To so many digits of their range, whatever their offset; what is not finite is left open."""
+def _rounded(values: FloatArray, digits: int, shown: float | None = None) -> list[float | None]:
+    """To so many digits of their range or of what is shown of it; what is not finite is left open."""
     finite = np.isfinite(values)
     known = values[finite] if finite.any() else np.zeros(1)
-    extent = float(np.ptp(known) or np.abs(known).max())
+    extent = shown or float(np.ptp(known) or np.abs(known).max())
     decimals = max(-_MOST_DECIMALS, min(_MOST_DECIMALS, digits - math.ceil(math.log10(extent)))) if extent > 0 else 0
     rounded: list[float | None] = np.round(np.where(finite, values, 0.0), decimals).tolist()
     return [value if is_finite else None for value, is_finite in zip(rounded, finite.tolist(), strict=True)]

@@ -168,7 +168,7 @@ const draw = (() => {
       axes[`xaxis${index}`] = axis(k === waves.length - 1 ? "time of the sweep [ms]" : "",
         { range: [x[0], x[x.length - 1]], anchor: `y${index}` });
       axes[`yaxis${index}`] = axis(`${markup(wave.name)}<br>[${markup(wave.unit)}]`,
-        { domain: [top - height + 0.3 * share, top], anchor: `x${index}` });
+        { domain: [top - height + 0.3 * share, top], anchor: `x${index}`, ...(wave.axis && { range: wave.axis }) });
       shapes.push(...sweepMarks(trial, index, session.mepWindow));
     });
     Plotly.react(figure, traces, layout({ ...axes, shapes, margin: { l: 90, r: 12, t: 8, b: 44 } }), options);
