@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from typing import Any
+from xml.sax.saxutils import escape
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from isiw.log.reader import SessionRecord
+from isiw.plots.session import session_figure
 from isiw.plots.style import inline_svg
 from isiw.plots.sweeps import sweeps_figure
 from isiw.plots.timeline import course_figure, timeline_figure
@@ -133,3 +135,9 @@ def test_a_picture_in_a_page_has_the_pages_colours_and_names_of_its_own(record: 
     ids = [set(re.findall(r' id="([^"]+)"', svg)) for svg in (one, other)]
     assert ids[0].isdisjoint(ids[1])
     assert one == inline_svg(course_figure(record), "one")
+
+
+def test_a_code_that_reads_like_markup_is_text_in_the_picture(record: SessionRecord) -> None:
+    for code in ("font: 1px a", "<b>P07</b>"):
+        named = replace(record, header=record.header.model_copy(update={"subject": code}))
+        assert f">{escape(code)}, " in inline_svg(session_figure(named), "s")

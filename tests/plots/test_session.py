@@ -12,7 +12,7 @@ from isiw.errors import InvalidValueError
 from isiw.log.amending import exclude
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import EstimateRecord
-from isiw.plots.session import save_session_plot, session_figure
+from isiw.plots.session import BELOW_THE_MEAN, save_session_plot, session_figure
 from isiw.session.loop import Session
 from isiw.strategy.catalogue import make_strategy
 from isiw.trials import Measurement, Trial
@@ -58,7 +58,7 @@ def test_the_picture_shows_profile_trials_window_and_truth(record: SessionRecord
         "window", "true window (simulated)", "90 % band of the expected MEP", "expected MEP", "trial", "excluded",
         "mistrial", "start of the window, with 90 % interval", "end of the window, with 90 % interval",
     }  # fmt: skip
-    assert profile.get_xlim() == (0, 200)
+    assert profile.get_xlim() == (-4, 204)  # points at the ends of the range are whole
     assert profile.get_xlabel() == "ISI after the valve command [ms]"
     assert "after 6 trials" in profile.get_title(loc="left")
 
@@ -68,6 +68,32 @@ def test_isis_after_an_electrical_pulse_count_from_it(record: SessionRecord) -> 
     header = record.header.model_copy(update={"device": device, "space": replace(SPACE, reference="impact")})
     (profile, *_) = session_figure(replace(record, header=header)).axes
     assert profile.get_xlabel() == "ISI after the electrical pulse [ms]"
+
+
+def test_tms_alone_stands_beside_the_range_with_its_mean(record: SessionRecord) -> None:
+    alone = [
+        replace(record.table[0], index=90 + k, commanded_isi_ms=None, isi_ms=None, mep_mv=mep_mv)
+        for k, mep_mv in enumerate((0.01, 0.03))
+    ]
+    profile = session_figure(replace(record, history=(*record.history, *alone))).axes[0]
+    isis_ms, meps_uv = line(profile, "trial")
+    assert {place_ms for place_ms, uv in zip(isis_ms, meps_uv, strict=True) if uv in (10.0, 30.0)} == {-12.0}
+    assert profile.get_xlim() == (-20, 204)
+    assert line(profile, "mean of TMS alone")[1] == [20.0, 20.0]
+    assert [tick.get_text() for tick in profile.get_xticklabels()][:2] == ["TMS\nalone", "0"]
+
+
+def test_subject_date_and_why_most_trials_lie_below_the_mean_are_in_the_picture(record: SessionRecord) -> None:
+    header = record.header.model_copy(update={"subject": "$P07"})
+    figure = session_figure(replace(record, header=header))
+    assert figure.get_suptitle() == f"\\$P07, {header.created[:10]}"
+    assert figure.legends[0].get_title().get_text() == BELOW_THE_MEAN
+
+
+def test_a_trial_that_counts_beyond_the_range_is_whole(record: SessionRecord) -> None:
+    beyond = replace(record.table.told[0], index=90, isi_ms=207.0)
+    profile = session_figure(replace(record, history=(*record.history, beyond))).axes[0]
+    assert profile.get_xlim() == (-4, 211)
 
 
 def test_trials_lie_where_they_were_realised(record: SessionRecord) -> None:
@@ -123,6 +149,14 @@ def test_mistrials_are_where_they_happened_and_trials_are_counted_as_in_the_log(
     assert line(edges, "start of the window, with 90 % interval")[0] == [
         estimate.trial for estimate in record.estimates
     ]
+
+
+def test_mistrials_without_an_mep_are_at_the_lower_edge_and_named(record: SessionRecord) -> None:
+    unmeasured = [replace(e, mep_mv=None) if isinstance(e, Trial) and e.reason else e for e in record.history]
+    figure = session_figure(replace(record, history=tuple(unmeasured)))
+    (lost,) = [trial for trial in record.table if trial.reason is not None]
+    assert line(figure.axes[0], "mistrial") == ([lost.isi_ms], [0.02])
+    assert "mistrial" in labels(figure)
 
 
 def test_where_nothing_counts_the_panels_say_so(record: SessionRecord) -> None:

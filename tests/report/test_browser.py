@@ -102,8 +102,14 @@ def test_the_last_trial_is_shown_first_with_the_logs_numbers(opened: Opened, rec
     assert opened.text("#told-trial").startswith(f"Trial {last.index} ({len(record.table)} of {len(record.table)})")
     assert estimate.reason in opened.text("#told-belief")
     shown = opened.drawn("document.getElementById('belief').data.find(trace => trace.name === 'trial')")
-    told = {trial.index: trial for trial in record.table.told if trial.isi_ms is not None}
-    assert dict(zip(shown["customdata"], shown["x"], strict=True)) == {n: t.isi_ms for n, t in told.items()}
+    told = {trial.index: trial for trial in record.table.told}
+    places = dict(zip(shown["customdata"], shown["x"], strict=True))
+    assert {n: places[n] for n, t in told.items() if t.isi_ms is not None} == {
+        n: t.isi_ms for n, t in told.items() if t.isi_ms is not None
+    }
+    beside = [places[n] for n, t in told.items() if t.isi_ms is None]
+    assert beside
+    assert max(beside) < record.header.space.low_ms
     assert shown["y"] == pytest.approx([1e3 * (trial.mep_mv or 0) for trial in told.values()], abs=0.01)
 
 

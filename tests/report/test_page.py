@@ -111,7 +111,7 @@ def test_a_page_about_electrical_pulses_speaks_of_no_tap(page: Page, record: Ses
 
 
 def test_lines_in_a_sweep_are_those_of_valve_and_hammer_after_a_tap(page: Page) -> None:
-    assert "Dotted orange lines: valve command and hit of the hammer. Green: MEP window." in page.words
+    assert "Dotted orange lines: valve command and hit of the hammer. Green: MEP window" in page.words
 
 
 def test_a_log_that_is_whole_and_closed_is_shown_without_a_warning(page: Page) -> None:

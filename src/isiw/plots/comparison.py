@@ -10,12 +10,9 @@ from matplotlib.figure import Figure
 
 from isiw.errors import InvalidValueError
 from isiw.log.reader import SessionRecord
-from isiw.plots.style import BLUE, FAINT, INK, edge_intervals, explain, save_figure, tidied
+from isiw.plots.style import BLUE, FAINT, INK, edge_intervals, explain, save_figure, session_name, tidied
 from isiw.sentences import TOO_LITTLE, chance_text, in_short
-from isiw.text import one_line
 from isiw.text.stimuli import words_of
-
-_LONGEST_CODE = 24
 
 
 def save_comparison_plot(records: Sequence[SessionRecord], path: str | Path, *, overwrite: bool = False) -> Path:
@@ -51,7 +48,7 @@ def comparison_figure(records: Sequence[SessionRecord], names: Sequence[str] | N
     tidied(axes)
     for line, record in enumerate(records):
         _draw(axes, line, record)
-    axes.set_yticks(range(len(records)), names or [_name(record) for record in records])
+    axes.set_yticks(range(len(records)), names or [session_name(record) for record in records])
     axes.set_ylim(len(records) - 0.4, -0.6)
     spaces = [record.header.space for record in records]
     axes.set_xlim(min(space.low_ms for space in spaces), max(space.high_ms for space in spaces))
@@ -78,9 +75,3 @@ def _draw(axes: Axes, line: int, record: SessionRecord) -> None:
         chance, (1.01, line), xycoords=("axes fraction", "data"), va="center", fontsize=8, color=INK,
         annotation_clip=False,
     )  # fmt: skip
-
-
-def _name(record: SessionRecord) -> str:
-    code = one_line(record.header.subject) or "unnamed"
-    code = code if len(code) <= _LONGEST_CODE else f"{code[: _LONGEST_CODE - 1]}…"
-    return f"{code}, {record.header.created[:10]}".replace("$", r"\$")

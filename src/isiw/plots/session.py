@@ -6,8 +6,10 @@ Everything is drawn with matplotlib's object interface, so no display is needed 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -27,6 +29,7 @@ from isiw.plots.style import (
     explain,
     save_figure,
     saying,
+    session_name,
     tidied,
 )
 from isiw.sentences import titled
@@ -35,6 +38,19 @@ from isiw.types import FloatArray
 from isiw.window import Window
 
 SMALLEST_UV = 1.0
+
+BELOW_THE_MEAN = "The expected MEP is a mean, which few large MEPs raise: most trials lie below it."
+
+_EDGE, _ALONE = 0.02, 0.06
+"""Shares of the range: the room beside it, so that points at its ends are whole, and the distance to TMS alone."""
+
+_STYLES: Mapping[str, Mapping[str, Any]] = MappingProxyType(
+    {
+        "trial": {"marker": "o", "ms": 4.5, "color": INK, "mec": "white", "mew": 0.5},
+        "excluded": {"marker": "o", "ms": 4.5, "mfc": "none", "mec": FAINT},
+        "mistrial": {"marker": "x", "ms": 5, "color": RED},
+    }
+)
 
 
 def save_session_plot(
@@ -67,6 +83,7 @@ def session_figure(record: SessionRecord, *, truth: Window | None = None) -> Fig
     edges.sharex(chance)
     edges.tick_params(labelbottom=False)
     last = record.found
+    figure.suptitle(session_name(record), x=0.01, ha="left", fontsize=9, color=INK)
     _draw_window(profile, last, truth)
     _draw_profile(profile, last)
     _draw_trials(profile, record)
@@ -75,7 +92,7 @@ def session_figure(record: SessionRecord, *, truth: Window | None = None) -> Fig
     _draw_probability(chance, record)
     if last is None:
         _say_what_is_missing(profile, edges, chance, record)
-    explain(figure, ncols=3)
+    explain(figure, ncols=3, note=BELOW_THE_MEAN if last and last.grid_ms else None)
     figure.align_ylabels((profile, edges, chance))
     return figure
 
@@ -115,25 +132,32 @@ def _draw_profile(axes: Axes, estimate: EstimateRecord | None) -> None:
 
 
 def _draw_trials(axes: Axes, record: SessionRecord) -> None:
-    told = [trial for trial in record.table if trial.told]
-    excluded = [trial for trial in record.table if trial.excluded]
-    mistrials = [trial for trial in record.table if trial.reason is not None]
-    if told:
-        axes.plot(*_points(told), "o", ms=4.5, color=INK, mec="white", mew=0.5, label="trial", zorder=3)
-    if excluded:
-        axes.plot(*_points(excluded), "o", ms=4.5, mfc="none", mec=FAINT, label="excluded", zorder=3)
-    if mistrials:
-        _draw_mistrials(axes, mistrials)
-
-
-def _draw_mistrials(axes: Axes, mistrials: Sequence[Trial]) -> None:
     """Where they happened; at the lower edge where no MEP was measured, at the ISI asked where none was realised."""
-    places = [(trial.commanded_isi_ms if trial.isi_ms is None else trial.isi_ms, trial.mep_mv) for trial in mistrials]
-    measured = [(isi_ms, mep_mv) for isi_ms, mep_mv in places if isi_ms is not None and mep_mv is not None]
-    isis_ms, meps_uv = [isi_ms for isi_ms, _ in measured], _uv([mep_mv for _, mep_mv in measured])
-    axes.plot(isis_ms, meps_uv, "x", ms=5, color=RED, label="mistrial", zorder=3)
-    lost = [isi_ms for isi_ms, mep_mv in places if isi_ms is not None and mep_mv is None]
-    axes.plot(lost, [0.02] * len(lost), "x", ms=5, color=RED, transform=axes.get_xaxis_transform(), zorder=3)
+    alone_ms = _alone_ms(record)
+    for kind, style in _STYLES.items():
+        trials = [(trial, place_ms) for trial in record.table
+                  if _kind(trial) == kind and (place_ms := _place_ms(trial, alone_ms)) is not None]  # fmt: skip
+        seen = [(place_ms, trial.mep_mv) for trial, place_ms in trials if trial.mep_mv is not None]
+        if seen:
+            places_ms, meps_mv = zip(*seen, strict=True)
+            axes.plot(places_ms, _uv(meps_mv), label=kind, zorder=3, ls="", **style)
+        lost = [place_ms for trial, place_ms in trials if trial.mep_mv is None]
+        if lost:
+            axes.plot(lost, [0.02] * len(lost), label=None if seen else kind, zorder=3, ls="",
+                      transform=axes.get_xaxis_transform(), **style)  # fmt: skip
+
+
+def _kind(trial: Trial) -> str:
+    return "mistrial" if trial.reason is not None else "excluded" if trial.excluded else "trial"
+
+
+def _place_ms(trial: Trial, alone_ms: float) -> float | None:
+    """Its ISI, or the strip of TMS alone; nowhere for a tap alone, and for an excluded trial without an MEP."""
+    if trial.tap_alone or (trial.reason is None and trial.mep_mv is None):
+        return None
+    if trial.is_control and trial.isi_ms is None:
+        return alone_ms
+    return trial.commanded_isi_ms if trial.isi_ms is None else trial.isi_ms
 
 
 def _finish_profile(axes: Axes, record: SessionRecord) -> None:
@@ -142,10 +166,45 @@ def _finish_profile(axes: Axes, record: SessionRecord) -> None:
     axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.yaxis.set_minor_formatter(NullFormatter())
-    axes.set_xlim(space.low_ms, space.high_ms)
+    _finish_isis(axes, record)
     axes.set_xlabel(record.header.stimulus.isi_axis(space.reference), fontsize=9)
     axes.set_ylabel("MEP [µV]", fontsize=9)
     axes.set_title(f"{_title(record)} after {len(record.table)} trials", fontsize=11, loc="left", color=INK, pad=12)
+
+
+def _finish_isis(axes: Axes, record: SessionRecord) -> None:
+    """Room for whole points at the ends of the range, and beside it for TMS alone with its mean."""
+    space = record.header.space
+    low_ms, high_ms = _ends_ms(record)
+    room_ms = _EDGE * (space.high_ms - space.low_ms)
+    meps_mv = [trial.mep_mv for trial in record.table.told if trial.isi_ms is None and trial.mep_mv is not None]
+    if not any(trial.is_control and not trial.tap_alone for trial in record.table):
+        axes.set_xlim(low_ms - room_ms, high_ms + room_ms)
+        return
+    alone_ms = _alone_ms(record)
+    axes.set_xlim(2 * alone_ms - low_ms + room_ms, high_ms + room_ms)
+    axes.axvline((alone_ms + low_ms) / 2, color=FAINT, lw=0.8)
+    ticks_ms = [
+        t
+        for t in MaxNLocator(8, steps=(1, 2, 5, 10)).tick_values(space.low_ms, space.high_ms)
+        if low_ms <= t <= high_ms
+    ]
+    axes.set_xticks([alone_ms, *ticks_ms], ["TMS\nalone", *(f"{tick_ms:g}" for tick_ms in ticks_ms)])
+    if meps_mv:
+        axes.axhline(_uv([float(np.mean(meps_mv))])[0], color=INK, lw=0.9, ls=":", label="mean of TMS alone")
+
+
+def _ends_ms(record: SessionRecord) -> tuple[float, float]:
+    """The range of ISIs, and what the trials that count add to it."""
+    space = record.header.space
+    isis_ms = [trial.isi_ms for trial in record.table.told if trial.isi_ms is not None]
+    return min([space.low_ms, *isis_ms]), max([space.high_ms, *isis_ms])
+
+
+def _alone_ms(record: SessionRecord) -> float:
+    """Where on the axis of the ISIs TMS alone has its place."""
+    space = record.header.space
+    return _ends_ms(record)[0] - _ALONE * (space.high_ms - space.low_ms)
 
 
 def _title(record: SessionRecord) -> str:
@@ -194,11 +253,6 @@ def _draw_probability(axes: Axes, record: SessionRecord) -> None:
 def _column(estimates: Sequence[EstimateRecord], name: str) -> FloatArray:
     """One figure by trial; NaN where a method does not have it."""
     return np.asarray([np.nan if (v := getattr(e, name)) is None else v for e in estimates], dtype=np.float64)
-
-
-def _points(trials: Sequence[Trial]) -> tuple[list[float], FloatArray]:
-    placed = [t for t in trials if t.isi_ms is not None and t.mep_mv is not None]
-    return [t.isi_ms or 0.0 for t in placed], _uv([t.mep_mv or 0.0 for t in placed])
 
 
 def _uv(amplitude_mv: Sequence[float]) -> FloatArray:

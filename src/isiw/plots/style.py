@@ -19,6 +19,8 @@ from matplotlib.figure import Figure
 from isiw.errors import InvalidValueError
 from isiw.estimate import Estimate
 from isiw.log.outputs import write_output
+from isiw.log.reader import SessionRecord
+from isiw.text import one_line
 from isiw.window import Interval
 
 INK, FAINT, BLUE, ORANGE, GREEN, RED = "#222222", "#8a8a8a", "#0072b2", "#e69f00", "#009e73", "#d55e00"
@@ -43,6 +45,8 @@ STRATEGY_COLOURS: Final[Mapping[str, str]] = MappingProxyType(
 
 EDGES: Final[Mapping[str, str]] = MappingProxyType({"start": GREEN, "end": ORANGE})
 """The colours of a window's edges."""
+
+_LONGEST_CODE: Final = 24
 
 TRIAL_AXIS: Final = "trial (from 0, as in the log)"
 
@@ -75,6 +79,13 @@ def edge_intervals(estimate: Estimate, low_ms: float, high_ms: float) -> list[tu
     return [(name, colour, edge.within(low_ms, high_ms)) for (name, colour), edge in ends if edge.is_known]
 
 
+def session_name(record: SessionRecord) -> str:
+    """Whose session it is and of which day, as matplotlib writes it whatever is in it."""
+    code = one_line(record.header.subject) or "unnamed"
+    code = code if len(code) <= _LONGEST_CODE else f"{code[: _LONGEST_CODE - 1]}…"
+    return f"{code}, {record.header.created[:10]}".replace("$", r"\$")
+
+
 def tidied(*panels: Axes) -> None:
     """Give panels the look that all have."""
     for axes in panels:
@@ -82,15 +93,18 @@ def tidied(*panels: Axes) -> None:
         axes.tick_params(labelsize=8, color=FAINT)
 
 
-def explain(figure: Figure, ncols: int, *, above: bool = False) -> None:
-    """Give a figure one legend, outside its panels, that has each label once; none where nothing has a label."""
+def explain(figure: Figure, ncols: int, *, above: bool = False, note: str | None = None) -> None:
+    """Give a figure one legend, outside its panels, that has each label once, and a note; none without a label."""
     labelled = [axes.get_legend_handles_labels() for axes in figure.axes]
     once = {label: handle for handles, labels in labelled for handle, label in zip(handles, labels, strict=True)}
     if once:
         loc: Literal["outside upper left", "outside lower center"] = (
             "outside upper left" if above else "outside lower center"
         )
-        figure.legend(list(once.values()), list(once), loc=loc, ncols=ncols, fontsize=7.5, frameon=False)
+        figure.legend(
+            list(once.values()), list(once), loc=loc, ncols=ncols, fontsize=7.5, frameon=False,
+            title=note, title_fontsize=7.5, alignment="left",
+        )  # fmt: skip
 
 
 def saying(axes: Axes, text: str) -> None:
@@ -119,7 +133,7 @@ def inline_svg(figure: Figure, name: str) -> str:
     text = picture.getvalue()
     text = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
     text = re.sub(r"(<(?:g|svg|defs)\b[^>]*?) id=\"[^\"]*\"", r"\1", text)
-    text = re.sub(r"font: ([\d.]+)px [^;\"]*", r"font-size: \1px", text)
+    text = re.sub(r"(<text style=\")font: ([\d.]+)px [^;\"]*", r"\1font-size: \2px", text)
     for drawn, named in PAGE_COLOURS.items():
         text = text.replace(drawn, f"var(--{named})")
     return text

@@ -67,6 +67,7 @@ def _trial(record: SessionRecord, trial: Trial) -> dict[str, Any]:
     return {
         "number": trial.index,
         "kind": "mistrial" if trial.reason is not None else "excluded" if trial.excluded else "counts",
+        "isAlone": trial.is_control and not trial.tap_alone and trial.isi_ms is None,
         "asked": row.asked,
         "realised": row.realised,
         "outcome": row.outcome,

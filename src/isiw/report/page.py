@@ -113,7 +113,7 @@ def _states(record: SessionRecord) -> list[str]:
 
 
 def _pictures(record: SessionRecord, truth: Window | None) -> Mapping[str, str]:
-    """The pictures as SVG, none of which holds a text of the log."""
+    """The pictures as SVG; the subject's code is the only text of the log in them."""
     figures = {
         "timeline": timeline_figure(record),
         "session": session_figure(record, truth=truth),

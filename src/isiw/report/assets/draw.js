@@ -44,15 +44,28 @@ const draw = (() => {
   }
 
   // A mistrial is drawn where it happened: at the lower edge where no MEP was measured, at what was asked where nothing came.
-  const placeMs = (trial) => (trial.kind === "mistrial" ? trial.isiMs ?? trial.askedMs : trial.isiMs);
+  // Beside the range is room for whole points at its ends, and at its left a strip for TMS alone.
+  const [roomShare, aloneShare] = [0.02, 0.06];
+  function placesMs(session) {
+    const [low, high] = session.range;
+    const isis = session.trials.filter((trial) => trial.kind === "counts" && trial.isiMs !== null).map((trial) => trial.isiMs);
+    const [least, most] = isis.reduce(([min, max], isi) => [Math.min(min, isi), Math.max(max, isi)], [low, high]);
+    const room = roomShare * (high - low);
+    if (!session.trials.some((trial) => trial.isAlone)) return { aloneMs: null, range: [least - room, most + room] };
+    const aloneMs = least - aloneShare * (high - low);
+    return { aloneMs, partMs: (least + aloneMs) / 2, range: [2 * aloneMs - least + room, most + room] };
+  }
+  const placeMs = (trial, places) => (trial.isAlone ? places.aloneMs
+    : trial.kind === "mistrial" ? trial.isiMs ?? trial.askedMs : trial.isiMs);
   const measuredUv = (trial, lowestUv) => (trial.mepUv === null ? null : Math.max(trial.mepUv, lowestUv));
   const heightUv = (trial, lowestUv) => measuredUv(trial, lowestUv) ?? (trial.kind === "mistrial" ? lowestUv : null);
 
-  function trialTrace(trials, kind, number, lowestUv) {
+  function trialTrace(trials, kind, number, lowestUv, places) {
     const symbol = { counts: "circle", excluded: "circle-open", mistrial: "x-thin-open" }[kind];
-    const shown = trials.filter((trial) => trial.kind === kind && placeMs(trial) !== null && heightUv(trial, lowestUv) !== null);
+    const shown = trials.filter((trial) => trial.kind === kind && placeMs(trial, places) !== null && heightUv(trial, lowestUv) !== null);
     return {
-      x: shown.map(placeMs), y: shown.map((trial) => heightUv(trial, lowestUv)), text: shown.map((trial) => trial.outcome),
+      x: shown.map((trial) => placeMs(trial, places)), y: shown.map((trial) => heightUv(trial, lowestUv)),
+      text: shown.map((trial) => `${trial.realised === "–" ? trial.asked : trial.realised}, ${trial.outcome}`),
       customdata: shown.map((trial) => trial.number), name: names[kind], mode: "markers", type: "scatter",
       marker: {
         symbol, size: shown.map((trial) => (trial.number === number ? 14 : 8)),
@@ -60,7 +73,7 @@ const draw = (() => {
         opacity: shown.map((trial) => (trial.number > number ? 0.18 : 1)),
         line: { width: kind === "mistrial" ? 2 : 1, color: colour(kind === "mistrial" ? "red" : "ink") },
       },
-      hovertemplate: "trial %{customdata}<br>%{x:.1f} ms, %{text}<extra></extra>",
+      hovertemplate: "trial %{customdata}<br>%{text}<extra></extra>",
     };
   }
 
@@ -94,6 +107,15 @@ const draw = (() => {
     return [...window, ...bars, ...next];
   }
 
+  // The strip of TMS alone: its name below the axis, and the line that parts it from the range.
+  function strip({ aloneMs, partMs }) {
+    if (aloneMs === null) return { shapes: [], annotations: [] };
+    return {
+      shapes: [{ type: "line", x0: partMs, x1: partMs, yref: "paper", y0: 0, y1: 1, line: { width: 1, color: colour("faint") } }],
+      annotations: [{ x: aloneMs, y: 0, yref: "paper", yanchor: "top", text: "TMS<br>alone", showarrow: false }],
+    };
+  }
+
   function legend(belief) {
     const key = (name, style) => line([null], [null], name, style);
     const found = belief && belief.window.length ? [
@@ -108,17 +130,19 @@ const draw = (() => {
   // Draws a belief with the trials, in an element with this id; the trial with this number stands out, later ones are pale.
   function belief(id, session, believed, number) {
     const [lowestUv, largestUv] = limitsUv(session);
+    const places = placesMs(session);
+    const { shapes, annotations } = strip(places);
     const points = session.trials.length
-      ? Object.keys(names).map((kind) => trialTrace(session.trials, kind, number, lowestUv)) : [];
+      ? Object.keys(names).map((kind) => trialTrace(session.trials, kind, number, lowestUv, places)) : [];
     const traces = [...profileTraces(believed), ...points, ...scoreTraces(believed), ...legend(believed)];
     Plotly.react(id, traces, layout({
-      xaxis: axis(session.isiAxis, { range: session.range, anchor: isScored(believed) ? "y2" : "y" }),
+      xaxis: axis(session.isiAxis, { range: places.range, anchor: isScored(believed) ? "y2" : "y" }),
       yaxis2: axis("score", { domain: [0, 0.2], visible: isScored(believed), showticklabels: false }),
       yaxis: axis("MEP [µV]", {
         domain: isScored(believed) ? [0.26, 1] : [0, 1], type: "log", tickvals: ticksUv,
         range: [Math.log10(lowestUv * 0.9), Math.log10(largestUv)],
       }),
-      shapes: beliefShapes(believed, session.range), uirevision: id, margin: { l: 60, r: 12, t: 60, b: 44 },
+      shapes: [...beliefShapes(believed, session.range), ...shapes], annotations, uirevision: id, margin: { l: 60, r: 12, t: 60, b: 44 },
       legend: { orientation: "h", y: 1.04, yanchor: "bottom", traceorder: "normal" },
     }), options);
   }
