@@ -8,19 +8,22 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from playwright.sync_api import Page, ViewportSize
 
-from browsing import IN_CHROMIUM, broken_rules, chromium, screenshots
+from browsing import IN_CHROMIUM, broken_rules, chromium, hard_to_read, screenshots
 from isiw.log.reader import SessionRecord, read_session
 from isiw.priors import Difference
 from isiw.report.comparison import save_comparison
 from isiw.report.page import save_report
 from isiw.session.opening import open_session
+from isiw.trials import Channel
+from known import known
 from report.sessions import HOSTILE, tapped
 from scripted import scripted_strategy
 
@@ -228,6 +231,65 @@ def test_the_page_passes_axe_and_its_picture_is_kept(opened: Opened, scheme: Any
     opened.page.screenshot(path=pictures / f"report-{scheme}.png", full_page=True)
     opened.page.emulate_media(media="screen", color_scheme="light")
     assert (pictures / f"report-{scheme}.png").stat().st_size > 50_000
+
+
+def test_an_mep_of_50_uv_beside_an_artefact_of_5_mv_has_a_fifth_of_the_axis(
+    browser: Any, record: SessionRecord, tmp_path: Path
+) -> None:
+    last, rate_hz = record.table[-1], 2000.0
+    since_ms = np.arange(3000) * 1e3 / rate_hz - known(last.t_tms_ms)
+    mep_mv = 0.025 * np.sin((since_ms - 20) * np.pi / 5) * ((since_ms > 20) & (since_ms < 30))
+    emg = Channel(mep_mv + 5.0 * ((since_ms > 0) & (since_ms < 1)), rate_hz, "mV")
+    shown = replace(record, waveforms={**record.waveforms, (last.index, "emg"): emg})
+    page = browser.new_page(viewport=SIZE)
+    page.goto(save_report(shown, tmp_path / "s.html").as_uri())
+    page.locator("#sweep .main-svg").first.wait_for()
+    traces, axis_mv = page.evaluate(
+        "() => { const { data, layout } = document.getElementById('sweep'); return [data, layout.yaxis.range]; }"
+    )
+    assert max(traces[0]["y"]) == pytest.approx(5.0)
+    in_window = [y for x, y in zip(traces[0]["x"], traces[0]["y"], strict=True) if 15 < x - known(last.t_tms_ms) < 35]
+    assert np.ptp(in_window) == pytest.approx(0.05, rel=0.02)
+    assert np.ptp(in_window) >= 0.2 * (axis_mv[1] - axis_mv[0])
+    assert axis_mv[0] < min(in_window)
+    assert max(in_window) < axis_mv[1]
+    page.close()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_on_a_narrow_screen_nothing_overflows_and_all_is_legible(
+    browser: Any, record: SessionRecord, path: Path, pictures: Path, scheme: Any
+) -> None:
+    difference = Difference(record, record, same_person=True, starts_later=0.97, ends_later=0.6, moved=0.91)
+    compared = save_comparison([record, record], [difference], pictures / "narrow.html", overwrite=True)
+    page = browser.new_page(viewport={"width": 400, "height": 900}, color_scheme=scheme)
+    for name, shown in (("report", path), ("compared", compared)):
+        page.goto(shown.as_uri())
+        page.wait_for_timeout(300)  # plotly draws
+        assert hard_to_read(page) == []
+        assert page.locator(".picture").first.evaluate("it => it.scrollWidth > it.clientWidth")
+        assert broken_rules(page) == []
+        page.screenshot(path=pictures / f"{name}-narrow-{scheme}.png", full_page=True)
+    page.close()
+
+
+def test_small_letters_and_what_is_too_wide_would_be_found(browser: Any) -> None:
+    page = browser.new_page(viewport={"width": 400, "height": 900})
+    page.set_content(
+        "<main><p style='font-size:10px'>small</p><div style='width:500px'>wide</div>"
+        "<p style='width:2em;word-break:break-all'>interval</p></main>"
+    )
+    assert hard_to_read(page) == ["the page is 508 px wide", "10.0 px: small", "broken: interval"]
+    page.close()
+
+
+def test_the_comparison_names_people_in_its_picture(browser: Any, record: SessionRecord, pictures: Path) -> None:
+    named = replace(record, header=record.header.model_copy(update={"subject": "P11"}))
+    page = browser.new_page(viewport=SIZE)
+    page.goto(save_comparison([named, named], [], pictures / "named.html", overwrite=True).as_uri())
+    drawn = page.locator("#windows svg").text_content()
+    assert [f"{number}: P11, {record.header.created[:10]}" in drawn for number in (1, 2)] == [True, True]
+    page.close()
 
 
 def test_a_nameless_button_and_faint_words_would_be_found(browser: Any) -> None:

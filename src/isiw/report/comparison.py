@@ -10,7 +10,7 @@ from isiw import sentences
 from isiw.estimate import Edge, Estimate
 from isiw.log.reader import SessionRecord
 from isiw.plots.comparison import comparison_figure
-from isiw.plots.style import inline_svg
+from isiw.plots.style import inline_svg, session_name
 from isiw.priors.days import DayToDay
 from isiw.priors.differing import Difference
 from isiw.report.page import rendered, write_page
@@ -120,11 +120,11 @@ def comparison_page(records: Sequence[SessionRecord], differences: Sequence[Diff
         ConfigError: jinja2 is not installed.
         InvalidValueError: no sessions, or ISIs that count from different events.
     """
-    numbers = [str(number) for number in range(1, len(records) + 1)]
+    names = [f"{number}: {session_name(record)}" for number, record in enumerate(records, start=1)]
     return rendered(
         "comparison.html",
         sentences=[comparison_sentence(difference) for difference in differences],
-        picture=inline_svg(comparison_figure(records, numbers), "comparison"),
+        picture=inline_svg(comparison_figure(records, names), "comparison"),
         headings=HEADINGS,
         rows=comparison_rows(records),
         sessions=[_session(record) for record in records],

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page
 
-from browsing import IN_CHROMIUM, broken_rules, chromium, screenshots
+from browsing import IN_CHROMIUM, broken_rules, chromium, hard_to_read, screenshots
 from isiw.text import plain
 from server.live.watched import HOSTILE, Watched
 
@@ -149,6 +149,33 @@ def test_the_page_passes_axe_and_its_picture_is_kept(
     page.screenshot(path=picture, full_page=True)
     page.emulate_media(color_scheme="light")
     assert picture.stat().st_size > 50_000
+
+
+def test_an_operator_has_all_of_it_on_one_screen(page: Page, tmp_path_factory: pytest.TempPathFactory) -> None:
+    page.set_viewport_size({"width": 1280, "height": 900})
+    page.locator("#sweep .main-svg").first.wait_for()
+    boxes: dict[str, Any] = {
+        name: page.locator(name).bounding_box() or {}
+        for name in ("#phase", "#operate", "#found", "#reason", ".answers", "#belief", "#sweep")
+    }
+    assert {name: box for name, box in boxes.items() if box["y"] < 0 or box["y"] + box["height"] > 900} == {}
+    window, swept = boxes["#belief"], boxes["#sweep"]
+    assert window["y"] == swept["y"]
+    assert window["x"] + window["width"] <= swept["x"]
+    assert min(window["height"], swept["height"]) > 350
+    page.screenshot(path=screenshots(tmp_path_factory) / "live-1280.png")
+    page.set_viewport_size({"width": 1000, "height": 900})
+
+
+def test_on_a_narrow_screen_nothing_overflows_and_all_is_legible(
+    page: Page, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    page.set_viewport_size({"width": 400, "height": 900})
+    page.wait_for_timeout(300)  # plotly redraws
+    assert hard_to_read(page) == []
+    assert broken_rules(page) == []
+    page.screenshot(path=screenshots(tmp_path_factory) / "live-narrow.png", full_page=True)
+    page.set_viewport_size({"width": 1000, "height": 900})
 
 
 def test_stopping_asks_again_and_the_end_is_told(page: Page, watched: Watched) -> None:

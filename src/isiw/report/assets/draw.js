@@ -112,7 +112,7 @@ const draw = (() => {
     if (aloneMs === null) return { shapes: [], annotations: [] };
     return {
       shapes: [{ type: "line", x0: partMs, x1: partMs, yref: "paper", y0: 0, y1: 1, line: { width: 1, color: colour("faint") } }],
-      annotations: [{ x: aloneMs, y: 0, yref: "paper", yanchor: "top", text: "TMS<br>alone", showarrow: false }],
+      annotations: [{ x: aloneMs, y: 0, yref: "paper", xanchor: "right", xshift: 12, yanchor: "top", text: "TMS<br>alone", showarrow: false }],
     };
   }
 
@@ -171,12 +171,12 @@ const draw = (() => {
     const figure = document.getElementById(id);
     if (!waves.length) {
       Plotly.purge(figure);
-      figure.style.height = "auto";
+      figure.style.setProperty("--rows", 0);
       figure.textContent = nothing;
       return;
     }
     if (!figure.classList.contains("js-plotly-plot")) figure.textContent = "";
-    figure.style.height = `${60 + 120 * (waves.length + 1)}px`;
+    figure.style.setProperty("--rows", waves.length + 1);
     const traces = [];
     const axes = {};
     const shapes = [];

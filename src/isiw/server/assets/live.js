@@ -52,15 +52,18 @@
     said("delivered-more", `of at most ${most}, mistrials and control trials included`);
   }
 
-  function row(cells) {
+  function row(cells, headed) {
     const line = document.createElement("tr");
-    for (const cell of cells) line.append(Object.assign(document.createElement("td"), { textContent: cell }));
+    cells.forEach((textContent, k) => {
+      const heads = headed && !k;
+      line.append(Object.assign(document.createElement(heads ? "th" : "td"), { textContent, ...(heads && { scope: "row" }) }));
+    });
     return line;
   }
 
   function tellTables() {
     element("events").replaceChildren(...shown.events.map(([trial, kind, text]) => row([trial ?? "–", kind, text])).reverse());
-    element("facts").replaceChildren(...shown.facts.map(row));
+    element("facts").replaceChildren(...shown.facts.map((fact) => row(fact, true)));
   }
 
   // ---- all of it
@@ -92,7 +95,7 @@
     tellLeft();
     tellTables();
     showButtons(last);
-    element("now").hidden = false;
+    element("now").hidden = element("more").hidden = false;
     later(picture);
   }
 
@@ -215,6 +218,10 @@
     const text = element("note").value.trim();
     if (text && await send("note", { text }, "The note is in the log.")) element("note").value = "";
   });
+  const resized = new ResizeObserver((seen) => {
+    for (const { target } of seen) if (target.classList.contains("js-plotly-plot")) Plotly.Plots.resize(target);
+  });
+  for (const id of ["belief", "sweep"]) resized.observe(element(id)); // words above them may take another line
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
   followOn();
 })();
