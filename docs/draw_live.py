@@ -2,7 +2,8 @@
 
     python docs/draw_live.py
 
-writes `docs/images/live.png`, of a session at the simulated tapping robot that is paused after 24 pairs of stimuli.
+writes `docs/images/live.png` and its dark twin `live-dark.png`, of a session at the simulated tapping
+robot that is paused after 24 pairs of stimuli.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from playwright.sync_api import sync_playwright
 
 import isiw
 
-PICTURE = Path(__file__).parent / "images" / "live.png"
+IMAGES = Path(__file__).parent / "images"
 SEED = 1
 PAUSE_AFTER = 23
 
@@ -44,14 +45,17 @@ def main() -> None:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
         session = session_of(Path(folder))
         with isiw.watch(session) as page:
-            shown = browser.new_page(viewport={"width": 1000, "height": 1500})
+            shown = browser.new_page(viewport={"width": 1280, "height": 900})
             shown.goto(page.url)
             shown.get_by_text("The session has not begun.").wait_for()
             runs = threading.Thread(target=session.run)
             runs.start()
             shown.get_by_text("Paused: Time to look at the coil.").wait_for(timeout=120_000)
             shown.get_by_text(f"Sweep of trial {PAUSE_AFTER}").wait_for()
-            shown.screenshot(path=PICTURE)
+            for scheme, name in (("light", "live.png"), ("dark", "live-dark.png")):
+                shown.emulate_media(color_scheme=scheme)
+                shown.wait_for_timeout(500)  # plotly redraws
+                shown.screenshot(path=IMAGES / name)
             session.end("The picture is taken.")
             runs.join()
         browser.close()

@@ -2,7 +2,8 @@
 
     python docs/draw_report.py
 
-writes `docs/images/report.png` and `docs/images/report-trial.png`, of a session at the simulated tapping robot.
+writes `docs/images/report.png`, its dark twin `report-dark.png`, and `docs/images/report-trial.png`, of a
+session at the simulated tapping robot.
 """
 
 from __future__ import annotations
@@ -43,7 +44,9 @@ def main() -> None:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
         page = browser.new_page(viewport={"width": 1000, "height": 1100})
         page.goto(path.as_uri())
-        page.screenshot(path=IMAGES / "report.png")
+        for scheme, name in (("dark", "report-dark.png"), ("light", "report.png")):
+            page.emulate_media(color_scheme=scheme)
+            page.screenshot(path=IMAGES / name)
         page.locator(f".choose[data-trial='{SHOWN}']").click()
         page.wait_for_timeout(500)
         page.locator("#explore").screenshot(path=IMAGES / "report-trial.png")
