@@ -10,6 +10,7 @@ import pytest
 import scipy.stats
 
 import isiw
+from isiw import sentences
 from isiw.errors import LogError
 from isiw.findings import NO_MEP
 from isiw.report.evidence import changed_with_time, contradiction, growth, no_comparison, nothing_stood_out, p_of_larger
@@ -30,14 +31,12 @@ WINDOW = Window(90, 150)
 
 def test_a_window_whose_meps_are_no_larger_is_not_borne_out() -> None:
     said = contradiction(WINDOW, trials([0.02, 0.021, 0.019, 0.02], [0.02, 0.022, 0.021, 0.02]))
-    assert said == (
-        "The data do not bear this out: the MEPs inside are no larger than those outside (medians 20 and 20 µV)."
-    )
+    assert said == sentences.not_larger((20.0, 20.0))
 
 
 def test_medians_that_say_the_contrary_are_left_out() -> None:
     said = contradiction(WINDOW, trials([0.06, 0.06, 0.06, 0.01, 0.01], [0.05, 0.05, 0.07, 0.07, 0.05, 0.02]))
-    assert said == "The data do not bear this out: the MEPs inside are no larger than those outside."
+    assert said == sentences.not_larger((60.0, 50.0))
 
 
 def test_without_a_probability_it_is_said_too_that_meps_are_not_clearly_larger() -> None:
