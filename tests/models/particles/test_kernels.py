@@ -262,6 +262,18 @@ def test_half_an_enhancement_is_half_a_boost(kind: NoiseKind) -> None:
     np.testing.assert_allclose(got, log_likelihood(weaker, told), atol=1e-3)
 
 
+@pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
+def test_both_engines_know_the_same_circumstances(kind: NoiseKind) -> None:
+    person, told = of_kind(kind)
+    draws = generator(11)
+    spread = torch.randn((*told.isi_ms.shape, 5), generator=draws)
+    known_mv = torch.stack((0.05 * spread[..., 0].abs(), 0.01 * spread[..., 1].abs()), dim=-1)
+    around = torch.cat((known_mv, spread[..., 2:3], 5.0 * spread[..., 3:4], torch.rand(spread[..., :1].shape)), dim=-1)
+    told = replace(told, circumstances=around)
+    expected = total_log_likelihood(in_double(person), told.to("cpu", torch.double))
+    np.testing.assert_allclose(log_likelihood(person, told), expected, atol=1e-3)
+
+
 def test_a_conditioning_stimulus_without_any_enhancement_is_tms_alone() -> None:
     person, told = of_kind(NoiseKind.MISSING)
     alone = replace(told, isi_ms=torch.full_like(told.isi_ms, torch.nan))

@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from enum import IntEnum
 from functools import cache
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from isiw.lazy import torch
 from isiw.models.protocol import Tensor
@@ -185,9 +185,10 @@ def _size(response: Response, level: Tensor) -> Tensor:
     return torch.where(_is(response, NoiseKind.ALL_OR_NONE), 1.0, level)
 
 
-def _drive(response: Response, level: Tensor) -> Tensor:
-    """Drive in logits by facilitation (..., p, t)."""
+def _drive(response: Response, level: Tensor, shift_pct_rmt: Tensor | float = 0.0) -> Tensor:
+    """Drive in logits by facilitation (..., p, t), and by how much stronger the pulse is."""
     linear = response.rest.unsqueeze(-1) + response.boost.unsqueeze(-1) * level
+    linear = linear + response.slope.unsqueeze(-1) * shift_pct_rmt
     log_size = torch.log(_size(response, level).clamp_min(1e-9))
     return torch.where(_recruits(response), linear, log_size)
 
@@ -211,19 +212,44 @@ def evoked_mean(response: Response, level: Tensor) -> Tensor:
     return mean * _response_probability(response, level)
 
 
-def _components(response: Response, level: Tensor, gain: Tensor | float = 0.0) -> tuple[Tensor, Tensor]:
+class Around(NamedTuple):
+    """What bears on trials besides their facilitation; neutral numbers, or tensors that broadcast to (..., p, n).
+
+    Args:
+        gain: by how much evoked MEPs are larger, natural log.
+        shift_pct_rmt: by how much the pulse is stronger [% RMT].
+        known_mv: a part of the amplitude that is not the pulse's [mV].
+        known_sd_mv: its SD [mV].
+    """
+
+    gain: Tensor | float = 0.0
+    shift_pct_rmt: Tensor | float = 0.0
+    known_mv: Tensor | float = 0.0
+    known_sd_mv: Tensor | float = 0.0
+
+    def in_floors(self, response: Response) -> tuple[Tensor, Tensor]:
+        """The known part and its variance, in floors, shapes (..., p, 1 or n)."""
+        per_floor = torch.exp(-response.log_floor).unsqueeze(-1)
+        return self.known_mv * per_floor, (self.known_sd_mv * per_floor) ** 2
+
+
+NOTHING: Final = Around()
+
+
+def _components(response: Response, level: Tensor, around: Around = NOTHING) -> tuple[Tensor, Tensor]:
     """Mean and inverse SD of log(mep / floor) at each node, shapes (..., p, q, t)."""
-    curve = _curve(response, gain)
-    share = (_drive(response, level).unsqueeze(-2) + curve.spread.unsqueeze(-1)).sigmoid_()
+    curve, (known, varies) = _curve(response, around.gain), around.in_floors(response)
+    share = (_drive(response, level, around.shift_pct_rmt).unsqueeze(-2) + curve.spread.unsqueeze(-1)).sigmoid_()
     kernel = torch.sub(1.0, share).square_().mul_(curve.between.unsqueeze(-1))
     _rectify(share, kernel, curve.between, response.onset.expand(share.shape[:-2]))
     kernel.add_(curve.output.unsqueeze(-1))
     evoked = share.mul_(curve.scale.unsqueeze(-2))
-    total = evoked.add(1.0)
+    evoked_and_known = evoked + known.unsqueeze(-2)
     # The variance is that of each part by its share of the total: (evoked² kernel + floor²) / total².
-    spread = kernel.mul_(evoked).mul_(evoked).add_(response.floor_log_sd.square()[..., None, None])
-    inverse_sd = spread.rsqrt_().mul_(total)
-    return evoked.log1p_(), inverse_sd
+    floor = response.floor_log_sd.square()[..., None] + varies
+    spread = kernel.mul_(evoked).mul_(evoked).add_(floor.unsqueeze(-2))
+    inverse_sd = spread.rsqrt_().mul_(evoked_and_known + 1.0)
+    return evoked_and_known.log1p_(), inverse_sd
 
 
 def _rectify(share: Tensor, kernel: Tensor, between: Tensor, onset: Tensor) -> None:
@@ -245,10 +271,17 @@ def _bell(z: Tensor) -> Tensor:
     return bell
 
 
-def _mix(response: Response, level: Tensor, log_relative: Tensor, evoked: Tensor) -> Tensor:
+def _silent(response: Response, around: Around) -> tuple[Tensor, Tensor]:
+    """Mean and SD of log(mep / floor) where nothing is evoked, shapes (..., p, 1 or t)."""
+    known, varies = around.in_floors(response)
+    sd = torch.sqrt(response.floor_log_sd.square().unsqueeze(-1) + varies)
+    return torch.log1p(known), sd / (1.0 + known)
+
+
+def _mix(response: Response, level: Tensor, log_relative: Tensor, evoked: Tensor, around: Around = NOTHING) -> Tensor:
     """Density of log(mep / floor) from the density of trials that respond: missing responses and outliers added."""
-    floor_sd = response.floor_log_sd.unsqueeze(-1)
-    silent = _bell(log_relative / floor_sd) / (floor_sd * math.sqrt(2 * math.pi))
+    mean, sd = _silent(response, around)
+    silent = _bell((log_relative - mean) / sd) / (sd * math.sqrt(2 * math.pi))
     low, high = OUTLIER_LOG_RANGE
     outlier = ((log_relative > low) & (log_relative < high)).to(evoked.dtype) / (high - low) + 1e-6
     responds = _response_probability(response, level)
@@ -257,27 +290,37 @@ def _mix(response: Response, level: Tensor, log_relative: Tensor, evoked: Tensor
 
 
 def log_likelihood(
-    response: Response, level: Tensor, log_mep: Tensor, log_mep_high: Tensor, gain: Tensor | float = 0.0
+    response: Response, level: Tensor, log_mep: Tensor, log_mep_high: Tensor, *bearing: Tensor | float
 ) -> Tensor:
-    """Log likelihood of MEPs, trial by trial: a density of the log MEP, or the probability of an interval."""
+    """Log likelihood of MEPs, trial by trial: a density of the log MEP, or the probability of an interval.
+
+    What else bears on the trials are the fields of `Around`, in order.
+    """
+    around = Around(*bearing)
     low, high = (end - response.log_floor.unsqueeze(-1) for end in (log_mep, log_mep_high))
-    mean, inverse_sd = _components(response, level, gain)
+    mean, inverse_sd = _components(response, level, around)
     censored = log_mep != log_mep_high
-    inside = _interval_likelihood(response, level, (low, high), mean, inverse_sd) if bool(censored.any()) else None
+    ends = low, high
+    inside = _inside(response, level, ends, (mean, inverse_sd), around) if bool(censored.any()) else None
     terms = _bell(mean.sub_(low.unsqueeze(-2)).mul_(inverse_sd)).mul_(inverse_sd)
     evoked = _over_nodes(terms) / math.sqrt(2 * math.pi)
-    likelihood = torch.log(_mix(response, level, low, evoked))
+    likelihood = torch.log(_mix(response, level, low, evoked, around))
     return likelihood if inside is None else torch.where(censored, inside, likelihood)
 
 
-def _interval_likelihood(
-    response: Response, level: Tensor, ends: tuple[Tensor, Tensor], mean: Tensor, inverse_sd: Tensor
+def _inside(
+    response: Response,
+    level: Tensor,
+    ends: tuple[Tensor, Tensor],
+    components: tuple[Tensor, Tensor],
+    around: Around,
 ) -> Tensor:
     """Log probability that log(mep / floor) lies between two ends, shape (..., p, n)."""
+    (mean, inverse_sd), (silent_mean, silent_sd) = components, _silent(response, around)
 
     def below(end: Tensor) -> Tensor:
         evoked = _over_nodes(torch.special.ndtr((end.unsqueeze(-2) - mean) * inverse_sd))
-        silent = torch.special.ndtr(end / response.floor_log_sd.unsqueeze(-1))
+        silent = torch.special.ndtr((end - silent_mean) / silent_sd)
         first, last = OUTLIER_LOG_RANGE
         outlier = ((end - first) / (last - first)).clamp(0.0, 1.0)
         responds = _response_probability(response, level)
@@ -301,7 +344,7 @@ def outcome_density(response: Response, level: Tensor, log_mep: Tensor) -> Tenso
 
 def draw_log_mep(response: Response, level: Tensor, generator: torch.Generator, gain: Tensor | float = 0.0) -> Tensor:
     """Draw natural logs of MEPs [mV] from the distribution that `log_likelihood` is of."""
-    mean, inverse_sd = _components(response, level, gain)
+    mean, inverse_sd = _components(response, level, Around(gain))
     node = torch.multinomial(_node_weights(level), level.numel(), replacement=True, generator=generator)
     picks = node.view(level.shape).unsqueeze(-2)
     mean, inverse_sd = (x.gather(-2, picks).squeeze(-2) for x in (mean, inverse_sd))

@@ -15,7 +15,7 @@ from isiw.types import FloatArray
 
 
 class Circumstances(NamedTuple):
-    """What else is known to bear on the amplitude of a trial; neutral by default, and nothing sets it yet.
+    """What else is known to bear on the amplitude of a trial; neutral by default.
 
     Args:
         known_mv: a part of the amplitude that is not the pulse's, such as the tap's own response [mV].
@@ -42,8 +42,7 @@ class History:
         log_mep: lower end of the log MEP, shape (b, n).
         log_mep_high: upper end, shape (b, n).
         order: how many trials were told before each, shape (b, n).
-        circumstances: the fields of `Circumstances`, shape (b, n, 5); None where all are neutral. The compiled kernels
-            know them, torch does not.
+        circumstances: the fields of `Circumstances`, shape (b, n, 5); None where all are neutral.
     """
 
     isi_ms: Tensor
@@ -65,7 +64,8 @@ class History:
 
     def to(self, device: torch.device | str, dtype: torch.dtype) -> History:
         """The same on another device, or in another precision."""
-        return History(*(column.to(device, dtype) for column in self.columns))
+        circumstances = None if self.circumstances is None else self.circumstances.to(device, dtype)
+        return History(*(column.to(device, dtype) for column in self.columns), circumstances)
 
     def appended(self, trial: History) -> History:
         """This history and one more trial."""
