@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any, Final, NamedTuple, Self
+from typing import Any, Final, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -18,6 +18,9 @@ from isiw.types import ArrayLike, FloatArray, IntArray, Number, Numbers
 from isiw.window import Interval, Window
 
 _NOTHING: Final[Mapping[str, float]] = {}
+
+SURE_OF_A_CHANGE: Final = 0.9
+"""Probability from which on a change during the session is said."""
 
 PROFILE_DECIMALS: Final = 6  # a nanovolt; the profile is a picture of the posterior, not a measurement
 
@@ -70,6 +73,33 @@ class Enhancement(NamedTuple):
     shift_pct_rmt: float | None = None
 
 
+@dataclass(frozen=True)
+class Change:
+    """A change in the course of a session, whatever the ISI, that is more probable than none.
+
+    Args:
+        kind: what changed: amplitudes, the intensity as far as MEPs show it, or the enhancement from trial to trial.
+        probability: that amplitudes or the intensity have changed, or the enhancement has.
+        size: by which factor amplitudes changed, or the enhancement since the first trial; by how much the intensity
+            did [% RMT].
+        low: lower end of its 90 % interval.
+        high: upper end.
+        trial: how many trials that count came before it; None for an enhancement.
+    """
+
+    kind: Literal["amplitudes", "intensity", "enhancement"]
+    probability: float
+    size: float
+    low: float
+    high: float
+    trial: int | None = None
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether it is said outright."""
+        return self.probability >= SURE_OF_A_CHANGE
+
+
 @dataclass(frozen=True, eq=False)
 class WindowEstimate:
     """What is believed about one person's window. What a non-Bayesian method does not have is None.
@@ -100,6 +130,9 @@ class WindowEstimate:
         depressed: the ISIs that depress the MEP, as far as they are reported; None where there are none, or where
             nobody looked for them.
         depressed_probability: probability that there are any; None where nobody looked for them.
+        change: what changed during the session, whatever the ISI; None where nothing probably did, or nobody looked.
+        time_alone: probability that there is no window, and that amplitudes have changed with time all the same; None
+            where nobody looked.
 
     Raises:
         InvalidValueError: a probability outside 0–1, a window or a depression reported against it, not one hypothesis a
@@ -127,9 +160,11 @@ class WindowEstimate:
     silent: bool = False
     depressed: Window | None = None
     depressed_probability: float | None = None
+    change: Change | None = None
+    time_alone: float | None = None
 
     def noting(self, **facts: Any) -> WindowEstimate:
-        """The same with other `pairs`, `silent` or `unusual`; what is still to be worked out remains so."""
+        """The same with other facts; what is still to be worked out remains so."""
         noted = object.__new__(type(self))
         noted.__dict__.update(self.__dict__ | facts)
         return noted
@@ -139,7 +174,7 @@ class WindowEstimate:
 
     def __post_init__(self) -> None:
         self._check_hypotheses()
-        check_probabilities(self, "expected_f1", "depressed_probability", optional=True)
+        check_probabilities(self, "expected_f1", "depressed_probability", "time_alone", optional=True)
         if self.depressed is not None and (self.depressed_probability or 0.0) < 0.5:
             raise InvalidValueError(
                 "a depression is reported although none is more probable", got=self.depressed_probability
@@ -312,7 +347,9 @@ class Estimate(Reported):
     `start_beyond`, `end_beyond` and `split` are probabilities given a window: that an edge lies beyond the range, and
     that there is more than one segment. `unusual` are probabilities by name; `excluded_mv` and `excluded_pct_rmt` are
     the largest enhancement that is excluded with 90 % probability. `depressed_ms` are the segments in which the tap
-    depresses the MEP, and `depressed_probability` is that there are any; None where nobody looked for them.
+    depresses the MEP, and `depressed_probability` is that there are any; None where nobody looked for them. `change` is
+    what changed during the session, whatever the ISI, if anything probably did; `time_alone` is the probability that
+    there is no window, and amplitudes changed with time all the same.
     """
 
     start_beyond: float | None = None
@@ -323,6 +360,8 @@ class Estimate(Reported):
     excluded_pct_rmt: float | None = None
     depressed_ms: tuple[float, ...] = ()
     depressed_probability: float | None = None
+    change: Change | None = None
+    time_alone: float | None = None
 
     @classmethod
     def of(cls, estimate: WindowEstimate, **more: Any) -> Self:
@@ -345,6 +384,8 @@ class Estimate(Reported):
             "excluded_pct_rmt": None if excluded is None else excluded.shift_pct_rmt,
             "depressed_ms": () if estimate.depressed is None else estimate.depressed.edges_ms,
             "depressed_probability": estimate.depressed_probability,
+            "change": estimate.change,
+            "time_alone": estimate.time_alone,
         }
         return cls(**figures, **edges, **_profile(estimate), **more)
 

@@ -203,6 +203,14 @@ class ExpectsTheUsual(Protocol):
 
 
 @runtime_checkable
+class NotesChanges(Protocol):
+    """Capability: a belief that reckons with changes in the course of a session, and can be told of one."""
+
+    def noting_change(self) -> Posterior:
+        """The same trials where somebody has seen that something changes now, such as the place of the coil."""
+
+
+@runtime_checkable
 class ReportsTrouble(Protocol):
     """Capability: a fit that can fail, and says so."""
 

@@ -10,7 +10,9 @@ from isiw.lazy import torch
 from isiw.models.protocol import Tensor
 
 SIMULATED: Final = 2**31
-"""The step whose stream simulated people are drawn from: no posterior gets there."""
+NOTED: Final = 2**30
+"""The step whose stream simulated people are drawn from, and that of the first change that is noted: no posterior gets
+there."""
 
 
 def step_generator(device: str, seed: int, step: int) -> torch.Generator:

@@ -20,7 +20,7 @@ from isiw.log.salvage import Salvage
 from isiw.log.schema import MOST_TRIALS, Event, Intent
 from isiw.log.verdicts import VERDICTS, under
 from isiw.log.writer import LogWriter
-from isiw.session.assembly import Earlier, versions
+from isiw.session.assembly import BELIEF_VERSION, ENGINE_VERSION, Earlier, versions
 from isiw.session.examination import learn, relearned
 from isiw.strategy.catalogue import known_settings, remade_strategy, settings_for
 from isiw.strategy.strategy import Strategy
@@ -155,7 +155,12 @@ def _require_same_space(strategy: Strategy, header: Header) -> None:
 
 def _require_other_versions(intent: Intent, asked_ms: float, header: Header) -> None:
     """Raise where the strategy has no reason to ask something else than it did."""
-    if header.schema_version == SCHEMA_VERSION and versions() == {**header.versions, "isiw": header.isiw_version}:
+    same = (header.schema_version, header.belief_version, header.engine_version) == (
+        SCHEMA_VERSION,
+        BELIEF_VERSION,
+        ENGINE_VERSION,
+    )
+    if same and versions() == {**header.versions, "isiw": header.isiw_version}:
         raise StrategyError(
             f"the strategy does not ask again what was asked in trial {intent.trial}",
             got=f"{asked_ms:g} ms",
@@ -167,7 +172,7 @@ def _require_other_versions(intent: Intent, asked_ms: float, header: Header) -> 
 
 def versions_text(header: Header) -> str:
     """The versions that a session was logged with."""
-    logged = {"isiw": header.isiw_version, **header.versions}
+    logged = {"isiw": header.isiw_version, "belief": header.belief_version, **header.versions}
     return plain(", ".join(f"{name} {version}" for name, version in logged.items()))
 
 

@@ -18,7 +18,15 @@ from isiw.acquisition.protocol import AcquisitionFunction, FollowsPlan, best_can
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
 from isiw.lazy import torch
-from isiw.models.protocol import ExpectsTheUsual, Observation, Posterior, ProposesIsi, ResponseModel, Tensor
+from isiw.models.protocol import (
+    ExpectsTheUsual,
+    NotesChanges,
+    Observation,
+    Posterior,
+    ProposesIsi,
+    ResponseModel,
+    Tensor,
+)
 from isiw.strategy.stopping import Progress, StopDecision, StoppingRule, looks_back
 
 ASKED_AGAIN = 2
@@ -180,6 +188,11 @@ class Course:
             earlier=tuple(belief.looked_back_on(self.people) for belief in self.past),
             paired=not alone,
         )
+
+    def noting_change(self) -> Course:
+        """The course where something changes now that bears on all MEPs; the same where the model knows no changes."""
+        posterior = self.posterior
+        return replace(self, posterior=posterior.noting_change()) if isinstance(posterior, NotesChanges) else self
 
     @property
     def paired_trials(self) -> int:

@@ -79,6 +79,20 @@ class Progress:
     past: tuple[WindowEstimate, ...] = ()
 
 
+MOST_BY_TIME: Final = 0.05
+"""No session stops on a window while changes with time explain it all with more probability than this."""
+
+
+def _by_time(estimate: WindowEstimate) -> str | None:
+    """That time alone may explain a window; None where it hardly can, or nobody looked."""
+    if estimate.time_alone is None or estimate.time_alone <= MOST_BY_TIME:
+        return None
+    return (
+        "It is too early to stop: that amplitudes have changed with time, and there is no window, has probability "
+        f"{estimate.time_alone:.2f}."
+    )
+
+
 class StoppingRule(Protocol):
     """A rule: from progress to a decision. `LooksBack` and `HasBudget` are what it may say of itself besides."""
 
@@ -174,7 +188,8 @@ class CredibleWidth:
         if progress.estimate.hypotheses is not None:
             spans += " under every likely hypothesis"
         if known:
-            return StopKind.KNOWN.stop(f"The window is known: {spans}.")
+            by_time = _by_time(progress.estimate)
+            return StopKind.KNOWN.go_on(by_time) if by_time else StopKind.KNOWN.stop(f"The window is known: {spans}.")
         return StopKind.KNOWN.go_on(f"The window is not known well enough yet: {spans}.")
 
 
@@ -238,7 +253,12 @@ class ExpectedF1:
             return StopKind.TOO_LITTLE.go_on(estimate.too_little)
         expected = f"an expected F1 of {estimate.expected_f1:.2f}"
         if self.f1 < 1.0 and estimate.expected_f1 >= self.f1 and estimate.probability >= self.min_probability:
-            return StopKind.KNOWN.stop(f"The window is known, with {expected}.")
+            by_time = _by_time(estimate)
+            return (
+                StopKind.KNOWN.go_on(by_time)
+                if by_time
+                else StopKind.KNOWN.stop(f"The window is known, with {expected}.")
+            )
         return StopKind.KNOWN.go_on(f"The window as it is known so far has {expected}.")
 
 
@@ -280,7 +300,8 @@ class SmallGain:
         small = self.gain > 0 and now.expected_f1 - before < self.gain and now.probability >= self.min_probability
         if small and progress.told >= self.min_told:
             reason = f"Another {self.last} stimuli would add little: {added}, now {now.expected_f1:.2f}."
-            return StopKind.SMALL_GAIN.stop(reason)
+            by_time = _by_time(now)
+            return StopKind.SMALL_GAIN.go_on(by_time) if by_time else StopKind.SMALL_GAIN.stop(reason)
         reason = f"Too early to stop: {added}, and a window has probability {now.probability:.2f}."
         return StopKind.SMALL_GAIN.go_on(reason)
 

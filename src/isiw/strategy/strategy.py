@@ -319,6 +319,15 @@ class Strategy:
         index = self._batch_ms.index(told_ms)
         return [*self._batch_ms[:index], *self._batch_ms[index + 1 :]]
 
+    def note_change(self) -> None:
+        """Learn that something changed that may bear on all MEPs from here on, such as the place of the coil.
+
+        A model that reckons with changes takes one for likely between the last trial and the next, and what is asked
+        next is chosen again; to other models it means nothing.
+        """
+        self._course = self._course.noting_change()
+        self._choice = self._fallback_reason = None
+
     def count_mistrial(self) -> None:
         """Count a delivered stimulus whose outcome is not told: it uses up budget, and is asked again at most twice."""
         self._mistrials += 1

@@ -12,6 +12,7 @@ import torch
 from isiw import compiled
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.models.particles import ParticleModel
+from isiw.models.particles.changes import Change
 from isiw.models.particles.engine import Compiled, EngineName, TorchEngine, engine_for
 from isiw.models.particles.jumps import WindowTarget
 from isiw.models.particles.kernels.likelihood import likelihoods
@@ -65,7 +66,8 @@ def in_double(person: Person) -> Person:
 
     low = person.depression
     depression = None if low is None else Depression(Shape(*double(low.shape)), low.depth.double(), low.present)
-    return Person(Shape(*double(person.shape)), Response(*double(person.response)), person.present, depression)
+    change = None if person.change is None else Change(*double(person.change))
+    return Person(Shape(*double(person.shape)), Response(*double(person.response)), person.present, depression, change)
 
 
 def furthest(target: Any, people: int, particles: int, seed: int, isi_sd_ms: float) -> float:
@@ -135,8 +137,8 @@ def test_a_sample_predicts_what_it_predicts_in_torch(space: DesignSpace) -> None
     target = WindowTarget(Prior(), space)
     latents = target.prior.sample(2, 300, generator(6), space)
     engine = engine_for("compiled", target)
-    person, records = engine.meaning(latents)
-    ours, theirs = PersonSample(person, space, 1, records), PersonSample(target.person(latents), space, 1)
+    person, records = engine.meaning(latents, 1)
+    ours, theirs = PersonSample(person, space, 1, records), PersonSample(target.person(latents).after(1), space, 1)
     grid_ms, few_ms = torch.tensor(space.grid_ms, dtype=torch.float32), torch.tensor([0.0, 180.0, 233.0, 260.0, 300.0])
     torch.testing.assert_close(ours.window_masks(grid_ms), theirs.window_masks(grid_ms))
     torch.testing.assert_close(ours.outcome_mass(few_ms), theirs.outcome_mass(few_ms), atol=2e-5, rtol=0.0)
@@ -150,7 +152,7 @@ def test_a_sample_predicts_what_it_predicts_in_torch(space: DesignSpace) -> None
 def test_a_sample_with_a_depression_predicts_what_it_predicts_in_torch() -> None:
     target = TARGETS["supra"]
     latents = SupraPrior().sample(1, 300, generator(6), target.space)
-    person, records = engine_for("compiled", target).meaning(latents)
+    person, records = engine_for("compiled", target).meaning(latents, 3)
     ours, theirs = (SupraSample(p, target.space, 3, r) for p, r in ((person, records), (target.person(latents), None)))
     isi_ms = torch.arange(0.0, 201.0, 4.0)
     torch.testing.assert_close(ours.outcome_mass(isi_ms), theirs.outcome_mass(isi_ms), atol=0.02, rtol=0.0)

@@ -152,8 +152,8 @@ def test_curves_that_start_at_a_threshold_are_as_their_law_says() -> None:
     latents = prior.sample(1, MANY, torch.Generator().manual_seed(1), VALVE_SPACE)
     shift_pct_rmt = prior.shift_pct_rmt(latents)[latents.present]
     assert shift_pct_rmt.median().item() == pytest.approx(law.boost_pct.median, rel=0.05)
-    below_threshold = torch.logit(response.onset) - response.rest
-    assert below_threshold.median().item() == pytest.approx(-slope * law.rest_pct.median, rel=0.05)
+    below_threshold_pct = (torch.logit(response.onset) - response.rest) / response.slope
+    assert below_threshold_pct.median().item() == pytest.approx(-law.rest_pct.median, rel=0.05)
 
 
 def test_no_other_curve_has_a_threshold() -> None:

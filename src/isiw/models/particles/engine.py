@@ -15,7 +15,7 @@ from isiw.models.particles.kernels.moves import OWN_DRAWS, log_places, records, 
 from isiw.models.particles.kernels.records import columns_of, person_of
 from isiw.models.particles.kernels.target import Tables
 from isiw.models.particles.likelihood import total_log_likelihood
-from isiw.models.particles.moves import L, Moved, Mover, Target
+from isiw.models.particles.moves import L, Moved, Mover, Target, steps_of
 from isiw.models.particles.prior import Person
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
@@ -27,8 +27,8 @@ EngineName: TypeAlias = Literal["compiled", "torch"]
 class Engine(Protocol[L]):
     """What particles are weighed and moved by."""
 
-    def meaning(self, latents: L) -> tuple[Person, FloatArray | None]:
-        """What particles mean, and the same as kernels have it; None where torch computes."""
+    def meaning(self, latents: L, trials: int) -> tuple[Person, FloatArray | None]:
+        """What particles mean after so many trials, and the same as kernels have it; None where torch computes."""
 
     def log_likelihood(self, latents: L, history: History) -> Tensor:
         """Log likelihood of a history under each particle, shape (b, p)."""
@@ -72,9 +72,9 @@ class TorchEngine(Generic[L]):
 
     target: Target[L]
 
-    def meaning(self, latents: L) -> tuple[Person, None]:
+    def meaning(self, latents: L, trials: int) -> tuple[Person, None]:
         """What particles mean; see `Engine`."""
-        return self.target.person(latents), None
+        return self.target.person(latents).after(trials), None
 
     def log_likelihood(self, latents: L, history: History) -> Tensor:
         """Log likelihood of a history under each particle; see `Engine`."""
@@ -103,16 +103,16 @@ class Compiled(Generic[L]):
     target: TabledTarget[L]
     tables: Tables = field(repr=False)
 
-    def meaning(self, latents: L) -> tuple[Person, FloatArray]:
+    def meaning(self, latents: L, trials: int) -> tuple[Person, FloatArray]:
         """What particles mean; see `Engine`."""
         with first_of("view of particles"):
-            particles = records(self.tables, *self._arrays(latents))
+            particles = records(self.tables, *self._arrays(latents), trials)
         return person_of(particles), particles
 
     def log_likelihood(self, latents: L, history: History) -> Tensor:
         """Log likelihood of a history under each particle; see `Engine`."""
         with first_of("view of particles"):
-            particles = records(self.tables, *self._arrays(latents))
+            particles = records(self.tables, *self._arrays(latents), -1)
             return torch.from_numpy(compiled.likelihoods(particles, columns_of(history)))
 
     def log_places(self, latents: L) -> Tensor:
@@ -127,6 +127,7 @@ class Compiled(Generic[L]):
         people, size = log_likelihood.shape
         values, kinds = (array.copy() for array in self._arrays(latents))
         found, trials = log_likelihood.numpy().copy(), columns_of(history)
+        steps = steps_of(history).contiguous().numpy()
         counts = torch.zeros((people, 4), dtype=torch.float32)
         width = OWN_DRAWS + len(self.tables.first) + 4
         with first_of("moves"):
@@ -134,7 +135,7 @@ class Compiled(Generic[L]):
                 uniform = torch.rand((people, size, width), generator=generator, dtype=torch.float32)
                 normal = torch.randn(values.shape, generator=generator, dtype=torch.float32)
                 draws = uniform.numpy(), normal.numpy()
-                counts += torch.from_numpy(sweep(self.tables, trials, values, kinds, found, *draws))
+                counts += torch.from_numpy(sweep(self.tables, trials, steps, (values, kinds, found), *draws))
         shifts, shifted, jumps, jumped = counts.T
         moved = self.target.latents(torch.from_numpy(values), torch.from_numpy(kinds))
         return Moved(moved, torch.from_numpy(found), shifted / shifts, jumped / jumps)

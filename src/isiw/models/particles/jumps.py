@@ -5,6 +5,7 @@ A jump leads to another kind of profile, of noise, or to and from "no window".
 
 from __future__ import annotations
 
+import math
 from dataclasses import astuple, dataclass
 from functools import cache
 from typing import Final
@@ -13,18 +14,29 @@ import numpy as np
 
 from isiw.design import DesignSpace
 from isiw.lazy import torch
+from isiw.models.particles.changes import ChangeKind
 from isiw.models.particles.kernels.building import prior_tables
 from isiw.models.particles.kernels.target import Tables
 from isiw.models.particles.latents import LATENTS, PROFILE_BLOCKS, RESPONSE_BLOCKS, Latents, latents_of, used_by
 from isiw.models.particles.mixture import drawn
+from isiw.models.particles.moves import A_LITTLE, ANOTHER_KIND, NEARLY, OF_STEPS, RECENT, STEP_SD
 from isiw.models.particles.noise import NoiseKind
 from isiw.models.particles.places import mixture_of
 from isiw.models.particles.prior import Person, Prior
 from isiw.models.protocol import Tensor
 
-JUMPS: Final = {"form": 0.25, "noise": 0.2, "window": 0.35, "place": 0.12, "response": 0.08}
+JUMPS: Final = {
+    "form": 0.18,
+    "noise": 0.15,
+    "window": 0.25,
+    "place": 0.09,
+    "response": 0.06,
+    "change": 0.15,
+    "time or window": 0.12,
+}
 """Shares of the jumps. They draw anew: the profile's kind and form; the noise's kind and all that belongs to it;
-whether there is a window, and all of it; where and how wide it is; what belongs to the noise's kind."""
+whether there is a window, and all of it; where and how wide it is; what belongs to the noise's kind; what changes in
+the session, and when; that and the window at once."""
 
 REDRAWN: Final = {
     "form": ("form",),
@@ -32,13 +44,23 @@ REDRAWN: Final = {
     "window": PROFILE_BLOCKS,
     "place": ("start", "width"),
     "response": RESPONSE_BLOCKS,
+    "change": (),
+    "time or window": PROFILE_BLOCKS,
 }
-"""The blocks of latents that each jump draws again."""
+"""The blocks of latents that each jump draws again from the prior; see `_changed` for those of a change."""
 
-KINDS: Final = ("shape", "noise", "present", "depressed")
+KINDS: Final = ("shape", "noise", "present", "depressed", "change")
 """The kinds of a particle as the kernels have them."""
 
-_RENEWED: Final = {"form": {"shape"}, "noise": {"noise"}, "window": {"shape", "present"}, "place": (), "response": ()}
+_RENEWED: Final = {
+    "form": {"shape"},
+    "noise": {"noise"},
+    "window": {"shape", "present"},
+    "place": (),
+    "response": (),
+    "change": {"change"},
+    "time or window": {"shape", "present", "change"},
+}
 """Which kinds each jump draws again."""
 
 
@@ -66,18 +88,21 @@ class WindowTarget:
     def tables(self) -> Tables:
         """What kernels know of the prior and of what moves may do."""
         profile = self.prior.profile
-        known, absent = torch.ones(len(NoiseKind), dtype=torch.long), torch.zeros(len(NoiseKind), dtype=torch.long)
-        used = [used_by(torch.arange(len(NoiseKind)), present.bool()) for present in (absent, known)]
+        change, present, noise = torch.meshgrid(
+            torch.arange(len(ChangeKind)), torch.arange(2), torch.arange(len(NoiseKind)), indexing="ij"
+        )
+        used = used_by(noise.flatten(), present.flatten().bool(), change.flatten())
         moves = {
             "apart": False,
-            "states": np.array([0, 1, len(NoiseKind), 0]),
-            "shifted": _shifted(torch.device("cpu")) & torch.cat(used).unsqueeze(1),
+            "states": np.array([0, 1, len(NoiseKind), 0, 2 * len(NoiseKind)]),
+            "shifted": _shifted(torch.device("cpu")) & used.unsqueeze(1),
             "jumps": tuple(JUMPS.values()),
             "redrawn": _redrawn(torch.device("cpu")),
             "renewed": np.array([[kind in kinds for kind in KINDS] for kinds in _RENEWED.values()]),
             "of_profile": np.array([jump in {"form", "place"} for jump in JUMPS]),
             "kinds": (astuple(profile.shapes), astuple(self.prior.noise), _no_and_yes(profile.p_window), (1.0,)),
         }
+        moves["kinds"] += (self.prior.changes.shares,)
         return prior_tables(
             self.space,
             profile.start,
@@ -92,11 +117,12 @@ class WindowTarget:
     def kinds(self, latents: Latents) -> Tensor:
         """The kinds of particles, integers of shape (b, p, k); there is no depression."""
         present = latents.present.long()
-        return torch.stack((latents.shape, latents.noise, present, torch.zeros_like(present)), dim=-1)
+        kinds = latents.shape, latents.noise, present, torch.zeros_like(present), latents.change
+        return torch.stack(kinds, dim=-1)
 
     def latents(self, values: Tensor, kinds: Tensor) -> Latents:
         """Particles from their latents (b, p, d) and kinds (b, p, k)."""
-        return Latents(values, kinds[..., 0], kinds[..., 1], kinds[..., 2].bool())
+        return Latents(values, kinds[..., 0], kinds[..., 1], kinds[..., 2].bool(), kinds[..., 4])
 
     def log_prior(self, latents: Latents) -> Tensor:
         """Log prior density of their latents but for a constant, shape (b, p)."""
@@ -108,20 +134,82 @@ class WindowTarget:
 
     def shifted(self, latents: Latents, part: Tensor) -> Tensor:
         """Which latents a difference moves, shape (b, p, d)."""
-        return _shifted(part.device)[part] & used_by(latents.noise, latents.present)
+        return _shifted(part.device)[part] & used_by(latents.noise, latents.present, latents.change)
 
-    def jumped(self, latents: Latents, generator: torch.Generator) -> Latents:
-        """Particles (n,) with some kinds and latents drawn anew."""
+    def jumped(self, latents: Latents, generator: torch.Generator, steps: Tensor) -> tuple[Latents, Tensor]:
+        """Particles (n,) with some kinds and latents drawn anew, and the log ratio of what that favours, (n,)."""
         fresh = self.prior.sample(1, len(latents.present), generator, self.space)
         uniform = torch.rand(latents.present.shape, generator=generator, dtype=torch.float32, device=generator.device)
         jump = drawn(tuple(JUMPS.values()), uniform)
-        form, noise, window, _, _ = (jump == number for number in range(len(JUMPS)))
-        return Latents(
+        form, noise, window, _, _, change, both = (jump == number for number in range(len(JUMPS)))
+        window = window | both
+        after = Latents(
             values=torch.where(_redrawn(jump.device)[jump], fresh.values[0], latents.values),
             shape=torch.where(form | window, fresh.shape[0], latents.shape),
             noise=torch.where(noise, fresh.noise[0], latents.noise),
             present=torch.where(window, fresh.present[0], latents.present),
+            change=latents.change,
         )
+        return self._changed(after, fresh, change | both, generator, steps)
+
+    def _changed(
+        self, latents: Latents, fresh: Latents, which: Tensor, generator: torch.Generator, steps: Tensor
+    ) -> tuple[Latents, Tensor]:
+        """Let some particles (n,) have another change, or none; most often one between the trials so far.
+
+        Half of those that have one keep it, and move it a little, or to another trial. The log ratio is that of prior
+        to proposal.
+        """
+        like, trials, shares = latents.values[:, 0], max(1, steps.shape[-1] - 1), self.prior.changes.shares
+        uniform = torch.rand((7, *like.shape), generator=generator, dtype=like.dtype, device=like.device)
+        normal = torch.randn((2, *like.shape), generator=generator, dtype=like.dtype, device=like.device)
+        columns = [LATENTS.index(name) for name in ("log_changed_after", "change_size")]
+        old, new = latents.values[:, columns], fresh.values[0][:, columns]
+        some = drawn(shares, shares[0] + (1.0 - shares[0]) * uniform[2])
+        kind = torch.where(uniform[1] < 0.5, 0, some)
+        recent = (kind > 0) & (uniform[3] < RECENT)
+        new[:, 0] = torch.where(recent, (trials * uniform[4]).clamp_min(1e-3).log(), new[:, 0])
+        near = _step_at(new[:, 0], steps) + STEP_SD * normal[1]
+        new[:, 1] = torch.where(recent & (uniform[6] < OF_STEPS), near, new[:, 1])
+        ratio = self._favour(new, kind, steps) - self._favour(old, latents.change, steps)
+        kept = (latents.change > 0) & (uniform[0] < 0.5)
+        after, anywhere = old[:, 0].exp(), uniform[1] < 0.5
+        after = torch.where(
+            anywhere, torch.where(after < trials, trials * uniform[4], after), after + NEARLY * normal[0]
+        )
+        moved = torch.stack((after.clamp_min(1e-6).log(), old[:, 1] + A_LITTLE * uniform[5] ** 2 * normal[1]), dim=-1)
+        by_moving = torch.where(after > 0, self._log_density(moved) - self._log_density(old), -torch.inf)
+        as_another = torch.where(uniform[3] < ANOTHER_KIND, some, latents.change)
+        kind, new, ratio = (
+            torch.where(kept.view(-1, *(1 for _ in a.shape[1:])), a, b)
+            for a, b in ((as_another, kind), (moved, new), (by_moving, ratio))
+        )
+        values = latents.values.clone()
+        values[:, columns] = torch.where(which.unsqueeze(-1), new, old)
+        after_all = latents._replace(values=values, change=torch.where(which, kind, latents.change))
+        return after_all, torch.where(which, ratio, 0.0)
+
+    def _log_density(self, change: Tensor) -> Tensor:
+        """Log prior density of the trial, not of its log, and the size of a change (n, 2), shape (n,)."""
+        when, size = (self.prior.mixtures[name] for name in ("changed", "change"))
+        return when.log_density(change[:, :1]) + size.log_density(change[:, 1:]) - change[:, 0]
+
+    def _favour(self, change: Tensor, kind: Tensor, steps: Tensor) -> Tensor:
+        """Log of the prior of a change (n, 2), or of none, by how `_changed` proposes it, shape (n,)."""
+        none, trials = self.prior.changes.shares[0], max(1, steps.shape[-1] - 1)
+        when, size = (self.prior.mixtures[name] for name in ("changed", "change"))
+        among = change[:, 0] - math.log(trials)
+        apart = (change[:, 1] - _step_at(change[:, 0], steps)) / STEP_SD
+        near = -0.5 * apart.square() - math.log(STEP_SD * math.sqrt(2.0 * math.pi)) - size.log_density(change[:, 1:])
+        density = torch.exp(among - when.log_density(change[:, :1])) * (1.0 - OF_STEPS + OF_STEPS * near.exp())
+        proposed = RECENT * torch.where(among < 0, density, 0.0) + 1.0 - RECENT
+        return torch.where(kind > 0, math.log(1.0 - none) - proposed.log(), math.log(2.0 * none))
+
+
+def _step_at(log_after: Tensor, steps: Tensor) -> Tensor:
+    """The step of the amplitudes (n, trials + 1) at the trial before which a change comes, shape (n,)."""
+    after = log_after.exp().ceil().clamp_max(steps.shape[-1] - 1).long()
+    return steps.gather(-1, after.unsqueeze(-1)).squeeze(-1)
 
 
 def _no_and_yes(probability: float) -> tuple[float, float]:
@@ -131,8 +219,8 @@ def _no_and_yes(probability: float) -> tuple[float, float]:
 @cache
 def _shifted(device: torch.device) -> Tensor:
     """Which latents a difference moves by its part, shape (parts, d)."""
-    of_profile = latents_of(*PROFILE_BLOCKS, device=device)
-    return torch.stack([torch.ones_like(of_profile), of_profile, ~of_profile])
+    of_profile, changed = (latents_of(*blocks, device=device) for blocks in (PROFILE_BLOCKS, ("changed",)))
+    return torch.stack([~changed, of_profile, ~of_profile & ~changed])
 
 
 @cache

@@ -7,6 +7,7 @@ from functools import cache
 from typing import Final, NamedTuple
 
 from isiw.lazy import torch
+from isiw.models.particles.changes import ChangeKind
 from isiw.models.particles.noise import NoiseKind
 from isiw.models.protocol import Tensor
 
@@ -26,6 +27,8 @@ BLOCKS: Final = {
     "switch": ("switched_on", "switched_off", "log_size", "log_size_cv"),
     "recruitment": _CURVE,
     "rectified": (*RECTIFIED.values(), "log_onset"),
+    "changed": ("log_changed_after",),
+    "change": ("change_size",),
 }
 """The latents by what they are about."""
 
@@ -52,15 +55,22 @@ def latents_of(*blocks: str, device: torch.device) -> Tensor:
     return torch.tensor([latent in chosen for latent in LATENTS], device=device)
 
 
-def used_by(noise: Tensor, present: Tensor) -> Tensor:
+def used_by(noise: Tensor, present: Tensor, change: Tensor | None = None) -> Tensor:
     """Which latents mean anything to particles of some kinds; all others are as the prior draws them."""
     of_profile = latents_of(*PROFILE_BLOCKS, device=noise.device)
-    return _used_by_kind(noise.device)[noise] | (present.unsqueeze(-1) & of_profile)
+    used = _used_by_kind(noise.device)[noise] | (present.unsqueeze(-1) & of_profile)
+    return used if change is None else used | _used_by_change(noise.device)[change]
 
 
 @cache
 def _used_by_kind(device: torch.device) -> Tensor:
     return torch.stack([latents_of(*_COMMON, *_USED[kind], device=device) for kind in NoiseKind])
+
+
+@cache
+def _used_by_change(device: torch.device) -> Tensor:
+    used = {ChangeKind.NONE: (), ChangeKind.ENHANCEMENT: ("change",)}
+    return torch.stack([latents_of(*used.get(kind, ("changed", "change")), device=device) for kind in ChangeKind])
 
 
 class Latents(NamedTuple):
@@ -71,12 +81,14 @@ class Latents(NamedTuple):
         shape: one of `ShapeKind`, shape (b, p).
         noise: one of `NoiseKind`, shape (b, p).
         present: whether there is any facilitation, shape (b, p).
+        change: one of `ChangeKind`, shape (b, p).
     """
 
     values: Tensor
     shape: Tensor
     noise: Tensor
     present: Tensor
+    change: Tensor
 
     def remade(self, fields: Iterable[Tensor]) -> Latents:
         """Particles with other fields, in the same order."""

@@ -230,15 +230,20 @@ class SessionPrior:
 
     Args:
         drift_sd: SD of what the log of evoked MEPs drifts by in the long run; about 0.26 over a session measured.
+        far_drift_sd: the same where they drift far.
+        far_drift_share: probability that they do.
         startup: how strongly the first trials startle, 1 being as much as in blocks of plain TMS.
 
     Raises:
-        InvalidValueError: an SD that is not positive, or an invalid scale.
+        InvalidValueError: an SD that is not positive, an invalid share, or an invalid scale.
     """
 
     drift_sd: float = 0.3
+    far_drift_sd: float = 1.2
+    far_drift_share: float = 0.1
     startup: Scale = Scale(0.5, 0.5)
 
     def __post_init__(self) -> None:
-        check_numbers(self, "drift_sd", above=0)
+        check_numbers(self, "drift_sd", "far_drift_sd", above=0)
+        check_probabilities(self, "far_drift_share")
         check_scales(self, "startup", positive=False, tailed=False)

@@ -43,11 +43,15 @@ def total_log_likelihood(person: Person, history: History) -> Tensor:
 def _by_trial(person: Person, history: History, isi_ms: Tensor) -> Tensor:
     """Log likelihood of each trial at some ISIs, shape (b, p, n)."""
     ends = (history.log_mep.unsqueeze(-2), history.log_mep_high.unsqueeze(-2))
-    gain = log_gain(person.response, history.order.unsqueeze(-2))
-    others = (levels(person, isi_ms), *ends, gain)
-    if history.circumstances is not None:
-        known_mv, sd_mv, offset, shift_pct_rmt, enhancement = history.circumstances.unsqueeze(-3).unbind(-1)
-        others = (others[0] * enhancement, *ends, gain + offset, shift_pct_rmt, known_mv, sd_mv)
+    level, gain = levels(person, isi_ms), log_gain(person.response, history.order.unsqueeze(-2))
+    known_mv, sd_mv, offset, shift_pct_rmt, enhancement = history.around.unsqueeze(-3).unbind(-1)
+    if person.change is not None:
+        changed = person.change.at(history.order.unsqueeze(-2))
+        offset, shift_pct_rmt = offset + changed.log_gain, shift_pct_rmt + changed.shift_pct_rmt
+        enhancement, per_scale = enhancement * changed.enhancement, torch.exp(-changed.log_scale)
+        ends = (ends[0] - changed.log_scale, ends[1] - changed.log_scale)
+        known_mv, sd_mv = known_mv * per_scale, sd_mv * per_scale
+    others = (level * enhancement, *ends, gain + offset, shift_pct_rmt, known_mv, sd_mv)
     return in_pieces(log_likelihood, person.response, others, NODES * isi_ms.shape[-1])
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import get_args
@@ -14,7 +15,7 @@ from isiw.later import Later
 from isiw.lazy import torch
 from isiw.models.particles.engine import Engine, EngineName, engine_for
 from isiw.models.particles.jumps import WindowTarget
-from isiw.models.particles.latents import Latents
+from isiw.models.particles.latents import Latents, latents_of
 from isiw.models.particles.likelihood import levels
 from isiw.models.particles.noise import draw_log_mep, log_gain, recruits
 from isiw.models.particles.posterior import SwarmPosterior
@@ -22,7 +23,7 @@ from isiw.models.particles.predictions import PersonSample
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.swarm import Moving, Swarm
 from isiw.models.protocol import Observation, PriorPerson
-from isiw.models.randomness import SIMULATED, step_generator
+from isiw.models.randomness import NOTED, SIMULATED, step_generator
 from isiw.models.windows import EXCLUDED_AT, SampledHypotheses, SampledProfiles, profile_grid, sampled_estimate
 from isiw.types import ArrayLike, FloatArray
 from isiw.window import Window
@@ -88,11 +89,7 @@ class ParticleModel:
         """
         self.prior.profile.require_space(space)
         latents = self.prior.sample(people, self.particles, step_generator(self.device, seed, 0), space)
-        engine, usual = (
-            engine_for(self.engine, WindowTarget(prior, space), self.device)
-            for prior in (self.prior, self.prior_where_asking)
-        )
-        return ParticlePosterior(self, space, seed, Swarm.of(latents), engine, usual)
+        return ParticlePosterior(self, space, seed, Swarm.of(latents), *_engines(self, space))
 
     def update(self, posterior: ParticlePosterior, observation: Observation) -> ParticlePosterior:
         """The posterior after one more trial."""
@@ -103,12 +100,15 @@ class ParticleModel:
     def simulate(self, space: DesignSpace, seed: int, isi_ms: ArrayLike) -> PriorPerson:
         """Draw one person from the prior, and an MEP at each ISI; see `SimulatesPeople`."""
         generator = step_generator(self.device, seed, SIMULATED)
-        person = self.prior.person(self.prior.sample(1, 1, generator, space))
+        latents = self.prior.sample(1, 1, generator, space)
+        person = self.prior.person(latents)
         isis_ms = torch.as_tensor(isi_ms, dtype=torch.float32, device=self.device).unsqueeze(0)
-        gain = log_gain(person.response, torch.arange(isis_ms.shape[-1], dtype=torch.float32, device=self.device))
-        log_mep = draw_log_mep(person.response, levels(person, isis_ms), generator, gain)
+        order = torch.arange(isis_ms.shape[-1], dtype=torch.float32, device=self.device)
+        changed = self.prior.change(latents).at(order)
+        gain, level = log_gain(person.response, order) + changed.log_gain, levels(person, isis_ms) * changed.enhancement
+        log_mep = draw_log_mep(person.response, level, generator, gain, changed.shift_pct_rmt) + changed.log_scale
         grid_ms = torch.as_tensor(space.grid_ms.copy(), dtype=torch.float32, device=self.device)
-        mask = PersonSample(person, space).window_masks(grid_ms)[0, 0]
+        mask = PersonSample(person.after(len(order)), space).window_masks(grid_ms)[0, 0]
         window = Window.from_mask(space.grid_ms, mask.cpu().numpy())
         return PriorPerson(window, log_mep[0, 0].double().exp().cpu().numpy())
 
@@ -135,14 +135,39 @@ class ParticlePosterior(SwarmPosterior[ParticleModel, Latents]):
         ratio = self.usual.log_places(latents) - self.engine.log_places(latents)
         return replace(self, swarm=self.swarm.times(torch.where(latents.present, ratio, 0.0)))
 
+    def noting_change(self) -> ParticlePosterior:
+        """What is believed where somebody has seen that something changes now; see `NotesChanges`."""
+        trials = self.trials
+        if not trials:
+            return self
+        before, latents = self.model.prior.changes, self.swarm.latents
+        changes = before.noting(trials)
+        model = replace(self.model, prior=replace(self.model.prior, changes=changes))
+        generator = step_generator(self.model.device, self.seed, NOTED + len(changes.noted))
+        kind, noted = changes.where_noted((len(latents.change), self.model.particles), generator)
+        # Particles that nothing has touched so far stand for those, too, in which something changes now.
+        untouched = self.model.prior.untouched(latents, trials)
+        share, left = changes.noted_share / before.untouched(trials), 1.0 - changes.noted_share
+        chance = torch.rand(kind.shape, generator=generator, dtype=torch.float32, device=generator.device)
+        chosen = untouched & (chance < share / (share + left))
+        values = latents.values.clone()
+        own = latents_of("changed", "change", device=values.device)
+        values[..., own] = torch.where(chosen.unsqueeze(-1), noted, values[..., own])
+        latents = latents._replace(values=values, change=torch.where(chosen, kind, latents.change))
+        swarm = replace(self.swarm, latents=latents).times(
+            torch.where(untouched, math.log(share + left), math.log(left))
+        )
+        engine, usual = _engines(model, self.space)
+        return replace(self, model=model, swarm=swarm, engine=engine, usual=usual)
+
     @cached_property
     def sample(self) -> PersonSample:
         """The particles that represent all of them where every candidate ISI is scored."""
-        return self._sample(self.swarm.picked(self.model.thinned), self.trials)
+        return self._sample(self.swarm.picked(self.model.thinned))
 
-    def _sample(self, latents: Latents, order: int = 0) -> PersonSample:
-        person, records = self.engine.meaning(latents)
-        return PersonSample(person, self.space, order, records)
+    def _sample(self, latents: Latents) -> PersonSample:
+        person, records = self.engine.meaning(latents, self.trials)
+        return PersonSample(person, self.space, self.trials, records)
 
     def prediction_mv(self, level: float, person: int = 0) -> tuple[FloatArray, FloatArray]:
         """Between which amplitudes the next MEP lies; see `PredictsMeps`."""
@@ -170,7 +195,19 @@ class ParticlePosterior(SwarmPosterior[ParticleModel, Latents]):
             SampledHypotheses(prior.hypothesis(latents)[0], prior.hypotheses),
             lambda: _excluded_shift_pct_rmt(prior, latents),
         )
-        return estimate.noting(unusual=Later(lambda: prior.unusual(latents, self.space)))
+        named = prior.changed(latents, self.trials)
+        return estimate.noting(
+            unusual=Later(lambda: prior.unusual(latents, self.space)),
+            change=named.change,
+            time_alone=float((named.of_time & ~latents.present[0]).double().mean()),
+        )
+
+
+def _engines(model: ParticleModel, space: DesignSpace) -> tuple[Engine[Latents], Engine[Latents]]:
+    """What computes with a model's prior, and with that which ISIs are chosen with."""
+    priors = model.prior, model.prior_where_asking
+    engine, usual = (engine_for(model.engine, WindowTarget(prior, space), model.device) for prior in priors)
+    return engine, usual
 
 
 def _excluded_shift_pct_rmt(prior: Prior, latents: Latents) -> float | None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Generic, NamedTuple, Protocol, Self, TypeVar
 
 from isiw.lazy import torch
@@ -20,6 +21,18 @@ from isiw.models.shared.history import History
 JUMP_PROBABILITY = 0.3
 PART_PROBABILITY = (0.35, 0.35, 0.30)
 """How often a difference moves all latents, those of the profile alone, and those of the response alone."""
+
+RECENT = 0.8
+"""How often the trial of another change is proposed among those so far."""
+
+NEARLY, A_LITTLE = 2.0, 0.3
+"""SDs of the moves of a change: by how many trials, and at most by what size."""
+
+OF_STEPS, STEP_SD = 0.7, 0.3
+"""How often a size is proposed near the step of the amplitudes at its trial, and how near, natural log."""
+
+ANOTHER_KIND = 0.25
+"""How often a change that moves a little becomes one of another kind."""
 
 BLUR = 0.02
 """SD of what is added to a difference, as a share of the usual SD of each latent."""
@@ -63,8 +76,12 @@ class Target(Protocol[L]):
     def shifted(self, latents: L, part: Tensor) -> Tensor:
         """Which latents a difference moves: those of a part that mean anything to the particle, shape (b, p, d)."""
 
-    def jumped(self, latents: L, generator: torch.Generator) -> L:
-        """Particles some of whose kinds and latents are drawn anew from the prior."""
+    def jumped(self, latents: L, generator: torch.Generator, steps: Tensor) -> tuple[L, Tensor]:
+        """Particles some of whose kinds and latents are drawn anew from the prior, or near where the trials so far are.
+
+        With them comes the log ratio of prior to proposal, after the jump and before; 0 for draws from the prior. The
+        steps are those of `steps_of` for the person of each particle.
+        """
 
 
 class Moved(NamedTuple, Generic[L]):
@@ -109,6 +126,11 @@ class Mover(Generic[L]):
     history: History
     generator: torch.Generator
 
+    @cached_property
+    def steps(self) -> Tensor:
+        """By how much amplitudes are larger from each trial on; see `steps_of`."""
+        return steps_of(self.history)
+
     def sweeps(self, number: int, latents: L, log_likelihood: Tensor) -> Moved[L]:
         """Move every particle some times."""
         if not number:
@@ -129,12 +151,14 @@ class Mover(Generic[L]):
         jumps = self._uniform(mine.log_prior) < JUMP_PROBABILITY
         where = jumps.nonzero(as_tuple=True)
         shifted = self._shift(mine.latents, theirs)
-        jumped = self.target.jumped(mine.latents.remade(field[where] for field in mine.latents), self.generator)
+        jumped, favour = self.target.jumped(
+            mine.latents.remade(field[where] for field in mine.latents), self.generator, self.steps[where[0]]
+        )
         proposal = shifted.remade(a.index_put(where, b) for a, b in zip(shifted, jumped, strict=True))
         log_likelihood = total_log_likelihood(self.target.person(proposal), self.history)
         log_prior = self.target.log_prior(proposal)
         # A jump draws from the prior, so that its density cancels, where what it leads to is possible at all.
-        possible = torch.where(log_prior.isneginf(), log_prior, 0.0)
+        possible = torch.where(log_prior.isneginf(), log_prior, 0.0).index_put(where, favour, accumulate=True)
         prior_ratio = torch.where(jumps, possible, log_prior - mine.log_prior)
         accept = torch.log(self._uniform(log_prior)) < log_likelihood - mine.log_likelihood + prior_ratio
         counts += torch.stack([~jumps, accept & ~jumps, jumps, accept & jumps]).sum(-1)
@@ -163,6 +187,16 @@ class Mover(Generic[L]):
 
     def _pick(self, people: int, size: int, of: int) -> Tensor:
         return torch.randint(of, (people, size), generator=self.generator, device=self.generator.device)
+
+
+def steps_of(history: History) -> Tensor:
+    """By how much the mean log MEP is larger from each trial on than before it, and 0 for all and none, (b, n + 1)."""
+    log_mep = torch.where(history.log_mep.isfinite(), history.log_mep, history.log_mep_high).nan_to_num(0.0, 0.0, 0.0)
+    before = torch.nn.functional.pad(log_mep.cumsum(-1), (1, 0))
+    trials = before.shape[-1] - 1
+    count = torch.arange(trials + 1, device=before.device)
+    steps = (before[:, -1:] - before) / (trials - count).clamp_min(1) - before / count.clamp_min(1)
+    return torch.where((count > 0) & (count < trials), steps, 0.0)
 
 
 def _choose(condition: Tensor, yes: Tensor, no: Tensor) -> Tensor:

@@ -21,6 +21,7 @@ from functools import cache
 from typing import Final, NamedTuple
 
 from isiw.lazy import torch
+from isiw.models.particles.changes import Changed
 from isiw.models.protocol import Tensor
 
 NODES = 8
@@ -100,6 +101,21 @@ class Response(NamedTuple):
     drift: Tensor
     startup: Tensor
     slope: Tensor
+
+    def changed(self, changed: Changed) -> Response:
+        """The response after what has changed, fields of the particles' shape."""
+        enhancement = changed.enhancement
+        missing, switches = (self.kind == kind for kind in (NoiseKind.MISSING, NoiseKind.ALL_OR_NONE))
+        proportional = missing | (self.kind == NoiseKind.CONSTANT_CV)
+        most, least = self.max_probability, self.rest_probability
+        fewer = torch.where(missing, most * enhancement.sqrt(), most)
+        return self._replace(
+            log_floor=self.log_floor + changed.log_scale,
+            log_ratio=self.log_ratio + changed.log_gain + torch.where(proportional, enhancement.log(), 0.0),
+            boost=self.boost * enhancement,
+            rest=self.rest + self.slope * changed.shift_pct_rmt,
+            max_probability=torch.where(switches, least + (most - least) * enhancement, fewer),
+        )
 
 
 def log_gain(response: Response, order: Tensor) -> Tensor:
@@ -342,9 +358,9 @@ def outcome_density(response: Response, level: Tensor, log_mep: Tensor) -> Tenso
     return _mix(flat, level.unsqueeze(-1), log_relative.unsqueeze(-2), evoked)
 
 
-def draw_log_mep(response: Response, level: Tensor, generator: torch.Generator, gain: Tensor | float = 0.0) -> Tensor:
+def draw_log_mep(response: Response, level: Tensor, generator: torch.Generator, *bearing: Tensor | float) -> Tensor:
     """Draw natural logs of MEPs [mV] from the distribution that `log_likelihood` is of."""
-    mean, inverse_sd = _components(response, level, Around(gain))
+    mean, inverse_sd = _components(response, level, Around(*bearing))
     node = torch.multinomial(_node_weights(level), level.numel(), replacement=True, generator=generator)
     picks = node.view(level.shape).unsqueeze(-2)
     mean, inverse_sd = (x.gather(-2, picks).squeeze(-2) for x in (mean, inverse_sd))

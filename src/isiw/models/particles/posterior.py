@@ -59,7 +59,7 @@ class SwarmPosterior(ABC, Generic[M, L]):
     @property
     def person(self) -> Person:
         """What the particles mean."""
-        return self.engine.meaning(self.swarm.latents)[0]
+        return self.engine.meaning(self.swarm.latents, self.trials)[0]
 
     @cached_property
     @abstractmethod

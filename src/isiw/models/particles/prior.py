@@ -15,6 +15,7 @@ from typing import Final, NamedTuple
 from isiw.checks import choice
 from isiw.design import DesignSpace
 from isiw.lazy import torch
+from isiw.models.particles.changes import Change, Changed, ChangeKind, ChangePrior, Named
 from isiw.models.particles.latents import BLOCKS, LATENTS, RECTIFIED, Latents, latents_of
 from isiw.models.particles.laws import (
     FOREARM,
@@ -30,7 +31,7 @@ from isiw.models.particles.laws import (
     check_laws,
 )
 from isiw.models.particles.mixture import JointMixture, Mixture, drawn
-from isiw.models.particles.noise import NoiseKind, Response, recruits
+from isiw.models.particles.noise import PERSISTENCE, NoiseKind, Response, recruits
 from isiw.models.particles.places import mixture_of
 from isiw.models.particles.profile import ProfilePrior
 from isiw.models.particles.shapes import Shape
@@ -59,13 +60,22 @@ class Depression(NamedTuple):
 class Person(NamedTuple):
     """What the latents mean: a profile, a response, and whether there is any facilitation; fields (b, p).
 
-    A depression is there only where it is looked for.
+    A depression is there only where it is looked for, and a change where particles are not as of one trial.
     """
 
     shape: Shape
     response: Response
     present: Tensor
     depression: Depression | None = None
+    change: Change | None = None
+
+    def after(self, trials: int) -> Person:
+        """The person as they are after so many trials, without any further change."""
+        if self.change is None:
+            return self
+        order = torch.tensor([float(trials)], device=self.present.device)
+        changed = Changed(*(field.squeeze(-1) for field in self.change.at(order)))
+        return self._replace(response=self.response.changed(changed), change=None)
 
 
 @dataclass(frozen=True)
@@ -80,7 +90,8 @@ class Prior:
         muscles: of recruitment curves.
         rectified: of recruitment curves that start at a threshold.
         floors: of the EMG floor.
-        session: of what changes within a session.
+        session: of how amplitudes drift within a session.
+        changes: of what else changes within it.
         muscle: the name of the muscle, where it is known: the others that have a name are left out then.
 
     Raises:
@@ -102,6 +113,7 @@ class Prior:
         Floor(0.15, Scale(0.009, 1.2), Scale(0.22, 0.5)),
     )
     session: SessionPrior = field(default_factory=SessionPrior)
+    changes: ChangePrior = field(default_factory=ChangePrior)
     muscle: str | None = None
 
     def __post_init__(self) -> None:
@@ -118,12 +130,18 @@ class Prior:
             "width": _mixture([(w.share, [w.width_ms.log_law]) for w in self.profile.widths]),
             "form": _mixture([(1.0, [(0.0, 1.0)])]),
             "floor": _mixture([(f.share, [f.median_mv.log_law, f.log_sd.log_law]) for f in self.floors]),
-            "session": _mixture([(1.0, [(0.0, session.drift_sd), session.startup.law])]),
+            "session": _mixture(
+                [
+                    (1.0 - session.far_drift_share, [(0.0, session.drift_sd), session.startup.law]),
+                    (session.far_drift_share, [(0.0, session.far_drift_sd), session.startup.law]),
+                ]
+            ),
             "gain": _mixture([(g.share, _of_gain(g)) for g in self.gains]),
             "reliability": _mixture([(1.0, [switch.reliability.law])]),
             "switch": _mixture([(size.share, [*often, *_of_gain(size)]) for size in switch.sizes]),
             "recruitment": _mixture([(m.share, _of_curve(m)) for m in self.possible_muscles]),
             "rectified": _mixture([(1.0, [*_of_curve(self.rectified), self.rectified.onset.log_law])]),
+            **self.changes.mixtures,
         }
 
     @cached_property
@@ -147,7 +165,7 @@ class Prior:
             space: the design space that the window is in.
         """
         size = (people, particles)
-        uniform = torch.rand((4, *size), generator=generator, dtype=torch.float32, device=generator.device)
+        uniform = torch.rand((5, *size), generator=generator, dtype=torch.float32, device=generator.device)
         start_ms = self.profile.start.start_ms(uniform[3], space).unsqueeze(-1)
         values = torch.cat([start_ms, self._joint.sample(size, generator)], dim=-1)
         if self.profile.p_place:
@@ -155,7 +173,8 @@ class Prior:
             known, place = chance < self.profile.p_place, self._joint_place.sample(size, generator)
             values = torch.cat([torch.where(known, place, values[..., :2]), values[..., 2:]], dim=-1)
         shape, noise = drawn(astuple(self.profile.shapes), uniform[0]), drawn(astuple(self.noise), uniform[1])
-        return Latents(values, shape, noise, uniform[2] < self.profile.p_window)
+        change = drawn(self.changes.shares, uniform[4])
+        return Latents(values, shape, noise, uniform[2] < self.profile.p_window, change)
 
     def log_density(self, values: Tensor, space: DesignSpace) -> Tensor:
         """Log density of latents but for a constant, shape (b, p).
@@ -260,6 +279,22 @@ class Prior:
         given["the EMG floor"] = 1.0 - self.mixtures["floor"].usual(floor)
         return {name: float(share.mean()) for name, share in given.items() if share.numel()}
 
+    def changed(self, latents: Latents, trials: int) -> Named:
+        """What changed by the last of so many trials of equally weighted particles of one person (1, p)."""
+        drift = latents.values[..., LATENTS.index("drift")]
+        drifted = drift * (1.0 - PERSISTENCE ** max(0, trials - 1))
+        return self.change(latents).named(drifted, trials)
+
+    def untouched(self, latents: Latents, trials: int) -> Tensor:
+        """In which particles nothing has changed any of so many trials, shape (b, p)."""
+        change = self.change(latents)
+        return (latents.change == ChangeKind.NONE) | ((change.fading == 0) & (change.after > trials - 1))
+
+    def change(self, latents: Latents) -> Change:
+        """What changes in a session of each particle, fields (b, p)."""
+        log_after, size = (latents.values[..., LATENTS.index(name)] for name in ("log_changed_after", "change_size"))
+        return Change.of(latents.change, log_after, size, recruits(latents.noise))
+
     def shift_pct_rmt(self, latents: Latents) -> Tensor:
         """Shift of the recruitment curve's input at the best ISI [% RMT], 0 without facilitation, shape (b, p)."""
         own, rectified = (latents.values[..., LATENTS.index(name)] for name in ("log_boost", RECTIFIED["log_boost"]))
@@ -270,7 +305,7 @@ class Prior:
         """What particles mean."""
         z = dict(zip(LATENTS, latents.values.unbind(-1), strict=True))
         shape = Shape(latents.shape, z["start_ms"], z["log_width_ms"].exp(), _even(z["form"]))
-        return Person(shape, self._response(z, latents.noise), latents.present)
+        return Person(shape, self._response(z, latents.noise), latents.present, change=self.change(latents))
 
     def _response(self, z: dict[str, Tensor], noise: Tensor) -> Response:
         curved, switches, rectified = recruits(noise), noise == NoiseKind.ALL_OR_NONE, noise == NoiseKind.RECTIFIED

@@ -59,6 +59,7 @@ def prior_tables(
     made: dict[str, Any] = {
         name: value.numpy() if isinstance(value, torch.Tensor) else value for name, value in moves.items()
     }
+    made |= {"changed": int(np.searchsorted(law["first"], where[27]))}
     made |= {"parts": _edges(PART_PROBABILITY, len(PART_PROBABILITY))}
     made |= {"jumps": _edges(moves["jumps"], len(moves["jumps"]))}
     made |= {"kinds": np.stack([_edges(shares, most_kinds) for shares in moves["kinds"]])}

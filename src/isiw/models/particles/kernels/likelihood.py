@@ -13,9 +13,11 @@ import numpy as np
 from isiw.compiled import exp, exp2, kernel, log, loop, ndtr, per, per_root, total
 from isiw.models.particles.kernels.records import (
     BOOST,
+    CHANGED,
     DEPTH,
     DRIFT,
     FACTOR,
+    FADING,
     FLOOR_SD,
     FORM,
     HIGH,
@@ -31,6 +33,7 @@ from isiw.models.particles.kernels.records import (
     LOW_WIDTH,
     MOST,
     NOISE,
+    NUMBER,
     OFFSET,
     ONSET,
     OUTPUT_SD,
@@ -46,7 +49,11 @@ from isiw.models.particles.kernels.records import (
     START,
     STARTLE,
     STARTLED,
+    STEP,
+    STEP_DRIVE,
+    STEP_SCALE,
     WIDTH,
+    enhancement_after,
     trial_records,
 )
 from isiw.models.particles.noise import (
@@ -164,6 +171,25 @@ def curve_of(particle: Any, spread: Any, between: Any, room: Any) -> None:
 
 
 @loop
+def _step(trials: Any, count: int, after: Any, size: Any, added_to: Any) -> None:
+    """Add a step to the trials that come after it."""
+    if size != _NIL:
+        number = trials[NUMBER]
+        for i in range(count):
+            added_to[i] += size if number[i] >= after else _NIL
+
+
+@loop
+def _fade(particle: Any, trials: Any, count: int, level: Any) -> None:
+    """Let the facilitation fade or grow from trial to trial."""
+    fading = particle[FADING]
+    if fading != _NIL:
+        number = trials[NUMBER]
+        for i in range(count):
+            level[i] *= enhancement_after(fading, number[i])
+
+
+@loop
 def _gains(particle: Any, trials: Any, count: int, work: Any) -> None:
     """Write the scale of each trial, and the known part of its amplitude; arguments as for `_inputs`."""
     scale, known, varies = work[2], work[4], work[5]
@@ -173,11 +199,20 @@ def _gains(particle: Any, trials: Any, count: int, work: Any) -> None:
     drift, startled, per_floor = particle[DRIFT], particle[STARTLED], exp(-particle[LOG_FLOOR])
     # Few arrays a loop, or the compiler gives up on proving that they do not overlap.
     for i in range(count):
-        scale[i] = exp(log_scale + drift * relaxed[i] + startled * startle[i] + offset[i])
+        scale[i] = log_scale + drift * relaxed[i] + startled * startle[i] + offset[i]
+    _step(trials, count, particle[CHANGED], particle[STEP], scale)
+    for i in range(count):
+        scale[i] = exp(scale[i])
     for i in range(count):
         known[i] = told[i] * per_floor
     for i in range(count):
         varies[i] = told_sd[i] * per_floor * (told_sd[i] * per_floor)
+    if particle[STEP_SCALE] != _NIL:
+        number, after, per_step = trials[NUMBER], particle[CHANGED], exp(-particle[STEP_SCALE])
+        for i in range(count):
+            known[i] *= per_step if number[i] >= after else _ONE
+        for i in range(count):
+            varies[i] *= per_step * per_step if number[i] >= after else _ONE
 
 
 @loop
@@ -191,11 +226,13 @@ def _inputs(particle: Any, trials: Any, count: int, node: Any, work: Any) -> Non
     for i in range(count):
         level[i] *= factor[i]
         responds[i] = _ONE
+    _fade(particle, trials, count, level)
     most, least, kind = particle[MOST], particle[LEAST], particle[NOISE]
     if is_curved(particle):
         rest, boost, slope = particle[REST], particle[BOOST], particle[SLOPE]
         for i in range(count):
             drive[i] = rest + boost * level[i] + slope * shift[i]
+        _step(trials, count, particle[CHANGED], particle[STEP_DRIVE], drive)
     elif kind == _ALL_OR_NONE:
         for i in range(count):
             drive[i] = _NIL
@@ -218,6 +255,7 @@ def _density(particle: Any, trials: Any, count: int, curve: Any, work: Any, like
     for i in range(count):
         relative[i] = low[i] - floor
         evoked[i] = _NIL
+    _step(trials, count, particle[CHANGED], -particle[STEP_SCALE], relative)
     start = particle[ONSET]
     for q in range(NODES):
         at, between, weight = curve[0, q], curve[1, q], NODE_WEIGHTS[q]
@@ -276,6 +314,8 @@ def _inside(particle: Any, trials: Any, count: int, curve: Any, work: Any, likel
     for i in range(count):
         high[i] = min(told_high[i], _EVER) - floor
         evoked[i] = _NIL
+    _step(trials, count, particle[CHANGED], -particle[STEP_SCALE], low)
+    _step(trials, count, particle[CHANGED], -particle[STEP_SCALE], high)
     for q in range(NODES):
         at, between, weight = curve[0, q], curve[1, q], NODE_WEIGHTS[q]
         for i in range(count):

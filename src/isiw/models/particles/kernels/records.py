@@ -6,13 +6,15 @@ its amplitude, neutral where nobody knows better.
 
 from __future__ import annotations
 
+import math
 from typing import Any, Final
 
 import numpy as np
 
-from isiw.compiled import LANES, exp, kernel, loop
+from isiw.compiled import LANES, exp, exp2, kernel, log, loop
 from isiw.lazy import torch
-from isiw.models.particles.noise import PERSISTENCE, STARTUP, Response
+from isiw.models.particles.changes import GROWN_AFTER, Change
+from isiw.models.particles.noise import PERSISTENCE, STARTUP, NoiseKind, Response
 from isiw.models.particles.prior import Depression, Person
 from isiw.models.particles.shapes import Shape
 from isiw.models.protocol import Tensor
@@ -22,19 +24,23 @@ from isiw.types import FloatArray
 # Of a particle.
 NOISE, SHAPE, PRESENT, START, WIDTH, FORM, LOG_FLOOR, FLOOR_SD, LOG_RATIO, SPREAD, OUTPUT_SD = range(11)
 BOOST, REST, ONSET, MOST, LEAST, DRIFT, STARTLED, SLOPE, LOW_START, LOW_WIDTH, DEPTH = range(11, 22)
-PARTICLE: Final = 22
+CHANGED, STEP, STEP_DRIVE, FADING, STEP_SCALE = range(22, 27)
+PARTICLE: Final = 27
 
 # Of a trial, as a history has it.
 ISI, ISI_SD, LOW, HIGH, ORDER, KNOWN, KNOWN_SD, OFFSET, SHIFT, FACTOR = range(10)
-# In place of the order: the two parts of the gain, and whether it is a trial at all.
-STARTLE, RELAXED, REAL = 4, 10, 11
-TRIAL: Final = 12
+# In place of the order: the two parts of the gain; then the order, and whether it is a trial at all.
+STARTLE, RELAXED, REAL, NUMBER = 4, 10, 11, 12
+TRIAL: Final = 13
 PIECE: Final = 128
 
 _f = np.float32
 _FIRST, _SECOND = _f(STARTUP[0]), _f(STARTUP[1])
 _LOG_PERSISTENCE: Final = np.float32(np.log(PERSISTENCE))
-_ONE, _NIL = np.float32(1.0), np.float32(0.0)
+_ONE, _NIL, _GROWN_AFTER = np.float32(1.0), np.float32(0.0), np.float32(GROWN_AFTER)
+_CONSTANT_CV, _MISSING, _ALL_OR_NONE = (
+    np.float32(kind) for kind in (NoiseKind.CONSTANT_CV, NoiseKind.MISSING, NoiseKind.ALL_OR_NONE)
+)
 
 
 def person_of(records: FloatArray) -> Person:
@@ -57,9 +63,14 @@ def people_of(person: Person) -> FloatArray:
         if low is None
         else (low.shape.start_ms, low.shape.width_ms, low.depth * low.present)
     )
+    change = (nothing,) * 5 if person.change is None else _change_of(person.change, response)
     profile = (shape.kind, person.present, shape.start_ms, shape.width_ms, shape.form)
-    fields = (response.kind, *profile, *response[1:], *below)
+    fields = (response.kind, *profile, *response[1:], *below, *change)
     return _plain(torch.stack([field.to(nothing) for field in fields], dim=-1))
+
+
+def _change_of(change: Change, response: Response) -> tuple[Tensor, ...]:
+    return change.after, change.log_gain, response.slope * change.shift_pct_rmt, change.fading, change.log_scale
 
 
 def columns_of(history: History) -> FloatArray:
@@ -77,6 +88,32 @@ def gain_of(order: Any) -> Any:
     """How a trial after so many others startles, and how far amplitudes have wandered by then; see `noise.log_gain`."""
     startle = _FIRST if order == 0 else (_SECOND if order == 1 else _NIL)
     return startle, _ONE - exp(_LOG_PERSISTENCE * _f(order))
+
+
+@loop
+def enhancement_after(fading: Any, order: Any) -> Any:
+    """The share of the enhancement that there is after so many trials; see `Change.at`."""
+    age = order if fading > _NIL else max(_GROWN_AFTER - order, _NIL)
+    return exp2(-abs(fading) * age)
+
+
+@loop
+def settle(particle: Any, order: Any) -> None:
+    """Let a particle be as it is after so many trials, without any further change; see `Person.after`."""
+    if order >= particle[CHANGED]:
+        particle[LOG_RATIO] += particle[STEP]
+        particle[REST] += particle[STEP_DRIVE]
+        particle[LOG_FLOOR] += particle[STEP_SCALE]
+    if particle[FADING] != _NIL:
+        share, kind = enhancement_after(particle[FADING], order), particle[NOISE]
+        particle[BOOST] *= share
+        if kind in (_CONSTANT_CV, _MISSING):
+            particle[LOG_RATIO] += log(share)
+        if kind == _MISSING:
+            particle[MOST] *= math.sqrt(share)
+        elif kind == _ALL_OR_NONE:
+            particle[MOST] = particle[LEAST] + (particle[MOST] - particle[LEAST]) * share
+    particle[STEP] = particle[STEP_DRIVE] = particle[STEP_SCALE] = particle[FADING] = _NIL
 
 
 @kernel
@@ -99,6 +136,7 @@ def trial_records(columns: Any, censored: bool) -> Any:  # noqa: FBT001 - kernel
             record[field, i] = columns[n, field]
         if np.isnan(columns[n, ISI]):
             record[ISI, i] = record[FACTOR, i] = _NIL
+        record[NUMBER, i] = columns[n, ORDER]
         record[STARTLE, i], record[RELAXED, i] = gain_of(columns[n, ORDER])
         record[REAL, i] = _ONE
         number += 1

@@ -11,10 +11,14 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from isiw.compiled import exp, inlined, log, loop
+from isiw.models.particles.changes import FADING as FADING_RATE
+from isiw.models.particles.changes import INTENSITY_PCT, ChangeKind
 from isiw.models.particles.kernels.records import (
     BOOST,
+    CHANGED,
     DEPTH,
     DRIFT,
+    FADING,
     FLOOR_SD,
     FORM,
     LEAST,
@@ -33,22 +37,27 @@ from isiw.models.particles.kernels.records import (
     SPREAD,
     START,
     STARTLED,
+    STEP,
+    STEP_DRIVE,
+    STEP_SCALE,
     WIDTH,
 )
 from isiw.models.particles.noise import NoiseKind
 from isiw.models.particles.prior import MOST_ONSET
 from isiw.types import FloatArray, IntArray
 
-KINDS: Final = 4
-"""Of a particle: its profile's shape, its noise, whether there is an enhancement, and whether there is a depression."""
+KINDS: Final = 5
+"""Of a particle: its profile's shape, its noise, whether there is an enhancement, and a depression, and its change."""
 
-MEANINGS: Final = 30
+MEANINGS: Final = 32
 """Latents that mean anything to `meant`: those of the default in their order, then three of a depression."""
 
 _f = np.float32
 _NIL, _HALF, _ONE, _TWO = _f(0.0), _f(0.5), _f(1.0), _f(2.0)
 _ROOT_HALF, _LEAST_RUN, _LEAST_DENSITY, _NEVER = _f(math.sqrt(0.5)), _f(1e-12), _f(1e-30), _f(-1e30)
 _MOST_ONSET = _f(MOST_ONSET)
+_INTENSITY, _ENHANCEMENT, _SCALE = ChangeKind.INTENSITY, ChangeKind.ENHANCEMENT, ChangeKind.SCALE
+_INTENSITY_PCT, _FADING = _f(INTENSITY_PCT), _f(FADING_RATE)
 _ALL_OR_NONE, _RECTIFIED, _RECRUITMENT = NoiseKind.ALL_OR_NONE, NoiseKind.RECTIFIED, NoiseKind.RECRUITMENT
 
 
@@ -82,6 +91,7 @@ class Tables(NamedTuple):
         renewed: which kinds each jump draws again, shape (jumps, k).
         of_profile: whether a jump concerns nothing but a profile, which without facilitation means nothing, (jumps,).
         kinds: sums of the probabilities of earlier values of each kind, shape (k, v - 1).
+        changed: the block of the latent that says when something changes; that of its size is the next.
     """
 
     at: IntArray
@@ -108,6 +118,7 @@ class Tables(NamedTuple):
     renewed: Any
     of_profile: Any
     kinds: FloatArray
+    changed: int
 
 
 @loop
@@ -139,8 +150,19 @@ def meant(z: Any, kinds: Any, at: Any, particle: Any) -> None:
         particle[LEAST] = _ONE / (_ONE + exp(-z[at[11]]))
     particle[LOW_START], particle[LOW_WIDTH], particle[DEPTH] = _NIL, _ONE, _NIL
     if depressed:
-        particle[LOW_START], particle[LOW_WIDTH] = z[at[27]], exp(z[at[28]])
-        particle[DEPTH] = exp(z[at[29]] - z[at[18]])
+        particle[LOW_START], particle[LOW_WIDTH] = z[at[29]], exp(z[at[30]])
+        particle[DEPTH] = exp(z[at[31]] - z[at[18]])
+    change, size = kinds[4], z[at[28]]
+    particle[CHANGED], particle[STEP], particle[STEP_DRIVE] = exp(z[at[27]]), _NIL, _NIL
+    particle[FADING], particle[STEP_SCALE] = _NIL, _NIL
+    if change == _ENHANCEMENT:
+        particle[FADING] = _FADING * size
+    elif change == _SCALE:
+        particle[STEP_SCALE] = size
+    elif change == _INTENSITY and particle[SLOPE] > _NIL:
+        particle[STEP_DRIVE] = particle[SLOPE] * _INTENSITY_PCT * size
+    elif change:
+        particle[STEP] = size
 
 
 @inlined

@@ -75,16 +75,17 @@ class SupraTarget:
         used = torch.stack([(~of_enhanced | up) & (~of_depressed | down) for up, down in there])
         moves = {
             "apart": True,
-            "states": np.array([0, 0, 1, 2]),
+            "states": np.array([0, 0, 1, 2, 0]),
             "shifted": _shifted(cpu) & used.unsqueeze(1),
             "jumps": tuple(JUMPS.values()),
             "redrawn": _redrawn(cpu),
-            "renewed": np.array([[False, False, jump == "enhanced", jump == "depressed"] for jump in JUMPS]),
+            "renewed": np.array([[False, False, jump == "enhanced", jump == "depressed", False] for jump in JUMPS]),
             "of_profile": np.zeros(len(JUMPS), dtype=bool),
             "kinds": (
                 (1.0,),
                 (1.0,),
                 *((1.0 - p, p) for p in (prior.enhanced.probability, prior.depressed.probability)),
+                (1.0,),
             ),
         }
         at = [LATENTS.index(name) if name in LATENTS else -1 for name in _AS_THE_DEFAULT]
@@ -96,7 +97,7 @@ class SupraTarget:
         """The kinds of particles, integers of shape (b, p, k)."""
         enhanced, depressed = latents.enhanced.long(), latents.depressed.long()
         shape, noise = (torch.full_like(enhanced, kind) for kind in (ShapeKind.GAUSSIAN, NoiseKind.RECRUITMENT))
-        return torch.stack((shape, noise, enhanced, depressed), dim=-1)
+        return torch.stack((shape, noise, enhanced, depressed, torch.zeros_like(enhanced)), dim=-1)
 
     def latents(self, values: Tensor, kinds: Tensor) -> SupraLatents:
         """Particles from their latents (b, p, d) and kinds (b, p, k)."""
@@ -116,17 +117,23 @@ class SupraTarget:
         used = (~enhanced | latents.enhanced.unsqueeze(-1)) & (~depressed | latents.depressed.unsqueeze(-1))
         return _shifted(part.device)[part] & used
 
-    def jumped(self, latents: SupraLatents, generator: torch.Generator) -> SupraLatents:
-        """Particles (n,) with some latents, and whether their segment is there, drawn anew."""
+    def jumped(
+        self,
+        latents: SupraLatents,
+        generator: torch.Generator,
+        steps: Tensor,  # noqa: ARG002 - nothing changes with time
+    ) -> tuple[SupraLatents, Tensor]:
+        """Particles (n,) with some latents, and whether their segment is there, drawn anew from the prior."""
         fresh = self.prior.draw(1, len(latents.enhanced), generator, self.space)
         uniform = torch.rand(latents.enhanced.shape, generator=generator, dtype=torch.float32, device=generator.device)
         jump = drawn(tuple(JUMPS.values()), uniform)
         enhanced, depressed, *_ = (jump == number for number in range(len(JUMPS)))
-        return SupraLatents(
+        after = SupraLatents(
             values=torch.where(_redrawn(jump.device)[jump], fresh.values[0], latents.values),
             enhanced=torch.where(enhanced, fresh.enhanced[0], latents.enhanced),
             depressed=torch.where(depressed, fresh.depressed[0], latents.depressed),
         )
+        return after, torch.zeros_like(latents.values[:, 0])
 
 
 @cache

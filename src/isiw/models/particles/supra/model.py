@@ -97,7 +97,7 @@ class SupraPosterior(SwarmPosterior[SupraModel, SupraLatents]):
         return self._sample(self.model.particles, 0)
 
     def _sample(self, size: int, order: int) -> SupraSample:
-        person, records = self.engine.meaning(self.swarm.picked(size))
+        person, records = self.engine.meaning(self.swarm.picked(size), self.trials)
         return SupraSample(person, self.space, order, records)
 
     def depressed_masks(self, isi_ms: Tensor) -> Tensor:

@@ -1,0 +1,228 @@
+"""What may change in the course of a session, whatever the ISI.
+
+A coil that is re-seated, an electrode or a gain multiplies everything that is evoked from some trial on; another
+intensity moves it along the recruitment curve; habituation and plasticity change the enhancement from trial to trial
+[Kim2020, 4.5, 5.4.1]. A particle has one change or none; a wide drift is a law of its own (`SessionPrior`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from functools import cached_property
+from typing import Final, NamedTuple
+
+from isiw.checks import check_numbers, check_probabilities
+from isiw.errors import InvalidValueError
+from isiw.estimate import Change as EstimatedChange
+from isiw.lazy import torch
+from isiw.models.particles.mixture import Mixture
+from isiw.models.protocol import Tensor
+from isiw.models.shared.scales import Scale, check_scales
+
+INTENSITY_PCT: Final = 9.0
+"""By how much the intensity changes, where it does, at a size of 1 [% RMT]."""
+
+FADING: Final = 0.04
+"""By how many halves the enhancement changes from trial to trial at a size of 1: to a half within 25 trials."""
+
+GROWN_AFTER: Final = 40.0
+"""After so many trials an enhancement that grows is whole."""
+
+
+MATTERS: Final = math.log(1.5)
+"""A smaller change, natural log, is not worth saying."""
+
+
+class ChangeKind(IntEnum):
+    """What changes."""
+
+    NONE = 0
+    LEVEL = 1
+    INTENSITY = 2
+    ENHANCEMENT = 3
+    SCALE = 4
+
+
+@dataclass(frozen=True)
+class ChangePrior:
+    """Of what changes within a session beside a slow drift.
+
+    Args:
+        level: probability that everything evoked becomes larger or smaller at some trial.
+        intensity: probability that the intensity changes at some trial.
+        enhancement: probability that the enhancement fades or grows.
+        scale: probability that all amplitudes become larger or smaller at some trial, the EMG floor's among them.
+        trial: how many trials come before a change.
+        size_sd: SD of the size of a change: of a level, natural log.
+        noted: after how many trials each change was noted that somebody saw.
+        noted_share: probability that a change that was noted is one of the amplitudes.
+
+    Raises:
+        InvalidValueError: probabilities whose sum is above 1, or an invalid number.
+    """
+
+    level: float = 0.05
+    intensity: float = 0.03
+    enhancement: float = 0.04
+    scale: float = 0.03
+    trial: Scale = Scale(20.0, 1.1)
+    size_sd: float = 1.0
+    noted: tuple[int, ...] = ()
+    noted_share: float = 0.5
+
+    def __post_init__(self) -> None:
+        check_probabilities(self, "level", "intensity", "enhancement", "scale", "noted_share")
+        check_scales(self, "trial", tailed=False)
+        check_numbers(self, "size_sd", above=0)
+        if self._usual[0] <= 0:
+            raise InvalidValueError(
+                "there must be room for no change at all", got=self._usual[1:], expected="less than 1"
+            )
+
+    @property
+    def _usual(self) -> tuple[float, ...]:
+        """Probabilities of the kinds where nothing was noted."""
+        changes = self.level, self.intensity, self.enhancement, self.scale
+        return 1.0 - sum(changes), *changes
+
+    @property
+    def _steps(self) -> float:
+        """Probability of a change at some trial where nothing was noted."""
+        return self.level + self.intensity + self.scale
+
+    @property
+    def _unnoted(self) -> float:
+        """Probability that nothing was the change of any note."""
+        return (1.0 - self.noted_share) ** len(self.noted)
+
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """Probabilities of the kinds, in the order of `ChangeKind`; what is noted is a change at some trial."""
+        noted = (1.0 - self._unnoted) / max(self._steps, 1e-9)
+        steps = {ChangeKind.LEVEL, ChangeKind.INTENSITY, ChangeKind.SCALE}
+        each = zip(ChangeKind, self._usual, strict=True)
+        return tuple(share * (self._unnoted + noted * (kind in steps)) for kind, share in each)
+
+    @cached_property
+    def mixtures(self) -> dict[str, Mixture]:
+        """Of the log of the trial before which a change comes, and of its size."""
+        steps = self._unnoted * self._steps
+        left, shares = 1.0, []
+        for _ in self.noted:  # the last note first
+            shares.append(left * self.noted_share)
+            left *= 1.0 - self.noted_share
+        laws = [(steps, self.trial.log_law)]
+        # Of a note after n trials: between trial n and the next, nearly all of it.
+        laws += [
+            (share, Scale(trials - 0.5, 0.2 / trials).log_law)
+            for share, trials in zip(shares, reversed(self.noted), strict=True)
+        ]
+        return {
+            "changed": Mixture.of([(share, [law]) for share, law in laws], "cpu"),
+            "change": Mixture.of([(1.0, [(0.0, self.size_sd)])], "cpu"),
+        }
+
+    def noting(self, trials: int) -> ChangePrior:
+        """The same where somebody noted a change after so many trials."""
+        return replace(self, noted=(*self.noted, trials))
+
+    def untouched(self, trials: int) -> float:
+        """Probability that nothing has changed any of so many trials."""
+        law, shares = self.mixtures["changed"], self.shares
+        later = torch.special.ndtr((law.means - math.log(max(trials - 1, 0.5))) / law.sds)[:, 0]
+        steps = 1.0 - shares[ChangeKind.NONE] - shares[ChangeKind.ENHANCEMENT]
+        return shares[ChangeKind.NONE] + steps * float((law.shares * later).sum())
+
+    def where_noted(self, size: tuple[int, int], generator: torch.Generator) -> tuple[Tensor, Tensor]:
+        """Changes at the last note: their kinds (b, p), and log trial and size (b, p, 2)."""
+        uniform = torch.rand((2, *size), generator=generator, dtype=torch.float32, device=generator.device)
+        normal = torch.randn(size, generator=generator, dtype=torch.float32, device=generator.device)
+        place = uniform[0] * self._steps
+        kind = torch.where(place < self.level + self.intensity, ChangeKind.INTENSITY, ChangeKind.SCALE)
+        kind = torch.where(place < self.level, ChangeKind.LEVEL, kind)
+        after = self.noted[-1] - 0.01 - 0.98 * uniform[1]
+        return kind, torch.stack((after.log(), self.size_sd * normal), dim=-1)
+
+
+class Changed(NamedTuple):
+    """What has changed after some trials, fields (b, p, n).
+
+    Args:
+        log_gain: by how much everything evoked is larger, natural log.
+        shift_pct_rmt: by how much the pulse is stronger [% RMT].
+        enhancement: the share of the enhancement that there is.
+        log_scale: by how much all amplitudes are larger, natural log.
+    """
+
+    log_gain: Tensor
+    shift_pct_rmt: Tensor
+    enhancement: Tensor
+    log_scale: Tensor
+
+
+class Change(NamedTuple):
+    """What changes in a session, fields (b, p).
+
+    Args:
+        after: how many trials come before it.
+        log_gain: by how much everything evoked is larger from then on, natural log.
+        shift_pct_rmt: by how much the pulse is stronger from then on [% RMT].
+        fading: by how many halves the enhancement fades from trial to trial; negative where it grows.
+        log_scale: by how much all amplitudes are larger from then on, the EMG floor's among them, natural log.
+    """
+
+    after: Tensor
+    log_gain: Tensor
+    shift_pct_rmt: Tensor
+    fading: Tensor
+    log_scale: Tensor
+
+    @classmethod
+    def of(cls, kind: Tensor, log_after: Tensor, size: Tensor, curved: Tensor) -> Change:
+        """What latents mean; without a recruitment curve an intensity is a level."""
+        shifted = (kind == ChangeKind.INTENSITY) & curved
+        levelled = (kind == ChangeKind.LEVEL) | ((kind == ChangeKind.INTENSITY) & ~curved)
+        fading = torch.where(kind == ChangeKind.ENHANCEMENT, FADING * size, 0.0)
+        gain, shift = torch.where(levelled, size, 0.0), torch.where(shifted, INTENSITY_PCT * size, 0.0)
+        return cls(log_after.exp(), gain, shift, fading, torch.where(kind == ChangeKind.SCALE, size, 0.0))
+
+    def at(self, order: Tensor) -> Changed:
+        """What has changed after so many trials (b, 1, n), fields (b, p, n)."""
+        after, gain, shift, fading, scale = (field.unsqueeze(-1) for field in self)
+        there = order >= after
+        age = torch.where(fading > 0, order, (GROWN_AFTER - order).clamp_min(0.0))
+        return Changed(gain * there, shift * there, torch.exp2(-fading.abs() * age), scale * there)
+
+    def named(self, drifted: Tensor, trials: int) -> Named:
+        """What changed by the last of so many trials of equally weighted particles (1, p), as far as it matters."""
+        at = torch.tensor([0.0, trials - 1.0, trials], device=self.after.device)
+        gain, shift_pct, enhancement, scale = (field[0] for field in self.at(at))
+        gain, shift_pct = gain[:, 1] + scale[:, 1], shift_pct[:, 1]
+        enhancement = enhancement[:, 2] / enhancement[:, 0]
+        levelled, shifted = gain.abs() > MATTERS, shift_pct.abs() > MATTERS * INTENSITY_PCT
+        stepped, faded = levelled | shifted, enhancement.log().abs() > MATTERS
+        of_time = stepped | (drifted[0].abs() > MATTERS)
+        share = stepped.double().mean().item(), faded.double().mean().item()
+        if max(share) < 0.5:
+            return Named(None, of_time)
+        if share[1] > share[0]:
+            return Named(EstimatedChange("enhancement", share[1], *_interval(enhancement[faded])), of_time)
+        trial = int(self.after[0, stepped].ceil().median())
+        if shifted.sum() > levelled.sum():
+            return Named(EstimatedChange("intensity", share[0], *_interval(shift_pct[shifted]), trial), of_time)
+        return Named(EstimatedChange("amplitudes", share[0], *_interval(gain[levelled].exp()), trial), of_time)
+
+
+class Named(NamedTuple):
+    """What changed in a session, if anything probably did, and in which particles amplitudes change with time (p,)."""
+
+    change: EstimatedChange | None
+    of_time: Tensor
+
+
+def _interval(sizes: Tensor) -> tuple[float, float, float]:
+    """Median, and the ends of the 90 % interval."""
+    low, median, high = torch.quantile(sizes, torch.tensor([0.05, 0.5, 0.95], dtype=sizes.dtype)).tolist()
+    return median, low, high

@@ -1,0 +1,150 @@
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+import isiw
+from isiw.design import VALVE_SPACE
+from isiw.errors import InvalidValueError
+from isiw.models.particles import ParticleModel, ParticlePosterior
+from isiw.models.particles.changes import ChangeKind, ChangePrior
+from isiw.models.particles.engine import engine_for
+from isiw.models.particles.jumps import WindowTarget
+from isiw.models.particles.latents import LATENTS, Latents
+from isiw.models.particles.likelihood import total_log_likelihood
+from isiw.models.particles.predictions import PersonSample
+from isiw.models.particles.prior import Prior
+from isiw.models.protocol import Observation
+from isiw.models.shared.history import History
+from isiw.sentences import at_a_trial
+from isiw.strategy.stopping import ExpectedF1, Progress
+from models.particles.test_kernels import generator, history, in_double
+
+TARGET = WindowTarget(Prior(), VALVE_SPACE)
+KINDS = {kind.name: kind for kind in ChangeKind}
+
+
+def people(kind: ChangeKind) -> tuple[Latents, History]:
+    """Particles that all have a change of a kind, and trials before it and after it."""
+    draws = generator(5)
+    latents = TARGET.prior.sample(2, 100, draws, VALVE_SPACE)
+    latents = latents._replace(change=torch.full_like(latents.change, kind))
+    return latents, history(TARGET.person(latents), 30, draws)
+
+
+@pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
+def test_both_engines_know_the_same_change(kind: ChangeKind) -> None:
+    latents, told = people(kind)
+    got = engine_for("compiled", TARGET).log_likelihood(latents, told)
+    expected = total_log_likelihood(in_double(TARGET.person(latents)), told.to("cpu", torch.double))
+    np.testing.assert_allclose(got, expected, atol=1e-3)
+
+
+@pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
+def test_after_a_change_people_are_the_same_to_both_engines(kind: ChangeKind) -> None:
+    latents, _ = people(kind)
+    ours, theirs = (engine_for(name, TARGET).meaning(latents, 12) for name in ("compiled", "torch"))
+    samples = [PersonSample(person, VALVE_SPACE, 12, records) for person, records in (ours, theirs)]
+    isi_ms = torch.tensor([0.0, 180.0, 233.0, 260.0, 300.0])
+    masks = [sample.window_masks(isi_ms) for sample in samples]
+    torch.testing.assert_close(*(sample.expected_mep_mv(isi_ms) for sample in samples), atol=1e-6, rtol=2e-4)
+    assert (masks[0] != masks[1]).float().mean() < 0.005
+
+
+def test_without_a_change_the_numbers_are_as_they_were() -> None:
+    latents, told = people(ChangeKind.NONE)
+    neutral = TARGET.person(latents)._replace(change=None)
+    torch.testing.assert_close(total_log_likelihood(TARGET.person(latents), told), total_log_likelihood(neutral, told))
+
+
+def test_a_step_of_the_level_is_another_response_from_its_trial_on() -> None:
+    latents, told = people(ChangeKind.LEVEL)
+    values = latents.values.clone()
+    values[..., LATENTS.index("log_changed_after")] = math.log(9.5)
+    latents = latents._replace(values=values)
+    late = told.order >= 10
+    before = TARGET.person(latents)._replace(change=None)
+    after = TARGET.person(latents).after(10)
+    parts = [total_log_likelihood(who, some(told, which)) for who, which in ((before, ~late), (after, late))]
+    torch.testing.assert_close(total_log_likelihood(TARGET.person(latents), told), sum(parts), atol=1e-3, rtol=1e-4)
+
+
+def some(told: History, which: torch.Tensor) -> History:
+    return History(*(column[which].view(len(column), -1) for column in told.columns))
+
+
+def scaled(trials: int, at: int, factor: float, noted: int | None = None) -> ParticlePosterior:
+    """Noise of the EMG alone at evenly spread ISIs, all of it multiplied from some trial on."""
+    rng = np.random.default_rng(1)
+    model = ParticleModel(particles=500)
+    posterior = model.begin(VALVE_SPACE, 1)
+    for trial in range(trials):
+        if trial == noted:
+            posterior = posterior.noting_change()
+        mep_mv = 0.012 * math.exp(0.2 * rng.standard_normal()) * (factor if trial >= at else 1.0)
+        posterior = model.update(posterior, Observation.of([(37.0 * trial) % 500], [mep_mv]))
+    return posterior
+
+
+def test_a_step_is_named_with_its_trial_and_size() -> None:
+    change = scaled(20, 8, 5.0).estimate().change
+    assert change is not None
+    assert change.is_sure
+    assert change.kind == "amplitudes"
+    assert change.trial == 8
+    assert change.low < 5.0 < change.high
+    assert at_a_trial(change, change.trial).startswith("Amplitudes rose ×")
+
+
+def test_where_amplitudes_rose_with_time_alone_no_window_is_sure() -> None:
+    estimate = scaled(20, 8, 5.0).estimate()
+    assert (estimate.probability or 1.0) < 0.9
+    assert (estimate.time_alone or 0.0) > 0.05
+
+
+def test_a_change_that_is_noted_is_likely_at_the_next_trial() -> None:
+    posterior = scaled(9, 8, 5.0)
+    noted = scaled(9, 8, 5.0, noted=8)
+    assert share_changed(noted) > max(0.5, 2.0 * share_changed(posterior))
+
+
+def test_a_note_alone_says_nothing_about_the_trials_so_far() -> None:
+    before = scaled(8, 8, 1.0)
+    after = before.noting_change()
+    kinds = after.swarm.latents.change[0].ne(ChangeKind.NONE)
+    assert float(after.swarm.log_weights[0].exp()[kinds].sum()) == pytest.approx(
+        1.0 - TARGET.prior.changes.noting(8).shares[0], abs=0.12
+    )
+    assert after.estimate().probability == pytest.approx(before.estimate().probability, abs=0.08)
+
+
+def share_changed(posterior: ParticlePosterior) -> float:
+    change = TARGET.prior.change(posterior.swarm.latents)
+    in_force = (posterior.swarm.latents.change > 0) & (change.after < posterior.trials)
+    return float(posterior.swarm.log_weights.exp()[in_force].sum())
+
+
+def test_a_strategy_asks_again_after_a_note() -> None:
+    strategy = isiw.make_strategy("default", seed=3, space=VALVE_SPACE)
+    for trial in range(5):
+        strategy.tell(strategy.ask(), 0.01 + 0.001 * trial)
+    strategy.ask()
+    strategy.note_change()
+    assert strategy.choice is None
+    assert strategy.ask() == strategy.ask()
+
+
+def test_shares_of_changes_leave_room_for_none() -> None:
+    with pytest.raises(InvalidValueError, match="no change at all"):
+        ChangePrior(level=0.6, scale=0.5)
+
+
+def test_no_session_stops_on_a_window_that_time_alone_may_explain() -> None:
+    estimate = scaled(20, 8, 1.0).estimate()
+    facts: dict[str, Any] = {"probability": 0.94, "expected_f1": 0.95, "pairs": 20}
+    stops = [
+        ExpectedF1()(Progress(20, 20, estimate.noting(**facts, time_alone=share))).stop for share in (0.0, 0.05, 0.06)
+    ]
+    assert stops == [True, True, False]
