@@ -66,6 +66,7 @@ class Kind(StrEnum):
     CUT_OFF = "MEPs that the MEP window cuts off"
     ARTEFACT = "an artefact in the MEP window"
     REPEATED = "the same sweep again"
+    CHANGED = "a change at one trial"
 
     IN_SECONDS = "an ISI in seconds"
     ORDER = "ISI and amplitude swapped"

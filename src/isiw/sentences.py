@@ -103,22 +103,22 @@ def summary(estimate: Estimate) -> str:
         nothing = "nowhere" if rules_out(depressed) else "undecided"
         lines.append(f"Depressed: {estimate.depressed or nothing} (probability of it: {depressed:.2f})")
     if estimate.change is not None and estimate.change.is_sure:
-        lines.append(at_a_trial(estimate.change, estimate.change.trial))
+        lines.append(f"{at_a_trial(estimate.change, estimate.change.trial)}.")
     return "\n".join(lines)
 
 
 def at_a_trial(change: Change, trial: int | None) -> str:
-    """What changed during the session, whatever the ISI, and at which trial."""
+    """What changed during the session, whatever the ISI, and at which trial; without a full stop."""
     more = change.size > (0.0 if change.kind == "intensity" else 1.0)
     if change.kind == "intensity":
         sizes = f"{abs(change.size):.0f} % RMT {'higher' if more else 'lower'}"
         interval = f"90 % interval {change.low:+.0f} to {change.high:+.0f}"
-        return f"From trial {trial} on MEPs are as if the intensity were {sizes} ({interval}), whatever the ISI."
+        return f"From trial {trial} on MEPs are as if the intensity were {sizes} ({interval}), whatever the ISI"
     sizes = f"×{change.size:.2g} (90 % interval ×{change.low:.2g} to ×{change.high:.2g})"
     if change.kind == "enhancement":
         word = "grown" if more else "faded"
-        return f"The enhancement has {word} during the session, {sizes}; the window is that of now."
-    return f"Amplitudes {'rose' if more else 'fell'} {sizes} at trial {trial}, whatever the ISI."
+        return f"The enhancement has {word} during the session, {sizes}; the window is that of now"
+    return f"Amplitudes {'rose' if more else 'fell'} {sizes} at trial {trial}, whatever the ISI"
 
 
 def finding(estimate: Estimate, first: StimulusWords, space: DesignSpace) -> str:

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 from pathlib import Path
 
 from isiw import sentences
-from isiw.estimate import Estimate
+from isiw.findings import Kind
 from isiw.log.kinds import continued_by
 from isiw.log.reader import SessionRecord, require_records
+from isiw.log.schema import Event
 from isiw.metrics import f1
 from isiw.report.evidence import changed_with_time, contradiction, no_comparison, nothing_measured, nothing_stood_out
+from isiw.session.examination import change_found
 from isiw.strategy.catalogue import known_settings, list_strategies
 from isiw.strategy.stopping import OF_THE_WINDOW
 from isiw.text.harmless import command
-from isiw.trials import Trial
 from isiw.window import Window
 
 TRIAL_HEADINGS = ("trial", "asked", "outcome", "realised")
@@ -70,9 +70,9 @@ def finding_sentences(record: SessionRecord) -> list[str]:
         contradiction(window, told, without_probability=estimate.probability is None),
         no_comparison(window, told),
         changed_with_time(window, told),
-        _change(estimate, told),
+        f"{changed}" if (changed := change_found(estimate.change, told)) else "",
         nothing_stood_out(told, _mep_window_ms(record)),
-        *(sentences.doubt(event.trial, event.text) for event in record.events if event.kind == "doubt"),
+        *(sentences.doubt(event.trial, event.text) for event in _doubts(record)),
         sentences.best_isi(estimate),
         sentences.excluded(estimate),
         sentences.expected_f1(estimate),
@@ -82,13 +82,9 @@ def finding_sentences(record: SessionRecord) -> list[str]:
     return [sentence for sentence in said if sentence]
 
 
-def _change(estimate: Estimate, told: Sequence[Trial]) -> str:
-    """What the strategy holds for a change during the session; empty where there is none for sure."""
-    change = estimate.change
-    if change is None or not change.is_sure:
-        return ""
-    at = None if change.trial is None else told[min(change.trial, len(told) - 1)].index
-    return sentences.at_a_trial(change, at)
+def _doubts(record: SessionRecord) -> list[Event]:
+    """What was doubted on the way, but for a change, of which the last estimate says more."""
+    return [event for event in record.events if event.kind == "doubt" and event.finding is not Kind.CHANGED]
 
 
 def _mep_window_ms(record: SessionRecord) -> tuple[float, float] | None:

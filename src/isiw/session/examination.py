@@ -9,12 +9,13 @@ interrupted. After a verdict all trials are learnt again, as they count from the
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Generic, NamedTuple, ParamSpec, Protocol, TypeAlias, TypeVar
 
-from isiw import checks
+from isiw import checks, sentences
 from isiw.errors import LimitExceededError, told
-from isiw.findings import Kind
+from isiw.estimate import Change
+from isiw.findings import Finding, Kind, Severity
 from isiw.log.schema import EstimateRecord, Event, EventKind, Intent, Record
 from isiw.log.verdicts import excluded_by, under_all
 from isiw.session.sink import Sink
@@ -51,6 +52,7 @@ class _Learner(Protocol[TableT, TrialT_contra]):
     def known(self) -> int: ...
     def learn(self, trial: TrialT_contra, /) -> None: ...
     def trouble_with(self, trial: TrialT_contra, /) -> str | None: ...
+    def doubt(self, trials: TableT, /) -> Finding | None: ...
     def learn_again(self, trials: TableT, /) -> None: ...
     def judged(self, trials: TableT, verdict: Event, /) -> TableT: ...
     def decision(self) -> StopDecision: ...
@@ -84,6 +86,7 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
         self.overruled = False
         self._events = list(events)
         self._keys = {event.key for event in self._events}
+        self._doubted = {event.finding for event in self._events}
         self._refusal: Exception | None = None
         self._lock = threading.RLock()
 
@@ -199,6 +202,10 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
         trouble = self.learner.trouble_with(trial)
         if trouble is not None and self._sink.is_open:
             self.event("fit", trouble)
+        doubt = self._freely(self.learner.doubt, self.trials)
+        if doubt is not None and doubt.kind not in self._doubted and self._sink.is_open:
+            self._doubted.add(doubt.kind)
+            self.event("doubt", f"{doubt}", finding=doubt.kind)
 
     def log_belief(
         self,
@@ -230,6 +237,9 @@ class _Window:
     def trouble_with(self, trial: Trial) -> str | None:
         return self.strategy.trouble if trial.told else None
 
+    def doubt(self, trials: TrialTable) -> Finding | None:
+        return change_found(self.strategy.estimate().change, trials.told)
+
     def learn_again(self, trials: TrialTable) -> None:
         self.strategy = relearned(self.strategy, trials)
 
@@ -255,6 +265,17 @@ def examination_of(
 ) -> WindowExamination:
     """The examination in which a strategy looks for a window; it has learnt the earlier trials."""
     return Examination(_Window(strategy), trials or TrialTable(), sink, events, freely)
+
+
+def change_found(change: Change | None, told: Sequence[Trial]) -> Finding | None:
+    """That something changed during the session, whatever the ISI; None where it is not sure."""
+    if change is None or not change.is_sure or not told:
+        return None
+    at = None if change.trial is None else told[min(change.trial, len(told) - 1)].index
+    remedy = (
+        "" if change.trial is None else "Did the coil or an electrode move, or was a gain or the intensity changed?"
+    )
+    return Finding(Kind.CHANGED, Severity.DOUBT, sentences.at_a_trial(change, at), remedy)
 
 
 def learn(strategy: Strategy, trial: Trial) -> None:

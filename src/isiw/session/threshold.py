@@ -198,6 +198,9 @@ class _Search:
     def trouble_with(self, outcome: PulseOutcome) -> None:
         """Nothing goes wrong when a pulse is learnt."""
 
+    def doubt(self, outcomes: Any) -> None:
+        """Nothing here changes with time."""
+
     def learn_again(self, trials: _Pulses) -> None:
         self.search.pulses, self.known = _learnable(trials.outcomes), len(trials)
 

@@ -1,0 +1,38 @@
+import pytest
+
+from isiw import sentences
+from isiw.estimate import Change
+from isiw.findings import Kind
+from isiw.session.examination import change_found
+from isiw.trials import Status, Trial
+
+TOLD = [Trial(number, Status.ACCEPTED, 100.0, isi_ms=100.0, mep_mv=0.1) for number in (0, 2, 3, 5)]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (
+            Change("amplitudes", 0.97, 4.6, 3.1, 6.7, 2),
+            "Amplitudes rose ×4.6 (90 % interval ×3.1 to ×6.7) at trial 3, whatever the ISI",
+        ),
+        (Change("amplitudes", 0.97, 0.2, 0.1, 0.3, 2), "Amplitudes fell ×0.2"),
+        (Change("intensity", 0.97, -9.0, -14.0, -5.0, 2), "MEPs are as if the intensity were 9 % RMT lower"),
+        (Change("enhancement", 0.97, 0.4, 0.2, 0.6), "The enhancement has faded during the session, ×0.4"),
+    ],
+)
+def test_a_change_is_found_with_its_trial_in_the_log_and_its_size(change: Change, said: str) -> None:
+    found = change_found(change, TOLD)
+    assert found is not None
+    assert found.kind is Kind.CHANGED
+    assert said in found.text
+
+
+def test_a_change_that_is_not_sure_is_not_said() -> None:
+    assert change_found(Change("amplitudes", 0.85, 4.6, 3.1, 6.7, 2), TOLD) is None
+    assert change_found(None, TOLD) is None
+
+
+def test_an_estimate_says_what_changed() -> None:
+    change = Change("enhancement", 0.95, 2.1, 1.6, 3.0)
+    assert sentences.at_a_trial(change, None).startswith("The enhancement has grown")
