@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any, Final, Literal, NamedTuple, Self
+from typing import Any, Final, NamedTuple, Self
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from isiw import sentences
+from isiw.change import Change
 from isiw.checks import check_probabilities, number
 from isiw.errors import InvalidValueError
 from isiw.findings import lacking
@@ -18,9 +19,6 @@ from isiw.types import ArrayLike, FloatArray, IntArray, Number, Numbers
 from isiw.window import Interval, Window
 
 _NOTHING: Final[Mapping[str, float]] = {}
-
-SURE_OF_A_CHANGE: Final = 0.9
-"""Probability from which on a change during the session is said."""
 
 PROFILE_DECIMALS: Final = 6  # a nanovolt; the profile is a picture of the posterior, not a measurement
 
@@ -73,33 +71,6 @@ class Enhancement(NamedTuple):
     shift_pct_rmt: float | None = None
 
 
-@dataclass(frozen=True)
-class Change:
-    """A change in the course of a session, whatever the ISI, that is more probable than none.
-
-    Args:
-        kind: what changed: amplitudes, the intensity as far as MEPs show it, or the enhancement from trial to trial.
-        probability: that amplitudes or the intensity have changed, or the enhancement has.
-        size: by which factor amplitudes changed, or the enhancement since the first trial; by how much the intensity
-            did [% RMT].
-        low: lower end of its 90 % interval.
-        high: upper end.
-        trial: how many trials that count came before it; None for an enhancement.
-    """
-
-    kind: Literal["amplitudes", "intensity", "enhancement"]
-    probability: float
-    size: float
-    low: float
-    high: float
-    trial: int | None = None
-
-    @property
-    def is_sure(self) -> bool:
-        """Whether it is said outright."""
-        return self.probability >= SURE_OF_A_CHANGE
-
-
 @dataclass(frozen=True, eq=False)
 class WindowEstimate:
     """What is believed about one person's window. What a non-Bayesian method does not have is None.
@@ -130,9 +101,8 @@ class WindowEstimate:
         depressed: the ISIs that depress the MEP, as far as they are reported; None where there are none, or where
             nobody looked for them.
         depressed_probability: probability that there are any; None where nobody looked for them.
-        change: what changed during the session, whatever the ISI; None where nothing probably did, or nobody looked.
-        time_alone: probability that there is no window, and that amplitudes have changed with time all the same; None
-            where nobody looked.
+        change: what probably changed during the session, whatever the ISI; None where nothing did, or nobody looked.
+        time_alone: probability that there is no window, but amplitudes changed with time; None where nobody looked.
 
     Raises:
         InvalidValueError: a probability outside 0–1, a window or a depression reported against it, not one hypothesis a
@@ -348,8 +318,7 @@ class Estimate(Reported):
     that there is more than one segment. `unusual` are probabilities by name; `excluded_mv` and `excluded_pct_rmt` are
     the largest enhancement that is excluded with 90 % probability. `depressed_ms` are the segments in which the tap
     depresses the MEP, and `depressed_probability` is that there are any; None where nobody looked for them. `change` is
-    what changed during the session, whatever the ISI, if anything probably did; `time_alone` is the probability that
-    there is no window, and amplitudes changed with time all the same.
+    what probably changed during the session, whatever the ISI.
     """
 
     start_beyond: float | None = None
@@ -361,7 +330,6 @@ class Estimate(Reported):
     depressed_ms: tuple[float, ...] = ()
     depressed_probability: float | None = None
     change: Change | None = None
-    time_alone: float | None = None
 
     @classmethod
     def of(cls, estimate: WindowEstimate, **more: Any) -> Self:
@@ -385,7 +353,6 @@ class Estimate(Reported):
             "depressed_ms": () if estimate.depressed is None else estimate.depressed.edges_ms,
             "depressed_probability": estimate.depressed_probability,
             "change": estimate.change,
-            "time_alone": estimate.time_alone,
         }
         return cls(**figures, **edges, **_profile(estimate), **more)
 

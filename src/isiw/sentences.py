@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
+from isiw.change import Change
 from isiw.design import DesignSpace
 from isiw.text.numbers import counted
 from isiw.text.stimuli import TAP, StimulusWords
@@ -16,7 +17,7 @@ from isiw.trials import Trial
 from isiw.window import MIN_EXCESS_MV, SURE, Window, rules_out
 
 if TYPE_CHECKING:  # an estimate prints itself in these words
-    from isiw.estimate import Change, Edge, Estimate
+    from isiw.estimate import Edge, Estimate
 
 WORTH_SAYING: Final = 0.1
 """Probability from which on an unusual window is mentioned."""

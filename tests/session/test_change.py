@@ -1,7 +1,7 @@
 import pytest
 
 from isiw import sentences
-from isiw.estimate import Change
+from isiw.change import Change
 from isiw.findings import Kind
 from isiw.session.examination import change_found
 from isiw.trials import Status, Trial

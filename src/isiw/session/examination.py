@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Generic, NamedTuple, ParamSpec, Protocol, TypeAlias, TypeVar
 
 from isiw import checks, sentences
+from isiw.change import Change
 from isiw.errors import LimitExceededError, told
-from isiw.estimate import Change
 from isiw.findings import Finding, Kind, Severity
 from isiw.log.schema import EstimateRecord, Event, EventKind, Intent, Record
 from isiw.log.verdicts import excluded_by, under_all

@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,8 @@ from isiw.models.protocol import Observation
 from isiw.models.shared.history import History
 from isiw.sentences import at_a_trial
 from isiw.strategy.stopping import ExpectedF1, Progress
+from isiw.subjects.cohorts import cohort
+from isiw.subjects.responses import RecruitmentResponse
 from models.particles.test_kernels import generator, history, in_double
 
 TARGET = WindowTarget(Prior(), VALVE_SPACE)
@@ -148,3 +151,22 @@ def test_no_session_stops_on_a_window_that_time_alone_may_explain() -> None:
         ExpectedF1()(Progress(20, 20, estimate.noting(**facts, time_alone=share))).stop for share in (0.0, 0.05, 0.06)
     ]
     assert stops == [True, True, False]
+
+
+@pytest.mark.slow
+def test_of_people_without_a_window_whose_amplitudes_rise_none_is_sure_to_have_one() -> None:
+    # Eight people of seeds for work; all amplitudes are multiplied by 5 after 14 trials.
+    sure = named = 0
+    for seed in range(8):
+        person = cohort("recruitment", seed + 1, 500)[seed]
+        assert isinstance(person.response, RecruitmentResponse)
+        responder = replace(person, response=replace(person.response, boost_pct_rmt=0.0)).begin(seed)
+        strategy = isiw.make_strategy("default", seed=seed, space=VALVE_SPACE)
+        for trial in range(40):
+            response = responder.respond(strategy.ask(), "valve")
+            strategy.learn(response.isi_ms, response.mep_mv * (5.0 if trial >= 14 else 1.0))
+        estimate = strategy.estimate()
+        sure += (estimate.probability or 0.0) >= 0.9
+        named += estimate.change is not None and estimate.change.is_sure
+    assert sure == 0
+    assert named >= 7

@@ -13,9 +13,9 @@ from enum import IntEnum
 from functools import cached_property
 from typing import Final, NamedTuple
 
+from isiw.change import Change as EstimatedChange
 from isiw.checks import check_numbers, check_probabilities
 from isiw.errors import InvalidValueError
-from isiw.estimate import Change as EstimatedChange
 from isiw.lazy import torch
 from isiw.models.particles.mixture import Mixture
 from isiw.models.protocol import Tensor

@@ -1,0 +1,36 @@
+"""A change in the course of a session, as an estimate has it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+SURE_OF_A_CHANGE: Final = 0.9
+"""Probability from which on a change during the session is said."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change in the course of a session, whatever the ISI, that is more probable than none.
+
+    Args:
+        kind: what changed: amplitudes, the intensity as far as MEPs show it, or the enhancement from trial to trial.
+        probability: that amplitudes or the intensity have changed, or the enhancement has.
+        size: by which factor amplitudes changed, or the enhancement since the first trial; by how much the intensity
+            did [% RMT].
+        low: lower end of its 90 % interval.
+        high: upper end.
+        trial: how many trials that count came before it; None for an enhancement.
+    """
+
+    kind: Literal["amplitudes", "intensity", "enhancement"]
+    probability: float
+    size: float
+    low: float
+    high: float
+    trial: int | None = None
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether it is said outright."""
+        return self.probability >= SURE_OF_A_CHANGE
