@@ -44,7 +44,7 @@ class RememberingPosterior:
         grid = self.space.grid_ms
         profile = 0.05 * np.exp(-(((grid - middle) / 20) ** 2))
         return WindowEstimate(
-            probability=0.9,
+            probability=0.9 if self.told else 0.5,
             window=Window(middle - 30, middle + 30),
             start_ms=middle - 30,
             end_ms=math.inf,

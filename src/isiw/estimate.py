@@ -103,6 +103,7 @@ class WindowEstimate:
         depressed_probability: probability that there are any; None where nobody looked for them.
         change: what probably changed during the session, whatever the ISI; None where nothing did, or nobody looked.
         time_alone: probability that there is no window, but amplitudes changed with time; None where nobody looked.
+        beforehand: probability of a window before the first trial; None where it is not known.
 
     Raises:
         InvalidValueError: a probability outside 0–1, a window or a depression reported against it, not one hypothesis a
@@ -132,6 +133,7 @@ class WindowEstimate:
     depressed_probability: float | None = None
     change: Change | None = None
     time_alone: float | None = None
+    beforehand: float | None = None
 
     def noting(self, **facts: Any) -> WindowEstimate:
         """The same with other facts; what is still to be worked out remains so."""
@@ -318,7 +320,7 @@ class Estimate(Reported):
     that there is more than one segment. `unusual` are probabilities by name; `excluded_mv` and `excluded_pct_rmt` are
     the largest enhancement that is excluded with 90 % probability. `depressed_ms` are the segments in which the tap
     depresses the MEP, and `depressed_probability` is that there are any; None where nobody looked for them. `change` is
-    what probably changed during the session, whatever the ISI.
+    what probably changed during the session, whatever the ISI. `beforehand` is the probability of a window before the first trial.
     """
 
     start_beyond: float | None = None
@@ -330,6 +332,7 @@ class Estimate(Reported):
     depressed_ms: tuple[float, ...] = ()
     depressed_probability: float | None = None
     change: Change | None = None
+    beforehand: float | None = None
 
     @classmethod
     def of(cls, estimate: WindowEstimate, **more: Any) -> Self:
@@ -353,6 +356,7 @@ class Estimate(Reported):
             "depressed_ms": () if estimate.depressed is None else estimate.depressed.edges_ms,
             "depressed_probability": estimate.depressed_probability,
             "change": estimate.change,
+            "beforehand": estimate.beforehand,
         }
         return cls(**figures, **edges, **_profile(estimate), **more)
 
@@ -394,13 +398,6 @@ def _profile(estimate: WindowEstimate) -> Mapping[str, Any]:
     band = None if estimate.grid_ms is None else estimate.profile(estimate.grid_ms)
     if band is None or estimate.grid_ms is None:
         return {}
-    return {
-        "grid_ms": tuple(estimate.grid_ms.tolist()),
-        "profile_mv": _rounded(band.median_mv),
-        "band_low_mv": _rounded(band.low_mv),
-        "band_high_mv": _rounded(band.high_mv),
-    }
-
-
-def _rounded(values: FloatArray) -> tuple[float, ...]:
-    return tuple(np.asarray(values, dtype=np.float64).round(PROFILE_DECIMALS).tolist())
+    named = {"profile_mv": band.median_mv, "band_low_mv": band.low_mv, "band_high_mv": band.high_mv}
+    rounded = {name: tuple(np.asarray(mv, float).round(PROFILE_DECIMALS).tolist()) for name, mv in named.items()}
+    return {"grid_ms": tuple(estimate.grid_ms.tolist()), **rounded}

@@ -14,7 +14,7 @@ from isiw.design import DesignSpace
 from isiw.text.numbers import counted
 from isiw.text.stimuli import TAP, StimulusWords
 from isiw.trials import Trial
-from isiw.window import MIN_EXCESS_MV, SURE, Window, rules_out
+from isiw.window import LEAST_FACTOR, MIN_EXCESS_MV, SURE, Window, bayes_factor, rules_out
 
 if TYPE_CHECKING:  # an estimate prints itself in these words
     from isiw.estimate import Edge, Estimate
@@ -83,7 +83,28 @@ def in_short(estimate: Estimate) -> str:
 
 def titled(estimate: Estimate) -> str:
     """The same for the head of a picture or a summary."""
-    return f"Window {estimate.window}" if estimate.window else in_short(estimate).capitalize()
+    window = f"{'Undecided, perhaps' if _is_guess(estimate) else 'Window'} {estimate.window}"
+    return window if estimate.window else in_short(estimate).capitalize()
+
+
+def _is_guess(estimate: Estimate) -> bool:
+    """Whether a window is reported that the trials hardly speak for, so that it is undecided whether there is one."""
+    factor = bayes_factor(estimate.probability, estimate.beforehand)
+    unsure = factor is not None and factor < LEAST_FACTOR and not _is_sure(estimate)
+    return estimate.window is not None and unsure
+
+
+def _chance(estimate: Estimate) -> str:
+    """The probability of a window and the Bayes factor, in brackets; empty where no probability is known."""
+    if estimate.probability is None:
+        return ""
+    factor = bayes_factor(estimate.probability, estimate.beforehand)
+    said = "" if factor is None else f"; Bayes factor {_factor(factor)}"
+    return f" (probability of a window: {estimate.probability:.2f}{said})"
+
+
+def _factor(value: float) -> str:
+    return "above 100" if value > 100 else "below 0.01" if value < 0.01 else f"{value:.2g}"
 
 
 def chance_text(probability: float | None) -> str:
@@ -93,9 +114,8 @@ def chance_text(probability: float | None) -> str:
 
 def summary(estimate: Estimate) -> str:
     """A window in a line, each of its edges in another where they are known, and where the MEP is depressed."""
-    chance = "" if estimate.probability is None else f" (probability of a window: {estimate.probability:.2f})"
-    found = in_short(estimate)
-    lines = [f"{found.capitalize() if estimate.window is None else f'Window: {found}'}{chance}"]
+    found, lead = in_short(estimate), "Undecided, if there is a window" if _is_guess(estimate) else "Window"
+    lines = [f"{found.capitalize() if estimate.window is None else f'{lead}: {found}'}{_chance(estimate)}"]
     for name, edge in (("Start", estimate.start), ("End", estimate.end)):
         if estimate.window is not None and edge.low_ms is not None and edge.high_ms is not None:
             median = "" if edge.median_ms is None else edge_text(edge.median_ms)
@@ -128,10 +148,12 @@ def finding(estimate: Estimate, first: StimulusWords, space: DesignSpace) -> str
     after = f"after the {first.origin(space.reference)}"
     if probability is None:
         return _without_probability(estimate, first, after, space)
-    chance = f" (probability of a window: {probability:.2f})"
+    chance = _chance(estimate)
+    undecided = f"It is undecided whether there is a window{chance}"
     if window is None:
-        is_none = rules_out(probability)
-        return f"No window was found{chance}." if is_none else f"It is undecided whether there is a window{chance}."
+        return f"No window was found{chance}." if rules_out(probability) else f"{undecided}."
+    if _is_guess(estimate):
+        return f"{undecided}: the trials hardly speak for one. If there is one, the best guess is {window} {after}."
     enhances = f"The {first.name} {'' if probability >= SURE else 'probably '}enhances the MEP"
     isis = f"{window} {after}{chance}"
     if estimate.expected_f1 is not None and estimate.expected_f1 < A_GUESS:

@@ -25,12 +25,23 @@ LEAST_DEPRESSED_MV = 0.05
 SURE = 0.95
 """Probability from which on it is said outright that there is a window, or none; below it "probably", or undecided."""
 
+LEAST_FACTOR = 3.0
+"""Bayes factor below which trials hardly speak for a window: "not worth more than a bare mention" [Kass1995]."""
+
 Interval: TypeAlias = tuple[float, float]
 
 
 def rules_out(probability: float | None) -> bool:
     """Whether nothing reported means that there is none; with more probability than this it is undecided."""
     return probability is None or 1 - probability >= SURE
+
+
+def bayes_factor(probability: float | None, beforehand: float | None) -> float | None:
+    """By what the trials multiplied the odds of a window; None where one of the probabilities is not known."""
+    if probability is None or beforehand is None or not 0 < beforehand < 1:
+        return None
+    odds = math.inf if probability == 1 else probability / (1 - probability)
+    return odds * (1 - beforehand) / beforehand
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from isiw.report.words import TRIAL_HEADINGS, counts_sentence, final_statement, 
 from isiw.session.loop import Session
 from isiw.strategy.stopping import StopKind
 from isiw.trials import Channel, Measurement, Status, Trial
+from isiw.visit import Visit
 from isiw.window import Window
 from known import instance
 from scripted import ScriptedDevice, scripted_strategy
@@ -39,7 +40,7 @@ def with_estimate(record: SessionRecord, **changes: Any) -> SessionRecord:
 def test_the_statement_has_window_intervals_counts_and_reason(record: SessionRecord) -> None:
     assert final_statement(record) == (
         "The tap probably enhances the MEP at ISIs of 33–93 ms after the valve command "
-        "(probability of a window: 0.90). "
+        "(probability of a window: 0.90; Bayes factor 9). "
         "If there is a window, with 90 % probability each it starts between 28 and 38 ms and ends after 150 ms. "
         "Given a window, it ends beyond the range with probability 0.67. "
         "4 pairs of stimuli were delivered; 3 count; mistrials: 1 background activity. "
@@ -108,8 +109,11 @@ def test_an_unusual_window_is_said_with_its_probability_once_it_is_worth_saying(
 @pytest.mark.parametrize(
     ("probability", "said"),
     [
-        (0.05, "No window was found (probability of a window: 0.05). 4 pairs"),
-        (0.07, "It is undecided whether there is a window (probability of a window: 0.07). 4 pairs"),
+        (0.05, "No window was found (probability of a window: 0.05; Bayes factor 0.053). 4 pairs"),
+        (
+            0.07,
+            "It is undecided whether there is a window (probability of a window: 0.07; Bayes factor 0.075). 4 pairs",
+        ),
     ],
 )
 def test_no_window_is_a_finding_once_it_has_95_percent(
@@ -134,11 +138,42 @@ def test_a_method_without_a_probability_says_what_it_has_measured(
 
 
 def test_isis_that_are_expected_to_be_wrong_are_a_guess(record: SessionRecord) -> None:
-    said = final_statement(with_estimate(record, probability=0.69, expected_f1=0.4))
+    said = final_statement(with_estimate(record, probability=0.69, expected_f1=0.4, beforehand=None))
     assert said.startswith(
         "The tap probably enhances the MEP, but at which ISIs is not known well; the best guess is 33–93 ms after the "
         "valve command (probability of a window: 0.69)."
     )
+
+
+@pytest.mark.parametrize(
+    ("probability", "beforehand", "said"),
+    [
+        (0.6, 0.69, "It is undecided whether there is a window (probability of a window: 0.60; Bayes factor 0.67): "),
+        (0.86, 0.69, "It is undecided whether there is a window (probability of a window: 0.86; Bayes factor 2.8): "),
+        (0.88, 0.69, "The tap probably enhances the MEP at ISIs of 33–93 ms"),
+        (0.6, 0.2, "The tap probably enhances the MEP at ISIs of 33–93 ms"),
+        (0.96, 0.97, "The tap enhances the MEP at ISIs of 33–93 ms"),
+    ],
+)
+def test_a_window_that_trials_hardly_speak_for_is_undecided(
+    record: SessionRecord, probability: float, beforehand: float, said: str
+) -> None:
+    changed = with_estimate(record, probability=probability, beforehand=beforehand)
+    assert final_statement(changed).startswith(said)
+    assert ("Undecided, if there is a window: 33–93 ms" in str(changed.estimates[-1])) == ("undecided" in said)
+
+
+def test_a_strategy_that_was_not_told_the_stated_intensity_is_named(record: SessionRecord) -> None:
+    said = "The strategy was not told the intensity, and expects about 90 % of RMT."
+    visit = Visit(intensity_pct_rmt=110.0)
+
+    def statement(**settings: Any) -> str:
+        recipe = StrategyRecipe(name="default", seed=0, settings=settings)
+        header = record.header.model_copy(update={"visit": visit, "strategy": recipe})
+        return final_statement(replace(record, header=header))
+
+    assert f"{said} Next time: make_strategy(..., intensity_pct_rmt=110)." in statement()
+    assert said not in statement(intensity_pct_rmt=110.0)
 
 
 def test_a_method_without_a_probability_is_said_to_have_none(record: SessionRecord) -> None:

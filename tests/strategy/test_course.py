@@ -115,3 +115,12 @@ def test_a_decision_counts_the_mistrials_of_its_person() -> None:
     going = told(course("nr", people=2, stopping=Budget(3)))
     assert not going.decision(0).stop
     assert going.decision(1, mistrials=2).stop
+
+
+def test_an_estimate_says_how_probable_a_window_was_before_the_first_trial() -> None:
+    first = course("default", people=2)
+    before = [first.estimate(person).probability for person in range(2)]
+    after = told(told(first))
+    assert [after.estimate(person).beforehand for person in range(2)] == before
+    assert 0.6 < (before[0] or 0.0) < 0.75
+    assert told(course("nr")).estimate().beforehand is None

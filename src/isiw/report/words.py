@@ -41,6 +41,7 @@ def final_statement(record: SessionRecord, config: Path | None = None) -> str:
             counts_sentence(record),
             fit_sentence(record),
             _unstated_hit_delay(record),
+            _unstated_intensity(record),
             _expects_a_tap(record),
             last.reason if record.rests_on_data or last.stop_kind not in OF_THE_WINDOW else "",
         ]
@@ -123,6 +124,17 @@ def _unstated_hit_delay(record: SessionRecord) -> str:
     if not any(name == "acceleration" for _, name in record.waveforms):
         return said
     return f"{said} {command('timing', record.path)} measures it."
+
+
+def _unstated_intensity(record: SessionRecord) -> str:
+    """That the strategy did not know of the intensity that the visit states, where it could have."""
+    recipe, stated_pct = record.header.strategy, record.header.visit.intensity_pct_rmt
+    if stated_pct is None or "intensity_pct_rmt" in recipe.settings or recipe.name not in list_strategies():
+        return ""
+    if not known_settings(recipe.name, {"intensity_pct_rmt": stated_pct}):
+        return ""
+    call = f"make_strategy(..., intensity_pct_rmt={stated_pct:g})"
+    return f"The strategy was not told the intensity, and expects about 90 % of RMT. Next time: {call}."
 
 
 def _expects_a_tap(record: SessionRecord) -> str:

@@ -127,7 +127,8 @@ class Method:
 
     def begin(self, seed: int, people: int = 1) -> Course:
         """The course before the first trial."""
-        return Course(self, self.model.begin(self.space, seed, people), people)
+        posterior = self.model.begin(self.space, seed, people)
+        return Course(self, posterior, people, Belief(posterior, 0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,16 +139,21 @@ class Belief:
         posterior: what is believed; None where all estimates are made.
         pairs: how many pairs of stimuli each person was told of.
         estimates: those made so far, by person.
+        first: what was believed before the first trial; None where it is that.
     """
 
     posterior: Posterior | None
     pairs: int
     estimates: dict[int, WindowEstimate] = field(default_factory=dict)
+    first: Belief | None = None
 
     def estimate(self, person: int) -> WindowEstimate:
         """What is believed about the window of one person."""
         if person not in self.estimates and self.posterior is not None:
-            self.estimates[person] = self.posterior.estimate(person).noting(pairs=self.pairs)
+            estimate = self.posterior.estimate(person)
+            knows = self.first is not None and estimate.probability is not None
+            before = self.first.estimate(person).probability if self.first is not None and knows else None
+            self.estimates[person] = estimate.noting(pairs=self.pairs, beforehand=before)
         return self.estimates[person]
 
     def looked_back_on(self, people: int) -> Belief:
@@ -163,6 +169,7 @@ class Course:
         method: how they are examined.
         posterior: what is believed.
         people: how many there are.
+        first: what was believed before the first trial.
         told: trials told of each.
         alone: how many of those were TMS alone.
         earlier: what was believed before the last trial, as far as the stopping rule looks back on it.
@@ -172,6 +179,7 @@ class Course:
     method: Method
     posterior: Posterior
     people: int
+    first: Belief
     told: int = 0
     alone: int = 0
     earlier: tuple[Belief, ...] = ()
@@ -202,7 +210,7 @@ class Course:
     @cached_property
     def belief(self) -> Belief:
         """What is believed now."""
-        return Belief(self.posterior, self.paired_trials)
+        return Belief(self.posterior, self.paired_trials, first=self.first)
 
     @cached_property
     def past(self) -> tuple[Belief, ...]:

@@ -26,7 +26,7 @@ from isiw.studies.own import OwnCode
 from isiw.studies.players import Crowd, Player, Reported, alone
 from isiw.subjects.cohorts import COHORTS, person_of
 from isiw.subjects.subject import Response, SimulatedSubject
-from isiw.window import Window
+from isiw.window import Window, bayes_factor
 
 TIMES = ("ask_ms", "tell_ms")
 """Columns that differ each time a session is run."""
@@ -268,6 +268,7 @@ class _Person:
 def _judged(estimate: Reported, truth: Window | None, space: DesignSpace) -> dict[str, Any]:
     posterior = estimate if isinstance(estimate, WindowEstimate) else None
     reported = posterior.window if posterior is not None else estimate
+    factor = None if posterior is None else bayes_factor(posterior.probability, posterior.beforehand)
     covered = None if posterior is None else covers(posterior, truth, space)
     return {
         "f1": f1(estimate, truth, space),
@@ -277,6 +278,7 @@ def _judged(estimate: Reported, truth: Window | None, space: DesignSpace) -> dic
         "start_ms": math.nan if reported is None else reported.start_ms,
         "end_ms": math.nan if reported is None else reported.end_ms,
         "probability": math.nan if posterior is None or posterior.probability is None else posterior.probability,
+        "bayes_factor": math.nan if factor is None else factor,
         "expected_f1": math.nan if posterior is None or posterior.expected_f1 is None else posterior.expected_f1,
         "start_covered": math.nan if covered is None else float(covered[0]),
         "end_covered": math.nan if covered is None else float(covered[1]),
