@@ -97,12 +97,13 @@ def _means(groups: pd.core.groupby.DataFrameGroupBy, names: list[str]) -> pd.Dat
     return both[["n", *(column for name in names for column in (name, f"{name}_se"))]]
 
 
-def main(
+def main(  # noqa: PLR0913, PLR0917 - an option each
     cohorts: Annotated[str, typer.Option(help="Cohorts, comma-separated.")] = "recruitment,gaussian,nonresponder",
     people: Annotated[int, typer.Option(help="People a cohort.")] = 100,
     trials: Annotated[int, typer.Option(help="Trials a session.")] = 60,
     seed: Annotated[int, typer.Option(help="Seed of the cohorts.")] = 100_000,
     hit_delay: Annotated[str, typer.Option(help="Whether what the rig knows is stated or unstated.")] = "stated",
+    intensity: Annotated[str, typer.Option(help="Whether the intensity is stated or unstated.")] = "unstated",
     space: Annotated[str, typer.Option(help="valve or impact, or with another high end [ms]: impact:100.")] = "valve",
     workers: Annotated[int, typer.Option(help="Processes.")] = 2,
     out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("people"),
@@ -118,6 +119,7 @@ def main(
         engine="batched",
         batch=25,
         hit_delay=hit_delay,  # type: ignore[arg-type] # checked by the study
+        intensity=intensity,  # type: ignore[arg-type] # likewise
         space=space_of(space),
     )
     with Progress() as progress:

@@ -301,9 +301,17 @@ def test_every_limit_of_a_configuration_is_the_sessions(tmp_path: Path) -> None:
 
 def test_the_strategy_is_told_what_the_device_delivers_first(config_file: WriteFile, tmp_path: Path) -> None:
     text = f"log = '{tmp_path}/s.mcap'\n[subject]\ncohort = 'COHORT'\n[space]\nreference = 'impact'\nhigh_ms = 320\n"
-    for cohort, stimulus in (("electrical", "electrical"), ("recruitment", "tap")):
+    # A tap is also what a device says that states nothing.
+    for cohort, stimulus in (("electrical", "electrical"), ("recruitment", None)):
         session = session_for(load_config(config_file(text.replace("COHORT", cohort))))
-        assert session.strategy.recipe.settings["conditioning"] == stimulus
+        assert session.strategy.recipe.settings.get("conditioning") == stimulus
+
+
+def test_the_strategy_is_told_the_intensity_that_the_visit_states(config_file: WriteFile, tmp_path: Path) -> None:
+    text = f"log = '{tmp_path}/s.mcap'\n[visit]\nintensity_pct_rmt = 110\n[strategy]\nname = 'NAME'\n"
+    for name, told_pct_rmt in (("default", 110.0), ("nr", None)):
+        session = session_for(load_config(config_file(text.replace("NAME", name))))
+        assert session.strategy.recipe.settings.get("intensity_pct_rmt") == told_pct_rmt
 
 
 def test_a_device_of_ones_own_needs_a_space_before_it_is_made(config_file: WriteFile) -> None:

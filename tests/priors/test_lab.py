@@ -256,6 +256,20 @@ def test_a_session_is_recalled_with_what_its_strategy_was_told_of_rig_and_muscle
     assert recall.model.prior.muscle == "hand"
 
 
+@pytest.mark.parametrize(
+    ("settings", "visit"),
+    [({"intensity_pct_rmt": 110.0}, isiw.Visit()), ({}, isiw.Visit(intensity_pct_rmt=110.0))],
+)
+def test_a_session_is_recalled_at_the_intensity_that_strategy_or_visit_states(
+    tmp_path: Path, settings: dict[str, Any], visit: isiw.Visit
+) -> None:
+    strategy = make_strategy("default", particles=100, **settings)
+    with isiw.open_session(strategy, tmp_path / "s.mcap", visit=visit) as session:
+        session.tell(session.ask(), 0.05)
+    recall = recalled(isiw.read_session(tmp_path / "s.mcap"), Prior(), particles=100)
+    assert recall.model.prior.intensity_pct_rmt == 110.0
+
+
 def test_what_electrical_pulses_taught_is_for_electrical_pulses(tmp_path: Path) -> None:
     pulsed = [
         write_log(

@@ -67,6 +67,12 @@ def test_it_asks_what_the_same_strategy_asks_in_process(client: httpx.Client, se
     assert told(client, session, 4) == asked
 
 
+def test_the_strategy_is_told_the_intensity_that_the_visit_states(client: httpx.Client, tmp_path: Path) -> None:
+    visit = PLAN["visit"] | {"intensity_pct_rmt": 110.0}
+    created(client, "P08", visit=visit)
+    assert read_session(tmp_path / "P08.mcap").header.strategy.settings["intensity_pct_rmt"] == 110.0
+
+
 def test_the_intent_is_on_disk_before_the_answer(client: httpx.Client, session: str, tmp_path: Path) -> None:
     answer = done(client.post(f"{session}/ask"))
     assert [intent.isi_ms for intent in read_session(tmp_path / "P07.mcap").intents] == [answer["isi_ms"]]

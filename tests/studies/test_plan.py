@@ -150,6 +150,16 @@ def test_what_the_rig_states_is_told_where_a_study_says_so() -> None:
     assert settings("stated", VALVE_SPACE) == [delay, delay | {"conditioning": "electrical"}]
 
 
+def test_the_intensity_that_a_visit_states_is_told_where_a_study_says_so_and_people_of_one_are_side_by_side() -> None:
+    cohorts = ("hand-flat", "gaussian")
+    study = Study((StudyStrategy("default"),), cohorts, 12, engine="batched", intensity="stated")
+    flat, gaussian = ([unit for unit in study.units() if name in unit.key] for name in cohorts)
+    stated = [dict(unit.sessions[0].settings) for unit in flat]
+    assert stated == [{"intensity_pct_rmt": 100.0}, {"intensity_pct_rmt": 110.0}, {"intensity_pct_rmt": 90.0}]
+    assert sorted(session.person for unit in flat for session in unit.sessions) == list(range(12))
+    assert [unit.sessions[0].settings for unit in gaussian] == [()]
+
+
 def test_spaces_have_names_in_python_too() -> None:
     assert tiny(space="impact").space == IMPACT_SPACE
 

@@ -245,7 +245,11 @@ def session_for(config: RunConfig) -> Session:
     log = config.log or fresh_log_path(config)
     device = device_for(config)
     info = device.describe()
-    known = {"hit_delay_ms": info.hit_delay_ms, "conditioning": info.conditioning}
+    known = {
+        "hit_delay_ms": info.hit_delay_ms,
+        "conditioning": None if info.conditioning == "tap" else info.conditioning,  # a tap may be nothing stated
+        "intensity_pct_rmt": config.visit.intensity_pct_rmt,
+    }
     settings = known_settings(config.strategy.name, known) | settings_with_taught(config, info)
     return Session(
         device,

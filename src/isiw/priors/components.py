@@ -54,8 +54,8 @@ def gain(share: float, mean: FloatArray, sd: FloatArray) -> Gain:
 
 def muscle(share: float, mean: FloatArray, sd: FloatArray, name: str) -> Muscle:
     """A law of recruitment curves."""
-    scales = [*_log_scales(mean[:-1], sd[:-1]), Scale(float(mean[-1]), float(sd[-1]))]
-    return Muscle(name, share, *scales)
+    ratio, slope, input_sd, sigma_y, boost = _log_scales(mean[:-1], sd[:-1])
+    return Muscle(name, share, ratio, slope, input_sd, sigma_y, boost, Scale(float(mean[-1]), float(sd[-1])))
 
 
 def _log_scales(mean: FloatArray, sd: FloatArray) -> list[Scale]:

@@ -205,7 +205,7 @@ def _shares(kinds: Tensor, of: int) -> list[float]:
 
 def _places(latents: Latents, law: DayToDay, posterior: ParticlePosterior) -> tuple[Place, ...]:
     profile = posterior.model.prior.profile
-    rig = posterior.space.reference, profile.start.hit_delay_ms, profile.conditioning
+    rig = posterior.space.reference, profile.start.hit_delay_ms, profile.stimulus
     return tuple(place(law.p_stays * share, mean, sd, *rig) for share, mean, sd in _normals(latents, "place", law))
 
 

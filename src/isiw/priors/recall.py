@@ -96,4 +96,6 @@ def _of_rig(prior: Prior, record: SessionRecord) -> Prior:
     )
     told = record.header.strategy.settings.get("muscle")
     known = told if told in {muscle.name for muscle in prior.muscles} else None
-    return replace(prior, profile=profile, muscle=prior.muscle or known)
+    settings, visit = record.header.strategy.settings, record.header.visit
+    stated_pct_rmt = settings.get("intensity_pct_rmt") or visit.intensity_pct_rmt or prior.intensity_pct_rmt
+    return replace(prior, profile=profile, muscle=prior.muscle or known, intensity_pct_rmt=stated_pct_rmt)

@@ -22,7 +22,7 @@ from isiw.server.requests import NAME, CreateRequest
 from isiw.session.opening import open_session
 from isiw.session.replay import strategy_of
 from isiw.session.terminal import alarm
-from isiw.strategy.catalogue import make_strategy
+from isiw.strategy.catalogue import known_settings, make_strategy
 
 MOST_OPEN: Final = 20
 
@@ -171,8 +171,10 @@ class Sessions:
 
     def _begin(self, request: CreateRequest) -> SessionAnswer:
         space, doubts = request.space.design(), list[str]()
+        stated = {"intensity_pct_rmt": request.visit.intensity_pct_rmt}
+        settings = known_settings(request.strategy.name, stated) | request.strategy.settings
         recorder = open_session(
-            make_strategy(request.strategy.name, space=space, seed=request.seed, **request.strategy.settings),
+            make_strategy(request.strategy.name, space=space, seed=request.seed, **settings),
             self._path(request.id),
             limits=dataclasses.replace(Limits.of_space(space), **request.limits.model_dump()),
             subject=request.visit.subject,

@@ -207,7 +207,8 @@ def require_matching(info: DeviceInfo, strategy: Strategy, protocol: VisitProtoc
             expected="the same one",
             remedy=own_reference(info.reference),
         )
-    assumed = strategy.recipe.settings.get("conditioning", info.conditioning)
+    profile = getattr(getattr(strategy.model, "prior", None), "profile", None)
+    assumed = getattr(profile, "stimulus", info.conditioning)
     if info.conditioning not in {"tap", assumed}:  # a tap is also what a device says that states nothing
         raise DeviceError(
             "the device's conditioning stimulus is not the one that the strategy expects, so windows would be missed",

@@ -16,7 +16,6 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from itertools import groupby, product
-from operator import attrgetter
 from pathlib import Path
 from typing import Any, Final, Literal, TypeAlias, get_args
 
@@ -40,7 +39,7 @@ _MOST_SESSIONS: Final = 1_000_000
 """Of a study; more could not even be listed in a moment."""
 
 Engine: TypeAlias = Literal["single", "batched"]
-HitDelay: TypeAlias = Literal["unstated", "stated"]
+Stated: TypeAlias = Literal["unstated", "stated"]
 
 _OF_THE_FOLDER: Final = frozenset({"checksum", "versions"})
 """What a folder of results says besides its study."""
@@ -153,6 +152,7 @@ class Study:
         amplitude: factor on all amplitudes of the people.
         hit_delay: whether strategies that can use it are told the hit delay as the rig states it (`"stated"`), or
             nothing (`"unstated"`).
+        intensity: the same of the intensity, as the visit states it.
 
     Raises:
         InvalidValueError: an invalid number or choice, a label given twice, or anything but names of cohorts and
@@ -171,7 +171,8 @@ class Study:
     batch: int = 50
     device: str = "cpu"
     amplitude: float = 1.0
-    hit_delay: HitDelay = "unstated"
+    hit_delay: Stated = "unstated"
+    intensity: Stated = "unstated"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "strategies", tuple(map(_named, _several(self.strategies))))
@@ -191,7 +192,8 @@ class Study:
             raise InvalidValueError("marks ascend from 0 to the number of trials", got=self.marks)
         check_choice(self, "stopping", get_args(Stopping))
         check_choice(self, "engine", get_args(Engine))
-        check_choice(self, "hit_delay", get_args(HitDelay))
+        check_choice(self, "hit_delay", get_args(Stated))
+        check_choice(self, "intensity", get_args(Stated))
         require_cohorts(self.cohorts)
         labels = [strategy.label for strategy in self.strategies]
         if (
@@ -212,14 +214,13 @@ class Study:
     def units(self) -> list[Unit]:
         """All of its work; the first people of each strategy and cohort come first, so that all grow together."""
         size = self.batch if self.engine == "batched" else 1
-        return [
-            self._unit(tuple(alike))
-            for first, cohort, strategy in product(range(0, self.people, size), self.cohorts, self.strategies)
-            for _, alike in groupby(
-                (self._session(strategy, cohort, person) for person in range(first, min(first + size, self.people))),
-                key=attrgetter("settings"),
-            )
-        ]
+        units = []
+        for first, cohort, strategy in product(range(0, self.people, size), self.cohorts, self.strategies):
+            people = range(first, min(first + size, self.people))
+            sessions = [self._session(strategy, cohort, person) for person in people]
+            alike = groupby(sorted(sessions, key=_settings_in_words), key=_settings_in_words)
+            units += [self._unit(tuple(side_by_side)) for _, side_by_side in alike]
+        return units
 
     def _session(self, strategy: StudyStrategy, cohort: str, person: int) -> SimulatedSession:
         session = SimulatedSession(
@@ -236,11 +237,17 @@ class Study:
             amplitude=self.amplitude,
             own=strategy.own,
         )
-        return session if self.hit_delay == "unstated" else session.as_the_rig_states()
+        session = session if self.hit_delay == "unstated" else session.as_the_rig_states()
+        return session if self.intensity == "unstated" else session.as_the_visit_states()
 
     def _unit(self, sessions: tuple[SimulatedSession, ...]) -> Unit:
         first, last = sessions[0], f"-{sessions[-1].person:05d}" if self.engine == "batched" else ""
         return Unit(f"{first.label}.{first.cohort}.{first.person:05d}{last}", sessions, self.engine, self.device)
+
+
+def _settings_in_words(session: SimulatedSession) -> str:
+    """By which sessions of people with the same settings come side by side."""
+    return repr(session.settings)
 
 
 def _require_torch_device(device: str) -> None:

@@ -126,6 +126,13 @@ class SimulatedSession:
         known = known_settings(self.strategy, {"hit_delay_ms": delay_ms, "conditioning": stimulus})
         return replace(self, settings=tuple((known | dict(self.settings)).items()))
 
+    def as_the_visit_states(self) -> SimulatedSession:
+        """The same with the intensity told to the strategy, where the visit states it and the strategy can use it."""
+        if self.own is not None:
+            return self
+        known = known_settings(self.strategy, {"intensity_pct_rmt": self.subject().stated_intensity_pct_rmt})
+        return replace(self, settings=tuple((known | dict(self.settings)).items()))
+
     def player(self) -> Player:
         """The strategy before its first trial."""
         seed, settings = self.seed + self.person, dict(self.settings)

@@ -134,10 +134,13 @@ class _Law:
             input_correlation=float(rng.uniform(0, 0.2)),
         )
         if self.intensity_range_pct_rmt is None:
-            intensity = float(rng.choice(self.intensities_pct_rmt)) + self.intensity_sd_pct_rmt * rng.standard_normal()
+            stated = float(rng.choice(self.intensities_pct_rmt))
+            intensity = stated + self.intensity_sd_pct_rmt * rng.standard_normal()
         else:
             intensity = float(rng.uniform(*self.intensity_range_pct_rmt))
-        return replace(subject, response=replace(response, intensity_pct_rmt=intensity))
+            stated = float(round(intensity))
+        response = replace(response, intensity_pct_rmt=intensity)
+        return replace(subject, response=response, stated_intensity_pct_rmt=stated)
 
 
 _USUAL: Final = _Law()

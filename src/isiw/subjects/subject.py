@@ -88,6 +88,7 @@ class SimulatedSubject:
         scale: factor on every amplitude.
         stated_hit_delay_ms: mean and SD of the hit delay that the rig states, where it knows itself [ms]; by default
             the tapping robot's, over people.
+        stated_intensity_pct_rmt: intensity of the pulse as the visit states it [% RMT]; None where it does not.
         conditioning: what is given to them first, a tap or an electrical pulse.
         plasticity: how the pairs that are delivered change the gain; None where they do not. The true window and
             profile are those before the first pair.
@@ -111,6 +112,7 @@ class SimulatedSubject:
     jitter_told: bool = True
     scale: float = 1.0
     stated_hit_delay_ms: tuple[float, float] = (180.0, 6.0)
+    stated_intensity_pct_rmt: float | None = None
     conditioning: Conditioning = "tap"
     plasticity: Plasticity | None = None
     change: Change | None = None
@@ -123,6 +125,7 @@ class SimulatedSubject:
         check_numbers(self, "input_correlation", least=-1, most=1)
         check_probabilities(self, "outlier_probability")
         check_numbers(self, "scale", above=0)
+        check_numbers(self, "stated_intensity_pct_rmt", above=0, optional=True)
         check_flags(self, "jitter_told")
         check_choice(self, "conditioning", get_args(Conditioning))
         stated_ms = mean_and_sd("SimulatedSubject.stated_hit_delay_ms", self.stated_hit_delay_ms)

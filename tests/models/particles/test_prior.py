@@ -15,6 +15,7 @@ from isiw.models.particles.laws import (
     HAND,
     Floor,
     Gain,
+    Intensity,
     Muscle,
     NoiseShares,
     RectifiedPrior,
@@ -29,6 +30,7 @@ from isiw.models.particles.supra.prior import SupraPrior
 from isiw.models.shared.scales import Scale
 from isiw.models.shared.start import StartPrior
 from isiw.priors.components import beside
+from isiw.types import Conditioning
 
 MANY = 20_000
 ONLY_CURVES = NoiseShares(0.0, 0.0, 1.0, 0.0, 0.0)
@@ -60,6 +62,8 @@ def test_kinds_come_as_often_as_the_prior_says() -> None:
         (RectifiedPrior, {"onset": Scale(-0.1, 0.5)}),
         (RectifiedPrior, {"rest_pct": Scale(-6.0, 0.0)}),
         (Floor, {"median_mv": Scale(0.009, 0.0)}),
+        (Intensity, {"pct_rmt": Scale(100.0, 0.0)}),
+        (Prior, {"intensity_pct_rmt": 0.0}),
         (SessionPrior, {"drift_sd": -0.1}),
         (SessionPrior, {"startup": Scale(0.5, -0.5)}),
         (SwitchPrior, {"reliability": Scale(0.2, 0.7, 0.1)}),  # a mixture has other components instead of tails
@@ -67,6 +71,7 @@ def test_kinds_come_as_often_as_the_prior_says() -> None:
 )
 def test_an_invalid_part_is_refused(part: type, wrong: dict[str, object]) -> None:
     usual = {Width: (0.5, Scale(100.0, 0.4)), Gain: (0.5, Scale(7.0, 0.6), Scale(0.6, 0.3))}
+    usual |= {Intensity: (0.5, Scale(100.0, 5.0))}
     usual |= {Floor: (0.5, Scale(0.009, 0.4), Scale(0.2, 0.4))}
     sound = part(*usual.get(part, ()))
     with pytest.raises(InvalidValueError, match=next(iter(wrong))):
@@ -87,6 +92,7 @@ def test_an_invalid_muscle_is_refused(wrong: dict[str, Any]) -> None:
         (Prior, "gains"),
         (Prior, "muscles"),
         (Prior, "floors"),
+        (Prior, "intensities"),
         (SwitchPrior, "sizes"),
         (ProfilePrior, "widths"),
         (SupraPrior, "curves"),
@@ -131,7 +137,8 @@ def test_without_a_window_or_a_curve_their_latents_mean_nothing() -> None:
 @pytest.mark.parametrize("muscle", [FOREARM, HAND])
 def test_a_muscles_curves_are_as_it_says(muscle: Muscle) -> None:
     # Half of a normal variable lies within 0.674 SDs of its median.
-    response = people(Prior(noise=ONLY_CURVES, muscles=(replace(muscle, share=1.0),))).response
+    one = (replace(muscle, share=1.0),)
+    response = people(Prior(noise=ONLY_CURVES, muscles=one, intensity_pct_rmt=90.0)).response
     slope = muscle.slope_per_pct.median
     for values, scale in ((response.log_ratio.exp(), muscle.ratio), (response.spread, muscle.input_sd)):
         assert values.median().item() == pytest.approx(scale.median, rel=0.05)
@@ -142,7 +149,7 @@ def test_a_muscles_curves_are_as_it_says(muscle: Muscle) -> None:
 
 
 def test_curves_that_start_at_a_threshold_are_as_their_law_says() -> None:
-    prior = Prior(noise=ONLY_RECTIFIED)
+    prior = Prior(noise=ONLY_RECTIFIED, intensity_pct_rmt=90.0)
     law, response = prior.rectified, people(prior).response
     slope = law.slope_per_pct.median
     assert response.log_ratio.exp().median().item() == pytest.approx(law.ratio.median, rel=0.06)
@@ -161,16 +168,46 @@ def test_no_other_curve_has_a_threshold() -> None:
     assert bool(((response.onset > 0) == (response.kind == NoiseKind.RECTIFIED)).all())
 
 
-def test_hands_reach_from_small_meps_to_large_ones_below_and_above_threshold() -> None:
-    # A of 0.2 and 3 mV over a floor of 0.009 mV; k = 0.23 times 90 % and 110 % RMT less an x50 of 117 %.
+def test_hands_reach_from_small_meps_to_large_ones() -> None:
+    # A of 0.2 and 3 mV over a floor of 0.009 mV.
     response = people(Prior(noise=ONLY_CURVES, muscles=(replace(HAND, share=1.0),), muscle="hand")).response
-    largest, drives = response.log_ratio.exp(), response.rest
-    for values, (low, high) in (
-        (largest, (0.2 / 0.009, 3.0 / 0.009)),
-        (drives, (0.23 * (90 - 117), 0.23 * (110 - 117))),
-    ):
-        for rare in (values < low, values > high):
-            assert 0.01 < rare.float().mean().item() < 0.25
+    largest = response.log_ratio.exp()
+    for rare in (largest < 0.2 / 0.009, largest > 3.0 / 0.009):
+        assert 0.01 < rare.float().mean().item() < 0.25
+
+
+@pytest.mark.parametrize(("muscle", "x50_pct_rmt"), [(FOREARM, 105.0), (HAND, 117.0)])
+def test_an_intensity_that_is_stated_says_where_on_its_curve_a_muscle_rests(muscle: Muscle, x50_pct_rmt: float) -> None:
+    one, slope = (replace(muscle, share=1.0),), muscle.slope_per_pct.median
+    for stated_pct_rmt in (90.0, 110.0):
+        prior = Prior(noise=ONLY_CURVES, muscles=one, intensity_pct_rmt=stated_pct_rmt)
+        rest_pct = people(prior).response.rest / slope
+        assert rest_pct.median().item() == pytest.approx(stated_pct_rmt - x50_pct_rmt, abs=0.5)
+        assert rest_pct.std().item() < 5.0
+
+
+def test_any_intensity_from_80_to_130_is_possible_where_none_is_stated() -> None:
+    forearm = (replace(FOREARM, share=1.0),)
+    intensity_pct = 105.0 + people(Prior(noise=ONLY_CURVES, muscles=forearm)).response.rest / 0.30
+    for beyond, least in ((intensity_pct < 85.0, 0.008), (intensity_pct > 100.0, 0.15), (intensity_pct > 125.0, 0.01)):
+        assert beyond.float().mean().item() > least
+    assert ((intensity_pct - 90.0).abs() < 4.0).float().mean().item() > 0.7
+
+
+def test_a_curve_that_was_learnt_stays_where_it_is_whatever_the_intensity() -> None:
+    learnt = replace(FOREARM, name="as in the lab", at_pct_rmt=None, share=1.0)
+    for stated_pct_rmt in (None, 120.0):
+        prior = Prior(noise=ONLY_CURVES, muscles=(learnt,), intensity_pct_rmt=stated_pct_rmt)
+        assert people(prior).response.rest.median().item() == pytest.approx(0.30 * -15.0, rel=0.05)
+
+
+def test_narrow_windows_are_possible_unless_a_tap_is_stated() -> None:
+    def narrow(conditioning: Conditioning | None) -> float:
+        person = people(Prior(ProfilePrior(conditioning=conditioning)))
+        return (person.shape.width_ms < 40.0).float().mean().item()
+
+    assert narrow("tap") < 0.03
+    assert 0.06 < narrow(None) < 0.18 < narrow("electrical")
 
 
 def test_a_known_muscle_leaves_only_itself_and_what_has_no_name() -> None:
@@ -237,11 +274,25 @@ def test_a_usual_start_is_usual_with_whatever_rig_where_none_is_stated() -> None
 def test_as_usual_unusual_windows_keep_a_part_of_their_probability(hit_delay_ms: Any) -> None:
     profile = ProfilePrior(start=StartPrior(hit_delay_ms=hit_delay_ms))
     usual = profile.as_usual(1 / 3)
-    assert [span.share for span in usual.start.spans] == pytest.approx([0.9, 0.1])
-    assert [width.share for width in usual.widths] == pytest.approx([0.9, 0.1])
+    assert [span.share for span in usual.start.spans] == pytest.approx([0.84, 0.1, 0.06])
+    assert [width.share for width in usual.widths] == pytest.approx([1 - 0.42 / 3, 0.32 / 3, 0.1 / 3])
     assert usual.start.p_anywhere == pytest.approx(0.04 / 3)
     assert (usual.p_window, usual.start.hit_delay_ms) == (profile.p_window, hit_delay_ms)
     assert profile.as_usual(1.0) == profile
+
+
+def test_as_usual_unusual_intensities_keep_a_part_of_their_probability_and_curves_tell_by_how_much() -> None:
+    prior = Prior()
+    usual = prior.as_usual(1 / 3)
+    assert [each.share for each in usual.intensities] == pytest.approx([1 - 0.25 / 3, 0.25 / 3])
+    latents = prior.sample(1, MANY, torch.Generator().manual_seed(1), VALVE_SPACE)
+    ratio = usual.log_curves(latents) - prior.log_curves(latents)
+    rest, curved = latents.values[..., LATENTS.index("rest")], latents.noise == NoiseKind.RECRUITMENT
+    assert bool((ratio[~curved & (latents.noise != NoiseKind.RECTIFIED)] == 0).all())
+    assert ratio[curved & (rest > 5)].mean().item() == pytest.approx(math.log(1 / 3), abs=0.1)
+    assert ratio.exp().mean().item() == pytest.approx(1.0, abs=0.01)
+    stated = replace(prior, intensity_pct_rmt=110.0)
+    assert bool((stated.as_usual(1 / 3).log_curves(latents) == stated.log_curves(latents)).all())
 
 
 def test_after_an_electrical_pulse_windows_are_believed_narrow_and_early() -> None:
@@ -258,7 +309,7 @@ def test_starts_and_widths_of_ones_own_are_kept_whatever_comes_first() -> None:
     own = (Width(1.0, Scale(50.0, 0.3)),)
     profile = ProfilePrior(widths=own)
     assert replace(profile, conditioning="electrical").widths == own
-    assert replace(ProfilePrior(conditioning="electrical"), conditioning="tap") == ProfilePrior()
+    assert replace(ProfilePrior(conditioning="electrical"), conditioning=None) == ProfilePrior()
     delayed = ProfilePrior(start=StartPrior(hit_delay_ms=(150.0, 5.0)), conditioning="electrical").start
     assert delayed == replace(ProfilePrior(conditioning="electrical").start, hit_delay_ms=(150.0, 5.0))
 

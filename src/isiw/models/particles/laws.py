@@ -5,11 +5,15 @@ The first of several laws is what is usual, the others say what else may be.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import Final
+import math
+from dataclasses import dataclass, fields, replace
+from typing import Any, Final, TypeVar
 
 from isiw.checks import check_numbers, check_probabilities, require_sum_of_one
 from isiw.models.shared.scales import Scale, check_scales
+
+L = TypeVar("L", bound=Any)
+"""A law with a share."""
 
 
 def check_shares(shares: object) -> None:
@@ -23,6 +27,13 @@ def check_laws(owner: object, *names: str) -> None:
     """Check fields of a dataclass that are several laws, each with a share."""
     for name in names:
         require_sum_of_one(f"the shares of {type(owner).__name__}.{name}", [law.share for law in getattr(owner, name)])
+
+
+def with_less_of_others(laws: tuple[L, ...], kept: float) -> tuple[L, ...]:
+    """The same laws, of which all but the first keep a part of their probability."""
+    first, *others = laws
+    less = [replace(law, share=kept * law.share) for law in others]
+    return replace(first, share=1.0 - math.fsum(law.share for law in less)), *less
 
 
 @dataclass(frozen=True)
@@ -51,6 +62,26 @@ class NoiseShares:
 
 
 @dataclass(frozen=True)
+class Intensity:
+    """A law of the intensity of the pulse.
+
+    Args:
+        share: its probability.
+        pct_rmt: the intensity [% RMT].
+
+    Raises:
+        InvalidValueError: an invalid share or scale.
+    """
+
+    share: float
+    pct_rmt: Scale
+
+    def __post_init__(self) -> None:
+        check_probabilities(self, "share")
+        check_scales(self, "pct_rmt", positive=False, tailed=False)
+
+
+@dataclass(frozen=True)
 class Muscle:
     """A law of recruitment curves: `s = A / (1 + exp(-k (x + sigma_x z1 - x50))) exp(sigma_y z2)` (Goetz et al.).
 
@@ -63,9 +94,10 @@ class Muscle:
         sigma_y: SD of the noise on the output, natural log.
         boost_pct: shift of the input at the best ISI [% RMT].
         rest_pct: the input without a tap, intensity − x50 [% RMT].
+        at_pct_rmt: the intensity that `rest_pct` is at [% RMT]; None where it is that of the session, whatever it is.
 
     Raises:
-        InvalidValueError: an invalid share or scale.
+        InvalidValueError: an invalid share, scale or intensity.
     """
 
     name: str
@@ -76,9 +108,11 @@ class Muscle:
     sigma_y: Scale
     boost_pct: Scale
     rest_pct: Scale
+    at_pct_rmt: float | None = None
 
     def __post_init__(self) -> None:
         check_probabilities(self, "share")
+        check_numbers(self, "at_pct_rmt", above=0, optional=True)
         check_scales(self, "ratio", "slope_per_pct", "input_sd", "sigma_y", "boost_pct", tailed=False)
         check_scales(self, "rest_pct", positive=False, tailed=False)
 
@@ -91,7 +125,8 @@ FOREARM: Final = Muscle(
     input_sd=Scale(2.1, 0.20),  # 5–9 % RMT
     sigma_y=Scale(0.39, 0.19),  # 0.3–0.5
     boost_pct=Scale(11.3, 0.36),  # 5–18 % RMT
-    rest_pct=Scale(-15.0, 1.5),  # 90 % RMT, half of the largest MEP at RMT + 4 %
+    rest_pct=Scale(-15.0, 1.5),  # half of the largest MEP at RMT + 4 %
+    at_pct_rmt=90.0,
 )
 
 HAND: Final = Muscle(
@@ -102,7 +137,8 @@ HAND: Final = Muscle(
     input_sd=Scale(1.65, 0.25),
     sigma_y=Scale(0.39, 0.19),
     boost_pct=Scale(15.0, 0.5),  # nobody has measured it
-    rest_pct=Scale(-19.0, 6.0),  # 90–110 % RMT, half of the largest MEP at RMT + 17 %
+    rest_pct=Scale(-27.0, 3.5),  # half of the largest MEP at RMT + 17 %
+    at_pct_rmt=90.0,
 )
 
 OTHER_MUSCLE: Final = Muscle(
@@ -114,6 +150,7 @@ OTHER_MUSCLE: Final = Muscle(
     sigma_y=Scale(0.39, 0.3),
     boost_pct=Scale(10.5, 0.45),
     rest_pct=Scale(-14.5, 5.0),
+    at_pct_rmt=90.0,
 )
 
 
@@ -131,10 +168,11 @@ class RectifiedPrior:
         sigma_y: SD of the noise on the output, natural log.
         boost_pct: shift of the input at the best ISI [% RMT].
         rest_pct: the input without a tap, intensity − threshold [% RMT].
+        at_pct_rmt: the intensity that `rest_pct` is at [% RMT]; None where it is that of the session, whatever it is.
         onset: the logistic curve at the threshold, as a share of its largest value.
 
     Raises:
-        InvalidValueError: an invalid scale.
+        InvalidValueError: an invalid scale or intensity.
     """
 
     ratio: Scale = Scale(200.0, 1.2)
@@ -144,8 +182,10 @@ class RectifiedPrior:
     boost_pct: Scale = Scale(18.0, 0.5)
     rest_pct: Scale = Scale(-6.0, 5.0)
     onset: Scale = Scale(0.1, 0.5)
+    at_pct_rmt: float | None = 90.0
 
     def __post_init__(self) -> None:
+        check_numbers(self, "at_pct_rmt", above=0, optional=True)
         positive = ("ratio", "slope_per_pct", "input_sd", "sigma_y", "boost_pct", "onset")
         check_scales(self, *positive, tailed=False)
         check_scales(self, "rest_pct", positive=False, tailed=False)

@@ -43,8 +43,8 @@ class ParticleModel:
         moves: how often particles move, and when they are resampled.
         detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
         response_threshold_mv: what a told response is known to be above [mV].
-        unusual_kept: the part of their probability that unusual starts and widths of the window keep where the next ISI
-            is chosen; what is believed and reported keeps all of it.
+        unusual_kept: the part of their probability that unusual starts and widths of the window, and intensities, keep
+            where the next ISI is chosen; what is believed and reported keeps all of it.
         device: torch device.
         engine: `"compiled"` loops on the CPU, or `"torch"`, which stands in where there are none; the same seed asks
             other ISIs with each.
@@ -74,7 +74,7 @@ class ParticleModel:
     @cached_property
     def prior_where_asking(self) -> Prior:
         """The prior that ISIs are chosen with."""
-        return replace(self.prior, profile=self.prior.profile.as_usual(self.unusual_kept))
+        return self.prior.as_usual(self.unusual_kept)
 
     def begin(self, space: DesignSpace, seed: int, people: int = 1) -> ParticlePosterior:
         """The posterior before the first trial.
@@ -132,8 +132,9 @@ class ParticlePosterior(SwarmPosterior[ParticleModel, Latents]):
     def as_usual(self) -> ParticlePosterior:
         """The same with the prior that ISIs are chosen with; see `ExpectsTheUsual`."""
         latents = self.swarm.latents
-        ratio = self.usual.log_places(latents) - self.engine.log_places(latents)
-        return replace(self, swarm=self.swarm.times(torch.where(latents.present, ratio, 0.0)))
+        places = self.usual.log_places(latents) - self.engine.log_places(latents)
+        curves = self.model.prior_where_asking.log_curves(latents) - self.model.prior.log_curves(latents)
+        return replace(self, swarm=self.swarm.times(torch.where(latents.present, places, 0.0) + curves))
 
     def noting_change(self) -> ParticlePosterior:
         """What is believed where somebody has seen that something changes now; see `NotesChanges`."""

@@ -8,11 +8,11 @@ on, and moves need no Jacobians.
 from __future__ import annotations
 
 import math
-from dataclasses import astuple, dataclass, field
+from dataclasses import astuple, dataclass, field, replace
 from functools import cached_property
 from typing import Final, NamedTuple
 
-from isiw.checks import choice
+from isiw.checks import check_numbers, choice
 from isiw.design import DesignSpace
 from isiw.lazy import torch
 from isiw.models.particles.changes import Change, Changed, ChangeKind, ChangePrior, Named
@@ -23,12 +23,14 @@ from isiw.models.particles.laws import (
     OTHER_MUSCLE,
     Floor,
     Gain,
+    Intensity,
     Muscle,
     NoiseShares,
     RectifiedPrior,
     SessionPrior,
     SwitchPrior,
     check_laws,
+    with_less_of_others,
 )
 from isiw.models.particles.mixture import JointMixture, Mixture, drawn
 from isiw.models.particles.noise import PERSISTENCE, NoiseKind, Response, recruits
@@ -37,6 +39,9 @@ from isiw.models.particles.profile import ProfilePrior
 from isiw.models.particles.shapes import Shape
 from isiw.models.protocol import Tensor
 from isiw.models.shared.scales import Scale
+
+STATED_SD_PCT_RMT: Final = 0.5
+"""How far an intensity that is stated may be off [% RMT]; how far people's curves are is in their laws."""
 
 MOST_ONSET: Final = 0.9
 """A threshold further up a recruitment curve would leave nothing of it."""
@@ -89,14 +94,16 @@ class Prior:
         switch: of how often responses come.
         muscles: of recruitment curves.
         rectified: of recruitment curves that start at a threshold.
+        intensities: of the intensity of the pulse, where it is not stated.
         floors: of the EMG floor.
         session: of how amplitudes drift within a session.
         changes: of what else changes within it.
         muscle: the name of the muscle, where it is known: the others that have a name are left out then.
+        intensity_pct_rmt: intensity of the pulse, where it is stated [% RMT].
 
     Raises:
-        InvalidValueError: shares of gains, muscles or floors that do not sum to 1, or a muscle that is none of the
-            muscles.
+        InvalidValueError: shares of gains, muscles, intensities or floors that do not sum to 1, a muscle that is none
+            of the muscles, or an intensity that is not positive.
     """
 
     profile: ProfilePrior = field(default_factory=ProfilePrior)
@@ -108,6 +115,10 @@ class Prior:
     switch: SwitchPrior = field(default_factory=SwitchPrior)
     muscles: tuple[Muscle, ...] = (FOREARM, HAND, OTHER_MUSCLE)
     rectified: RectifiedPrior = field(default_factory=RectifiedPrior)
+    intensities: tuple[Intensity, ...] = (
+        Intensity(0.75, Scale(90.0, STATED_SD_PCT_RMT)),
+        Intensity(0.25, Scale(106.0, 12.0)),  # 80–130 % RMT
+    )
     floors: tuple[Floor, ...] = (
         Floor(0.85, Scale(0.009, 0.38), Scale(0.22, 0.4)),
         Floor(0.15, Scale(0.009, 1.2), Scale(0.22, 0.5)),
@@ -115,9 +126,11 @@ class Prior:
     session: SessionPrior = field(default_factory=SessionPrior)
     changes: ChangePrior = field(default_factory=ChangePrior)
     muscle: str | None = None
+    intensity_pct_rmt: float | None = None
 
     def __post_init__(self) -> None:
-        check_laws(self, "gains", "muscles", "floors")
+        check_laws(self, "gains", "muscles", "intensities", "floors")
+        check_numbers(self, "intensity_pct_rmt", above=0, optional=True)
         if self.muscle is not None:
             choice("Prior.muscle", self.muscle, [muscle.name for muscle in self.muscles])
 
@@ -139,8 +152,13 @@ class Prior:
             "gain": _mixture([(g.share, _of_gain(g)) for g in self.gains]),
             "reliability": _mixture([(1.0, [switch.reliability.law])]),
             "switch": _mixture([(size.share, [*often, *_of_gain(size)]) for size in switch.sizes]),
-            "recruitment": _mixture([(m.share, _of_curve(m)) for m in self.possible_muscles]),
-            "rectified": _mixture([(1.0, [*_of_curve(self.rectified), self.rectified.onset.log_law])]),
+            "recruitment": _mixture([(share, _of_curve(m, rest)) for m, share, rest in self._possible_curves]),
+            "rectified": _mixture(
+                [
+                    (share, [*_of_curve(self.rectified, rest), self.rectified.onset.log_law])
+                    for share, rest in self._rests(self.rectified)
+                ]
+            ),
             **self.changes.mixtures,
         }
 
@@ -237,11 +255,47 @@ class Prior:
     def _beside_place(self) -> JointMixture:
         return JointMixture([mixture for name, mixture in self.mixtures.items() if name != "width"])
 
+    def as_usual(self, kept: float) -> Prior:
+        """The same with less probability of unusual starts, widths and intensities.
+
+        Args:
+            kept: the part of their probability that they keep.
+        """
+        return replace(
+            self, profile=self.profile.as_usual(kept), intensities=with_less_of_others(self.intensities, kept)
+        )
+
+    def log_curves(self, latents: Latents) -> Tensor:
+        """Log density of each particle's recruitment curve but for a constant, 0 without a curve, shape (b, p)."""
+        own, rectified = (
+            self.mixtures[name].log_density(latents.values[..., latents_of(name, device=latents.values.device)])
+            for name in ("recruitment", "rectified")
+        )
+        without = torch.where(latents.noise == NoiseKind.RECTIFIED, rectified, 0.0)
+        return torch.where(latents.noise == NoiseKind.RECRUITMENT, own, without)
+
     @property
     def possible_muscles(self) -> tuple[Muscle, ...]:
         """All muscles but, where one is known, the others that have a name of their own."""
         others = set() if self.muscle is None else {FOREARM.name, HAND.name} - {self.muscle}
         return tuple(m for m in self.muscles if m.name not in others)
+
+    @cached_property
+    def _possible_curves(self) -> list[tuple[Muscle, float, Scale]]:
+        """Each muscle at each intensity, the probability of both, and the input without a tap [% RMT]."""
+        return [(m, m.share * share, rest) for m in self.possible_muscles for share, rest in self._rests(m)]
+
+    def _rests(self, law: Muscle | RectifiedPrior) -> list[tuple[float, Scale]]:
+        """The input without a tap at each intensity [% RMT], and the probability of the intensity."""
+        if law.at_pct_rmt is None:
+            return [(1.0, law.rest_pct)]
+        stated = self.intensity_pct_rmt
+        known = self.intensities if stated is None else (Intensity(1.0, Scale(stated, STATED_SD_PCT_RMT)),)
+        median, sd = law.rest_pct.law
+        return [
+            (each.share, Scale(median + each.pct_rmt.median - law.at_pct_rmt, math.hypot(sd, each.pct_rmt.sd)))
+            for each in known
+        ]
 
     @property
     def hypotheses(self) -> tuple[str, ...]:
@@ -252,7 +306,7 @@ class Prior:
     def hypothesis(self, latents: Latents) -> Tensor:
         """Which of `hypotheses` each particle belongs to, shape (b, p)."""
         recruitment = latents.values[..., latents_of("recruitment", device=latents.values.device)]
-        names = [muscle.name for muscle in self.possible_muscles]
+        names = [muscle.name for muscle, *_ in self._possible_curves]
         numbers = torch.tensor([list(dict.fromkeys(names)).index(name) for name in names], device=recruitment.device)
         kind = len(_WITHOUT_MUSCLE) + numbers[self.mixtures["recruitment"].component(recruitment)]
         for number, noise in enumerate(_WITHOUT_MUSCLE):
@@ -334,9 +388,9 @@ def _of_gain(law: Gain) -> list[tuple[float, float]]:
     return [law.ratio.log_law, law.cv.log_law]
 
 
-def _of_curve(law: Muscle | RectifiedPrior) -> list[tuple[float, float]]:
+def _of_curve(law: Muscle | RectifiedPrior, rest_pct: Scale) -> list[tuple[float, float]]:
     scales = (law.ratio, law.slope_per_pct, law.input_sd, law.sigma_y, law.boost_pct)
-    return [*(scale.log_law for scale in scales), law.rest_pct.law]
+    return [*(scale.log_law for scale in scales), rest_pct.law]
 
 
 def _mixture(components: list[tuple[float, list[tuple[float, float]]]]) -> Mixture:

@@ -14,7 +14,7 @@ from typing import Final, NamedTuple, get_args
 from isiw.checks import check_choice, check_probabilities
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.models.particles.laws import check_laws, check_shares
+from isiw.models.particles.laws import check_laws, check_shares, with_less_of_others
 from isiw.models.particles.places import Place
 from isiw.models.shared.scales import Scale, check_scales
 from isiw.models.shared.start import TAP_SPANS, Span, StartPrior
@@ -74,8 +74,13 @@ class _Windows(NamedTuple):
     widths: tuple[Width, ...]
 
 
-_AFTER: Final[Mapping[Conditioning, _Windows]] = MappingProxyType(
+_AFTER: Final[Mapping[Conditioning | None, _Windows]] = MappingProxyType(
     {
+        # A tap most probably; but windows of 15–40 ms, as after an electrical pulse, too.
+        None: _Windows(
+            TAP_SPANS,
+            (Width(0.58, Scale(100.0, 0.42)), Width(0.32, Scale(190.0, 0.45)), Width(0.10, Scale(28.0, 0.35))),
+        ),
         # 60–220 ms, mean 108 measured (dissertation, Table 4.1).
         "tap": _Windows(TAP_SPANS, (Width(0.7, Scale(100.0, 0.42)), Width(0.3, Scale(170.0, 0.5)))),
         # 15–20 ms measured, with TMS below the threshold (dissertation, 3.3.4); most studies use an ISI of 25 ms.
@@ -85,7 +90,7 @@ _AFTER: Final[Mapping[Conditioning, _Windows]] = MappingProxyType(
         ),
     }
 )
-"""What is believed of windows after each kind of conditioning stimulus."""
+"""What is believed of windows after each kind of conditioning stimulus, and where it is not stated."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +106,8 @@ class ProfilePrior:
         widths: how wide they are.
         places: where and how wide they are as far as earlier sessions say; the rest of the probability is that of
             `start` and `widths`.
-        conditioning: what the first stimulus of a pair is: a tap on the tendon, or an electrical pulse to the nerve.
+        conditioning: what the first stimulus of a pair is: a tap on the tendon, or an electrical pulse to the nerve;
+            None where it is not stated, and a tap is most probable.
 
     Raises:
         InvalidValueError: an invalid probability or conditioning stimulus, widths whose shares do not sum to 1,
@@ -111,13 +117,13 @@ class ProfilePrior:
     p_window: float = 0.72
     shapes: ShapeShares = field(default_factory=ShapeShares, metadata={"shares": True})
     start: StartPrior = field(default_factory=StartPrior)
-    widths: tuple[Width, ...] = _AFTER["tap"].widths
+    widths: tuple[Width, ...] = _AFTER[None].widths
     places: tuple[Place, ...] = ()
-    conditioning: Conditioning = "tap"
+    conditioning: Conditioning | None = None
 
     def __post_init__(self) -> None:
         check_probabilities(self, "p_window")
-        check_choice(self, "conditioning", get_args(Conditioning))
+        check_choice(self, "conditioning", (None, *get_args(Conditioning)))
         own = _AFTER[self.conditioning]
         if self.start.spans in [each.spans for each in _AFTER.values()]:
             object.__setattr__(self, "start", replace(self.start, spans=own.spans))
@@ -130,6 +136,11 @@ class ProfilePrior:
             raise InvalidValueError("ProfilePrior.places must count from one event", got=sorted(references))
 
     @property
+    def stimulus(self) -> Conditioning:
+        """The conditioning stimulus, as it is stated, or a tap."""
+        return self.conditioning or "tap"
+
+    @property
     def p_place(self) -> float:
         """Probability that a window is where earlier sessions say."""
         return math.fsum(place.share for place in self.places)
@@ -140,10 +151,7 @@ class ProfilePrior:
         Args:
             kept: the part of their probability that they keep.
         """
-        first, *others = self.widths
-        less = tuple(replace(width, share=kept * width.share) for width in others)
-        usual = replace(first, share=1.0 - math.fsum(width.share for width in less))
-        return replace(self, start=self.start.as_usual(kept), widths=(usual, *less))
+        return replace(self, start=self.start.as_usual(kept), widths=with_less_of_others(self.widths, kept))
 
     def require_rig(self, space: DesignSpace) -> None:
         """Check that the rig of a new session fits its space; what an earlier log says goes on as it was.
@@ -175,15 +183,15 @@ class ProfilePrior:
             InvalidValueError: they count from another event than the space, or are of a rig with another hit delay, or
                 of another conditioning stimulus.
         """
-        if any(place.conditioning != self.conditioning for place in self.places):
+        if any(place.conditioning != self.stimulus for place in self.places):
             raise InvalidValueError(
                 "the prior was learnt with another conditioning stimulus, so its windows say nothing here",
-                got=self.conditioning,
+                got=self.stimulus,
                 expected=self.places[0].conditioning,
                 remedy="Learn a prior from sessions with this stimulus.",
             )
         if self.places and (learnt := self.places[0].reference) != space.reference:
-            origin = STIMULI[self.conditioning].origin
+            origin = STIMULI[self.stimulus].origin
             raise InvalidValueError(
                 "the earlier sessions of the prior and the design space count ISIs from different events",
                 got=f"{space.reference} in the space",

@@ -69,7 +69,7 @@ class Span:
         return Span(share * self.share, self.low_ms + mean_ms, self.high_ms + mean_ms, blur_ms)
 
 
-TAP_SPANS: Final = (Span(0.7, 0.0, 115.0), Span(0.3, -30.0, 260.0, 20.0))
+TAP_SPANS: Final = (Span(0.52, 0.0, 115.0), Span(0.3, -30.0, 260.0, 20.0), Span(0.18, -40.0, 0.0))
 """Where windows start after a tap."""
 
 

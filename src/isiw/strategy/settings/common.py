@@ -33,6 +33,7 @@ KNOWN: Final = {
         ("model", "prior", "start", "hit_delay_ms"),
     ),
     "muscle": (("model", "prior", "muscle"),),
+    "intensity_pct_rmt": (("model", "prior", "intensity_pct_rmt"),),
     "conditioning": (("model", "prior", "profile", "conditioning"),),
 }
 """Short keys of what is known of the rig and the person; they stand for fields deep in a model's prior."""
