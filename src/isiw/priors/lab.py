@@ -126,14 +126,8 @@ class LabPrior:
             usual: what is believed of people in general; by default the built-in prior.
         """
         usual = usual or Prior()
-        conditioning = usual.profile.conditioning if self.place is None else self.place.conditioning
-        profile = replace(
-            usual.profile,
-            p_window=self.p_window,
-            shapes=self.shapes,
-            places=_given(self.place),
-            conditioning=conditioning,
-        )
+        own = usual.profile if self.place is None else usual.profile.after(self.place.conditioning)
+        profile = replace(own, p_window=self.p_window, shapes=self.shapes, places=_given(self.place))
         return replace(
             usual,
             profile=profile,
@@ -186,7 +180,7 @@ def learn(
     sessions = tuple(_learnt_session(record) for record in records)
     _require_different(records, sessions, again=again)
     conditioning, space = records[0].header.conditioning, records[0].header.space
-    prior = Prior(ProfilePrior(conditioning=conditioning))
+    prior = Prior(ProfilePrior().after(conditioning))
     posteriors = []
     for record in records:
         posteriors.append(recalled(record, prior))

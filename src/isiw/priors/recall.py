@@ -91,9 +91,7 @@ def _of_rig(prior: Prior, record: SessionRecord) -> Prior:
     """The prior, told what came when and whose MEPs these are, as far as prior, strategy or device say."""
     start = prior.profile.start
     delay_ms = stated_hit_delay_ms(record) or start.hit_delay_ms
-    profile = replace(
-        prior.profile, start=replace(start, hit_delay_ms=delay_ms), conditioning=record.header.conditioning
-    )
+    profile = replace(prior.profile, start=replace(start, hit_delay_ms=delay_ms)).after(record.header.conditioning)
     told = record.header.strategy.settings.get("muscle")
     known = told if told in {muscle.name for muscle in prior.muscles} else None
     settings, visit = record.header.strategy.settings, record.header.visit

@@ -140,6 +140,10 @@ class ProfilePrior:
         """The conditioning stimulus, as it is stated, or a tap."""
         return self.conditioning or "tap"
 
+    def after(self, stimulus: Conditioning) -> ProfilePrior:
+        """The same of a conditioning stimulus; unchanged where that is what is most probable already."""
+        return self if stimulus == self.stimulus else replace(self, conditioning=stimulus)
+
     @property
     def p_place(self) -> float:
         """Probability that a window is where earlier sessions say."""
