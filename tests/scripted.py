@@ -33,6 +33,10 @@ class RememberingPosterior:
     space: DesignSpace
     seed: int
     told: tuple[tuple[float, float], ...] = ()
+    changes: tuple[int, ...] = ()
+
+    def noting_change(self) -> RememberingPosterior:
+        return replace(self, changes=(*self.changes, len(self.told)))
 
     @property
     def trials(self) -> int:
@@ -55,7 +59,7 @@ class RememberingPosterior:
 
     @property
     def wanted_ms(self) -> float:
-        scrambled = math.fsum((k + 1) * (isi + 1e3 * mep) for k, (isi, mep) in enumerate(self.told))
+        scrambled = math.fsum((k + 1) * (isi + 1e3 * mep) for k, (isi, mep) in enumerate(self.told)) + sum(self.changes)
         return self.space.low_ms + (37.0 * self.seed + 53.0 + 7.0 * scrambled) % (
             self.space.high_ms - self.space.low_ms
         )

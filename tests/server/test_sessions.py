@@ -225,6 +225,16 @@ def test_a_note_with_a_key_is_logged_once_also_after_resuming(
     assert notes_in(tmp_path / "P07.mcap") == [("coil moved: 1 = 2 & 5 µV", "n1")]
 
 
+def test_a_change_with_a_key_is_logged_once_and_named_in_the_log(
+    client: httpx.Client, session: str, tmp_path: Path
+) -> None:
+    told(client, session, 2)
+    for _ in range(2):
+        done(client.post(f"{session}/change", json={"text": "coil re-seated", "key": "c1"}))
+    changes = [event for event in read_session(tmp_path / "P07.mcap").events if event.kind == "change"]
+    assert [(event.trial, event.text) for event in changes] == [(1, "coil re-seated")]
+
+
 def test_a_note_whose_text_ends_like_a_key_swallows_no_later_one(
     client: httpx.Client, session: str, tmp_path: Path
 ) -> None:

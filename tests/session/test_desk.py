@@ -31,6 +31,9 @@ class Operated:
     def note(self, text: str) -> None:
         self.done.append(("note", text))
 
+    def note_change(self, text: str) -> None:
+        self.done.append(("change", text))
+
     def exclude(self, trial: int, reason: str = "") -> None:
         self.done.append(("exclude", trial, reason))
 
@@ -124,6 +127,15 @@ def test_a_note_is_typed_and_its_letters_are_no_commands() -> None:
     session = Operated(trial(0))
     press(Desk(session), "nprexy\x7f caf\u00e9\n")
     assert session.done == [("note", "prex caf\u00e9")]
+
+
+def test_a_change_is_typed_as_a_note_is(capsys: pytest.CaptureFixture[str]) -> None:
+    session = Operated(trial(0))
+    desk = Desk(session)
+    with shown(desk, capsys) as lines:
+        press(desk, "ccoil\nnwell\n")
+    assert session.done == [("change", "coil"), ("note", "well")]
+    assert [line for line in lines if "in the log" in line] == ["The change is in the log.", "The note is in the log."]
 
 
 @pytest.mark.parametrize("keys", ["nnever\x1b", "n  \n", "n\x7f\n"])

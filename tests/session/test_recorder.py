@@ -43,9 +43,9 @@ from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Trial, TrialTable
 from isiw.types import Reference
-from known import known
+from known import instance, known
 from logs import cut_after
-from scripted import FakeRealClock, ScriptedDevice, scripted_strategy, told_to
+from scripted import FakeRealClock, RememberingPosterior, ScriptedDevice, scripted_strategy, told_to
 
 
 class BusyClock(FakeRealClock):
@@ -431,6 +431,28 @@ def test_an_excluded_trial_is_unlearnt_and_stays_so(log: Path) -> None:
         assert resumed.ask() == after
 
 
+def test_a_change_is_learnt_where_it_was_noted_also_after_a_verdict_and_after_resuming(log: Path) -> None:
+    def changes(session: Recorder) -> tuple[int, ...]:
+        return instance(RememberingPosterior, session.strategy.posterior).changes
+
+    with open_session(scripted_strategy(9), log) as session:
+        run(session, 3)
+        for _ in range(2):  # it is sent again
+            session.note_change("coil re-seated", key="c1")
+        assert changes(session) == (3,)
+        run(session, 2)
+        session.exclude(1)
+        assert changes(session) == (2,)
+        after = session.ask()
+    with open_session(scripted_strategy(9), log, resume=True) as resumed:
+        assert changes(resumed) == (2,)
+        assert resumed.ask() == after
+        resumed.note_change("and again", key="c1")
+        assert changes(resumed) == (2,)
+    events = [event for event in read_session(log).events if event.kind == "change"]
+    assert [(event.trial, event.text) for event in events] == [(2, "coil re-seated")]
+
+
 @pytest.mark.parametrize("nothing", [None, 3])
 def test_what_is_said_about_a_session_is_a_text(log: Path, nothing: Any) -> None:
     with open_session(scripted_strategy(9), log) as session:
@@ -568,10 +590,10 @@ def test_an_interrupted_trial_is_in_the_next_estimate(log: Path, monkeypatch: py
 def test_trials_are_judged_in_another_thread_without_losing_any(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     learns, told = threading.Event(), relearned
 
-    def slowly(strategy: Strategy, trials: TrialTable) -> Strategy:
+    def slowly(strategy: Strategy, trials: TrialTable, changes: list[int]) -> Strategy:
         learns.set()
         time.sleep(0.2)  # long enough for several trials of the loop
-        return told(strategy, trials)
+        return told(strategy, trials, changes)
 
     monkeypatch.setattr(examination, "relearned", slowly)
     with open_session(scripted_strategy(30), log) as session:

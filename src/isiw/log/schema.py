@@ -163,6 +163,7 @@ EventKind: TypeAlias = Literal[
     "pause",
     "doubt",
     "note",
+    "change",
 ]
 
 
@@ -180,9 +181,9 @@ class Event(LogRecord):
     """Something that happened to a session.
 
     `trial` is the one that was judged by an operator, refused or answered late, and otherwise the last one before the
-    event. What is "refused" was not delivered, whatever the intent before it says. A note with the `key` of an earlier
-    one is not logged. `finding` is what a doubt or a pause is about, and `corrected` what a correction says that the
-    trial's values really were.
+    event. What is "refused" was not delivered, whatever the intent before it says. A note or a change with the
+    `key` of an earlier one is not logged. A "change" bears on all MEPs after its trial. `finding` is what a
+    doubt or a pause is about, and `corrected` what a correction says that the trial's values really were.
     """
 
     kind: EventKind

@@ -81,6 +81,12 @@ def acceptance(trials: TrialTable, number: int, space: DesignSpace) -> Event:
     return Event(kind="acceptance", trial=number, text=f"Accepted by the operator all the same: {trial.reason}.")
 
 
+def change(trials: TrialTable, what: str, key: str | None = None) -> Event:
+    """That something changed after the last trial that may bear on all later MEPs; trials count as they did."""
+    text("the key of a change", key or "")
+    return Event(kind="change", trial=trials[-1].index if trials else None, text=text("a change", what), key=key)
+
+
 def correction(trials: TrialTable, number: int, why: str, corrected: Correction) -> Event:
     """That some values of a trial were others than its record says; the record stays as it is."""
     _require("correct", number, [trial.index for trial in trials], "of this session")

@@ -43,6 +43,7 @@ _BODIES: Final[dict[str, type[BaseModel]]] = {
     "/sessions/{id}/tell": TellRequest,
     "/sessions/{id}/mistrial": MistrialRequest,
     "/sessions/{id}/note": NoteRequest,
+    "/sessions/{id}/change": NoteRequest,
     "/sessions/{id}/exclude": ExcludeRequest,
     "/sessions/{id}/include": IncludeRequest,
 }

@@ -170,6 +170,10 @@ class DrivenSession:
         """Log a remark; with a key that was used before, nothing."""
         self.recorder.note(request.text, key=request.key)
 
+    def note_change(self, request: NoteRequest) -> None:
+        """Log a change; with a key that was used before, nothing."""
+        self.recorder.note_change(request.text, key=request.key)
+
     def exclude(self, request: ExcludeRequest) -> None:
         """Let a trial not count; one that is excluded already stays so."""
         if not any(trial.index == request.trial and trial.excluded for trial in self.recorder.trials):

@@ -102,13 +102,13 @@ class MistrialRequest(_Request):
 
 
 class NoteRequest(_Request):
-    """A remark for the log."""
+    """A remark for the log, or what changed."""
 
     text: Text
     key: str | None = Field(
         default=None,
         pattern=r"^[A-Za-z0-9_-]{1,64}$",
-        description="Of the client's choice: a note with the same key is logged once only.",
+        description="Of the client's choice: a note or change with the same key is logged once only.",
     )
 
 

@@ -139,6 +139,14 @@ def note(folder: Folder, name: Name, body: Annotated[NoteRequest, Depends(body_o
     return _json(OkAnswer())
 
 
+@router.post("/sessions/{id}/change", responses=_errors(400, 404, 409, 415), response_model=OkAnswer)
+def change(folder: Folder, name: Name, body: Annotated[NoteRequest, Depends(body_of(NoteRequest))]) -> Response:
+    """That something changed that may bear on all later MEPs, such as the coil's place. Safe to repeat with a key."""
+    with folder.driving(name) as session:
+        session.note_change(body)
+    return _json(OkAnswer())
+
+
 @router.post("/sessions/{id}/exclude", responses=_errors(400, 404, 409, 415), response_model=SessionAnswer)
 def exclude(folder: Folder, name: Name, body: Annotated[ExcludeRequest, Depends(body_of(ExcludeRequest))]) -> Response:
     """Let a trial not count. Safe to repeat."""

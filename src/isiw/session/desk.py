@@ -17,8 +17,8 @@ from isiw.session.terminal import ERASED, ESCAPE, Keys, Screen, is_terminal
 from isiw.trials import TrialTable
 
 KEYS: Final = (
-    "p pause, x exclude the last trial, u undo that, n note, ? these keys,\n"
-    "a accept or j reject the last MEP, Ctrl-C pause, Ctrl-C twice end"
+    "p pause, x exclude the last trial, u undo that, n note, c note a change (coil, electrodes, gain),\n"
+    "? these keys, a accept or j reject the last MEP, Ctrl-C pause, Ctrl-C twice end"
 )
 _WORTH_COUNTING_S = 15.0
 
@@ -40,6 +40,9 @@ class Operated(Protocol):
     def note(self, text: str) -> None:
         """Log a remark."""
 
+    def note_change(self, text: str) -> None:
+        """Log that something changed that bears on all MEPs from here on."""
+
     def exclude(self, trial: int, reason: str = "") -> None:
         """Let a trial not count."""
 
@@ -60,6 +63,8 @@ class Desk:
         self._session, self.screen, self._asking = session, Screen(), asking or Asking()
         self._keys: Keys | None = None
         self._note: str | None = None
+        self._keep: Callable[[str], None] = session.note
+        self._typed = "note"
         self._left_alone = False
         self._counted: int | None = None
         self.shown: int | None = None
@@ -140,7 +145,8 @@ class Desk:
             "u": self._undo,
             "a": lambda: self._judge(self._session.accept, "counts"),
             "j": lambda: self._judge(self._session.reject, "is rejected and does not count"),
-            "n": self._begin_note,
+            "n": lambda: self._begin("note", self._session.note),
+            "c": lambda: self._begin("change", self._session.note_change),
             "?": lambda: self.screen.say(f"Keys: {KEYS}."),
         }
 
@@ -171,17 +177,17 @@ class Desk:
         self._session.include(number)
         self.screen.say(f"Trial {number} counts again.")
 
-    def _begin_note(self) -> None:
-        self._note = ""
-        self.screen.type("Note (Enter keeps it, Esc drops it): ")
+    def _begin(self, what: str, keep: Callable[[str], None]) -> None:
+        self._note, self._typed, self._keep = "", what, keep
+        self.screen.type(f"{what.capitalize()} (Enter keeps it, Esc drops it): ")
 
     def _type(self, note: str, key: str) -> None:
         if key in "\r\n":
             self._note = None
             self.screen.type("\n")
             if note.strip():
-                self._session.note(note.strip())
-                self.screen.say("The note is in the log.")
+                self._keep(note.strip())
+                self.screen.say(f"The {self._typed} is in the log.")
         elif key == ESCAPE:
             self._note = None
             self.screen.type("\n")

@@ -161,9 +161,15 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
             self.unconcluded = trial
 
     def judge(self, verdict: Callable[[TableT], Event]) -> None:
-        """Put on disk what an operator says about a trial; from then on all trials have to be learnt again."""
+        """Put on disk what an operator says about a trial; from then on all trials have to be learnt again.
+
+        With a key that an event has already, nothing is.
+        """
         with self._lock:
             event = verdict(self.trials)
+            if event.key is not None and event.key in self._keys:
+                return
+            self._keys.add(event.key)
             self._sink.append(event)
             self.trials = self.learner.judged(self.trials, event)
             self._events.append(event)
@@ -224,8 +230,8 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
 class _Window:
     """A strategy as an examination sees it; another one once all trials were learnt again."""
 
-    def __init__(self, strategy: Strategy) -> None:
-        self.strategy = strategy
+    def __init__(self, strategy: Strategy, events: Iterable[Event] = ()) -> None:
+        self.strategy, self._changes = strategy, changed_after(events)
 
     @property
     def known(self) -> int:
@@ -241,9 +247,10 @@ class _Window:
         return change_found(self.strategy.estimate().change, trials.told)
 
     def learn_again(self, trials: TrialTable) -> None:
-        self.strategy = relearned(self.strategy, trials)
+        self.strategy = relearned(self.strategy, trials, self._changes)
 
     def judged(self, trials: TrialTable, verdict: Event) -> TrialTable:
+        self._changes += changed_after([verdict])
         return under_all(trials, [verdict])
 
     def decision(self) -> StopDecision:
@@ -264,7 +271,8 @@ def examination_of(
     freely: Callable[..., Any] = _directly,
 ) -> WindowExamination:
     """The examination in which a strategy looks for a window; it has learnt the earlier trials."""
-    return Examination(_Window(strategy), trials or TrialTable(), sink, events, freely)
+    events = tuple(events)
+    return Examination(_Window(strategy, events), trials or TrialTable(), sink, events, freely)
 
 
 def change_found(change: Change | None, told: Sequence[Trial]) -> Finding | None:
@@ -295,11 +303,18 @@ def learn(strategy: Strategy, trial: Trial) -> None:
         strategy.count_mistrial()
 
 
-def relearned(strategy: Strategy, trials: Iterable[Trial]) -> Strategy:
-    """The same strategy, which has learnt all trials from the beginning."""
+def changed_after(events: Iterable[Event]) -> list[int]:
+    """The trials after which somebody noted a change."""
+    return [event.trial for event in events if event.kind == "change" and event.trial is not None]
+
+
+def relearned(strategy: Strategy, trials: Iterable[Trial], changes: Sequence[int] = ()) -> Strategy:
+    """The same strategy, which has learnt all trials from the beginning, and what changed after some of them."""
     again = strategy.restarted()
     for trial in trials:
         learn(again, trial)
+        for _ in range(changes.count(trial.index)):
+            again.note_change()
     return again
 
 

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 
 from isiw.log.schema import Event
-from isiw.log.verdicts import LOOKED_AT, acceptance, exclusion, inclusion
+from isiw.log.verdicts import LOOKED_AT, acceptance, change, exclusion, inclusion
 from isiw.session.examination import WindowExamination
 from isiw.strategy.strategy import Strategy
 from isiw.trials import TrialTable
@@ -42,6 +42,20 @@ class Judging(ABC):
             InvalidValueError: text or key is no text, or the session is not open.
         """
         self._examination.note(text, key=key)
+
+    def note_change(self, text: str, *, key: str | None = None) -> None:
+        """Log that something changed that may bear on all MEPs from here on, such as a coil that was re-seated.
+
+        A strategy that reckons with changes takes one for likely then.
+
+        Args:
+            text: what changed.
+            key: as for `note`.
+
+        Raises:
+            InvalidValueError: text or key is no text, or the session is not open.
+        """
+        self._judge(lambda trials: change(trials, text, key))
 
     @property
     def last_excluded(self) -> int | None:

@@ -21,7 +21,7 @@ from isiw.log.schema import MOST_TRIALS, Event, Intent
 from isiw.log.verdicts import VERDICTS, under
 from isiw.log.writer import LogWriter
 from isiw.session.assembly import BELIEF_VERSION, ENGINE_VERSION, Earlier, versions
-from isiw.session.examination import learn, relearned
+from isiw.session.examination import changed_after, learn, relearned
 from isiw.strategy.catalogue import known_settings, remade_strategy, settings_for
 from isiw.strategy.strategy import Strategy
 from isiw.text import plain
@@ -70,6 +70,7 @@ def replay(record: SessionRecord, strategy: Strategy, *, verify: bool = True) ->
     """
     _require_same_space(strategy, record.header)
     told: list[Trial] = []
+    changes: list[int] = []
     differing: list[int] = []
     first = record.header.asks_from
     by_fallback = {event.trial for event in record.events if event.kind == "fallback"}
@@ -90,10 +91,10 @@ def replay(record: SessionRecord, strategy: Strategy, *, verify: bool = True) ->
         elif isinstance(entry, Trial):
             learn(strategy, entry)
             told.append(entry)
-        elif isinstance(entry, Event) and entry.kind in VERDICTS:
+        elif isinstance(entry, Event) and entry.kind in {*VERDICTS, "change"}:
             # In the order of telling, in which a trial that was lost stands behind later ones.
-            told = [under(trial, entry) for trial in told]
-            strategy = relearned(strategy, told)
+            told, changes = [under(trial, entry) for trial in told], [*changes, *changed_after([entry])]
+            strategy = relearned(strategy, told, changes)
     unknown = record.unknown_trials
     for trial in unknown:
         learn(strategy, trial)

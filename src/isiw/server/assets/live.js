@@ -213,15 +213,19 @@
     if (kind === "excluded") send("include", { trial: number }, `Trial ${number} counts again.`);
     else send("exclude", { trial: number }, `Trial ${number} is excluded.`);
   });
-  element("remark").addEventListener("submit", async (event) => {
-    event.preventDefault();
+  async function log(kind, said) {
     const text = element("note").value.trim();
-    if (text && await send("note", { text }, "The note is in the log.")) element("note").value = "";
+    if (text && await send(kind, { text }, said)) element("note").value = "";
+  }
+  element("remark").addEventListener("submit", (event) => {
+    event.preventDefault();
+    log("note", "The note is in the log.");
   });
   const resized = new ResizeObserver((seen) => {
     for (const { target } of seen) if (target.classList.contains("js-plotly-plot")) Plotly.Plots.resize(target);
   });
   for (const id of ["belief", "sweep"]) resized.observe(element(id)); // words above them may take another line
+  element("change").addEventListener("click", () => log("change", "The change is in the log; MEPs may differ from here on."));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
   followOn();
 })();

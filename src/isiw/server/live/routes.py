@@ -177,3 +177,10 @@ def note(session: Running, body: Annotated[NoteRequest, Depends(body_of(NoteRequ
     """Log a remark."""
     session.note(body.text, key=body.key)
     return OkAnswer()
+
+
+@router.post("/change")
+def change(session: Running, body: Annotated[NoteRequest, Depends(body_of(NoteRequest))]) -> OkAnswer:
+    """Log that something changed that may bear on all later MEPs."""
+    session.note_change(body.text, key=body.key)
+    return OkAnswer()
