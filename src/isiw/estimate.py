@@ -320,7 +320,8 @@ class Estimate(Reported):
     that there is more than one segment. `unusual` are probabilities by name; `excluded_mv` and `excluded_pct_rmt` are
     the largest enhancement that is excluded with 90 % probability. `depressed_ms` are the segments in which the tap
     depresses the MEP, and `depressed_probability` is that there are any; None where nobody looked for them. `change` is
-    what probably changed during the session, whatever the ISI. `beforehand` is the probability of a window before the first trial.
+    what probably changed during the session, whatever the ISI. `beforehand` is the probability of a window before the
+    first trial.
     """
 
     start_beyond: float | None = None

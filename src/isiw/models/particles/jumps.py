@@ -100,9 +100,14 @@ class WindowTarget:
             "redrawn": _redrawn(torch.device("cpu")),
             "renewed": np.array([[kind in kinds for kind in KINDS] for kinds in _RENEWED.values()]),
             "of_profile": np.array([jump in {"form", "place"} for jump in JUMPS]),
-            "kinds": (astuple(profile.shapes), astuple(self.prior.noise), _no_and_yes(profile.p_window), (1.0,)),
+            "kinds": (
+                astuple(profile.shapes),
+                astuple(self.prior.noise),
+                _no_and_yes(profile.p_window),
+                (1.0,),
+                self.prior.changes.shares,
+            ),
         }
-        moves["kinds"] += (self.prior.changes.shares,)
         return prior_tables(
             self.space,
             profile.start,

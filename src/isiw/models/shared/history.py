@@ -65,7 +65,8 @@ class History:
     def to(self, device: torch.device | str, dtype: torch.dtype) -> History:
         """The same on another device, or in another precision."""
         circumstances = None if self.circumstances is None else self.circumstances.to(device, dtype)
-        return History(*(column.to(device, dtype) for column in self.columns), circumstances)
+        columns = History(*(column.to(device, dtype) for column in self.columns))
+        return replace(columns, circumstances=circumstances)
 
     def appended(self, trial: History) -> History:
         """This history and one more trial."""

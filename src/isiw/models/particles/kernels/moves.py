@@ -82,7 +82,8 @@ def _change(tables: Any, steps: Any, draws: Any, normal: Any, z: Any, kinds: Any
         z[size] += _f(A_LITTLE) * uniform[5] * uniform[5] * normal[size]
         if uniform[3] < ANOTHER_KIND:
             kinds[4] = _which(none + (_f(1.0) - none) * uniform[2], tables.kinds[4])
-        return log_block(z, changed, tables, parts) + log_block(z, changed + 1, tables, parts) - z[when] - before
+        now = log_block(z, changed, tables, parts) + log_block(z, changed + 1, tables, parts) - z[when]
+        return float(now - before)
     before = _favour(tables, z, kinds[4], steps, parts)
     fresh_values(changed, tables, draws[OWN_DRAWS:], normal, fresh)
     fresh_values(changed + 1, tables, draws[OWN_DRAWS:], normal, fresh)
