@@ -177,7 +177,9 @@ def test_a_configuration_without_a_device_has_nothing_to_check_and_is_told_how_t
     (tmp_path / "c.toml").write_text("seed = 1\n", encoding="utf-8")
     result = isiw("check", "c.toml")
     assert result.exit_code == 1
-    assert "c.toml names no device, so there is nothing to check; expected a section [device]" in result.output
+    assert (
+        "c.toml names no device of your own, so there is nothing to check; expected a section [device]" in result.output
+    )
     assert 'factory = "rig:make"' in result.output
 
 

@@ -267,7 +267,8 @@ def test_a_log_holds_the_configuration_it_was_run_with(tmp_path: Path, config_fi
     config = config.with_overrides(log=tmp_path / "s.mcap")
     session_for(config).run()
     record = read_session(tmp_path / "s.mcap")
-    assert run_of_log(record).model_dump() == {"seed": 5, "subject": config.subject.model_dump(exclude={"data"})}
+    person = config.subject.model_dump(exclude={"data"})
+    assert run_of_log(record).model_dump() == {"seed": 5, "subject": person, "device": None}
     assert truth_of(record) == Truth(known=True, window=subject_for(config).window(record.header.space))
     assert len(record.table) == 2
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from isiw.config.logged import run_of_log
 from isiw.config.run import RunConfig
-from isiw.config.sections import SimulatedConfig
+from isiw.config.sections import RobotConfig, SimulatedConfig
 from isiw.config.session import learns_from_earlier
 from isiw.devices.limits import Limits
 from isiw.errors import ConfigError, IsiwError, LimitExceededError, LogError
@@ -132,14 +132,18 @@ def _require_same_simulated(config: RunConfig, record: SessionRecord) -> None:
     except ConfigError:
         return
     now = SimulatedConfig(**config.subject.model_dump(exclude={"data"}))
-    if (was.seed, was.subject) != (config.seed, now):
+    if (was.seed, was.subject, was.device) != (config.seed, now, config.robot):
         raise ConfigError(
-            "the configuration simulates another person",
-            got=f"seed {config.seed}, {config.subject}",
-            expected=f"seed {was.seed}, {was.subject}",
+            "the configuration simulates another person, or another robot",
+            got=f"seed {config.seed}, {config.subject}, {_robot_text(config.robot)}",
+            expected=f"seed {was.seed}, {was.subject}, {_robot_text(was.device)}",
             remedy="Leave the configuration out; the simulated person's settings are in the log: "
             f"{continued_by(record.path, record.header)}",
         )
+
+
+def _robot_text(robot: RobotConfig | None) -> str:
+    return "no robot" if robot is None else str(robot)
 
 
 def _differing(name: str, before: Any, after: Any) -> Iterator[tuple[str, object, object]]:

@@ -8,10 +8,11 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from isiw.config.sections import SimulatedConfig
+from isiw.config.robot import person_under
+from isiw.config.sections import RobotConfig, SimulatedConfig
 from isiw.config.session import simulated_device
 from isiw.devices.simulated import SimulatedDevice
-from isiw.errors import ConfigError
+from isiw.errors import ConfigError, InvalidValueError
 from isiw.log.headers import RUN_KEY
 from isiw.log.kinds import continued_by
 from isiw.log.reader import SessionRecord
@@ -27,6 +28,7 @@ class _LoggedRun(BaseModel):
 
     seed: int = Field(default=0, ge=0)
     subject: SimulatedConfig = SimulatedConfig()
+    device: RobotConfig | None = None
 
 
 @dataclass(frozen=True)
@@ -45,13 +47,14 @@ class Truth:
 
 
 def run_of_log(record: SessionRecord) -> _LoggedRun:
-    """Seed and simulated person of a session of `isiw run`.
+    """Seed, simulated person and robot of a session of `isiw run`.
 
     Raises:
         ConfigError: it was run with a device of the lab's own or by other software, or the person is not known here.
     """
     run = record.header.config.get(RUN_KEY)
-    if run is None or (isinstance(run, Mapping) and "device" in run):
+    device = run.get("device", {}) if isinstance(run, Mapping) else {}
+    if run is None or (device != {} and not (isinstance(device, Mapping) and "kind" in device)):
         raise ConfigError(
             "the session's device is not known here",
             got=record.header.device.name,
@@ -66,9 +69,12 @@ def truth_of(record: SessionRecord) -> Truth:
         return Truth()
     try:
         run = run_of_log(record)
-    except ConfigError as error:
+        if run.device is not None:
+            person = person_under(run.device, run.subject, run.seed)
+        else:
+            person = person_of(run.subject.cohort, run.subject.number, run.seed)
+    except (ConfigError, InvalidValueError) as error:
         return Truth(lacking=f"The true window of the simulated person is not known: {error}")
-    person = person_of(run.subject.cohort, run.subject.number, run.seed)
     return Truth(known=True, window=person.window(record.header.space))
 
 
@@ -84,4 +90,4 @@ def device_of_log(record: SessionRecord, data: Path | None = None) -> SimulatedD
         DeviceError: no recordings in the folder.
     """
     run = run_of_log(record)
-    return simulated_device(run.seed, run.subject, record.header.space.reference, data)
+    return simulated_device(run.seed, run.subject, record.header.space, data, run.device)

@@ -19,10 +19,12 @@ from typing import Any, Self, get_args
 
 from pydantic import Field, model_validator
 
+from isiw.config.robot import robot_for
 from isiw.config.sections import (
     TIMEOUT_S,
     DeviceConfig,
     LimitsConfig,
+    RobotConfig,
     Section,
     SpaceConfig,
     StrategyConfig,
@@ -40,7 +42,7 @@ from isiw.visit import VisitProtocol
 
 
 class RunConfig(Section):
-    """The whole configuration of `isiw run`; with a device, nobody is simulated, and a new session needs a space."""
+    """The whole configuration of `isiw run`; with a rig of one's own nobody is simulated, and a space is needed."""
 
     seed: int = Field(default=0, ge=0)
     log: Path | None = None
@@ -57,14 +59,26 @@ class RunConfig(Section):
 
     @model_validator(mode="after")
     def _one_person(self) -> Self:
-        if self.device is not None and "subject" in self.model_fields_set:
+        if self.own_rig and "subject" in self.model_fields_set:
             raise ConfigError(
                 "device and subject exclude each other",
                 expected="a device of your own, or a simulated subject",
                 remedy="To stimulate, remove [subject] and leave out --subject and --data; the person's code is "
                 "visit.subject. To simulate, remove [device].",
             )
+        if self.robot is not None:
+            robot_for(self.robot, self.seed, self.subject, self.space.design())
         return self
+
+    @property
+    def own_rig(self) -> bool:
+        """Whether the device is the lab's own."""
+        return self.device is not None and self.robot is None
+
+    @property
+    def robot(self) -> RobotConfig | None:
+        """The simulated robot; None where there is none."""
+        return None if self.device is None else self.device.robot
 
     @property
     def space_named(self) -> bool:
@@ -77,7 +91,7 @@ class RunConfig(Section):
         Raises:
             ConfigError: a device of the lab's own, and nobody says from which event it counts.
         """
-        if self.device is not None and not self.space_named:
+        if self.own_rig and not self.space_named:
             missing = missing_reference()
             raise ConfigError(
                 "a device of your own needs a section [space]: " + missing.what,
@@ -164,8 +178,10 @@ def load_config(path: str | Path | None = None) -> RunConfig:
     if path is None:
         return _validated({}, "the defaults")
     values, folder = read_toml(path), Path(path).resolve().parent
-    if isinstance(values.get("device"), dict):  # a module of the user's own usually lies beside the file
-        values["device"] = {"folder": folder} | values["device"]
+    if (
+        isinstance(device := values.get("device"), dict) and "factory" in device
+    ):  # a module of the user's own usually lies beside the file
+        values["device"] = {"folder": folder} | device
     config = _read_from(folder, _validated(values, str(path)))
     require_units(values)
     require_together(values)

@@ -155,18 +155,43 @@ class LimitsConfig(Section):
     max_consecutive_mistrials: int = Field(default=3, ge=1)
 
 
-class DeviceConfig(Section):
-    """A lab's own rig: what makes it, with which settings; a log never names it."""
+class RobotConfig(BaseModel):
+    """A simulated robot of isiw's own, in names and numbers; other keys are ignored, as in `SimulatedConfig`."""
 
-    factory: str
+    model_config = ConfigDict(frozen=True)
+
+    kind: Literal["tapper", "rotating-tapper"]
+    settings: dict[str, Any] = Field(default_factory=dict)
+
+
+class DeviceConfig(Section):
+    """A lab's own rig by the factory that makes it, which no log names, or a simulated robot by its kind."""
+
+    factory: str | None = None
+    kind: Literal["tapper", "rotating-tapper"] | None = None
     settings: dict[str, Any] = Field(default_factory=dict)
     folder: Path | None = None
     timeout_s: float = Field(default=TIMEOUT_S, gt=0.0, allow_inf_nan=False)
 
+    @model_validator(mode="after")
+    def _either(self) -> Self:
+        if (self.factory is None) == (self.kind is None):
+            raise ConfigError(
+                "a device has either a factory, which makes your own, or the kind of a simulated robot",
+                got={"factory": self.factory, "kind": self.kind},
+                expected='such as factory = "rig:make", or kind = "tapper"',
+            )
+        return self
+
+    @property
+    def robot(self) -> RobotConfig | None:
+        """The simulated robot; None where the rig is the lab's own."""
+        return None if self.kind is None else RobotConfig(kind=self.kind, settings=self.settings)
+
     @field_validator("factory")
     @classmethod
-    def _named(cls, factory: str) -> str:
-        if not re.fullmatch(r"[\w.]+:\w+", factory):
+    def _named(cls, factory: str | None) -> str | None:
+        if factory is not None and not re.fullmatch(r"[\w.]+:\w+", factory):
             raise ConfigError(
                 "a factory is named by its module and its function",
                 got=factory,

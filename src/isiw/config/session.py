@@ -10,8 +10,10 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, Final
 
+from isiw.config.robot import robot_for
 from isiw.config.run import RunConfig, limits_for
-from isiw.config.sections import SimulatedConfig, SubjectConfig
+from isiw.config.sections import RobotConfig, SimulatedConfig, SubjectConfig
+from isiw.design import DesignSpace
 from isiw.devices.protocol import Device, DeviceInfo
 from isiw.devices.recorded import RecordedPerson, load_recordings
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
@@ -28,7 +30,6 @@ from isiw.strategy.catalogue import known_settings, make_strategy, settings_for
 from isiw.subjects.cohorts import person_of
 from isiw.subjects.subject import SimulatedSubject
 from isiw.text.named_code import named_code, require_fitting
-from isiw.types import Reference
 from isiw.visit import Visit
 
 TEMPLATE_FILES = ("rig.py", "session.toml", "test_rig.py")
@@ -167,7 +168,7 @@ def fresh_log_path(config: RunConfig) -> Path:
 
 def assumed_space(config: RunConfig) -> str | None:
     """What to say where a new session has the design space that nobody has named; None where it has another."""
-    if config.space_named or config.device is not None:
+    if config.space_named or config.own_rig:
         return None
     return f"No [space] is given, so ISIs are {config.space.design()}."
 
@@ -178,19 +179,24 @@ def subject_for(config: RunConfig) -> SimulatedSubject:
 
 
 def device_for(config: RunConfig) -> Device:
-    """The device: the user's own, or a simulated person, in recorded EMG where asked for.
+    """The device: the user's own, or a simulated person, under a simulated robot or in recorded EMG if asked for.
 
     Raises:
         ConfigError: recorded EMG without its folder, or a factory that makes no device.
         DeviceError: no recordings in the folder.
     """
-    if config.device is not None:
+    if config.device is not None and config.device.factory is not None:
         return device_from_factory(config.device.factory, config.device.settings, config.device.folder)
-    return simulated_device(config.seed, config.subject, config.space.reference, config.subject.data)
+    return simulated_device(config.seed, config.subject, config.space.design(), config.subject.data, config.robot)
 
 
-def simulated_device(seed: int, person: SimulatedConfig, reference: Reference, data: Path | None) -> SimulatedDevice:
+def simulated_device(
+    seed: int, person: SimulatedConfig, space: DesignSpace, data: Path | None, robot: RobotConfig | None = None
+) -> SimulatedDevice:
     """The device of a simulated person."""
+    if robot is not None:
+        return SimulatedDevice(robot_for(robot, seed, person, space))
+    reference = space.reference
     subject = person_of(person.cohort, person.number, seed)
     respond = partial(subject.begin(seed).respond, reference=reference)
     hit_delay_ms = subject.stated_hit_delay_ms if reference == "valve" else None
@@ -219,9 +225,9 @@ def require_device(config: RunConfig, path: Path) -> None:
     Raises:
         ConfigError: it would simulate a person.
     """
-    if config.device is None:
+    if not config.own_rig:
         raise ConfigError(
-            f"{path} names no device, so there is nothing to check",
+            f"{path} names no device of your own, so there is nothing to check",
             expected='a section [device] with the function that makes it, such as factory = "rig:make"',
             remedy="Add it. isiw new rig FOLDER writes a device, and a configuration that names it.",
         )
@@ -256,9 +262,9 @@ def session_for(config: RunConfig) -> Session:
         make_strategy(config.strategy.name, space=space, seed=config.seed, **settings),
         log=log,
         limits=limits_for(config),
-        subject=config.visit.subject or ("" if config.device else _code(config)),
+        subject=config.visit.subject or ("" if config.own_rig else _code(config)),
         signals=config.signals,
-        config={} if config.device else {RUN_KEY: _kept(config)},
+        config={} if config.own_rig else {RUN_KEY: _kept(config)},
         timeout_s=config.timeout_s,
         visit=config.visit.noted(),
         protocol=config.protocol,
@@ -286,4 +292,6 @@ def _kept(config: RunConfig) -> dict[str, Any]:
     kept = config.model_dump(mode="json", exclude_none=True, exclude={"log", "device", "signals"})
     if config.subject.data is not None:
         kept["subject"]["data"] = str(config.subject.data.resolve())
+    if config.robot is not None:
+        kept["device"] = config.robot.model_dump()
     return kept

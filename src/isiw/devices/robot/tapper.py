@@ -10,7 +10,7 @@ from typing import Literal, Protocol, TypeAlias, get_args
 
 import numpy as np
 
-from isiw.checks import check_choice, check_numbers
+from isiw.checks import MOST_DELAY_MS, check_choice, check_numbers
 from isiw.devices.protocol import DeviceInfo
 from isiw.devices.robot.mechanism import Geometry, Taps, draw_taps
 from isiw.devices.robot.presets import preset
@@ -22,6 +22,7 @@ from isiw.types import FloatArray, Reference
 
 Trigger: TypeAlias = Literal["open-loop", "impact"]
 
+MOST_RATE_HZ = 100_000.0
 SWEEP_MS = 1000.0
 AFTER_PULSE_MS = 60.0
 ALONE_MS = 200.0  # TMS alone comes as late after the valve command, which then moves nothing, as a usual pulse
@@ -67,8 +68,10 @@ class TapperSettings:
     def __post_init__(self) -> None:
         check_choice(self, "reference", get_args(Reference))
         check_choice(self, "trigger", get_args(Trigger))
-        check_numbers(self, "rate_hz", "expected_hit_ms", "expected_hit_sd_ms", "expected_tap_sd_ms", above=0)
-        check_numbers(self, "pulse_jitter_ms", least=0)
+        check_numbers(self, "rate_hz", above=0, most=MOST_RATE_HZ)
+        times = "expected_hit_ms", "expected_hit_sd_ms", "expected_tap_sd_ms"
+        check_numbers(self, *times, above=0, most=MOST_DELAY_MS)
+        check_numbers(self, "pulse_jitter_ms", least=0, most=MOST_DELAY_MS)
         if self.trigger == "impact" and not self.accelerometer:
             raise InvalidValueError("the impact cannot trigger a pulse without an accelerometer to find it")
         if self.reference == "impact" and not self.accelerometer:
@@ -147,7 +150,7 @@ class Tapper:
             DeviceError: an ISI too short to be triggered by the impact.
         """
         if stimulus.isi_ms is not None:
-            self._require_possible(stimulus.isi_ms)
+            self.require_possible(stimulus.isi_ms)
         rng = np.random.default_rng([self._seed, stimulus.trial])
         taps = draw_taps(self.geometry, 1, rng)
         if stimulus.isi_ms is not None:
@@ -158,7 +161,8 @@ class Tapper:
         """The commanded ISI, counted from the impact as predicted [ms]."""
         return isi_ms if self.settings.reference == "impact" else isi_ms - self.hit_delay.mean_ms
 
-    def _require_possible(self, isi_ms: float) -> None:
+    def require_possible(self, isi_ms: float) -> None:
+        """Raise DeviceError where an ISI is too short to be triggered by the impact."""
         after_impact_ms = self._after_impact_ms(isi_ms)
         if self.settings.trigger == "impact" and after_impact_ms < DETECTION_LATENCY_MS:
             raise DeviceError(

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from isiw.checks import number, whole
+from isiw.checks import MOST_DELAY_MS, number, whole
 from isiw.devices.protocol import DeviceInfo
 from isiw.devices.robot.tapper import Tapper
 from isiw.devices.robot.vane.actuator import Vane
@@ -18,6 +18,7 @@ from isiw.signals.mep import MEP_WINDOWS_MS
 from isiw.trials import Channel, Stimulus, Sweep
 
 STROKES = 32
+WAIT_MS = 60.0
 STILL_MS = 1000.0  # as long as a usual sweep
 LATEST_MEP_MS = max(end for _, end in MEP_WINDOWS_MS.values())
 
@@ -40,9 +41,9 @@ class RotatingTapper:
         InvalidValueError: a wait in which an MEP may still come, or a negative seed.
     """
 
-    def __init__(self, tapper: Tapper, vane: Vane | None = None, *, wait_ms: float = 60.0, seed: int = 0) -> None:
+    def __init__(self, tapper: Tapper, vane: Vane | None = None, *, wait_ms: float = WAIT_MS, seed: int = 0) -> None:
         self.tapper, self.vane = tapper, vane or Vane()
-        self.wait_ms = number("wait_ms", wait_ms, least=LATEST_MEP_MS)
+        self.wait_ms = number("wait_ms", wait_ms, least=LATEST_MEP_MS, most=MOST_DELAY_MS)
         self._seed = whole("seed", seed, least=0)
 
     @property
