@@ -157,6 +157,14 @@ class VisitProtocol:
             return rest_s
         return max(rest_s, float(_draws(seed, trial, _ITI_DRAWS).uniform(*self.iti_s)))
 
+    def stimuli_for(self, pairs: int) -> int:
+        """How many stimuli so many pairs take at most, their control trials among them.
+
+        Args:
+            pairs: how many pairs.
+        """
+        return math.ceil((pairs + 1) / (1 - self._share)) if self._share else pairs
+
     def control(self, trial: int, seed: int) -> Control | None:
         """Which control trial this is; None for a pair of stimuli.
 

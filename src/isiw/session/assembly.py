@@ -79,6 +79,21 @@ def require_parts(log: object, **parts: tuple[object, type | UnionType]) -> Path
     return log_of(Path(log))
 
 
+def require_room(strategy: Strategy, header: Header) -> None:
+    """Raise where the limits end a strategy's plan before its end, so that it would say nothing about most ISIs."""
+    planned, most = strategy.stimuli_planned, header.limits.max_pulses
+    if planned is None or (needed := header.protocol.stimuli_for(planned)) <= most:
+        return
+    name = strategy.recipe.name or type(strategy.acquisition).__name__
+    raise InvalidValueError(
+        f"the plan of {name} does not fit into the limits",
+        got=f"max_pulses = {most}",
+        expected=f"at least {needed}, its control trials among them" if needed > planned else f"at least {needed}",
+        remedy=f"Write max_pulses = {needed} under [limits] (in Python Limits.of_space(space, max_pulses={needed})), "
+        "or a smaller max_trials under [strategy.settings], which ends the plan there.",
+    )
+
+
 def header_of(strategy: Strategy, **details: Any) -> Header:
     """The header of a session that begins now."""
     recipe, limit_mv = strategy.recipe, strategy.detection_limit_mv

@@ -18,7 +18,7 @@ from isiw.log.headers import Header
 from isiw.log.pulses import earlier_pulses_s
 from isiw.log.schema import Event
 from isiw.log.writer import LogWriter
-from isiw.session.assembly import Earlier, Options, assembled
+from isiw.session.assembly import Earlier, Options, assembled, require_room
 from isiw.session.desk import Table
 from isiw.session.judging import Judging
 from isiw.session.sink import Follower, SessionResult
@@ -114,7 +114,8 @@ class Session(Judging):
         Raises:
             DeviceError: the device failed; it is stopped, and the trial is a mistrial "outcome unknown". Or another
                 session drives it.
-            InvalidValueError: a rest or a period of limits or protocol that limits nothing; nothing was delivered.
+            InvalidValueError: a rest or a period of limits or protocol that limits nothing, or limits that do not hold
+                the plan of the strategy; nothing was delivered.
             LimitExceededError: a stimulus was refused; nothing was delivered.
             LogError: the log cannot be written, or is no longer at its path; nothing is delivered without a log.
             StrategyError: the strategy knows of trials that are not this session's; nothing was delivered.
@@ -216,6 +217,7 @@ class Session(Judging):
             self._limits.require_effect()
             self._header.protocol.require_effect(self._limits.min_iti_s)
             self._header.signals.require_behind_artefact()
+            require_room(self.strategy, self._header)
 
     def _earlier_s(self) -> list[float]:
         """How long ago each earlier stimulus was to the same person, as far as the logs to look at know [s]."""

@@ -17,7 +17,7 @@ from isiw.log.kinds import OWN_LOOP
 from isiw.log.reader import SessionRecord, read_salvaged
 from isiw.log.salvage import Salvage, salvage
 from isiw.log.writer import LogWriter
-from isiw.session.assembly import header_of, require_parts
+from isiw.session.assembly import header_of, require_parts, require_room
 from isiw.session.examination import believed
 from isiw.session.recorder import Recorder
 from isiw.session.replay import require_same_person, taken_up
@@ -66,8 +66,8 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
         DamagedLogError: the log's end is missing, and `lost_pulses` is not given.
         DeviceError: the log is of a simulated device.
         InvalidValueError: `lost_pulses` is no number of stimuli, or the log's end is there; a subject that is no text,
-            or another than the log's; a protocol with control trials; a rest or a period that limits nothing, or a
-            limit on intensity or coil temperature, which nobody reports here.
+            or another than the log's; a protocol with control trials; a rest or a period that limits nothing, a limit
+            on intensity or coil temperature, which nobody reports here, or limits that do not hold the strategy's plan.
         LogError: there is a log already, or it cannot be written or read.
         StrategyError: the strategy knows of trials already, or asks something else than the log says it asked.
 
@@ -100,6 +100,7 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
     header.protocol.require_effect(header.limits.min_iti_s)
     clock = clock or MonotonicClock()
     if not (resume and log_exists(path)):
+        require_room(strategy, header)
         return Recorder(strategy, LogWriter.create(path, header), header, clock, on_doubt=on_doubt)
     given = {"subject": subject, "visit": visit, "protocol": protocol, "limits": limits, "config": config}
     changes = {name: getattr(header, name) for name, value in given.items() if value is not None and value != ""}

@@ -23,7 +23,7 @@ from isiw.signals.evidence import Evidence, Told, is_silent
 from isiw.signals.limits import isi_far, off_by, require_plausible
 from isiw.signals.watch import Doubts, findings
 from isiw.strategy.course import Choice, Cost, Method, evenly_spaced, instead_of_lost
-from isiw.strategy.stopping import StopDecision, StopKind, StoppingRule
+from isiw.strategy.stopping import StopDecision, StopKind, StoppingRule, stimuli_left
 from isiw.types import FloatArray
 
 _T = TypeVar("_T")
@@ -150,6 +150,12 @@ class Strategy:
     def spent(self) -> int:
         """How many stimuli its budget counts: pairs, mistrials among them, but no control trials."""
         return self._course.paired_trials + self._mistrials
+
+    @property
+    def stimuli_planned(self) -> int | None:
+        """How many stimuli its plan takes at most; None for a method that chooses as it learns."""
+        ahead = self._course.plans_ahead and len(self._course.ahead_ms(2)) > 1
+        return stimuli_left(self.stopping, 0) if ahead else None
 
     @property
     def detection_limit_mv(self) -> float | None:
