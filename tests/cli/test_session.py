@@ -65,6 +65,13 @@ def test_exclude_appends_and_resume_learns_without_it(isiw: Command, log: Path) 
     assert "2 count; 1 excluded" in result.output
 
 
+def test_resume_says_how_many_trials_it_replays_before_it_does(isiw: Command, log: Path, tmp_path: Path) -> None:
+    more = tmp_path / "more.toml"
+    more.write_text("[limits]\nmax_pulses = 100\n")
+    for arguments in ((log,), (log, more)):
+        assert "Replaying 3 trials …" in isiw("resume", *arguments).output.splitlines()[0]
+
+
 def test_resume_of_another_softwares_log_says_how(isiw: Command, tmp_path: Path) -> None:
     Session(ScriptedDevice(), scripted_strategy(1), log=tmp_path / "s.mcap").run()
     result = isiw("resume", "s.mcap")

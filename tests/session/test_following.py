@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from isiw.devices.clock import VirtualClock
+from isiw.devices.limits import Limits
 from isiw.errors import InvalidValueError
 from isiw.log.reader import read_session
 from isiw.log.schema import Intent, Record
@@ -17,7 +19,9 @@ from isiw.session.rig import Safeguards
 from isiw.session.sink import SessionUpdate, Sink
 from isiw.session.steps import Asking, Pace
 from isiw.trials import Trial
-from scripted import ScriptedDevice, scripted_strategy
+from isiw.visit import VisitProtocol
+from known import known
+from scripted import SPACE, ScriptedDevice, scripted_strategy
 
 
 @dataclass
@@ -190,10 +194,40 @@ def test_who_fails_in_two_threads_at_once_is_let_go_of_once() -> None:
 
 def test_the_pace_is_the_usual_one_whatever_rests_were_between() -> None:
     pace = Pace()
-    assert pace.left_s(10) is None
+    assert pace.usual_s is None
     for end_s in (0.0, 5.0, 10.0, 600.0, 605.0):
         pace.passed(end_s)
-    assert pace.left_s(10) == pytest.approx(50.0)
+    assert pace.usual_s == pytest.approx(5.0)
+
+
+@pytest.mark.parametrize(
+    ("limits", "protocol"),
+    [
+        ({}, {"block_trials": 4, "rest_s": 60.0}),
+        ({}, {"tms_alone": 0.2}),
+        ({"max_block_pulses": 3, "rest_s": 40.0}, {}),
+        ({"max_period_pulses": 5, "period_s": 300.0}, {"tms_alone": 0.2, "block_trials": 4, "rest_s": 60.0}),
+    ],
+    ids=["rests", "controls", "rests of the limits", "all"],
+)
+def test_the_time_that_is_left_counts_rests_and_control_trials(
+    tmp_path: Path, limits: dict[str, Any], protocol: dict[str, Any]
+) -> None:
+    clock = VirtualClock()
+    seen: list[tuple[float, float | None]] = []
+    session = Session(
+        ScriptedDevice(),
+        scripted_strategy(12),
+        log=tmp_path / "s.mcap",
+        clock=clock,
+        limits=replace(Limits.of_space(SPACE), **limits),
+        protocol=VisitProtocol(**protocol),
+        on_trial=lambda update: seen.append((clock.now_s(), update.left_s)),
+    )
+    session.run()
+    ended_s = read_session(tmp_path / "s.mcap").intents[-1].t_s
+    for now_s, left_s in seen[1:]:
+        assert now_s + known(left_s) == pytest.approx(ended_s, abs=1.0)
 
 
 @pytest.mark.parametrize("answer", ["n", 1, None])

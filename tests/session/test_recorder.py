@@ -211,6 +211,24 @@ def test_a_limit_on_what_a_loop_of_ones_own_does_not_report_is_refused_at_once(
     assert not log.exists()
 
 
+@pytest.mark.parametrize("limits", [{}, {"max_pulses": 500}, {"max_consecutive_mistrials": 5}])
+def test_a_loop_of_ones_own_waits_for_no_interval_that_nobody_stated(
+    log: Path, space: DesignSpace, limits: dict[str, Any]
+) -> None:
+    clock = VirtualClock()
+    with open_session(scripted_strategy(9), log, limits=Limits.of_space(space, **limits), clock=clock) as session:
+        session.ask()
+    assert clock.now_s() == 0.0
+    assert read_session(log).header.limits.min_iti_s == 0.0
+
+
+def test_where_isiw_delivers_an_interval_that_nobody_stated_is_5_s(log: Path, space: DesignSpace) -> None:
+    Session(ScriptedDevice(), scripted_strategy(3), log=log, limits=Limits.of_space(space, max_pulses=20)).run()
+    record = read_session(log)
+    assert record.header.limits.min_iti_s == 5.0
+    assert record.intents[2].t_s - record.intents[1].t_s == pytest.approx(5.0)
+
+
 def test_it_says_what_is_open_and_how_long_the_next_ask_would_wait(log: Path, space: DesignSpace) -> None:
     limits = Limits.of_space(space, min_iti_s=7.0)
     with open_session(scripted_strategy(9), log, limits=limits, clock=VirtualClock()) as session:

@@ -159,7 +159,11 @@ def test_a_loop_of_the_labs_own_cannot_keep_a_locked_intensity_and_is_told_so(lo
 
 
 def test_what_a_session_went_on_with_holds_when_it_is_resumed_again(interrupted: Path, space: DesignSpace) -> None:
-    before, limits, device = read_session(interrupted).header, Limits.of_space(space, max_pulses=6), ScriptedDevice()
+    before, limits, device = (
+        read_session(interrupted).header,
+        Limits.of_space(space, max_pulses=6).stated(5.0),
+        ScriptedDevice(),
+    )
     device.info = dataclasses.replace(device.info, version="2.1")
     resume(interrupted, device, scripted_strategy(10), limits=limits, timeout_s=9.0).run()
     after = read_session(interrupted).header
@@ -218,7 +222,9 @@ def test_the_interval_that_a_device_takes_over_is_the_longer_one_unless_another_
 
 
 IDLE = (
-    dataclasses.replace(Limits.of_space(scripted_strategy().space, max_pulses=5), max_block_pulses=3, rest_s=2.0),
+    dataclasses.replace(
+        Limits.of_space(scripted_strategy().space, min_iti_s=5.0, max_pulses=5), max_block_pulses=3, rest_s=2.0
+    ),
     VisitProtocol(block_trials=3, rest_s=2.0),
 )
 """Limits and a protocol whose rests are shorter than the interval."""
@@ -228,7 +234,7 @@ IDLE = (
 def test_rests_that_limit_nothing_are_refused_where_they_are_stated_and_go_on_from_an_earlier_log(
     log: Path, part: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    own = {"limits": Limits.of_space(scripted_strategy().space)} | part
+    own = {"limits": Limits.of_space(scripted_strategy().space, min_iti_s=5.0)} | part
     with pytest.raises(InvalidValueError, match="no effect"):
         Session(ScriptedDevice(), scripted_strategy(4), log=log, **part).run()
     with pytest.raises(InvalidValueError, match="no effect"):

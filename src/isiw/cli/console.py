@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,6 +15,7 @@ from rich.text import Text
 
 import isiw
 from isiw.text import plain
+from isiw.text.numbers import counted
 
 if TYPE_CHECKING:
     from isiw.log.reader import SessionRecord
@@ -39,6 +40,15 @@ def show_entry(heading: str, text: str) -> None:
     """Print an entry of a list: its heading, and below it the text, indented and as wide as the terminal."""
     show(heading, style="bold")
     Console(highlight=False).print(Padding(Text(text), (0, 0, 0, 4)))
+
+
+@contextmanager
+def counting(doing: str, number: int, thing: str) -> Iterator[Callable[[int], None]]:
+    """Print what is done with how many things; within, a terminal counts them."""
+    if number:
+        show(f"{doing} {counted(number, thing)} …")
+    with Console(stderr=True).status("") as status:
+        yield lambda done: status.update(f"{done} of {number}")
 
 
 def exit_if_damaged(losses: Sequence[str]) -> None:

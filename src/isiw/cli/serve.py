@@ -33,13 +33,14 @@ def serve(
 ) -> None:
     """Serve sessions over HTTP to MATLAB, LabVIEW or any other software of this computer."""
     with errors_reported("The server has ended; its sessions can be resumed."):
+        show("isiw serve starts …")
         given = _token(token_file) if token_file else os.environ.get(TOKEN)
         settings = isiw.server.ServerSettings(
             folder, host, port, certificate=certificate, key=key, **({} if given is None else {"token": given})
         )
 
         def ready(url: str) -> None:
-            show(f"isiw serves the sessions of {folder} at {url}", style="bold")
+            show(f"Ready: isiw serves the sessions of {folder} at {url}", style="bold")
             show("token: as given" if given is not None else f"token: {settings.token}")
 
         isiw.server.serve(settings, ready)

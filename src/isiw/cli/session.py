@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import isiw
-from isiw.cli.console import NO_DEFAULT, NOT_OVER, SESSIONS, errors_reported, show
+from isiw.cli.console import NO_DEFAULT, NOT_OVER, SESSIONS, counting, errors_reported, show
 from isiw.cli.files import free_beside, log_exists
 from isiw.text.harmless import command
 
@@ -106,7 +106,8 @@ def resume(
             changes = isiw.config.changes_on_resume(settings, record)
             differences = isiw.config.differences_on_resume(settings, record)
             device = isiw.config.device_for(settings.with_overrides(data=data))
-        session = isiw.resume(log, device, lost_pulses=lost_pulses, verify=verify, **changes)
+        with counting("Replaying", len(record.table), "trial") as count:
+            session = isiw.resume(log, device, lost_pulses=lost_pulses, verify=verify, replayed=count, **changes)
         for difference in differences:
             show(difference, style="yellow", stderr=True)
         _run_to_the_end(session, config, live=live, resumed=True)

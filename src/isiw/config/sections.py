@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validat
 
 from isiw.checks import choice
 from isiw.design import DesignSpace, missing_reference
+from isiw.devices.limits import USUAL_ITI_S
 from isiw.errors import ConfigError
 from isiw.findings import INTENSITY_PCT, STOP_WIDTH_MS, Scale
 from isiw.strategy.catalogue import list_strategies, settings_for
@@ -144,7 +145,7 @@ class LimitsConfig(Section):
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
-    min_iti_s: float = Field(default=5.0, ge=0.0)
+    min_iti_s: float = Field(default=USUAL_ITI_S, ge=0.0)
     max_pulses: int = Field(default=200, ge=1)
     max_block_pulses: int | None = Field(default=None, ge=1)
     rest_s: float = Field(default=120.0, gt=0.0)

@@ -84,6 +84,14 @@ class Pacing:
         due_s = max(self._limits.earliest_s(self._times_s, self._since_s), last_s + interval_s)
         return max(0.0, due_s - self._clock.now_s())
 
+    def ahead_s(self, intervals_s: Sequence[float]) -> float:
+        """How long the next stimuli take that follow each other at these intervals, or as the limits allow [s]."""
+        now_s, times_s = self._clock.now_s(), list(self._times_s)
+        for interval_s in intervals_s:
+            last_s = times_s[-1] if times_s else self._since_s
+            times_s.append(max(now_s, last_s + interval_s, self._limits.earliest_s(times_s, self._since_s)))
+        return times_s[-1] - now_s if intervals_s else 0.0
+
     def begin_anew(self) -> None:
         """From now on there may be stimuli; the next one comes a whole interval later at the earliest."""
         self._since_s = self._clock.now_s()

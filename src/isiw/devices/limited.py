@@ -67,6 +67,10 @@ class LimitedDevice:
         """How long until the interval, the rest and the period allow the next delivery [s]."""
         return self._pacing.wait_s(interval_s)
 
+    def ahead_s(self, intervals_s: Sequence[float]) -> float:
+        """How long the next stimuli take that follow each other at these intervals, or as the limits allow [s]."""
+        return self._pacing.ahead_s(intervals_s)
+
     def check(self, stimulus: Stimulus) -> None:
         """Raise where this stimulus must not be delivered now."""
         self._limits.require_left(self._delivered)
@@ -76,7 +80,7 @@ class LimitedDevice:
             raise LimitExceededError(
                 "the next stimulus comes too early",
                 got=f"{wait_s:.3f} s before its time",
-                expected=f"at least {self._limits.min_iti_s:g} s between stimuli, and the rests of the limits",
+                expected=f"at least {self._limits.iti_s:g} s between stimuli, and the rests of the limits",
                 remedy="This stimulus was not delivered. Sleep for wait_s() first.",
             )
         self._check_state()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from isiw.checks import check_numbers, check_wholes
@@ -16,6 +16,9 @@ from isiw.visit import interval_s
 _GRID_TOLERANCE_MS = 1e-6
 _SAME_PCT_MSO = 0.01
 
+USUAL_ITI_S = 5.0
+"""Between two stimuli that isiw delivers, where nobody states another interval [s]."""
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -24,7 +27,8 @@ class Limits:
     Args:
         low_ms: shortest ISI on the device's reference [ms].
         high_ms: longest ISI [ms].
-        min_iti_s: shortest time between two deliveries [s].
+        min_iti_s: shortest time between two deliveries [s]; where it is not stated, 5 s if isiw delivers, and none in a
+            loop of your own, as of `isiw.open_session`.
         max_pulses: largest number of deliveries in a session, failed ones included.
         step_ms: ISIs are whole multiples of it above the shortest [ms]; None where any ISI of the range is allowed.
         max_block_pulses: most deliveries in a row without a rest; None where none is needed.
@@ -43,7 +47,7 @@ class Limits:
 
     low_ms: float
     high_ms: float
-    min_iti_s: float = 5.0
+    min_iti_s: float | None = None
     max_pulses: int = 200
     step_ms: float | None = None
     max_block_pulses: int | None = None
@@ -56,7 +60,7 @@ class Limits:
 
     def __post_init__(self) -> None:
         check_numbers(self, "low_ms", "high_ms")
-        check_numbers(self, "min_iti_s", least=0)
+        check_numbers(self, "min_iti_s", least=0, optional=True)
         check_wholes(self, "max_pulses", "max_consecutive_mistrials", least=1)
         check_wholes(self, "max_block_pulses", "max_period_pulses", least=1, optional=True)
         check_numbers(self, "rest_s", "period_s", above=0)
@@ -68,13 +72,18 @@ class Limits:
 
     @classmethod
     def of_space(
-        cls, space: DesignSpace, *, min_iti_s: float = 5.0, max_pulses: int = 200, max_consecutive_mistrials: int = 3
+        cls,
+        space: DesignSpace,
+        *,
+        min_iti_s: float | None = None,
+        max_pulses: int = 200,
+        max_consecutive_mistrials: int = 3,
     ) -> Limits:
         """Limits that allow exactly the ISIs of a design space.
 
         Args:
             space: the design space.
-            min_iti_s: shortest time between two deliveries [s].
+            min_iti_s: as for `Limits` [s].
             max_pulses: largest number of deliveries in a session.
             max_consecutive_mistrials: after so many trials in a row that are rejected, or show a faulty rig, a session
                 pauses.
@@ -92,6 +101,19 @@ class Limits:
             max_consecutive_mistrials=max_consecutive_mistrials,
         )
 
+    @property
+    def iti_s(self) -> float:
+        """The interval that holds where isiw delivers [s]."""
+        return USUAL_ITI_S if self.min_iti_s is None else self.min_iti_s
+
+    def stated(self, iti_s: float) -> Limits:
+        """The same with this interval [s], unless another one is stated.
+
+        Args:
+            iti_s: what holds otherwise.
+        """
+        return replace(self, min_iti_s=iti_s) if self.min_iti_s is None else self
+
     def require_effect(self) -> None:
         """Raise where the interval alone keeps what a rest or a period asks for, so that these limit nothing.
 
@@ -101,21 +123,20 @@ class Limits:
             InvalidValueError: a rest that is no longer than the interval, or a period that always lets a stimulus pass;
                 or an interval in ms.
         """
-        interval_s("Limits.min_iti_s", self.min_iti_s)
-        if self.max_block_pulses is not None and self.rest_s <= self.min_iti_s:
+        interval_s("Limits.min_iti_s", self.iti_s)
+        if self.max_block_pulses is not None and self.rest_s <= self.iti_s:
             raise InvalidValueError(
                 "the rest of the limits is no longer than the interval between two stimuli, so it would have no effect",
-                got=f"rest_s {self.rest_s:g}, min_iti_s {self.min_iti_s:g}",
-                expected=f"rest_s above {self.min_iti_s:g}",
+                got=f"rest_s {self.rest_s:g}, min_iti_s {self.iti_s:g}",
+                expected=f"rest_s above {self.iti_s:g}",
                 remedy="Set a longer rest_s [s], or leave out max_block_pulses and rest_s.",
             )
         # At the shortest interval n stimuli take so long that the next one comes when the first is n intervals old.
-        if self.max_period_pulses is not None and self.period_s <= self.max_period_pulses * self.min_iti_s:
+        if self.max_period_pulses is not None and self.period_s <= self.max_period_pulses * self.iti_s:
             raise InvalidValueError(
                 "the period limit has no effect: at the shortest interval no more than max_period_pulses fit into it",
-                got=f"period_s {self.period_s:g}, max_period_pulses {self.max_period_pulses}, "
-                f"min_iti_s {self.min_iti_s:g}",
-                expected=f"period_s above {self.max_period_pulses * self.min_iti_s:g}",
+                got=f"period_s {self.period_s:g}, max_period_pulses {self.max_period_pulses}, min_iti_s {self.iti_s:g}",
+                expected=f"period_s above {self.max_period_pulses * self.iti_s:g}",
                 remedy="Set a longer period_s [s] or fewer max_period_pulses, or leave out both.",
             )
 
@@ -198,8 +219,8 @@ class Limits:
             since_s: when the session began, or went on [s]; it waits a whole interval before its first stimulus.
         """
         if not times_s:
-            return since_s + self.min_iti_s
-        earliest = [max(since_s, times_s[-1]) + self.min_iti_s]
+            return since_s + self.iti_s
+        earliest = [max(since_s, times_s[-1]) + self.iti_s]
         if self.max_block_pulses is not None and self._block_pulses(times_s) >= self.max_block_pulses:
             earliest.append(times_s[-1] + self.rest_s)
         if self.max_period_pulses is not None and len(times_s) >= self.max_period_pulses:

@@ -99,7 +99,7 @@ def _limits(limits: Limits) -> str:
     said = [
         f"ISIs of {limits.low_ms:g}–{limits.high_ms:g} ms",
         f"at most {limits.max_pulses} stimuli",
-        f"at least {limits.min_iti_s:g} s apart",
+        f"at least {limits.iti_s:g} s apart",
         f"a pause after {limits.max_consecutive_mistrials} mistrials in a row",
     ]
     if limits.max_block_pulses is not None:
@@ -201,7 +201,7 @@ def counted_rows(record: SessionRecord) -> list[Counted]:
         Counted("stimuli delivered", f"{record.given}", f"at most {limits.max_pulses}" if kept else ""),
         Counted("of them with an unknown outcome", f"{unknown}", ""),
         Counted("shortest time between two stimuli", "not known" if shortest_s is None else f"{shortest_s:.2f} s",
-                f"at least {limits.min_iti_s:g} s" if kept else ""),
+                f"at least {limits.iti_s:g} s" if kept else ""),
         Counted("ISIs asked", asked_ms, f"{limits.low_ms:g}–{limits.high_ms:g} ms" if kept else ""),
         Counted("most mistrials in a row", f"{_mistrials_in_a_row(record)}",
                 f"a pause after {limits.max_consecutive_mistrials}" if kept else ""),

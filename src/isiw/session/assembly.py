@@ -15,7 +15,7 @@ import isiw
 from isiw.checks import deadline, number, text
 from isiw.compiled import version as engine_version
 from isiw.devices.clock import Clock
-from isiw.devices.limits import Limits
+from isiw.devices.limits import USUAL_ITI_S, Limits
 from isiw.devices.protocol import Device
 from isiw.errors import InvalidValueError
 from isiw.log.durable import log_of
@@ -173,7 +173,7 @@ def assembled(
         protocol=(protocol, VisitProtocol | None),
     )
     safeguards, protocol = options.get("safeguards") or Safeguards(), protocol or VisitProtocol()
-    limits = limits or Limits.of_space(strategy.space)
+    limits = (limits or Limits.of_space(strategy.space)).stated(USUAL_ITI_S)
     asking, sink = Asking(), Sink(options.get("on_trial"))
     desk = Desk(operated, asking)
     rig = Rig(device, limits, options.get("clock"), safeguards, sink, away=desk.away)

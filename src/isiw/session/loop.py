@@ -215,7 +215,7 @@ class Session(Judging):
     def _require_effect(self) -> None:
         if not self._earlier.first_records:  # what an earlier log says goes on as it was
             self._limits.require_effect()
-            self._header.protocol.require_effect(self._limits.min_iti_s)
+            self._header.protocol.require_effect(self._limits.iti_s)
             self._header.signals.require_behind_artefact()
             require_room(self.strategy, self._header)
 

@@ -47,9 +47,9 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
         log: where the log is; it must not exist yet, unless the session goes on.
         resume: whether to go on with the log where there is one. What was asked and has no outcome in it becomes a
             mistrial.
-        limits: what may be asked; the strategy's space and 200 pulses by default, without an inter-trial interval; of a
-            session that goes on, the logged ones by default. Limits of the coil and of the intensity allow nothing, as
-            nobody reports these here.
+        limits: what may be asked; the strategy's space and 200 pulses by default. Nothing waits between stimuli unless
+            their `min_iti_s` is stated. Of a session that goes on, the logged ones by default. Limits of the coil and
+            of the intensity allow nothing, as nobody reports these here.
         clock: tells the time, and waits in `ask` until the interval, the rest and the period of the limits have passed,
             before the first stimulus, too, as nobody knows what came before.
         subject: the person's code, for the log; of a session that goes on, the logged one by default.
@@ -92,12 +92,12 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
         subject=text("subject", subject),
         visit=visit or Visit(),
         protocol=_without_controls(protocol or VisitProtocol()),
-        limits=limits or Limits.of_space(strategy.space, min_iti_s=0.0),
+        limits=(limits or Limits.of_space(strategy.space)).stated(0.0),
         config=dict(config or {}),
     )
     _require_reported(header.limits)
     header.limits.require_effect()
-    header.protocol.require_effect(header.limits.min_iti_s)
+    header.protocol.require_effect(header.limits.iti_s)
     clock = clock or MonotonicClock()
     if not (resume and log_exists(path)):
         require_room(strategy, header)

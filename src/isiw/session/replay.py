@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
@@ -53,7 +53,13 @@ class Replayed:
     asks_from: int = 0
 
 
-def replay(record: SessionRecord, strategy: Strategy, *, verify: bool = True) -> Replayed:
+def replay(
+    record: SessionRecord,
+    strategy: Strategy,
+    *,
+    verify: bool = True,
+    replayed: Callable[[int], None] = lambda _: None,
+) -> Replayed:
     """Tell a strategy everything that a log holds, in the order in which it was told then.
 
     What an operator said about a trial holds from then on; asks before it are compared as they were made. Of a long
@@ -63,6 +69,7 @@ def replay(record: SessionRecord, strategy: Strategy, *, verify: bool = True) ->
         record: the log.
         strategy: the session's strategy before its first trial.
         verify: whether to compare what the strategy asks with what it asked then.
+        replayed: called after each trial with how many have been told.
 
     Raises:
         StrategyError: it has another design space, or asks something else, although the versions are those that were
@@ -91,6 +98,7 @@ def replay(record: SessionRecord, strategy: Strategy, *, verify: bool = True) ->
         elif isinstance(entry, Trial):
             learn(strategy, entry)
             told.append(entry)
+            replayed(len(told))
         elif isinstance(entry, Event) and entry.kind in {*VERDICTS, "change"}:
             # In the order of telling, in which a trial that was lost stands behind later ones.
             told, changes = [under(trial, entry) for trial in told], [*changes, *changed_after([entry])]
@@ -185,6 +193,7 @@ def taken_up(
     lost_pulses: int | None,
     *,
     verify: bool = True,
+    replayed: Callable[[int], None] = lambda _: None,
 ) -> tuple[Strategy, Earlier]:
     """The strategy that has learnt a log, and where the log ends.
 
@@ -192,16 +201,17 @@ def taken_up(
         OtherVersionsWarning: with other versions than those that were logged it would have asked something else.
     """
     record = _with_lost_pulses(record, lost_pulses)
-    header, replayed = record.header, replay(record, strategy or strategy_of(record.header), verify=verify)
-    if replayed.differing:
-        warn(_differing_text(replayed, header), OtherVersionsWarning)
-    return replayed.strategy, Earlier(
+    header = record.header
+    told = replay(record, strategy or strategy_of(header), verify=verify, replayed=replayed)
+    if told.differing:
+        warn(_differing_text(told, header), OtherVersionsWarning)
+    return told.strategy, Earlier(
         partial(LogWriter.continuing, salvaged.path, salvaged, header),
-        replayed.trials,
+        told.trials,
         record.events,
-        {"created": header.created, "asks_from": replayed.asks_from},
-        (*replayed.unknown, _resumption(record, replayed, limits)),
-        partial(_ages_s, salvaged, len(replayed.trials)),
+        {"created": header.created, "asks_from": told.asks_from},
+        (*told.unknown, _resumption(record, told, limits)),
+        partial(_ages_s, salvaged, len(told.trials)),
     )
 
 
@@ -270,7 +280,7 @@ def _differing_text(replayed: Replayed, header: Header) -> str:
 
 def _resumption(record: SessionRecord, replayed: Replayed, limits: Limits) -> Event:
     """What the log says about a resumption."""
-    was_s, now_s = record.header.limits.min_iti_s, limits.min_iti_s
+    was_s, now_s = record.header.limits.iti_s, limits.iti_s
     sentences = [f"Resumed after {len(replayed.trials)} trials."]
     if replayed.differing:
         sentences.append(_differing_text(replayed, record.header))

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from pathlib import Path
 from typing import Unpack, overload
 
 from isiw.devices.clock import MonotonicClock
-from isiw.devices.limits import Limits
+from isiw.devices.limits import USUAL_ITI_S, Limits
 from isiw.devices.protocol import Device, HasMemory
 from isiw.log.headers import Header
 from isiw.log.kinds import OWN_LOOP, LogKind, of_another_kind
@@ -32,6 +33,7 @@ def resume(
     *,
     lost_pulses: int | None = None,
     verify: bool = True,
+    replayed: Callable[[int], None] = lambda _: None,
     **options: Unpack[ResumeOptions],
 ) -> Session: ...
 @overload
@@ -42,6 +44,7 @@ def resume(
     *,
     lost_pulses: int | None = None,
     verify: bool = True,
+    replayed: Callable[[int], None] = lambda _: None,
     **options: Unpack[ResumeOptions],
 ) -> Recorder | ThresholdRecorder: ...
 def resume(
@@ -51,6 +54,7 @@ def resume(
     *,
     lost_pulses: int | None = None,
     verify: bool = True,
+    replayed: Callable[[int], None] = lambda _: None,
     **options: Unpack[ResumeOptions],
 ) -> Session | Recorder | ThresholdRecorder:
     """What goes on where a log ends. With a device it is a session; nothing is delivered or written before its `run`.
@@ -71,6 +75,7 @@ def resume(
         verify: whether the strategy must ask again what the log says it asked, at first and at last. With other
             versions than those that were logged a difference is a warning; without verification the logged trials are
             told as they are.
+        replayed: with a device, called after each logged trial that the strategy is told again, with how many it knows.
         **options: what holds from here on instead of what was logged last: `limits` (else those that `limits_of_log`
             says), `signals` (trials that were judged stay as they are), `timeout_s` and `ask_deadline_s`; and `clock`,
             `on_trial` and `safeguards`. All are as for `Session`.
@@ -105,7 +110,7 @@ def resume(
         limits.require_effect()
     require_as_real(device.describe(), header.device)
     strategy = strategy.restarted() if strategy else None
-    strategy, earlier = taken_up(salvaged, record, strategy, limits, lost_pulses, verify=verify)
+    strategy, earlier = taken_up(salvaged, record, strategy, limits, lost_pulses, verify=verify, replayed=replayed)
     if isinstance(device, HasMemory):
         device.resume_after([Stimulus(t.index, t.commanded_isi_ms, t.tap_alone) for t in earlier.trials])
     options |= {"limits": limits, "signals": options.get("signals") or header.signals}
@@ -129,6 +134,6 @@ def limits_of_log(header: Header) -> Limits:
     least the default one.
     """
     limits = header.limits
-    if header.device.name != OWN_LOOP or limits.min_iti_s >= Limits.min_iti_s:
+    if header.device.name != OWN_LOOP or limits.iti_s >= USUAL_ITI_S:
         return limits
-    return dataclasses.replace(limits, min_iti_s=Limits.min_iti_s)
+    return dataclasses.replace(limits, min_iti_s=USUAL_ITI_S)

@@ -155,6 +155,10 @@ class Rig:
         """How long until the limits, and an interval since the last delivery [s], allow the next one [s]."""
         return self._limited.wait_s(interval_s)
 
+    def ahead_s(self, intervals_s: Sequence[float]) -> float:
+        """How long the next stimuli take, as `Pacing.ahead_s` has it [s]."""
+        return self._limited.ahead_s(intervals_s)
+
     def check(self, stimulus: Stimulus) -> None:
         """Raise where this stimulus must not be delivered now, as `LimitedDevice.check` does."""
         with self.interrupts.allowed():

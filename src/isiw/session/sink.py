@@ -27,7 +27,8 @@ class SessionUpdate:
         decision: whether the session stops here, and why.
         next_isi_ms: what is asked next [ms]; None where the session stops, or a control trial comes next.
         stimuli_left: how many stimuli the budget and the limits still allow.
-        left_s: about how long so many take at the pace of the last ones [s]; None where there is no pace yet.
+        left_s: about how long so many take at the pace of the last ones, rests and control trials among them [s]; None
+            before there is a pace.
     """
 
     trial: Trial

@@ -160,6 +160,9 @@ class Asking:
 
 _LAST: Final = 20
 
+_FORESEEN: Final = 500
+"""So many pairs are looked ahead to; how long more of them take follows from these."""
+
 _NAP_S = 0.25  # how long a pause may go unnoticed between two stimuli
 
 _NOTHING_GIVEN = (NotDelivered, LimitExceededError)
@@ -186,10 +189,11 @@ class Pace:
         """A stimulus was delivered."""
         self._ends_s.append(now_s)
 
-    def left_s(self, stimuli: int) -> float | None:
-        """About how long so many stimuli take [s]; None before the second one."""
+    @property
+    def usual_s(self) -> float | None:
+        """The usual time from one to the next [s]; None before the second one."""
         gaps_s = [after - before for before, after in itertools.pairwise(self._ends_s)]
-        return stimuli * statistics.median(gaps_s) if gaps_s else None
+        return statistics.median(gaps_s) if gaps_s else None
 
 
 class Steps:
@@ -250,8 +254,21 @@ class Steps:
             self._pausing.reason, self._pausing.kind = f"{pause}", pause.kind
         left = self._stimuli_left()
         estimate = self._strategy.estimate()
-        update = SessionUpdate(trial, estimate, decision, next_isi_ms, left, self._pace.left_s(left))
+        update = SessionUpdate(trial, estimate, decision, next_isi_ms, left, self._left_s(left))
         self._freely(self._sink.updated, update)
+
+    def _left_s(self, left: int) -> float | None:
+        """About how long so many pairs take [s], with the rests and control trials between them."""
+        protocol, seed, usual_s = self._header.protocol, self._header.seed, self._pace.usual_s
+        if usual_s is None:
+            return None
+        intervals_s, pairs = [], 0
+        for number in itertools.count(len(self._examination.trials)):
+            if pairs == min(left, _FORESEEN) or len(intervals_s) == self._rig.pulses_left:
+                break
+            intervals_s.append(max(usual_s, protocol.rest_s) if protocol.rests_before(number) else usual_s)
+            pairs += protocol.control(number, seed) is None
+        return self._rig.ahead_s(intervals_s) * (left / pairs if pairs == _FORESEEN else 1)
 
     def _decision(self) -> StopDecision:
         """The strategy's decision; none is made on data that a person should look at first."""

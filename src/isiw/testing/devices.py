@@ -111,7 +111,7 @@ def _announcement(device: Device, pace: Pace) -> str:
         return f"{info.name} is simulated: nothing is delivered to anybody."
     pairs = 8 if isinstance(device, HasMemory) else 3
     alone = ", one magnetic pulse alone and one tap alone" if info.tap_alone else " and one magnetic pulse alone"
-    iti_s = max(pace.iti_s, pace.limits.min_iti_s)
+    iti_s = max(pace.iti_s, pace.limits.iti_s)
     return f"This check stimulates: {pairs} pairs{alone}, {iti_s:g} s apart. Keep the coil on a phantom."
 
 

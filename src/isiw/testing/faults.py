@@ -264,7 +264,7 @@ def check_ledger(ledger: Iterable[Fired], record: SessionRecord, limits: Limits)
     require(len(fired) <= limits.max_pulses, f"at most {limits.max_pulses} pairs are fired", str(len(fired)))
     for before, after in itertools.pairwise(fired):
         spent_s = after.t_s - before.t_s
-        require(spent_s >= limits.min_iti_s - _ROUNDING_S, f"pairs come {limits.min_iti_s:g} s apart", f"{spent_s:g} s")
+        require(spent_s >= limits.iti_s - _ROUNDING_S, f"pairs come {limits.iti_s:g} s apart", f"{spent_s:g} s")
 
 
 def _isis_of_open_intents(record: SessionRecord) -> dict[int, float | None]:
