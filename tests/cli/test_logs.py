@@ -139,7 +139,7 @@ def test_show_of_a_log_without_its_end_asks_for_the_stimulators_count_and_exits_
 
 def test_an_excluded_trial_is_included_again(isiw: Command, log: Path) -> None:
     assert isiw("exclude", log, 1, "--reason", "cough").exit_code == 0
-    assert isiw("include", log, 1).output == "Trial 1 counts again.\n"
+    assert isiw("include", log, 1).output.startswith("Trial 1 counts again.\nEstimate with it: isiw estimate ")
     assert all(trial.told for trial in read_session(log).table)
 
 

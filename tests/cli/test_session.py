@@ -65,6 +65,24 @@ def test_exclude_appends_and_resume_learns_without_it(isiw: Command, log: Path) 
     assert "2 count; 1 excluded" in result.output
 
 
+def test_estimate_learns_without_an_excluded_trial_as_resuming_does(isiw: Command, log: Path, tmp_path: Path) -> None:
+    resumed = tmp_path / "resumed.mcap"
+    assert "isiw estimate" in isiw("exclude", log, 1, "--reason", "sneezed").output
+    resumed.write_bytes(log.read_bytes())
+    assert isiw("resume", resumed).exit_code == 0
+    result = isiw("estimate", log)
+    assert result.exit_code == 0, result.output
+    assert result.output.startswith("Learning 3 trials …")
+    assert "2 count; 1 excluded" in result.output
+    record, other = read_session(log), read_session(resumed)
+    assert not record.is_judged_since
+    assert record.estimates[-1] == other.estimates[-1].model_copy(update={"next_isi_ms": None})
+    assert record.events[-1].text.startswith("Estimated again")
+    before = log.read_bytes()
+    assert "No trial was excluded or included since" in isiw("estimate", log).output
+    assert log.read_bytes() == before
+
+
 def test_resume_says_how_many_trials_it_replays_before_it_does(isiw: Command, log: Path, tmp_path: Path) -> None:
     more = tmp_path / "more.toml"
     more.write_text("[limits]\nmax_pulses = 100\n")

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 import isiw
-from isiw.cli.console import LOGS, NO_DEFAULT, Overwrite, errors_reported, exit_if_damaged, say_unread, show
+from isiw.cli.console import LOGS, NO_DEFAULT, Overwrite, counting, errors_reported, exit_if_damaged, say_unread, show
 from isiw.cli.files import free_beside
+from isiw.text.harmless import command
 from isiw.text.numbers import counted
 
 if TYPE_CHECKING:
@@ -107,10 +108,11 @@ def exclude(
     trial: Annotated[int, typer.Argument(help="The trial's number, as in isiw show.")],
     reason: Annotated[str, typer.Option(help="The reason, for readers of the log.")],
 ) -> None:
-    """Exclude a trial afterwards. Nothing is erased; a resumed session learns without it."""
+    """Exclude a trial afterwards. Nothing is erased; isiw estimate and isiw resume learn without it."""
     with errors_reported():
         isiw.exclude(log, trial, reason)
         show(f"Trial {trial} is excluded: {reason}")
+        show(f"Estimate without it: {command('estimate', log)}")
 
 
 @app.command(rich_help_panel=LOGS)
@@ -118,10 +120,26 @@ def include(
     log: Log,
     trial: Annotated[int, typer.Argument(help="The trial's number, as in isiw show.")],
 ) -> None:
-    """Let an excluded trial count again; a resumed session learns with it."""
+    """Let an excluded trial count again; isiw estimate and isiw resume learn with it."""
     with errors_reported():
         isiw.include(log, trial)
         show(f"Trial {trial} counts again.")
+        show(f"Estimate with it: {command('estimate', log)}")
+
+
+@app.command(rich_help_panel=LOGS)
+def estimate(log: Log) -> None:
+    """Estimate again after trials were excluded or included, and append it to the log; needs no device."""
+    with errors_reported():
+        record = isiw.read_session(log)
+        if record.is_judged_since:
+            with counting("Learning", len(record.table), "trial") as count:
+                isiw.session.estimate_again(log, replayed=count)
+            record = isiw.read_session(log)
+        else:
+            show("No trial was excluded or included since the last estimate.")
+        show(isiw.report.final_statement(record), style="bold")
+        exit_if_damaged(record.losses)
 
 
 @app.command(rich_help_panel=LOGS)

@@ -1,6 +1,7 @@
 """A session: the closed loop from the first ask to the decision, and going on with one from its log."""
 
 from isiw.log.kinds import LogKind
+from isiw.session.again import estimate_again
 from isiw.session.loop import Session
 from isiw.session.opening import open_session
 from isiw.session.progress import PROGRESS_HEADINGS, aligned, progress_row
@@ -19,6 +20,7 @@ __all__ = [
     "SessionUpdate",
     "ThresholdRecorder",
     "aligned",
+    "estimate_again",
     "open_session",
     "open_simulated",
     "open_threshold",
