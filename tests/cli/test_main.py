@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 
 from cli.conftest import COMMAND, Command
 from isiw import __version__
+from isiw.cli.console import show_paragraph
 
 
 def test_the_version_is_shown(isiw: Command) -> None:
@@ -61,3 +63,21 @@ def test_a_sign_that_the_output_lacks_ends_nothing(short: Path, tmp_path: Path) 
     )  # fmt: skip
     assert ended.returncode == 0, ended.stderr
     assert "picture: s.png" in ended.stdout
+
+
+def test_a_paragraph_is_as_wide_as_the_terminal_and_its_command_is_in_one_piece(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said, way_on = (
+        "The session is not over, as three trials in a row were lost; go on with:",
+        "isiw resume P07.mcap a.toml",
+    )
+    show_paragraph(f"{said} {way_on}")
+    assert capsys.readouterr().out == f"{said} {way_on}\n"  # of a pipe nobody knows how wide it is
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("COLUMNS", "24")
+    show_paragraph(f"{said} {way_on}")
+    *lines, last = re.sub(r"\x1b\[[0-9;]*m", "", capsys.readouterr().out).splitlines()
+    assert max(map(len, lines)) <= 24
+    assert " ".join(line.strip() for line in lines) == said
+    assert last == way_on

@@ -32,6 +32,28 @@ def test_how_things_stand_stays_below_what_is_said(capsys: pytest.CaptureFixture
     assert seen(capsys.readouterr().err) == ["trial 0", "paused", "trial 1", "16 left", ""]
 
 
+def test_in_a_narrow_terminal_the_last_line_is_cut_and_what_is_said_is_folded(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the terminal itself breaks could not be taken back, and would stay behind."""
+    monkeypatch.setattr("isiw.session.terminal._wide", lambda: 30)
+    with Screen() as screen:
+        screen.say("The session is paused, as three trials in a row were lost.", "next 135 ms, 17 left, ~1:44 min")
+        for sign in ["Note: ", *"the arm was moved a little, to the left"]:
+            screen.type(sign)
+        screen.say("trial 1")
+    lines = seen(capsys.readouterr().err)
+    assert lines == [
+        "The session is paused, as",
+        "three trials in a row were",
+        "lost.",
+        "trial 1",
+        "s moved a little, to the left",
+        "",
+    ]
+    assert max(map(len, lines)) <= 30
+
+
 def test_a_countdown_takes_the_last_line_and_gives_it_back(capsys: pytest.CaptureFixture[str]) -> None:
     with Screen() as screen:
         screen.say("trial 0", "17 left")

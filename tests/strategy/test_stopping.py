@@ -81,7 +81,7 @@ def test_an_edge_beyond_the_range_for_certain_is_known() -> None:
 def test_an_edge_that_may_lie_beyond_the_range_has_no_narrow_interval(start_ms: list[float]) -> None:
     decision = CredibleWidth(30)(progress(edges_ms=[(start, 100.0) for start in start_ms]))
     assert not decision.stop
-    assert "span more than the range and 0 ms" in decision.reason
+    assert "its start is still unknown and its end is known to 0 ms" in decision.reason
 
 
 @pytest.mark.parametrize(("doubters", "stop"), [(1, True), (2, False), (30, False)])
@@ -93,7 +93,14 @@ def test_a_hypothesis_that_is_still_likely_must_agree(doubters: int, *, stop: bo
     )
     decision = CredibleWidth(30)(Progress(3, 3, estimate))
     assert decision.stop == stop
-    assert f"span 0 ms and {0 if stop else 40} ms under every likely hypothesis" in decision.reason
+    assert f"its end is known to {0 if stop else 40} ms (90 % intervals, whichever plausible" in decision.reason
+
+
+def test_an_f1_that_does_not_end_the_session_never_reads_as_the_one_that_does() -> None:
+    nearly, enough = (ExpectedF1(0.92)(expecting(f1, probability=0.95)) for f1 in (0.9199, 0.92))
+    assert (nearly.stop, enough.stop) == (False, True)
+    assert "an expected F1 of 0.91; 0.92 ends the session" in nearly.reason
+    assert "an expected F1 of 0.92." in enough.reason
 
 
 def test_without_intervals_the_edges_are_not_known() -> None:

@@ -36,6 +36,17 @@ def show(text: str, *, style: str | None = None, stderr: bool = False) -> None:
     Console(stderr=stderr, highlight=False, soft_wrap=True, emoji=False).print(plain(text), style=style, markup=False)
 
 
+def show_paragraph(text: str) -> None:
+    """Print a paragraph as wide as the terminal; a command at its end has a line of its own, to be copied."""
+    said, found, way_on = text.rpartition(": isiw ")
+    console = Console(highlight=False, emoji=False)
+    if not (found and console.is_terminal):
+        said, found, way_on = text, "", ""
+    console.print(plain(said + found[:1]), style="bold", markup=False, soft_wrap=not console.is_terminal)
+    if found:
+        show(f"isiw {way_on}", style="bold")
+
+
 def show_entry(heading: str, text: str) -> None:
     """Print an entry of a list: its heading, and below it the text, indented and as wide as the terminal."""
     show(heading, style="bold")

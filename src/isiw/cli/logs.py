@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 import isiw
-from isiw.cli.console import LOGS, NO_DEFAULT, Overwrite, counting, errors_reported, exit_if_damaged, say_unread, show
+from isiw.cli.console import (
+    LOGS,
+    NO_DEFAULT,
+    Overwrite,
+    counting,
+    errors_reported,
+    exit_if_damaged,
+    say_unread,
+    show,
+    show_paragraph,
+)
 from isiw.cli.files import free_beside
 from isiw.text.harmless import command
 from isiw.text.numbers import counted
@@ -39,7 +49,7 @@ def show_log(
         show(isiw.session.aligned(isiw.report.TRIAL_HEADINGS))
         _list("trials", [isiw.session.aligned(row) for row in isiw.report.trial_rows(record)], whole=whole)
         _list("events", [_event(event) for event in record.events], whole=whole)
-        show(isiw.report.final_statement(record), style="bold")
+        show_paragraph(isiw.report.final_statement(record))
         exit_if_damaged(record.losses)
 
 
@@ -138,7 +148,7 @@ def estimate(log: Log) -> None:
             record = isiw.read_session(log)
         else:
             show("No trial was excluded or included since the last estimate.")
-        show(isiw.report.final_statement(record), style="bold")
+        show_paragraph(isiw.report.final_statement(record))
         exit_if_damaged(record.losses)
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import isiw
-from isiw.cli.console import NO_DEFAULT, NOT_OVER, SESSIONS, counting, errors_reported, show
+from isiw.cli.console import NO_DEFAULT, NOT_OVER, SESSIONS, counting, errors_reported, show, show_paragraph
 from isiw.cli.files import free_beside, log_exists
 from isiw.text.harmless import command
 
@@ -135,7 +135,7 @@ def _run_to_the_end(session: Session, config: Path | None, *, live: bool, resume
         raise
     record = isiw.read_session(result.log)
     truth = isiw.config.truth_of(record)
-    show(f"\n{isiw.report.final_statement(record, config)}", style="bold")
+    show_paragraph(f"\n{isiw.report.final_statement(record, config)}")
     if truth.known:
         show(isiw.report.truth_sentence(record, truth.window))
     show(f"log:     {result.log}")

@@ -13,7 +13,7 @@ from isiw.log.headers import Header
 from isiw.session.progress import fitted, progress_row, show_legend, show_progress, standing
 from isiw.session.sink import SessionUpdate
 from isiw.session.steps import Asking
-from isiw.session.terminal import ERASED, ESCAPE, Keys, Screen, is_terminal
+from isiw.session.terminal import ERASED, ESCAPE, Keys, Screen, columns, is_terminal
 from isiw.trials import TrialTable
 
 KEYS: Final = (
@@ -220,7 +220,7 @@ class Table:
     def _show(self, update: SessionUpdate) -> None:
         row = progress_row(update, self._header.stimulus)
         if self._desk.is_staffed and is_terminal(sys.stdout):
-            self._desk.show(fitted(row), standing(update, self._header.space))
+            self._desk.show(fitted(row)[: columns()], standing(update, self._header.space))
         else:
             show_progress(row)
         self._desk.shown = update.trial.index

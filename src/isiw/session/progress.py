@@ -14,6 +14,7 @@ from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
 from isiw.sentences import asked, interval_cell, outcome
 from isiw.session.sink import SessionUpdate
+from isiw.session.terminal import COLUMNS, columns, folded, is_terminal
 from isiw.text import plain
 from isiw.text.stimuli import TAP, StimulusWords
 
@@ -26,7 +27,6 @@ PROGRESS_LEGEND: Final = (
 )
 """What the headings and signs of the table mean."""
 
-COLUMNS: Final = 80
 SPARKS: Final = "▁▂▃▄▅▆▇█"
 MOST_SPARKS: Final = 28
 
@@ -47,14 +47,20 @@ def progress_row(update: SessionUpdate, first: StimulusWords = TAP) -> tuple[str
 
 def show_progress(row: Sequence[str]) -> None:
     """Print a row of the table."""
-    sys.stdout.write(f"{fitted(row)}\n")
+    sys.stdout.write(f"{_short_of(fitted(row), _most())}\n")
     sys.stdout.flush()
 
 
 def show_legend() -> None:
     """Print what comes before the first row: what the headings mean, and the headings."""
-    sys.stdout.write("".join(f"{line}\n" for line in (*PROGRESS_LEGEND, fitted(PROGRESS_HEADINGS))))
-    sys.stdout.flush()
+    legend = " ".join(PROGRESS_LEGEND) if _most() < COLUMNS else "\n".join(PROGRESS_LEGEND)
+    sys.stdout.write(f"{folded(legend)}\n")
+    show_progress(PROGRESS_HEADINGS)
+
+
+def _most() -> int:
+    """How many columns a row may have: where a terminal is narrower than the table, its last cells are cut off."""
+    return columns() if is_terminal(sys.stdout) else COLUMNS
 
 
 def aligned(row: Sequence[str]) -> str:
@@ -75,8 +81,9 @@ def standing(update: SessionUpdate, space: DesignSpace) -> str:
     """How a session stands, in a line: the expected MEP over the ISIs, [ ] around the window, what is next and left."""
     following = "" if update.next_isi_ms is None else f"next {update.next_isi_ms:.4g} ms, "
     pace = "" if update.left_s is None else f", ~{_minutes(update.left_s)} min"
-    text = f"{_profile(update.estimate, space)}{following}{update.stimuli_left} left{pace}"
-    return _short_of(text, COLUMNS - 1)
+    text = f"{following}{update.stimuli_left} left{pace}"
+    drawn = f"{_profile(update.estimate, space)}{text}"
+    return _short_of(text if len(drawn) >= columns() else drawn, COLUMNS - 1)
 
 
 def _minutes(duration_s: float) -> str:

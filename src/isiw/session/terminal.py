@@ -11,6 +11,7 @@ import queue
 import re
 import select
 import sys
+import textwrap
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -24,6 +25,9 @@ if sys.platform == "win32":
 else:
     import termios
     import tty
+
+COLUMNS: Final = 80
+"""What all that is shown fits into, where nobody knows how wide the terminal is."""
 
 _GLANCE_S = 0.1
 _LAST_WORDS_S = 1.0
@@ -45,6 +49,25 @@ _as_they_were: dict[int, Any] = {}
 def is_terminal(stream: object) -> bool:
     """Whether somebody sits at the other end of a stream."""
     return bool(getattr(stream, "isatty", lambda: False)())
+
+
+def columns() -> int:
+    """How wide the terminal is in which the operator reads; 80 where nobody knows."""
+    return _wide() or COLUMNS
+
+
+def _wide() -> int | None:
+    try:
+        return os.get_terminal_size(sys.stderr.fileno()).columns
+    except (AttributeError, OSError, ValueError):  # no terminal
+        return None
+
+
+def folded(text: str) -> str:
+    """A text whose lines are no longer than the terminal, broken between words."""
+    wide, lines = _wide() or len(text), text.split("\n")
+    folds = (line if len(line) <= wide else textwrap.fill(line, wide, break_on_hyphens=False) for line in lines)
+    return "\n".join(folds)
 
 
 def somebody_there() -> bool:
@@ -96,7 +119,7 @@ class Screen:
         cleared = self._cleared
         if standing is not None:
             self._standing = plain(standing)
-        self._texts.put(f"{cleared}{plain(text)}\n{self._line}")
+        self._texts.put(f"{cleared}{folded(plain(text))}\n{self._line}")
 
     def type(self, text: str) -> None:
         """Show what is being typed, in the last line."""
@@ -106,13 +129,14 @@ class Screen:
             self._texts.put(f"\n{self._line}")
         else:
             self._typed = self._typed[:-1] if text == ERASED else self._typed + text
-            self._texts.put(f"{begun}{text}")
+            too_long = len(self._typed) >= columns() - 1  # what went on in another line could not be taken back
+            self._texts.put(f"\r{self._line}\x1b[K" if too_long else f"{begun}{text}")
 
     def count_down(self, text: str) -> None:
         """Show a line in the place of the last one that counted down."""
         self._counting = plain(text)
         if not self._typed:
-            self._texts.put(f"\r{self._counting}\x1b[K")
+            self._texts.put(f"\r{self._line}\x1b[K")
 
     def counted_down(self) -> None:
         """Clear the line that counted down, where there is one."""
@@ -122,8 +146,9 @@ class Screen:
 
     @property
     def _line(self) -> str:
-        """The last line, which is written over."""
-        return self._typed or self._counting or self._standing
+        """The last line, which is written over: of what is typed its end, of anything else its beginning."""
+        most = columns() - 1
+        return self._typed[-most:] or (self._counting or self._standing)[:most]
 
     @property
     def _cleared(self) -> str:

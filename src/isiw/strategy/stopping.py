@@ -181,20 +181,21 @@ class CredibleWidth:
             return StopKind.KNOWN.go_on("The edges have no credible intervals.")
         # An edge that lies beyond the range for certain is an answer: its interval has no width.
         widths = [0.0 if low == high else high - low for low, high in intervals]
-        known = (progress.estimate.probability or 0.0) >= self.min_probability and max(widths) <= self.width_ms
-        spans = (
-            f"the {100 * self.level:.0f} % intervals of start and end span {_span(widths[0])} and {_span(widths[1])}"
-        )
-        if progress.estimate.hypotheses is not None:
-            spans += " under every likely hypothesis"
-        if known:
-            by_time = _by_time(progress.estimate)
-            return StopKind.KNOWN.go_on(by_time) if by_time else StopKind.KNOWN.stop(f"The window is known: {spans}.")
-        return StopKind.KNOWN.go_on(f"The window is not known well enough yet: {spans}.")
+        probability = progress.estimate.probability or 0.0
+        start, end = map(_known_to, widths)
+        whatever = "" if progress.estimate.hypotheses is None else ", whichever plausible noise model holds"
+        edges = f"its start {start} and its end {end} ({100 * self.level:.0f} % intervals{whatever})"
+        if max(widths) > self.width_ms:
+            return StopKind.KNOWN.go_on(f"The window is to be known to {self.width_ms:g} ms: {edges}.")
+        if probability < self.min_probability:
+            needed = f"{probability:.2f}, and {self.min_probability:g} is needed"
+            return StopKind.KNOWN.go_on(f"The window is not probable enough yet ({needed}): {edges}.")
+        by_time = _by_time(progress.estimate)
+        return StopKind.KNOWN.go_on(by_time) if by_time else StopKind.KNOWN.stop(f"The window is known: {edges}.")
 
 
-def _span(width_ms: float) -> str:
-    return f"{width_ms:.0f} ms" if math.isfinite(width_ms) else "more than the range"
+def _known_to(width_ms: float) -> str:
+    return f"is known to {width_ms:.0f} ms" if math.isfinite(width_ms) else "is still unknown"
 
 
 @dataclass(frozen=True)
@@ -251,15 +252,14 @@ class ExpectedF1:
             return StopKind.KNOWN.go_on("The F1 to be expected is not known.")
         if estimate.too_little is not None:
             return StopKind.TOO_LITTLE.go_on(estimate.too_little)
-        expected = f"an expected F1 of {estimate.expected_f1:.2f}"
+        expected = (
+            f"an expected F1 of {math.floor(100 * estimate.expected_f1 + 1e-9) / 100:.2f}"  # never what is not reached
+        )
         if self.f1 < 1.0 and estimate.expected_f1 >= self.f1 and estimate.probability >= self.min_probability:
-            by_time = _by_time(estimate)
-            return (
-                StopKind.KNOWN.go_on(by_time)
-                if by_time
-                else StopKind.KNOWN.stop(f"The window is known, with {expected}.")
-            )
-        return StopKind.KNOWN.go_on(f"The window as it is known so far has {expected}.")
+            by_time, known = _by_time(estimate), f"The window is known, with {expected}."
+            return StopKind.KNOWN.go_on(by_time) if by_time else StopKind.KNOWN.stop(known)
+        ends = f"; {self.f1:g} ends the session" if self.f1 < 1.0 else ""
+        return StopKind.KNOWN.go_on(f"The window as it is known so far has {expected}{ends}.")
 
 
 @dataclass(frozen=True)
