@@ -66,7 +66,10 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
             sentences.finding(Estimate(probability=None), TAP, SPACE),
             "The method has no answer yet: it has not measured enough for one.",
         ),
-        (sentences.finding(SWEPT, TAP, SPACE), "No window was found at the ISIs measured so far, 10–20 ms."),
+        (
+            sentences.finding(SWEPT, TAP, SPACE),
+            "The scan of ISIs is not finished: of 0–200 ms it has measured 10–20 ms, where the MEP is not enhanced.",
+        ),
         (sentences.finding(SWEPT, TAP, DesignSpace(10, 20, reference="impact")), "No window was found."),
         (
             sentences.edges(SURE, SPACE),

@@ -37,7 +37,7 @@ THRESHOLD_PCT_RMT: Final = 100.0
 TOO_LITTLE: Final = "too little was measured"
 """In the place of a window."""
 
-JUDGED_SINCE: Final = "Trials were judged anew after this estimate; resume the session to have it with what counts now."
+JUDGED_SINCE: Final = "Trials were excluded or included after this estimate; isiw estimate LOG computes it again."
 
 _LOOK: Final = "Did the stimulator fire? Was the EMG recorded? Was the intensity high enough?"
 _PLACED: Final = "Is the time of the pulse right? Does the MEP window fit the muscle?"
@@ -168,10 +168,19 @@ def _without_probability(estimate: Estimate, first: StimulusWords, after: str, s
         return f"By this method, which gives no probability, the {first.name} enhances the MEP at ISIs of {isis}."
     if not estimate.has_answer:
         return "The method has no answer yet: it has not measured enough for one."
-    first_ms, last_ms = estimate.grid_ms[0], estimate.grid_ms[-1]
-    if last_ms - first_ms < MOST_OF_THE_RANGE * (space.high_ms - space.low_ms):
-        return f"No window was found at the ISIs measured so far, {first_ms:g}–{last_ms:g} ms."
+    if is_unfinished(estimate, space):
+        so_far = f"{estimate.grid_ms[0]:g}–{estimate.grid_ms[-1]:g} ms"
+        scan = f"The scan of ISIs is not finished: of {space.low_ms:g}–{space.high_ms:g} ms it has measured {so_far}"
+        return f"{scan}, where the MEP is not enhanced."
     return "No window was found."
+
+
+def is_unfinished(estimate: Estimate, space: DesignSpace) -> bool:
+    """Whether a scan of ISIs has reported nothing, and has not come to the end of the range yet."""
+    grid_ms = estimate.grid_ms
+    if estimate.window is not None or estimate.probability is not None or grid_ms is None or not len(grid_ms):
+        return False
+    return grid_ms[-1] - grid_ms[0] < MOST_OF_THE_RANGE * (space.high_ms - space.low_ms)
 
 
 def edges(estimate: Estimate, space: DesignSpace) -> str:

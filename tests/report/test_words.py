@@ -126,7 +126,7 @@ def test_no_window_is_a_finding_once_it_has_95_percent(
     ("grid_ms", "said"),
     [
         ((), "The method has no answer yet: it has not measured enough for one."),
-        ((0.0, 10.0), "No window was found at the ISIs measured so far, 0–10 ms."),
+        ((0.0, 10.0), "The scan of ISIs is not finished: of 0–200 ms it has measured 0–10 ms"),
         ((0.0, 100.0, 200.0), "No window was found. 4 pairs"),
     ],
 )
@@ -285,7 +285,7 @@ def test_an_exclusion_after_the_estimate_is_said(record: SessionRecord) -> None:
     exclude(record.path, 0, "sneezed")
     statement = final_statement(read_session(record.path))
     assert "1 excluded" in statement
-    assert "judged anew after this estimate" in statement
+    assert "excluded or included after this estimate" in statement
 
 
 def test_without_a_trial_there_is_nothing_to_say(record: SessionRecord) -> None:

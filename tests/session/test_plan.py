@@ -13,12 +13,14 @@ from isiw.devices.limits import Limits
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import InvalidValueError
 from isiw.log.reader import read_session
+from isiw.report.words import final_statement, truth_sentence
 from isiw.session.loop import Session
 from isiw.session.opening import open_session
 from isiw.strategy.catalogue import list_strategies, make_strategy
 from isiw.strategy.stopping import StopKind
 from isiw.subjects.cohorts import person_of
 from isiw.visit import VisitProtocol
+from isiw.window import Window
 from known import known
 
 SPACE = DesignSpace(40, 320, step_ms=5, reference="impact")
@@ -67,3 +69,14 @@ def test_a_plan_runs_to_its_end_within_the_limits_that_are_proposed(tmp_path: Pa
     Session(device(), strategy, log=tmp_path / "s.mcap", limits=limits).run()
     decision = known(read_session(tmp_path / "s.mcap").decision)
     assert decision.kind in {StopKind.SETTLED, StopKind.BUDGET}
+
+
+def test_a_sweep_that_was_cut_short_never_says_that_there_is_no_window(tmp_path: Path) -> None:
+    strategy = make_strategy("incremental", DesignSpace(0, 320, step_ms=5, reference="impact"), max_trials=60)
+    Session(device("nonresponder"), strategy, log=tmp_path / "s.mcap").run()
+    record = read_session(tmp_path / "s.mcap")
+    assert record.estimates[-1].has_answer
+    for said in (final_statement(record), truth_sentence(record, Window(60.0, 160.0))):
+        assert "o window" not in said
+        assert "none was reported" not in said
+    assert "is not finished: of 0–320 ms it has measured 0–20 ms" in final_statement(record)

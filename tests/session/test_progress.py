@@ -37,7 +37,7 @@ def test_progress_tells_trial_isi_mep_window_intervals_and_what_is_left() -> Non
 def test_progress_of_a_method_without_posterior_has_gaps() -> None:
     trial = Trial(3, Status.MISTRIAL, None, Kind.NO_IMPACT)
     assert progress_row(update_with(WindowEstimate(None, None), trial)) == (
-        "3", "TMS alone", "mistrial: no impact", "", "none", "", "", "17"
+        "3", "TMS alone", "mistrial: no impact", "", "–", "", "", "17"
     )  # fmt: skip
 
 

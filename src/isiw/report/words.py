@@ -158,8 +158,10 @@ def truth_sentence(record: SessionRecord, truth: Window | None) -> str:
         record: the session.
         truth: the true window; None where there is none.
     """
-    found = record.estimates[-1].window if record.estimates else None
-    share = f1(found, truth, record.header.space) if record.rests_on_data else None
+    space, last = record.header.space, record.estimates[-1] if record.estimates else None
+    found = None if last is None else last.window
+    says_nothing = not record.rests_on_data or (last is not None and sentences.is_unfinished(last, space))
+    share = None if says_nothing else f1(found, truth, space)
     return sentences.truth(truth, found, share)
 
 

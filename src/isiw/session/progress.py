@@ -118,7 +118,7 @@ def _found(estimate: WindowEstimate) -> tuple[str, ...]:
     start, end = estimate.edges
     return (
         "" if estimate.probability is None else f"{estimate.probability:.2f}",
-        "none" if estimate.window is None else str(estimate.window),
+        str(estimate.window or ("–" if estimate.probability is None else "none")),
         interval_cell(start),
         interval_cell(end),
     )
