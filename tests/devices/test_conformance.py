@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import re
 import signal
 import threading
 import time
@@ -24,6 +25,7 @@ from isiw.devices.lock import driven
 from isiw.devices.protocol import DeviceInfo, Readiness
 from isiw.devices.recorded import RecordedPerson, Recordings
 from isiw.devices.replay import RecordedTrials
+from isiw.devices.robot.tapper import Tapper, TapperSettings
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, LimitExceededError, NotDelivered
 from isiw.subjects.cohorts import cohort
@@ -31,7 +33,7 @@ from isiw.subjects.subject import Response
 from isiw.testing import check_device
 from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial, TrialTable
 from isiw.types import Reference
-from known import instance
+from known import instance, known
 from wrong_rigs import NAMED, WRONG, rig
 from wrong_rigs import SPACE as RIG_SPACE
 
@@ -118,7 +120,7 @@ def test_the_suite_finds_a_device_that_cannot_resume(space: DesignSpace) -> None
 
 
 def test_the_suite_finds_a_device_with_wrong_timing(space: DesignSpace) -> None:
-    with pytest.raises(AssertionError, match=r"ISI off .* 20 ms.* 0 ms"):
+    with pytest.raises(AssertionError, match=r"3 of 5 trials .* 20 ms.* 0 ms"):
         check_device(lambda: Inaccurate(SimulatedPerson(responder(), "valve")), space)
 
 
@@ -271,12 +273,52 @@ def test_a_device_of_sweeps_conforms(space: DesignSpace) -> None:
     [
         ({"unit": "microvolt"}, "can judge .*unit of the channel emg"),
         ({"other": "event"}, "can judge .*cannot have this name"),
-        ({"length_ms": 310}, "can use .*missing channel"),
+        ({"length_ms": 310}, "rejected: missing channel"),
     ],
 )
 def test_the_suite_finds_sweeps_that_no_session_could_use(space: DesignSpace, rig: dict[str, Any], broken: str) -> None:
     with pytest.raises(AssertionError, match=broken):
         check_device(lambda: Rig(**rig), space, clock=VirtualClock())
+
+
+class Unlearning:
+    """The robot with a rig that learns nothing of when the hammer hits: it keeps to what it assumes."""
+
+    def __init__(self, assumed_ms: float, change: Callable[[Sweep], Sweep] = lambda sweep: sweep) -> None:
+        settings = TapperSettings(expected_hit_ms=assumed_ms, rate_hz=3000.0)
+        self.made = partial(Tapper, lambda _: Response(None, 0.01), "subject4", settings)
+        self.info, self.change = self.made().info, change
+
+    def answer(self, stimulus: Stimulus) -> Sweep:
+        return self.change(self.made().answer(stimulus))
+
+
+@pytest.mark.parametrize(("assumed_ms", "change"), [(162.0, "add"), (202.0, "take off")])
+def test_a_wrong_hit_delay_is_told_with_the_milliseconds_to_correct(assumed_ms: float, change: str) -> None:
+    with pytest.raises(AssertionError) as caught:
+        check_device(lambda: SimulatedDevice(Unlearning(assumed_ms)), RIG_SPACE)
+    said = re.search(
+        r"\n\n3 of 5 trials would be rejected: the impact came (\d+) ms after the valve command; "
+        rf"your rig assumes {assumed_ms:.0f} ms: {change} (\d+) ms.$",
+        str(caught.value),
+    )
+    hit_ms, by_ms = map(float, known(said).groups())
+    assert hit_ms == pytest.approx(182, abs=3)
+    assert by_ms == pytest.approx(20, abs=3)
+
+
+def test_each_fault_of_a_rig_is_a_paragraph_of_its_own() -> None:
+    def tense(sweep: Sweep) -> Sweep:
+        return WRONG["tense muscle"](sweep) if sweep.t_valve_ms is None else sweep
+
+    with pytest.raises(AssertionError) as caught:
+        check_device(lambda: SimulatedDevice(Unlearning(162.0, tense)), RIG_SPACE)
+    _, *faults = str(caught.value).split("\n\n")
+    assert [fault[:33] for fault in faults] == [
+        "3 of 5 trials would be rejected: t",
+        "1 of 5 trials would be rejected: t",
+    ]
+    assert "µV RMS, at most" in faults[1]
 
 
 @pytest.mark.parametrize("wrong", WRONG)
@@ -510,7 +552,7 @@ def test_the_suite_finds_an_artefact_that_pairs_alone_have() -> None:
 
 @pytest.mark.parametrize("early_ms", [5.0, 12.0, 40.0, 47.0])
 def test_the_suite_finds_a_pulse_away_from_its_reported_time_on_a_phantom(early_ms: float) -> None:
-    late = rf"a phantom evokes nothing, and the steepest edge of the EMG is \+{early_ms - 0.2:.1f} ms from the reported"
+    late = rf"phantom evokes nothing, and the steepest edge of the EMG is \+{early_ms - 0.2:.1f} ms from the reported"
     with pytest.raises(AssertionError, match=late):
         check_device(lambda: PhantomRig(early_ms), RIG_SPACE, clock=VirtualClock())
     simulated = PhantomRig(early_ms)

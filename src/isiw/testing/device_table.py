@@ -9,9 +9,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from isiw.devices.protocol import Answer, DeviceInfo
+from isiw.findings import Kind
 from isiw.signals.limits import SignalLimits
 from isiw.signals.rig import steepest_edge, tap_span_ms
 from isiw.trials import Channel, Stimulus, Sweep, Trial
+
+OF_TIMING = frozenset({Kind.TMS_BEFORE_IMPACT, Kind.ISI_OFF})
+"""What comes of a hit delay that is not the one that the rig assumes."""
+
+ALIKE_MS = 8.0
+"""The ISIs that are off by the hit delay are off by the same, but for how the hit varies from tap to tap."""
 
 NEAR_PULSE_MS = 3.0
 """How far from the reported pulse its artefact's steepest edge may be."""
@@ -118,6 +125,22 @@ def _span_ms(sweep: Sweep, pulse_ms: float | None) -> tuple[float, float] | None
 def _amplitudes(trials: Sequence[Trial]) -> str:
     meps_mv = [trial.mep_mv for trial in trials if trial.mep_mv is not None]
     return f"{1e3 * min(meps_mv):.3g} to {1e3 * max(meps_mv):.3g} µV" if meps_mv else "none"
+
+
+def wrong_hit_delay(deliveries: Sequence[Delivery]) -> str | None:
+    """That all pulses are off by what the rig assumes of the hit, and by how much; None if they are not."""
+    trials = [delivery.trial for delivery in deliveries]
+    off_ms = [t.commanded_isi_ms - t.isi_ms for t in trials if t.isi_ms is not None and t.commanded_isi_ms is not None]
+    if len(off_ms) < 2 or np.ptp(off_ms) > ALIKE_MS or abs(late_ms := float(np.median(off_ms))) <= NEAR_PULSE_MS:
+        return None
+    change = f"{'add' if late_ms > 0 else 'take off'} {abs(late_ms):.0f} ms"
+    hits_ms = [t.t_hit_ms - t.t_valve_ms for t in trials if t.t_hit_ms is not None and t.t_valve_ms is not None]
+    if not hits_ms:
+        early = "early" if late_ms > 0 else "late"
+        return f"the pulse came {abs(late_ms):.0f} ms too {early}: {change} where your rig assumes the hit delay."
+    hit_ms = float(np.median(hits_ms))
+    assumed = f"your rig assumes {hit_ms - late_ms:.0f} ms: {change}"
+    return f"the impact came {hit_ms:.0f} ms after the valve command; {assumed}."
 
 
 def edges_ms(deliveries: Sequence[Delivery]) -> list[float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -20,7 +21,7 @@ from isiw.signals import SignalLimits, judge, judge_measurement
 from isiw.signals.evidence import Evidence, Told
 from isiw.signals.rig import too_early_by_chance
 from isiw.signals.watch import findings
-from isiw.testing.device_table import Delivery, DeviceTable, device_table
+from isiw.testing.device_table import OF_TIMING, Delivery, DeviceTable, device_table, wrong_hit_delay
 from isiw.testing.guarded import Guarded, Pace
 from isiw.testing.phantom import artefact_in_window, late_artefact
 from isiw.testing.requirements import broken, require
@@ -202,18 +203,27 @@ def _named(stimulus: Stimulus) -> str:
 
 def _require_usable(deliveries: Sequence[Delivery], rules: _Rules, *, real: bool) -> None:
     """Raise where a session would reject what was delivered, or pause over it, or take an artefact for an MEP."""
-    said = []
+    delay = wrong_hit_delay(deliveries) if rules.space.reference == "impact" else None
+    lost, texts, said = Counter[Kind](), dict[Kind, str](), list[str]()
     for delivery in deliveries:
         trial = delivery.trial
         found = next(findings(Evidence(trial, delivery.answer, rules.limits)), None)
-        if found is not None and not too_early_by_chance(trial, rules.space):
-            said.append(f"{found}" if trial.reason is None else f"a mistrial, {trial.reason}: {found}")
+        if found is None or too_early_by_chance(trial, rules.space):
+            continue
+        if trial.reason is None:
+            said.append(f"{found}")
+        else:
+            kind = Kind.ISI_OFF if delay and found.kind in OF_TIMING else found.kind
+            lost[kind] += 1
+            texts.setdefault(kind, delay if delay and kind is Kind.ISI_OFF else f"{found}")
+    said = [f"{n} of {len(deliveries)} trials would be rejected: {texts[kind]}" for kind, n in lost.items()] + said
     told = [Told(delivery.trial.mep_mv) for delivery in deliveries if delivery.trial.mep_mv is not None]
     said += [f"{doubt}" for doubt in findings(Evidence(told=told)) if doubt.kind is not Kind.EQUAL][:1]
     artefact = (artefact_in_window(deliveries, rules.limits) or late_artefact(deliveries)) if real else None
     if artefact is not None:
         said.append(artefact)
-    require(not said, "a session can use what deliver returns", "; ".join(dict.fromkeys(said)))
+    faults = "\n\n".join(dict.fromkeys(fault[0].upper() + fault[1:] for fault in said))
+    require(not said, "a session can use what deliver returns", f"\n\n{faults}")
 
 
 def _check_memory(make: Callable[[], Device], space: DesignSpace, pace: Pace) -> None:
