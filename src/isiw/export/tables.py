@@ -44,6 +44,8 @@ _SESSION_COLUMNS: Final[Columns] = {
     "mistrials": ("", "trials that were judged to be mistrials"),
     "p_window": ("", "probability that there is a window, at the end; empty, as what was found, if little was told"),
     "window": ("", "the window that was reported, its segments; empty where none was"),
+    "start_ms": ("ms", "where the reported window starts; empty where none was reported"),
+    "end_ms": ("ms", "where it ends"),
     "start_low_ms": ("ms", "lower end of the 90 % interval of its start; infinite beyond the range"),
     "start_high_ms": ("ms", "upper end of the 90 % interval of its start"),
     "end_low_ms": ("ms", "lower end of the 90 % interval of its end"),
@@ -167,5 +169,7 @@ def _what_came_of_it(record: SessionRecord) -> dict[str, Any]:
     if not record.rests_on_data:
         return counts | ended
     edges = ("start_low_ms", "start_high_ms", "end_low_ms", "end_high_ms")
-    found = {"p_window": last.probability, "window": "" if last.window is None else str(last.window)}
+    found = {"p_window": last.probability, "window": ""}
+    if (window := last.window) is not None:
+        found |= {"window": str(window), "start_ms": window.start_ms, "end_ms": window.end_ms}
     return counts | found | {name: getattr(last, name) for name in edges} | ended
