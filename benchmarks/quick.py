@@ -32,6 +32,7 @@ QUICK: Final[Mapping[str, str]] = {
     "calibration": "--replications 4 --trials 5 --people 1 --out OUT",
     "dissertation": "--few --out OUT",
     "fair_opponent": "--people 3 --trials 12 --out OUT",
+    "first_words": "--trials 6",
     "house": "",
     "impact_stream": "--sweeps 100",
     "inhibition": "--people 1 --out OUT",

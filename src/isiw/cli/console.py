@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -19,6 +20,8 @@ from isiw.text.numbers import counted
 
 if TYPE_CHECKING:
     from isiw.log.reader import SessionRecord
+
+_SILENT_S = 1.0
 
 DAMAGED = 3
 NOT_OVER = 5  # a session that a person should look at, or that its operator ended early
@@ -55,11 +58,20 @@ def show_entry(heading: str, text: str) -> None:
 
 @contextmanager
 def counting(doing: str, number: int, thing: str) -> Iterator[Callable[[int], None]]:
-    """Print what is done with how many things; within, a terminal counts them."""
+    """Print what is done with how many things; within, a terminal counts them, and a pipe gets a line now and then."""
     if number:
         show(f"{doing} {counted(number, thing)} …")
-    with Console(stderr=True).status("") as status:
-        yield lambda done: status.update(f"{done} of {number}")
+    console, said_s = Console(stderr=True), time.monotonic()
+    with console.status("") as status:
+
+        def count(done: int) -> None:
+            nonlocal said_s
+            status.update(f"{done} of {number}")
+            if not console.is_terminal and time.monotonic() - said_s > _SILENT_S:
+                said_s = time.monotonic()
+                show(f"{done} of {number}")
+
+        yield count
 
 
 def exit_if_damaged(losses: Sequence[str]) -> None:

@@ -103,6 +103,7 @@ def _save(
 ) -> None:
     """Save what is made of a log, beside it where nobody gave a place, and say where it is."""
     record = isiw.read_session(log)
+    show(f"Drawing {record.path.name} …", stderr=True)
     say_unread(record)
     truth = isiw.config.truth_of(record)
     target = output or free_beside(record.path, suffix)
@@ -191,8 +192,8 @@ def compare(
         records = [isiw.read_session(log) for log in logs]
         for record in records:
             say_unread(record)
-        differences = isiw.priors.differences(records)
         show(isiw.report.comparison_table(records))
+        differences = isiw.priors.differences(records)
         for difference in differences:
             show(isiw.report.comparison_sentence(difference), style="bold")
         if output is not None and output.suffix.lower() == ".html":

@@ -36,6 +36,7 @@ def learn(
     losses: list[str] = []
     with errors_reported("Interrupted: nothing was written."):
         isiw.priors.check_lab_output(output, overwrite=overwrite)
+        show(f"Learning from {counted(len(logs), 'session')} …", stderr=True)
         with Progress(console=Console(stderr=True)) as progress:
             task = progress.add_task("sessions", total=len(logs))
 
@@ -60,6 +61,7 @@ def show_prior(
     """Show what a lab's people are like, compared with the built-in prior."""
     with errors_reported():
         lab = isiw.priors.read_lab_prior(source)
+        show(f"Comparing {source.name} with the built-in prior …", stderr=True)
         _print(lab)
         if output is not None:
             picture = isiw.plots.save_prior_plot(isiw.priors.densities(lab), output, overwrite=overwrite)

@@ -72,9 +72,8 @@ def run(  # noqa: PLR0913, PLR0917 - an option each
             day=day,
             operator=operator,
         )
+        show(isiw.config.assumed_space(settings) or "Preparing the session …")
         session = isiw.config.session_for(settings)
-        if (space := isiw.config.assumed_space(settings)) is not None:
-            show(space)
         _run_to_the_end(session, config, live=live)
 
 

@@ -29,6 +29,7 @@ def timing(
 ) -> None:
     """Report how repeatable the taps are, or the rotations of the vane actuator: events, ISI errors, mistrials."""
     with errors_reported():
+        show(f"Studying {source} …", stderr=True)
         study = _timing_study(source, taps, seed)
         show(isiw.repeatability.timing_report(study))
         if output is not None:
