@@ -68,7 +68,7 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
         ),
         (
             sentences.finding(SWEPT, TAP, SPACE),
-            "The scan of ISIs is not finished: of 0–200 ms it has measured 10–20 ms, where the MEP is not enhanced.",
+            "The scan of ISIs is not finished: of 10–320 ms it has measured 10–20 ms, where the MEP is not enhanced.",
         ),
         (sentences.finding(SWEPT, TAP, DesignSpace(10, 20, reference="impact")), "No window was found."),
         (

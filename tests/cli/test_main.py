@@ -31,7 +31,7 @@ def test_the_version_is_shown(isiw: Command) -> None:
 def test_an_error_is_a_message_and_exit_code_1(isiw: Command, arguments: list[str], message: str) -> None:
     result = isiw(*arguments)
     assert result.exit_code == 1
-    assert result.output.startswith("error: ")
+    assert result.output.splitlines()[-1].startswith("error: ")
     assert message in result.output
     assert "Traceback" not in result.output
 

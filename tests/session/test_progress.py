@@ -13,8 +13,9 @@ from isiw.estimate import WindowEstimate
 from isiw.findings import Kind
 from isiw.log.reader import read_session
 from isiw.session.loop import Session
-from isiw.session.progress import COLUMNS, PROGRESS_HEADINGS, PROGRESS_LEGEND, fitted, progress_row, standing
+from isiw.session.progress import PROGRESS_HEADINGS, PROGRESS_LEGEND, fitted, progress_row, standing
 from isiw.session.sink import SessionUpdate
+from isiw.session.terminal import COLUMNS
 from isiw.strategy.stopping import StopDecision
 from isiw.text.stimuli import STIMULI
 from isiw.trials import Status, Trial

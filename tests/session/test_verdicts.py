@@ -73,7 +73,7 @@ def test_an_excluded_trial_is_unlearnt_before_the_next_is_asked_for(log: Path) -
         if trial.index != 2:
             strategy.tell(trial.isi_ms, trial.mep_mv)
     assert strategy.ask() == record.intents[5].isi_ms
-    assert "judged anew" not in final_statement(record)
+    assert "excluded or included" not in final_statement(record)
 
 
 def test_the_estimate_behind_a_verdict_is_without_the_trial(log: Path) -> None:
@@ -279,7 +279,7 @@ def test_a_killed_and_resumed_session_has_them_all_and_asks_what_it_would_have_a
 def test_in_a_log_at_rest_trials_are_excluded_and_included(log: Path) -> None:
     Session(ScriptedDevice(), scripted_strategy(4), log=log).run()
     exclude(log, 2, "a cough")
-    assert "judged anew" in final_statement(read_session(log))
+    assert "excluded or included" in final_statement(read_session(log))
     include(log, 2)
     assert all(trial.told for trial in read_session(log).table)
     with pytest.raises(InvalidValueError, match=r"cannot include.* got 2; "):

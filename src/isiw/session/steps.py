@@ -160,9 +160,7 @@ class Asking:
 
 _LAST: Final = 20
 
-_FORESEEN: Final = 500
-"""So many pairs are looked ahead to; how long more of them take follows from these."""
-
+_FORESEEN: Final = 500  # pairs that are looked ahead to; how long more of them take follows from these
 _NAP_S = 0.25  # how long a pause may go unnoticed between two stimuli
 
 _NOTHING_GIVEN = (NotDelivered, LimitExceededError)
@@ -262,10 +260,10 @@ class Steps:
         protocol, seed, usual_s = self._header.protocol, self._header.seed, self._pace.usual_s
         if usual_s is None:
             return None
-        intervals_s, pairs = [], 0
-        for number in itertools.count(len(self._examination.trials)):
-            if pairs == min(left, _FORESEEN) or len(intervals_s) == self._rig.pulses_left:
-                break
+        intervals_s: list[float] = []
+        first, pairs = len(self._examination.trials), 0
+        while pairs < min(left, _FORESEEN) and len(intervals_s) < self._rig.pulses_left:
+            number = first + len(intervals_s)
             intervals_s.append(max(usual_s, protocol.rest_s) if protocol.rests_before(number) else usual_s)
             pairs += protocol.control(number, seed) is None
         return self._rig.ahead_s(intervals_s) * (left / pairs if pairs == _FORESEEN else 1)
