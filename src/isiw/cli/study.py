@@ -46,6 +46,7 @@ def run(
 ) -> None:
     """Run a study, or what is left of it. The exit code is 1 where sessions failed."""
     with errors_reported():
+        show(f"Running the study of {source} …", stderr=True)
         studies, store = isiw.studies, _store(source, out)
         folder = store.folder
         processes = (os.cpu_count() or 1) if workers is None else workers
