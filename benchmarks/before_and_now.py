@@ -7,14 +7,15 @@
     PYTHONPATH=../before/src python -m benchmarks.before_and_now run --to-stopping 80 --out before
     python -m benchmarks.before_and_now run --to-stopping 80 --out now
     python -m benchmarks.before_and_now stops before now --out benchmarks/results/before_and_now_stops
+    python -m benchmarks.before_and_now honest before now --out benchmarks/results/realities
     python -m benchmarks.before_and_now speed ../before/src src > benchmarks/results/before_and_now_speed.md
     python -m benchmarks.before_and_now session ../before/src src > benchmarks/results/session_speed.md
     python -m benchmarks.before_and_now start ../before/src src > benchmarks/results/before_and_now_start.md
 
 `run` keeps one table a cohort, and goes on where it was interrupted; `compare` pairs the people of both, `stops` where
-the stopping rule of each ends; `speed` and `session` have both run the same sessions in turn, `start` the same commands
-about a log. The hit delay is stated where a version can be told it. Reported people come from seed 100,000 on; seeds
-below 1,000 are for work.
+the stopping rule of each ends, `honest` how often each is sure and wrong; `speed` and `session` have both run the same
+sessions in turn, `start` the same commands about a log. The hit delay is stated where a version can be told it.
+Reported people come from seed 100,000 on; seeds below 1,000 are for work.
 """
 
 from __future__ import annotations
@@ -42,6 +43,8 @@ from benchmarks.earlier import logged_session
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
 from isiw.studies import Processes, Study, StudyStrategy, conduct, run_unit
+from isiw.studies.summary import SURE_F1, WRONG_F1
+from isiw.window import LEAST_FACTOR, SURE
 
 MARKS = (5, 10, 15, 20, 25, 30, 40)
 LATER = (50, 60, 80)
@@ -90,6 +93,47 @@ def stops(
     """Compare where the stopping rules of both versions end, on the people that both measured."""
     table = pd.concat([ends(before / path.name, path) for path in sorted(now.glob("*.parquet"))])
     _write(table, now, out, "a session that has not stopped by the last trial counts as it stands there")
+
+
+@app.command()
+def honest(
+    before: Annotated[Path, typer.Argument(help="Folder of the tables of the other version.")],
+    now: Annotated[Path, typer.Argument(help="Folder of the tables of this version.")],
+    out: Annotated[Path, typer.Option(help="Path of the result, without suffix.")] = Path("realities"),
+) -> None:
+    """Compare how often each version is sure and wrong, on the people that both measured."""
+    tables = [honesty(before / path.name, path) for path in sorted(now.glob("*.parquet"))]
+    how = f"sure and wrong: an expected F1 of at least {SURE_F1:g}, and at least {WRONG_F1:g} above the actual one"
+    _write(pd.concat(tables), now, out, how)
+
+
+def honesty(before: Path, now: Path) -> pd.DataFrame:
+    """Expected and actual F1, who is sure and wrong, coverage, and windows of people without one, by trial.
+
+    Args:
+        before: rows of the other version.
+        now: rows of this version.
+    """
+    keys = ["cohort", "person", "trial"]
+    both = pd.read_parquet(before).merge(pd.read_parquet(now), on=keys, suffixes=("_before", "_now"))
+    both = both[both["trial"].isin((20, 40, 60))]
+    there = both["true_window_now"].astype(bool)
+    rows = {"people": both["f1_now"].notna().astype(int), "f1_more": both["f1_now"] - both["f1_before"]}
+    rows["f1_more_with_window"] = rows["f1_more"].where(there)
+    for which in ("before", "now"):
+        f1, expected = both[f"f1_{which}"], both[f"expected_f1_{which}"]
+        rows[f"f1_{which}"], rows[f"expected_{which}"] = f1, expected
+        rows[f"sure_and_wrong_{which}"] = ((expected >= SURE_F1) & (expected - f1 >= WRONG_F1)).astype(float)
+        rows[f"start_{which}"], rows[f"end_{which}"] = both[f"start_covered_{which}"], both[f"end_covered_{which}"]
+        rows[f"false_window_{which}"] = both[f"reported_window_{which}"].astype(float).mask(there)
+        rows[f"false_sure_{which}"] = (both[f"probability_{which}"] >= 0.9).astype(float).mask(there)
+    unclear = both["reported_window_now"].astype(bool) & (both["bayes_factor"] < LEAST_FACTOR)
+    rows["undecided_now"] = (unclear & (both["probability_now"] < SURE)).astype(float)
+    groups = pd.DataFrame(rows).groupby([both["cohort"], both["trial"]])
+    table = groups.mean().assign(people=groups["people"].sum())
+    for name in ("f1_more", "f1_more_with_window"):
+        table.insert(table.columns.get_loc(name) + 1, f"{name}_se", groups[name].sem())
+    return table.reset_index()
 
 
 def _write(table: pd.DataFrame, now: Path, out: Path, how: str) -> None:
