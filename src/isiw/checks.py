@@ -60,6 +60,17 @@ def amplitude(what: str, value: object) -> float:
     return plain
 
 
+def amplitude_interval(ends_mv: object) -> tuple[float, float]:
+    """An interval of amplitudes, whose upper end may be infinite [mV]."""
+    if isinstance(ends_mv, tuple | list) and len(ends_mv) == 2:
+        low_mv, high_mv = ends_mv
+        if 0 <= number("an amplitude's lower end [mV]", low_mv) < high_mv:
+            return float(low_mv), float(high_mv)
+    raise InvalidValueError(
+        "this is no interval of amplitudes", got=ends_mv, expected="two amplitudes in mV that ascend, such as (0, 0.05)"
+    )
+
+
 def check_amplitude(owner: object, name: str, *, optional: bool = False) -> None:
     """Check a field of a frozen dataclass that is the amplitude of an MEP [mV]."""
     _check(owner, (name,), amplitude, optional=optional)

@@ -104,6 +104,8 @@ class WindowEstimate:
         change: what probably changed during the session, whatever the ISI; None where nothing did, or nobody looked.
         time_alone: probability that there is no window, but amplitudes changed with time; None where nobody looked.
         beforehand: probability of a window before the first trial; None where it is not known.
+        tap_may_explain: whether the tap's own response may be what is larger within the window, as nobody knows what
+            the tap alone does there.
 
     Raises:
         InvalidValueError: a probability outside 0–1, a window or a depression reported against it, not one hypothesis a
@@ -134,6 +136,7 @@ class WindowEstimate:
     change: Change | None = None
     time_alone: float | None = None
     beforehand: float | None = None
+    tap_may_explain: bool = False
 
     def noting(self, **facts: Any) -> WindowEstimate:
         """The same with other facts; what is still to be worked out remains so."""
@@ -321,7 +324,7 @@ class Estimate(Reported):
     the largest enhancement that is excluded with 90 % probability. `depressed_ms` are the segments in which the tap
     depresses the MEP, and `depressed_probability` is that there are any; None where nobody looked for them. `change` is
     what probably changed during the session, whatever the ISI. `beforehand` is the probability of a window before the
-    first trial.
+    first trial. `tap_may_explain` says whether the tap's own response may be what is larger within the window.
     """
 
     start_beyond: float | None = None
@@ -334,6 +337,7 @@ class Estimate(Reported):
     depressed_probability: float | None = None
     change: Change | None = None
     beforehand: float | None = None
+    tap_may_explain: bool = False
 
     @classmethod
     def of(cls, estimate: WindowEstimate, **more: Any) -> Self:
@@ -358,6 +362,7 @@ class Estimate(Reported):
             "depressed_probability": estimate.depressed_probability,
             "change": estimate.change,
             "beforehand": estimate.beforehand,
+            "tap_may_explain": estimate.tap_may_explain,
         }
         return cls(**figures, **edges, **_profile(estimate), **more)
 

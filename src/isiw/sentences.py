@@ -125,7 +125,17 @@ def summary(estimate: Estimate) -> str:
         lines.append(f"Depressed: {estimate.depressed or nothing} (probability of it: {depressed:.2f})")
     if estimate.change is not None and estimate.change.is_sure:
         lines.append(f"{at_a_trial(estimate.change, estimate.change.trial)}.")
-    return "\n".join(lines)
+    return "\n".join((*lines, *filter(None, (tap_unknown(estimate),))))
+
+
+def tap_unknown(estimate: Estimate) -> str:
+    """That the first stimulus's own response may be what is larger within a window."""
+    if not estimate.tap_may_explain:
+        return ""
+    return (
+        "What the first stimulus alone does to the EMG is not known within this window: its own response, rather than "
+        "the MEP, may be what is larger there. Give it alone some times; amplitudes are told with pulse=False."
+    )
 
 
 def at_a_trial(change: Change, trial: int | None) -> str:

@@ -11,7 +11,7 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from isiw.checks import check_amplitude, check_numbers, check_texts, check_wholes, choice, number, text
+from isiw.checks import amplitude_interval, check_amplitude, check_numbers, check_texts, check_wholes, choice, text
 from isiw.errors import InvalidValueError
 from isiw.findings import MISTRIALS, Kind
 from isiw.lazy import pd
@@ -193,10 +193,11 @@ class Trial:
         t_hit_ms: time of the impact [ms].
         t_tms_ms: time of the magnetic pulse [ms].
         excluded: excluded by an operator afterwards.
-        tap_alone: whether it was a tap without the magnetic pulse, from which a strategy learns nothing.
+        tap_alone: whether it was a tap without the magnetic pulse, which shows what the tap alone does.
         overruled: why it had been a mistrial before an operator accepted it; None otherwise.
-        mep_sd_mv: SD of the amplitude, if it is the mean of several [mV]; 0 for one that was measured once.
+        mep_sd_mv: SD of the amplitude [mV]: of the mean of several, or from what is left of the tap's own response.
         mep_interval_mv: the interval that the amplitude lies in, if no more is known [mV]; its end may be infinite.
+        tap_mv: what is left of the tap's own response in the amplitude, in the mean [mV]; None where nobody knows.
 
     Raises:
         InvalidValueError: a mistrial without a reason, an accepted trial with one or without an amplitude, a tap alone
@@ -219,6 +220,7 @@ class Trial:
     overruled: Kind | None = None
     mep_sd_mv: float = 0.0
     mep_interval_mv: tuple[float, float] | None = None
+    tap_mv: float | None = None
     __pydantic_config__: ClassVar = {"ser_json_inf_nan": "strings"}  # as JSON knows no infinity
 
     def __post_init__(self) -> None:
@@ -231,7 +233,7 @@ class Trial:
         if self.tap_alone and self.commanded_isi_ms is not None:
             raise InvalidValueError("a tap alone has no ISI", got=self.commanded_isi_ms, expected="None")
         if self.mep_interval_mv is not None:
-            object.__setattr__(self, "mep_interval_mv", _interval_mv(self.mep_interval_mv))
+            object.__setattr__(self, "mep_interval_mv", amplitude_interval(self.mep_interval_mv))
         measured = self.mep_mv is not None or self.mep_interval_mv is not None
         if self.status is Status.ACCEPTED and not measured and not self.tap_alone:
             raise InvalidValueError("an accepted trial needs its MEP", got=self.index)
@@ -240,6 +242,7 @@ class Trial:
         check_amplitude(self, "mep_mv", optional=True)
         check_numbers(self, "background_rms_uv", least=0, optional=True)
         check_numbers(self, "isi_sd_ms", "mep_sd_mv", least=0)
+        check_numbers(self, "tap_mv", least=0, optional=True)
 
     @classmethod
     def unknown(cls, stimulus: Stimulus) -> Trial:
@@ -277,17 +280,6 @@ class Trial:
     def accepted_anyway(self) -> Trial:
         """The same trial, accepted by an operator after looking at it."""
         return dataclasses.replace(self, status=Status.ACCEPTED, reason=None, overruled=self.reason)
-
-
-def _interval_mv(ends_mv: object) -> tuple[float, float]:
-    """An interval of amplitudes, whose upper end may be infinite [mV]."""
-    if isinstance(ends_mv, tuple | list) and len(ends_mv) == 2:
-        low_mv, high_mv = ends_mv
-        if 0 <= number("an amplitude's lower end [mV]", low_mv) < high_mv:
-            return float(low_mv), float(high_mv)
-    raise InvalidValueError(
-        "this is no interval of amplitudes", got=ends_mv, expected="two amplitudes in mV that ascend, such as (0, 0.05)"
-    )
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from fractions import Fraction
+from typing import Final
 
 import numpy as np
 
@@ -78,6 +79,10 @@ def different_muscles(noted: Iterable[str]) -> list[str]:
     return list(muscles.values()) if len(muscles) > 1 else []
 
 
+PAIRS_FIRST: Final = 4
+"""So many trials show whether a rig works, before taps alone are given."""
+
+
 @dataclass(frozen=True)
 class VisitProtocol:
     """How the stimuli of a session follow each other, within its limits.
@@ -89,6 +94,8 @@ class VisitProtocol:
             limits allow.
         tms_alone: share of trials that are a magnetic pulse without a tap.
         tap_alone: share of trials that are a tap without a magnetic pulse; the device must be able to.
+        taps_first: how many taps alone follow on the first four trials, to learn what they do to the EMG; on devices
+            that deliver them and record it. More follow if a window is found that this could explain. 0 for none.
         block_trials: a rest follows every block of so many trials; None for no rests.
         rest_s: how long a rest lasts [s].
 
@@ -100,12 +107,14 @@ class VisitProtocol:
     iti_s: tuple[float, float] | None = None
     tms_alone: float = 0.0
     tap_alone: float = 0.0
+    taps_first: int = 3
     block_trials: int | None = None
     rest_s: float = 120.0
 
     def __post_init__(self) -> None:
         check_probabilities(self, "tms_alone", "tap_alone", least=0, below=1)
         check_wholes(self, "block_trials", least=1, optional=True)
+        check_wholes(self, "taps_first", least=0)
         check_numbers(self, "rest_s", above=0)
         if self.iti_s is not None:
             object.__setattr__(self, "iti_s", _interval(self.iti_s))

@@ -49,7 +49,7 @@ def test_a_subject_of_several_lines_cannot_pass_for_other_facts(record: SessionR
 def test_the_rest_of_the_header_is_told_in_its_own_words(record: SessionRecord) -> None:
     facts = dict(further_facts(record))
     assert facts["visit"] == "day 2, operator MK, muscle FCR"
-    assert facts["judgement of a sweep"] == "mep_window_ms 15–35, background_uv 10, tap_artefact_ms 8"
+    assert facts["judgement of a sweep"] == "mep_window_ms 15–35, background_uv 10"
     assert facts["log"] == f"s.mcap, schema {record.header.schema_version}"
 
 

@@ -256,6 +256,26 @@ def test_tms_alone_is_told_without_being_asked(log: Path) -> None:
     assert read_session(log).table[0].commanded_isi_ms is None
 
 
+def test_a_tap_alone_is_told_without_being_asked_and_says_what_is_its_own(log: Path, space: DesignSpace) -> None:
+    with open_session(make_strategy(space=space, particles=100), log=log) as session:
+        for isi_ms in (0.0, 20.0, 40.0):
+            session.tell(isi_ms, 0.2, pulse=False)
+        session.tell(session.ask(), mep_interval_mv=(0.0, 0.05))
+        session.tell(session.ask(), 0.1, mep_sd_mv=0.02)
+        with pytest.raises(InvalidValueError, match="not of the kind"):
+            session.tell(session.ask(), 0.1, pulse=False)
+        session.mistrial(Kind.NO_PULSE)
+        told = session.estimate().probability
+    record = read_session(log)
+    assert [intent.tap_alone for intent in record.intents] == [True] * 3 + [False] * 3
+    assert [trial.isi_ms for trial in record.table][:3] == [0.0, 20.0, 40.0]
+    assert record.table[3].mep_interval_mv == (0.0, 0.05)
+    with resume(log) as again:
+        assert isinstance(again, Recorder)
+        assert again.estimate().probability == told
+        assert again.strategy.spent == 3
+
+
 def test_tms_alone_that_was_given_is_logged_at_once_whatever_the_limits_allow(log: Path, space: DesignSpace) -> None:
     clock, limits = VirtualClock(), Limits.of_space(space, min_iti_s=7.0, max_pulses=2)
     with open_session(scripted_strategy(9), log, limits=limits, clock=clock) as session:

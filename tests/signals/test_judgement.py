@@ -8,14 +8,11 @@ import pytest
 from scipy.signal import butter, sosfilt
 
 from isiw.design import DesignSpace
-from isiw.devices.robot.presets import preset
-from isiw.devices.robot.tapper import Tapper, TapperSettings
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.findings import Kind
 from isiw.signals import SignalLimits, is_saturated, judge, judge_measurement
 from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep
 from isiw.types import ArrayLike, FloatArray
-from known import known
 from signals.made import sweep_of
 
 IMPACT = DesignSpace(0, 320, reference="impact")
@@ -221,82 +218,14 @@ def test_an_impact_that_the_device_only_predicts_carries_its_uncertainty() -> No
     assert (judged.isi_ms, judged.isi_sd_ms) == (98.0, 2.5)
 
 
-def test_the_artefact_of_the_tap_counts_neither_as_background_nor_as_an_mep() -> None:
-    for isi_ms in (5.0, 40.0, 100.0):
+@pytest.mark.parametrize("after_hit_ms", [20, 70, 110])
+def test_what_the_tap_does_to_the_emg_is_no_background(after_hit_ms: int) -> None:
+    for isi_ms in (5.0, 40.0, 100.0, 140.0):
         emg = 0.002 * np.random.default_rng(5).standard_normal(5000)
-        emg[3500:3530] += 0.5  # 20 ms after the impact
+        emg[5 * (680 + after_hit_ms) :][:150] += 0.5
         judged = judge(with_channel(sweep_of(t_tms_ms=680.0 + isi_ms), "emg", emg), Stimulus(0, isi_ms), IMPACT)
         assert judged.reason is None
-        assert known(judged.mep_mv) < 0.02
         assert judged.background_rms_uv == pytest.approx(2.0, rel=0.2)
-
-
-class Evoked:
-    def __init__(self, mep_mv: float) -> None:
-        self.mep_mv = mep_mv
-
-
-def told_mv(
-    isi_ms: float,
-    evoked_mv: float,
-    artefact_mv: float,
-    name: str = "subject1",
-    space: DesignSpace = IMPACT,
-    trials: int = 8,
-) -> FloatArray:
-    geometry = replace(preset(name), artefact_mv=artefact_mv)
-    robot = Tapper(lambda _: Evoked(evoked_mv), geometry, TapperSettings(reference=space.reference), seed=3)
-    stimuli = [Stimulus(trial, float(isi_ms)) for trial in range(trials)]
-    judged = [judge(robot.answer(stimulus), stimulus, space) for stimulus in stimuli]
-    return np.array([one.mep_mv for one in judged if one.reason is None])
-
-
-@pytest.mark.parametrize("artefact_mv", [0.0, 0.1])
-@pytest.mark.parametrize("name", ["subject1", "subject2"])
-@pytest.mark.parametrize("isi_ms", [13, 14, 15, 16, 20])
-def test_from_13_ms_on_the_tap_changes_no_amplitude(isi_ms: float, name: str, artefact_mv: float) -> None:
-    np.testing.assert_allclose(told_mv(isi_ms, 0.2, artefact_mv, name), 0.2, atol=0.01)
-
-
-@pytest.mark.parametrize("artefact_mv", [0.0, 0.1])
-@pytest.mark.parametrize("name", ["subject1", "subject2"])
-@pytest.mark.parametrize("isi_ms", [0, 3, 6, 9, 11])
-def test_where_tap_and_mep_coincide_at_least_half_of_the_mep_is_told(
-    isi_ms: float, name: str, artefact_mv: float
-) -> None:
-    told = told_mv(isi_ms, 0.2, artefact_mv, name)
-    assert told.min() > 0.1
-    assert told.max() < 0.21
-
-
-@pytest.mark.parametrize("name", ["subject1", "subject2"])
-@pytest.mark.parametrize("isi_ms", [0, 3, 6, 9, 12, 15])
-def test_the_tap_of_a_trial_without_a_response_is_never_told_as_an_mep(isi_ms: float, name: str) -> None:
-    assert told_mv(isi_ms, 0.0, 0.1, name).max() < 0.01
-
-
-@pytest.mark.parametrize("begins_ms", [-400.0, -100.0])
-@pytest.mark.parametrize("isi_ms", [0, 3, 6, 9, 12, 15])
-def test_a_rig_that_states_the_hit_alone_gets_no_mep_from_the_tap(isi_ms: float, begins_ms: float) -> None:
-    geometry = replace(preset("subject1"), artefact_mv=0.1)
-    robot = Tapper(lambda _: Evoked(0.0), geometry, TapperSettings(reference="impact"), seed=3)
-    for trial in range(8):
-        stimulus = Stimulus(trial, float(isi_ms))
-        whole = robot.answer(stimulus)
-        hit_ms, emg, pulse_ms = judge(whole, stimulus, IMPACT).t_hit_ms, whole.channels["emg"], known(whole.t_tms_ms)
-        first = round((pulse_ms + begins_ms - emg.t0_ms) * emg.rate_hz / 1000)
-        part = replace(emg, values=emg.values[first:], t0_ms=emg.t0_ms + first * 1000 / emg.rate_hz)
-        told = judge(Sweep({"emg": part}, t_tms_ms=pulse_ms, t_hit_ms=hit_ms), stimulus, IMPACT)
-        assert told.reason is not None or known(told.mep_mv) < 0.01
-
-
-@pytest.mark.parametrize("evoked_mv", [0.0, 0.012, 0.025])
-@pytest.mark.parametrize("name", ["subject1", "subject2"])
-def test_the_tap_that_follows_the_pulse_makes_no_small_mep_large(name: str, evoked_mv: float) -> None:
-    told = [
-        told_mv(preset(name).hit.mean_ms + isi_ms, evoked_mv, 0.1, name, VALVE, trials=4) for isi_ms in range(-30, 0, 2)
-    ]
-    assert np.mean(np.concatenate(told) > 1.1 * max(evoked_mv, 0.008)) < 0.03
 
 
 def test_a_short_sweep_that_begins_after_the_valve_command_is_judged_by_what_there_is() -> None:
@@ -317,9 +246,7 @@ def test_a_sweep_with_too_little_rest_says_so_and_not_that_a_channel_is_missing(
     assert mistrial_of(sweep(emg), Stimulus(0, None)) is Kind.TOO_LITTLE_REST
 
 
-@pytest.mark.parametrize(
-    "wrong", [{"background_uv": 0.0}, {"tap_artefact_ms": np.nan}, {"mep_window_ms": (35.0, 15.0)}]
-)
+@pytest.mark.parametrize("wrong", [{"background_uv": 0.0}, {"full_scale_mv": np.nan}, {"mep_window_ms": (35.0, 15.0)}])
 def test_invalid_limits_are_errors(wrong: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match="SignalLimits"):
         SignalLimits(**wrong)

@@ -175,6 +175,7 @@ class Correction(LogRecord):
     mep_mv: FiniteFloat | None = Field(default=None, ge=0, le=MOST_MEP_MV)
     mep_sd_mv: FiniteFloat | None = Field(default=None, ge=0)
     background_rms_uv: FiniteFloat | None = Field(default=None, ge=0)
+    tap_mv: FiniteFloat | None = Field(default=None, ge=0)
 
 
 class Event(LogRecord):

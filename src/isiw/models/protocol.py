@@ -37,12 +37,17 @@ class Observation:
             `response` is known.
         isi_sd_ms: SD of the realised ISI [ms], shape (b,).
         response: 1 seen, 0 not seen, NaN where the amplitude is told instead, shape (b,).
+        mep_high_mv: upper end of the interval that begins at `mep_mv` and holds the amplitude [mV], shape (b,); None
+            where all amplitudes are points.
+        known_mv: mean and SD of a part of the amplitude that is not the pulse's [mV], shape (b, 2); None for none.
     """
 
     isi_ms: Tensor
     mep_mv: Tensor
     isi_sd_ms: Tensor
     response: Tensor
+    mep_high_mv: Tensor | None = None
+    known_mv: Tensor | None = None
 
     @classmethod
     def of(
@@ -51,6 +56,8 @@ class Observation:
         mep_mv: Values,
         isi_sd_ms: Values | None = None,
         response: Sequence[bool | None] | None = None,
+        mep_high_mv: Values | None = None,
+        known_mv: Sequence[tuple[float, float]] | None = None,
     ) -> Observation:
         """One trial of each person.
 
@@ -59,10 +66,15 @@ class Observation:
             mep_mv: amplitude of the MEP [mV], one a person; None or NaN where only the response is told.
             isi_sd_ms: SD of the realised ISI [ms], one a person; by default all were measured.
             response: whether a response was seen, one a person; by default amplitudes are told.
+            mep_high_mv: where amplitudes are intervals, their upper ends [mV], one a person.
+            known_mv: mean and SD of a part of the amplitude that is not the pulse's [mV], one a person.
         """
         isi, mep = _column(isi_ms), _column(mep_mv)
         seen = torch.full_like(mep, torch.nan) if response is None else _column(response)
-        return cls(isi, mep, torch.zeros_like(isi) if isi_sd_ms is None else _column(isi_sd_ms), seen)
+        sds = torch.zeros_like(isi) if isi_sd_ms is None else _column(isi_sd_ms)
+        high = None if mep_high_mv is None else _column(mep_high_mv)
+        known = None if known_mv is None else torch.tensor(known_mv, dtype=torch.float32).reshape(-1, 2)
+        return cls(isi, mep, sds, seen, high, known)
 
 
 def _column(values: Values) -> Tensor:

@@ -12,7 +12,7 @@ from isiw.log.reader import SessionRecord
 from isiw.models.particles import ParticleModel, ParticlePosterior
 from isiw.models.particles.places import MOST_APART_MS
 from isiw.models.particles.prior import Prior
-from isiw.models.protocol import Observation
+from isiw.strategy.outcomes import Outcomes
 from isiw.text.harmless import command
 
 TOLD_LOSSES: Final = 3
@@ -37,9 +37,11 @@ def recalled(record: SessionRecord, prior: Prior, *, particles: int = 1000) -> P
     if (limit_mv := record.header.detection_limit_mv) is not None:
         model = replace(model, detection_limit_mv=limit_mv)
     posterior = model.begin(record.header.space, seed=record.header.seed)
-    for trial in record.table.told:
-        told = Observation.of([trial.isi_ms], [trial.mep_mv], [trial.isi_sd_ms])
-        posterior = model.update(posterior, told)
+    told = Outcomes(record.header.space.reference, record.header.strategy.settings.get("amplitude_step_mv")).of(
+        record.table
+    )
+    for outcome in told.pulses:
+        posterior = model.update(posterior, told.observation(outcome))
     return posterior
 
 

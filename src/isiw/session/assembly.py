@@ -28,6 +28,7 @@ from isiw.session.rig import Rig, Safeguards, require_matching
 from isiw.session.sink import SessionUpdate, Sink
 from isiw.session.steps import Asking, Pausing, Steps
 from isiw.signals.limits import SignalLimits
+from isiw.signals.tap import TapResponses
 from isiw.signals.watch import Watch
 from isiw.strategy.strategy import Strategy
 from isiw.trials import TrialTable
@@ -51,6 +52,7 @@ class Earlier:
         kept: fields of the header that stay as they were logged.
         first_records: what is logged first; never empty if there was an earlier run.
         ages_s: how long ago each stimulus was [s].
+        taps: what its sweeps show of the first stimulus alone, by what a sweep must satisfy.
     """
 
     open_log: Callable[[Header], LogWriter]
@@ -59,6 +61,7 @@ class Earlier:
     kept: Mapping[str, Any] = field(default_factory=dict)
     first_records: Sequence[Record] = ()
     ages_s: Callable[[], Sequence[float]] = tuple
+    taps: Callable[[SignalLimits], TapResponses] = lambda signals: TapResponses(signals.mep_window_ms)
 
 
 def versions() -> dict[str, str]:
@@ -200,5 +203,5 @@ def assembled(
     if earlier.first_records:
         paused_for = [event.finding for event in earlier.events if event.kind == "pause" and event.finding is not None]
         watch = watch.resumed(earlier.trials, paused_for)
-    steps = Steps(examination, rig, sink, pausing, watch, header, safeguards.backoffs_s)
+    steps = Steps(examination, rig, sink, pausing, watch, header, safeguards.backoffs_s, earlier.taps(header.signals))
     return Parts(path, header, limits, safeguards, sink, rig, examination, asking, pausing, steps, desk)

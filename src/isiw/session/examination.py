@@ -20,6 +20,7 @@ from isiw.log.schema import EstimateRecord, Event, EventKind, Intent, Record
 from isiw.log.verdicts import excluded_by, under_all
 from isiw.session.sink import Sink
 from isiw.strategy.course import candidate_isis
+from isiw.strategy.outcomes import details_of
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Trial, TrialTable
@@ -294,7 +295,9 @@ def learn(strategy: Strategy, trial: Trial) -> None:
         trial: the trial.
     """
     if trial.told:
-        strategy.learn(trial.isi_ms, trial.mep_mv, isi_sd_ms=trial.isi_sd_ms)
+        strategy.learn(trial.isi_ms, None if trial.mep_interval_mv else trial.mep_mv, **details_of(trial))
+    elif trial.counts and trial.isi_ms is not None:  # a tap alone whose amplitude was told
+        strategy.learn_tap(trial.isi_ms, trial.mep_mv)
     elif trial.is_control:
         strategy.count_control()
     elif trial.excluded and trial.reason is None:

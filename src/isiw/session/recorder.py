@@ -26,6 +26,7 @@ from isiw.signals.evidence import Evidence, told_of
 from isiw.signals.limits import isi_far, require_plausible
 from isiw.signals.rig import remedy_for
 from isiw.signals.watch import Doubts, findings
+from isiw.strategy.outcomes import Outcome
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Status, Stimulus, Trial, TrialTable
@@ -106,9 +107,9 @@ class Recorder(Judging):
             self._begin(isi_ms, self.strategy.fallback_reason)
             return isi_ms
 
-    def _begin(self, isi_ms: float | None, fallback: str | None = None) -> None:
+    def _begin(self, isi_ms: float | None, fallback: str | None = None, *, tap_alone: bool = False) -> None:
         """Put on disk what is about to be delivered."""
-        stimulus = Stimulus(len(self.trials), isi_ms)
+        stimulus = Stimulus(len(self.trials), isi_ms, tap_alone)
         self._examination.intend(Intent.of(stimulus, self._clock.now_s()), fallback)
         self._sink.log.require_in_place()
         self._asked = stimulus
@@ -116,10 +117,13 @@ class Recorder(Judging):
     def tell(
         self,
         isi_ms: float | None,
-        mep_mv: float,
+        mep_mv: float | None = None,
         *,
         isi_sd_ms: float = 0.0,
         background_rms_uv: float | None = None,
+        mep_sd_mv: float = 0.0,
+        mep_interval_mv: tuple[float, float] | None = None,
+        pulse: bool = True,
     ) -> None:
         """What came of the ISI that was asked; it is on disk before the strategy learns it.
 
@@ -129,6 +133,9 @@ class Recorder(Judging):
             mep_mv: peak-to-peak amplitude [mV]; 0 is below the detection limit.
             isi_sd_ms: SD of the realised ISI [ms]; 0 where it was measured.
             background_rms_uv: EMG before the pulse [µV RMS], where known.
+            mep_sd_mv: as for `Strategy.tell` [mV].
+            mep_interval_mv: as for `Strategy.tell` [mV].
+            pulse: False is a tap alone, as for `Strategy.tell`, which was given without being asked for.
 
         Raises:
             InvalidValueError: nothing was asked, a value that cannot be, a slip of unit or order, a pulse before the
@@ -141,28 +148,36 @@ class Recorder(Judging):
             ImplausibleDataWarning: what looks like a slip of unit; it is told and logged all the same.
         """
         with self._lock:
-            self._tell(isi_ms, mep_mv, isi_sd_ms, background_rms_uv)
+            self._examination.conclude()
+            if isi_ms is None or not pulse:
+                self._begin_alone(tap_alone=not pulse)
+            outcome = Outcome(isi_ms, mep_mv, None, isi_sd_ms, mep_sd_mv, mep_interval_mv)
+            self._tell(outcome, background_rms_uv, pulse=pulse)
 
-    def _tell(self, isi_ms: float | None, mep_mv: float, isi_sd_ms: float, background_rms_uv: float | None) -> None:
-        self._examination.conclude()
-        if isi_ms is None and self.asked is None:
-            self._begin(None)  # given already, and logged whatever the limits allow
+    def _begin_alone(self, *, tap_alone: bool) -> None:
+        """Put on disk that one stimulus was given alone, whatever the limits allow."""
+        if self.asked is None:
+            self._begin(None, tap_alone=tap_alone)
             if len(self.trials) >= self._limits.max_pulses:
                 self._examination.event("limit", f"TMS alone was given beyond {self._limits.max_pulses} pulses.")
-        mep_mv = number("mep_mv", mep_mv, least=0)
+
+    def _tell(self, outcome: Outcome, background_rms_uv: float | None, *, pulse: bool) -> None:
+        isi_ms, mep_mv, space = outcome.isi_ms, outcome.mep_mv, self.strategy.space
         isi_ms = None if isi_ms is None else number("a realised ISI [ms]", isi_ms)
         asked = self._require_asked()
-        require_plausible(isi_ms, mep_mv, asked.isi_ms, self.strategy.space, isi_sd_ms)
-        isi_ms = None if isi_ms is None else self.strategy.space.check_realised(isi_ms)
-        if (isi_ms is None) != (asked.isi_ms is None):
+        require_plausible(isi_ms, mep_mv, asked.isi_ms, space, outcome.isi_sd_ms)
+        isi_ms = None if isi_ms is None else space.check_realised(isi_ms)
+        if (isi_ms is None or not pulse) != (asked.isi_ms is None) or asked.tap_alone is pulse:
+            alone = "a tap alone" if asked.tap_alone else "TMS alone"
             raise InvalidValueError(
                 "the outcome is not of the kind of trial that was asked for",
                 got=isi_ms,
-                expected=f"the outcome of {'TMS alone' if asked.isi_ms is None else f'{asked.isi_ms:g} ms'}",
+                expected=f"the outcome of {alone if asked.isi_ms is None else f'{asked.isi_ms:g} ms'}",
                 remedy="Tell that first, or call mistrial().",
             )
         trial = Trial(asked.trial, Status.ACCEPTED, asked.isi_ms, isi_ms=isi_ms, mep_mv=mep_mv,
-                      isi_sd_ms=isi_sd_ms, background_rms_uv=background_rms_uv)  # fmt: skip
+                      isi_sd_ms=outcome.isi_sd_ms, background_rms_uv=background_rms_uv, tap_alone=not pulse,
+                      mep_sd_mv=outcome.mep_sd_mv, mep_interval_mv=outcome.mep_interval_mv)  # fmt: skip
         self._conclude(trial)
         evidence = Evidence(told=told_of(self.trials), detection_limit_mv=self._detection_limit_mv)
         off = isi_far(isi_ms, asked.isi_ms, self.strategy.space)

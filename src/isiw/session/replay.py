@@ -22,10 +22,12 @@ from isiw.log.verdicts import VERDICTS, under
 from isiw.log.writer import LogWriter
 from isiw.session.assembly import BELIEF_VERSION, ENGINE_VERSION, Earlier, versions
 from isiw.session.examination import changed_after, learn, relearned
+from isiw.signals.limits import SignalLimits
+from isiw.signals.tap import TapResponses
 from isiw.strategy.catalogue import known_settings, remade_strategy, settings_for
 from isiw.strategy.strategy import Strategy
 from isiw.text import plain
-from isiw.trials import Trial, TrialTable
+from isiw.trials import Sweep, Trial, TrialTable
 
 _COMPARED_AT_EACH_END = 50
 
@@ -82,7 +84,10 @@ def replay(
     first = record.header.asks_from
     by_fallback = {event.trial for event in record.events if event.kind == "fallback"}
     last = max((intent.trial for intent in record.intents), default=0)
+    judged = False
     for entry in record.history:
+        if judged and isinstance(entry, Intent | Trial):
+            strategy, judged = relearned(strategy, told, changes), False
         if isinstance(entry, Intent):
             # Behind a lost trial the strategy knew more than the log does.
             comparable = (
@@ -102,7 +107,8 @@ def replay(
         elif isinstance(entry, Event) and entry.kind in {*VERDICTS, "change"}:
             # In the order of telling, in which a trial that was lost stands behind later ones.
             told, changes = [under(trial, entry) for trial in told], [*changes, *changed_after([entry])]
-            strategy = relearned(strategy, told, changes)
+            judged = True
+    strategy = relearned(strategy, told, changes) if judged else strategy
     unknown = record.unknown_trials
     for trial in unknown:
         learn(strategy, trial)
@@ -212,7 +218,18 @@ def taken_up(
         {"created": header.created, "asks_from": told.asks_from},
         (*told.unknown, _resumption(record, told, limits)),
         partial(_ages_s, salvaged, len(told.trials)),
+        partial(_taps, record),
     )
+
+
+def _taps(record: SessionRecord, signals: SignalLimits) -> TapResponses:
+    """What the sweeps of a log show of the first stimulus alone."""
+    taps = TapResponses(signals.mep_window_ms)
+    for trial in (entry for entry in record.history if isinstance(entry, Trial)):
+        if channels := record.sweep(trial.index):
+            taps = taps.after(trial, Sweep(channels, trial.t_valve_ms, trial.t_tms_ms, trial.t_hit_ms))
+            taps, _ = taps.corrected(record.table)
+    return taps
 
 
 def _with_lost_pulses(record: SessionRecord, lost_pulses: int | None) -> SessionRecord:

@@ -11,23 +11,26 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from typing import Final, NamedTuple
 
 from isiw.devices.protocol import Answer
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, LimitExceededError, NotDelivered, told
 from isiw.findings import Finding, Kind
 from isiw.log.headers import Header
-from isiw.log.schema import Event, Intent, Waveform
+from isiw.log.schema import Correction, Event, Intent, Waveform
+from isiw.log.verdicts import correction
 from isiw.session.examination import WindowExamination
 from isiw.session.rig import Rig
 from isiw.session.sink import SessionUpdate, Sink
 from isiw.signals.judgement import judge, judge_measurement
+from isiw.signals.tap import OWN_RESPONSE, TapResponses
 from isiw.signals.watch import Watch
 from isiw.strategy.stopping import StopDecision, StopKind, stimuli_left
 from isiw.strategy.strategy import Strategy
 from isiw.text.harmless import shown
 from isiw.trials import Measurement, Stimulus, Sweep, Trial
-from isiw.visit import Control
+from isiw.visit import PAIRS_FIRST, Control
 
 _INTERRUPTED = "Interrupted by the operator."
 
@@ -206,9 +209,11 @@ class Steps:
         watch: Watch,
         header: Header,
         backoffs_s: tuple[float, ...],
+        taps: TapResponses,
     ) -> None:
         self._examination, self._rig, self._sink, self._pausing = examination, rig, sink, pausing
         self._watch, self._header, self._backoffs_s = watch, header, backoffs_s
+        self._taps = taps
         self._pace, self._freely = Pace(), rig.interrupts.freely
 
     @property
@@ -292,7 +297,13 @@ class Steps:
 
     @property
     def _next_control(self) -> Control | None:
-        return self._header.protocol.control(len(self._examination.trials), self._header.seed)
+        number, protocol, device = len(self._examination.trials), self._header.protocol, self._header.device
+        if number >= PAIRS_FIRST and protocol.taps_first and device.tap_alone and "emg" in device.channels:
+            window = self._strategy.estimate().window
+            few = number < PAIRS_FIRST + protocol.taps_first
+            if few or self._taps.wants_taps(window, self._examination.trials):
+                return Control.TAP_ALONE
+        return protocol.control(number, self._header.seed)
 
     def _next_isi_ms(self) -> float | None:
         """What is asked next [ms]; None where a control trial comes next."""
@@ -337,6 +348,9 @@ class Steps:
             trial = Trial.unknown(stimulus)  # from here on it may have been given, whatever fails
             answer = self._answer(stimulus)
             trial = self._judged(stimulus, answer)
+            if isinstance(answer, Sweep):
+                self._taps = self._taps.after(trial, answer)
+                trial = self._taps.measured(trial)
             self._watch = self._watch.after(trial, answer)
             doubt = self._watch.doubts.new
         except Exception as error:
@@ -352,8 +366,16 @@ class Steps:
                 self._examination.came(trial)
                 if doubt is not None:
                     self._examination.event("doubt", f"{doubt}", finding=doubt.kind)
+                self._correct()
             self._examination.log_faults()
             self._sink.log.sync()
+
+    def _correct(self) -> None:
+        """Correct earlier amplitudes by what is known now of the tap's own response."""
+        self._taps, others = self._taps.corrected(self._examination.trials)
+        for trial in others:
+            right = Correction(mep_mv=trial.mep_mv, mep_sd_mv=trial.mep_sd_mv, tap_mv=trial.tap_mv)
+            self._examination.judge(partial(correction, number=trial.index, why=OWN_RESPONSE, corrected=right))
 
     def _require_allowed(self, stimulus: Stimulus) -> None:
         """Raise where the limits or the device do not allow a stimulus, before anything is logged of it."""

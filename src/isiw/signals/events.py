@@ -20,8 +20,6 @@ from isiw.types import ArrayLike, FloatArray
 
 MOTION_SD = 3.0
 ARTEFACT_SEARCH_MS = (12.0, 30.0)  # four people: 18 to 23 ms after the impact, SD below 2 (Table 3.2)
-USUAL_ARTEFACT_MS = (12.0, 24.0)
-ARTEFACT_RISE_MS = 2.0
 ARTEFACT_SPAN_MS = (-1.0, 2.0)
 LATEST_MEP_MS = 50.0  # after the pulse, in hand muscles
 
@@ -182,11 +180,10 @@ def tap_artefact_times(
     *,
     valve_ms: float = VALVE_MS,
     t_tms_ms: ArrayLike | None = None,
-    even_as_mep: bool = False,
 ) -> FloatArray:
     """When the tap shows in the EMG [ms from the first sample], NaN where it does not, shape (n,).
 
-    What begins 10 to 50 ms after the pulse may be the MEP and is not taken for the tap, unless asked for.
+    What begins 10 to 50 ms after the pulse may be the MEP and is not taken for the tap.
     """
     waves = as_waveforms(emg, rate_hz, "EMG")
     level, noise = rest_level(waves, round(valve_ms * rate_hz / 1000), rate_hz)
@@ -195,17 +192,8 @@ def tap_artefact_times(
     since_pulse = times - per_waveform(t_tms_ms, waves)[:, None]
     deviation[(since_pulse >= ARTEFACT_SPAN_MS[0]) & (since_pulse <= ARTEFACT_SPAN_MS[1])] = 0.0
     since_hit = times - per_waveform(hit_ms, waves)[:, None]
-    first_ms, last_ms = USUAL_ARTEFACT_MS if even_as_mep else ARTEFACT_SEARCH_MS
-    sought = (since_hit >= first_ms) & (since_hit <= last_ms)
-    if not even_as_mep:
-        sought &= ~((since_pulse >= EARLIEST_ONSET_MS) & (since_pulse <= LATEST_MEP_MS))
-    surely = sought & (deviation > HYSTERESIS_SD * noise)
-    shown = first_true(surely)
-    earliest = np.full(len(waves), -math.inf)
-    if even_as_mep:
-        # The MEP of a pulse before the hit begins before the tap shows; a small one is told from it by its size.
-        before = (shown >= 0) & (per_waveform(t_tms_ms, waves) < per_waveform(hit_ms, waves))
-        shown = np.where(before, np.where(surely, deviation, -1.0).argmax(axis=-1), shown)
-        earliest = np.where(before, times[shown] - ARTEFACT_RISE_MS, earliest)
-    onset: FloatArray = np.maximum(crossing_before(deviation, MOTION_SD * noise, shown) * 1000 / rate_hz, earliest)
+    sought = (since_hit >= ARTEFACT_SEARCH_MS[0]) & (since_hit <= ARTEFACT_SEARCH_MS[1])
+    sought &= ~((since_pulse >= EARLIEST_ONSET_MS) & (since_pulse <= LATEST_MEP_MS))
+    shown = first_true(sought & (deviation > HYSTERESIS_SD * noise))
+    onset: FloatArray = crossing_before(deviation, MOTION_SD * noise, shown) * 1000 / rate_hz
     return onset

@@ -15,7 +15,6 @@ from isiw.checks import MOST_MEP_MV, choice
 from isiw.design import DesignSpace
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.findings import MISTRIALS, Kind
-from isiw.signals.events import tap_artefact_times
 from isiw.signals.impact import impact_time
 from isiw.signals.limits import (
     ACCELERATION_UNITS,
@@ -27,8 +26,8 @@ from isiw.signals.limits import (
     require_agreement,
     tap_with_tms_alone,
 )
-from isiw.signals.mep import background_rms, mep_amplitudes
-from isiw.signals.waveforms import MIN_REST_MS, at_rest, is_blanked, is_recording, is_saturated, mains_hum
+from isiw.signals.mep import TAP_SPAN_MS, background_rms, mep_amplitudes
+from isiw.signals.waveforms import TAP_MS, at_rest, is_blanked, is_recording, is_saturated, mains_hum
 from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial
 from isiw.types import FloatArray
 
@@ -63,9 +62,10 @@ def _judge_pulse(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: S
 def _judge_emg(emg: Channel, timed: Trial, limits: SignalLimits) -> Trial:
     """The MEP and the EMG before it, of a trial whose timing is right."""
     emg_mv = emg.values * _unit_mv(emg)
-    mep_mv = _mep_mv(_without_hum(emg_mv, emg, timed), emg, timed, limits)
-    timed = replace(timed, background_rms_uv=_background_uv(emg_mv, emg, timed))
     pulse = _on_channel(timed.t_tms_ms, emg)
+    quiet_mv = _without_hum(emg_mv, emg, timed)
+    mep_mv = float(mep_amplitudes(quiet_mv, emg.rate_hz, pulse, limits.mep_window_ms)[0])
+    timed = replace(timed, background_rms_uv=_background_uv(emg_mv, emg, timed))
     span_ms = (pulse + limits.mep_window_ms[0], pulse + limits.mep_window_ms[1])
     if is_saturated(emg_mv, emg.rate_hz, limits.full_scale_mv, span_ms=span_ms):
         return _mistrial(timed, Kind.SATURATION)
@@ -106,9 +106,7 @@ def _judge_tap(sweep: Sweep, stimulus: Stimulus, limits: SignalLimits) -> Trial:
 
 
 def _measured(timed: Trial, mep_mv: float) -> Trial:
-    """The trial with its amplitude, where there is one [mV]; in a sweep even EMG at rest has more than 0."""
-    if math.isnan(mep_mv):
-        return timed
+    """The trial with its amplitude [mV]; in a sweep even EMG at rest has more than 0."""
     if mep_mv == 0 or implausible_amplitude(mep_mv) is not None:
         told_mv = mep_mv if mep_mv <= MOST_MEP_MV else None  # as where a sample is missing and the converter says so
         return _mistrial(replace(timed, mep_mv=told_mv), Kind.IMPLAUSIBLE)
@@ -244,14 +242,14 @@ def _on_channel(time_ms: float | None, channel: Channel) -> float:
 def _background_uv(emg_mv: FloatArray, emg: Channel, timed: Trial) -> float | None:
     """RMS of the EMG at rest, where possible of EMG that the tap cannot have touched; None where there is too little.
 
-    After the valve command the artefact of the tap may be anywhere if the impact is unknown. A short sweep may hold
-    nothing else, and then all of its EMG before the pulse is judged.
+    After the valve command the tap may be anywhere if the impact is unknown. A short sweep may hold nothing but the
+    tap's reflexes, or nothing else, and then all of its EMG before the pulse is judged.
     """
     pulse, hit = _on_channel(timed.t_tms_ms, emg), _on_channel(timed.t_hit_ms, emg)
     untouched = np.fmin(pulse, _on_channel(timed.t_valve_ms, emg)) if math.isnan(hit) else pulse
-    for end, tap in ((float(untouched), hit), (pulse, math.nan)):
+    for end, tap, lasts_ms in ((float(untouched), hit, TAP_MS), (pulse, hit, TAP_SPAN_MS), (pulse, math.nan, 0.0)):
         try:
-            return float(1000 * background_rms(emg_mv, emg.rate_hz, end, tap)[0])
+            return float(1000 * background_rms(emg_mv, emg.rate_hz, end, tap, tap_ms=lasts_ms)[0])
         except InvalidValueError as error:
             _reason(error)
     return None
@@ -261,19 +259,3 @@ def _without_hum(emg_mv: FloatArray, emg: Channel, timed: Trial) -> FloatArray:
     """The EMG without mains hum, if there is any."""
     found = mains_hum(emg_mv, emg.rate_hz, at_rest(emg, timed))
     return emg_mv if found is None else emg_mv - found.course_mv
-
-
-def _mep_mv(emg_mv: FloatArray, emg: Channel, timed: Trial, limits: SignalLimits) -> float:
-    pulse = _on_channel(timed.t_tms_ms, emg)
-    shown = np.array([math.nan])
-    hit, valve = _on_channel(timed.t_hit_ms, emg), _on_channel(timed.t_valve_ms, emg)
-    at_rest_ms = valve if valve >= MIN_REST_MS else float(np.fmin(hit, pulse))
-    if not math.isnan(hit) and at_rest_ms >= MIN_REST_MS:  # without rest, the tap cannot be found in the EMG
-        # A trial without a response must not get the tap's amplitude: where the two coincide, rather too small.
-        shown, coinciding = (
-            tap_artefact_times(emg_mv, emg.rate_hz, hit, valve_ms=at_rest_ms, t_tms_ms=pulse, even_as_mep=even_as_mep)
-            for even_as_mep in (False, True)
-        )
-        shown = np.where(np.isnan(shown), coinciding, shown)
-    blank = (shown, shown + limits.tap_artefact_ms)
-    return float(mep_amplitudes(emg_mv, emg.rate_hz, pulse, limits.mep_window_ms, blank_ms=blank)[0])

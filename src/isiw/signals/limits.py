@@ -34,8 +34,6 @@ class SignalLimits:
             looked for in any case.
         isi_tolerance_ms: how far the realised ISI may be from the commanded one [ms], where that is less than the
             space's tolerance.
-        tap_artefact_ms: how long the artefact of the tap lasts in the EMG [ms]; what it covers of the MEP window does
-            not count.
 
     Raises:
         InvalidValueError: a limit that is not positive, a window without first and last ms, or a slip of unit.
@@ -45,10 +43,9 @@ class SignalLimits:
     background_uv: float = 10.0
     full_scale_mv: float | None = None
     isi_tolerance_ms: float | None = None
-    tap_artefact_ms: float = 8.0
 
     def __post_init__(self) -> None:
-        check_numbers(self, "background_uv", "tap_artefact_ms", above=0)
+        check_numbers(self, "background_uv", above=0)
         check_numbers(self, "full_scale_mv", "isi_tolerance_ms", above=0, optional=True)
         _check_window(self.mep_window_ms)
         if (slip := BACKGROUND_LIMIT_UV.slip(self.background_uv)) is not None:

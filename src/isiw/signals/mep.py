@@ -171,7 +171,12 @@ def mep_present(
 
 
 def background_rms(
-    emg_mv: ArrayLike, rate_hz: float, t_tms_ms: ArrayLike, t_hit_ms: ArrayLike | None = None
+    emg_mv: ArrayLike,
+    rate_hz: float,
+    t_tms_ms: ArrayLike,
+    t_hit_ms: ArrayLike | None = None,
+    *,
+    tap_ms: float = TAP_SPAN_MS,
 ) -> FloatArray:
     """RMS of the EMG about its mean in the last 100 ms of rest before the pulse [mV], shape (n,).
 
@@ -179,8 +184,8 @@ def background_rms(
         emg_mv: EMG [mV], shape (n, w).
         rate_hz: sampling rate [Hz].
         t_tms_ms: the magnetic pulse [ms from the first sample], one or shape (n,).
-        t_hit_ms: the impact [ms from the first sample], NaN or None where unknown. The 50 ms after it hold the
-            artefact of the tap and are passed over.
+        t_hit_ms: the impact [ms from the first sample], NaN or None where unknown.
+        tap_ms: how long after the impact the EMG may show it [ms]; that is passed over.
 
     Raises:
         InvalidValueError: a waveform that is not a recording, a pulse after its end, or less than 40 ms of rest.
@@ -193,7 +198,7 @@ def background_rms(
             got=f"pulse at {pulse.max():g} ms in a sweep of {waves.shape[-1] * 1000 / rate_hz:g} ms",
             remedy="Pulse times count from the sweep's first sample.",
         )
-    rest = _quiet(waves, rate_hz, pulse, per_waveform(t_hit_ms, waves))
+    rest = _quiet(waves, rate_hz, pulse, per_waveform(t_hit_ms, waves), tap_ms)
     return np.asarray(np.nanstd(rest, axis=-1), dtype=np.float64)
 
 
@@ -227,15 +232,17 @@ def _window(
     return cut(waves, first, count), times
 
 
-def _quiet(waves: FloatArray, rate_hz: float, pulse_ms: FloatArray, hit_ms: FloatArray) -> FloatArray:
+def _quiet(
+    waves: FloatArray, rate_hz: float, pulse_ms: FloatArray, hit_ms: FloatArray, tap_ms: float = TAP_SPAN_MS
+) -> FloatArray:
     """The last 100 ms of rest before each pulse, the rest of the columns NaN, shape (n, samples)."""
-    reach = round((BACKGROUND_MS + TAP_SPAN_MS) * rate_hz / 1000)
+    reach = round((BACKGROUND_MS + tap_ms) * rate_hz / 1000)
     if not np.isfinite(pulse_ms).all():
         raise InvalidValueError("the time of the pulse must be finite", got=pulse_ms)
     stop = np.minimum(np.floor((pulse_ms - PULSE_GUARD_MS) * rate_hz / 1000).astype(np.int64), waves.shape[-1])
     columns = (stop - reach)[:, None] + np.arange(reach)
     since_hit = columns * 1000 / rate_hz - hit_ms[:, None]
-    resting = (columns >= 0) & ~((since_hit >= 0) & (since_hit <= TAP_SPAN_MS))
+    resting = (columns >= 0) & ~((since_hit >= 0) & (since_hit <= tap_ms))
     later = np.cumsum(resting[:, ::-1], axis=-1)[:, ::-1]  # resting samples from here to the pulse
     resting &= later <= round(BACKGROUND_MS * rate_hz / 1000)
     if (resting.sum(axis=-1) < samples(MIN_BACKGROUND_MS, rate_hz)).any():

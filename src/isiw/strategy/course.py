@@ -7,7 +7,7 @@ same course, so that both follow the same rules.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, TypeAlias
@@ -184,6 +184,13 @@ class Course:
     alone: int = 0
     earlier: tuple[Belief, ...] = ()
     paired: bool = False
+
+    def again(self, seed: int, observations: Iterable[Observation | None]) -> Course:
+        """The course of the same people after some trials from the beginning; None is a change."""
+        course = self.method.begin(seed, self.people)
+        for observation in observations:
+            course = course.noting_change() if observation is None else course.after(observation)
+        return course
 
     def after(self, observation: Observation) -> Course:
         """The course after one more trial of each person; all of them pairs of stimuli, or all TMS alone."""

@@ -7,9 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, TypeVar
-
-import numpy as np
+from typing import Any, TypeVar, Unpack
 
 from isiw.acquisition.batch import greedy_batch
 from isiw.acquisition.protocol import AcquisitionFunction, require_acquisition
@@ -18,11 +16,12 @@ from isiw.design import DesignSpace, require_space
 from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError, warn
 from isiw.estimate import WindowEstimate
 from isiw.findings import NO_MEP
-from isiw.models.protocol import Observation, Posterior, PredictsMeps, ReportsTrouble, ResponseModel
+from isiw.models.protocol import Posterior, PredictsMeps, ReportsTrouble, ResponseModel
 from isiw.signals.evidence import Evidence, Told, is_silent
 from isiw.signals.limits import isi_far, off_by, require_plausible
 from isiw.signals.watch import Doubts, findings
 from isiw.strategy.course import Choice, Cost, Method, evenly_spaced, instead_of_lost
+from isiw.strategy.outcomes import Details, Outcome, Outcomes
 from isiw.strategy.stopping import StopDecision, StopKind, StoppingRule, stimuli_left
 from isiw.types import FloatArray
 
@@ -105,6 +104,7 @@ class Strategy:
             )
         self._mistrials = self._controls = self._lost = 0
         self._told: list[Told] = []
+        self._outcomes = Outcomes(space.reference, self.amplitude_step_mv)
         self._doubts = Doubts()
         self._choice: Choice | None = None
         self._batch_ms: list[float] = []  # what was not told yet of the last batch
@@ -160,8 +160,16 @@ class Strategy:
     @property
     def detection_limit_mv(self) -> float | None:
         """What it takes an amplitude of 0 to be below [mV]; None where neither setting nor model says."""
-        told: float | None = self.recipe.settings.get("detection_limit_mv")
-        return getattr(self.model, "detection_limit_mv", None) if told is None else told
+        return self._stated("detection_limit_mv")
+
+    @property
+    def amplitude_step_mv(self) -> float | None:
+        """The step of the amplitudes that it is told [mV]; None where it is to be found, 0 where there is none."""
+        return self._stated("amplitude_step_mv")
+
+    def _stated(self, setting: str) -> float | None:
+        told: float | None = self.recipe.settings.get(setting)
+        return getattr(self.model, setting, None) if told is None else told
 
     def ask(self, deadline_s: float | None = None) -> float:
         """The next ISI [ms], on the grid; the same until the next `tell`, or until its trial was lost three times.
@@ -238,6 +246,9 @@ class Strategy:
         *,
         response: bool | None = None,
         isi_sd_ms: float = 0.0,
+        mep_sd_mv: float = 0.0,
+        mep_interval_mv: tuple[float, float] | None = None,
+        pulse: bool = True,
     ) -> None:
         """Learn from one accepted trial.
 
@@ -247,11 +258,18 @@ class Strategy:
             response: whether a response was seen, instead of an amplitude; for a strategy of its own, as sessions log
                 amplitudes.
             isi_sd_ms: SD of the realised ISI [ms], at most 50; 0 where it was measured.
+            mep_sd_mv: SD of the amplitude, as of the mean of several [mV]; 0 where it was measured once.
+            mep_interval_mv: the interval that the amplitude lies in, instead of an amplitude [mV]; its end may be
+                infinite.
+            pulse: whether the magnetic pulse was given. Without it, this is a tap alone, which uses up no budget:
+                `mep_mv` is the amplitude of what the MEP window would hold at `isi_ms`, and what the tap itself adds to
+                amplitudes near this ISI is learnt.
 
         Raises:
             InvalidValueError: NaN, infinite or negative values, a response that is neither True nor False, not exactly
-                one of `mep_mv` and `response`, an amplitude that no muscle gives, swapped arguments, seconds, a pulse
-                before the impact, or an ISI that is too uncertain.
+                one of `mep_mv`, `mep_interval_mv` and `response`, an amplitude that no muscle gives, swapped arguments,
+                seconds, a pulse before the impact, an ISI that is too uncertain, or a tap alone without ISI or
+                amplitude.
             OutOfSpaceError: an ISI beyond the space and its tolerance.
             StrategyError: a kind of outcome that the model cannot learn from.
 
@@ -261,49 +279,69 @@ class Strategy:
         """
         plain_ms = None if isi_ms is None else number("a realised ISI [ms]", isi_ms)
         plain_mv = None if mep_mv is None else number("mep_mv", mep_mv, least=0)
+        if not pulse:
+            return self.learn_tap(plain_ms, plain_mv)
         asked_ms = None if plain_ms is None else self._meant_ms(plain_ms, plain_mv)
         require_plausible(plain_ms, plain_mv, asked_ms, self.space, isi_sd_ms)
-        self.learn(isi_ms, mep_mv, response=response, isi_sd_ms=isi_sd_ms)
+        more = Details(response=response, isi_sd_ms=isi_sd_ms, mep_sd_mv=mep_sd_mv, mep_interval_mv=mep_interval_mv)
+        self.learn(isi_ms, mep_mv, **more)
         evidence = Evidence(told=self._told, detection_limit_mv=self.detection_limit_mv)
         self._doubts = self._doubts.after((isi_far(plain_ms, asked_ms, self.space), *findings(evidence)))
         if self._doubts.new is not None:
             warn(f"{self._doubts.new}", ImplausibleDataWarning)
+        return None
 
-    def learn(
-        self,
-        isi_ms: float | None,
-        mep_mv: float | None = None,
-        *,
-        response: bool | None = None,
-        isi_sd_ms: float = 0.0,
-    ) -> None:
+    def learn(self, isi_ms: float | None, mep_mv: float | None = None, **more: Unpack[Details]) -> None:
         """Learn from one trial that was judged before, as a session does: as `tell`, however implausible.
 
         Args:
             isi_ms: as for `tell` [ms].
             mep_mv: as for `tell` [mV].
-            response: as for `tell`.
-            isi_sd_ms: as for `tell` [ms].
+            **more: as for `tell`, and `tap_mv`: what is left of the tap's own response in the amplitude, in the mean
+                [mV]; None where nobody knows.
 
         Raises:
-            InvalidValueError: NaN, infinite or negative values, an amplitude that no amplifier gives, a response that
-                is neither True nor False, or not exactly one of `mep_mv` and `response`.
-            OutOfSpaceError: an ISI beyond the space and its tolerance.
-            StrategyError: a kind of outcome that the model cannot learn from.
+            InvalidValueError: an amplitude that no amplifier gives, or other values that `tell` refuses.
+            OutOfSpaceError: as for `tell`.
+            StrategyError: as for `tell`.
         """
-        if (mep_mv is None) == (response is None):
-            raise InvalidValueError("tell needs either mep_mv or response, and not both", got=(mep_mv, response))
-        if not (response is None or isinstance(response, bool | np.bool_)):
-            raise InvalidValueError("response must be True or False", got=response)
-        mep_mv = None if mep_mv is None else amplitude("mep_mv", mep_mv)
-        isi_sd_ms = number("isi_sd_ms", isi_sd_ms, least=0)
-        isi_ms = None if isi_ms is None else self.space.check_realised(isi_ms)
-        self._course = self._course.after(Observation.of([isi_ms], [mep_mv], [isi_sd_ms], [response]))
+        outcome = Outcome(isi_ms, mep_mv, **more)
+        outcome = replace(outcome, isi_ms=None if isi_ms is None else self.space.check_realised(isi_ms))
+        outcomes = self._outcomes.after(outcome)
+        self._course = (
+            self._course.after(outcomes.observation(outcome))
+            if outcomes.step_mv == self._outcomes.step_mv
+            else self._course.again(self.seed, outcomes.observations)
+        )
+        self._outcomes, isi_ms, mep_mv = outcomes, outcome.isi_ms, outcome.mep_mv
         if mep_mv is not None:
             self._told.append(Told(mep_mv, isi_ms))
         self._batch_ms = self._left_of_batch_ms(isi_ms)
         self._choice = self._fallback_reason = None
         self._lost = 0 if isi_ms is not None else self._lost
+
+    def learn_tap(self, isi_ms: float | None, mep_mv: float | None) -> None:
+        """Learn from a tap alone, whatever was told before it.
+
+        Args:
+            isi_ms: as for `tell` [ms].
+            mep_mv: as for `tell` [mV].
+
+        Raises:
+            InvalidValueError: no ISI or no amplitude, or one that no amplifier gives.
+            OutOfSpaceError: as for `tell`.
+        """
+        if isi_ms is None or mep_mv is None:
+            raise InvalidValueError(
+                "a tap alone needs the ISI at which the MEP window would lie, and the amplitude of what it holds",
+                got=(isi_ms, mep_mv),
+            )
+        outcomes = self._outcomes.after_tap(self.space.check_realised(isi_ms), amplitude("mep_mv", mep_mv))
+        if outcomes.pulses:
+            self._course = self._course.again(self.seed, outcomes.observations)
+            self._choice = self._fallback_reason = None
+        self._outcomes = outcomes
+        self._controls += 1
 
     def _meant_ms(self, isi_ms: float, mep_mv: float | None) -> float | None:
         """Which ISI that was asked a trial is of [ms], be it told in seconds or swapped; None where none was asked."""
@@ -331,7 +369,7 @@ class Strategy:
         A model that reckons with changes takes one for likely between the last trial and the next, and what is asked
         next is chosen again; to other models it means nothing.
         """
-        self._course = self._course.noting_change()
+        self._course, self._outcomes = self._course.noting_change(), self._outcomes.after_change()
         self._choice = self._fallback_reason = None
 
     def count_mistrial(self) -> None:
@@ -355,6 +393,8 @@ class Strategy:
     def estimate(self) -> WindowEstimate:
         """What is believed about the window now."""
         estimate = self._course.estimate()
+        if self._outcomes.tap_may_explain(estimate.window):
+            estimate = estimate.noting(tap_may_explain=True)
         return estimate.noting(silent=True) if self._is_silent else estimate
 
     def prediction_mv(self) -> tuple[FloatArray, FloatArray] | None:

@@ -35,6 +35,23 @@ def test_a_response_is_above_the_threshold_and_its_absence_below() -> None:
     assert interval(None, response=False) == pytest.approx((-math.inf, math.log(THRESHOLD_MV)))
 
 
+def test_an_interval_ends_where_it_was_told_to() -> None:
+    trial = observed(Observation.of([1.0], [0.03], None, [None], [0.05]), LIMIT_MV, THRESHOLD_MV, order=0)
+    assert (trial.log_mep.item(), trial.log_mep_high.item()) == pytest.approx((math.log(0.03), math.log(0.05)))
+    below = observed(Observation.of([1.0], [0.0], None, [None], [0.01]), LIMIT_MV, THRESHOLD_MV, order=0)
+    assert (below.log_mep.item(), below.log_mep_high.item()) == pytest.approx((-math.inf, math.log(0.01)))
+    assert AmplitudeHistory.nothing(1).appended(Observation.of([1.0], [0.0], None, [None], [0.01])).mep_mv[0, 0] == (
+        pytest.approx(0.005)
+    )
+
+
+def test_a_known_part_is_kept_in_every_precision_and_taken_off_for_models_that_know_none() -> None:
+    told = Observation.of([1.0], [0.3], known_mv=[(0.1, 0.05)])
+    trial = observed(told, LIMIT_MV, THRESHOLD_MV, order=0).to("cpu", torch.double)
+    assert trial.around[0, 0].tolist() == pytest.approx([0.1, 0.05, 0.0, 0.0, 1.0])
+    assert AmplitudeHistory.nothing(1).appended(told).mep_mv[0, 0] == pytest.approx(0.2)
+
+
 def test_a_history_grows_by_one_trial_of_each_person_and_stays_what_it_was() -> None:
     empty = History.empty(2, torch.device("cpu"))
     trial = observed(Observation.of([100.0, None], [0.1, 0.2]), LIMIT_MV, THRESHOLD_MV, order=0)

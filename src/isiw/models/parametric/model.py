@@ -25,7 +25,7 @@ from isiw.models.parametric.program import WindowProgram
 from isiw.models.parametric.sampling import Chains, sample_person
 from isiw.models.protocol import Observation, PriorPerson, Tensor
 from isiw.models.randomness import SIMULATED, step_generator, systematic
-from isiw.models.shared.history import History, observed
+from isiw.models.shared.history import History, observed, without_known
 from isiw.models.shared.tables import OUTCOMES, interpolated, table_levels
 from isiw.models.windows import Runs, SampledProfiles, least_excess_mv, profile_grid, sampled_estimate
 from isiw.types import ArrayLike
@@ -98,7 +98,7 @@ class ParametricModel:
             order: its place among the trials, from 0.
         """
         known = self.detection_limit_mv, self.response_threshold_mv
-        return observed(observation, *known, order=order).to("cpu", torch.double)
+        return observed(without_known(observation), *known, order=order).to("cpu", torch.double)
 
     def simulate(self, space: DesignSpace, seed: int, isi_ms: ArrayLike) -> PriorPerson:
         """Draw one person from the prior, and an MEP at each ISI; see `SimulatesPeople`."""

@@ -42,6 +42,8 @@ class ParticleModel:
         thinned: how many of them represent the posterior where every candidate ISI is scored.
         moves: how often particles move, and when they are resampled.
         detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
+        amplitude_step_mv: the step of the converter or display that amplitudes come from [mV]; an amplitude then stands
+            for the interval of a step about it. None to have it found in the amplitudes, 0 for none.
         response_threshold_mv: what a told response is known to be above [mV].
         unusual_kept: the part of their probability that unusual starts and widths of the window, and intensities, keep
             where the next ISI is chosen; what is believed and reported keeps all of it.
@@ -58,6 +60,7 @@ class ParticleModel:
     thinned: int = 192
     moves: Moving = field(default_factory=Moving)
     detection_limit_mv: float = 0.005
+    amplitude_step_mv: float | None = None
     response_threshold_mv: float = 0.02
     unusual_kept: float = 1 / 3
     device: str = "cpu"
@@ -67,6 +70,7 @@ class ParticleModel:
         check_wholes(self, "particles", least=2, most=MOST_OF_A_KIND)  # half of them move at a time
         check_wholes(self, "thinned", least=1, most=MOST_OF_A_KIND)
         check_numbers(self, "detection_limit_mv", "response_threshold_mv", above=0)
+        check_numbers(self, "amplitude_step_mv", least=0, optional=True)
         check_probabilities(self, "unusual_kept")
         check_choice(self, "engine", get_args(EngineName))
         _require_device(self.device)

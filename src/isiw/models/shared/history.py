@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from isiw.errors import StrategyError
 from isiw.lazy import torch
 from isiw.models.protocol import Observation, Tensor
 from isiw.types import FloatArray
+
+_LEAST_MV: Final = 1e-3
+"""What is left at least of an amplitude without its known part [mV]."""
 
 
 class Circumstances(NamedTuple):
@@ -91,8 +94,25 @@ def observed(observation: Observation, detection_limit_mv: float, response_thres
     low = torch.where(seen, threshold, torch.where(unseen, -torch.inf, log_mep))
     high = torch.where(seen, torch.inf, torch.where(unseen, threshold, log_mep))
     high = torch.where(observation.mep_mv == 0, limit, high)
+    if observation.mep_high_mv is not None:
+        told = torch.log(observation.mep_high_mv)
+        high = torch.where(told.isnan(), high, torch.where(observation.mep_mv == 0, told.clamp_min(limit), told))
     columns = (observation.isi_ms, observation.isi_sd_ms, low, high, torch.full_like(log_mep, order))
-    return History(*(x.unsqueeze(-1) for x in columns))
+    trial = History(*(x.unsqueeze(-1) for x in columns))
+    if observation.known_mv is None:
+        return trial
+    around = trial.around.clone()
+    around[:, 0, :2] = observation.known_mv.to(around)
+    return replace(trial, circumstances=around)
+
+
+def without_known(observation: Observation) -> Observation:
+    """The same without the mean of the known parts, for models that know no such part."""
+    if observation.known_mv is None:
+        return observation
+    known = observation.known_mv[:, 0].to(observation.mep_mv)
+    left = torch.where(known > 0, (observation.mep_mv - known).clamp_min(_LEAST_MV), observation.mep_mv)
+    return replace(observation, mep_mv=left, known_mv=None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,8 +158,12 @@ class AmplitudeHistory:
         return int(self.isi_ms.shape[0])
 
     def appended(self, observation: Observation) -> AmplitudeHistory:
-        """These and one more trial."""
-        isi_ms, mep_mv = (x.detach().cpu().double().numpy()[:, None] for x in (observation.isi_ms, observation.mep_mv))
+        """These and one more trial; of an interval its middle."""
+        amplitude = without_known(observation).mep_mv
+        if observation.mep_high_mv is not None:
+            high = observation.mep_high_mv.nan_to_num(0.0, posinf=0.0)
+            amplitude = torch.where(high > amplitude, (amplitude + high) / 2, amplitude)
+        isi_ms, mep_mv = (x.detach().cpu().double().numpy()[:, None] for x in (observation.isi_ms, amplitude))
         if np.isnan(mep_mv).any():
             raise StrategyError(
                 "the model learns from amplitudes only",

@@ -1,0 +1,215 @@
+"""The tap's own response in the EMG: its course, learnt from the EMG that shows it alone, and amplitudes without it.
+
+What a tap evokes comes at its own times after the hit. The EMG before the pulse of a pair shows what the tap alone does
+until then, a tap alone shows all of it. Where the MEP window of a trial meets these times, the mean course is
+subtracted. How much is left of the response then is known from how far each course is from the mean of the others,
+never from the trial's own amplitude. An electrical first pulse has an artefact and an M-wave, and the same holds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from isiw.signals.limits import EMG_UNITS_MV
+from isiw.signals.mep import MEP_WINDOW_MS
+from isiw.signals.waveforms import PULSE_GUARD_MS, TAP_MS, at_rest, mains_hum, samples
+from isiw.trials import Sweep, Trial, TrialTable
+from isiw.types import FloatArray
+from isiw.window import Window
+
+STEP_MS: Final = 0.25
+HIT_DELAY_MS, APART_MS = 180.0, 40.0
+"""From the valve command to the hit, usually, and how far from that it may be."""
+
+GRID_MS: Final = np.arange(-APART_MS, TAP_MS + APART_MS, STEP_MS)
+LEAST_SHOWN: Final = 3
+"""So many sweeps say what the tap does at a time after the hit; with fewer nobody knows how much it varies."""
+
+ENOUGH_SHOWN, TAP_EVERY = 12, 4
+"""With fewer sweeps that show a response within a window, every so many-th trial is one more tap alone."""
+
+CLEAR: Final = 0.7
+"""By this share, over the root of the number of sweeps, EMG after the hit is larger than at rest by chance at most."""
+
+USUAL_VARIANCE, USUAL_COUNTS = 0.43, 3.0
+"""Relative variance of the response's size that is expected, that of a log SD of .6; it counts as so many sweeps."""
+
+SAME_MV, SAME_SHARE = 0.003, 0.1
+"""What changes an amplitude by less is not worth a correction."""
+
+
+OWN_RESPONSE: Final = "What the first stimulus alone does to the EMG is known now, and was subtracted."
+
+
+class Left(NamedTuple):
+    """What is left of the response in an amplitude: mean and SD [mV]; and how many sweeps say so."""
+
+    mean_mv: float
+    sd_mv: float
+    shown: int
+
+
+class _Shown(NamedTuple):
+    """The EMG of one sweep after the hit at `GRID_MS`, NaN from the pulse on, and its peak-to-peak size at rest."""
+
+    course_mv: FloatArray
+    rest_mv: float
+
+
+class _MepWindow(NamedTuple):
+    """The EMG in a trial's MEP window, its times after the hit, and how many sweeps its amplitude was told by."""
+
+    emg_mv: FloatArray
+    since_hit_ms: FloatArray
+    told_by: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class TapResponses:
+    """What the sweeps of a session show of the tap alone, and the MEP windows of its trials.
+
+    Args:
+        mep_window_ms: where the MEP is sought [ms after the pulse].
+        shown: what each sweep shows.
+        windows: the MEP windows, by the trial's number.
+    """
+
+    mep_window_ms: tuple[float, float] = MEP_WINDOW_MS
+    shown: tuple[_Shown, ...] = ()
+    windows: Mapping[int, _MepWindow] = field(default_factory=dict)
+
+    def after(self, trial: Trial, sweep: Sweep) -> TapResponses:
+        """The same after one more trial; of TMS alone, and of a trial that was lost, nothing is learnt."""
+        hit_ms = _origin_ms(trial)
+        is_control = trial.commanded_isi_ms is None and not trial.tap_alone
+        if hit_ms is None or is_control or "emg" not in sweep.channels:
+            return self
+        emg = sweep.channels["emg"]
+        values = emg.values * EMG_UNITS_MV[emg.unit]
+        times_ms = emg.t0_ms + np.arange(values.size) * 1000 / emg.rate_hz
+        rest = at_rest(emg, trial) if trial.t_tms_ms is not None else times_ms < hit_ms - PULSE_GUARD_MS
+        wave = mains_hum(values, emg.rate_hz, rest)
+        values = values if wave is None else values - wave.course_mv
+        shown, windows = self.shown, dict(self.windows)
+        if trial.counts:
+            until_ms = times_ms[-1] if trial.t_tms_ms is None else trial.t_tms_ms - PULSE_GUARD_MS
+            course = np.interp(GRID_MS, times_ms - hit_ms, values)
+            course[(hit_ms + GRID_MS < times_ms[0]) | (hit_ms + GRID_MS > until_ms)] = math.nan
+            shown = (*shown, _Shown(course, self._size_mv(values[rest], emg.rate_hz)))
+        if trial.mep_mv is not None and trial.t_tms_ms is not None:
+            first, last = (trial.t_tms_ms + edge for edge in self.mep_window_ms)
+            within = (times_ms >= first - 1e-6) & (times_ms <= last + 1e-6)
+            windows[trial.index] = _MepWindow(values[within], times_ms[within] - hit_ms)
+        return replace(self, shown=shown, windows=windows)
+
+    def _size_mv(self, resting_mv: FloatArray, rate_hz: float) -> float:
+        """The mean peak-to-peak size of EMG at rest over the length of the MEP window [mV]; NaN if it is shorter."""
+        first, last = self.mep_window_ms
+        pieces = resting_mv[resting_mv.size % (each := samples(last - first, rate_hz) + 1) :].reshape(-1, each)
+        return float(np.ptp(pieces, axis=-1).mean()) if pieces.size else math.nan
+
+    def measured(self, trial: Trial) -> Trial:
+        """The trial with its amplitude without the tap's response, as far as that is known; else as it is."""
+        window = self.windows.get(trial.index)
+        left = None if window is None else self._left(window.since_hit_ms)
+        if window is None or left is None or trial.mep_mv is None:
+            return trial
+        mep_mv = float(np.ptp(window.emg_mv - self._mean(window.since_hit_ms))) if left.mean_mv else trial.mep_mv
+        return replace(trial, mep_mv=mep_mv, mep_sd_mv=left.sd_mv, tap_mv=left.mean_mv)
+
+    def corrected(self, trials: Iterable[Trial]) -> tuple[TapResponses, list[Trial]]:
+        """The trials whose amplitudes are others by what is known now; each is looked at when twice as much is."""
+        windows, found = dict(self.windows), []
+        for trial in trials:
+            window = windows.get(trial.index)
+            left = None if window is None else self._left(window.since_hit_ms)
+            if window is None or left is None or left.shown < 2 * window.told_by:
+                continue
+            windows[trial.index] = window._replace(told_by=left.shown)
+            again = self.measured(trial)
+            if trial.counts and _differs(trial, again):
+                found.append(again)
+        return replace(self, windows=windows), found
+
+    def wants_taps(self, window: Window | None, trials: TrialTable) -> bool:
+        """Whether a window rests on trials whose part of the tap's response few sweeps, or none, have shown."""
+        if window is None or any(trial.tap_alone for trial in trials.trials[-TAP_EVERY + 1 :]):
+            return False
+        inside = (trial.index for trial in trials.told if trial.isi_ms is not None and _inside(window, trial.isi_ms))
+        lefts = (self._left(self.windows[number].since_hit_ms) for number in inside if number in self.windows)
+        return any(left is None or (left.mean_mv > 0 and left.shown < ENOUGH_SHOWN) for left in lefts)
+
+    def _covering(self, since_hit_ms: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The courses that show some times, as far as a response lasts, shape (k, t), and what they have at rest."""
+        meets = (since_hit_ms[0] - STEP_MS <= GRID_MS) & (since_hit_ms[-1] + STEP_MS >= GRID_MS)
+        courses = [one for one in self.shown if not np.isnan(one.course_mv[meets]).any()]
+        waves = np.array([one.course_mv[meets] for one in courses]).reshape(len(courses), int(meets.sum()))
+        return waves, np.array([one.rest_mv for one in courses])
+
+    def _mean(self, since_hit_ms: FloatArray) -> FloatArray:
+        """The mean course at some times after the hit [mV]; the level that it begins with where it is over."""
+        meets = (since_hit_ms[0] - STEP_MS <= GRID_MS) & (since_hit_ms[-1] + STEP_MS >= GRID_MS)
+        mean = self._covering(since_hit_ms)[0].mean(axis=0)
+        return np.asarray(np.interp(since_hit_ms, GRID_MS[meets], mean))
+
+    def _left(self, since_hit_ms: FloatArray) -> Left | None:
+        """What subtracting the mean course leaves of the response at some times after the hit; None where unknown."""
+        if since_hit_ms[-1] < 0 or since_hit_ms[0] > GRID_MS[-1]:
+            return Left(0.0, 0.0, LEAST_SHOWN)
+        waves, rests = self._covering(since_hit_ms)
+        count = len(waves)
+        if count < LEAST_SHOWN or np.isnan(rests).all():
+            return None
+        rest, size, mean = float(np.nanmean(rests)), float(np.ptp(waves, axis=-1).mean()), waves.mean(axis=0)
+        whole = float(np.ptp(mean))
+        if size <= rest * (1 + CLEAR / math.sqrt(count)) and whole <= 2 * rest / math.sqrt(count):
+            return Left(0.0, 0.0, count)
+        apart = np.ptp(waves - (count * mean - waves) / (count - 1), axis=-1)
+        excess = max(0.0, float(apart.mean()) - rest * math.sqrt(count / (count - 1)))
+        mean_share, sd_share = _left_of_varying_size(waves, mean)
+        return Left(max(excess, whole * mean_share), max(float(apart.std()), whole * sd_share), count)
+
+
+def _left_of_varying_size(waves: FloatArray, mean: FloatArray) -> tuple[float, float]:
+    """Mean and SD of what is left of a response of log-normal size without its mean, as shares of its mean size."""
+    count, centred = len(waves), mean - mean.mean()
+    sizes = waves @ centred / max(float(centred @ centred), 1e-12)
+    variance = (USUAL_COUNTS * USUAL_VARIANCE + float(((sizes - sizes.mean()) ** 2).sum())) / (USUAL_COUNTS + count - 1)
+    log_sd = math.sqrt(math.log1p(variance) * (1 + 2 / count))  # as the mean, too, is known from so few only
+    left = 2 * math.erf(log_sd / math.sqrt(8))
+    return left, math.sqrt(math.expm1(log_sd**2) - left**2)
+
+
+def _origin_ms(trial: Trial) -> float | None:
+    """The hit, as it was measured or is to be expected [ms on the sweep's clock]; None without a time of the tap."""
+    if trial.t_hit_ms is None and trial.t_valve_ms is not None:
+        return trial.t_valve_ms + HIT_DELAY_MS
+    return trial.t_hit_ms
+
+
+def _differs(before: Trial, after: Trial) -> bool:
+    pairs = ((before.mep_mv or 0.0, after.mep_mv or 0.0), (before.tap_mv or 0.0, after.tap_mv or 0.0))
+    return any(abs(new - old) > max(SAME_MV, SAME_SHARE * max(new, old)) for old, new in pairs)
+
+
+def meets_response(isi_ms: float, reference: str, mep_window_ms: tuple[float, float] = MEP_WINDOW_MS) -> bool:
+    """Whether the MEP window at an ISI meets the time after the hit in which a tap may move the EMG."""
+    from_hit_ms = isi_ms - (HIT_DELAY_MS if reference == "valve" else 0.0)
+    return -mep_window_ms[1] <= from_hit_ms <= TAP_MS - mep_window_ms[0]
+
+
+def may_be_the_taps(window: Window | None, unknown_ms: Iterable[float], known_ms: Iterable[float]) -> bool:
+    """Whether what the tap alone does is unknown at most of the ISIs within a window at which that matters."""
+    if window is None:
+        return False
+    unknown, known = (sum(_inside(window, isi_ms) for isi_ms in isis_ms) for isis_ms in (unknown_ms, known_ms))
+    return unknown > known
+
+
+def _inside(window: Window, isi_ms: float) -> bool:
+    return any(start <= isi_ms <= end for start, end in window.segments)

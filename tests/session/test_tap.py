@@ -1,0 +1,121 @@
+"""What the tap alone does to the EMG: learnt while the session runs, corrected by appended events, and resumed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from isiw.log.reader import read_session
+from isiw.session.loop import Session
+from isiw.session.resume import resume
+from isiw.session.rig import Safeguards
+from isiw.strategy.catalogue import make_strategy
+from isiw.strategy.strategy import Strategy
+from isiw.trials import TrialTable
+from isiw.visit import VisitProtocol
+from isiw.window import Window
+from known import known
+from session.test_resume import stop_after
+from tapped import IMPACT, TapRig, reflex
+
+NO_TAPS = VisitProtocol(taps_first=0)
+
+
+def on_nothing(isi_ms: float | None, rng: np.random.Generator) -> float:  # noqa: ARG001 - the same at every ISI
+    return 0.15 * float(np.exp(0.6 * rng.standard_normal()))
+
+
+def silent(isi_ms: float | None, rng: np.random.Generator) -> float:  # noqa: ARG001 - no MEP at any ISI
+    return 0.0
+
+
+def few(trials: int = 12, seed: int = 0) -> Strategy:
+    return make_strategy("even", space=IMPACT, max_trials=trials, seed=seed, particles=100)
+
+
+def ran(rig: TapRig, log: Path, strategy: Strategy, **options: Any) -> Session:
+    safeguards = Safeguards(on_pause=lambda _: True)
+    session = Session(rig, strategy, log=log, safeguards=safeguards, **options)
+    session.run(progress=False)
+    return session
+
+
+def test_three_taps_alone_follow_on_the_first_four_trials_and_use_up_no_budget(log: Path) -> None:
+    rig = TapRig()
+    session = ran(rig, log, few(6))
+    assert [stimulus.tap_alone for stimulus in rig.delivered] == [False] * 4 + [True] * 3 + [False] * 2
+    assert {trial.tap_mv is None for trial in session.trials.trials[7:]} == {False}
+
+
+def test_more_taps_alone_follow_while_a_window_is_found_that_the_response_could_explain() -> None:
+    rig, trials = TapRig(reflex(0.3)), TrialTable()
+    for isi_ms in (None, None, None, 20.0, 30.0, 100.0, 20.0):
+        trials = trials.appended(rig.trial(isi_ms, pulse=isi_ms is not None))
+    assert rig.taps.wants_taps(Window(10.0, 60.0), trials)
+    assert not rig.taps.wants_taps(Window(90.0, 110.0), trials)
+    assert not rig.taps.wants_taps(None, trials)
+    for _ in range(9):
+        trials = trials.appended(rig.trial(None, pulse=False))
+        assert not rig.taps.wants_taps(Window(10.0, 60.0), trials)
+    trials = trials.appended(rig.trial(20.0)).appended(rig.trial(20.0)).appended(rig.trial(20.0))
+    assert not rig.taps.wants_taps(Window(10.0, 60.0), trials)
+
+
+@pytest.mark.parametrize(("tap_alone", "protocol"), [(False, VisitProtocol()), (True, NO_TAPS)])
+def test_none_is_given_where_the_device_cannot_or_nobody_wants_it(
+    log: Path, protocol: VisitProtocol, *, tap_alone: bool
+) -> None:
+    rig = TapRig(reflex(0.3), tap_alone=tap_alone)
+    ran(rig, log, few(3), protocol=protocol)
+    assert not any(stimulus.tap_alone for stimulus in rig.delivered)
+
+
+def test_earlier_amplitudes_are_corrected_in_the_log_and_learnt_again(log: Path) -> None:
+    session = ran(TapRig(reflex(0.3), mep_mv=silent), log, few(), protocol=NO_TAPS)
+    record = read_session(log)
+    corrections = [event for event in record.events if event.kind == "correction"]
+    assert corrections
+    assert record.table == session.trials
+    for trial in record.table:
+        assert known(trial.mep_mv) - (trial.tap_mv or 0.0) < 0.15
+    fresh = few()
+    for trial in record.table:
+        fresh.learn(trial.isi_ms, trial.mep_mv, mep_sd_mv=trial.mep_sd_mv, tap_mv=trial.tap_mv)
+    assert fresh.estimate().probability == session.strategy.estimate().probability
+
+
+def test_a_resumed_session_corrects_and_asks_as_an_uninterrupted_one(log: Path, tmp_path: Path) -> None:
+    strategy = make_strategy(space=IMPACT, max_trials=12, particles=100)
+    whole = ran(TapRig(reflex(0.3), mep_mv=silent), tmp_path / "whole.mcap", strategy.restarted(), protocol=NO_TAPS)
+    with pytest.raises(KeyboardInterrupt):
+        ran(TapRig(reflex(0.3), mep_mv=silent), log, strategy, protocol=NO_TAPS, on_trial=stop_after(8))
+    safeguards = Safeguards(on_pause=lambda _: True)
+    again = resume(log, TapRig(reflex(0.3), mep_mv=silent), safeguards=safeguards)
+    again.run(progress=False)
+    assert again.trials == whole.trials
+
+
+def test_a_person_whose_tap_evokes_no_response_and_who_has_no_window_gets_no_sure_one(log: Path) -> None:
+    strategy = make_strategy(space=IMPACT, seed=1, max_trials=40)
+    session = ran(TapRig(seed=1, mep_mv=on_nothing, tap_alone=False), log, strategy)
+    assert known(session.strategy.estimate().probability) < 0.9
+    short = [known(trial.mep_mv) for trial in session.trials if known(trial.isi_ms) < 4]
+    assert min(short, default=1.0) > 0.02
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("protocol", [VisitProtocol(), NO_TAPS], ids=["three taps", "no tap"])
+@pytest.mark.parametrize("size_mv", [0.1, 0.3])
+def test_people_without_a_window_get_no_sure_one_from_a_reflex(
+    tmp_path: Path, size_mv: float, protocol: VisitProtocol
+) -> None:
+    sure = 0
+    for seed in range(10):
+        strategy = make_strategy(space=IMPACT, seed=seed, max_trials=40)
+        rig = TapRig(reflex(size_mv, start_ms=20.0 + 8 * seed), seed=seed, mep_mv=silent)
+        session = ran(rig, tmp_path / f"{seed}.mcap", strategy, protocol=protocol)
+        sure += known(session.strategy.estimate().probability) >= 0.9
+    assert sure <= 1

@@ -1,0 +1,150 @@
+"""The tap's own response: learnt from the EMG that shows it alone, and subtracted where the MEP window meets it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from isiw.devices.robot.presets import preset
+from isiw.devices.robot.tapper import Tapper, TapperSettings
+from isiw.signals import judge
+from isiw.signals.tap import TapResponses
+from isiw.trials import Channel, Stimulus, Sweep
+from known import known
+from tapped import IMPACT, TapRig, reflex
+
+LONG_MS = (310.0, 280.0, 250.0, 220.0, 300.0, 260.0)
+
+
+@pytest.mark.parametrize("isi_ms", range(0, 61, 5))
+def test_without_a_response_to_the_tap_an_mep_keeps_its_amplitude_at_every_isi(isi_ms: int) -> None:
+    rig = TapRig()
+    rig.trials(LONG_MS)
+    told = [known(rig.trial(float(isi_ms)).mep_mv) for _ in range(20)]
+    usual = [known(trial.mep_mv) for trial in rig.trials([200.0] * 20)]
+    assert np.median(told) == pytest.approx(np.median(usual), rel=0.05)
+    assert rig.trial(float(isi_ms)).tap_mv == 0.0
+
+
+@pytest.mark.parametrize("size_mv", [0.1, 0.3])
+@pytest.mark.parametrize("isi_ms", [0.0, 10.0, 20.0, 30.0, 45.0])
+def test_a_response_to_the_tap_is_not_told_as_an_mep(size_mv: float, isi_ms: float) -> None:
+    rig = TapRig(reflex(size_mv))
+    rig.trials(LONG_MS * 2)
+    told = [rig.trial(isi_ms, 0.0) for _ in range(20)]
+    above = [known(trial.mep_mv) - known(trial.tap_mv) - 0.01 for trial in told]
+    assert np.mean(above) < max(0.01, 0.15 * size_mv)
+    assert np.mean([abs(one) > 3 * trial.mep_sd_mv + 0.01 for one, trial in zip(above, told, strict=True)]) <= 0.1
+
+
+def test_a_response_that_is_always_the_same_leaves_the_mep_as_it_is() -> None:
+    rig = TapRig(reflex(0.3, log_sd=0.0))
+    rig.trials(LONG_MS * 3)
+    told = rig.trials([20.0] * 10)
+    assert np.median([known(trial.mep_mv) for trial in told]) == pytest.approx(0.155, rel=0.06)
+    assert told[0].mep_sd_mv < 0.06
+
+
+def test_how_far_a_trial_is_known_depends_on_its_isi_and_not_on_its_amplitude() -> None:
+    rig = TapRig(reflex(0.3))
+    rig.trials(LONG_MS)
+    sizes = [(trial.tap_mv, trial.mep_sd_mv) for trial in (rig.trial(20.0, mep_mv) for mep_mv in (0.0, 0.1, 1.0))]
+    assert sizes[0] == pytest.approx(sizes[1])
+    assert sizes[0] == pytest.approx(sizes[2])
+    assert known(rig.trial(200.0).tap_mv) == 0.0
+
+
+def test_tms_alone_is_told_as_it_is() -> None:
+    rig = TapRig(reflex(0.3))
+    rig.trials(LONG_MS)
+    alone = rig.trial(None)
+    assert (alone.tap_mv, alone.mep_sd_mv) == (None, 0.0)
+    assert alone.mep_mv == pytest.approx(0.155, rel=0.05)
+
+
+def test_where_no_sweep_shows_the_response_nothing_is_subtracted() -> None:
+    rig = TapRig(reflex(0.3))
+    told = rig.trials([0.0, 10.0, 20.0, 30.0] * 3)
+    assert {(trial.tap_mv, trial.mep_sd_mv) for trial in told} == {(None, 0.0)}
+
+
+def test_three_taps_alone_show_it_all() -> None:
+    rig = TapRig(reflex(0.3))
+    for _ in range(3):
+        rig.trial(None, pulse=False)
+    assert known(rig.trial(20.0).tap_mv) > 0.03
+
+
+def test_earlier_trials_are_corrected_when_the_course_is_known_and_when_twice_as_much_is() -> None:
+    rig, trials, corrected_after = TapRig(reflex(0.3)), [], []
+    for isi_ms in (10.0, 20.0, *LONG_MS, *LONG_MS):
+        trials.append(rig.trial(isi_ms))
+        rig.taps, others = rig.taps.corrected(trials)
+        for other in others:
+            trials[other.index] = other
+            corrected_after.append((other.index, len(trials)))
+    assert corrected_after[:2] == [(0, 5), (1, 5)]
+    assert {after for _, after in corrected_after} <= {5, 8, 14}
+    assert known(trials[1].mep_mv) - known(trials[1].tap_mv) < 0.25
+
+
+def test_a_rig_without_a_response_gets_no_correction() -> None:
+    rig, trials = TapRig(), []
+    for isi_ms in (10.0, 20.0, 0.0, *LONG_MS, *LONG_MS):
+        trials.append(rig.trial(isi_ms))
+        rig.taps, others = rig.taps.corrected(trials)
+        assert not others
+
+
+def test_a_trial_that_an_operator_excluded_is_not_corrected() -> None:
+    rig = TapRig(reflex(0.3))
+    raw = [rig.trial(20.0), *rig.trials(LONG_MS)]
+    excluded = [replace(raw[0], excluded=True), *raw[1:]]
+    assert [trial.index for trial in rig.taps.corrected(raw)[1]] == [0]
+    assert not rig.taps.corrected(excluded)[1]
+
+
+@pytest.mark.parametrize("name", ["subject1", "subject2"])
+@pytest.mark.parametrize("isi_ms", [0.0, 5.0, 10.0])
+def test_the_artefact_of_the_robots_tap_is_known(isi_ms: float, name: str) -> None:
+    class Evoked:
+        mep_mv = 0.0
+
+    taps = TapResponses()
+    robot = Tapper(lambda _: Evoked, replace(preset(name), artefact_mv=0.1), TapperSettings(), seed=3)
+    told = []
+    for trial in range(18):
+        stimulus = Stimulus(trial, None, tap_alone=True) if trial < 6 else Stimulus(trial, isi_ms)
+        sweep = robot.answer(stimulus)
+        judged = judge(sweep, stimulus, IMPACT)
+        taps = taps.after(judged, sweep)
+        told.append(taps.measured(judged))
+    pairs = [trial for trial in told[6:] if trial.counts]
+    assert abs(np.mean([known(trial.mep_mv) - known(trial.tap_mv) for trial in pairs])) < 0.03
+
+
+@given(
+    rate_hz=st.floats(500.0, 50_000.0),
+    before_ms=st.floats(0.0, 400.0),
+    after_ms=st.floats(0.0, 200.0),
+    hit_ms=st.floats(-250.0, 60.0),
+    t0_ms=st.floats(-1e4, 1e4),
+)
+@settings(max_examples=100, deadline=None)
+def test_whatever_rate_length_and_offset_a_sweep_has_it_shows_something_or_nothing(
+    rate_hz: float, before_ms: float, after_ms: float, hit_ms: float, t0_ms: float
+) -> None:
+    samples = max(2, int((before_ms + after_ms) * rate_hz / 1000))
+    emg = Channel(0.002 * np.random.default_rng(0).standard_normal(samples), rate_hz, "mV", t0_ms=t0_ms)
+    pulse_ms, taps = t0_ms + before_ms, TapResponses()
+    for trial in range(4):
+        stimulus = Stimulus(trial, -hit_ms)
+        sweep = Sweep({"emg": emg}, t_tms_ms=pulse_ms, t_hit_ms=pulse_ms + hit_ms)
+        judged = judge(sweep, stimulus, IMPACT)
+        taps = taps.after(judged, sweep)
+        assert taps.measured(judged).status == judged.status
+        taps.corrected([judged])
