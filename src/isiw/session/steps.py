@@ -121,11 +121,7 @@ class Asking:
         return self._number
 
     def wait(self, nobody: Callable[[], bool]) -> bool:
-        """Wait for an answer; where nobody is left who could give one, it is no.
-
-        Args:
-            nobody: whether nobody is left.
-        """
+        """Wait for an answer; where nobody is left who could give one, it is no."""
         with self._lock:  # an answer that came too late for the last question is none to this one
             self._answer, self.asked = None, True
         try:
@@ -137,15 +133,7 @@ class Asking:
         return bool(self._answer) and not self.over
 
     def answer(self, *, goes_on: bool, number: int | None = None) -> None:
-        """Answer; from any thread.
-
-        Args:
-            goes_on: whether the session goes on.
-            number: the question that is answered; None for whichever is asked.
-
-        Raises:
-            InvalidValueError: nobody asks, or another question is asked.
-        """
+        """Answer the question of this number, or whichever is asked; from any thread."""
         with self._lock:
             if not self.asked or (goes_on and (self.over or self._answer is False)):
                 raise InvalidValueError("the session does not wait for an answer", remedy="Pause it first.")
