@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.devices.limits import Limits
-from isiw.errors import InvalidValueError, OutOfSpaceError
+from isiw.errors import InvalidValueError, LimitExceededError, OutOfSpaceError
 from isiw.strategy.course import candidate_isis
 
 spaces = st.builds(
@@ -144,3 +144,34 @@ def test_a_space_with_more_isis_than_anybody_needs_is_refused(space: tuple[float
 
 def test_a_second_in_steps_of_a_tenth_of_a_millisecond_is_a_space() -> None:
     assert len(DesignSpace(0, 1000, 0.1, reference="impact").grid_ms) == 10_001
+
+
+LISTED = DesignSpace.of([30, 10, 20, 15, 50], reference="impact")
+
+
+def test_a_space_can_be_a_list_of_isis_in_any_order() -> None:
+    assert LISTED.grid_ms.tolist() == [10, 15, 20, 30, 50]
+    assert (LISTED.low_ms, LISTED.high_ms) == (10, 50)
+    assert str(LISTED) == "10, 15, 20, 30 and 50 ms after the impact"
+    assert [LISTED.snap(isi_ms) for isi_ms in (0, 12, 13, 41, 99)] == [10, 10, 15, 50, 50]
+    assert LISTED.stops_ms(10).tolist() == [10, 20, 30, 50]
+    assert DesignSpace.of([10, 15, 20, 30, 50], reference="impact") == LISTED
+
+
+def test_the_limits_of_a_list_allow_its_isis_alone() -> None:
+    limits = Limits.of_space(LISTED)
+    limits.require_isi(30)
+    for isi_ms in (25, 60):
+        with pytest.raises(LimitExceededError):
+            limits.require_isi(isi_ms)
+
+
+@pytest.mark.parametrize(("isis_ms", "reference"), [([10], "impact"), ([10, math.nan], "impact"), ([10, 20], "")])
+def test_a_list_that_makes_no_space_is_refused(isis_ms: list[float], reference: Any) -> None:
+    with pytest.raises(InvalidValueError):
+        DesignSpace.of(isis_ms, reference=reference)
+
+
+def test_a_list_whose_range_says_otherwise_is_refused() -> None:
+    with pytest.raises(InvalidValueError, match=r"DesignSpace\.of"):
+        dataclasses.replace(LISTED, high_ms=60)

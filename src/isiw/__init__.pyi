@@ -2,6 +2,7 @@ from . import acquisition as acquisition
 from . import config as config
 from . import devices as devices
 from . import errors as errors
+from . import existing as existing
 from . import export as export
 from . import interval as interval
 from . import log as log
@@ -45,6 +46,8 @@ from .devices.transports.line import LineDevice as LineDevice
 from .devices.transports.lsl import LslChannel as LslChannel
 from .devices.transports.lsl import LslDevice as LslDevice
 from .estimate import WindowEstimate as WindowEstimate
+from .existing.analysis import Analysis as Analysis
+from .existing.analysis import analyse as analyse
 from .log.amending import exclude as exclude
 from .log.amending import include as include
 from .log.reader import read_session as read_session

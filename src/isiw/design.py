@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final, cast, get_args
@@ -17,13 +19,16 @@ from isiw.types import FloatArray, Reference
 MOST_ISIS = 10_001
 """Of a design space: a second in steps of 0.1 ms."""
 
+_MOST_TOLD: Final = 12
+"""ISIs of a list that are told one by one."""
+
 _UNSAID: Final = cast("Reference", "")
 """No reference; it is the default so that its absence is refused in words, and not as a missing argument."""
 
 
 @dataclass(frozen=True)
 class DesignSpace:
-    """The ISIs that may be asked: a grid from `low_ms` to `high_ms`, both included.
+    """The ISIs that may be asked: a grid from `low_ms` to `high_ms`, both included, or a list; see `of`.
 
     Args:
         low_ms: first ISI [ms].
@@ -33,6 +38,7 @@ class DesignSpace:
             no default, as the same number is another ISI in the other one.
         tolerance_ms: how far a *realised* ISI may lie beyond the range before it is an error, and from the commanded
             one before it is a mistrial [ms]; by default 10.
+        isis_ms: the ISIs of a list [ms], ascending; by default there is a grid. `of` makes the other fields fit.
 
     Raises:
         InvalidValueError: a bound that is not finite, an empty range, a step that does not fit, too many ISIs, an
@@ -44,6 +50,24 @@ class DesignSpace:
     step_ms: float = 1.0
     reference: Reference = _UNSAID
     tolerance_ms: float = 10.0
+    isis_ms: tuple[float, ...] = ()
+
+    @classmethod
+    def of(cls, isis_ms: Iterable[float], *, reference: Reference = _UNSAID, tolerance_ms: float = 10.0) -> DesignSpace:
+        """The space of a list of ISIs, for stimulators with fixed ones; windows begin and end at one of them.
+
+        Args:
+            isis_ms: the ISIs [ms], in any order; at least two.
+            reference: the event that an ISI is counted from.
+            tolerance_ms: as for a grid [ms].
+
+        Raises:
+            InvalidValueError: fewer than two ISIs, one that is not finite, too many of them, or no reference.
+        """
+        listed = tuple(sorted({number("an ISI of the design space [ms]", isi_ms) for isi_ms in isis_ms}))
+        if len(listed) < 2:
+            raise InvalidValueError("a list of ISIs needs at least two", got=listed)
+        return cls(listed[0], listed[-1], _widest_ms(listed), reference, tolerance_ms, listed)
 
     def __post_init__(self) -> None:
         if not self.reference:
@@ -63,6 +87,10 @@ class DesignSpace:
                 expected=f"a range in ms of at least {self.step_ms:g} ms",
                 remedy=f"In seconds? Then low_ms={1e3 * self.low_ms:g}, high_ms={1e3 * self.high_ms:g}.",
             )
+        object.__setattr__(self, "isis_ms", tuple(self.isis_ms))
+        if self.isis_ms:
+            self._check_list()
+            return
         steps = (self.high_ms - self.low_ms) / self.step_ms
         if steps >= MOST_ISIS:
             raise InvalidValueError(
@@ -78,6 +106,20 @@ class DesignSpace:
                 remedy="Choose high_ms = low_ms + k * step_ms with a whole k.",
             )
 
+    def _check_list(self) -> None:
+        listed = self.isis_ms
+        if len(listed) > MOST_ISIS:
+            raise InvalidValueError(
+                "the design space has too many ISIs", got=len(listed), expected=f"at most {MOST_ISIS}"
+            )
+        ends_ms = (self.low_ms, self.high_ms, self.step_ms)
+        if tuple(sorted(set(listed))) != listed or ends_ms != (listed[0], listed[-1], _widest_ms(listed)):
+            raise InvalidValueError(
+                "the range of a list of ISIs is not that of the list",
+                got=(*ends_ms, listed),
+                remedy="Make it with DesignSpace.of([10, 15, 20], reference=...).",
+            )
+
     def __str__(self) -> str:
         return self.told(TAP)
 
@@ -88,11 +130,19 @@ class DesignSpace:
             first: what the conditioning stimulus is called.
         """
         counted = first.origin(self.reference)
+        if self.isis_ms:
+            *before, last = (f"{isi_ms:g}" for isi_ms in self.isis_ms)
+            shown = [*before[:_MOST_TOLD], "…"] if len(before) > _MOST_TOLD else before
+            return f"{', '.join(shown)} and {last} ms after the {counted}"
         return f"{self.low_ms:g}–{self.high_ms:g} ms after the {counted}, every {self.step_ms:g} ms"
 
     @cached_property
     def grid_ms(self) -> FloatArray:
         """All ISIs that may be asked [ms], shape (t,)."""
+        if self.isis_ms:
+            listed: FloatArray = np.array(self.isis_ms)
+            listed.setflags(write=False)
+            return listed
         steps = np.arange(round((self.high_ms - self.low_ms) / self.step_ms) + 1, dtype=np.float64)
         grid: FloatArray = self.low_ms + self.step_ms * steps
         grid[-1] = self.high_ms  # rounding may have put it a little beyond, where limits refuse it
@@ -106,6 +156,8 @@ class DesignSpace:
             InvalidValueError: not a finite number.
         """
         inside = min(max(number("an ISI [ms]", isi_ms), self.low_ms), self.high_ms)
+        if self.isis_ms:
+            return float(self.grid_ms[np.abs(self.grid_ms - inside).argmin()])
         steps = round((inside - self.low_ms) / self.step_ms)
         return float(self.grid_ms[steps])
 
@@ -119,6 +171,10 @@ class DesignSpace:
         Args:
             step_ms: from one to the next [ms]; where that is none of the grid's, the next multiple of its step.
         """
+        if self.isis_ms:
+            stops_ms = [self.isis_ms[0]]
+            stops_ms += [i for i in self.isis_ms if i - stops_ms[-1] >= step_ms - 1e-9]
+            return np.array(stops_ms)
         whole_ms = self.whole_steps_ms(step_ms)
         stops = math.floor((self.high_ms - self.low_ms) / whole_ms + 1e-9) + 1
         isis_ms: FloatArray = self.low_ms + whole_ms * np.arange(stops, dtype=np.float64)
@@ -144,6 +200,11 @@ class DesignSpace:
                 remedy=f"ISIs count from the {self.reference}; check the reference, or log the trial as a mistrial.",
             )
         return realised_ms
+
+
+def _widest_ms(listed_ms: tuple[float, ...]) -> float:
+    """The largest distance from one ISI of a list to the next [ms]."""
+    return max(after - before for before, after in itertools.pairwise(listed_ms))
 
 
 def missing_reference() -> InvalidValueError:

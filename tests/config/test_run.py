@@ -19,7 +19,7 @@ from isiw.config import (
     subject_for,
     truth_of,
 )
-from isiw.design import VALVE_SPACE
+from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import ConfigError, DeviceError, InvalidValueError, StrategyError
 from isiw.log.reader import read_session
@@ -332,3 +332,12 @@ def test_the_space_that_nobody_named_is_said(config_file: WriteFile, text: str, 
     config = load_config(config_file(text)).with_overrides(strategy="even", seed=3)
     assert assumed_space(config) == said
     assert config.design() == VALVE_SPACE
+
+
+def test_a_space_can_be_a_list_of_isis_and_not_a_range_as_well(tmp_path: Path) -> None:
+    path = tmp_path / "list.toml"
+    path.write_text('[space]\nisis_ms = [10, 20, 50]\nreference = "impact"\n')
+    assert load_config(path).space.design() == DesignSpace.of([10, 20, 50], reference="impact")
+    path.write_text('[space]\nisis_ms = [10, 20, 50]\nhigh_ms = 60.0\nreference = "impact"\n')
+    with pytest.raises(ConfigError, match="exclude each other"):
+        load_config(path)

@@ -260,3 +260,15 @@ def test_a_tap_that_hits_after_the_last_isi_is_refused() -> None:
     with pytest.raises(InvalidValueError, match=r"after the last ISI.* 5000 ms"):
         make_strategy(hit_delay_ms=(5000.0, 6.0), **FEW)
     assert make_strategy(space=IMPACT_SPACE, hit_delay_ms=(5000.0, 6.0), **FEW).estimate().window is not None
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_strategy_works_on_a_list_of_isis(name: str) -> None:
+    listed = DesignSpace.of([10, 15, 20, 30, 50], reference="impact")
+    strategy = make_strategy(name, listed, seed=1, **few(name))
+    for mep_mv in (0.02, 0.3, 0.2, 0.02, 0.25, 0.03, 0.02):
+        asked = strategy.ask()
+        assert asked in listed.isis_ms
+        strategy.tell(asked, mep_mv)
+    window = strategy.estimate().window
+    assert window is None or name == "pf" or {window.start_ms, window.end_ms} <= set(listed.isis_ms)

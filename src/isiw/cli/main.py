@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 import isiw
-from isiw.cli import interval, logs, prior, rig, serve, session, strategies, study, threshold, timing
+from isiw.cli import analyse, interval, logs, prior, rig, serve, session, strategies, study, threshold, timing
 from isiw.cli.console import SESSIONS, STUDIES, show
 
 app = typer.Typer(
@@ -18,7 +18,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for commands in (session, rig, threshold, interval, timing, serve, logs, strategies):
+for commands in (session, rig, threshold, interval, timing, serve, analyse, logs, strategies):
     app.add_typer(commands.app)
 app.add_typer(prior.app, name="prior", rich_help_panel=STUDIES)
 app.add_typer(study.app, name="study", rich_help_panel=STUDIES)

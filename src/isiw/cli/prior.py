@@ -34,6 +34,7 @@ def learn(
 ) -> None:
     """Learn what a lab's people are like from sessions already run. Exit code 3 where a log is damaged."""
     losses: list[str] = []
+    imported: list[str] = []
     with errors_reported("Interrupted: nothing was written."):
         isiw.priors.check_lab_output(output, overwrite=overwrite)
         show(f"Learning from {counted(len(logs), 'session')} …", stderr=True)
@@ -42,11 +43,14 @@ def learn(
 
             def note(record: SessionRecord) -> None:
                 progress.advance(task)
+                imported.extend([record.path.name] if record.header.imported else [])
                 losses.extend(f"{record.path.name}: {loss}" for loss in record.losses)
 
             lab = isiw.priors.learn(logs, again=again, damaged=damaged, seed=seed, on_done=note)
         isiw.priors.write_lab_prior(lab, output, overwrite=overwrite)
         _print(lab)
+        if imported:
+            show(isiw.session.imported_sentence(imported))
         show(f"prior: {output}")
         show(f"Run a session with it, and with your rig's CONFIG: {command('run', 'CONFIG', '--prior', output)}")
         exit_if_damaged(losses)

@@ -53,6 +53,10 @@ def run(  # noqa: PLR0913, PLR0917 - an option each
         list[Path] | None,
         typer.Option(help="The log of an earlier session of the same person; repeat it for several, earliest first."),
     ] = None,
+    earlier: Annotated[
+        list[Path] | None,
+        typer.Option(help="A log of earlier trials of this visit, such as isiw analyse writes; repeat it for several."),
+    ] = None,
     day: Annotated[
         int | None, typer.Option(help="The number of the person's visit, for the log.", **NO_DEFAULT)
     ] = None,
@@ -69,11 +73,14 @@ def run(  # noqa: PLR0913, PLR0917 - an option each
             strategy=strategy,
             prior=lab,
             after=after,
+            earlier=earlier,
             day=day,
             operator=operator,
         )
         show(isiw.config.assumed_space(settings) or "Preparing the session …")
         session = isiw.config.session_for(settings)
+        if imported := isiw.config.told_imported(settings):
+            show(imported)
         _run_to_the_end(session, config, live=live)
 
 

@@ -11,6 +11,7 @@ from isiw.config.session import (
     require_same_person,
     session_for,
     subject_for,
+    told_imported,
     write_rig_template,
 )
 
@@ -33,6 +34,7 @@ __all__ = [
     "run_of_log",
     "session_for",
     "subject_for",
+    "told_imported",
     "truth_of",
     "write_rig_template",
 ]

@@ -14,7 +14,7 @@ from isiw.config.session import simulated_device
 from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import ConfigError, InvalidValueError
 from isiw.log.headers import RUN_KEY
-from isiw.log.kinds import continued_by
+from isiw.log.kinds import continued_by, require_session
 from isiw.log.reader import SessionRecord
 from isiw.subjects.cohorts import person_of
 from isiw.text.toml_files import checked
@@ -52,6 +52,7 @@ def run_of_log(record: SessionRecord) -> _LoggedRun:
     Raises:
         ConfigError: it was run with a device of the lab's own or by other software, or the person is not known here.
     """
+    require_session(record.path, record.header)
     run = record.header.config.get(RUN_KEY)
     device = run.get("device", {}) if isinstance(run, Mapping) else {}
     if run is None or (device != {} and not (isinstance(device, Mapping) and "kind" in device)):

@@ -48,6 +48,7 @@ class RunConfig(Section):
     log: Path | None = None
     prior: Path | None = None
     after: tuple[Path, ...] = ()
+    earlier: tuple[Path, ...] = ()
     device: DeviceConfig | None = None
     visit: VisitConfig = VisitConfig()
     subject: SubjectConfig = SubjectConfig()
@@ -115,6 +116,7 @@ class RunConfig(Section):
         strategy: str | None = None,
         prior: Path | None = None,
         after: Sequence[Path] | None = None,
+        earlier: Sequence[Path] | None = None,
         day: int | None = None,
         operator: str | None = None,
     ) -> RunConfig:
@@ -128,12 +130,13 @@ class RunConfig(Section):
             strategy: one of `list_strategies()`.
             prior: a lab's prior.
             after: logs of earlier sessions of the same person, the first one first.
+            earlier: logs of earlier trials of the same visit, the first one first.
             day: the number of the person's visit, from 1.
             operator: who runs the session.
         """
         _require_simulation(subject)
         values = self.model_dump(exclude_unset=True)  # what nobody set is not known to be wanted
-        values |= _given(seed=seed, log=log, prior=prior, after=after or None)
+        values |= _given(seed=seed, log=log, prior=prior, after=after or None, earlier=earlier or None)
         sections = {
             "subject": _given(kind=subject, data=data),
             "visit": _given(day=day, operator=operator),
@@ -192,7 +195,10 @@ def load_config(path: str | Path | None = None) -> RunConfig:
 
 def _read_from(folder: Path, config: RunConfig) -> RunConfig:
     """A configuration whose files that are read, but for modules, lie where they do as seen from its own folder."""
-    found: dict[str, Any] = {"after": tuple((folder / log).resolve() for log in config.after)} if config.after else {}
+    logs = {"after": config.after, "earlier": config.earlier}
+    found: dict[str, Any] = {
+        key: tuple((folder / log).resolve() for log in named) for key, named in logs.items() if named
+    }
     if config.prior is not None:
         found["prior"] = (folder / config.prior).resolve()
     if config.subject.data is not None:

@@ -94,7 +94,7 @@ class SubjectConfig(SimulatedConfig):
 
 
 class SpaceConfig(Section):
-    """The design space, as in `isiw.DesignSpace`."""
+    """The design space, as in `isiw.DesignSpace`: a range with a step, or a list of ISIs."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
@@ -103,6 +103,7 @@ class SpaceConfig(Section):
     step_ms: float = 1.0
     reference: Reference
     tolerance_ms: float = 10.0
+    isis_ms: list[float] = Field(default_factory=list)
 
     @model_validator(mode="before")
     @classmethod
@@ -118,7 +119,15 @@ class SpaceConfig(Section):
 
     def design(self) -> DesignSpace:
         """The design space."""
-        return DesignSpace(**self.model_dump())
+        if not self.isis_ms:
+            return DesignSpace(**self.model_dump(exclude={"isis_ms"}))
+        if given := self.model_fields_set & {"low_ms", "high_ms", "step_ms"}:
+            raise ConfigError(
+                "a list of ISIs and a range exclude each other",
+                got=f"isis_ms and {', '.join(sorted(given))}",
+                remedy="Give either isis_ms, or low_ms, high_ms and step_ms.",
+            )
+        return DesignSpace.of(self.isis_ms, reference=self.reference, tolerance_ms=self.tolerance_ms)
 
 
 class StrategyConfig(Section):

@@ -20,6 +20,7 @@ from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import ConfigError, StrategyError
 from isiw.log.durable import log_exists
 from isiw.log.headers import RUN_KEY
+from isiw.log.kinds import imported_sentence
 from isiw.log.outputs import write_output
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import now
@@ -30,6 +31,7 @@ from isiw.strategy.catalogue import known_settings, make_strategy, settings_for
 from isiw.subjects.cohorts import person_of
 from isiw.subjects.subject import SimulatedSubject
 from isiw.text.named_code import named_code, require_fitting
+from isiw.trials import Trial
 from isiw.visit import Visit
 
 TEMPLATE_FILES = ("rig.py", "session.toml", "test_rig.py")
@@ -106,21 +108,52 @@ def _taught(config: RunConfig, device: DeviceInfo) -> Prior:
     """What the lab's people and the person's earlier sessions taught."""
     lab = None if config.prior is None else read_lab_prior(config.prior)
     earlier = [read_session(path) for path in config.after]
-    nobodys = [str(record.path) for record in earlier if record.header.device.simulated]
-    if lab is not None and lab.simulated:
-        nobodys.append(str(config.prior))
+    _require_people(config, earlier, device, [str(config.prior)] if lab is not None and lab.simulated else [])
+    if lab is not None:
+        _require_like(config, Visit(muscle=lab.noted_muscle), config.prior)
+    return after(*earlier, prior=None if lab is None else lab.joined())
+
+
+def _require_people(
+    config: RunConfig, records: Sequence[SessionRecord], device: DeviceInfo, simulated: Sequence[str] = ()
+) -> None:
+    """Raise if sessions, or what else was simulated, cannot teach anything of the person who will be examined."""
+    nobodys = [*simulated, *(str(record.path) for record in records if record.header.device.simulated)]
     if nobodys and not device.simulated:
         raise ConfigError(
             "what simulated sessions taught says nothing about the person who will be stimulated",
             got=nobodys,
             remedy="Leave it out, or learn from sessions with people.",
         )
-    require_same_person(config, earlier)
-    for record in earlier:
+    require_same_person(config, records)
+    for record in records:
         _require_like(config, record.header.visit, record.path)
-    if lab is not None:
-        _require_like(config, Visit(muscle=lab.noted_muscle), config.prior)
-    return after(*earlier, prior=None if lab is None else lab.joined())
+
+
+def earlier_trials(config: RunConfig, device: DeviceInfo) -> tuple[Trial, ...]:
+    """The earlier trials of the visit, which a strategy learns before its first ask."""
+    records = [read_session(path) for path in config.earlier]
+    _require_people(config, records, device)
+    for record in records:
+        header = record.header
+        if (header.space.reference, header.conditioning) != (device.reference, device.conditioning):
+            raise ConfigError(
+                "the ISIs of the earlier trials are not those of the session",
+                got=f"{header.conditioning} and {header.space.reference} in {record.path}",
+                expected=f"{device.conditioning} and {device.reference}",
+                remedy="Leave this file out.",
+            )
+    return tuple(trial for record in records for trial in record.table.told)
+
+
+def told_imported(config: RunConfig) -> str:
+    """Which of the earlier sessions were none, in words; empty if all were.
+
+    Args:
+        config: the configuration.
+    """
+    logs = (*config.after, *config.earlier)
+    return imported_sentence([path.name for path in logs if read_session(path).header.imported])
 
 
 def require_same_person(config: RunConfig, records: Sequence[SessionRecord]) -> None:
@@ -257,9 +290,12 @@ def session_for(config: RunConfig) -> Session:
         "intensity_pct_rmt": config.visit.intensity_pct_rmt,
     }
     settings = known_settings(config.strategy.name, known) | settings_with_taught(config, info)
+    strategy = make_strategy(config.strategy.name, space=space, seed=config.seed, **settings)
+    if config.earlier:
+        strategy.learn_all(earlier_trials(config, info))
     return Session(
         device,
-        make_strategy(config.strategy.name, space=space, seed=config.seed, **settings),
+        strategy,
         log=log,
         limits=limits_for(config),
         subject=config.visit.subject or ("" if config.own_rig else _code(config)),

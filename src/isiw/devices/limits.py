@@ -40,6 +40,7 @@ class Limits:
             report it. Where None, one that is reported when the device is staged may not change any more.
         max_consecutive_mistrials: after so many trials in a row that are rejected, or show a faulty rig, a session
             pauses, so that a person can look.
+        isis_ms: the only ISIs that are allowed [ms]; by default all of the range, or of its grid.
 
     Raises:
         InvalidValueError: values that are not finite or limit nothing, or a number that is not whole.
@@ -57,6 +58,7 @@ class Limits:
     max_coil_c: float | None = None
     intensity_pct_mso: float | None = None
     max_consecutive_mistrials: int = 3
+    isis_ms: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         check_numbers(self, "low_ms", "high_ms")
@@ -97,8 +99,9 @@ class Limits:
             space.high_ms,
             min_iti_s,
             max_pulses,
-            space.step_ms,
+            None if space.isis_ms else space.step_ms,
             max_consecutive_mistrials=max_consecutive_mistrials,
+            isis_ms=space.isis_ms,
         )
 
     @property
@@ -168,6 +171,13 @@ class Limits:
                 expected=f"{self.low_ms:g} to {self.high_ms:g} ms",
                 remedy="This stimulus was not delivered. Narrow the design space to the limits; widen the limits only "
                 "if your ethics approval allows it.",
+            )
+        if self.isis_ms and isi_ms not in self.isis_ms:
+            raise LimitExceededError(
+                "the ISI is not one of those that the limits list",
+                got=isi_ms,
+                expected=f"one of {', '.join(f'{one:g}' for one in self.isis_ms)} ms",
+                remedy="This stimulus was not delivered. Use the same list in the design space and in the limits.",
             )
         if self.step_ms is not None and self._off_grid_ms(isi_ms) > _GRID_TOLERANCE_MS:
             raise LimitExceededError(

@@ -85,6 +85,7 @@ def _changed(record: SessionRecord, person: _Person) -> SessionRecord:
             "visit": replace(record.header.visit, operator=""),
             "device": replace(record.header.device, address=""),
             "config": {},
+            "source": "",
         }
     )
     shift_ns = person.shift_days * _DAY_NS
@@ -309,7 +310,8 @@ def stimulus_of(parts: Iterable[Part]) -> StimulusWords:
 def log_losses(record: SessionRecord) -> list[str]:
     """What a log lacks, a sentence each."""
     unknown = [str(intent.trial) for intent in record.unknown]
-    timeless = [str(trial.index) for trial in record.table if trial.index not in record.onsets]
+    has_onsets = not record.header.imported
+    timeless = [str(trial.index) for trial in record.table if has_onsets and trial.index not in record.onsets]
     said: Sequence[tuple[object, str]] = (
         (record.end_lost, "The end of the log is missing; nobody knows how many stimuli it told of."),
         (unknown, f"The outcome of stimuli that may have been given is not known: trials {', '.join(unknown)}."),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from isiw.log.kinds import require_session
 from isiw.log.reader import read_salvaged
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event
@@ -47,6 +48,7 @@ def include(path: str | Path, trial: int) -> None:
 def _judge(path: str | Path, verdict: Callable[[TrialTable], Event]) -> None:
     salvaged = salvage(path)
     record = read_salvaged(salvaged)
+    require_session(record.path, record.header)
     event = verdict(record.table)
     record.require_end()
     if record.losses:  # then the header may be written again

@@ -29,6 +29,7 @@ from isiw.log.production import ProductionHeader
 from isiw.signals.limits import SignalLimits
 from isiw.strategy.threshold.pulses import IntensityRange
 from isiw.text.stimuli import STIMULI, StimulusWords
+from isiw.trials import Trial
 from isiw.types import Conditioning, Reference
 from isiw.visit import Visit, VisitProtocol
 
@@ -95,10 +96,13 @@ class Header(_Header):
     """What a session is, written before anything else, and again before it goes on: the last one holds.
 
     `asks_from` is the first trial that was asked with these versions. `belief_version` and `engine_version` grow where
-    the same settings come to believe something else, or compute it otherwise; 1 is what older logs mean.
+    the same settings come to believe something else, or compute it otherwise; 1 is what older logs mean. An "imported"
+    one is of trials that were delivered without isiw, and `source` says where they are from: it was no session, and has
+    no intents. `earlier` are trials that were learnt before the first ask, and count against nothing.
     """
 
-    kind: Literal["session"] = "session"
+    kind: Literal["session", "imported"] = "session"
+    source: str = ""
     strategy: StrategyRecipe
     space: Annotated[DesignSpace, BeforeValidator(with_reference)]
     limits: Limits
@@ -110,6 +114,13 @@ class Header(_Header):
     asks_from: int = 0
     belief_version: int = 1
     engine_version: int = 1
+    earlier: tuple[Trial, ...] = ()
+    earlier_same_level: bool = False
+
+    @property
+    def imported(self) -> bool:
+        """Whether its trials were delivered without isiw."""
+        return self.kind == "imported"
 
     @property
     def conditioning(self) -> Conditioning:
@@ -161,6 +172,7 @@ AnyHeader: TypeAlias = Header | ThresholdHeader | ProductionHeader
 ANY_HEADER: Final[TypeAdapter[AnyHeader]] = TypeAdapter(
     Annotated[
         Annotated[Header, Tag("session")]
+        | Annotated[Header, Tag("imported")]
         | Annotated[ThresholdHeader, Tag("threshold")]
         | Annotated[ProductionHeader, Tag("production")],
         Discriminator(kind_tag),
@@ -228,7 +240,9 @@ def first_fault(error: ValueError) -> str:
     """What is wrong with a record, without what pydantic says of where to read more."""
     if isinstance(error, ValidationError):
         first = error.errors(include_url=False, include_input=False)[0]
-        where = first["loc"][first["loc"][:1] in {("session",), ("threshold",), ("production",)} :]  # without the kind
+        where = first["loc"][
+            first["loc"][:1] in {("session",), ("imported",), ("threshold",), ("production",)} :
+        ]  # without the kind
         return f"{'.'.join(map(str, where))}: {first['msg']}"
     return str(error)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import Final
@@ -22,6 +22,7 @@ class LogKind(StrEnum):
     SEARCH = "a search for a window"
     THRESHOLD = "a search for a motor threshold"
     PRODUCTION = "an interval production task"
+    IMPORTED = "trials that were delivered without isiw"
 
     def shown_by(self, path: Path) -> str:
         """The command that shows a log of this kind.
@@ -30,7 +31,7 @@ class LogKind(StrEnum):
             path: the log.
         """
         match self:
-            case LogKind.SEARCH:
+            case LogKind.SEARCH | LogKind.IMPORTED:
                 return command("show", path)
             case LogKind.THRESHOLD:
                 return command("threshold", path, "--show")
@@ -50,9 +51,16 @@ class LogKind(StrEnum):
                 return command("threshold", path, "--resume")
             case LogKind.PRODUCTION:
                 return command("interval", path, "--resume")
+            case LogKind.IMPORTED:
+                return command("run", "CONFIG", "--earlier", path)
 
 
-_OF_TAG: Final = {"session": LogKind.SEARCH, "threshold": LogKind.THRESHOLD, "production": LogKind.PRODUCTION}
+_OF_TAG: Final = {
+    "session": LogKind.SEARCH,
+    "threshold": LogKind.THRESHOLD,
+    "production": LogKind.PRODUCTION,
+    "imported": LogKind.IMPORTED,
+}
 
 
 def kind_of(header: AnyHeader) -> LogKind:
@@ -64,7 +72,7 @@ def continued_by(
     path: Path, header: AnyHeader, config: Path | None = None, *, end_lost: bool = False, changed: bool = False
 ) -> str:
     """How to continue what a log is of: a command, or the call that a loop of the lab's own was begun with."""
-    if not isinstance(header, Header):
+    if not isinstance(header, Header) or header.imported:
         return kind_of(header).continued_by(path)
     if SERVED_KEY in header.config:
         lost = ", with N as lost_pulses in its body" if end_lost else ""
@@ -81,6 +89,22 @@ def continued_by(
         return command(*words, config or "CONFIG")
     by_hand = "where CONFIG names your device, or in your own software isiw.resume(path, device).run()"
     return f"{command(*words, 'CONFIG')}, {by_hand}"
+
+
+def require_session(path: Path, header: Header) -> None:
+    """Raise if a log's trials were delivered without isiw, so that there is nothing to go on with, or to judge anew."""
+    if header.imported:
+        raise LogError(
+            f"the log is of {LogKind.IMPORTED}, and stays as it was imported",
+            got=str(path),
+            remedy="To leave a trial out, mark it in the file that it is from, and analyse that again. To go on with "
+            f"the person, begin a session that knows the trials: {LogKind.IMPORTED.continued_by(path)}",
+        )
+
+
+def imported_sentence(names: Sequence[str]) -> str:
+    """That some logs are of no session, in words; empty if there are none."""
+    return f"Imported, and no sessions of isiw: {', '.join(names)}." if names else ""
 
 
 def of_another_kind(path: Path, kind: LogKind, wanted: LogKind) -> LogError:

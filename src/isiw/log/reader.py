@@ -57,9 +57,10 @@ class SessionRecord:
 
     def __str__(self) -> str:
         header, last = self.header, self.estimates[-1] if self.estimates else None
+        kind = "Imported trials" if header.imported else "Session"
         strategy = header.strategy.name or "of a user's own objects"
         lines = [
-            f"Session of {header.subject or 'an unnamed subject'}, {header.created}",
+            f"{kind} of {header.subject or 'an unnamed subject'}, {header.created}",
             f"Strategy: {strategy}, seed {header.strategy.seed}, {header.space.told(header.stimulus)}",
             f"Trials: {self.table.counted(header.stimulus)}"
             + (f", {len(self.unknown)} of unknown outcome" if self.unknown else ""),

@@ -2,6 +2,7 @@ from .comparison import comparison_page as comparison_page
 from .comparison import comparison_sentence as comparison_sentence
 from .comparison import comparison_table as comparison_table
 from .comparison import save_comparison as save_comparison
+from .methods import method_answers as method_answers
 from .page import report_page as report_page
 from .page import save_report as save_report
 from .tables import first_facts as first_facts

@@ -8,6 +8,7 @@ from typing import Any
 
 from isiw import sentences
 from isiw.estimate import Edge, Estimate
+from isiw.log.kinds import imported_sentence
 from isiw.log.reader import SessionRecord
 from isiw.plots.comparison import comparison_figure
 from isiw.plots.style import inline_svg, session_name
@@ -32,7 +33,8 @@ def comparison_table(records: Sequence[SessionRecord]) -> str:
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
     since = [f"{_whose(r)}: {sentences.JUDGED_SINCE}" for r in records if r.estimates and r.is_judged_since]
-    return "\n".join([*lines, *since])
+    imported = imported_sentence([_whose(record) for record in records if record.header.imported])
+    return "\n".join([*lines, *since, *filter(None, [imported])])
 
 
 def comparison_rows(records: Sequence[SessionRecord]) -> list[tuple[str, ...]]:

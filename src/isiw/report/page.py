@@ -25,6 +25,7 @@ from isiw.plots.sweeps import sweeps_figure
 from isiw.plots.timeline import course_figure, timeline_figure
 from isiw.report.answers import answers
 from isiw.report.drawn import drawn
+from isiw.report.methods import method_answers
 from isiw.report.tables import (
     counted_rows,
     event_rows,
@@ -87,6 +88,7 @@ def _contents(record: SessionRecord) -> dict[str, Any]:
         "findings": finding_sentences(record),
         "fit": fit_sentence(record),
         "answers": answers(record),
+        "methods": method_answers(record) if record.header.imported else [],
         "facts": first_facts(record),
         "further": further_facts(record),
         "settings": settings_facts(record),

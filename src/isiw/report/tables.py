@@ -11,9 +11,11 @@ from typing import Any, NamedTuple
 
 from isiw.devices.limits import Limits
 from isiw.findings import Kind
+from isiw.log.headers import Header
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Event, Intent
 from isiw.sentences import asked, outcome
+from isiw.text.numbers import counted
 from isiw.text.stimuli import TAP, StimulusWords
 from isiw.trials import Trial
 
@@ -33,11 +35,13 @@ def first_facts(record: SessionRecord) -> list[Fact]:
     """
     header = record.header
     versions = ", ".join(f"{package} {version}" for package, version in header.versions.items())
+    own = {"trials": f"imported from {header.source}; {_whose(header.device.simulated)}"}
+    session = {"device": _device(record), "limits": _limits(header.limits)}
     told = {
         "subject": _subject(record),
         "date": header.created.replace("T", " ").replace("+00:00", " UTC"),
-        "device": _device(record),
-        "limits": _limits(header.limits),
+        **(own if header.imported else session),
+        **({"earlier": f"{counted(len(header.earlier), 'trial')}, learnt before the first"} if header.earlier else {}),
         "strategy": f"{header.strategy.name or 'of own objects'}, seed {header.strategy.seed}",
         "version": f"isiw {header.isiw_version}" + (f" ({versions})" if versions else ""),
     }
@@ -53,9 +57,7 @@ def further_facts(record: SessionRecord) -> list[Fact]:
         "ISIs": header.space.told(header.stimulus),
         "tolerance": f"{header.space.tolerance_ms:g} ms",
         "judgement of a sweep": header.signals,
-        "protocol": header.protocol,
-        "deadline of a delivery": f"{header.timeout_s:g} s",
-        "deadline of a choice": "none" if header.ask_deadline_s is None else f"{header.ask_deadline_s:g} s",
+        **({} if header.imported else _loop(header)),
         "log": f"{record.path.name}, schema {header.schema_version}",
     }
     told = {name: value if isinstance(value, str) else _fields(value) for name, value in groups.items()}
@@ -65,6 +67,15 @@ def further_facts(record: SessionRecord) -> list[Fact]:
         "deadline of a choice": "ask_deadline_s",
     }
     return [Fact(name, _read(record, parts.get(name, name), value)) for name, value in told.items() if value]
+
+
+def _loop(header: Header) -> dict[str, Any]:
+    """How the session's loop runs; an imported log had none."""
+    return {
+        "protocol": header.protocol,
+        "deadline of a delivery": f"{header.timeout_s:g} s",
+        "deadline of a choice": "none" if header.ask_deadline_s is None else f"{header.ask_deadline_s:g} s",
+    }
 
 
 def settings_facts(record: SessionRecord) -> list[Fact]:
@@ -92,7 +103,11 @@ def _device(record: SessionRecord) -> str:
     info = record.header.device
     parts = [info.name, *([f"version {info.version}"] if info.version else [])]
     parts += [f"at {info.address}"] if info.address else []
-    return ", ".join([*parts, "simulated: nobody was stimulated" if info.simulated else "real"])
+    return ", ".join([*parts, _whose(info.simulated)])
+
+
+def _whose(simulated: bool) -> str:  # noqa: FBT001 - it is all that is said
+    return "simulated: nobody was stimulated" if simulated else "real"
 
 
 def _limits(limits: Limits) -> str:

@@ -1,6 +1,6 @@
 """A session: the closed loop from the first ask to the decision, and going on with one from its log."""
 
-from isiw.log.kinds import LogKind
+from isiw.log.kinds import LogKind, imported_sentence
 from isiw.session.again import estimate_again
 from isiw.session.loop import Session
 from isiw.session.opening import open_session
@@ -21,6 +21,7 @@ __all__ = [
     "ThresholdRecorder",
     "aligned",
     "estimate_again",
+    "imported_sentence",
     "open_session",
     "open_simulated",
     "open_threshold",

@@ -109,6 +109,8 @@ def header_of(strategy: Strategy, **details: Any) -> Header:
         space=strategy.space,
         belief_version=BELIEF_VERSION,
         engine_version=ENGINE_VERSION,
+        earlier=strategy.earlier,
+        earlier_same_level=bool(strategy.earlier) and strategy.same_level,
         **details,
     )
 

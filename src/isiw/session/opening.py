@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from isiw.devices.protocol import DeviceInfo
 from isiw.errors import InvalidValueError, StrategyError
 from isiw.log.durable import log_exists
 from isiw.log.headers import Header
-from isiw.log.kinds import OWN_LOOP
+from isiw.log.kinds import OWN_LOOP, require_session
 from isiw.log.reader import SessionRecord, read_salvaged
 from isiw.log.salvage import Salvage, salvage
 from isiw.log.writer import LogWriter
@@ -23,6 +23,7 @@ from isiw.session.recorder import Recorder
 from isiw.session.replay import require_same_person, taken_up
 from isiw.signals.limits import SignalLimits
 from isiw.strategy.strategy import Strategy
+from isiw.trials import Trial
 from isiw.visit import Visit, VisitProtocol
 
 
@@ -31,6 +32,7 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
     log: str | Path,
     *,
     resume: bool = False,
+    earlier: Iterable[Trial] = (),
     limits: Limits | None = None,
     clock: Clock | None = None,
     subject: str = "",
@@ -47,6 +49,8 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
         log: where the log is; it must not exist yet, unless the session goes on.
         resume: whether to go on with the log where there is one. What was asked and has no outcome in it becomes a
             mistrial.
+        earlier: trials of this person that were delivered before, such as the `record.table` of a log or an analysis:
+            the strategy learns them before its first ask, as `Strategy.learn_all` does, and nothing counts them.
         limits: what may be asked; the strategy's space and 200 pulses by default. Nothing waits between stimuli unless
             their `min_iti_s` is stated. Of a session that goes on, the logged ones by default. Limits of the coil and
             of the intensity allow nothing, as nobody reports these here.
@@ -87,6 +91,8 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
             got=f"{strategy.delivered} trials",
             remedy="Make it anew, or give the session strategy.restarted().",
         )
+    if trials := tuple(earlier):
+        strategy.learn_all(trials)
     header = _header(
         strategy,
         subject=text("subject", subject),
@@ -118,6 +124,7 @@ def own_loop_resumed(
     on_doubt: Callable[[str], None] | None,
 ) -> Recorder:
     """The session of a log, from where it ends, with the fields of its header that are said otherwise."""
+    require_session(record.path, record.header)
     record.require_read()
     logged = record.header
     require_same_person(changes.get("subject", ""), logged)

@@ -131,7 +131,14 @@ def strategy_of(header: Header) -> Strategy:
     settings = known_settings(recipe.name, {"engine": "torch"}) | recipe.settings  # the one there was before others
     if header.schema_version < SCHEMA_VERSION:
         settings = _known_settings(recipe.model_copy(update={"settings": settings}))
-    return remade_strategy(recipe.name, header.space, recipe.seed, **settings)
+    return knowing_earlier(remade_strategy(recipe.name, header.space, recipe.seed, **settings), header)
+
+
+def knowing_earlier(strategy: Strategy, header: Header) -> Strategy:
+    """A strategy that has learnt what a session's had before its first ask; the same if it has already."""
+    if header.earlier and not strategy.earlier:
+        strategy.learn_all(header.earlier, same_level=header.earlier_same_level)
+    return strategy
 
 
 def _known_settings(recipe: StrategyRecipe) -> dict[str, Any]:
@@ -208,7 +215,8 @@ def taken_up(
     """
     record = _with_lost_pulses(record, lost_pulses)
     header = record.header
-    told = replay(record, strategy or strategy_of(header), verify=verify, replayed=replayed)
+    strategy = knowing_earlier(strategy, header) if strategy else strategy_of(header)
+    told = replay(record, strategy, verify=verify, replayed=replayed)
     if told.differing:
         warn(_differing_text(told, header), OtherVersionsWarning)
     return told.strategy, Earlier(

@@ -11,7 +11,7 @@ from isiw.devices.clock import MonotonicClock
 from isiw.devices.limits import USUAL_ITI_S, Limits
 from isiw.devices.protocol import Device, HasMemory
 from isiw.log.headers import Header
-from isiw.log.kinds import OWN_LOOP, LogKind, of_another_kind
+from isiw.log.kinds import OWN_LOOP, LogKind, of_another_kind, require_session
 from isiw.log.reader import read_any
 from isiw.log.salvage import salvage
 from isiw.log.threshold import ThresholdRecord
@@ -99,6 +99,7 @@ def resume(
         if device is not None:
             raise of_another_kind(record.path, LogKind.THRESHOLD, LogKind.SEARCH)
         return resume_threshold(path, clock=options.get("clock"))
+    require_session(record.path, record.header)
     if device is None:
         clock = options.get("clock") or MonotonicClock()
         return own_loop_resumed(salvaged, record, strategy, {}, lost_pulses, clock, None)

@@ -174,6 +174,8 @@ class Course:
         alone: how many of those were TMS alone.
         earlier: what was believed before the last trial, as far as the stopping rule looks back on it.
         paired: whether the last trial was a pair of stimuli.
+        known: pairs that were learnt of each before the first ask; no plan and no budget counts them.
+        known_told: trials that were, those with TMS alone among them.
     """
 
     method: Method
@@ -184,13 +186,21 @@ class Course:
     alone: int = 0
     earlier: tuple[Belief, ...] = ()
     paired: bool = False
+    known: int = 0
+    known_told: int = 0
+
+    def begun_here(self) -> Course:
+        """The course whose first trial is the next one, whatever was learnt before."""
+        known, told = self.known + self.paired_trials, self.known_told + self.told
+        return replace(self, told=0, alone=0, earlier=(), paired=False, known=known, known_told=told)
 
     def again(self, seed: int, observations: Iterable[Observation | None]) -> Course:
         """The course of the same people after some trials from the beginning; None is a change."""
         course = self.method.begin(seed, self.people)
         for observation in observations:
             course = course.noting_change() if observation is None else course.after(observation)
-        return course
+        told, alone = course.told - self.known_told, course.alone - (self.known_told - self.known)
+        return replace(course, told=told, alone=alone, known=self.known, known_told=self.known_told)
 
     def after(self, observation: Observation) -> Course:
         """The course after one more trial of each person; all of them pairs of stimuli, or all TMS alone."""
@@ -217,7 +227,7 @@ class Course:
     @cached_property
     def belief(self) -> Belief:
         """What is believed now."""
-        return Belief(self.posterior, self.paired_trials, first=self.first)
+        return Belief(self.posterior, self.known + self.paired_trials, first=self.first)
 
     @cached_property
     def past(self) -> tuple[Belief, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -21,8 +21,9 @@ from isiw.signals.evidence import Evidence, Told, is_silent
 from isiw.signals.limits import isi_far, off_by, require_plausible
 from isiw.signals.watch import Doubts, findings
 from isiw.strategy.course import Choice, Cost, Method, evenly_spaced, instead_of_lost
-from isiw.strategy.outcomes import Details, Outcome, Outcomes
+from isiw.strategy.outcomes import Details, Outcome, Outcomes, details_of
 from isiw.strategy.stopping import StopDecision, StopKind, StoppingRule, stimuli_left
+from isiw.trials import Trial
 from isiw.types import FloatArray
 
 _T = TypeVar("_T")
@@ -105,6 +106,8 @@ class Strategy:
         self._mistrials = self._controls = self._lost = 0
         self._told: list[Told] = []
         self._outcomes = Outcomes(space.reference, self.amplitude_step_mv)
+        self._earlier: tuple[Trial, ...] = ()
+        self.same_level = True
         self._doubts = Doubts()
         self._choice: Choice | None = None
         self._batch_ms: list[float] = []  # what was not told yet of the last batch
@@ -124,8 +127,8 @@ class Strategy:
     __repr__ = __str__  # in a notebook, too, somebody sees from which event its ISIs count
 
     def restarted(self) -> Strategy:
-        """The same strategy before its first trial."""
-        return Strategy(
+        """The same strategy before its first trial; it has learnt the earlier ones."""
+        again = Strategy(
             self.space,
             self.model,
             self.acquisition,
@@ -135,6 +138,8 @@ class Strategy:
             seed=self.seed,
             recipe=self.recipe,
         )
+        again.learn_all(self._earlier, same_level=self.same_level)
+        return again
 
     @property
     def posterior(self) -> Posterior:
@@ -306,7 +311,42 @@ class Strategy:
             StrategyError: as for `tell`.
         """
         outcome = Outcome(isi_ms, mep_mv, **more)
-        outcome = replace(outcome, isi_ms=None if isi_ms is None else self.space.check_realised(isi_ms))
+        self._learn(replace(outcome, isi_ms=None if isi_ms is None else self.space.check_realised(isi_ms)))
+
+    def learn_all(self, trials: Iterable[Trial], *, same_level: bool = False) -> None:
+        """Learn trials that were delivered before the first ask, at whatever ISIs; no plan and no budget counts them.
+
+        Args:
+            trials: the trials, in order; mistrials and taps alone teach nothing.
+            same_level: whether electrodes, coil and intensity stay as they were. Otherwise the level of the MEPs from
+                here on may be another one, as far as the model can say so; the window stays.
+
+        Raises:
+            InvalidValueError: an amplitude that no amplifier gives.
+            StrategyError: an ISI was asked for or told before, trials of another level were learnt before, or the model
+                cannot learn from such a trial.
+        """
+        if self.delivered or self._choice is not None or (self._earlier and not (same_level and self.same_level)):
+            raise StrategyError(
+                "earlier trials are learnt once, before the first ask",
+                remedy="Make the strategy, then let it learn all of them.",
+            )
+        learnt = tuple(trial for trial in trials if trial.told)
+        for trial in learnt:
+            mep_mv = None if trial.mep_interval_mv else trial.mep_mv
+            self._learn(Outcome(trial.isi_ms, mep_mv, **details_of(trial)))
+        self._course = self._course.begun_here()
+        if learnt and not same_level:
+            self.note_change()
+        self._earlier, self.same_level = (*self._earlier, *learnt), same_level
+
+    @property
+    def earlier(self) -> tuple[Trial, ...]:
+        """The trials that it learnt before its first ask."""
+        return self._earlier
+
+    def _learn(self, outcome: Outcome) -> None:
+        """Learn from one trial, wherever its ISI lies."""
         outcomes = self._outcomes.after(outcome)
         self._course = (
             self._course.after(outcomes.observation(outcome))

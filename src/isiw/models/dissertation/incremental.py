@@ -103,11 +103,6 @@ class SweepPosterior:
         return self.told.trials
 
     @cached_property
-    def _step_ms(self) -> float:
-        """From one ISI to the next [ms]: the model's step, or the next multiple of the space's."""
-        return self.space.whole_steps_ms(self.model.step_ms)
-
-    @cached_property
     def _stops_ms(self) -> FloatArray:
         """The ISIs of one sweep [ms]."""
         return self.space.stops_ms(self.model.step_ms)
@@ -123,7 +118,7 @@ class SweepPosterior:
         per_isi, discarded = self.model.trials_per_isi, self.model.discarded
         kept = np.arange(len(trials.isi_ms)) % per_isi >= discarded
         mep_mv, last = self.model.floor.excess_mv(trials.mep_mv[kept], 0.0), len(self._stops_ms) - 1
-        stop = ((trials.isi_ms[kept] - self.space.low_ms) / self._step_ms).round().clip(0, last).astype(np.int64)
+        stop = np.abs(trials.isi_ms[kept][:, None] - self._stops_ms).argmin(axis=-1)
         count = np.bincount(stop, minlength=last + 1)
         # A stop that has only a stray trial or two of its neighbours would be the largest mean too often.
         done = count >= max(2, (per_isi - discarded) // 2)

@@ -124,8 +124,8 @@ class RegressionPosterior:
 
     def _nearest(self, isi_ms: Tensor) -> Tensor:
         """Indices of the nearest grid points, shape (t,)."""
-        steps = ((isi_ms - self.space.low_ms) / self.space.step_ms).round().long()
-        return steps.clamp(0, len(self.space.grid_ms) - 1)
+        grid_ms = torch.as_tensor(self.space.grid_ms.copy(), dtype=isi_ms.dtype)
+        return (isi_ms.unsqueeze(-1) - grid_ms).abs().argmin(-1)
 
     def window_masks(self, isi_ms: Tensor) -> Tensor:
         """Sampled windows; see `SamplesWindows`."""

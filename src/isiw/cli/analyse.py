@@ -1,0 +1,140 @@
+"""The command about trials that were delivered without isiw."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import Progress
+
+import isiw
+from isiw.cli.console import LOGS, NO_DEFAULT, STUDIES, Overwrite, errors_reported, show
+from isiw.cli.files import free_beside
+from isiw.text.harmless import command
+
+if TYPE_CHECKING:
+    from isiw.existing.batch import Person, Way
+
+app = typer.Typer()
+
+Columns = Annotated[
+    list[str] | None,
+    typer.Option("--column", metavar="KEY=NAME", help='What a column holds, such as "isi=Delay"; repeat it.'),
+]
+Units = Annotated[list[str] | None, typer.Option("--unit", help="Unit of ISIs (ms, s) or amplitudes (mV, uV, V).")]
+Reference = Annotated[str | None, typer.Option(help="What ISIs count from: impact, or valve.", **NO_DEFAULT)]
+Markers = Annotated[
+    list[str] | None,
+    typer.Option("--marker", metavar="KEY=NAME", help="What an event of a recording marks: pulse, tap or valve."),
+]
+Channels = Annotated[
+    list[str] | None, typer.Option("--channel", metavar="KEY=NAME", help="Which channel holds the EMG: emg=NAME.")
+]
+LayoutFile = Annotated[Path | None, typer.Option("--layout", help="How the files are laid out (TOML).", **NO_DEFAULT)]
+
+
+@app.command(rich_help_panel=LOGS)
+def analyse(  # noqa: PLR0913, PLR0917 - an option each
+    files: Annotated[list[Path], typer.Argument(help="Tables, recordings or logs; docs/your-data.md.", **NO_DEFAULT)],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="The log to write (.mcap), or a folder.", **NO_DEFAULT)
+    ] = None,
+    reference: Reference = None,
+    column: Columns = None,
+    unit: Units = None,
+    marker: Markers = None,
+    channel: Channels = None,
+    alone: Annotated[str | None, typer.Option(help="What stands for the ISI of TMS alone.", **NO_DEFAULT)] = None,
+    decimal: Annotated[str | None, typer.Option(help="The decimal sign of the file.", **NO_DEFAULT)] = None,
+    layout: LayoutFile = None,
+    config: Annotated[
+        Path | None, typer.Option(help="Space, strategy, seed and visit as for isiw run (TOML).", **NO_DEFAULT)
+    ] = None,
+    strategy: Annotated[str | None, typer.Option(help="Whose belief it is; see isiw strategies.", **NO_DEFAULT)] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the belief.", **NO_DEFAULT)] = None,
+    only: Annotated[str | None, typer.Option(help="The code of the one person who is wanted.", **NO_DEFAULT)] = None,
+    simulated: Annotated[bool, typer.Option("--simulated", help="Nobody was stimulated.")] = False,  # noqa: FBT002 - a flag
+) -> None:
+    """Say what trials that were delivered without isiw tell about the window; with -o, make a log of them.
+
+    Called again with the same files and folder, it goes on where it was interrupted.
+    """
+    with errors_reported("Interrupted: what is finished is kept; the same command goes on."):
+        read = isiw.existing.read_layout(layout) if layout is not None else isiw.existing.Layout()
+        read = read.saying(
+            reference=reference,
+            columns=isiw.existing.pairs_of("--column", column or []),
+            units=tuple(unit or ()),
+            markers=isiw.existing.pairs_of("--marker", marker or []),
+            channels=isiw.existing.pairs_of("--channel", channel or []),
+            alone=alone,
+            decimal=decimal,
+        )
+        settings = isiw.config.load_config(config).with_overrides(strategy=strategy, seed=seed)
+        way = isiw.existing.way_of(settings, read, simulated=simulated)
+        _analyse_all(isiw.existing.read_files(files, way, output, only), way, files[0])
+
+
+@app.command(rich_help_panel=STUDIES)
+def replay(  # noqa: PLR0913, PLR0917 - an option each
+    file: Annotated[Path, typer.Argument(help="A table, or a log.", **NO_DEFAULT)],
+    strategy: Annotated[list[str] | None, typer.Option(help="A name that isiw strategies lists; repeat it.")] = None,
+    seeds: Annotated[int, typer.Option(help="How many times each strategy is run, with other draws.")] = 5,
+    trials: Annotated[int, typer.Option(help="How many stimuli each time.")] = 60,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Picture to draw.", **NO_DEFAULT)] = None,
+    reference: Reference = None,
+    column: Columns = None,
+    unit: Units = None,
+    layout: LayoutFile = None,
+    only: Annotated[str | None, typer.Option(help="The code of the one person who is wanted.", **NO_DEFAULT)] = None,
+    overwrite: Overwrite = False,  # noqa: FBT002 - a flag of the command line
+) -> None:
+    """How many stimuli would it have taken? Strategies ask, and the trials of a file answer."""
+    with errors_reported("Interrupted."):
+        read = isiw.existing.read_layout(layout) if layout is not None else isiw.existing.Layout()
+        read = read.saying(
+            reference=reference,
+            columns=isiw.existing.pairs_of("--column", column or []),
+            units=tuple(unit or ()),
+        )
+        found = isiw.existing.read_files([file], isiw.existing.Way(read), only=only)
+        if len(found) > 1:
+            people = isiw.existing.told_people([one.delivered for one in found])
+            raise isiw.errors.ConfigError("a replay is of one person", got=people, remedy="Say whose: --only CODE.")
+        names = strategy or ["default"]
+        with Progress(console=Console(stderr=True)) as progress:
+            task = progress.add_task("runs", total=seeds * len(names))
+            replayed = isiw.existing.replay(
+                found[0].delivered, names, seeds=seeds, trials=trials, on_done=lambda: progress.advance(task)
+            )
+        show(f"{replayed}")
+        if output is not None:
+            show(f"picture: {replayed.plot(output, overwrite=overwrite)}")
+
+
+def _analyse_all(people: list[Person], way: Way, source: Path) -> None:
+    several = len(people) > 1
+    with Progress(console=Console(stderr=True), disable=not several) as progress:
+        task = progress.add_task("people", total=len(people))
+        for person in people:
+            _analyse_one(person, way, source, several=several)
+            progress.advance(task)
+
+
+def _analyse_one(person: Person, way: Way, source: Path, *, several: bool) -> None:
+    name = f"{person.delivered.subject}: " if several else ""
+    if isiw.existing.is_there(person):
+        show(f"{name}{person.log} is there already, of the same file and settings.")
+        return
+    analysis = isiw.existing.analyse_person(person, way)
+    show(f"{name}{analysis}", style=None if several else "bold")
+    if person.log is not None:
+        show(f"log:     {person.log}")
+    beside = person.log or (source.with_name(f"{source.stem}_{person.delivered.subject}") if several else source)
+    picture = free_beside(beside, ".png")
+    analysis.plot(picture)
+    show(f"picture: {picture}")
+    if person.log is not None and not several:
+        show(f"Its page: {command('report', person.log)}")

@@ -1,0 +1,17 @@
+from .analysis import Analysis as Analysis
+from .analysis import analyse as analyse
+from .analysis import analysed as analysed
+from .batch import Person as Person
+from .batch import Way as Way
+from .batch import analyse_person as analyse_person
+from .batch import is_there as is_there
+from .batch import read_files as read_files
+from .batch import way_of as way_of
+from .delivered import Delivered as Delivered
+from .delivered import told_people as told_people
+from .layout import Layout as Layout
+from .layout import pairs_of as pairs_of
+from .layout import read_layout as read_layout
+from .reading import read_people as read_people
+from .replay import Replay as Replay
+from .replay import replay as replay

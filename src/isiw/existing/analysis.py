@@ -1,0 +1,263 @@
+"""What trials that were delivered without isiw say of a person's window, and a log of them that was never a session."""
+
+from __future__ import annotations
+
+import datetime as dt
+import html
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from isiw.design import DesignSpace, require_space
+from isiw.devices.limits import Limits
+from isiw.devices.protocol import Answer, DeviceInfo
+from isiw.errors import InvalidValueError, LogError
+from isiw.estimate import WindowEstimate
+from isiw.existing.delivered import Delivered
+from isiw.files import put
+from isiw.log.durable import log_exists, log_of
+from isiw.log.headers import Header
+from isiw.log.outputs import made_folder
+from isiw.log.reader import SessionRecord
+from isiw.log.schema import Event, Record, Waveform, clock_ns
+from isiw.log.writer import LogWriter
+from isiw.plots.session import save_session_plot, session_figure
+from isiw.plots.style import inline_svg
+from isiw.report.page import save_report
+from isiw.report.words import final_statement
+from isiw.session.assembly import header_of
+from isiw.session.examination import believed
+from isiw.signals.watch import Watch
+from isiw.strategy.catalogue import make_strategy
+from isiw.strategy.stopping import StopKind
+from isiw.strategy.strategy import Strategy
+from isiw.trials import Measurement, Status, Sweep, Trial, TrialTable
+from isiw.types import ArrayLike, FloatArray
+from isiw.visit import Visit
+
+MOST_ESTIMATES: Final = 100
+"""Of a long series of trials the belief is logged after so many of them, evenly spread, and after the last."""
+
+_END: Final = StopKind.OWN.stop("All trials are analysed. They were delivered without isiw, so none can follow.")
+_NEVER: Final = 10**9
+
+
+@dataclass(frozen=True, eq=False)
+class Analysis:
+    """What trials that were delivered without isiw say of one person's window.
+
+    Args:
+        record: the trials and what is believed after them, as a log of them tells it.
+        estimate: what is believed about the window after all of them.
+    """
+
+    record: SessionRecord
+    estimate: WindowEstimate
+
+    def __str__(self) -> str:
+        return final_statement(self.record)
+
+    def _repr_html_(self) -> str:
+        """In a notebook: the statement and the picture."""
+        style = "--ink:#222;--faint:#888;--blue:#0072b2;--orange:#d55e00;--green:#009e73;--red:#c1272d;--paper:#fff"
+        picture = inline_svg(self.plot(), "analysis")
+        return f'<div style="{style}"><p>{html.escape(str(self))}</p>{picture}</div>'
+
+    def plot(self, path: str | Path | None = None, *, overwrite: bool = False) -> Figure:
+        """The picture of profile, trials and window, as `isiw plot` draws it.
+
+        Args:
+            path: where to save it, too; the suffix chooses the format.
+            overwrite: whether to replace a file that is there.
+
+        Raises:
+            InvalidValueError: a format that matplotlib does not know, or a file that is not to be replaced.
+        """
+        if path is not None:
+            save_session_plot(self.record, path, overwrite=overwrite)
+        return session_figure(self.record)
+
+    def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Write the page about the trials, as `isiw report` does.
+
+        Args:
+            path: where to, such as `P01.html`.
+            overwrite: whether to replace a file that is there.
+
+        Raises:
+            ConfigError: plotly or jinja2 is not installed.
+            InvalidValueError: a path that is none of a page, or a file that is not to be replaced.
+        """
+        return save_report(self.record, path, overwrite=overwrite)
+
+    def to_log(self, path: str | Path) -> Path:
+        """Write a log that is marked as imported: everything that looks at logs works on it; it cannot be resumed.
+
+        Args:
+            path: where to, such as `P01.mcap`; nothing is replaced.
+
+        Raises:
+            LogError: there is a log already.
+        """
+        target = log_of(Path(path))
+        if log_exists(target):
+            raise LogError(
+                "there is a log already, and it is never overwritten", got=str(target), remedy="Choose another path."
+            )
+        made_folder(target.parent)
+        with tempfile.TemporaryDirectory() as folder:  # a log that is not whole never gets a name
+            whole = Path(folder) / "log.mcap"
+            with LogWriter.create(whole, self.record.header) as log:
+                for number, channels in self._sweeps.items():
+                    for name, channel in channels.items():
+                        log.append(Waveform.of(number, channel), name)
+                for record in self.record.history:
+                    log.append(record)
+            put(target, whole.read_bytes(), replacing=False)
+        return target
+
+    @property
+    def _sweeps(self) -> dict[int, dict[str, Any]]:
+        sweeps: dict[int, dict[str, Any]] = {}
+        for (number, name), channel in self.record.waveforms.items():
+            sweeps.setdefault(number, {})[name] = channel
+        return sweeps
+
+
+def analyse(
+    isi_ms: ArrayLike,
+    mep_mv: ArrayLike,
+    *,
+    space: DesignSpace,
+    strategy: str = "default",
+    seed: int = 0,
+    subject: str = "",
+    visit: Visit | None = None,
+    simulated: bool = False,
+    **settings: Any,
+) -> Analysis:
+    """What trials that exist already say of a person's window.
+
+    Args:
+        isi_ms: the ISI of each trial [ms], in the order of delivery, shape (n,); NaN is TMS alone.
+        mep_mv: peak-to-peak amplitude of its MEP [mV], shape (n,); 0 is below the detection limit, NaN a trial that was
+            lost.
+        space: the ISIs at which a window is sought; trials at others teach, too.
+        strategy: whose belief it is, one of `isiw.list_strategies()`.
+        seed: seed of all randomness.
+        subject: the person's code.
+        visit: what is noted about the visit.
+        simulated: whether nobody was stimulated.
+        **settings: settings of the strategy, such as `detection_limit_mv=0.05` or `conditioning="pulse"`.
+
+    Raises:
+        InvalidValueError: no design space, shapes that differ, no pair of stimuli, or numbers that are probably in
+            another unit or swapped.
+        StrategyError: an unknown strategy or setting.
+    """
+    require_space(space)
+    isis, meps = (np.asarray(values, dtype=np.float64) for values in (isi_ms, mep_mv))
+    if isis.shape != meps.shape or isis.ndim != 1:
+        raise InvalidValueError("each trial has one ISI and one MEP", got=(isis.shape, meps.shape))
+    delivered = Delivered(
+        _trials(isis, meps),
+        space.reference,
+        subject=subject,
+        visit=visit or Visit(),
+        source="arrays",
+        simulated=simulated,
+    )
+    return analysed(delivered, make_strategy(strategy, space, seed, **settings))
+
+
+def _trials(isis_ms: FloatArray, meps_mv: FloatArray) -> TrialTable:
+    trials = []
+    for number, (isi, mep) in enumerate(zip(isis_ms.tolist(), meps_mv.tolist(), strict=True)):
+        isi_ms, lost = None if np.isnan(isi) else isi, bool(np.isnan(mep))
+        outcome: dict[str, Any] = {"reason": "outcome unknown"} if lost else {"mep_mv": mep}
+        status = Status.MISTRIAL if lost else Status.ACCEPTED
+        trials.append(Trial(number, status, isi_ms, isi_ms=isi_ms, **outcome))
+    return TrialTable(tuple(trials))
+
+
+def analysed(delivered: Delivered, strategy: Strategy, config: Mapping[str, Any] | None = None) -> Analysis:
+    """What the belief of a strategy that has learnt nothing yet makes of trials that were delivered without isiw.
+
+    Args:
+        delivered: the trials.
+        strategy: the strategy; it has learnt them afterwards.
+        config: what is kept in the log, as TOML values.
+
+    Raises:
+        StrategyError: the strategy has learnt or asked something before, or cannot learn from such trials.
+    """
+    header = _header(delivered, strategy, config or {})
+    history = tuple(_history(delivered, strategy, header))
+    name = f"{delivered.subject or 'analysis'}{f'_day{delivered.visit.day}' if delivered.visit.day else ''}"
+    record = SessionRecord(
+        path=Path(f"{name}.mcap"),
+        header=header,
+        history=history,
+        waveforms={(n, name): channel for n, sweep in delivered.sweeps.items() for name, channel in sweep.items()},
+        losses=(),
+        finished=True,
+        delivered=len(delivered.trials),
+    )
+    return Analysis(record, strategy.estimate())
+
+
+def _header(delivered: Delivered, strategy: Strategy, config: Mapping[str, Any]) -> Header:
+    units = {name: channel.unit for sweep in delivered.sweeps.values() for name, channel in sweep.items()}
+    device = DeviceInfo(
+        "none: the trials were delivered without isiw",
+        delivered.reference,
+        simulated=delivered.simulated,
+        channels=units,
+        conditioning=strategy.recipe.settings.get("conditioning", delivered.conditioning),
+    )
+    limits = replace(Limits.of_space(strategy.space, min_iti_s=0.0), max_pulses=max(1, len(delivered.trials)))
+    header = header_of(
+        strategy,
+        kind="imported",
+        source=delivered.source,
+        subject=delivered.subject,
+        visit=delivered.visit,
+        device=device,
+        limits=limits,
+        signals=delivered.signals,
+        config=dict(config),
+    )
+    moment = dt.datetime.fromtimestamp(clock_ns() / 1e9, dt.UTC)  # what tells one log of a person from the next
+    return header.model_copy(update={"created": delivered.created or moment.isoformat(timespec="microseconds")})
+
+
+def _history(delivered: Delivered, strategy: Strategy, header: Header) -> Iterator[Record]:
+    """The trials, and what is odd and what is believed after them."""
+    trials = delivered.trials
+    told = [trial.index for trial in trials if trial.told]
+    logged = {told[int(place)] for place in np.linspace(0, len(told) - 1, MOST_ESTIMATES).round()} if told else set()
+    watch = Watch(header.space, header.signals, _NEVER, header.detection_limit_mv)
+    for trial in trials:
+        if trial.index in delivered.blocks:
+            yield Event(kind="note", trial=trial.index, text=f"Block {delivered.blocks[trial.index]} begins.")
+        yield trial
+        strategy.learn_all([trial], same_level=True)
+        watch = watch.after(trial, _answer(delivered, trial))
+        if (doubt := watch.doubts.new) is not None and trial.told:
+            yield Event(kind="doubt", finding=doubt.kind, trial=trial.index, text=f"{doubt}")
+        if strategy.trouble is not None and trial.told:
+            yield Event(kind="fit", trial=trial.index, text=strategy.trouble)
+        if trial.index in logged or trial.index == trials[-1].index:
+            yield believed(strategy, trial.index, _END, None)
+
+
+def _answer(delivered: Delivered, trial: Trial) -> Answer:
+    """What a device would have answered."""
+    if trial.index in delivered.sweeps:
+        return Sweep(delivered.sweeps[trial.index], trial.t_valve_ms, trial.t_tms_ms, trial.t_hit_ms)
+    return Measurement(trial.mep_mv or 0.0, trial.isi_ms)

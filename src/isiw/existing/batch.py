@@ -1,0 +1,207 @@
+"""Many files and people in one call: a log each, and what is there already of an earlier call is not made again."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from isiw.config.run import RunConfig
+from isiw.design import DesignSpace
+from isiw.errors import ConfigError, InvalidValueError, LogError
+from isiw.existing.analysis import Analysis, analysed
+from isiw.existing.delivered import Delivered, told_people
+from isiw.existing.layout import Layout
+from isiw.existing.reading import read_people
+from isiw.log.durable import log_exists
+from isiw.log.reader import read_session
+from isiw.strategy.catalogue import make_strategy
+from isiw.visit import Visit
+
+ANALYSED_KEY: Final = "isiw_analyse"
+"""Where a log keeps from which file and how it was made."""
+
+
+class Person(NamedTuple):
+    """Trials of one person, where their log goes, and what it is made of."""
+
+    delivered: Delivered
+    log: Path | None
+    made_of: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Way:
+    """How trials are read and analysed.
+
+    Args:
+        layout: how the files are laid out.
+        space: the ISIs at which a window is sought; by default the range of those that were delivered.
+        strategy: whose belief it is.
+        seed: seed of all randomness.
+        settings: settings of the strategy.
+        subject: the code of a person who has none in the file.
+        visit: what is noted about the visits.
+        simulated: whether nobody was stimulated.
+    """
+
+    layout: Layout = field(default_factory=Layout)
+    space: DesignSpace | None = None
+    strategy: str = "default"
+    seed: int = 0
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    subject: str = ""
+    visit: Visit = field(default_factory=Visit)
+    simulated: bool = False
+
+
+def way_of(config: RunConfig, layout: Layout, *, simulated: bool = False) -> Way:
+    """How a configuration says that trials are analysed: its space, strategy, seed and visit.
+
+    Args:
+        config: the configuration.
+        layout: how the files are laid out.
+        simulated: whether nobody was stimulated.
+
+    Raises:
+        ConfigError: a prior, or earlier logs, which an analysis does not learn from.
+    """
+    if config.prior is not None or config.after:
+        raise ConfigError(
+            "an analysis says what the trials themselves tell, and learns from no prior and no earlier session",
+            got=str(config.prior or config.after[0]),
+            remedy="Leave prior and after out of the configuration.",
+        )
+    return Way(
+        layout,
+        config.space.design() if config.space_named else None,
+        config.strategy.name,
+        config.seed,
+        config.strategy.settings,
+        config.visit.subject,
+        config.visit.noted(),
+        simulated,
+    )
+
+
+def read_files(
+    sources: Sequence[str | Path], way: Way, output: str | Path | None = None, only: str | None = None
+) -> list[Person]:
+    """The people of some files; nothing is analysed or written.
+
+    Args:
+        sources: the files.
+        way: how to read them.
+        output: a log (.mcap) for one person, or a folder for a log of each; None for none.
+        only: the code of the one person who is wanted.
+
+    Raises:
+        InvalidValueError: as for `read_people`, or not one person for one log.
+        LogError: a log of something else where one would be written.
+    """
+    people = [person for source in sources for person in _read(Path(source), way)]
+    if only is not None:
+        people = _chosen(people, only)
+    paths = _paths([delivered for delivered, _ in people], output)
+    found = [Person(delivered, path, made_of) for (delivered, made_of), path in zip(people, paths, strict=True)]
+    for person in found:
+        if person.log is not None and log_exists(person.log) and not is_there(person):
+            raise LogError(
+                "there is another log already, and it is never overwritten",
+                got=str(person.log),
+                remedy="Choose another path, or move it away.",
+            )
+    return found
+
+
+def _read(source: Path, way: Way) -> Iterator[tuple[Delivered, Mapping[str, Any]]]:
+    layout = way.layout
+    if layout.reference is None and way.space is not None:
+        layout = replace(layout, reference=way.space.reference)
+    if way.space is not None and layout.reference != way.space.reference:
+        raise InvalidValueError(
+            "the reference of the file is not that of the design space",
+            got=(layout.reference, way.space.reference),
+            remedy="ISIs of one cannot be compared with those of the other: correct one of them.",
+        )
+    for delivered in read_people(source, layout, subject=way.subject):
+        visit = replace(way.visit, day=delivered.visit.day or way.visit.day)
+        simulated = way.simulated or delivered.simulated
+        made_of = {
+            "file": source.name,
+            "sha256": hashlib.sha256(source.read_bytes()).hexdigest(),
+            "layout": {key: value for key, value in asdict(layout).items() if value not in (None, {}, ())},
+            "strategy": {"name": way.strategy, "seed": way.seed, "settings": dict(way.settings)},
+            "space": "as delivered" if way.space is None else f"{way.space}",
+            "simulated": simulated,
+        }
+        as_logged = json.loads(json.dumps(made_of))  # a log knows no tuples
+        yield replace(delivered, visit=visit, simulated=simulated), as_logged
+
+
+def _chosen(people: list[tuple[Delivered, Mapping[str, Any]]], only: str) -> list[tuple[Delivered, Mapping[str, Any]]]:
+    chosen = [person for person in people if person[0].subject == only]
+    if not chosen:
+        raise InvalidValueError(
+            "nobody has this code", got=only, expected=told_people([delivered for delivered, _ in people])
+        )
+    return chosen
+
+
+def _paths(people: Sequence[Delivered], output: str | Path | None) -> list[Path | None]:
+    """Where the logs go: the file that is named, or a file for each in a folder."""
+    if output is None:
+        return [None] * len(people)
+    if Path(output).suffix == ".mcap":
+        if len(people) > 1:
+            raise InvalidValueError(
+                f"there are trials of {len(people)} people or days, and a log is of one",
+                got=told_people(people),
+                remedy="Name a folder with --output, or one of them with --only CODE.",
+            )
+        return [Path(output)]
+    stems = [_stem(one) for one in people]
+    twice = sorted({stem for stem in stems if stems.count(stem) > 1})
+    if twice:
+        raise InvalidValueError(
+            "two of the people or days would have one log",
+            got=twice[0],
+            remedy="Give each a code, or a day, of their own.",
+        )
+    return [Path(output) / f"{stem}.mcap" for stem in stems]
+
+
+def _stem(one: Delivered) -> str:
+    stem = re.sub(r"[^\w.-]+", "_", one.subject).strip("._") or "unnamed"
+    return f"{stem}_day{one.visit.day}" if one.visit.day else stem
+
+
+def is_there(person: Person) -> bool:
+    """Whether the log of a person is there already, of the same file, read and analysed in the same way."""
+    if person.log is None or not log_exists(person.log):
+        return False
+    return read_session(person.log).header.config.get(ANALYSED_KEY) == dict(person.made_of)
+
+
+def analyse_person(person: Person, way: Way) -> Analysis:
+    """What is believed of a person; their log is written if it has a place.
+
+    Args:
+        person: as `read_files` has found them.
+        way: how to analyse them.
+
+    Raises:
+        InvalidValueError: ISIs that are all the same.
+        LogError: the log cannot be written.
+        StrategyError: an unknown strategy or setting.
+    """
+    delivered = person.delivered
+    strategy = make_strategy(way.strategy, way.space or delivered.space(), way.seed, **way.settings)
+    analysis = analysed(delivered, strategy, {ANALYSED_KEY: dict(person.made_of)})
+    if person.log is not None:
+        analysis.to_log(person.log)
+    return analysis

@@ -1,0 +1,120 @@
+"""Cells of a table: numbers as other programs write them, and words for yes and no."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from numbers import Real
+from typing import Any, Final
+
+from isiw.errors import InvalidValueError
+
+_MISSING: Final = frozenset({"", "nan", "na", "n/a", "none", "null", "<na>", "nat", "-", "--", ".", "?"})
+_YES: Final = frozenset({"1", "1.0", "true", "yes", "y", "x", "accepted", "accept", "ok", "good", "valid", "keep"})
+_NO: Final = frozenset({"0", "0.0", "false", "no", "n", "mistrial", "rejected", "reject", "bad", "invalid", "excluded"})
+_ALONE: Final = frozenset({"tms alone", "tms only", "tms", "single", "single pulse", "sp", "alone", "baseline",
+                           "control", "unconditioned", "ts", "ts alone"})  # fmt: skip
+"""What a cell of ISIs says of TMS alone."""
+
+_NUMBER: Final = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?inf(inity)?", re.IGNORECASE)
+_GROUPED: Final = re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+")
+
+
+def is_missing(cell: Any) -> bool:
+    """Whether a cell holds nothing."""
+    if isinstance(cell, str):
+        return cell.strip().casefold() in _MISSING
+    return cell is None or cell != cell or type(cell).__name__ in {"NAType", "NaTType"}  # noqa: PLR0124 - NaN
+
+
+def says_alone(cell: Any, mark: str | None) -> bool:
+    """Whether a cell of ISIs says that there was TMS alone; an empty one does only if that is the mark."""
+    if mark is not None and (is_missing(cell) if not mark.strip() else _same(cell, mark)):
+        return True
+    return isinstance(cell, str) and cell.strip().casefold() in _ALONE
+
+
+def _same(cell: Any, mark: str) -> bool:
+    if str(cell).strip().casefold() == mark.strip().casefold():
+        return True
+    return isinstance(cell, Real) and bool(_NUMBER.fullmatch(mark.strip())) and float(cell) == float(mark)
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column that holds something known.
+
+    Args:
+        name: what the file calls it.
+        cells: its cells, as they were read.
+        decimal: the decimal sign of its texts.
+        of: the file, for messages.
+    """
+
+    name: str
+    cells: Sequence[Any]
+    decimal: str = "."
+    of: str = "the data"
+
+    def number(self, row: int, factor: float = 1.0) -> float | None:
+        """The number in a row, in other units; None if the cell is empty."""
+        cell = self.cells[row]
+        if is_missing(cell):
+            return None
+        if isinstance(cell, str):
+            text = cell.strip().replace("\N{MINUS SIGN}", "-")
+            text = text.replace(",", ".") if self.decimal == "," else text
+            value = float(text) if _NUMBER.fullmatch(text) else math.nan
+        else:
+            value = float(cell) if isinstance(cell, Real) and not isinstance(cell, bool) else math.nan
+        if not math.isfinite(value):
+            raise self.refused(row, "is no number", self._remedy(cell))
+        return value if factor == 1.0 else value * factor
+
+    def _remedy(self, cell: Any) -> str:
+        if isinstance(cell, str) and "," in cell and self.decimal != ",":
+            return "If the comma is a decimal sign, say --decimal ,"
+        return "Correct it, leave the cell empty, or name another column: --column KEY=NAME."
+
+    def flag(self, row: int) -> bool | None:
+        """Whether the cell of a row says yes; None if it is empty."""
+        cell = self.cells[row]
+        if is_missing(cell):
+            return None
+        word = str(cell).strip().casefold()
+        if word not in _YES | _NO:
+            raise self.refused(row, "says neither yes nor no", "Use accepted and rejected, or 1 and 0.")
+        return word in _YES
+
+    def text(self, row: int) -> str:
+        """The cell of a row as text; a whole number has no decimal sign."""
+        cell = self.cells[row]
+        if is_missing(cell):
+            return ""
+        whole = isinstance(cell, Real) and not isinstance(cell, bool) and float(cell).is_integer()
+        return str(int(cell)) if whole else str(cell).strip()
+
+    def refused(self, row: int, why: str, remedy: str) -> InvalidValueError:
+        """The error that a cell of a row cannot be read."""
+        return InvalidValueError(
+            f"row {row + 1} of the column {self.name!r} of {self.of} {why}", got=self.cells[row], remedy=remedy
+        )
+
+
+def decimal_of(columns: Sequence[Column], stated: str | None) -> str:
+    """The decimal sign of some columns' texts; a comma that may also group thousands is asked about."""
+    if stated is not None:
+        return stated
+    texts = [cell.strip() for column in columns for cell in column.cells if isinstance(cell, str) and "," in cell]
+    numbers = [text for text in texts if _NUMBER.fullmatch(text.replace(",", ".", 1))]
+    if not numbers:
+        return "."
+    if all(_GROUPED.fullmatch(text) for text in numbers):
+        raise InvalidValueError(
+            f"the comma in the numbers of {columns[0].of} may be a decimal sign, or group thousands",
+            got=numbers[0],
+            remedy="If it is, say --decimal , and if it groups thousands, write the numbers without it.",
+        )
+    return ","

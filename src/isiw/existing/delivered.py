@@ -1,0 +1,169 @@
+"""Trials of one person that were delivered without isiw: what was given, what came of it, and what is known besides."""
+
+from __future__ import annotations
+
+import math
+import statistics
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+from isiw.design import MOST_ISIS, DesignSpace
+from isiw.errors import InvalidValueError, LogError
+from isiw.findings import AMPLITUDE_MV, Kind
+from isiw.log.reader import SessionRecord, read_session
+from isiw.log.schema import MOST_TRIALS
+from isiw.signals.limits import SignalLimits, implausible_scale
+from isiw.text.numbers import counted
+from isiw.trials import Channel, Trial, TrialTable
+from isiw.types import Conditioning, Reference
+from isiw.visit import Visit
+
+LONGEST_ISI_MS: Final = 5000.0
+"""Longer than any interval after which a tap is studied; a larger number is in another unit."""
+
+
+@dataclass(frozen=True, eq=False)
+class Delivered:
+    """Trials of one person that were delivered without isiw.
+
+    Args:
+        trials: the trials, in the order of delivery.
+        reference: the event that their ISIs count from.
+        subject: the person's code.
+        visit: what is known of the visit.
+        source: where they are from, in words.
+        created: when the first one was delivered, as ISO 8601 in UTC; empty if nobody knows.
+        signals: what sweeps were judged by.
+        sweeps: the waveforms, by trial and channel; empty if amplitudes alone are known.
+        blocks: the first trial of each block, and what the block is called.
+        conditioning: the conditioning stimulus.
+        simulated: whether nobody was stimulated.
+
+    Raises:
+        InvalidValueError: no pair of stimuli, more trials than any session has, or numbers that are probably in another
+            unit or column.
+    """
+
+    trials: TrialTable
+    reference: Reference
+    subject: str = ""
+    visit: Visit = field(default_factory=Visit)
+    source: str = ""
+    created: str = ""
+    signals: SignalLimits = field(default_factory=SignalLimits)
+    sweeps: Mapping[int, Mapping[str, Channel]] = field(default_factory=dict)
+    blocks: Mapping[int, str] = field(default_factory=dict)
+    conditioning: Conditioning = "tap"
+    simulated: bool = False
+
+    def __post_init__(self) -> None:
+        if len(self.trials) >= MOST_TRIALS:
+            raise InvalidValueError(f"{self.named} has more trials than any session", got=len(self.trials))
+        isis_ms = [trial.isi_ms for trial in self.trials if trial.isi_ms is not None]
+        if not isis_ms:
+            raise InvalidValueError(f"{self.named} has no pair of stimuli", remedy="Which column holds the ISIs?")
+        judged = [trial for trial in self.trials if trial.told or trial.reason is Kind.IMPLAUSIBLE]
+        meps_mv = [trial.mep_mv for trial in judged if trial.mep_mv is not None]
+        self._require_not_swapped(isis_ms, meps_mv)
+        self._require_ms(isis_ms)
+        self._require_mv(meps_mv)
+
+    @property
+    def named(self) -> str:
+        """The trials in words, for a message."""
+        return f"{self.source or 'the data'}{f', {self.subject},' if self.subject else ''}"
+
+    def __str__(self) -> str:
+        return f"{self.subject or 'unnamed'}: {self.trials}"
+
+    @property
+    def isis_ms(self) -> list[float]:
+        """The ISIs of the trials that count [ms], those of control trials left out."""
+        return [trial.isi_ms for trial in self.trials if trial.told and trial.isi_ms is not None]
+
+    def space(self, step_ms: float = 1.0) -> DesignSpace:
+        """The range of the ISIs that were delivered, in whole steps."""
+        isis_ms = self.isis_ms
+        if not isis_ms:
+            raise InvalidValueError(f"{self.named} has no trial that counts", remedy="Look at its status column.")
+        low, high = math.floor(min(isis_ms) / step_ms), math.ceil(max(isis_ms) / step_ms)
+        if not 1 <= high - low < MOST_ISIS:
+            raise InvalidValueError(
+                f"the ISIs of {self.named} are {'all the same' if high == low else 'too far apart for a window'}",
+                got=(min(isis_ms), max(isis_ms)),
+                remedy="A window is found among several ISIs. Which column holds them, and in which unit?",
+            )
+        return DesignSpace(low * step_ms, high * step_ms, step_ms, reference=self.reference)
+
+    def _require_not_swapped(self, isis_ms: Sequence[float], meps_mv: Sequence[float]) -> None:
+        seen = [mep_mv for mep_mv in meps_mv if mep_mv > 0]
+        repeated = len(set(seen)) <= len(seen) / 2 and len(set(isis_ms)) > len(isis_ms) / 2
+        if len(seen) >= 6 and repeated and statistics.median(seen) > statistics.median(map(abs, isis_ms)):
+            raise InvalidValueError(
+                f"the columns of {self.named} are probably swapped: the amplitudes repeat as ISIs do",
+                got=f"ISIs such as {isis_ms[0]:.4g} and amplitudes such as {seen[0]:.4g} mV",
+                remedy="Name them: --column isi=NAME --column mep=NAME.",
+            )
+
+    def _require_ms(self, isis_ms: Sequence[float]) -> None:
+        longest = max(map(abs, isis_ms))
+        slip = "s" if 0 < longest < 1 else "us" if longest > LONGEST_ISI_MS else None
+        if slip is not None:
+            raise InvalidValueError(
+                f"the ISIs of {self.named} cannot be in ms",
+                got=f"at most {longest:g} ms",
+                remedy=f"If they are in {slip}, say --unit {slip}.",
+            )
+
+    def _require_mv(self, meps_mv: Sequence[float]) -> None:
+        seen = [mep_mv for mep_mv in meps_mv if mep_mv > 0]
+        found = implausible_scale(meps_mv)
+        usual_mv = statistics.median(seen) if seen else 0.0
+        if found is None and usual_mv <= AMPLITUDE_MV.most:
+            return
+        raise InvalidValueError(
+            f"the amplitudes of {self.named} cannot be in mV",
+            got=f"{usual_mv:.3g} mV in the median",
+            remedy="If they are in V, say --unit V." if found else "If they are in µV, say --unit uV.",
+        )
+
+
+def of_record(record: SessionRecord) -> Delivered:
+    """The trials of a log, as they count after what an operator said about them."""
+    header = record.header
+    sweeps: dict[int, dict[str, Channel]] = {}
+    for (number, name), channel in record.waveforms.items():
+        sweeps.setdefault(number, {})[name] = channel
+    return Delivered(
+        record.table,
+        header.space.reference,
+        subject=header.subject,
+        visit=header.visit,
+        source=header.source or record.path.name,
+        created=header.created,
+        signals=header.signals,
+        sweeps=sweeps,
+        conditioning=header.conditioning,
+        simulated=header.device.simulated,
+    )
+
+
+def renumbered(trials: Sequence[Trial]) -> TrialTable:
+    """Trials as a table, numbered from 0 on."""
+    return TrialTable(tuple(replace(trial, index=number) for number, trial in enumerate(trials)))
+
+
+def read_log(path: object) -> Delivered:
+    """The trials of a log at a path."""
+    record = read_session(str(path))
+    if record.losses:
+        raise LogError("the log is damaged, so that trials may be missing", got=str(path), remedy=f"{record.losses[0]}")
+    return of_record(record)
+
+
+def told_people(people: Sequence[Delivered]) -> str:
+    """People by their codes, in words, for a message."""
+    names = [f"{one.subject or 'unnamed'}{f' day {one.visit.day}' if one.visit.day else ''}" for one in people]
+    more = f" and {counted(len(names) - 5, 'more', 'more')}" if len(names) > 5 else ""
+    return ", ".join(names[:5]) + more

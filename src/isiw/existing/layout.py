@@ -1,0 +1,131 @@
+"""How a file of another program is laid out: which column, marker or channel is what, and in which unit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Final, get_args
+
+from isiw.checks import check_choice, check_numbers, check_texts, check_wholes, choice
+from isiw.errors import InvalidValueError
+from isiw.signals.limits import EMG_UNITS_MV
+from isiw.text.toml_files import checked, read_toml
+from isiw.types import Reference
+
+ISI_UNITS_MS: Final[Mapping[str, float]] = {"ms": 1.0, "s": 1e3, "us": 1e-3, "µs": 1e-3, "μs": 1e-3}
+"""One of each unit in ms."""
+
+COLUMNS: Final[Mapping[str, tuple[str, ...]]] = {
+    "isi": ("isi", "realisedisi", "isirealised", "actualisi", "interstimulusinterval", "interval", "delay", "soa"),
+    "mep": ("mep", "mepamplitude", "mepamp", "mepp2p", "meppp", "mepptp", "meppeaktopeak", "ptpmep", "amplitude",
+            "peaktopeak", "p2p", "ptp", "amp"),
+    "asked": ("commandedisi", "askedisi", "nominalisi", "targetisi", "plannedisi", "isicommanded", "isinominal"),
+    "isi_sd": ("isisd",),
+    "background": ("backgroundrms", "background", "prestimrms", "rmsbackground", "baselinerms"),
+    "status": ("status", "accepted", "accept", "valid", "include", "included", "keep", "good"),
+    "exclude": ("excluded", "exclude", "rejected", "reject", "bad", "artefact", "artifact"),
+    "reason": ("reason",),
+    "tap_alone": ("tapalone",),
+    "subject": ("subject", "subjectid", "participant", "participantid", "subj", "person", "patient", "sub", "id"),
+    "day": ("day", "visit", "session", "ses"),
+    "block": ("block", "run"),
+    "order": ("trial", "trialnumber", "trialno", "trialnr", "index", "onset", "time"),
+    "date": ("date", "recordingdate"),
+}  # fmt: skip
+"""By what they are called in letters alone, the columns that are found without being named; the first name wins."""
+
+MARKERS: Final = ("pulse", "tap", "valve")
+CHANNELS: Final = ("emg", "acceleration")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a file is laid out; what is not said is found, or asked for.
+
+    Args:
+        reference: the event that ISIs count from, `"impact"` (of the hammer, or an electrical pulse) or `"valve"`.
+        columns: the name of a column by what it holds, one of `COLUMNS`.
+        units: the units of columns whose names do not say theirs, such as `("ms", "mV")`.
+        alone: what stands in the place of the ISI of TMS alone, such as `"single"` or `"-1"`; `""` is an empty cell.
+        decimal: the decimal sign, `"."` or `","`.
+        separator: what separates two cells of a text file.
+        skip_lines: how many lines come before the one with the columns' names.
+        names: the columns' names, if no line of the file holds them.
+        sheet: the sheet of a workbook; by default the first one.
+        markers: of a recording, the name of an event by what it marks: `pulse` (of TMS), `tap` or `valve`.
+        channels: of a recording, the name of a channel by what it holds: `emg`, `acceleration`.
+        rate_hz: the sampling rate of arrays that do not hold it [Hz].
+        longest_isi_ms: the longest ISI of a recording; a pulse that comes later after a tap is TMS alone [ms].
+        mep_window_ms: where the MEP of a recording is sought [ms after the pulse]; by default as in a session.
+
+    Raises:
+        InvalidValueError: an unknown reference, column, marker, channel or unit, or a number that is not positive.
+    """
+
+    reference: Reference | None = None
+    columns: Mapping[str, str] = field(default_factory=dict)
+    units: tuple[str, ...] = ()
+    alone: str | None = None
+    decimal: str | None = None
+    separator: str | None = None
+    skip_lines: int = 0
+    names: tuple[str, ...] = ()
+    sheet: str | None = None
+    markers: Mapping[str, str] = field(default_factory=dict)
+    channels: Mapping[str, str] = field(default_factory=dict)
+    rate_hz: float | None = None
+    longest_isi_ms: float = 500.0
+    mep_window_ms: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        if self.reference is not None:
+            check_choice(self, "reference", get_args(Reference))
+        if self.decimal is not None:
+            check_choice(self, "decimal", (".", ","))
+        for what, table, known in (("column", self.columns, COLUMNS), ("marker", self.markers, MARKERS),
+                                   ("channel", self.channels, CHANNELS)):  # fmt: skip
+            for key in table:
+                choice(f"what a {what} holds", key, sorted(known))
+        for unit in self.units:
+            choice("a unit", unit, [*ISI_UNITS_MS, *EMG_UNITS_MV])
+        check_wholes(self, "skip_lines", least=0)
+        check_numbers(self, "longest_isi_ms", above=0)
+        check_numbers(self, "rate_hz", above=0, optional=True)
+        check_texts(self, "alone") if self.alone is not None else None
+
+    def unit_of(self, known: Mapping[str, float]) -> str | None:
+        """The unit that is stated, of those of one quantity."""
+        return next((unit for unit in self.units if unit in known), None)
+
+    def saying(self, **values: Any) -> Layout:
+        """The same, with what is said besides; of tables, the entries that are given."""
+        given = {key: value for key, value in values.items() if value not in (None, (), {})}
+        for name in ("columns", "markers", "channels"):
+            if name in given:
+                given[name] = {**getattr(self, name), **given[name]}
+        if "units" in given:
+            given["units"] = (*given["units"], *self.units)
+        return replace(self, **given)
+
+
+def read_layout(path: str | Path) -> Layout:
+    """The layout that a TOML file describes."""
+    return checked(Layout, read_toml(path), str(path))
+
+
+def pairs_of(option: str, texts: Sequence[str]) -> dict[str, str]:
+    """What an option says by KEY=NAME, each time that it is given.
+
+    Args:
+        option: what it is called.
+        texts: what was given.
+
+    Raises:
+        InvalidValueError: no KEY=NAME.
+    """
+    parts = [text.partition("=") for text in texts]
+    for text, (key, sign, name) in zip(texts, parts, strict=True):
+        if not (key and sign and name):
+            raise InvalidValueError(f"{option} needs KEY=NAME", got=text, remedy=f'Such as {option} "isi=Delay".')
+    return {key.strip(): name for key, _, name in parts}

@@ -1,0 +1,193 @@
+"""How many stimuli would it have taken? Strategies ask, and a person's recorded trials answer, each trial once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final, Literal
+
+import numpy as np
+
+from isiw.checks import whole
+from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError
+from isiw.existing.analysis import analysed
+from isiw.existing.delivered import Delivered
+from isiw.metrics import f1
+from isiw.plots.replay import save_replay_plot
+from isiw.strategy.catalogue import make_strategy
+from isiw.trials import Trial
+from isiw.types import FloatArray
+from isiw.window import Window
+
+NEAR_MS: Final = 2.5
+"""Half of the dissertation's step between two ISIs: an answer that is farther away is not of the ISI that was asked."""
+
+SHARED: Final = (
+    "The trials that answer are among those of the answer from all trials, so that the two agree more than two "
+    "sessions of this person would. Each amplitude is as it was recorded at its place in the session: drift and a "
+    "startle at the start come at other places than they would have."
+)
+"""What is said beside every replay."""
+
+
+@dataclass(frozen=True, eq=False)
+class Replayed:
+    """A strategy that was answered by recorded trials.
+
+    Args:
+        strategy: its name.
+        seed: the seed of the strategy and of the draws.
+        windows: what it reported after each trial.
+        far_ms: how far each answer was from the ISI that was asked [ms].
+        stopped: after how many trials it would have stopped; None if it did not.
+    """
+
+    strategy: str
+    seed: int
+    windows: tuple[Window | None, ...]
+    far_ms: tuple[float, ...]
+    stopped: int | None
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """Strategies on the trials of one person, and the answer from all trials.
+
+    Args:
+        delivered: the person's trials.
+        space: the ISIs that were asked.
+        pairs: how many pairs of stimuli answered.
+        runs: each strategy with each seed.
+    """
+
+    delivered: Delivered
+    space: DesignSpace
+    pairs: int
+    runs: tuple[Replayed, ...]
+
+    @cached_property
+    def window(self) -> Window | None:
+        """What the default's belief reports after all trials."""
+        strategy = make_strategy("default", self.space, self.runs[0].seed)
+        return analysed(self.delivered, strategy).estimate.window
+
+    @property
+    def strategies(self) -> list[str]:
+        """The names of the strategies."""
+        return list(dict.fromkeys(run.strategy for run in self.runs))
+
+    def f1_by_trial(self, strategy: str, truth: Window | Literal["all"] | None = "all") -> FloatArray:
+        """F1 against the answer from all trials, or against a window that is known, shape (seeds, trials).
+
+        Args:
+            strategy: its name.
+            truth: the window, or None for none; by default the answer from all trials.
+        """
+        against = self.window if isinstance(truth, str) else truth
+        runs = [run for run in self.runs if run.strategy == strategy]
+        longest = min(len(run.windows) for run in runs)
+        return np.array([[f1(found, against, self.space) for found in run.windows[:longest]] for run in runs])
+
+    def __str__(self) -> str:
+        found = "no window" if self.window is None else f"the window {self.window}"
+        lines = [f"All {self.pairs} pairs of stimuli say: {found}. F1 against that, by the number of stimuli:"]
+        lines += [line for name in self.strategies for line in self._lines(name)]
+        return "\n".join([*lines, SHARED])
+
+    def _lines(self, name: str) -> Iterator[str]:
+        scores = self.f1_by_trial(name)
+        at = [n for n in (5, 10, 15, 20, 30, 40, 60, 80, 100) if n <= scores.shape[1]]
+        low, middle, high = np.quantile(scores, (0.0, 0.5, 1.0), axis=0)
+        cells = [f"{n}: {middle[n - 1]:.2f} ({low[n - 1]:.2f}–{high[n - 1]:.2f})" for n in at]
+        yield f"{name}  {', '.join(cells)}"
+        runs = [run for run in self.runs if run.strategy == name]
+        stops = [run.stopped for run in runs if run.stopped is not None]
+        if stops:
+            yield f"  It would have stopped after {np.median(stops):.0f} ({len(stops)} of {len(runs)} seeds)."
+        far_ms = np.concatenate([run.far_ms for run in runs])
+        if (share := float((far_ms > NEAR_MS).mean())) > 0:
+            yield (
+                f"  {100 * share:.0f} % of its ISIs could not be answered: no trial was left within {NEAR_MS:g} ms, "
+                f"and the nearest one answered, at most {far_ms.max():.0f} ms away."
+            )
+
+    def plot(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Draw F1 by the number of stimuli, with the band over seeds.
+
+        Args:
+            path: where to; the suffix chooses the format.
+            overwrite: whether to replace a file that is there.
+        """
+        curves = {name: self.f1_by_trial(name) for name in self.strategies}
+        return save_replay_plot(curves, path, overwrite=overwrite)
+
+
+def replay(
+    delivered: Delivered,
+    strategies: Sequence[str] = ("default",),
+    *,
+    space: DesignSpace | None = None,
+    seeds: int = 5,
+    trials: int = 60,
+    first_seed: int = 0,
+    on_done: Callable[[], None] = lambda: None,
+    **settings: Any,
+) -> Replay:
+    """Let strategies ask for a person's recorded trials, and see how soon they say what all trials say.
+
+    At an ISI that is asked a trial is drawn among those left at the nearest ISI that has any; each answers once.
+
+    Args:
+        delivered: the person's trials.
+        strategies: names of strategies.
+        space: the ISIs that may be asked; by default the range of those that were delivered.
+        seeds: how many times each strategy is run, with other draws.
+        trials: how many stimuli each time, at most as many as there are.
+        first_seed: the seed of the first run.
+        on_done: called after each run.
+        **settings: settings that all of the strategies have.
+
+    Raises:
+        InvalidValueError: too few trials, or no whole numbers.
+        StrategyError: an unknown strategy or setting.
+    """
+    space = space or delivered.space()
+    seeds, trials = whole("seeds", seeds, least=1), whole("trials", trials, least=1)
+    pairs = [trial for trial in delivered.trials.told if trial.isi_ms is not None and space.admits(trial.isi_ms)]
+    if len(pairs) < 2:
+        raise InvalidValueError("too few trials to be asked for", got=len(pairs), expected="two and more")
+    runs = []
+    for name in strategies:
+        for seed in range(first_seed, first_seed + seeds):
+            runs.append(_run(name, space, seed, pairs, min(trials, len(pairs)), settings))
+            on_done()
+    return Replay(delivered, space, len(pairs), tuple(runs))
+
+
+def _run(
+    name: str, space: DesignSpace, seed: int, pairs: Sequence[Trial], trials: int, settings: dict[str, Any]
+) -> Replayed:
+    strategy, rng, left = make_strategy(name, space, seed, **settings), np.random.default_rng([seed, 1]), list(pairs)
+    windows: list[Window | None] = []
+    far_ms: list[float] = []
+    stopped = None
+    for _ in range(trials):
+        asked_ms = strategy.ask()
+        gaps_ms = np.abs([_asked_ms(trial) - asked_ms for trial in left])
+        nearest = np.flatnonzero(gaps_ms <= gaps_ms.min() + 1e-9)
+        trial = left.pop(int(rng.choice(nearest)))
+        far_ms.append(float(gaps_ms.min()))
+        strategy.learn(trial.isi_ms, trial.mep_mv, isi_sd_ms=trial.isi_sd_ms)
+        windows.append(strategy.estimate().window)
+        if stopped is None and strategy.decision().stop:
+            stopped = len(windows)
+    return Replayed(name, seed, tuple(windows), tuple(far_ms), stopped)
+
+
+def _asked_ms(trial: Trial) -> float:
+    """Which ISI a trial is of: the one that was commanded, or else the realised one [ms]."""
+    at_ms = trial.isi_ms if trial.commanded_isi_ms is None else trial.commanded_isi_ms
+    return float(at_ms or 0.0)

@@ -1,0 +1,134 @@
+"""What three methods say of the same trials: the belief, the mean MEPs by the dissertation's rule, response counts."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from isiw.errors import InvalidValueError
+from isiw.log.reader import SessionRecord
+from isiw.models.dissertation.curves import curve_masks
+from isiw.models.dissertation.profiles import best_fit, normality, profile_fits
+from isiw.report.words import finding_sentences
+from isiw.response_counts import effective_window, response_counts, response_threshold_mv
+from isiw.text.numbers import counted
+from isiw.trials import RESPONSE_MV
+from isiw.types import FloatArray
+from isiw.window import Window
+
+BIN_MS: Final = 5.0
+"""Into such steps ISIs are put that hardly repeat; the dissertation's own step [Kim2020, 4.2.1]."""
+
+USUAL_TRIALS: Final = 10
+"""Trials at each ISI that the dissertation takes means of [Kim2020, 4.2.1]."""
+
+
+class MethodAnswer(NamedTuple):
+    """What a method says of a window, what it needs for that, and what it cannot say."""
+
+    method: str
+    answer: str
+    needs: str
+    cannot: str
+
+
+class _Trials(NamedTuple):
+    """The trials that count: ISIs in steps [ms] and MEPs [mV] of pairs, shape (n,), and MEPs of TMS alone [mV]."""
+
+    isi_ms: FloatArray
+    mep_mv: FloatArray
+    alone_mv: FloatArray
+
+
+def method_answers(record: SessionRecord) -> list[MethodAnswer]:
+    """The belief, the dissertation's rule on mean MEPs, response counts, and the form of the profile.
+
+    Args:
+        record: the trials and what is believed of them.
+    """
+    trials = _trials_of(record)
+    belief = MethodAnswer(
+        "isiw's belief",
+        " ".join(finding_sentences(record)[:2]),
+        "Single trials at any ISIs, in their order; TMS alone helps, and is not needed.",
+        "Anything about people unlike all that it knows of; it expects a law of people and of noise (docs/model.md).",
+    )
+    if not len(trials.isi_ms):
+        return [belief]
+    return [belief, _by_means(trials), _by_counts(trials), _by_form(trials)]
+
+
+def _trials_of(record: SessionRecord) -> _Trials:
+    told = [trial for trial in record.table.told if trial.mep_mv is not None]
+    pairs = [trial for trial in told if trial.isi_ms is not None]
+    asked_ms = np.array([trial.commanded_isi_ms for trial in pairs], dtype=np.float64)
+    if len(np.unique(asked_ms)) > len(asked_ms) / 2:
+        asked_ms = BIN_MS * np.round(asked_ms / BIN_MS)
+    alone_mv = np.array([trial.mep_mv for trial in told if trial.isi_ms is None], dtype=np.float64)
+    return _Trials(asked_ms, np.array([trial.mep_mv for trial in pairs], dtype=np.float64), alone_mv)
+
+
+def _means(trials: _Trials) -> tuple[FloatArray, FloatArray, int]:
+    """The ISIs [ms], the mean MEP at each [mV], and the fewest trials at one."""
+    at_ms, which, counts = np.unique(trials.isi_ms, return_inverse=True, return_counts=True)
+    return at_ms, np.bincount(which, trials.mep_mv) / counts, int(counts.min())
+
+
+def _by_means(trials: _Trials) -> MethodAnswer:
+    """ISIs about the largest mean whose mean has .135 of its excess over TMS alone."""
+    at_ms, mean_mv, fewest = _means(trials)
+    known = len(trials.alone_mv) > 0
+    baseline_mv = float(trials.alone_mv.mean() if known else np.median(mean_mv))
+    inside = curve_masks((mean_mv - baseline_mv)[None], baseline_mv)[0]
+    window = Window.from_mask(at_ms, inside)
+    of = f"of {counted(len(trials.alone_mv), 'trial')} with TMS alone" if known else "guessed: the median of all means"
+    said = f"Baseline {1e3 * baseline_mv:.3g} µV ({of}); means of {counted(fewest, 'trial')} at least."
+    return MethodAnswer(
+        "Mean MEPs [Kim2020, 4.3; baseline as in 4.2]",
+        f"{_told(window)} {said}",
+        f"Some {USUAL_TRIALS} trials at every ISI, and TMS alone for the baseline.",
+        "How sure it is, and whether there is a window at all: the largest of some means is above any baseline. Few "
+        "trials make windows too narrow or torn.",
+    )
+
+
+def _by_counts(trials: _Trials) -> MethodAnswer:
+    """ISIs at which more than 40 % of the trials respond."""
+    known = len(trials.alone_mv) > 0
+    threshold_mv = response_threshold_mv(trials.alone_mv) if known else RESPONSE_MV
+    of = "95 % of the trials with TMS alone are not larger" if known else "nobody's own: there is no TMS alone"
+    try:
+        counts = response_counts(trials.isi_ms, trials.mep_mv, max(threshold_mv, 1e-6))
+        answer = _told(effective_window(counts, segments="peak"))
+    except InvalidValueError as error:
+        answer = f"No answer: {error.what}."
+    return MethodAnswer(
+        "Response counts [Kim2020, 3.3.4]",
+        f"{answer} Threshold of a response {1e3 * threshold_mv:.3g} µV ({of}).",
+        "A threshold of the person's own, and some ten trials at every ISI.",
+        "How large the enhancement is, and how sure it is; the window depends on the threshold.",
+    )
+
+
+def _by_form(trials: _Trials) -> MethodAnswer:
+    """How many Gaussians the mean MEPs by ISI are made of, and whether they are normal."""
+    at_ms, mean_mv, _ = _means(trials)
+    said = []
+    try:
+        normal = normality(mean_mv)
+        said.append(f"The means {'pass' if normal.normal else 'fail'} a test of normality (p = {normal.p_value:.2g}).")
+        fits = profile_fits(trials.isi_ms, trials.mep_mv)
+        said.append(f"Of up to five Gaussians and a spline, AICc prefers: {best_fit(fits).name}.")
+    except InvalidValueError as error:
+        said.append(f"No more can be said: {error.what}.")
+    return MethodAnswer(
+        "Form of the profile [Kim2020, Tables 4.1 and 8.1, Fig. 8.2]",
+        " ".join(said),
+        "Means at five ISIs and more; a few hundred trials to tell two Gaussians from one.",
+        f"Where the window is. {counted(len(at_ms), 'ISI')} were used.",
+    )
+
+
+def _told(window: Window | None) -> str:
+    return "No window." if window is None else f"Window {window}."

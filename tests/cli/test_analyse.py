@@ -1,0 +1,120 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import isiw as library
+
+if TYPE_CHECKING:
+    from cli.conftest import Command
+
+CONFIG = "[strategy.settings]\nparticles = 100\n"
+
+
+@pytest.fixture
+def people(tmp_path: Path) -> Path:
+    """A file with the trials of two people."""
+    rng, rows = np.random.default_rng(1), list[tuple[str, float, float]]()
+    for code in ("A", "B"):
+        responder = library.subjects.cohort("gaussian", 1, 3)[0].begin(3)
+        isis_ms = rng.choice(np.arange(0.0, 201.0, 5.0), 10).tolist()
+        rows += [(code, isi_ms, responder.respond(isi_ms, "impact").mep_mv) for isi_ms in isis_ms]
+    pd.DataFrame(rows, columns=["subject", "isi_ms", "mep_mv"]).to_csv(tmp_path / "people.csv", index=False)
+    (tmp_path / "few.toml").write_text(CONFIG)
+    return tmp_path / "people.csv"
+
+
+def test_each_person_of_a_file_gets_a_log_and_called_again_nothing_is_made_twice(isiw: Command, people: Path) -> None:
+    words = ("analyse", people, "--reference", "impact", "--config", "few.toml", "-o", "logs")
+    first = isiw(*words)
+    assert first.exit_code == 0, first.output
+    assert sorted(path.name for path in Path("logs").iterdir()) == ["A.mcap", "A.png", "B.mcap", "B.png"]
+    Path("logs/B.mcap").unlink()
+    again = isiw(*words)
+    assert again.exit_code == 0
+    assert "A.mcap is there already" in again.output
+    assert "A.mcap" not in again.output.replace("A.mcap is there already", "")
+    assert library.read_session("logs/B.mcap").header.imported
+    other = isiw(*words, "--seed", "5")
+    assert other.exit_code == 1
+    assert "another log already" in other.output
+
+
+def test_what_reads_logs_reads_imported_ones_and_says_what_they_are(isiw: Command, people: Path) -> None:
+    isiw("analyse", people, "--reference", "impact", "--config", "few.toml", "-o", "logs")
+    logs = ("logs/A.mcap", "logs/B.mcap")
+    said = {
+        ("show", logs[0]): "imported from people.csv",
+        ("plot", logs[0], "-o", "a.svg"): "picture: a.svg",
+        ("report", logs[0]): "report: ",
+        ("export", "logs", "tables"): "2 sessions with 20 trials",
+        ("compare", *logs): "Imported, and no sessions of isiw: A (A.mcap), B (B.mcap).",
+        ("prior", "learn", *logs, "-o", "lab.toml"): "Imported, and no sessions of isiw: A.mcap, B.mcap.",
+    }
+    for words, expected in said.items():
+        result = isiw(*words)
+        assert result.exit_code == 0, result.output
+        assert expected in result.output
+    refused: list[tuple[object, ...]] = [("resume", logs[0]), ("exclude", logs[0], 1, "--reason", "moved")]
+    for each in refused:
+        result = isiw(*each)
+        assert result.exit_code == 1
+        assert "delivered without isiw" in result.output
+
+
+def test_a_session_after_an_imported_log_knows_it_and_says_what_it_is(isiw: Command, people: Path) -> None:
+    made = ("--reference", "impact", "--config", "few.toml", "--simulated", "--only", "A", "-o", "A.mcap")
+    assert isiw("analyse", people, *made).exit_code == 0
+    Path("run.toml").write_text(f'[space]\nhigh_ms = 200.0\nreference = "impact"\n{CONFIG}max_trials = 2\n')
+    result = isiw("run", "run.toml", "--after", "A.mcap", "--log", "next.mcap")
+    assert result.exit_code == 0, result.output
+    assert "Imported, and no sessions of isiw: A.mcap." in result.output
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ((), "--reference"),
+        (("--reference", "impact", "-o", "both.mcap"), "--only CODE"),
+        (("--reference", "impact", "--only", "C"), "nobody has this code"),
+        (("--reference", "impact", "--column", "isi"), "KEY=NAME"),
+        (("--reference", "impact", "--column", "width=isi_ms"), "what a column holds"),
+        (("--reference", "valve", "--config", "impact.toml"), "is not that of the design space"),
+    ],
+)
+def test_what_is_missing_or_ambiguous_is_asked_for_and_nothing_is_written(
+    words: tuple[str, ...], says: str, isiw: Command, people: Path
+) -> None:
+    Path("impact.toml").write_text('[space]\nhigh_ms = 200.0\nreference = "impact"\n')
+    before = sorted(Path().iterdir())
+    result = isiw("analyse", people, *words)
+    assert result.exit_code == 1
+    assert says in result.output
+    assert sorted(Path().iterdir()) == before
+
+
+def test_a_session_is_run_with_earlier_trials(isiw: Command, people: Path) -> None:
+    made = ("--reference", "impact", "--config", "few.toml", "--simulated", "--only", "A", "-o", "A.mcap")
+    assert isiw("analyse", people, *made).exit_code == 0
+    Path("run.toml").write_text(f'[space]\nhigh_ms = 100.0\nreference = "impact"\n{CONFIG}max_trials = 2\n')
+    result = isiw("run", "run.toml", "--earlier", "A.mcap", "--log", "next.mcap")
+    assert result.exit_code == 0, result.output
+    record = library.read_session("next.mcap")
+    assert (len(record.header.earlier), len(record.table)) == (10, 2)
+    Path("valve.toml").write_text(f'[space]\nhigh_ms = 400.0\nreference = "valve"\n{CONFIG}')
+    refused = isiw("run", "valve.toml", "--earlier", "A.mcap", "--log", "other.mcap")
+    assert refused.exit_code == 1
+    assert "not those of the session" in refused.output
+
+
+def test_a_file_is_replayed_for_one_person(isiw: Command, people: Path) -> None:
+    words = ("replay", people, "--reference", "impact", "--strategy", "random", "--seeds", "1", "--trials", "6")
+    result = isiw(*words, "--only", "A", "-o", "a.png")
+    assert result.exit_code == 0, result.output
+    assert "All 10 pairs of stimuli say" in result.output
+    assert Path("a.png").exists()
+    assert "--only CODE" in isiw(*words).output

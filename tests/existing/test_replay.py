@@ -1,0 +1,62 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import isiw
+from isiw.errors import InvalidValueError
+from isiw.existing.delivered import Delivered
+from isiw.existing.replay import replay
+
+SPACE = isiw.DesignSpace(0, 200, 5, reference="impact")
+FEW: dict[str, Any] = {"particles": 100}
+
+
+def swept(trials: int = 4) -> Delivered:
+    """Every ISI so many times, of a person whose MEPs tell much."""
+    responder = isiw.subjects.cohort("gaussian", 1, 3)[0].begin(3)
+    isis_ms = np.random.default_rng(1).permutation(np.repeat(SPACE.grid_ms, trials))
+    meps_mv = [responder.respond(isi_ms, "impact").mep_mv for isi_ms in isis_ms.tolist()]
+    return Delivered(isiw.analyse(isis_ms, meps_mv, space=SPACE, particles=50).record.table, "impact")
+
+
+def test_strategies_are_answered_by_recorded_trials_and_compared_with_all_of_them() -> None:
+    replayed = replay(swept(), ["default", "random"], space=SPACE, seeds=2, trials=20, **FEW)
+    scores = replayed.f1_by_trial("default")
+    assert scores.shape == (2, 20)
+    assert np.median(scores[:, -1]) > 0.8
+    assert (scores[:, -1] >= scores[:, 0]).all()
+    assert set(replayed.strategies) == {"default", "random"}
+    said = str(replayed)
+    assert "All 164 pairs of stimuli say: the window" in said
+    assert "are among those of the answer from all trials" in said
+    assert "could not be answered" not in said
+
+
+def test_each_trial_answers_once_and_what_no_trial_is_left_for_is_said() -> None:
+    replayed = replay(swept(1), ["incremental"], space=SPACE, seeds=1, trials=41)
+    (run,) = replayed.runs
+    assert len(run.windows) == 41
+    assert max(run.far_ms) > 2.5
+    assert "could not be answered: no trial was left within 2.5 ms" in str(replayed)
+
+
+def test_what_was_found_is_compared_with_a_window_that_is_known() -> None:
+    replayed = replay(swept(), space=SPACE, seeds=1, trials=15, **FEW)
+    truth = isiw.subjects.cohort("gaussian", 1, 3)[0].window(SPACE)
+    assert replayed.f1_by_trial("default", truth)[0, -1] > 0.7
+    assert replayed.f1_by_trial("default", None)[0, -1] == 0.0
+
+
+def test_a_replay_is_drawn(tmp_path: Path) -> None:
+    replayed = replay(swept(1), ["random"], space=SPACE, seeds=2, trials=5, **FEW)
+    assert replayed.plot(tmp_path / "replay.png").stat().st_size > 1000
+
+
+def test_too_few_trials_are_refused() -> None:
+    one = isiw.analyse([10.0, np.nan], [0.1, 0.1], space=SPACE, **FEW).record.table
+    with pytest.raises(InvalidValueError, match="too few trials"):
+        replay(Delivered(one, "impact"), space=SPACE)

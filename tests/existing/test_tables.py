@@ -1,0 +1,206 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from isiw.errors import IsiwError
+from isiw.existing.delivered import Delivered
+from isiw.existing.layout import Layout, pairs_of, read_layout
+from isiw.existing.reading import read_people
+
+ISIS = [10.0, 20.5, 30.0, 40.0, 55.25]
+MEPS = [0.123456789012, 0.2, 1.5, 0.75, 0.0]
+IMPACT = Layout(reference="impact")
+
+
+def trials_of(people: list[Delivered]) -> list[tuple[float | None, float | None]]:
+    (person,) = people
+    return [(trial.isi_ms, trial.mep_mv) for trial in person.trials]
+
+
+def frame(isi: str = "isi_ms", mep: str = "mep_mv", factor: float = 1.0, **more: Any) -> pd.DataFrame:
+    return pd.DataFrame({isi: ISIS, mep: [factor * mep_mv for mep_mv in MEPS], **more})
+
+
+def written(table: pd.DataFrame, path: Path) -> Path:
+    """The table in a file of the kind that its name says, as pandas writes it."""
+    if path.suffix == ".xlsx":
+        table.to_excel(path, index=False)
+    elif path.suffix == ".parquet":
+        table.to_parquet(path, index=False)
+    else:
+        table.to_csv(path, index=False, sep="\t" if path.suffix == ".tsv" else ",")
+    return path
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".tsv", ".txt", ".xlsx", ".parquet"])
+def test_a_table_of_another_program_is_read_to_the_last_digit(suffix: str, tmp_path: Path) -> None:
+    path = written(frame(), tmp_path / f"P01{suffix}")
+    (person,) = read_people(path, IMPACT)
+    assert trials_of([person]) == list(zip(ISIS, MEPS, strict=True))
+    assert person.subject == "P01"
+
+
+def test_a_data_frame_is_read_as_it_is() -> None:
+    assert trials_of(read_people(frame(), IMPACT)) == list(zip(ISIS, MEPS, strict=True))
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])
+def test_a_decimal_comma_and_any_encoding_are_read(encoding: str, tmp_path: Path) -> None:
+    frame("ISI (ms)", "MEP [µV]", 1000.0).to_csv(
+        tmp_path / "a.csv", sep=";", decimal=",", index=False, encoding=encoding
+    )
+    found = trials_of(read_people(tmp_path / "a.csv", IMPACT))
+    assert np.allclose(np.array(found, dtype=float), np.array([ISIS, MEPS]).T, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("isi", "mep", "factor", "units"),
+    [
+        ("ISI", "Amplitude", 1.0, ("ms", "mV")),
+        ("Interstimulus interval (ms)", "MEP amplitude [uV]", 1000.0, ()),
+        ("isi.ms", "MEP p2p (mV)", 1.0, ()),
+        ("delay_ms", "ptp_V", 1e-3, ()),
+        ("ISI", "peak-to-peak µV", 1000.0, ("ms",)),
+    ],
+)
+def test_columns_are_found_by_their_names_and_units(isi: str, mep: str, factor: float, units: tuple[str, ...]) -> None:
+    found = trials_of(read_people(frame(isi, mep, factor), Layout(reference="impact", units=units)))
+    assert np.allclose(np.array(found, dtype=float), np.array([ISIS, MEPS]).T, rtol=1e-12)
+
+
+def test_isis_in_seconds_are_read_in_ms() -> None:
+    table = pd.DataFrame({"ISI [s]": [0.01, 0.02, 0.03], "mep_mv": [0.1, 0.2, 0.3]})
+    assert [isi_ms for isi_ms, _ in trials_of(read_people(table, IMPACT))] == pytest.approx([10, 20, 30])
+
+
+def test_columns_are_those_that_are_named() -> None:
+    table = pd.DataFrame({"a": ISIS, "b": MEPS, "isi_ms": 0.0, "mep_mv": 0.0})
+    layout = Layout(reference="impact", columns=pairs_of("--column", ["isi=a", "mep=b"]), units=("ms", "mV"))
+    assert trials_of(read_people(table, layout)) == list(zip(ISIS, MEPS, strict=True))
+
+
+def test_each_person_and_day_of_a_file_is_somebody() -> None:
+    table = frame(subject=["A", "B", "A", "B", "A"], day=[1, 1, 1, 1, 2])
+    table = pd.concat([table, table.assign(isi_ms=table["isi_ms"] + 1)], ignore_index=True)
+    people = read_people(table, IMPACT)
+    assert [(one.subject, one.visit.day, len(one.trials)) for one in people] == [("A", 1, 4), ("B", 1, 4), ("A", 2, 2)]
+
+
+def test_a_row_without_an_mep_is_lost_and_one_that_says_tms_is_tms_alone() -> None:
+    table = pd.DataFrame({"isi_ms": ["10", "TMS alone", "20", "30"], "mep_mv": ["0.1", "0.2", "n/a", ""]})
+    (person,) = read_people(table, IMPACT)
+    assert [trial.is_control for trial in person.trials] == [False, True, False, False]
+    assert [str(trial.reason) for trial in person.trials if trial.reason] == ["outcome unknown"] * 2
+
+
+@pytest.mark.parametrize(("mark", "cell"), [("-1", -1.0), ("", None), ("none given", "none given")])
+def test_the_mark_of_tms_alone_is_what_somebody_says(mark: str, cell: Any) -> None:
+    table = pd.DataFrame({"isi_ms": pd.Series([10.0, cell, 20.0], dtype=object), "mep_mv": [0.1, 0.2, 0.3]})
+    (person,) = read_people(table, Layout(reference="impact", alone=mark))
+    assert [trial.is_control for trial in person.trials] == [False, True, False]
+
+
+@pytest.mark.parametrize(
+    "judged",
+    [
+        {"status": ["accepted", "mistrial", "ok", "bad", "1"]},
+        {"exclude": [0, 1, 0, 1, ""]},
+        {"Rejected": [None, "x", None, "yes", None]},
+        {"valid": [True, False, True, False, True]},
+    ],
+)
+def test_rows_that_the_file_excludes_are_lost(judged: dict[str, list[Any]]) -> None:
+    (person,) = read_people(frame().assign(**judged), IMPACT)
+    assert [trial.told for trial in person.trials] == [True, False, True, False, True]
+
+
+def test_without_a_status_a_row_is_judged_as_in_a_session() -> None:
+    table = pd.DataFrame({"isi_ms": [-3.0, 10, 20, 30], "mep_mv": [0.1, 55.0, 0.2, 0.3]})
+    (person,) = read_people(table, IMPACT)
+    assert [str(trial.reason or "") for trial in person.trials] == [
+        "TMS before impact", "implausible amplitude", "", "",
+    ]  # fmt: skip
+    nominal = frame(commanded_isi_ms=[10.0, 60.0, 30.0, 40.0, 55.0])
+    (person,) = read_people(nominal, IMPACT)
+    assert [trial.told for trial in person.trials] == [True, False, True, True, True]
+
+
+def test_blocks_and_dates_are_kept() -> None:
+    (person,) = read_people(frame(block=[1, 1, 2, 2, 3], date=["2024-05-01 10:00"] * 5), IMPACT)
+    assert person.blocks == {2: "2", 4: "3"}
+    assert person.created.startswith("2024-05-01T10:00")
+
+
+def test_a_layout_is_read_of_a_file(tmp_path: Path) -> None:
+    (tmp_path / "signal.toml").write_text(
+        'reference = "impact"\nskip_lines = 2\nseparator = "\\t"\nunits = ["s", "mV"]\n'
+        'names = ["frame", "state", "delay", "peak"]\n[columns]\nisi = "delay"\nmep = "peak"\n'
+    )
+    (tmp_path / "a.txt").write_text("Signal\nexport\n1\t2\t0.01\t0.5\n2\t2\t0.02\t0.7\n3\t2\t0.03\t0.8\n")
+    found = trials_of(read_people(tmp_path / "a.txt", read_layout(tmp_path / "signal.toml")))
+    assert found == [(10.0, 0.5), (20.0, 0.7), (30.0, 0.8)]
+
+
+HEAD = "isi_ms,mep_mv\n"
+BROKEN: dict[str, tuple[str, dict[str, Any], str]] = {
+    "no reference": (HEAD + "10,0.1\n20,0.2\n", {"reference": None}, "--reference"),
+    "no unit of the ISI": ("ISI,mep_mv\n10,0.1\n20,0.2\n", {}, "--unit with ms or s"),
+    "no unit of the MEP": ("isi_ms,MEP\n10,0.1\n20,0.2\n", {}, "--unit with mV, uV or V"),
+    "microvolt as millivolt": (HEAD + "10,120\n20,250\n30,90\n", {}, "--unit uV"),
+    "volt as millivolt": (HEAD + "10,0.0001\n20,0.0003\n30,0.0002\n", {}, "--unit V"),
+    "seconds as milliseconds": (HEAD + "0.01,0.1\n0.02,0.3\n0.03,0.2\n", {}, "--unit s"),
+    "microseconds as milliseconds": (HEAD + "10000,0.1\n20000,0.3\n30000,0.2\n", {}, "--unit us"),
+    "swapped": (HEAD + "0.11,10\n0.52,20\n0.33,10\n0.24,20\n0.75,10\n0.4,20\n", {}, "swapped"),
+    "text in the MEPs": (HEAD + "10,0.1\n20,artefact\n30,0.2\n", {}, "row 2 of the column 'mep_mv'"),
+    "text in the ISIs": (HEAD + "10,0.1\nlong,0.3\n30,0.2\n", {}, "row 2 of the column 'isi_ms'"),
+    "infinite": (HEAD + "10,inf\n20,0.3\n", {}, "is no number"),
+    "negative": (HEAD + "10,-0.1\n20,0.3\n", {}, "is no amplitude"),
+    "more than an amplifier gives": (HEAD + "10,5000\n20,0.3\n", {}, "is no amplitude"),
+    "no ISI column": ("when,mep_mv\n10,0.1\n", {}, '--column "isi=NAME"'),
+    "no MEP column": ("isi_ms,emg\n10,0.1\n", {}, '--column "mep=NAME"'),
+    "two MEP columns": ("isi_ms,MEP (mV),mep_mv\n10,0.1,0.2\n", {}, '--column "mep=MEP \\(mV\\)"'),
+    "a column that is not there": (HEAD + "10,0.1\n", {"columns": {"isi": "ISI ms"}}, "no such column"),
+    "rows without an ISI": (HEAD + "10,0.1\n,0.3\n20,0.2\n", {}, "--alone"),
+    "no pair": (HEAD + "tms,0.1\ntms,0.3\n", {}, "no pair of stimuli"),
+    "no rows": (HEAD, {}, "no rows"),
+    "nothing": ("", {}, "no table that can be read"),
+    "empty lines": (HEAD + ",\n,\n", {}, "has no trials"),
+    "a comma that may be of thousands": ("isi_ms;mep_mv\n10;1,250\n20;2,300\n", {}, "--decimal ,"),
+    "a comma among points": ("isi_ms;mep_mv\n10;0.5\n20;1.250,5\n", {}, "is no number"),
+    "an unknown status": ("isi_ms,mep_mv,status\n10,0.1,perhaps\n", {}, "neither yes nor no"),
+    "rows in another order": ("trial,isi_ms,mep_mv\n2,10,0.1\n1,20,0.2\n", {}, "not in the order"),
+    "no date": ("isi_ms,mep_mv,date\n10,0.1,yesterday\n20,0.3,yesterday\n", {}, "is no date"),
+    "more cells than names": (HEAD + "10,0.1\n20,0.3,4,5\n", {}, "no table that can be read"),
+    "one column": ("isi_ms mep_mv;\n10 0.1;\n", {}, "--column"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", BROKEN)
+def test_a_broken_table_ends_in_a_sentence_that_says_what_to_do(kind: str, tmp_path: Path) -> None:
+    content, said, expected = BROKEN[kind]
+    (tmp_path / "P01.csv").write_text(content)
+    with pytest.raises(IsiwError, match=expected) as refused:
+        read_people(tmp_path / "P01.csv", Layout(**{"reference": "impact", **said}))
+    assert len(str(refused.value)) < 500
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "content"), [("a.xlsx", b"no workbook"), ("a.parquet", b"none"), ("a.doc", b"x"), ("b.csv", None)]
+)
+def test_a_file_that_is_none_of_its_kind_is_refused(name: str, content: bytes | None, tmp_path: Path) -> None:
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(IsiwError):
+        read_people(tmp_path / name, IMPACT)
+
+
+def test_isis_that_are_all_the_same_make_no_space() -> None:
+    (person,) = read_people(pd.DataFrame({"isi_ms": [30.0] * 4, "mep_mv": [0.1, 0.2, 0.3, 0.4]}), IMPACT)
+    with pytest.raises(IsiwError, match="all the same"):
+        person.space()

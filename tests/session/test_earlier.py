@@ -1,0 +1,84 @@
+"""Earlier trials of a visit: learnt before the first ask, logged, and counted against nothing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import isiw
+from isiw.trials import Trial
+
+SPACE = isiw.DesignSpace(0, 200, reference="impact")
+SETTINGS: dict[str, Any] = {"particles": 200, "max_trials": 4}
+
+
+def earlier(n: int = 60, factor: float = 1.0) -> tuple[Trial, ...]:
+    """Trials of a person with a window of 102–163 ms, some of them outside the narrow space."""
+    responder = isiw.subjects.cohort("recruitment", 1, 3)[0].begin(3)
+    isis_ms = np.random.default_rng(3).uniform(-5.0, 240.0, n).tolist()
+    meps_mv = [factor * responder.respond(isi_ms, "impact").mep_mv for isi_ms in isis_ms]
+    return isiw.analyse(isis_ms, meps_mv, space=SPACE, particles=50).record.table.trials
+
+
+def test_a_session_knows_earlier_trials_and_no_limit_counts_them(tmp_path: Path) -> None:
+    trials = earlier()
+    limits = isiw.Limits.of_space(SPACE, min_iti_s=0, max_pulses=5)
+    strategy = isiw.make_strategy(space=SPACE, seed=2, **SETTINGS)
+    with isiw.open_session(strategy, tmp_path / "a.mcap", earlier=trials, limits=limits) as session:
+        assert (session.estimate().probability or 0.0) > 0.9
+        for mep_mv in (0.02, 0.05, 0.1, 0.07):
+            session.tell(session.ask(), mep_mv)
+        assert session.decision().stop
+    record = isiw.read_session(tmp_path / "a.mcap")
+    assert len(record.table) == 4
+    assert record.header.earlier == tuple(trial for trial in trials if trial.told)
+    assert not record.header.earlier_same_level
+    assert any(fact.name == "earlier" and fact.value.startswith("6") for fact in isiw.report.first_facts(record))
+
+
+def test_a_session_that_goes_on_knows_them_still(tmp_path: Path) -> None:
+    trials = earlier(20)
+    asked = []
+    for resumed in (False, True):
+        log = tmp_path / f"{resumed}.mcap"
+        strategy = isiw.make_strategy(space=SPACE, seed=2, **SETTINGS)
+        session = isiw.open_session(strategy, log, earlier=trials)
+        session.tell(session.ask(), 0.05)
+        if resumed:
+            session.close()
+            session = isiw.open_session(isiw.make_strategy(space=SPACE, seed=2, **SETTINGS), log, resume=True)
+        asked.append(session.ask())
+        session.close()
+    assert asked[0] == asked[1]
+
+
+@pytest.mark.parametrize("factor", [1.0, 5.0])
+def test_the_window_is_taken_over_whatever_the_level_was(factor: float) -> None:
+    strategy = isiw.make_strategy(space=SPACE, seed=2, particles=500)
+    strategy.learn_all(earlier(factor=factor))
+    responder = isiw.subjects.cohort("recruitment", 1, 3)[0].begin(4)
+    for isi_ms in (130.0, 20.0, 120.0, 180.0, 140.0, 60.0):
+        strategy.learn(isi_ms, responder.respond(isi_ms, "impact").mep_mv)
+    truth = isiw.subjects.cohort("recruitment", 1, 3)[0].window(SPACE)
+    assert isiw.metrics.f1(strategy.estimate().window, truth, SPACE) > 0.8
+
+
+def test_at_the_same_level_they_are_learnt_as_if_they_were_the_sessions_own() -> None:
+    trials = [trial for trial in earlier(10) if trial.isi_ms is not None and SPACE.admits(trial.isi_ms)]
+    told, known = (isiw.make_strategy(space=SPACE, seed=2, **SETTINGS) for _ in range(2))
+    for trial in trials:
+        told.learn(trial.isi_ms, trial.mep_mv)
+    known.learn_all(trials, same_level=True)
+    assert str(known.estimate()) == str(told.estimate())
+    assert known.spent == 0
+
+
+@pytest.mark.parametrize("name", ["gp-straddle", "nr", "pf", "incremental"])
+def test_strategies_that_cannot_widen_what_they_believe_learn_them_as_they_are(name: str) -> None:
+    strategy = isiw.make_strategy(name, SPACE, seed=1)
+    strategy.learn_all(earlier(30))
+    assert strategy.ask() in SPACE.grid_ms
+    assert strategy.estimate().pairs == len([trial for trial in earlier(30) if trial.told])
