@@ -1,9 +1,9 @@
-"""The results table and picture of the README, and its paragraph on the reproduction, from the results beside this.
+"""The results table of the README, its picture, and the paragraph on the reproduction, from the results beside this.
 
     python -m benchmarks.readme_results
 
-prints the table and the paragraph, to be put between the `results` and the `reproduction` marks of the README, and
-draws `docs/images/results.svg`.
+prints the table, to be put between the `results` marks of the README, and the paragraph, to be put between the
+`reproduction` marks of `docs/performance.md`, and draws `docs/images/results.svg`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ METHODS = {
     "nr": "the dissertation's nonlinear regression",
     "gpr": "the dissertation's Gaussian process",
     "default": "**isiw's default**",
-    "second": "oracle that is not told that there is a window",
+    "second": "oracle that must also find whether there is a window",
     "oracle": "oracle",
 }
 PICTURED = {

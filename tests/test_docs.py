@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PAGES = sorted(path for path in (ROOT / "docs").rglob("*.md") if path.name != "README.md")
+MADE = {"reference", "results", "project"}
+PAGES = sorted(path for path in (ROOT / "docs").rglob("*.md") if path.relative_to(ROOT / "docs").parts[0] not in MADE)
 DECISIONS = sorted((ROOT / "docs" / "decisions").glob("*.md"))
-TEXTS = [*PAGES, ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "docs" / "README.md"]
+TEXTS = [*PAGES, ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
 SOURCES = sorted(path for folder in ("src", "benchmarks") for path in (ROOT / folder).rglob("*.py"))
 KEY = re.compile(r"\[((?:[A-Z]|ter)[A-Za-z]+[12][0-9]{3})")
 
@@ -27,12 +28,12 @@ def defined() -> set[str]:
 @pytest.mark.parametrize("path", TEXTS, ids=name)
 def test_every_link_of_a_page_leads_somewhere(path: Path) -> None:
     for target in re.findall(r"\]\((?!http|#)([^)#]+)", path.read_text("utf-8")):
-        assert (path.parent / target).exists(), target
-
-
-@pytest.mark.parametrize("path", PAGES, ids=name)
-def test_the_index_has_every_page(path: Path) -> None:
-    assert f"({path.relative_to(ROOT / 'docs')})" in (ROOT / "docs" / "README.md").read_text("utf-8")
+        linked = path.parent / target
+        made = (
+            linked.resolve().is_relative_to(ROOT / "docs")
+            and linked.resolve().relative_to(ROOT / "docs").parts[0] in MADE
+        )
+        assert made or linked.exists(), target  # Sphinx checks what it makes
 
 
 @pytest.mark.parametrize("path", DECISIONS, ids=name)

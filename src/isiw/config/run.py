@@ -42,7 +42,14 @@ from isiw.visit import VisitProtocol
 
 
 class RunConfig(Section):
-    """The whole configuration of `isiw run`; with a rig of one's own nobody is simulated, and a space is needed."""
+    """The whole configuration of `isiw run`; with a rig of one's own nobody is simulated, and a space is needed.
+
+    Args:
+        seed: of the simulated person, the trials and the strategy.
+        log: the file of the log; by default a new one in `isiw-sessions`.
+        prior: a lab's prior, as `isiw prior learn` writes it.
+        after: logs of earlier sessions of the same person, earliest first.
+    """
 
     seed: int = Field(default=0, ge=0)
     log: Path | None = None

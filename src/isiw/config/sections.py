@@ -86,7 +86,14 @@ class SimulatedConfig(BaseModel):
 
 
 class SubjectConfig(SimulatedConfig):
-    """Who is stimulated: a simulated person, whose MEPs may be put into recorded EMG."""
+    """Who is stimulated: a simulated person, whose MEPs may be put into recorded EMG.
+
+    Args:
+        kind: `"simulated"`, or `"recorded"` for simulated MEPs in recorded EMG.
+        cohort: one of `isiw.subjects.COHORTS`.
+        number: which person of the cohort, from 0.
+        data: the folder with the recorded EMG.
+    """
 
     model_config = ConfigDict(extra="forbid")
 
@@ -131,7 +138,12 @@ class SpaceConfig(Section):
 
 
 class StrategyConfig(Section):
-    """The strategy: a name from `isiw.list_strategies()`, and its settings by key."""
+    """The strategy.
+
+    Args:
+        name: one of `isiw.list_strategies()`.
+        settings: its settings by key, as `isiw.list_settings` has them.
+    """
 
     name: str = "default"
     settings: dict[str, Any] = Field(default_factory=dict)
@@ -175,7 +187,15 @@ class RobotConfig(BaseModel):
 
 
 class DeviceConfig(Section):
-    """A lab's own rig by the factory that makes it, which no log names, or a simulated robot by its kind."""
+    """A lab's own rig by the factory that makes it, which no log names, or a simulated robot by its kind.
+
+    Args:
+        factory: the function that makes the device, as `module:function`.
+        kind: the simulated robot.
+        settings: keyword arguments of the factory, or settings of the robot.
+        folder: where the factory's module is; by default beside the configuration.
+        timeout_s: the longest time that one delivery may take [s].
+    """
 
     factory: str | None = None
     kind: Literal["tapper", "rotating-tapper"] | None = None

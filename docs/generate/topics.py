@@ -1,0 +1,32 @@
+"""The topics of a log, with the fields of their records."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from docs.generate.schemas import fields
+from docs.generate.tables import cell, sentence
+from pydantic import TypeAdapter
+
+from isiw.log import schema, topics
+from isiw.log.schema import ThresholdHeader, Waveform
+
+
+def pages() -> Iterator[tuple[str, str]]:
+    """One page."""
+    lines = (schema.__doc__ or "").splitlines()
+    parts = [
+        "# Topics of a log\n\nA log is an [MCAP](https://mcap.dev) file of JSON records, a topic for each kind of record. "
+        "[Decision 1](../decisions/0001-the-log.md) says why.\n\n```text\n" + "\n".join(lines).strip() + "\n```\n"
+    ]
+    for title, kind in kinds().items():
+        schema_of_kind = TypeAdapter(kind).json_schema(mode="serialization")
+        parts.append(f"\n## {title}\n\n{cell(sentence(kind))}\n\n{fields(schema_of_kind, kind)}")
+    yield "log-topics.md", "".join(parts)
+
+
+def kinds() -> dict[str, Any]:
+    """The kind of record of each topic, by the title of its section."""
+    own = {f"`{topic}`": kind for topic, kind in topics._KINDS.items()}  # noqa: SLF001 - the list of topics itself
+    return own | {"`/header` of a motor threshold": ThresholdHeader, "Any other topic: a channel's waveforms": Waveform}

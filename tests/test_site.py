@@ -1,0 +1,86 @@
+"""The reference has every public name, command and configuration key; the pages have the parts that the site needs."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import pkgutil
+import re
+from typing import Any
+
+import pytest
+from docs.generate import api, commands, configuration, topics
+from pydantic import BaseModel
+from typer.main import get_command
+
+import isiw
+from isiw.cli.main import app
+from isiw.config.run import RunConfig
+
+OWN = {"isiw.cli", "isiw.text"}
+"""Packages whose exports are for isiw itself."""
+
+
+def public() -> set[str]:
+    """Full names of what packages export."""
+    rooms = [isiw, *(importlib.import_module(room.name) for room in pkgutil.walk_packages(isiw.__path__, "isiw."))]
+    return {
+        f"{room.__name__}.{name}"
+        for room in rooms
+        if hasattr(room, "__path__") and room.__name__ not in OWN
+        for name in getattr(room, "__all__", ())
+        if not inspect.ismodule(getattr(room, name))
+    }
+
+
+def command_names(group: Any, before: str = "isiw") -> set[str]:
+    parts = getattr(group, "commands", None)
+    if parts is None:
+        return {before}
+    return set().union(*(command_names(inner, f"{before} {name}") for name, inner in parts.items()))
+
+
+REFERENCE = dict(api.pages())
+
+
+def test_every_public_name_is_in_the_reference() -> None:
+    described = set(re.findall(r"^(?:\.\. [\w:]+:: |``)(isiw[\w.]+)", "\n".join(REFERENCE.values()), re.MULTILINE))
+    assert public() - described == set()
+
+
+def test_every_public_name_has_an_example_or_a_link_to_one() -> None:
+    assert [name for name in sorted(public()) if not api.example_of(name)] == []
+
+
+def test_every_command_and_its_options_are_in_the_reference() -> None:
+    ((_, page),) = commands.pages()
+    root = get_command(app)
+    names = command_names(root)
+    assert {"isiw run", "isiw new rig"} <= names
+    assert [name for name in sorted(names) if f"\n## `{name}`\n" not in page] == []
+    options = {option for _, command in commands.every(root) for one in command.params for option in one.opts}
+    assert [option for option in options if option.startswith("-") and f"`{option}`" not in page] == []
+
+
+def test_every_configuration_key_is_in_the_reference_with_its_meaning() -> None:
+    page = dict(configuration.pages())["configuration.md"]
+    for name, field in RunConfig.model_fields.items():
+        section = next(
+            (one for one in (field.annotation, *getattr(field.annotation, "__args__", ())) if is_section(one)), None
+        )
+        if section is None:
+            assert f"\n| `{name}` |" in page
+            continue
+        part = page.partition(f"\n## `[{name}]`\n")[2].partition("\n## ")[0]
+        keys = getattr(section, "model_fields", None) or inspect.signature(section).parameters
+        assert [key for key in keys if not re.search(rf"^\| `{key}` \| [^|]+ \| [^|]+ \|$", part, re.MULTILINE)] == []
+
+
+def is_section(kind: Any) -> bool:
+    return isinstance(kind, type) and (issubclass(kind, BaseModel) or hasattr(kind, "__dataclass_fields__"))
+
+
+@pytest.mark.parametrize("topic", ["/header", "/intent", "/trial", "/estimate", "/event", "/threshold/pulse"])
+def test_every_topic_of_a_log_is_in_the_reference(topic: str) -> None:
+    ((_, page),) = topics.pages()
+    assert f"\n## `{topic}`\n" in page

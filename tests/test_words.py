@@ -1,0 +1,49 @@
+"""What users read is plain English: `docs/words.md` has the words, and these phrases must not come back."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PHRASES = re.compile(
+    r"\b(?:(?:is|are|be|been|was|were) told|(?:is|are|was|were|been) believed|(?:believes|believed) (?:to|that|of|about)|"
+    r"anew|asks? for what|tells? most|not known to be one|whatever became|knows? of it|hardly anything|said so)\b",
+    re.IGNORECASE,
+)
+CONTINUING = re.compile(r"\b(?:go|goes|went|going) on with\b", re.IGNORECASE)
+PAGES = [
+    path
+    for path in [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "docs").glob("[lt]*/*.md")]
+    if path.name != "words.md"
+]
+SOURCES = sorted((ROOT / "src").rglob("*.py"))
+
+
+def name(path: Path) -> str:
+    return str(path.relative_to(ROOT))
+
+
+@pytest.mark.parametrize("path", PAGES, ids=name)
+def test_a_page_has_none_of_the_worst_phrases(path: Path) -> None:
+    assert [
+        line for line in path.read_text("utf-8").splitlines() if PHRASES.search(line) or CONTINUING.search(line)
+    ] == []
+
+
+def test_no_message_has_one_of_the_worst_phrases() -> None:
+    said = [f"{name(path)}: {text}" for path in SOURCES for text in messages(path) if PHRASES.search(text)]
+    assert said == []
+
+
+def messages(path: Path) -> Iterator[str]:
+    """The texts in a module's code; docstrings are for developers."""
+    tree = ast.parse(path.read_text("utf-8"))
+    bare = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in bare:
+            yield node.value
