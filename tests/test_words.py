@@ -11,8 +11,9 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PHRASES = re.compile(
-    r"\b(?:(?:is|are|be|been|was|were) told|(?:is|are|was|were|been) believed|(?:believes|believed) (?:to|that|of|about)|"
-    r"anew|asks? for what|tells? most|not known to be one|whatever became|knows? of it|hardly anything|said so)\b",
+    r"\b(?:(?:is|are|be|been|was|were) told|(?:is|are|was|were|been) believed|"
+    r"(?:believes|believed) (?:to|that|of|about)|anew|asks? for what|tells? most|"
+    r"not known to be one|whatever became|knows? of it|hardly anything|said so)\b",
     re.IGNORECASE,
 )
 CONTINUING = re.compile(r"\b(?:go|goes|went|going) on with\b", re.IGNORECASE)

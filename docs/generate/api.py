@@ -34,9 +34,9 @@ def pages() -> Iterator[tuple[str, str]]:
 
 
 _INDEX = """
-What may be imported, by package. ``import isiw`` loads a part when it is first used. Units are in names (``isi_ms``,
-``mep_mv``), and shapes use one alphabet: *n* trials, *t* candidate ISIs, *s* posterior samples, *p* particles, *b* people
-side by side, *w* samples of a waveform. Errors are :doc:`values of one tree <isiw.errors>`.
+What may be imported, by package. ``import isiw`` loads a part when it is first used. Units are in names
+(``isi_ms``, ``mep_mv``), and shapes use one alphabet: *n* trials, *t* candidate ISIs, *s* posterior samples,
+*p* particles, *b* people side by side, *w* samples of a waveform. Errors are :doc:`values of one tree <isiw.errors>`.
 
 """
 

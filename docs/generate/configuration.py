@@ -72,7 +72,7 @@ def _sessions() -> str:
     parts = [
         """# Configuration of a session
 
-What `isiw run CONFIG.toml` reads. Every key may be left out unless it is required; a key that does not exist is an error.
+What `isiw run CONFIG.toml` reads. Every key may be left out unless it is required; an unknown key is an error.
 """
     ]
     for name, fields in keys().items():

@@ -17,7 +17,7 @@ def pages() -> Iterator[tuple[str, str]]:
     """One page."""
     lines = (schema.__doc__ or "").splitlines()
     parts = [
-        "# Topics of a log\n\nA log is an [MCAP](https://mcap.dev) file of JSON records, a topic for each kind of record. "
+        "# Topics of a log\n\nA log is an [MCAP](https://mcap.dev) file of JSON records, a topic for each kind. "
         "[Decision 1](../decisions/0001-the-log.md) says why.\n\n```text\n" + "\n".join(lines).strip() + "\n```\n"
     ]
     for title, kind in kinds().items():
