@@ -24,9 +24,11 @@ def test_every_public_name_is_what_its_module_calls_so(name: str) -> None:
     assert getattr(isiw, name) is (getattr(module, name) if home else module)
 
 
-def test_the_version_is_that_of_the_package() -> None:
+def test_the_version_is_that_of_the_package_and_of_the_citation() -> None:
     package = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     assert isiw.__version__ == package["project"]["version"]
+    assert f"\nversion: {isiw.__version__}\n" in citation
 
 
 def test_an_unknown_name_is_an_attribute_error() -> None:

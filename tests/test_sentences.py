@@ -187,7 +187,7 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
         (
             sentences.few_outside(1, 9, 0),
             (
-                "Hardly anything shows how large MEPs are without enhancement: 1 of 9 pairs are "
+                "The baseline is poorly measured: 1 of 9 pairs are "
                 "outside, and the number of "
                 "pulses of TMS alone was 0. In the next session add TMS alone (in a configuration: "
                 "[protocol] tms_alone), or "

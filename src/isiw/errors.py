@@ -145,7 +145,7 @@ def told(error: BaseException) -> str:
     try:
         text = str(error)
     except Exception:  # noqa: BLE001 - a device's own error may fail in any way when asked for its message
-        text = "(its message cannot be told)"
+        text = "(its message cannot be shown)"
     whole = f"{type(error).__name__}: {text[:_LONGEST_TEXT]}"
     return whole.encode(errors="backslashreplace").decode()
 

@@ -343,7 +343,7 @@ def at_rest(window_ms: tuple[float, float] | None, since: int | None) -> str:
 def few_outside(outside: int, pairs: int, alone: int) -> str:
     """That hardly a trial shows the MEP outside a reported window."""
     return (
-        f"Hardly anything shows how large MEPs are without enhancement: {outside} of {pairs} pairs are outside, "
+        f"The baseline is poorly measured: {outside} of {pairs} pairs are outside, "
         f"and the number of pulses of TMS alone was {alone}. In the next session add TMS alone (in a configuration: "
         "[protocol] tms_alone), or widen the range of ISIs."
     )

@@ -65,7 +65,7 @@ def test_of_the_same_person_it_is_said_whether_the_window_moved(record: SessionR
 def test_where_nothing_can_be_said_it_is_said_why(record: SessionRecord) -> None:
     difference = Difference(record, record, same_person=False, obstacle="There is probably no window: s.mcap")
     assert comparison_sentence(difference) == (
-        "P07 (s.mcap) against P07 (s.mcap), two people, or not known to be one: There is probably no window: s.mcap."
+        "P07 (s.mcap) against P07 (s.mcap), different subject codes: There is probably no window: s.mcap."
     )
 
 
@@ -76,4 +76,4 @@ def test_a_session_whose_trials_were_judged_anew_says_so(record: SessionRecord) 
     assert len(lines) == 2
     assert said == f"P07 (s.mcap): {JUDGED_SINCE}"
     assert JUDGED_SINCE in comparison_page([judged], [])
-    assert "before trials were judged anew" in session_figure(judged).axes[0].get_title(loc="left")
+    assert "outdated: trials were judged since" in session_figure(judged).axes[0].get_title(loc="left")

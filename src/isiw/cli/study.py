@@ -31,7 +31,7 @@ def run(
     source: Annotated[
         Path,
         typer.Argument(
-            help="A study (TOML), or the folder of one, to go on with it, or with --out to begin anew.",
+            help="A study (TOML), or the folder of one, to continue it, or with --out to begin again.",
             **NO_DEFAULT,
         ),
     ],

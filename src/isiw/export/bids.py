@@ -35,7 +35,7 @@ _README: Final = """# Sessions of isiw
 {sessions} sessions of paired stimulation, {simulated} of them with simulated people. isiw looks for the inter-stimulus
 intervals (ISI) at which {given} enhances the motor evoked potential (MEP).
 
-- beh: all trials of a session, with their onsets and what was believed after each.
+- beh: all trials of a session, with their onsets and the estimate after each.
 - emg: the sweeps, written end to end ("epoched"). Onsets in _events.tsv are times in the file; when a trial was in the
   session is session_s.
 - sourcedata: the logs (MCAP), which hold everything; left out where the sessions are pseudonymised.
@@ -68,7 +68,7 @@ def _require_distinct(parts: Iterable[Part]) -> None:
         label = _label(part).casefold()
         if not label or codes.setdefault(label, part.subject) != part.subject:
             raise InvalidValueError(
-                "a person's code cannot be told from another one's in the names of files",
+                "a person's code looks like another one's in the names of files",
                 got=part.subject,
                 expected="codes that differ in Latin letters or digits",
                 remedy="Export with --pseudonymise, which numbers the people.",

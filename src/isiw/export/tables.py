@@ -42,7 +42,7 @@ _SESSION_COLUMNS: Final[Columns] = {
     "delivered": ("", "stimuli that were given, or may have been"),
     "told": ("", "trials that the strategy learnt from"),
     "mistrials": ("", "trials that were judged to be mistrials"),
-    "p_window": ("", "probability that there is a window, at the end; empty, as what was found, if little was told"),
+    "p_window": ("", "probability that there is a window, at the end; empty, as the result, after too few trials"),
     "window": ("", "the window that was reported, its segments; empty where none was"),
     "start_ms": ("ms", "where the reported window starts; empty where none was reported"),
     "end_ms": ("ms", "where it ends"),
@@ -52,7 +52,7 @@ _SESSION_COLUMNS: Final[Columns] = {
     "end_high_ms": ("ms", "upper end of the 90 % interval of its end"),
     "stopped": ("", "whether the strategy had stopped"),
     "why": ("", "why it stopped, or went on"),
-    "judged_since": ("", "whether trials were judged anew after what was found, which does not know of it"),
+    "judged_since": ("", "whether trials were excluded, included or judged after this result, which is then outdated"),
     "lacks": ("", "what the log lacks; empty where it is whole"),
 }
 

@@ -257,7 +257,7 @@ _COLUMNS: Final[Mapping[str, tuple[str, str]]] = {
     "tap_alone": ("", "whether it was {0.one} without the magnetic pulse"),
     "overruled": ("", "why it had been a mistrial before an operator accepted it"),
     "p_window": ("", "probability that there is a window, after this trial"),
-    "window_start_ms": ("ms", "start of the window that was believed in after this trial; none where none was"),
+    "window_start_ms": ("ms", "start of the window that was reported after this trial; empty if none was"),
     "window_end_ms": ("ms", "its end"),
     "start_ms": ("ms", "posterior median of the start, given a window; infinite beyond the range"),
     "start_low_ms": ("ms", "lower end of its 90 % interval"),

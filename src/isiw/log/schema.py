@@ -4,13 +4,13 @@
     /intent     about to be delivered; an intent without a trial was interrupted, or refused as an event says
     /trial      what came of it
     /emg …      the waveforms of a trial, one topic a channel
-    /estimate   what was believed after the trial, and what is asked next
+    /estimate   the estimate after the trial, and the ISI that comes next
     /event      what happened: an exclusion, a limit, a fault, a resumption, a pause, a note … (`EventKind`)
 
 A log of a motor threshold has a header of its own, intents with an intensity, and in place of trials and estimates
 
     /threshold/pulse    what came of a pulse
-    /threshold/belief   what was believed of the threshold after it
+    /threshold/belief   the estimate of the threshold after it
 
 JSON knows no infinity: where a number is not finite it is one of the strings "Infinity", "-Infinity" and "NaN".
 """
@@ -82,7 +82,7 @@ class PulseOutcome(LogRecord):
 
 
 class ThresholdBelief(LogRecord):
-    """What was believed of a motor threshold after a pulse, and whether to stop."""
+    """The estimate of a motor threshold after a pulse, and whether to stop."""
 
     trial: TrialNumber
     estimate: ThresholdEstimate

@@ -214,7 +214,7 @@ def _title(record: SessionRecord) -> str:
         return f"Too little was measured (pairs that count: {record.pairs})"
     if record.found is None:
         return "No estimate"
-    since = ", before trials were judged anew," if record.is_judged_since else ""
+    since = " (outdated: trials were judged since)" if record.is_judged_since else ""
     return f"{titled(record.found)}{since}"
 
 

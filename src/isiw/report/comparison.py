@@ -74,7 +74,7 @@ def comparison_sentence(difference: Difference) -> str:
     Args:
         difference: between the sessions.
     """
-    kind = "the same person" if difference.same_person else "two people, or not known to be one"
+    kind = "the same person" if difference.same_person else "different subject codes"
     said = [
         f"{_whose(difference.second)} against {_whose(difference.first)}, {kind}:",
         sentences.moved(difference.moved, 1.0 - DayToDay().p_stays),

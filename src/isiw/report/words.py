@@ -147,8 +147,8 @@ def _expects_a_tap(record: SessionRecord) -> str:
     if known_settings(name, {"conditioning": record.header.conditioning}):
         return ""
     return (
-        f"{name} expects windows as after a tap, and cannot be told of the electrical pulse: do not rely on its "
-        "probabilities. The default strategy can be told."
+        f"{name} expects windows as after a tap, and has no setting for an electrical pulse: do not rely on its "
+        "probabilities. The default strategy has one."
     )
 
 

@@ -84,8 +84,7 @@ class TellRequest(_Request):
 
     trial: TrialNumber = Field(description="Its number, as ask has answered it.")
     isi_ms: float | None = Field(
-        description="The realised ISI [ms]; null for TMS alone, which is told without being asked, as the trial that "
-        "comes next."
+        description="The realised ISI [ms]; null for TMS alone, which needs no ask, as the trial that comes next."
     )
     mep_mv: float = Field(description="Peak-to-peak amplitude [mV]; 0 is below the detection limit.")
     isi_sd_ms: float = Field(default=0.0, description="SD of the realised ISI [ms]; 0 where it was measured.")

@@ -118,7 +118,7 @@ class Sessions:
             open_trial=unknown[-1].trial if unknown else None,
             open_isi_ms=unknown[-1].isi_ms if unknown else None,
             stop=decision is not None and decision.stop,
-            reason=decision.reason if decision else "Nothing was told yet.",
+            reason=decision.reason if decision else "No trial has an outcome yet.",
         )
 
     def trials(self, name: str) -> list[TrialRow]:

@@ -89,7 +89,7 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
         raise StrategyError(
             "the strategy knows of trials that are not this session's",
             got=f"{strategy.delivered} trials",
-            remedy="Make it anew, or give the session strategy.restarted().",
+            remedy="Make it again, or give the session strategy.restarted().",
         )
     if trials := tuple(earlier):
         strategy.learn_all(trials)

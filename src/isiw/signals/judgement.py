@@ -131,7 +131,7 @@ def judge_measurement(
     limits = limits or SignalLimits()
     if (measurement.isi_ms is None) != (stimulus.isi_ms is None):
         raise DeviceError(
-            "the device reports another kind of trial than it was told to deliver",
+            "the device reports another kind of trial than it had to deliver",
             got=f"a realised ISI of {measurement.isi_ms}",
             expected=f"one for the commanded ISI of {stimulus.isi_ms}",
         )

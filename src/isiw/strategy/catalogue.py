@@ -36,16 +36,16 @@ _PARTICLES, _PARAMETRIC, _GP = "particles:ParticleSettings", "parametric:Paramet
 
 _CATALOGUE: Final[dict[str, _Entry]] = {
     "default": _Entry(
-        "Particle posterior; asks in turn what tells most about the window and about all unknowns.",
+        "Particle posterior; chooses ISIs in turn most informative about the window and about all unknowns.",
         _PARTICLES,
     ),
     "particles-window": _Entry(
-        "Particle posterior; asks what tells most about which ISIs are in the window.",
+        "Particle posterior; chooses the ISI most informative about which ISIs are in the window.",
         _PARTICLES,
         {"acquisition": "window-gain"},
     ),
     "particles-mi": _Entry(
-        "Particle posterior; asks what tells most about all unknowns.",
+        "Particle posterior; chooses the ISI most informative about all unknowns.",
         _PARTICLES,
         {"acquisition": "mutual-information"},
     ),
@@ -58,18 +58,18 @@ _CATALOGUE: Final[dict[str, _Entry]] = {
         "supra:SupraSettings",
     ),
     "parametric-mi": _Entry(
-        "Gaussian window in Pyro; asks what tells most about all unknowns.",
+        "Gaussian window in Pyro; chooses the ISI most informative about all unknowns.",
         _PARAMETRIC,
         {"acquisition": "mutual-information"},
     ),
     "parametric-window": _Entry(
-        "Gaussian window in Pyro; asks what tells most about which ISIs are in the window.",
+        "Gaussian window in Pyro; chooses the ISI most informative about which ISIs are in the window.",
         _PARAMETRIC,
         {"acquisition": "window-gain"},
     ),
     "gp-straddle": _Entry("Gaussian process; asks where it is least clear whether an ISI is in the window.", _GP),
     "gp-variance": _Entry(
-        "Gaussian process; asks what tells most about the whole profile.",
+        "Gaussian process; chooses the ISI most informative about the whole profile.",
         _GP,
         {"acquisition": "integrated-variance"},
     ),

@@ -292,7 +292,7 @@ def _read(path: Path, state: str) -> pa.Table:
         raise StudyError(
             f"a part of the study is damaged, or cannot be read: {error}",
             got=str(path),
-            remedy="Delete that file and run the study again; only its people are computed anew.",
+            remedy="Delete that file and run the study again; only its people are computed again.",
         ) from error
     if (part.schema.metadata or {}).get(_OF_STUDY) not in {None, state.encode()}:  # None before parts named it
         raise StudyError(

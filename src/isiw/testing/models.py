@@ -78,10 +78,10 @@ def _after(model: ResponseModel, space: DesignSpace, trials: Trials, *, seed: in
 def _check_learning(model: ResponseModel, space: DesignSpace, trials: Trials) -> None:
     before = model.begin(space, 1)
     require(isinstance(before, Posterior), "a posterior has trials and estimate()")
-    require(before.trials == 0, "a prior has been told no trials")
+    require(before.trials == 0, "a prior has learnt from no trials")
     estimate = before.estimate()
     after = model.update(before, _observation(*trials[0]))
-    require(after.trials == 1 and before.trials == 0, "update makes a posterior that has been told one trial more")
+    require(after.trials == 1 and before.trials == 0, "update makes a posterior that has learnt from one trial more")
     require(same_estimates(before.estimate(), estimate), "a posterior never changes")
 
 
@@ -171,4 +171,4 @@ def _check_further(posterior: Posterior, people: int, when: str) -> None:
         require(fine, f"proposed_isis_ms has the shape (b, k) with k of at least 1 {when}", str(tuple(plan.shape)))
     if isinstance(posterior, ReportsTrouble):
         trouble = posterior.trouble
-        require(trouble is None or trouble.endswith("."), f"trouble is told in sentences {when}", repr(trouble))
+        require(trouble is None or trouble.endswith("."), f"trouble is stated in sentences {when}", repr(trouble))

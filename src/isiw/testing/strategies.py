@@ -105,7 +105,7 @@ def _check_mistrials(make: Callable[[], Strategy]) -> None:
     strategy, other = make(), make()
     strategy.count_mistrial()
     require(strategy.ask() == other.ask(), "a mistrial does not change what is asked")
-    require(same_estimates(strategy.estimate(), other.estimate()), "a mistrial does not change what is believed")
+    require(same_estimates(strategy.estimate(), other.estimate()), "a mistrial does not change the estimate")
 
 
 def _check_deadline(strategy: Strategy) -> None:

@@ -35,7 +35,7 @@ def test_answers_of_one_kind_never_give_a_number(*, method: str, answer: bool, a
 
 def test_before_the_first_pulse_there_is_no_number() -> None:
     search = make_threshold_search("bayes", SPACE)
-    assert str(search.estimate()) == "No threshold can be stated. Nothing was told yet."
+    assert str(search.estimate()) == "No threshold can be stated. No pulse has an outcome yet."
     assert not search.decision().stop
 
 

@@ -50,7 +50,7 @@ def trouble_of(health: Health) -> str | None:
     ess, shifts, distinct = (float(x.nan_to_num(1.0).min()) for x in (health.ess, health.shifts, health.distinct))
     said = []
     if ess < LEAST_ESS:
-        said.append(f"The trial contradicts what was believed: {ess:.1%} of the particles carry the posterior.")
+        said.append(f"The trial contradicts the estimate before it: {ess:.1%} of the particles carry the posterior.")
     if shifts < LEAST_ACCEPTED:
         said.append(f"The particles hardly move: {shifts:.1%} of their shifts were accepted.")
     if distinct < LEAST_DISTINCT:

@@ -214,7 +214,7 @@ def one_sided(pulses: Sequence[Pulse], space: IntensityRange) -> StopDecision | 
     if len(kinds) == 2:
         return None
     if not kinds:
-        return StopKind.THRESHOLD.go_on("Nothing was told yet.")
+        return StopKind.THRESHOLD.go_on("No pulse has an outcome yet.")
     answered = kinds == {True}
     end = space.low_pct_mso if answered else space.high_pct_mso
     at_end = sum(abs(pulse.intensity_pct_mso - end) <= NEAR_THE_END_PCT_MSO for pulse in pulses)
