@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 import tempfile
 from pathlib import Path
@@ -12,14 +13,10 @@ sys.path.insert(0, str(ROOT))
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # as on the machines whose results are shown
 # Notebooks import modules that they have written, and print what a terminal without colours would show.
 os.environ["PYTHONPATH"] = os.pathsep.join([*filter(None, [os.environ.get("PYTHONPATH")]), "."])
-_profile = tempfile.TemporaryDirectory()  # kept until Sphinx ends; kernels would ask for colours
-_startup = Path(_profile.name, "profile_default", "startup", "plain.py")
-_startup.parent.mkdir(parents=True)
-_startup.write_text(
-    "import os\n"
-    "os.environ |= {'NO_COLOR': '1', 'TERM': 'dumb', 'COLUMNS': '110'}\n"
-    "[os.environ.pop(name, None) for name in ('FORCE_COLOR', 'CLICOLOR', 'CLICOLOR_FORCE')]\n"
-)
+_profile = tempfile.TemporaryDirectory()  # kept until Sphinx ends
+_startup = Path(_profile.name, "profile_default", "startup")
+_startup.mkdir(parents=True)
+shutil.copy(ROOT / "docs" / "generate" / "kernel.py", _startup)
 os.environ["IPYTHONDIR"] = _profile.name
 os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
 

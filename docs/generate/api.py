@@ -89,7 +89,9 @@ def _page(room: ModuleType) -> str:
 def _entry(full: str) -> str:
     thing = _thing(full)
     if inspect.isclass(thing):
-        kind, options = "class", "   :members:\n   :show-inheritance:\n"
+        kind, options = "class", "   :members:\n"
+        if thing.__bases__ != (object,):
+            options += "   :show-inheritance:\n"
     elif inspect.isroutine(thing):
         kind, options = "function", ""
     else:
