@@ -9,8 +9,9 @@ from docs.generate.schemas import fields
 from docs.generate.tables import cell, sentence
 from pydantic import TypeAdapter
 
-from isiw.log import schema, topics
-from isiw.log.schema import ThresholdHeader, Waveform
+from isiw.log import schema
+from isiw.log.headers import ThresholdHeader
+from isiw.log.schema import Waveform
 
 
 def pages() -> Iterator[tuple[str, str]]:
@@ -28,5 +29,5 @@ def pages() -> Iterator[tuple[str, str]]:
 
 def kinds() -> dict[str, Any]:
     """The kind of record of each topic, by the title of its section."""
-    own = {f"`{topic}`": kind for topic, kind in topics._KINDS.items()}  # noqa: SLF001 - the list of topics itself
+    own = {f"`{topic}`": kind for topic, kind in schema._KINDS.items()}  # noqa: SLF001 - the list of topics itself
     return own | {"`/header` of a motor threshold": ThresholdHeader, "Any other topic: a channel's waveforms": Waveform}
