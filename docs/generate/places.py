@@ -20,6 +20,7 @@ _PAGES = {
     ROOT / "CHANGELOG.md": DOCS / "project" / "changelog.md",
     DOCS / "decisions": DOCS / "decisions.md",
 }
+_PICTURE = re.compile(r'<picture><source media="[^"]*" srcset="([^"]+)"><img alt="([^"]+)" src="([^"]+)"></picture>')
 _LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\[\]]*\])*)\]\((?!https?:|#)([^)\s#]+)(#[^)\s]*)?\)")
 
 
@@ -44,4 +45,4 @@ def relinked(text: str, source: Path, shown: Path) -> str:
         link = os.path.relpath(on_site(path), shown.parent)
         return f"{mark}[{words}]({link}{anchor or ''})"
 
-    return _LINK.sub(replace, text)
+    return _LINK.sub(replace, _PICTURE.sub(r"![\2](\3){.only-light}![\2](\1){.only-dark}", text))
