@@ -134,7 +134,7 @@ def tap_unknown(estimate: Estimate) -> str:
         return ""
     return (
         "What the first stimulus alone does to the EMG is not known within this window: its own response, rather than "
-        "the MEP, may be what is larger there. Give it alone some times; give its amplitude with pulse=False."
+        "the MEP, may be what is larger there. Give it alone some times, and tell its amplitude with pulse=False."
     )
 
 
