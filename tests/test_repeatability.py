@@ -30,6 +30,7 @@ from isiw.signals import TapEvents
 from isiw.signals.impact import VALVE_MS
 from isiw.signals.rotation import RotationEvents
 from isiw.trials import Stimulus, Sweep
+from isiw.visit import VisitProtocol
 from known import instance, known
 from scripted import scripted_strategy
 
@@ -199,7 +200,7 @@ def test_a_logged_session_is_studied_like_a_preset(tmp_path: Path) -> None:
     space = DesignSpace(0, 200, reference="impact")
     device = SimulatedDevice(Tapper(lambda _: NoResponse(), "subject4"))
     strategy = scripted_strategy(max_trials=12, space=space)
-    result = Session(device, strategy, log=tmp_path / "taps.mcap").run()
+    result = Session(device, strategy, log=tmp_path / "taps.mcap", protocol=VisitProtocol(taps_first=0)).run()
     study = study_session(read_session(result.log))
     assert len(study.commanded_ms) == 12
     logged = [known(trial.t_hit_ms) for trial in result.trials]

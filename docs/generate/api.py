@@ -8,7 +8,8 @@ import inspect
 import pkgutil
 import re
 import sys
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator
 from functools import cache
 from itertools import pairwise
 from types import ModuleType
@@ -118,11 +119,11 @@ def _said_of(full: str, thing: Any) -> str:
 def example_of(full: str) -> str:
     """Where the name is used, as a link: on a page whose code runs, or in a test."""
     room, _, name = full.rpartition(".")
-    word = re.compile(rf"\b{name}\b")
-    if found := [page for page, code in _code_of_pages().items() if word.search(code)]:
+    if found := [page for page, words in _words_of(_code_of_pages).items() if words[name]]:
         return "Used in " + ", ".join(f":doc:`/{page}`" for page in found[:3]) + "."
     near = f"tests/{'/'.join(room.split('.')[1:])}"
-    files = [path for path, text in _code().items() if len(word.findall(text)) > _defines(text, name)]
+    words = _words_of(_code)
+    files = [path for path, text in _code().items() if words[path][name] and words[path][name] > _defines(text, name)]
     if not files:
         return ""
     path = min(files, key=lambda path: (not path.startswith(near), not path.startswith("tests"), path))
@@ -131,6 +132,12 @@ def example_of(full: str) -> str:
 
 def _defines(text: str, name: str) -> bool:
     return bool(re.search(rf"^(?:class|def) {name}\b|^{name}\b.*=", text, re.MULTILINE))
+
+
+@cache
+def _words_of(texts: Callable[[], dict[str, str]]) -> dict[str, Counter[str]]:
+    """How often each word is in each text."""
+    return {path: Counter(re.findall(r"\w+", text)) for path, text in texts().items()}
 
 
 @cache

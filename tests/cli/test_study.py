@@ -149,5 +149,5 @@ def test_sessions_that_failed_are_told_by_their_error(folder: Path) -> None:
 def test_an_error_is_a_message_and_exit_code_1(arguments: list[str], message: str) -> None:
     result = study(*arguments)
     assert result.exit_code == 1
-    assert result.output.startswith("error: ")
+    assert result.output.splitlines()[-1].startswith("error: ")
     assert message in result.output

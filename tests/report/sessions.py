@@ -44,7 +44,7 @@ def tapped(path: Path, trials: int = 6, subject: str = HOSTILE) -> SessionRecord
         log=path,
         subject=subject,
         visit=Visit(day=2, operator="MK", muscle="FCR"),
-        protocol=VisitProtocol(tms_alone=0.2),
+        protocol=VisitProtocol(tms_alone=0.2, taps_first=0),
         on_trial=on_trial,
     )
     session.run()
