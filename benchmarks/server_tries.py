@@ -32,7 +32,7 @@ from schemathesis.specs.openapi import checks
 import isiw
 
 TOKEN = "a token for benchmarks"  # noqa: S105 - of no real server
-PLAN = {"space": {"low_ms": 0, "high_ms": 200, "reference": "impact"}, "limits": {"min_iti_s": 0.0}}
+PLAN = {"space": {"low_ms": 0, "high_ms": 200, "reference": "impact"}, "limits": {"min_iti_s": 0.0, "max_pulses": 1000}}
 
 DELIVERY_S = 0.005
 

@@ -163,9 +163,9 @@ def test_the_command_says_what_is_wrong(tmp_path: Path, monkeypatch: pytest.Monk
 
 def test_the_command_says_that_it_starts_and_when_it_is_ready(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("isiw.server.serve", lambda _, ready: ready("http://127.0.0.1:8473"))
-    lines = CliRunner().invoke(app, ["serve", str(tmp_path)]).output.splitlines()
-    assert lines[0] == "isiw serve starts …"
-    assert lines[1].startswith("Ready: isiw serves the sessions of")
+    result = CliRunner().invoke(app, ["serve", str(tmp_path)])
+    assert result.stderr == "isiw serve starts …\n"
+    assert result.stdout.startswith("Ready: isiw serves the sessions of")
 
 
 def test_without_its_libraries_the_server_says_which_extra_to_install() -> None:

@@ -33,7 +33,7 @@ def serve(
 ) -> None:
     """Serve sessions over HTTP to MATLAB, LabVIEW or any other software of this computer."""
     with errors_reported("The server has ended; its sessions can be resumed."):
-        show("isiw serve starts …")
+        show("isiw serve starts …", stderr=True)  # standard output begins with the address
         given = _token(token_file) if token_file else os.environ.get(TOKEN)
         settings = isiw.server.ServerSettings(
             folder, host, port, certificate=certificate, key=key, **({} if given is None else {"token": given})

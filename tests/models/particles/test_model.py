@@ -219,7 +219,13 @@ def test_a_clear_responder_is_found_and_a_non_responder_is_not_given_a_window() 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("factor", [10.0, 1 / 3])
+@pytest.mark.parametrize(
+    "factor",
+    [
+        pytest.param(10.0, marks=pytest.mark.xfail(reason="decision 25: the gap is 1.1 posterior SDs of either edge")),
+        1 / 3,
+    ],
+)
 def test_the_unit_of_the_amplitude_is_learnt(factor: float) -> None:
     # The prior of the floor, and particles far out in it, pull by less than a posterior SD, averaged over twelve seeds:
     # where amplitudes are ten times the usual, the median of one seed differs from that of another by 9 ms (SD).
