@@ -73,7 +73,7 @@ class Enhancement(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class WindowEstimate:
-    """What is believed about one person's window. What a non-Bayesian method does not have is None.
+    """The estimate of one person's window. What a non-Bayesian method does not have is None.
 
     A stopping rule needs the probability, the edges and the F1 only; bands, the best ISI, what is excluded and what is
     unusual may be given as `Later`.
@@ -194,7 +194,7 @@ class WindowEstimate:
 
     @property
     def rests_on_data(self) -> bool:
-        """Whether enough was measured to speak of a window; with less it is what was believed beforehand."""
+        """Whether enough was measured to speak of a window; with less it is the prior."""
         return self.too_little is None
 
     @property

@@ -35,7 +35,7 @@ def test_a_session_whose_last_decision_is_not_on_disk_is_to_be_resumed(
         raise LogError("the log cannot be written")
 
     session = Session(ScriptedDevice(), scripted_strategy(2), log=tmp_path / "s.mcap")
-    monkeypatch.setattr("isiw.session.examination.believed", full)
+    monkeypatch.setattr("isiw.session.examination.estimate_record", full)
     with pytest.raises(LogError) as failed:
         session.run()
     assert "isiw resume" in after_error(session, None, failed.value, delivered=True)[-1]

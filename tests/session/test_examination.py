@@ -48,7 +48,7 @@ def test_what_was_interrupted_after_it_was_learnt_is_learnt_once_and_logged_late
 
     with LogWriter.create(tmp_path / "s.mcap", make_header()) as log:
         examined = begun(log)
-        monkeypatch.setattr(examination, "believed", full)
+        monkeypatch.setattr(examination, "estimate_record", full)
         with pytest.raises(LogError):
             examined.conclude()
         monkeypatch.undo()

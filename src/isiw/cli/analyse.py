@@ -59,9 +59,9 @@ def analyse(  # noqa: PLR0913, PLR0917 - an option each
 ) -> None:
     """Say what trials that were delivered without isiw tell about the window; with -o, make a log of them.
 
-    Called again with the same files and folder, it goes on where it was interrupted.
+    Called again with the same files and folder, it continues where it was interrupted.
     """
-    with errors_reported("Interrupted: what is finished is kept; the same command goes on."):
+    with errors_reported("Interrupted: what is finished is kept; give the same command to continue."):
         read = isiw.existing.read_layout(layout) if layout is not None else isiw.existing.Layout()
         read = read.saying(
             reference=reference,

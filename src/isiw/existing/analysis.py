@@ -31,7 +31,7 @@ from isiw.plots.style import inline_svg
 from isiw.report.page import save_report
 from isiw.report.words import final_statement
 from isiw.session.assembly import header_of
-from isiw.session.examination import believed
+from isiw.session.examination import estimate_record
 from isiw.signals.watch import Watch
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.stopping import StopKind
@@ -52,8 +52,8 @@ class Analysis:
     """What trials that were delivered without isiw say of one person's window.
 
     Args:
-        record: the trials and what is believed after them, as a log of them tells it.
-        estimate: what is believed about the window after all of them.
+        record: the trials and the estimates after them, as in a log.
+        estimate: the window's estimate after all of them.
     """
 
     record: SessionRecord
@@ -237,7 +237,7 @@ def _header(delivered: Delivered, strategy: Strategy, config: Mapping[str, Any])
 
 
 def _history(delivered: Delivered, strategy: Strategy, header: Header) -> Iterator[Record]:
-    """The trials, and what is odd and what is believed after them."""
+    """The trials, with findings, and the estimates after them."""
     trials = delivered.trials
     told = [trial.index for trial in trials if trial.told]
     logged = {told[int(place)] for place in np.linspace(0, len(told) - 1, MOST_ESTIMATES).round()} if told else set()
@@ -253,7 +253,7 @@ def _history(delivered: Delivered, strategy: Strategy, header: Header) -> Iterat
         if strategy.trouble is not None and trial.told:
             yield Event(kind="fit", trial=trial.index, text=strategy.trouble)
         if trial.index in logged or trial.index == trials[-1].index:
-            yield believed(strategy, trial.index, _END, None)
+            yield estimate_record(strategy, trial.index, _END, None)
 
 
 def _answer(delivered: Delivered, trial: Trial) -> Answer:

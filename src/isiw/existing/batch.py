@@ -188,7 +188,7 @@ def is_there(person: Person) -> bool:
 
 
 def analyse_person(person: Person, way: Way) -> Analysis:
-    """What is believed of a person; their log is written if it has a place.
+    """Analyse one person, and write their log if it has a place.
 
     Args:
         person: as `read_files` has found them.

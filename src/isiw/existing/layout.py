@@ -55,7 +55,6 @@ class Layout:
         sheet: the sheet of a workbook; by default the first one.
         markers: of a recording, the name of an event by what it marks: `pulse` (of TMS), `tap` or `valve`.
         channels: of a recording, the name of a channel by what it holds: `emg`, `acceleration`.
-        rate_hz: the sampling rate of arrays that do not hold it [Hz].
         longest_isi_ms: the longest ISI of a recording; a pulse that comes later after a tap is TMS alone [ms].
         mep_window_ms: where the MEP of a recording is sought [ms after the pulse]; by default as in a session.
 
@@ -74,7 +73,6 @@ class Layout:
     sheet: str | None = None
     markers: Mapping[str, str] = field(default_factory=dict)
     channels: Mapping[str, str] = field(default_factory=dict)
-    rate_hz: float | None = None
     longest_isi_ms: float = 500.0
     mep_window_ms: tuple[float, float] | None = None
 
@@ -91,7 +89,6 @@ class Layout:
             choice("a unit", unit, [*ISI_UNITS_MS, *EMG_UNITS_MV])
         check_wholes(self, "skip_lines", least=0)
         check_numbers(self, "longest_isi_ms", above=0)
-        check_numbers(self, "rate_hz", above=0, optional=True)
         check_texts(self, "alone") if self.alone is not None else None
 
     def unit_of(self, known: Mapping[str, float]) -> str | None:

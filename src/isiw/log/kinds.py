@@ -92,7 +92,7 @@ def continued_by(
 
 
 def require_session(path: Path, header: Header) -> None:
-    """Raise if a log's trials were delivered without isiw, so that there is nothing to go on with, or to judge anew."""
+    """Raise if a log's trials were delivered without isiw, so that nothing can be continued or judged again."""
     if header.imported:
         raise LogError(
             f"the log is of {LogKind.IMPORTED}, and stays as it was imported",

@@ -11,7 +11,7 @@ from isiw.log.reader import read_salvaged
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event
 from isiw.log.writer import LogWriter
-from isiw.session.examination import believed, learn
+from isiw.session.examination import estimate_record, learn
 from isiw.session.replay import strategy_of
 from isiw.strategy.strategy import Strategy
 
@@ -46,4 +46,4 @@ def estimate_again(
     said = f"Estimated again with isiw {isiw.__version__} from the trials as they count now."
     with LogWriter.continuing(path, salvaged, record.header) as log:
         log.append(Event(kind="note", trial=last, text=" ".join([said, *record.losses])))
-        log.append(believed(made, last, made.decision(), None))
+        log.append(estimate_record(made, last, made.decision(), None))

@@ -258,7 +258,7 @@ class _Window:
         return self.strategy.decision()
 
     def belief(self, trial: int, decision: StopDecision, next_isi_ms: float | None) -> EstimateRecord:
-        return believed(self.strategy, trial, decision, next_isi_ms)
+        return estimate_record(self.strategy, trial, decision, next_isi_ms)
 
 
 WindowExamination: TypeAlias = Examination[_Window, TrialTable, Trial]
@@ -296,7 +296,7 @@ def learn(strategy: Strategy, trial: Trial) -> None:
     """
     if trial.told:
         strategy.learn(trial.isi_ms, None if trial.mep_interval_mv else trial.mep_mv, **details_of(trial))
-    elif trial.counts and trial.isi_ms is not None:  # a tap alone whose amplitude was told
+    elif trial.counts and trial.isi_ms is not None:  # a tap alone with an amplitude
         strategy.learn_tap(trial.isi_ms, trial.mep_mv)
     elif trial.is_control:
         strategy.count_control()
@@ -321,7 +321,9 @@ def relearned(strategy: Strategy, trials: Iterable[Trial], changes: Sequence[int
     return again
 
 
-def believed(strategy: Strategy, trial: int, decision: StopDecision, next_isi_ms: float | None) -> EstimateRecord:
+def estimate_record(
+    strategy: Strategy, trial: int, decision: StopDecision, next_isi_ms: float | None
+) -> EstimateRecord:
     """The record of what a strategy knows after a trial; scores are those that it has worked out anyway."""
     record = EstimateRecord.after(trial, strategy.estimate(), decision, next_isi_ms)
     predicted = _predicted(strategy) if record.grid_ms else {}

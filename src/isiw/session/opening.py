@@ -18,7 +18,7 @@ from isiw.log.reader import SessionRecord, read_salvaged
 from isiw.log.salvage import Salvage, salvage
 from isiw.log.writer import LogWriter
 from isiw.session.assembly import header_of, require_parts, require_room
-from isiw.session.examination import believed
+from isiw.session.examination import estimate_record
 from isiw.session.recorder import Recorder
 from isiw.session.replay import require_same_person, taken_up
 from isiw.signals.limits import SignalLimits
@@ -137,7 +137,7 @@ def own_loop_resumed(
     for first in earlier.first_records:
         writer.append(first)
     if record.is_judged_since:
-        writer.append(believed(strategy, len(earlier.trials) - 1, strategy.decision(), None))
+        writer.append(estimate_record(strategy, len(earlier.trials) - 1, strategy.decision(), None))
     writer.sync()
     return Recorder(strategy, writer, header, clock, earlier, on_doubt)
 

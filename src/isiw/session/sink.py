@@ -23,7 +23,7 @@ class SessionUpdate:
 
     Args:
         trial: the trial.
-        estimate: what is believed about the window.
+        estimate: the window's estimate.
         decision: whether the session stops here, and why.
         next_isi_ms: what is asked next [ms]; None where the session stops, or a control trial comes next.
         stimuli_left: how many stimuli the budget and the limits still allow.
@@ -44,7 +44,7 @@ class SessionResult:
     """How a session ended.
 
     Args:
-        estimate: what is believed about the window.
+        estimate: the window's estimate.
         decision: why it ended.
         trials: all its trials.
         log: its log.

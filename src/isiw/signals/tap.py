@@ -62,7 +62,7 @@ class _Shown(NamedTuple):
 
 
 class _MepWindow(NamedTuple):
-    """The EMG in a trial's MEP window, its times after the hit, and how many sweeps its amplitude was told by."""
+    """The EMG in a trial's MEP window, its times after the hit, and how many sweeps its amplitude rests on."""
 
     emg_mv: FloatArray
     since_hit_ms: FloatArray

@@ -1,4 +1,4 @@
-"""What a strategy was told, and what each amplitude stands for: a point, an interval, or more than the MEP alone."""
+"""Outcomes that a strategy has learnt from; each is a point, an interval, or more than the MEP alone."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Details(TypedDict, total=False):
 
 
 def details_of(trial: Trial) -> Details:
-    """What a trial that is told says of its outcome, besides ISI and amplitude."""
+    """The details of a trial's outcome besides ISI and amplitude."""
     return {
         "isi_sd_ms": trial.isi_sd_ms,
         "mep_sd_mv": trial.mep_sd_mv,
@@ -82,7 +82,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Outcomes:
-    """All that was told so far.
+    """All outcomes so far.
 
     Args:
         reference: what ISIs count from.

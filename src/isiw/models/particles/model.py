@@ -141,7 +141,7 @@ class ParticlePosterior(SwarmPosterior[ParticleModel, Latents]):
         return replace(self, swarm=self.swarm.times(torch.where(latents.present, places, 0.0) + curves))
 
     def noting_change(self) -> ParticlePosterior:
-        """What is believed where somebody has seen that something changes now; see `NotesChanges`."""
+        """The posterior if somebody has seen that something changes now; see `NotesChanges`."""
         trials = self.trials
         if not trials:
             return self

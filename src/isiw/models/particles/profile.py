@@ -90,7 +90,7 @@ _AFTER: Final[Mapping[Conditioning | None, _Windows]] = MappingProxyType(
         ),
     }
 )
-"""What is believed of windows after each kind of conditioning stimulus, and where it is not stated."""
+"""The law of windows after each kind of conditioning stimulus, and if it is not stated."""
 
 
 @dataclass(frozen=True)

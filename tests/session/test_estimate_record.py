@@ -11,7 +11,7 @@ import pytest
 
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import EstimateRecord, decode, encode
-from isiw.session.examination import believed
+from isiw.session.examination import estimate_record
 from isiw.session.loop import Session
 from isiw.session.opening import open_session
 from isiw.strategy.catalogue import make_strategy
@@ -31,7 +31,7 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> SessionRecord:
     device = ScriptedDevice(
         lambda s: Measurement(0.02 + 0.013 * s.trial, s.isi_ms, background_rms_uv=50.0 if s.trial == 4 else 2.0)
     )
-    log = tmp_path_factory.mktemp("believed") / "s.mcap"
+    log = tmp_path_factory.mktemp("estimate_record") / "s.mcap"
     Session(device, strategy(7), log=log).run()
     return read_session(log)
 
@@ -61,7 +61,7 @@ def test_asking_and_predicting_change_no_ask() -> None:
         for each in (watched, unwatched):
             each.tell(each.ask(), mep_mv)
         known(watched.prediction_mv())
-        believed(watched, 0, watched.decision(), watched.ask())
+        estimate_record(watched, 0, watched.decision(), watched.ask())
     assert watched.ask() == unwatched.ask()
 
 
@@ -73,7 +73,7 @@ def test_a_fallback_is_no_choice_of_the_scores() -> None:
     late.tell(late.ask(), 0.02)
     isi_ms = late.ask(deadline_s=0.0)
     assert known(late.choice).by == "fallback"
-    written = believed(late, 0, late.decision(), isi_ms)
+    written = estimate_record(late, 0, late.decision(), isi_ms)
     assert (written.chosen_by, written.scores) == ("fallback", ())
 
 
@@ -100,5 +100,5 @@ def test_a_score_that_is_not_finite_is_kept_as_such() -> None:
     choice = known(asked.choice)
     scores = candidate_isis(SPACE) * float("nan")
     asked._choice = replace(choice, by="acquisition", scores=scores)  # noqa: SLF001 - no acquisition function gives one here
-    written = encode("/estimate", believed(asked, 0, asked.decision(), choice.isi_ms))
+    written = encode("/estimate", estimate_record(asked, 0, asked.decision(), choice.isi_ms))
     assert np.isnan(instance(EstimateRecord, decode("/estimate", written)).scores).all()
