@@ -32,15 +32,7 @@ from collections.abc import Iterable
 
 
 class IsiwError(Exception):
-    """The root of everything that isiw raises on purpose.
-
-    Args:
-        what: what is wrong, as a sentence without a full stop.
-        got: the offending value, if there is one.
-        expected: what would have been accepted.
-        remedy: the way out.
-        found: which `isiw.findings.Kind` of finding it is; None for any other error.
-    """
+    """The root of everything that isiw raises on purpose."""
 
     def __init__(
         self,

@@ -13,11 +13,7 @@ __all__ = ["botorch", "gpytorch", "pa", "parquet", "pd", "pyro", "scipy", "sklea
 
 
 class _Library:
-    """A library that stays out of `sys.modules` until it is used, since others look there for what is in use.
-
-    Args:
-        name: of its module.
-    """
+    """A library that stays out of `sys.modules` until it is used, since others look there for what is in use."""
 
     def __init__(self, name: str) -> None:
         self._name = name

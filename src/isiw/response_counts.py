@@ -72,20 +72,7 @@ class CountStudy:
 
 
 def response_counts(isi_ms: ArrayLike, mep_mv: ArrayLike, threshold_mv: float) -> pd.DataFrame:
-    """How many trials respond at each ISI.
-
-    Args:
-        isi_ms: ISI of each trial [ms], shape (n,).
-        mep_mv: its MEP [mV], shape (n,).
-        threshold_mv: a larger MEP is a response [mV].
-
-    Returns:
-        A row an ISI, ascending; columns trials, responses, share.
-
-    Raises:
-        InvalidValueError: shapes that differ, values that are not finite, amplitudes that are no MEPs in mV, or a
-            threshold that is not positive or larger than any MEP.
-    """
+    """How many trials respond at each ISI."""
     isi, mep = np.asarray(isi_ms, dtype=np.float64), np.asarray(mep_mv, dtype=np.float64)
     if isi.shape != mep.shape or isi.ndim != 1:
         raise InvalidValueError("each trial has one ISI and one MEP", got=(isi.shape, mep.shape))

@@ -45,11 +45,7 @@ class FollowsPlan(Protocol):
 
 
 def require_acquisition(given: object) -> None:
-    """Raise where something else is given for an acquisition function.
-
-    Raises:
-        StrategyError: it is none, or the class of one.
-    """
+    """Raise where something else is given for an acquisition function."""
     if isinstance(given, type):
         raise StrategyError(
             "an acquisition function is needed, and not its class", got=given, remedy=f"Make one: {given.__name__}()."
@@ -64,17 +60,7 @@ def require_acquisition(given: object) -> None:
 
 
 def require_scores(acquisition: AcquisitionFunction, scores: object, candidates: int, people: int = 1) -> Tensor:
-    """The scores of an acquisition function, which has one for each ISI, for all people alike or for each of them.
-
-    Args:
-        acquisition: the acquisition function.
-        scores: what it gave.
-        candidates: how many ISIs were scored, t.
-        people: how many people there are, b.
-
-    Raises:
-        StrategyError: no tensor of shape (t,), (1, t) or (b, t).
-    """
+    """The scores of an acquisition function, which has one for each ISI, for all people alike or for each of them."""
     what = f"{type(acquisition).__name__} must score each ISI"
     shape = f"shape ({candidates},) or ({people}, {candidates})"
     if not isinstance(scores, torch.Tensor):
@@ -86,13 +72,7 @@ def require_scores(acquisition: AcquisitionFunction, scores: object, candidates:
 
 
 def best_candidate(scores: Tensor, cost: Tensor | None = None, first: int = 0) -> Tensor:
-    """Index of the best candidate for each person, shape (b,); a score that is not finite loses.
-
-    Args:
-        scores: shape (b, t).
-        cost: what each candidate costs, in the unit of the scores, shape (t,).
-        first: a tie goes to this candidate, or to the next one behind it, in a circle.
-    """
+    """Index of the best candidate for each person, shape (b,); a score that is not finite loses."""
     net = scores if cost is None else scores - cost
     net = torch.where(torch.isfinite(net), net, -torch.inf).roll(-first, dims=-1)
     return (net.argmax(dim=-1) + first) % scores.shape[-1]

@@ -41,12 +41,7 @@ class _RotatingTapperKeys(_TapperKeys):
 
 
 def robot_for(robot: RobotConfig, seed: int, simulated: SimulatedConfig, space: DesignSpace) -> Tapper | RotatingTapper:
-    """The robot that taps a simulated person.
-
-    Raises:
-        ConfigError: a setting that is unknown or cannot be used, or a person whom the robot cannot tap.
-        DeviceError: a design space that begins too soon after an impact that triggers the pulse.
-    """
+    """The robot that taps a simulated person."""
     person, geometry = _under(robot, simulated, seed)
     hit_ms, sd_ms = person.stated_hit_delay_ms
     values = {"reference": space.reference, "expected_hit_ms": hit_ms, "expected_hit_sd_ms": sd_ms} | robot.settings

@@ -62,11 +62,6 @@ class Pacing:
     """The times of a session's stimuli, and how long its limits have the next one wait.
 
     The first one waits a whole interval, too: nobody knows what came before.
-
-    Args:
-        limits: the interval, the rest and the period.
-        clock: tells the time.
-        earlier_s: how long ago each earlier stimulus was [s], in any order.
     """
 
     def __init__(self, limits: Limits, clock: Clock, earlier_s: Sequence[float] = ()) -> None:
@@ -75,11 +70,7 @@ class Pacing:
         self._times_s = [self._since_s - age_s for age_s in sorted(earlier_s, reverse=True)]
 
     def wait_s(self, interval_s: float = 0.0) -> float:
-        """How long until the next stimulus may come [s].
-
-        Args:
-            interval_s: the least between the last one and it that is asked for beside the limits [s].
-        """
+        """How long until the next stimulus may come [s]."""
         last_s = self._times_s[-1] if self._times_s else self._since_s
         due_s = max(self._limits.earliest_s(self._times_s, self._since_s), last_s + interval_s)
         return max(0.0, due_s - self._clock.now_s())

@@ -143,14 +143,7 @@ class HasMemory(Protocol):
 
 
 def readiness_of(device: Device) -> Readiness:
-    """What a device says about its state; ready, where it cannot say.
-
-    Args:
-        device: the device.
-
-    Raises:
-        DeviceError: it says something else than a `Readiness`.
-    """
+    """What a device says about its state; ready, where it cannot say."""
     state: object = device.readiness() if isinstance(device, ReportsReadiness) else Readiness()
     if not isinstance(state, Readiness):
         raise DeviceError(
@@ -162,11 +155,6 @@ def readiness_of(device: Device) -> Readiness:
 
 
 def require_staged(name: str, *, staged: bool) -> None:
-    """Raise NotDelivered where a device is told to deliver without being armed.
-
-    Args:
-        name: the device's, for the message.
-        staged: whether it is armed.
-    """
+    """Raise NotDelivered where a device is told to deliver without being armed."""
     if not staged:
         raise NotDelivered(f"{name} is not staged, so it delivers nothing", remedy="Call stage() first.")

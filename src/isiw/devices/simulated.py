@@ -64,11 +64,7 @@ class SimulatedDevice:
         self._staged = True
 
     def deliver(self, stimulus: Stimulus, timeout_s: float) -> Answer:  # noqa: ARG002 - answers at once
-        """The simulation's answer.
-
-        Raises:
-            DeviceError: not staged, or the simulation refuses.
-        """
+        """The simulation's answer."""
         require_staged(self.describe().name, staged=self._staged)
         self._asked += 1
         return self.simulation.answer(stimulus)
@@ -153,12 +149,7 @@ class DryRun:
         self._staged = True
 
     def deliver(self, stimulus: Stimulus, timeout_s: float) -> Measurement:  # noqa: ARG002 - answers at once
-        """Fire nothing.
-
-        Args:
-            stimulus: what would be delivered.
-            timeout_s: the longest the call may take [s].
-        """
+        """Fire nothing."""
         require_staged(self._info.name, staged=self._staged)
         return Measurement(0.0, stimulus.isi_ms)
 

@@ -32,28 +32,13 @@ class Judging(ABC):
         return self._examination.trials
 
     def note(self, text: str, *, key: str | None = None) -> None:
-        """Log a remark; with a key that a note of this session has already, nothing.
-
-        Args:
-            text: anything.
-            key: of your choice, so that a note which is sent again is logged once.
-
-        Raises:
-            InvalidValueError: text or key is no text, or the session is not open.
-        """
+        """Log a remark; with a key that a note of this session has already, nothing."""
         self._examination.note(text, key=key)
 
     def note_change(self, text: str, *, key: str | None = None) -> None:
         """Log that something changed that may bear on all MEPs from here on, such as a coil that was re-seated.
 
         A strategy that reckons with changes takes one for likely then.
-
-        Args:
-            text: what changed.
-            key: as for `note`.
-
-        Raises:
-            InvalidValueError: text or key is no text, or the session is not open.
         """
         self._judge(lambda trials: change(trials, text, key))
 
@@ -63,47 +48,17 @@ class Judging(ABC):
         return self._examination.last_excluded
 
     def exclude(self, trial: int, reason: str = "") -> None:
-        """Let a trial not count from here on: an event is appended, and the strategy learns anew without it.
-
-        Args:
-            trial: its number.
-            reason: why, for whoever reads the log.
-
-        Raises:
-            InvalidValueError: no trial that counts has this number, the reason is no text, or the session is not open.
-        """
+        """Let a trial not count from here on: an event is appended, and the strategy learns anew without it."""
         self._judge(lambda trials: exclusion(trials, trial, reason))
 
     def include(self, trial: int) -> None:
-        """Let a trial count again that was excluded, and learn anew with it.
-
-        Args:
-            trial: its number.
-
-        Raises:
-            InvalidValueError: no excluded trial has this number, or the session is not open.
-        """
+        """Let a trial count again that was excluded, and learn anew with it."""
         self._judge(lambda trials: inclusion(trials, trial))
 
     def reject(self, trial: int) -> None:
-        """Let a trial not count whose MEP an operator has looked at; an exclusion with this reason.
-
-        Args:
-            trial: its number.
-
-        Raises:
-            InvalidValueError: no trial that counts has this number, or the session is not open.
-        """
+        """Let a trial not count whose MEP an operator has looked at; an exclusion with this reason."""
         self.exclude(trial, LOOKED_AT)
 
     def accept(self, trial: int) -> None:
-        """Let a trial count all the same that was judged a mistrial or excluded, once an operator has looked at it.
-
-        Args:
-            trial: its number.
-
-        Raises:
-            InvalidValueError: no such trial, one that counts already or of which no MEP was measured that a muscle can
-                give, or the session is not open.
-        """
+        """Let a trial count all the same that was judged a mistrial or excluded, once an operator has looked at it."""
         self._judge(lambda trials: acceptance(trials, trial, self.strategy.space))

@@ -66,16 +66,6 @@ def replay(
 
     What an operator said about a trial holds from then on; asks before it are compared as they were made. Of a long
     session the first and the last asks are compared: the last ones depend on all that was told before.
-
-    Args:
-        record: the log.
-        strategy: the session's strategy before its first trial.
-        verify: whether to compare what the strategy asks with what it asked then.
-        replayed: called after each trial with how many have been told.
-
-    Raises:
-        StrategyError: it has another design space, or asks something else, although the versions are those that were
-            logged.
     """
     _require_same_space(strategy, record.header)
     told: list[Trial] = []
@@ -274,16 +264,7 @@ def require_as_real(info: DeviceInfo, was: DeviceInfo) -> None:
 
 
 def require_same_person(subject: str, logged: Header) -> None:
-    """Raise where the trials of a log that a loop of the lab's own continues are another person's, or nobody's.
-
-    Args:
-        subject: the person's code; empty where nobody said it.
-        logged: the header of the log.
-
-    Raises:
-        DeviceError: the log is of a simulated device.
-        InvalidValueError: the log is another person's.
-    """
+    """Raise where the trials of a log that a loop of the lab's own continues are another person's, or nobody's."""
     require_as_real(DeviceInfo(OWN_LOOP, logged.space.reference), logged.device)
     if subject and logged.subject and subject != logged.subject:
         raise InvalidValueError(

@@ -267,12 +267,7 @@ class ThresholdRecorder:
         self._examination.event("resume", f"Went on after {self.given} pulses.", durable=True)
 
     def ask(self) -> float:
-        """The next intensity [% MSO], the same until its outcome; on disk as about to be given before this returns.
-
-        Raises:
-            LimitExceededError: a limit is reached; deliver nothing.
-            LogError: the log cannot be written, or is no longer at its path; deliver nothing.
-        """
+        """The next intensity [% MSO], the same until its outcome; on disk as about to be given before this returns."""
         if self._asked is None:
             self._require_left()
             intensity = self.search.ask()

@@ -183,11 +183,7 @@ class DaskCluster:
     def results(
         self, run: Callable[[_Item], _Result], items: Sequence[_Item]
     ) -> Generator[tuple[_Item, _Result | Failure], None, None]:
-        """See `Executor`.
-
-        Raises:
-            StudyError: Dask is not installed, or the scheduler is not reached or lost.
-        """
+        """See `Executor`."""
         dask = _distributed()
         with ExitStack() as stack:
             address = self.scheduler if isinstance(self.scheduler, str) else None

@@ -166,14 +166,7 @@ class Carrier(Protocol):
 
 
 class Exchange:
-    """Arms, delivers and disarms by requests, one at a time; `disarm` may come from any thread.
-
-    Args:
-        name: what is asked, for messages.
-        carrier: carries requests and answers.
-        keys: what an answer to a delivery may have besides what every answer has.
-        stop_timeout_s: how long an answer to a request to disarm is awaited [s].
-    """
+    """Arms, delivers and disarms by requests, one at a time; `disarm` may come from any thread."""
 
     def __init__(self, name: str, carrier: Carrier, keys: Iterable[str], stop_timeout_s: float) -> None:
         self._name, self._carrier = name, carrier
@@ -192,15 +185,7 @@ class Exchange:
         return self._arming > self._disarmed
 
     def arm(self, timeout_s: float) -> None:
-        """Have it disarmed, which shows that somebody is there and undoes what an earlier run left, and then armed.
-
-        Args:
-            timeout_s: the longest that both may take [s].
-
-        Raises:
-            DeviceError: it cannot be armed.
-            DeviceTimeoutError: no answer in time.
-        """
+        """Have it disarmed, which shows that somebody is there and undoes what an earlier run left, and then armed."""
         end_s = time.monotonic() + timeout_s
         disarming = self._sent(Verb.DISARM, timeout_s)
         self._confirmed(disarming)
@@ -218,26 +203,11 @@ class Exchange:
             raise DeviceError(f"{self._name} was stopped while it was being armed")
 
     def require_staged(self) -> None:
-        """Raise where it is not known to be armed.
-
-        Raises:
-            NotDelivered: it is not.
-        """
+        """Raise where it is not known to be armed."""
         require_staged(self._name, staged=self._staged)
 
     def deliver(self, stimulus: Stimulus, timeout_s: float, read: Callable[[Reply], _T]) -> _T:
-        """Have a pair of stimuli, or TMS alone, delivered.
-
-        Args:
-            stimulus: what to deliver.
-            timeout_s: the longest it may take [s].
-            read: makes of the answer what is returned.
-
-        Raises:
-            NotDelivered: not armed, or refused before firing.
-            DeviceTimeoutError: no answer in time.
-            DeviceError: anything else; whether the pulse was given is not known.
-        """
+        """Have a pair of stimuli, or TMS alone, delivered."""
         if stimulus.tap_alone:
             raise NotDelivered(f"{self._name} cannot deliver a tap alone")
         with self._sending:
@@ -254,11 +224,7 @@ class Exchange:
                 raise reply.broken(error.what, got=error.got) from error
 
     def disarm(self) -> None:
-        """Have it disarmed. Where nobody answers, that is an error only if it may be armed.
-
-        Raises:
-            DeviceError: it may still be armed.
-        """
+        """Have it disarmed. Where nobody answers, that is an error only if it may be armed."""
         try:
             self._confirmed(self._sent(Verb.DISARM, self._stop_timeout_s))
         except DeviceError:
@@ -345,10 +311,5 @@ def _require_answer_to(stimulus: Stimulus, reply: Reply) -> None:
 
 
 def described(info: DeviceInfo | Mapping[str, Any], **known: Any) -> DeviceInfo:
-    """What a device says about itself, from a table of a configuration or from the object.
-
-    Args:
-        info: the fields of a `DeviceInfo`.
-        **known: fields that the device itself knows.
-    """
+    """What a device says about itself, from a table of a configuration or from the object."""
     return dataclasses.replace(from_table(DeviceInfo, info, "info"), **known)

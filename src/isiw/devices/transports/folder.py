@@ -78,12 +78,7 @@ class FolderDevice:
         return self._info
 
     def stage(self) -> None:
-        """Have the other software arm, and wait for its word.
-
-        Raises:
-            DeviceError: no such folder, or it does not arm.
-            DeviceTimeoutError: no answer in time.
-        """
+        """Have the other software arm, and wait for its word."""
         self._exchange.arm(self._stage_timeout_s)
 
     def deliver(self, stimulus: Stimulus, timeout_s: float) -> Answer:
@@ -92,11 +87,7 @@ class FolderDevice:
         return self._exchange.deliver(stimulus, timeout_s, read)
 
     def stop(self) -> None:
-        """Have the other software disarm, and wait for its word.
-
-        Raises:
-            DeviceError: it may still be armed.
-        """
+        """Have the other software disarm, and wait for its word."""
         self._exchange.disarm()
 
     def unstage(self) -> None:

@@ -81,11 +81,7 @@ class LineDevice:
         return self._info
 
     def readiness(self) -> Readiness:
-        """What the instrument says about its state; ready, where the table has no status.
-
-        Raises:
-            NotDelivered: it is not, or does not answer.
-        """
+        """What the instrument says about its state; ready, where the table has no status."""
         if self._commands.status is None:
             return Readiness()
         with _nothing_given():
@@ -95,11 +91,7 @@ class LineDevice:
             return Readiness(coil_c=number_of(said, "coil_c"), intensity_pct_mso=number_of(said, "intensity_pct_mso"))
 
     def stage(self) -> None:
-        """Open a connection, and have the instrument confirm that it is disarmed; each trial arms it.
-
-        Raises:
-            DeviceError: it cannot be reached, or does not confirm.
-        """
+        """Open a connection, and have the instrument confirm that it is disarmed; each trial arms it."""
         era = self._since_stop
         self._close()
         self._connect(era, math.inf)
@@ -107,17 +99,7 @@ class LineDevice:
             self._staged = True
 
     def deliver(self, stimulus: Stimulus, timeout_s: float) -> Answer:
-        """Set the ISI, read it back, arm, fire once, and report what came of it.
-
-        Args:
-            stimulus: what to deliver.
-            timeout_s: the longest the call may take [s].
-
-        Raises:
-            NotDelivered: it failed before the command to fire was sent.
-            DeviceTimeoutError: no answer to that command in time.
-            DeviceError: anything else went wrong after it; whether the pulse was given is not known.
-        """
+        """Set the ISI, read it back, arm, fire once, and report what came of it."""
         era, end_s = self._since_stop, time.monotonic() + timeout_s - min(_SPARE_S, 0.1 * timeout_s)
         require_staged(self._info.name, staged=self._staged)
         command = self._firing(stimulus)
@@ -129,11 +111,7 @@ class LineDevice:
             return self._outcome(era, stimulus, said, end_s)
 
     def stop(self) -> None:
-        """Disarm: over the connection that there is, or over a fresh one where that one fails.
-
-        Raises:
-            DeviceError: the instrument does not confirm that it is disarmed.
-        """
+        """Disarm: over the connection that there is, or over a fresh one where that one fails."""
         self._staged, self._since_stop = False, object()
         with self._stopping:
             if self._busy.acquire(timeout=self._settings.timeout_s):

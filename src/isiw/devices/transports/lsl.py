@@ -28,13 +28,7 @@ _MOST_KEPT: Final = 8
 
 
 class Markers:
-    """Carries requests as markers, and answers as echoes.
-
-    Args:
-        lsl: the library.
-        name: of the stream of markers.
-        echo: the name of the stream of echoes.
-    """
+    """Carries requests as markers, and answers as echoes."""
 
     def __init__(self, lsl: Any, name: str, echo: str) -> None:
         self._lsl, self._name, self.echo = lsl, name, echo
@@ -64,11 +58,7 @@ class Markers:
             self._inlet = inlet
 
     def await_listener(self, timeout_s: float) -> None:
-        """Wait until somebody listens, since markers are lost that nobody listens to.
-
-        Raises:
-            DeviceTimeoutError: nobody does.
-        """
+        """Wait until somebody listens, since markers are lost that nobody listens to."""
         if not self._outlet.wait_for_consumers(timeout_s):
             raise DeviceTimeoutError(
                 "nobody listens to the markers",
@@ -77,11 +67,7 @@ class Markers:
             )
 
     def correction_s(self, timeout_s: float) -> float:
-        """What has to be added to times of an echo to be on the local clock [s].
-
-        Raises:
-            DeviceError: it is not known.
-        """
+        """What has to be added to times of an echo to be on the local clock [s]."""
         try:
             return float(self._inlet.time_correction(timeout_s))
         except (self._lsl.util.TimeoutError, self._lsl.util.LostError) as error:
@@ -210,12 +196,7 @@ class LslDevice:
         return self._info
 
     def stage(self) -> None:
-        """Find the streams, wait until somebody listens to the markers, and have it arm.
-
-        Raises:
-            DeviceError: a stream that is there twice or has another rate, or it does not arm.
-            DeviceTimeoutError: a stream is missing, nobody listens, or no echo came.
-        """
+        """Find the streams, wait until somebody listens to the markers, and have it arm."""
         end_s = time.monotonic() + self._stage_timeout_s
         self._markers.open()
         found = self._found(end_s)
@@ -234,11 +215,7 @@ class LslDevice:
         return self._exchange.deliver(stimulus, _left_s(end_s), partial(self._sweep, asked_s, end_s))
 
     def stop(self) -> None:
-        """Have it disarm, and wait for its word; without a connection there is nobody to ask.
-
-        Raises:
-            DeviceError: it may still be armed.
-        """
+        """Have it disarm, and wait for its word; without a connection there is nobody to ask."""
         if self._markers.connected:
             self._exchange.disarm()
 

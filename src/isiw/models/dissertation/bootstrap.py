@@ -97,11 +97,7 @@ class BootstrapFilter:
         )
 
     def update(self, posterior: BootstrapPosterior, observation: Observation) -> BootstrapPosterior:
-        """One more particle measured; the next generation where it was the last one of its own.
-
-        Raises:
-            StrategyError: a response without its amplitude.
-        """
+        """One more particle measured; the next generation where it was the last one of its own."""
         told = posterior.told.appended(observation)
         paired = np.flatnonzero(~np.isnan(told.isi_ms[:, -1]))
         measured_ms, mep_mv = posterior.measured_ms.copy(), posterior.mep_mv.copy()
@@ -148,12 +144,7 @@ class BootstrapFilter:
         return {"fits": tuple(fits), "floors_mv": floors_mv}
 
     def on_lattice(self, space: DesignSpace, isi_ms: FloatArray) -> FloatArray:
-        """The nearest ISIs [ms] of the lattice, inside the range; same shape.
-
-        Args:
-            space: the range.
-            isi_ms: ISIs [ms], any shape.
-        """
+        """The nearest ISIs [ms] of the lattice, inside the range; same shape."""
         last = math.floor((space.high_ms - space.low_ms) / self.lattice_ms + 1e-9)
         return space.low_ms + self.lattice_ms * ((isi_ms - space.low_ms) / self.lattice_ms).round().clip(0, last)
 

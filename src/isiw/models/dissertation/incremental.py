@@ -75,11 +75,7 @@ class SweepModel:
         return SweepPosterior(self, space, AmplitudeHistory.nothing(people))
 
     def update(self, posterior: SweepPosterior, observation: Observation) -> SweepPosterior:
-        """One more trial.
-
-        Raises:
-            StrategyError: a response without its amplitude.
-        """
+        """One more trial."""
         return replace(posterior, told=posterior.told.appended(observation))
 
 

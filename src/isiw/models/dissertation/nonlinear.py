@@ -137,13 +137,7 @@ class NonlinearRegression:
         return _Beliefs(start, *(np.tile(values, self.peaks) for values in (sd, low, high)))
 
     def starts(self, space: DesignSpace, amplitude_mv: float, rng: np.random.Generator) -> list[list[float]]:
-        """Amplitude [mV], mean and SD [ms] from which the search for each Gaussian starts.
-
-        Args:
-            space: the design space.
-            amplitude_mv: what is known of the amplitude [mV].
-            rng: what a random start is drawn from.
-        """
+        """Amplitude [mV], mean and SD [ms] from which the search for each Gaussian starts."""
         middle_ms, sd_ms = 0.5 * (space.low_ms + space.high_ms), self.width_ms / 4.0
         apart_ms = min(sd_ms, 0.25 * (space.high_ms - space.low_ms))  # inside a range that is narrower than a window
         if self.start == "random":

@@ -62,11 +62,7 @@ class RegressionModel:
         return self._fitted(space, seed, AmplitudeHistory.nothing(people))
 
     def update(self, posterior: RegressionPosterior, observation: Observation) -> RegressionPosterior:
-        """The posterior after one more trial.
-
-        Raises:
-            StrategyError: a response without its amplitude.
-        """
+        """The posterior after one more trial."""
         return self._fitted(posterior.space, posterior.seed, posterior.told.appended(observation))
 
     def _fitted(self, space: DesignSpace, seed: int, told: AmplitudeHistory) -> RegressionPosterior:

@@ -101,11 +101,7 @@ class GaussianProcess:
         return GaussianProcessPosterior(self, space, seed, AmplitudeHistory.nothing(people))
 
     def update(self, posterior: GaussianProcessPosterior, observation: Observation) -> GaussianProcessPosterior:
-        """The posterior after one more trial.
-
-        Raises:
-            StrategyError: a response without an amplitude.
-        """
+        """The posterior after one more trial."""
         return replace(posterior, told=posterior.told.appended(observation), held=None)
 
     def fit(self, told: PersonTrials) -> Fit:

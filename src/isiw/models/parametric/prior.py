@@ -141,13 +141,7 @@ class WindowPrior:
         check_scales(self, "outliers", positive=False)
 
     def unknowns(self, latents: Tensor, likelihood: Likelihood, space: DesignSpace) -> Unknowns:
-        """What standard normal latents mean.
-
-        Args:
-            latents: in the order of `latent_names`, shape (m, d).
-            likelihood: the likelihood.
-            space: the design space.
-        """
+        """What standard normal latents mean."""
         z = dict(zip(latent_names(likelihood), latents.unbind(-1), strict=True))
         floor_mv = self.floor.mean_mv.log_normal(z["floor"])
         evoked = self._saturating(z, floor_mv) if likelihood == "input-noise" else self._proportional(z, floor_mv)

@@ -81,16 +81,7 @@ class ParticleModel:
         return self.prior.as_usual(self.unusual_kept)
 
     def begin(self, space: DesignSpace, seed: int, people: int = 1) -> ParticlePosterior:
-        """The posterior before the first trial.
-
-        Args:
-            space: the design space.
-            seed: seed of all randomness.
-            people: how many people.
-
-        Raises:
-            InvalidValueError: the prior's places count from another event than the space.
-        """
+        """The posterior before the first trial."""
         self.prior.profile.require_space(space)
         latents = self.prior.sample(people, self.particles, step_generator(self.device, seed, 0), space)
         return ParticlePosterior(self, space, seed, Swarm.of(latents), *_engines(self, space))

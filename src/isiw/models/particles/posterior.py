@@ -87,11 +87,7 @@ class SwarmPosterior(ABC, Generic[M, L]):
         return self.swarm.trouble
 
     def told(self, observation: Observation) -> Self:
-        """The same particles, weighted by one more trial as well.
-
-        Args:
-            observation: the trial.
-        """
+        """The same particles, weighted by one more trial as well."""
         known = self.model.detection_limit_mv, self.model.response_threshold_mv
         trial = observed(observation, *known, order=self.trials).to(self.device, torch.float32)
         return replace(self, swarm=self.swarm.told(trial, self.engine))

@@ -174,14 +174,7 @@ class Prior:
         return torch.cat(parts + [self.mixtures[name].sds[0] for name in BLOCKS if name != "start"])
 
     def sample(self, people: int, particles: int, generator: torch.Generator, space: DesignSpace) -> Latents:
-        """Particles of the prior.
-
-        Args:
-            people: how many people.
-            particles: how many particles of each.
-            generator: source of randomness.
-            space: the design space that the window is in.
-        """
+        """Particles of the prior."""
         size = (people, particles)
         uniform = torch.rand((5, *size), generator=generator, dtype=torch.float32, device=generator.device)
         start_ms = self.profile.start.start_ms(uniform[3], space).unsqueeze(-1)
@@ -195,23 +188,13 @@ class Prior:
         return Latents(values, shape, noise, uniform[2] < self.profile.p_window, change)
 
     def log_density(self, values: Tensor, space: DesignSpace) -> Tensor:
-        """Log density of latents but for a constant, shape (b, p).
-
-        Args:
-            values: latents, shape (b, p, d).
-            space: the design space that the window is in.
-        """
+        """Log density of latents but for a constant, shape (b, p)."""
         if not self.profile.p_place:
             return self.profile.start.log_density(values[..., 0], space) + self._joint.log_density(values[..., 1:])
         return self.log_place(values, space) + self._beside_place.log_density(values[..., 2:])
 
     def log_densities(self, values: Tensor, space: DesignSpace) -> dict[str, Tensor]:
-        """Log density of the latents of each block, shape (b, p); start and width are one: `"place"`.
-
-        Args:
-            values: latents, shape (b, p, d).
-            space: the design space that the window is in.
-        """
+        """Log density of the latents of each block, shape (b, p); start and width are one: `"place"`."""
         sizes = [len(names) for names in BLOCKS.values()]
         parts = dict(zip(BLOCKS, torch.split(values, sizes, dim=-1), strict=True))
         others = {name: mixture for name, mixture in self.mixtures.items() if name != "width"}
@@ -219,12 +202,7 @@ class Prior:
         return place | {name: mixture.log_density(parts[name]) for name, mixture in others.items()}
 
     def log_places(self, values: Tensor, space: DesignSpace) -> Tensor:
-        """Log density of start and width, times its probability: anywhere, and in each place, shape (b, p, 1 + k).
-
-        Args:
-            values: latents, shape (b, p, d).
-            space: the design space that the window is in.
-        """
+        """Log density of start and width, times its probability: anywhere, and in each place, shape (b, p, 1 + k)."""
         start, width = self.profile.start.log_density(values[..., 0], space), self.mixtures["width"]
         anywhere = (start + width.log_density(values[..., 1:2])).unsqueeze(-1)
         share = self.profile.p_place
@@ -234,12 +212,7 @@ class Prior:
         return torch.cat([math.log1p(-share) + anywhere, places], dim=-1)
 
     def log_place(self, values: Tensor, space: DesignSpace) -> Tensor:
-        """Log density of start and width, shape (b, p).
-
-        Args:
-            values: latents, shape (b, p, d).
-            space: the design space that the window is in.
-        """
+        """Log density of start and width, shape (b, p)."""
         density: Tensor = torch.logsumexp(self.log_places(values, space), dim=-1)
         return density
 
@@ -256,11 +229,7 @@ class Prior:
         return JointMixture([mixture for name, mixture in self.mixtures.items() if name != "width"])
 
     def as_usual(self, kept: float) -> Prior:
-        """The same with less probability of unusual starts, widths and intensities.
-
-        Args:
-            kept: the part of their probability that they keep.
-        """
+        """The same with less probability of unusual starts, widths and intensities."""
         return replace(
             self, profile=self.profile.as_usual(kept), intensities=with_less_of_others(self.intensities, kept)
         )
@@ -314,13 +283,7 @@ class Prior:
         return kind
 
     def unusual(self, latents: Latents, space: DesignSpace) -> dict[str, float]:
-        """How probable it is that parts of a person are of another law than the usual one, by what they are called.
-
-        Args:
-            latents: equally weighted particles of one person, fields of shape (1, p); those without facilitation say
-                nothing about a window.
-            space: the design space that the window is in.
-        """
+        """How probable it is that parts of a person are of another law than the usual one, by what they are called."""
         values = latents.values
         start, width = values[..., 0], values[..., latents_of("width", device=values.device)]
         anywhere = torch.softmax(self.log_places(values, space), dim=-1)[..., 0]

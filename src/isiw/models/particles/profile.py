@@ -150,20 +150,11 @@ class ProfilePrior:
         return math.fsum(place.share for place in self.places)
 
     def as_usual(self, kept: float) -> ProfilePrior:
-        """The same with less probability of unusual starts and widths.
-
-        Args:
-            kept: the part of their probability that they keep.
-        """
+        """The same with less probability of unusual starts and widths."""
         return replace(self, start=self.start.as_usual(kept), widths=with_less_of_others(self.widths, kept))
 
     def require_rig(self, space: DesignSpace) -> None:
-        """Check that the rig of a new session fits its space; what an earlier log says goes on as it was.
-
-        Raises:
-            InvalidValueError: ISIs count from a valve command that the conditioning stimulus does not have, or all are
-                shorter than the hit delay.
-        """
+        """Check that the rig of a new session fits its space; what an earlier log says goes on as it was."""
         if self.conditioning == "electrical" and space.reference == "valve":
             raise InvalidValueError(
                 "ISIs after an electrical pulse count from the pulse, and there is no valve command",
@@ -181,12 +172,7 @@ class ProfilePrior:
             )
 
     def require_space(self, space: DesignSpace) -> None:
-        """Check that the places mean something in a space.
-
-        Raises:
-            InvalidValueError: they count from another event than the space, or are of a rig with another hit delay, or
-                of another conditioning stimulus.
-        """
+        """Check that the places mean something in a space."""
         if any(place.conditioning != self.stimulus for place in self.places):
             raise InvalidValueError(
                 "the prior was learnt with another conditioning stimulus, so its windows say nothing here",

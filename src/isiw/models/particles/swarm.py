@@ -44,12 +44,7 @@ class Moving:
         check_probabilities(self, "min_ess")
 
     def sweeps_after(self, trials: int, *, resampled: bool = True) -> int:
-        """How many sweeps follow a trial: more where the history is short, fewer where it has become long.
-
-        Args:
-            trials: how long the history is.
-            resampled: whether particles were resampled, so that some are alike.
-        """
+        """How many sweeps follow a trial: more where the history is short, fewer where it has become long."""
         if 0 < self.max_trial_sweeps < trials and self.sweeps:
             return int(resampled or trials % math.ceil(2 * trials / self.max_trial_sweeps) == 0)
         early = min(4.0, max(1.0, 25 / max(1, trials)))

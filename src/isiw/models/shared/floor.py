@@ -50,10 +50,5 @@ class FloorTreatment:
         return float(np.quantile(trials.mep_mv, GUESSED_AT[self.floor])) if len(trials.mep_mv) else 0.0
 
     def excess_mv(self, mep_mv: FloatArray, level_mv: FloatArray | float = 0.0) -> FloatArray:
-        """What MEPs have above the floor [mV], broadcast shape.
-
-        Args:
-            mep_mv: the MEPs [mV].
-            level_mv: what is subtracted from them [mV].
-        """
+        """What MEPs have above the floor [mV], broadcast shape."""
         return np.where(mep_mv < self.threshold_mv, 0.0, mep_mv) if self.floor == "zeroed" else mep_mv - level_mv

@@ -58,13 +58,7 @@ class Span:
         return density
 
     def later(self, mean_ms: float, sd_ms: float, share: float = 1.0) -> Span:
-        """The same counted from an earlier event.
-
-        Args:
-            mean_ms: how much earlier it is [ms].
-            sd_ms: SD of that [ms].
-            share: the share of this span's share that the result has.
-        """
+        """The same counted from an earlier event."""
         blur_ms = math.hypot(self.sd_ms, sd_ms)
         return Span(share * self.share, self.low_ms + mean_ms, self.high_ms + mean_ms, blur_ms)
 
@@ -102,12 +96,7 @@ class StartPrior:
             object.__setattr__(self, "hit_delay_ms", mean_and_sd("StartPrior.hit_delay_ms", self.hit_delay_ms))
 
     def start_ms(self, quantile: Tensor, space: DesignSpace) -> Tensor:
-        """Starts in a space [ms] at some quantiles of the prior, same shape.
-
-        Args:
-            quantile: the quantiles in 0–1, any shape.
-            space: the design space.
-        """
+        """Starts in a space [ms] at some quantiles of the prior, same shape."""
         law = _law(space, self, quantile.dtype, quantile.device)
         return law.start_ms.at(quantile)
 
@@ -121,34 +110,20 @@ class StartPrior:
         return law.density.x, law.density.y, law.start_ms.x
 
     def log_density(self, start_ms: Tensor, space: DesignSpace) -> Tensor:
-        """Log density at some starts, same shape; -inf where no start can be.
-
-        Args:
-            start_ms: the starts [ms], any shape.
-            space: the design space.
-        """
+        """Log density at some starts, same shape; -inf where no start can be."""
         law = _law(space, self, start_ms.dtype, start_ms.device)
         inside = (start_ms >= law.density.x[0]) & (start_ms <= law.density.x[-1])
         return torch.where(inside, law.density.at(start_ms).clamp_min(1e-30).log(), -torch.inf)
 
     def usual(self, start_ms: Tensor, space: DesignSpace) -> Tensor:
-        """Probability that some starts are of the usual span, whatever the rig, same shape.
-
-        Args:
-            start_ms: the starts [ms], any shape.
-            space: the design space.
-        """
+        """Probability that some starts are of the usual span, whatever the rig, same shape."""
         spans = torch.stack([span.share * span.density(start_ms) for span in self.in_space(space)])
         usual = spans[:: len(self.spans)].sum(0)  # the first of all spans is there once for each kind of rig
         even = self.p_anywhere / (space.high_ms - space.low_ms + BEFORE_MS)
         return (1.0 - self.p_anywhere) * usual / ((1.0 - self.p_anywhere) * spans.sum(0) + even)
 
     def as_usual(self, kept: float) -> StartPrior:
-        """The same with less probability of all but the usual span.
-
-        Args:
-            kept: the part of their probability that the others keep.
-        """
+        """The same with less probability of all but the usual span."""
         first, *others = self.spans
         less = tuple(replace(span, share=kept * span.share) for span in others)
         usual = replace(first, share=1.0 - math.fsum(span.share for span in less))

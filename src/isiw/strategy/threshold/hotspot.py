@@ -102,24 +102,13 @@ class WalkedHotSpot:
         return self.repeats * len(_places(self.half_width_mm, self.step_mm))
 
     def ask(self, pulses: Sequence[CoilPulse]) -> tuple[float, float]:
-        """The next place of the coil [mm].
-
-        Args:
-            pulses: what was told so far.
-        """
+        """The next place of the coil [mm]."""
         places = _places(self.half_width_mm, self.step_mm)
         x_mm, y_mm = places[len(pulses) // self.repeats % len(places)].tolist()
         return x_mm, y_mm
 
     def estimate(self, pulses: Sequence[CoilPulse]) -> HotSpotEstimate:
-        """The place with the largest mean MEP.
-
-        Args:
-            pulses: what was told so far.
-
-        Raises:
-            InvalidValueError: no pulse was answered.
-        """
+        """The place with the largest mean MEP."""
         _require_a_response(pulses)
         by_place: dict[tuple[float, float], list[float]] = {}
         for pulse in pulses:
@@ -150,21 +139,13 @@ class BayesHotSpot:
         check_numbers(self, "half_width_mm", "step_mm", above=0)
 
     def posterior(self, pulses: Sequence[CoilPulse]) -> FloatArray:
-        """Probabilities by place, and by what else is unknown: spread and intensity, shape (t, c).
-
-        Args:
-            pulses: what was told so far.
-        """
+        """Probabilities by place, and by what else is unknown: spread and intensity, shape (t, c)."""
         log = sum((_told(self, pulse) for pulse in pulses), start=np.zeros((1, 1, 1)))
         shape = (len(_places(self.half_width_mm, self.step_mm)), len(SPREADS_MM) * len(INTENSITIES_PCT))
         return np.asarray(scipy.special.softmax(np.broadcast_to(log, (*shape, log.shape[-1]))).sum(axis=-1))
 
     def ask(self, pulses: Sequence[CoilPulse]) -> tuple[float, float]:
-        """The next place of the coil [mm].
-
-        Args:
-            pulses: what was told so far.
-        """
+        """The next place of the coil [mm]."""
         places, posterior = _places(self.half_width_mm, self.step_mm), self.posterior(pulses)
         acting = np.clip(_distances(self, places), *_USEFUL_PCT)
         mean = np.einsum("tc,ptc->p", posterior, acting)
@@ -173,14 +154,7 @@ class BayesHotSpot:
         return x_mm, y_mm
 
     def estimate(self, pulses: Sequence[CoilPulse]) -> HotSpotEstimate:
-        """The posterior's mean, and how far from it the hot spot may be.
-
-        Args:
-            pulses: what was told so far.
-
-        Raises:
-            InvalidValueError: no pulse was answered.
-        """
+        """The posterior's mean, and how far from it the hot spot may be."""
         _require_a_response(pulses)
         places, belief = _places(self.half_width_mm, self.step_mm), self.posterior(pulses).sum(axis=1)
         mean = belief @ places

@@ -73,11 +73,7 @@ class ThresholdSearch:
         return asdict(method) if is_dataclass(method) and not isinstance(method, type) else {}
 
     def ask(self) -> float:
-        """The next intensity [% MSO], on the grid and within the range; the same until the next `tell`.
-
-        Raises:
-            LimitExceededError: a method of one's own proposes an intensity that must not be delivered.
-        """
+        """The next intensity [% MSO], on the grid and within the range; the same until the next `tell`."""
         intensity = self.method.ask(self.pulses, self.space)
         self.space.require(intensity)
         return intensity

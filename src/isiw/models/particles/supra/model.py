@@ -57,13 +57,7 @@ class SupraModel:
         check_choice(self, "engine", get_args(EngineName))
 
     def begin(self, space: DesignSpace, seed: int, people: int = 1) -> SupraPosterior:
-        """The posterior before the first trial.
-
-        Args:
-            space: the design space.
-            seed: seed of all randomness.
-            people: how many people.
-        """
+        """The posterior before the first trial."""
         latents = self.prior.sample(people, self.particles, step_generator("cpu", seed, 0), space)
         engine = engine_for(self.engine, SupraTarget(self.prior, space))
         return SupraPosterior(self, space, seed, Swarm.of(latents), engine)

@@ -188,14 +188,7 @@ class SupraPrior:
         return torch.cat([starts, *(mixture.sds[0] for mixture in self.mixtures)])
 
     def sample(self, people: int, particles: int, generator: torch.Generator, space: DesignSpace) -> SupraLatents:
-        """Particles of the prior.
-
-        Args:
-            people: how many people.
-            particles: how many particles of each.
-            generator: source of randomness.
-            space: the design space that the segments are in.
-        """
+        """Particles of the prior."""
         latents = self.draw(people, particles, generator, space)
         for _ in range(REDRAWS):
             again = self.draw(people, particles, generator, space).values
@@ -203,14 +196,7 @@ class SupraPrior:
         return latents
 
     def draw(self, people: int, particles: int, generator: torch.Generator, space: DesignSpace) -> SupraLatents:
-        """Particles of the prior, but for segments that overlap.
-
-        Args:
-            people: how many people.
-            particles: how many particles of each.
-            generator: source of randomness.
-            space: the design space that the segments are in.
-        """
+        """Particles of the prior, but for segments that overlap."""
         size = (people, particles)
         uniform = torch.rand((4, *size), generator=generator, dtype=torch.float32, device=generator.device)
         starts_ms = self.start.start_ms(uniform[:2], space).movedim(0, -1)
@@ -218,12 +204,7 @@ class SupraPrior:
         return SupraLatents(values, uniform[2] < self.enhanced.probability, uniform[3] < self.depressed.probability)
 
     def log_density(self, values: Tensor, space: DesignSpace) -> Tensor:
-        """Log density of latents but for a constant, -inf where the segments overlap, shape (b, p).
-
-        Args:
-            values: latents, shape (b, p, d).
-            space: the design space that the segments are in.
-        """
+        """Log density of latents but for a constant, -inf where the segments overlap, shape (b, p)."""
         starts = self.start.log_density(values[..., :2], space).sum(-1)
         density = starts + self._joint.log_density(values[..., 2:])
         return torch.where(_apart(values), density, -torch.inf)
