@@ -32,7 +32,7 @@ from benchmarks.reduction.recorded import STEP_MS, SWEPT, TRIALS_PER_ISI, Record
 from benchmarks.tables import write_tables
 from benchmarks.threshold import Way, made, threshold_row
 from isiw.devices.robot.mechanism import draw_taps
-from isiw.devices.robot.presets import preset
+from isiw.devices.robot.tapper import preset
 from isiw.devices.robot.waveforms import record_robot, sample_times_ms
 from isiw.signals import impact_times
 from isiw.types import FloatArray

@@ -26,8 +26,7 @@ from benchmarks.tables import write_tables
 from benchmarks.vane_claims import FULL, claims_of
 from isiw import Rotor, Vane, repeatability
 from isiw.devices.robot.vane.actuator import Load, Supply
-from isiw.devices.robot.vane.plane import Performance, performance
-from isiw.devices.robot.vane.rotation import rotate
+from isiw.devices.robot.vane.rotation import Performance, performance, rotate
 from isiw.plots.style import BLUE, FAINT, ORANGE, save_figure, tidied
 from isiw.types import FloatArray
 

@@ -9,7 +9,7 @@ import pytest
 from isiw.design import DesignSpace
 from isiw.devices.robot.tapper import Tapper, TapperSettings
 from isiw.devices.robot.vane.actuator import Vane
-from isiw.devices.robot.vane.strokes import draw_strokes
+from isiw.devices.robot.vane.tapper import draw_strokes
 from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import InvalidValueError
 from isiw.log.reader import read_session

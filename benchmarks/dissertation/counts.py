@@ -16,7 +16,7 @@ from benchmarks.dissertation.size import Size
 from benchmarks.reduction.look import OURS, THEIRS, panels
 from benchmarks.waveform_loop import REST_UV_PER_FLOOR_MV
 from isiw.devices.robot.mechanism import Geometry
-from isiw.devices.robot.presets import preset
+from isiw.devices.robot.tapper import preset
 from isiw.response_counts import EFFECTIVE_SHARE, STIMULATION, CountStudy, study_counts
 from isiw.subjects import MEASURED_KIM, WIDTHS_KIM_MS, SimulatedSubject, cohort
 from isiw.types import FloatArray

@@ -16,7 +16,7 @@ from benchmarks.dissertation.parts import Told, verdict
 from benchmarks.dissertation.size import Size
 from benchmarks.reduction.look import OURS, panels
 from isiw.devices.robot.mechanism import Event
-from isiw.devices.robot.presets import preset
+from isiw.devices.robot.tapper import preset
 from isiw.repeatability import STUDY_ISI_MS, TimingStudy, study_preset, study_sweeps
 
 __all__ = ["tell"]

@@ -15,7 +15,7 @@ from benchmarks.dissertation.size import Size
 from benchmarks.reduction.look import OURS, panels
 from isiw.design import IMPACT_SPACE
 from isiw.devices.robot.mechanism import Event
-from isiw.devices.robot.presets import preset
+from isiw.devices.robot.tapper import preset
 from isiw.subjects import SimulatedSubject, cohort
 from isiw.types import FloatArray
 from isiw.window import Window

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from isiw.change import Change
 from isiw.design import DesignSpace
-from isiw.text.numbers import counted
+from isiw.text.harmless import counted
 from isiw.text.stimuli import TAP, StimulusWords
 from isiw.trials import Trial
 from isiw.window import LEAST_FACTOR, MIN_EXCESS_MV, SURE, Window, bayes_factor, rules_out

@@ -12,7 +12,7 @@ from isiw.config.going_on import changes_on_resume, differences_on_resume
 from isiw.devices.protocol import Readiness
 from isiw.log.reader import SessionRecord, read_session
 from isiw.session.loop import Session
-from isiw.session.opening import open_session
+from isiw.session.resume import open_session
 from scripted import SPACE, ScriptedDevice, scripted_strategy
 
 

@@ -24,9 +24,8 @@ from isiw.devices.limits import Limits
 from isiw.devices.lock import driven
 from isiw.devices.protocol import DeviceInfo, Readiness
 from isiw.devices.recorded import RecordedPerson, Recordings
-from isiw.devices.replay import RecordedTrials
 from isiw.devices.robot.tapper import Tapper, TapperSettings
-from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
+from isiw.devices.simulated import RecordedTrials, SimulatedDevice, SimulatedPerson
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, LimitExceededError, NotDelivered
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.subject import Response

@@ -7,8 +7,7 @@ import pytest
 
 from isiw.design import VALVE_SPACE
 from isiw.devices.limits import Limits
-from isiw.devices.replay import RecordedTrials
-from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
+from isiw.devices.simulated import RecordedTrials, SimulatedDevice, SimulatedPerson
 from isiw.errors import DeviceError
 from isiw.findings import Kind
 from isiw.log.reader import SessionRecord, read_session

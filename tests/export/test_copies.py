@@ -12,11 +12,10 @@ import pytest
 
 from export.recorded import sweep, write_sweeps
 from isiw.export import Exported, export_logs
-from isiw.log.amending import exclude
 from isiw.log.reader import read_session
+from isiw.session.again import exclude
 from isiw.session.loop import Session
-from isiw.session.opening import open_session
-from isiw.session.resume import resume
+from isiw.session.resume import open_session, resume
 from logs import cut_after, damage
 from scripted import ScriptedDevice, scripted_strategy
 

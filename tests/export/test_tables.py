@@ -16,11 +16,11 @@ from isiw.devices.protocol import DeviceInfo
 from isiw.errors import InvalidValueError, LogError
 from isiw.export import export_logs
 from isiw.export.tables import session_facts
-from isiw.log.amending import exclude
 from isiw.log.headers import StrategyRecipe
 from isiw.log.reader import TRIAL_COLUMNS, read_session
+from isiw.session.again import exclude
 from isiw.session.loop import Session
-from isiw.session.opening import open_session
+from isiw.session.resume import open_session
 from isiw.visit import Visit
 from logs import cut_after
 from scripted import ScriptedDevice, scripted_strategy

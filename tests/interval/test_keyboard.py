@@ -14,9 +14,8 @@ if os.name == "nt":
 
 from interval.terminals import Person, somebody
 from isiw.errors import DeviceError, InvalidValueError
-from isiw.interval.keyboard import resume_task, run_task
 from isiw.interval.record import read_productions
-from isiw.interval.task import session_blocks
+from isiw.interval.task import resume_task, run_task, session_blocks
 
 
 @pytest.fixture

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from isiw.errors import InvalidValueError
-from isiw.interval.optimisation import LightSearch, search_light
-from isiw.log.production import Block
+from isiw.interval.producers import LightSearch, search_light
+from isiw.log.headers import Block
 
 
 def test_it_begins_with_evenly_spaced_intervals_and_finds_the_target() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from isiw.errors import InvalidValueError
 from isiw.interval.producers import Producer, produce
-from isiw.log.production import Block
+from isiw.log.headers import Block
 
 STEADY = Producer(
     timing_cv=0.0, motor_ms=0.0, offset_ms=0.0, offset_sd_ms=0.0, start_sd_ms=0.0, search_ms=0.0, learning=0.5

@@ -9,8 +9,7 @@ from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DamagedLogError, InvalidValueError, LogError
 from isiw.interval.record import begin_log, continue_log, read_productions
 from isiw.interval.task import answer, session_blocks
-from isiw.log.headers import AnyHeader, StrategyRecipe, ThresholdHeader
-from isiw.log.production import Block
+from isiw.log.headers import AnyHeader, Block, StrategyRecipe, ThresholdHeader
 from isiw.log.reader import read_session
 from isiw.log.writer import LogWriter
 from isiw.session import read_threshold

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from isiw.errors import InvalidValueError
 from isiw.interval.task import SESSIONS, answer, feedback, score_pct, session_blocks
-from isiw.log.production import Block
+from isiw.log.headers import Block
 
 
 def test_the_score_is_equation_6_1_with_the_example_of_the_text() -> None:

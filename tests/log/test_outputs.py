@@ -8,7 +8,7 @@ import pytest
 
 from disks import no_room
 from isiw.errors import InvalidValueError
-from isiw.log.outputs import made_folder, write_output
+from isiw.files import made_folder, write_output
 
 
 def test_a_file_that_is_there_is_replaced_only_where_that_is_asked_for(tmp_path: Path) -> None:

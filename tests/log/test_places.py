@@ -14,13 +14,13 @@ import pytest
 from hostile import IN_THE_WAY, at_once
 from isiw.devices.clock import VirtualClock
 from isiw.errors import LogError
-from isiw.log.amending import exclude
 from isiw.log.durable import Fingerprint
 from isiw.log.headers import Header
 from isiw.log.reader import read_session
 from isiw.log.salvage import Salvage, salvage, salvage_file
 from isiw.log.schema import Event
 from isiw.log.writer import LogWriter
+from isiw.session.again import exclude
 from isiw.session.loop import Session
 from log.written import write_trials
 from scripted import ScriptedDevice, scripted_strategy

@@ -12,8 +12,7 @@ from typing import Any
 import pytest
 
 from isiw.errors import DamagedLogError, LogError
-from isiw.log.headers import Header
-from isiw.log.production import Block, Production, ProductionHeader
+from isiw.log.headers import Block, Header, Production, ProductionHeader
 from isiw.log.pulses import earlier_pulses_s, pulses_s
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Intent, Message

@@ -10,8 +10,7 @@ import pytest
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
 from isiw.findings import Kind
-from isiw.log.headers import Header
-from isiw.log.production import Production
+from isiw.log.headers import Header, Production
 from isiw.log.salvage import salvage
 from isiw.log.schema import (
     CHANNEL_IDS,

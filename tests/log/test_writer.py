@@ -16,7 +16,7 @@ from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Waveform
 from isiw.log.writer import LogWriter
-from isiw.session.opening import open_session
+from isiw.session.resume import open_session
 from isiw.trials import Channel
 from log.written import write_trials
 from logs import blocks_of, damage

@@ -6,7 +6,7 @@ import math
 
 import torch
 
-from isiw.models.randomness import SIMULATED, step_generator, systematic
+from isiw.models.shared.tables import SIMULATED, step_generator, systematic
 
 
 def draw(seed: int, step: int) -> list[float]:

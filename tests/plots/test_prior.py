@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from isiw.errors import InvalidValueError
-from isiw.plots.prior import prior_figure, save_prior_plot
+from isiw.plots.comparison import prior_figure, save_prior_plot
 
 
 @pytest.fixture

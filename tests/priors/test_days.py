@@ -12,10 +12,10 @@ import torch
 from isiw import priors
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
 from isiw.errors import DamagedLogError, InvalidValueError, LogError
-from isiw.log.amending import exclude
 from isiw.log.reader import read_session
 from isiw.models.particles.prior import Prior
-from isiw.priors.recall import recalled
+from isiw.priors.days import recalled
+from isiw.session.again import exclude
 from isiw.strategy.catalogue import make_strategy
 from isiw.subjects.profiles import PeakProfile
 from isiw.subjects.responses import GainResponse

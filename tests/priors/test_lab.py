@@ -20,7 +20,7 @@ from isiw.models.particles import ParticleModel
 from isiw.models.particles.laws import NoiseShares
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.profile import ProfilePrior
-from isiw.priors.recall import recalled
+from isiw.priors.days import recalled
 from isiw.strategy.catalogue import make_strategy
 from isiw.visit import Visit
 from known import instance

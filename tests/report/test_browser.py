@@ -21,7 +21,7 @@ from isiw.log.reader import SessionRecord, read_session
 from isiw.priors import Difference
 from isiw.report.comparison import save_comparison
 from isiw.report.page import save_report
-from isiw.session.opening import open_session
+from isiw.session.resume import open_session
 from isiw.trials import Channel
 from known import known
 from report.sessions import HOSTILE, tapped

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from isiw.log.amending import exclude
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import EstimateRecord
 from isiw.plots.comparison import comparison_figure
@@ -13,6 +12,7 @@ from isiw.plots.session import session_figure
 from isiw.priors import Difference
 from isiw.report.comparison import comparison_page, comparison_sentence, comparison_table
 from isiw.sentences import JUDGED_SINCE, later, moved
+from isiw.session.again import exclude
 from isiw.session.loop import Session
 from scripted import ScriptedDevice, scripted_strategy
 

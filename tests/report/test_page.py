@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from isiw.errors import ConfigError, InvalidValueError
-from isiw.log.amending import exclude
 from isiw.log.reader import SessionRecord, read_session
 from isiw.report.page import report_page, save_report
 from isiw.report.words import finding_sentences
 from isiw.sentences import JUDGED_SINCE
+from isiw.session.again import exclude
 from isiw.window import Window
 from logs import cut_after
 from report.sessions import HOSTILE, Page, pulsed, tapped

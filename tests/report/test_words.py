@@ -10,11 +10,11 @@ import pytest
 
 from isiw import sentences
 from isiw.design import DesignSpace
-from isiw.log.amending import exclude
 from isiw.log.headers import StrategyRecipe
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import EstimateRecord, Event, Intent
 from isiw.report.words import TRIAL_HEADINGS, counts_sentence, final_statement, trial_rows, truth_sentence
+from isiw.session.again import exclude
 from isiw.session.loop import Session
 from isiw.strategy.stopping import StopKind
 from isiw.trials import Channel, Measurement, Status, Trial

@@ -14,8 +14,8 @@ from typing import Any
 import pytest
 
 from isiw.errors import LogError
-from isiw.log.amending import exclude
 from isiw.log.reader import SessionRecord, read_session
+from isiw.session.again import exclude
 from isiw.session.loop import Session
 from isiw.session.resume import resume
 from scripted import ScriptedDevice, scripted_strategy

@@ -13,7 +13,7 @@ from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import EstimateRecord, decode, encode
 from isiw.session.examination import estimate_record
 from isiw.session.loop import Session
-from isiw.session.opening import open_session
+from isiw.session.resume import open_session
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.course import candidate_isis
 from isiw.strategy.strategy import Strategy

@@ -13,8 +13,7 @@ from isiw.devices.protocol import DeviceInfo
 from isiw.errors import LogError
 from isiw.log.reader import read_session
 from isiw.session.loop import Session
-from isiw.session.opening import open_session
-from isiw.session.resume import resume
+from isiw.session.resume import open_session, resume
 from isiw.session.sink import SessionUpdate
 from isiw.session.threshold import open_threshold
 from isiw.strategy.threshold import IntensityRange, make_threshold_search

@@ -15,7 +15,7 @@ from isiw.errors import InvalidValueError
 from isiw.log.reader import read_session
 from isiw.report.words import final_statement, truth_sentence
 from isiw.session.loop import Session
-from isiw.session.opening import open_session
+from isiw.session.resume import open_session
 from isiw.strategy.catalogue import list_strategies, make_strategy
 from isiw.strategy.stopping import StopKind
 from isiw.subjects.cohorts import person_of

@@ -12,8 +12,8 @@ import pytest
 from isiw.estimate import WindowEstimate
 from isiw.findings import Kind
 from isiw.log.reader import read_session
+from isiw.session.desk import PROGRESS_HEADINGS, PROGRESS_LEGEND, fitted, progress_row, standing
 from isiw.session.loop import Session
-from isiw.session.progress import PROGRESS_HEADINGS, PROGRESS_LEGEND, fitted, progress_row, standing
 from isiw.session.sink import SessionUpdate
 from isiw.session.terminal import COLUMNS
 from isiw.strategy.stopping import StopDecision

@@ -18,8 +18,7 @@ from isiw.errors import DeviceError, InvalidValueError
 from isiw.findings import Kind
 from isiw.log.reader import read_session
 from isiw.session.loop import Session
-from isiw.session.opening import open_session
-from isiw.session.resume import resume
+from isiw.session.resume import open_session, resume
 from isiw.session.sink import SessionUpdate
 from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep
 from isiw.visit import Control, Visit, VisitProtocol

@@ -28,17 +28,16 @@ from isiw.errors import (
     StrategyError,
 )
 from isiw.findings import Kind
-from isiw.log.amending import exclude
 from isiw.log.reader import read_session
 from isiw.log.schema import EstimateRecord, Intent
 from isiw.log.writer import LogWriter
 from isiw.report import final_statement
 from isiw.session import examination
+from isiw.session.again import exclude
 from isiw.session.examination import relearned
 from isiw.session.loop import Session
-from isiw.session.opening import open_session
 from isiw.session.recorder import Recorder
-from isiw.session.resume import resume
+from isiw.session.resume import open_session, resume
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Trial, TrialTable
@@ -560,7 +559,7 @@ VICTIM = """
 import sys, time
 sys.path.insert(0, {tests!r})
 from scripted import scripted_strategy
-from isiw.session.opening import open_session
+from isiw.session.resume import open_session
 
 session = open_session(scripted_strategy(9), {log!r})
 for _ in range(3):

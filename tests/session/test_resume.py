@@ -17,16 +17,15 @@ from isiw.devices.protocol import Readiness
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import DamagedLogError, DeviceError, InvalidValueError, LimitExceededError, LogError, StrategyError
 from isiw.findings import Kind
-from isiw.log.amending import exclude
 from isiw.log.headers import StrategyRecipe
 from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Intent, decode
 from isiw.log.writer import LogWriter
+from isiw.session.again import exclude
 from isiw.session.loop import Session
-from isiw.session.opening import open_session
 from isiw.session.replay import strategy_of
-from isiw.session.resume import resume
+from isiw.session.resume import open_session, resume
 from isiw.session.sink import SessionUpdate
 from isiw.strategy.catalogue import make_strategy, remade_strategy
 from isiw.strategy.strategy import Strategy

@@ -17,14 +17,13 @@ from forked import Forked
 from isiw.devices.limits import Limits
 from isiw.errors import InvalidValueError
 from isiw.findings import Kind
-from isiw.log.amending import exclude, include
 from isiw.log.reader import read_session
 from isiw.log.schema import EstimateRecord, Event, Intent
 from isiw.log.verdicts import LOOKED_AT
 from isiw.report import final_statement
+from isiw.session.again import exclude, include
 from isiw.session.loop import Session
-from isiw.session.opening import open_session
-from isiw.session.resume import resume
+from isiw.session.resume import open_session, resume
 from isiw.session.rig import Safeguards
 from isiw.session.sink import SessionUpdate
 from isiw.strategy.catalogue import make_strategy

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from isiw.devices.robot.mechanism import Geometry, Taps, draw_taps
-from isiw.devices.robot.presets import preset
+from isiw.devices.robot.tapper import preset
 from isiw.devices.robot.waveforms import record_emg, record_robot, sample_times_ms
 from isiw.trials import Channel, Sweep
 from isiw.types import FloatArray

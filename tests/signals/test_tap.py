@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from isiw.devices.robot.presets import preset
-from isiw.devices.robot.tapper import Tapper, TapperSettings
+from isiw.devices.robot.tapper import Tapper, TapperSettings, preset
 from isiw.signals import judge
 from isiw.signals.tap import TapResponses
 from isiw.trials import Channel, Stimulus, Sweep

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from isiw.text.numbers import read_number, read_whole
+from isiw.text.harmless import read_number, read_whole
 
 
 @pytest.mark.parametrize(

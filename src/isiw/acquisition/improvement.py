@@ -12,8 +12,8 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
-from isiw.acquisition.lookahead import lookahead
 from isiw.acquisition.protocol import ForeseesProfiles
+from isiw.acquisition.twostep import lookahead
 from isiw.checks import check_numbers
 from isiw.lazy import torch
 from isiw.models.protocol import Posterior, PredictsOutcomes, SamplesProfiles, Tensor

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
 from isiw.acquisition.kernels import entropy_reductions, variance_reductions
-from isiw.acquisition.lookahead import expected_variance_reduction
 from isiw.acquisition.protocol import ForeseesWindows
+from isiw.acquisition.twostep import expected_variance_reduction
 from isiw.checks import check_wholes
 from isiw.compiled import AVAILABLE, first_of
 from isiw.lazy import torch

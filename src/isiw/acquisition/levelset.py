@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from isiw.acquisition.lookahead import lookahead
 from isiw.acquisition.protocol import ForeseesProfiles
+from isiw.acquisition.twostep import lookahead
 from isiw.checks import check_numbers
 from isiw.lazy import torch
 from isiw.models.protocol import PredictsOutcomes, SamplesProfiles, Tensor

@@ -16,7 +16,7 @@ from rich.text import Text
 
 import isiw
 from isiw.text import plain
-from isiw.text.numbers import counted
+from isiw.text.harmless import counted
 
 if TYPE_CHECKING:
     from isiw.log.reader import SessionRecord

@@ -21,8 +21,7 @@ from isiw.cli.console import (
     show_paragraph,
 )
 from isiw.cli.files import free_beside
-from isiw.text.harmless import command
-from isiw.text.numbers import counted
+from isiw.text.harmless import command, counted
 
 if TYPE_CHECKING:
     from isiw.log.schema import Event

@@ -11,8 +11,7 @@ from rich.progress import Progress
 
 import isiw
 from isiw.cli.console import NO_DEFAULT, Overwrite, errors_reported, exit_if_damaged, show
-from isiw.text.harmless import command
-from isiw.text.numbers import counted
+from isiw.text.harmless import command, counted
 
 if TYPE_CHECKING:
     from isiw.log.reader import SessionRecord

@@ -1,7 +1,16 @@
 """Configuration files, and the sessions that they describe."""
 
-from isiw.config.going_on import after_end, after_error, changes_on_resume, differences_on_resume, read_to_resume
-from isiw.config.logged import Truth, device_of_log, run_of_log, truth_of
+from isiw.config.going_on import (
+    Truth,
+    after_end,
+    after_error,
+    changes_on_resume,
+    device_of_log,
+    differences_on_resume,
+    read_to_resume,
+    run_of_log,
+    truth_of,
+)
 from isiw.config.run import RunConfig, limits_for, load_config
 from isiw.config.session import (
     assumed_space,

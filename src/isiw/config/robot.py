@@ -8,8 +8,7 @@ from typing import Final
 from isiw.config.sections import RobotConfig, SimulatedConfig
 from isiw.design import DesignSpace
 from isiw.devices.robot.mechanism import LINE_DELAY_MS, Event, Geometry, SensorNoise
-from isiw.devices.robot.presets import preset
-from isiw.devices.robot.tapper import Tapper, TapperSettings
+from isiw.devices.robot.tapper import Tapper, TapperSettings, preset
 from isiw.devices.robot.vane.actuator import Vane
 from isiw.devices.robot.vane.tapper import WAIT_MS, RotatingTapper
 from isiw.errors import ConfigError

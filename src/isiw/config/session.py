@@ -18,10 +18,10 @@ from isiw.devices.protocol import Device, DeviceInfo
 from isiw.devices.recorded import RecordedPerson, load_recordings
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import ConfigError, StrategyError
+from isiw.files import write_output
 from isiw.log.durable import log_exists
 from isiw.log.headers import RUN_KEY
 from isiw.log.kinds import imported_sentence
-from isiw.log.outputs import write_output
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import now
 from isiw.models.particles.prior import Prior

@@ -19,10 +19,9 @@ from isiw.devices.protocol import Answer, DeviceInfo
 from isiw.errors import InvalidValueError, LogError
 from isiw.estimate import WindowEstimate
 from isiw.existing.delivered import Delivered
-from isiw.files import put
+from isiw.files import made_folder, put
 from isiw.log.durable import log_exists, log_of
 from isiw.log.headers import Header
-from isiw.log.outputs import made_folder
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Event, Record, Waveform, clock_ns
 from isiw.log.writer import LogWriter

@@ -10,9 +10,9 @@ from isiw.existing import recordings, tables
 from isiw.existing.delivered import Delivered, read_log
 from isiw.existing.layout import Layout
 from isiw.existing.people import people_of
+from isiw.files import is_mcap
 from isiw.lazy import pd
 from isiw.log.durable import log_exists
-from isiw.log.outputs import is_mcap
 
 
 def read_people(source: str | Path | Any, layout: Layout | None = None, *, subject: str = "") -> list[Delivered]:

@@ -16,7 +16,7 @@ from isiw.errors import InvalidValueError
 from isiw.existing.analysis import analysed
 from isiw.existing.delivered import Delivered
 from isiw.metrics import f1
-from isiw.plots.replay import save_replay_plot
+from isiw.plots.study import save_replay_plot
 from isiw.strategy.catalogue import make_strategy
 from isiw.trials import Trial
 from isiw.types import FloatArray

@@ -23,7 +23,7 @@ from isiw.log.records import Onset
 from isiw.log.salvage import only_in, salvage_file
 from isiw.log.schema import Event
 from isiw.log.verdicts import VERDICTS
-from isiw.text.numbers import counted
+from isiw.text.harmless import counted
 from isiw.text.stimuli import StimulusWords, words_of
 
 _FIRST_DAY: Final = dt.date(1900, 1, 1)

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from isiw.export.collection import Part, log_losses, stimulus_of
+from isiw.files import write_output
 from isiw.lazy import pd
-from isiw.log.outputs import write_output
 from isiw.log.reader import SessionRecord, trial_columns
 from isiw.text import one_line
 from isiw.text.stimuli import TAP, StimulusWords, meanings

@@ -13,9 +13,16 @@ import isiw
 from isiw.checks import text, whole
 from isiw.errors import InvalidValueError
 from isiw.lazy import pd
-from isiw.log.headers import SCHEMA_VERSION, Header, ThresholdHeader
+from isiw.log.headers import (
+    PRODUCTION_VERSION,
+    SCHEMA_VERSION,
+    Block,
+    Header,
+    Production,
+    ProductionHeader,
+    ThresholdHeader,
+)
 from isiw.log.kinds import LogKind, kind_of, of_another_kind
-from isiw.log.production import PRODUCTION_VERSION, Block, Production, ProductionHeader
 from isiw.log.records import Records
 from isiw.log.salvage import Salvage, salvage
 from isiw.log.schema import Event, now

@@ -8,8 +8,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from isiw.errors import DamagedLogError, LogError
+from isiw.files import is_mcap
 from isiw.log.durable import kept_for, log_exists, log_of
-from isiw.log.outputs import is_mcap
 from isiw.log.reader import of_production, read_any
 from isiw.log.salvage import Salvage, holds, salvage
 from isiw.log.schema import Event, Intent, Message, Record, decode

@@ -18,15 +18,13 @@ from pydantic import ValidationError
 
 from isiw.errors import DamagedLogError, LogError
 from isiw.findings import Kind
-from isiw.log.headers import AnyHeader, first_fault, header_in_parts
-from isiw.log.production import Production
+from isiw.log.headers import AnyHeader, Production, first_fault, header_in_parts
 from isiw.log.salvage import Salvage
 from isiw.log.schema import MOST_TRIALS, EstimateRecord, Event, Intent, Message, PulseOutcome, Record, Waveform, decode
 from isiw.log.writer import CONFIGURATION
 from isiw.strategy.stopping import StopKind
-from isiw.text.json_texts import read_json
-from isiw.text.numbers import counted
-from isiw.text.toml_files import parsed
+from isiw.text.harmless import counted
+from isiw.text.toml_files import parsed, read_json
 from isiw.trials import Channel, Trial
 
 

@@ -20,7 +20,7 @@ from isiw.files import opened
 from isiw.log.blocks import RECORD_HEAD_BYTES, UNREADABLE, LostBlockError, Unpacking, counted_records, marked
 from isiw.log.durable import Fingerprint, disk_errors, log_of, part_of
 from isiw.log.schema import ANNOUNCEMENT, CHANNEL_IDS, Message
-from isiw.text.numbers import counted
+from isiw.text.harmless import counted
 
 
 @dataclass

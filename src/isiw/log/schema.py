@@ -39,11 +39,10 @@ from isiw.checks import MOST_MEP_MV
 from isiw.errors import InvalidValueError, LogError, told
 from isiw.estimate import Estimate, WindowEstimate
 from isiw.findings import Kind
-from isiw.log.headers import ANY_HEADER, AnyHeader, Header, LogRecord, ThresholdHeader
-from isiw.log.production import Production, ProductionHeader
+from isiw.log.headers import ANY_HEADER, AnyHeader, Header, LogRecord, Production, ProductionHeader, ThresholdHeader
 from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.strategy.threshold.pulses import ThresholdEstimate
-from isiw.text.json_texts import refuse_doubled
+from isiw.text.toml_files import refuse_doubled
 from isiw.trials import Channel, Stimulus, Trial
 from isiw.types import Numbers
 

@@ -1,7 +1,6 @@
 """Pictures: of sessions, of a study, and of the timing of taps. They draw, and compute nothing anew."""
 
-from isiw.plots.comparison import comparison_figure, save_comparison_plot
-from isiw.plots.prior import prior_figure, save_prior_plot
+from isiw.plots.comparison import comparison_figure, prior_figure, save_comparison_plot, save_prior_plot
 from isiw.plots.session import save_session_plot, session_figure
 from isiw.plots.study import STUDY_PICTURES, save_study_plot, study_figure
 from isiw.plots.timing import save_timing_plot, timing_figure

@@ -1,4 +1,4 @@
-"""The pictures of a study: F1 by trial, stimuli against F1, coverage and latency, each with a panel a cohort."""
+"""The pictures of a study, each with a panel a cohort, and of a replay: F1 by trial, against stimuli, and by method."""
 
 from __future__ import annotations
 
@@ -15,7 +15,20 @@ from matplotlib.ticker import MaxNLocator
 
 from isiw.checks import choice
 from isiw.lazy import pd
-from isiw.plots.style import FAINT, INK, explain, save_figure, saying, strategy_colours, tidied
+from isiw.plots.style import (
+    BLUE,
+    FAINT,
+    GREEN,
+    INK,
+    ORANGE,
+    RED,
+    explain,
+    save_figure,
+    saying,
+    strategy_colours,
+    tidied,
+)
+from isiw.types import FloatArray
 
 StudyPicture: TypeAlias = Literal["f1", "frontier", "coverage", "latency"]
 
@@ -189,3 +202,25 @@ STUDY_PICTURES: Final[Mapping[StudyPicture, Callable[[Axes, _Curves, _Colours], 
     {"f1": _draw_f1, "frontier": _draw_frontier, "coverage": _draw_coverage, "latency": _draw_latency}
 )
 """The pictures of a study by name, and what draws a panel of each."""
+
+
+def save_replay_plot(curves: Mapping[str, FloatArray], path: str | Path, *, overwrite: bool = False) -> Path:
+    """Draw F1 by the number of stimuli into a file."""
+    return save_figure(replay_figure(curves), path, overwrite=overwrite)
+
+
+def replay_figure(curves: Mapping[str, FloatArray]) -> Figure:
+    """F1 of each strategy by the number of stimuli: the median, and from the least to the largest over its seeds."""
+    figure = Figure(figsize=(7.2, 3.8), layout="constrained")
+    axes = figure.subplots()
+    tidied(axes)
+    colours = (BLUE, ORANGE, GREEN, RED, INK)
+    for number, (name, scores) in enumerate(curves.items()):
+        colour, trials = colours[number % len(colours)], np.arange(1, scores.shape[1] + 1)
+        axes.fill_between(trials, scores.min(axis=0), scores.max(axis=0), color=colour, alpha=0.15, lw=0)
+        axes.plot(trials, np.median(scores, axis=0), color=colour, lw=1.8, label=name)
+    axes.set_ylim(0, 1.02)
+    axes.set_xlabel("stimuli", fontsize=9)
+    axes.set_ylabel("F1 against all trials", fontsize=9)
+    explain(figure, ncols=3)
+    return figure

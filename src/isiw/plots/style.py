@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 
 from isiw.errors import InvalidValueError
 from isiw.estimate import Estimate
-from isiw.log.outputs import write_output
+from isiw.files import write_output
 from isiw.log.reader import SessionRecord
 from isiw.text import one_line
 from isiw.window import Interval

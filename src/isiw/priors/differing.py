@@ -11,8 +11,7 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.log.reader import SessionRecord, require_records
 from isiw.models.particles.prior import Prior
-from isiw.priors.days import moved
-from isiw.priors.recall import recalled, too_far_apart_ms
+from isiw.priors.days import moved, recalled, too_far_apart_ms
 from isiw.types import FloatArray
 
 _OTHER_RIG = (

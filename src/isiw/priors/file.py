@@ -9,7 +9,7 @@ from typing import Any
 import tomli_w
 
 from isiw.errors import ConfigError, InvalidValueError
-from isiw.log.outputs import check_output, write_output
+from isiw.files import check_output, write_output
 from isiw.models.particles.laws import NoiseShares
 from isiw.models.particles.prior import Prior
 from isiw.priors.lab import SCHEMA_VERSION, LabPrior

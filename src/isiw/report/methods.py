@@ -12,7 +12,7 @@ from isiw.models.dissertation.curves import curve_masks
 from isiw.models.dissertation.profiles import best_fit, normality, profile_fits
 from isiw.report.words import finding_sentences
 from isiw.response_counts import effective_window, response_counts, response_threshold_mv
-from isiw.text.numbers import counted
+from isiw.text.harmless import counted
 from isiw.trials import RESPONSE_MV
 from isiw.types import FloatArray
 from isiw.window import Window

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from isiw.errors import ConfigError, InvalidValueError
-from isiw.log.outputs import check_output, write_output
+from isiw.files import check_output, write_output
 from isiw.log.reader import SessionRecord, require_records
 from isiw.plots.session import session_figure
 from isiw.plots.style import inline_svg

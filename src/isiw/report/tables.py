@@ -15,7 +15,7 @@ from isiw.log.headers import Header
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Event, Intent
 from isiw.sentences import asked, outcome
-from isiw.text.numbers import counted
+from isiw.text.harmless import counted
 from isiw.text.stimuli import TAP, StimulusWords
 from isiw.trials import Trial
 

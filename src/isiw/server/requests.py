@@ -15,8 +15,16 @@ from isiw.config.sections import LimitsConfig, SpaceConfig, StrategyConfig, Visi
 from isiw.errors import IsiwError
 from isiw.log.schema import MOST_TRIALS
 from isiw.server.answers import Refusal
-from isiw.text.json_texts import DoubledKeyError, once_each, read_json
-from isiw.text.toml_files import UNKNOWN, expected_instead, first_to_tell, known_keys, meant_instead
+from isiw.text.toml_files import (
+    UNKNOWN,
+    DoubledKeyError,
+    expected_instead,
+    first_to_tell,
+    known_keys,
+    meant_instead,
+    once_each,
+    read_json,
+)
 from isiw.visit import VisitProtocol
 
 FORM: Final = "application/x-www-form-urlencoded"

@@ -12,15 +12,15 @@ from typing import Final
 
 from isiw.devices.limits import Limits
 from isiw.errors import told
+from isiw.files import made_folder
 from isiw.log.durable import log_exists, log_of, part_of
 from isiw.log.headers import SERVED_KEY
-from isiw.log.outputs import made_folder
 from isiw.log.reader import SessionRecord, read_session
 from isiw.server.answers import DecisionAnswer, EstimateAnswer, Refusal, SessionAnswer, SessionEntry, TrialRow
 from isiw.server.driven import DrivenSession, not_open
 from isiw.server.requests import NAME, CreateRequest
-from isiw.session.opening import open_session
 from isiw.session.replay import strategy_of
+from isiw.session.resume import open_session
 from isiw.session.terminal import alarm
 from isiw.strategy.catalogue import known_settings, make_strategy
 

@@ -2,11 +2,10 @@
 
 from isiw.log.kinds import LogKind, imported_sentence
 from isiw.session.again import estimate_again
+from isiw.session.desk import PROGRESS_HEADINGS, aligned, progress_row
 from isiw.session.loop import Session
-from isiw.session.opening import open_session
-from isiw.session.progress import PROGRESS_HEADINGS, aligned, progress_row
 from isiw.session.recorder import Recorder
-from isiw.session.resume import resume
+from isiw.session.resume import open_session, resume
 from isiw.session.sink import SessionResult, SessionUpdate
 from isiw.session.threshold import ThresholdRecorder, open_threshold, read_threshold, resume_threshold, search_of
 from isiw.session.threshold_loops import open_simulated, run_by_hand, run_simulated, simulated_person

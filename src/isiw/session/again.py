@@ -1,4 +1,4 @@
-"""A session's estimate once more, from its trials as they count now, without a device."""
+"""A session's log once more, without a device: a trial judged afterwards, and the estimate made again."""
 
 from __future__ import annotations
 
@@ -7,13 +7,16 @@ from pathlib import Path
 
 import isiw
 from isiw.errors import LogError
+from isiw.log.kinds import require_session
 from isiw.log.reader import read_salvaged
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event
+from isiw.log.verdicts import exclusion, inclusion
 from isiw.log.writer import LogWriter
 from isiw.session.examination import estimate_record, learn
 from isiw.session.replay import strategy_of
 from isiw.strategy.strategy import Strategy
+from isiw.trials import TrialTable
 
 
 def estimate_again(
@@ -47,3 +50,48 @@ def estimate_again(
     with LogWriter.continuing(path, salvaged, record.header) as log:
         log.append(Event(kind="note", trial=last, text=" ".join([said, *record.losses])))
         log.append(estimate_record(made, last, made.decision(), None))
+
+
+def exclude(path: str | Path, trial: int, reason: str) -> None:
+    """Exclude a trial afterwards: an event is appended to the log, nothing is erased. Resuming learns without it.
+
+    Args:
+        path: the log, with or without `.part`.
+        trial: the trial's number.
+        reason: why, for whoever reads the log.
+
+    Raises:
+        LogError: no such log, or it is still being written.
+        DamagedLogError: the log's end is missing; resume the session first.
+        InvalidValueError: no such trial, or one that counts for nothing anyway.
+    """
+    _judge(path, lambda trials: exclusion(trials, trial, reason))
+
+
+def include(path: str | Path, trial: int) -> None:
+    """Let a trial count again that was excluded: an event is appended to the log. Resuming learns with it.
+
+    Args:
+        path: the log, with or without `.part`.
+        trial: the trial's number.
+
+    Raises:
+        LogError: no such log, or it is still being written.
+        DamagedLogError: the log's end is missing; resume the session first.
+        InvalidValueError: no excluded trial has this number.
+    """
+    _judge(path, lambda trials: inclusion(trials, trial))
+
+
+def _judge(path: str | Path, verdict: Callable[[TrialTable], Event]) -> None:
+    salvaged = salvage(path)
+    record = read_salvaged(salvaged)
+    require_session(record.path, record.header)
+    event = verdict(record.table)
+    record.require_end()
+    if record.losses:  # then the header may be written again
+        record.require_read()
+    with LogWriter.continuing(path, salvaged, record.header) as log:
+        log.append(event)
+        if record.losses:
+            log.append(Event(kind="fault", trial=event.trial, text=" ".join(record.losses)))

@@ -13,7 +13,7 @@ from typing import Final, Protocol, runtime_checkable
 from isiw.checks import check_numbers, check_probabilities, check_wholes
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
-from isiw.text.numbers import counted
+from isiw.text.harmless import counted
 from isiw.window import SURE
 
 

@@ -13,12 +13,11 @@ import numpy as np
 
 from isiw.checks import choice, whole
 from isiw.subjects.labs import LABS, lab
-from isiw.subjects.measured import MEASURED_KIM, WIDTHS_KIM_MS
+from isiw.subjects.measured import MEASURED_KIM, WIDTHS_KIM_MS, supra_threshold
 from isiw.subjects.profiles import PeakProfile, Profile, TwoPeakProfile
 from isiw.subjects.realities import CHANGED
 from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse, ResponseCurve
 from isiw.subjects.subject import Drift, SimulatedSubject
-from isiw.subjects.supra import supra_threshold
 
 P_STAYS: Final = 0.7
 """How often the window is the one of the day before, moved as a whole."""

@@ -14,6 +14,9 @@ What the text leaves open, and what was chosen:
 - Peaks can be read from the ends of axes alone, and only three: subject 3 in Fig. 4.29, subject 4 in Fig. 4.22, and the
   tallest of all in Fig. 4.18, which is taken to be subject 7, the widest. For the others: 2.5 thresholds.
 - The EMG floor is 0.4 thresholds. Noise on the input is less than usual (2 % RMT), for TMS alone to be silent.
+
+People under TMS above the motor threshold have laws of their own: a tap may depress the MEP as well as enhance it
+[Kim2020, 8.1.3].
 """
 
 from __future__ import annotations
@@ -25,7 +28,7 @@ import numpy as np
 
 from isiw.checks import check_numbers
 from isiw.lazy import scipy
-from isiw.subjects.profiles import PeakProfile
+from isiw.subjects.profiles import OpposedProfile, PeakProfile
 from isiw.subjects.responses import EmgFloor, RecruitmentResponse
 from isiw.subjects.subject import SimulatedSubject
 
@@ -131,3 +134,49 @@ MEASURED_KIM: Final = (
 
 WIDTHS_KIM_MS: Final = tuple(int(person.width_ms) for person in MEASURED_KIM)
 """Window widths of the dissertation's eleven subjects [ms] (Table 4.1)."""
+
+
+INTENSITY_PCT_RMT: Final = 120.0
+"""Intensity of the pulse [% RMT] [Kim2020, 8.1.3]."""
+
+RANGE_MS: Final = 120.0
+"""Both segments lie between the impact and this ISI [ms]."""
+
+WIDTH_LIMITS_MS: Final = (10.0, 60.0)
+"""A segment's width is clipped to these [ms], so that two of them always fit into the range."""
+
+
+def supra_threshold(rng: np.random.Generator) -> SimulatedSubject:
+    """A person of the cohort `supra-threshold`."""
+    boost_pct, dip_pct = float(rng.uniform(6, 18)), float(rng.uniform(5, 12))
+    first, second = _segments(rng)
+    if rng.random() < 0.5:
+        first, second = second, first
+    response = RecruitmentResponse(
+        EmgFloor(_log_normal(rng, 0.010, 0.25), float(rng.uniform(0.12, 0.25))),
+        amplitude_mv=_log_normal(rng, 1.0, 0.4),
+        slope_per_pct=0.23,
+        x50_pct_rmt=float(rng.uniform(112, 122)),
+        boost_pct_rmt=boost_pct,
+        sigma_x_pct_rmt=float(rng.uniform(5, 9)),
+        sigma_y=float(rng.uniform(0.3, 0.5)),
+        intensity_pct_rmt=INTENSITY_PCT_RMT,
+    )
+    return SimulatedSubject(
+        OpposedProfile(first, second, dip_pct / boost_pct),
+        response,
+        hit_delay_ms=float(rng.uniform(170, 190)),
+        hit_delay_sd_ms=float(rng.uniform(1, 4)),
+        input_correlation=float(rng.uniform(0, 0.2)),
+    )
+
+
+def _segments(rng: np.random.Generator) -> tuple[PeakProfile, PeakProfile]:
+    """Two segments one behind the other; what they leave of the range is cut at random."""
+    widths_ms = [float(np.clip(_log_normal(rng, 30.0, 0.3), *WIDTH_LIMITS_MS)) for _ in range(2)]
+    before_ms, until_ms = np.sort(rng.uniform(0.0, RANGE_MS - sum(widths_ms), 2)).tolist()
+    return PeakProfile(before_ms, widths_ms[0]), PeakProfile(until_ms + widths_ms[0], widths_ms[1])
+
+
+def _log_normal(rng: np.random.Generator, median: float, log_sd: float) -> float:
+    return float(median * np.exp(log_sd * rng.standard_normal()))

@@ -6,12 +6,11 @@ sessions; `check_ledger` compares what it fired with the log. `PulsePeer` is an 
 
 from __future__ import annotations
 
-from isiw.testing.acquisition import check_acquisition
 from isiw.testing.devices import check_device
 from isiw.testing.faults import Fault, FaultyDevice, Fired, check_ledger
 from isiw.testing.line_peer import PEER_COMMANDS, Lie, PulsePeer
 from isiw.testing.models import check_model
-from isiw.testing.strategies import check_strategy
+from isiw.testing.strategies import check_acquisition, check_strategy
 
 __all__ = [
     "PEER_COMMANDS",

@@ -1,4 +1,4 @@
-"""Text from elsewhere, made harmless, values in a few words, and commands as one types them.
+"""Text from elsewhere, made harmless, values, numbers and counts in a few words, and commands as one types them.
 
 What a terminal, a page or a picture would obey is taken out.
 """
@@ -57,3 +57,24 @@ def _plain(character: str) -> str:
         return character
     category = unicodedata.category(character)
     return "" if category in _OBEYED else "\n" if category in ("Zl", "Zp") else character
+
+
+_NUMBER: Final = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+_WHOLE: Final = re.compile(r"[0-9]{1,18}")
+
+
+def read_number(text: str) -> float:
+    """The number that a text is, in ASCII digits with a decimal point; Python itself would take 1_0_0 and ١٢, too."""
+    if not _NUMBER.fullmatch(text):
+        raise ValueError("no number with a decimal point")
+    return float(text)
+
+
+def read_whole(text: str) -> int | None:
+    """The whole number that a text is, in ASCII digits without a sign; None where it is none."""
+    return int(text) if _WHOLE.fullmatch(text) else None
+
+
+def counted(count: int, one: str, several: str | None = None) -> str:
+    """A number of things in words, such as "1 session" and "2 sessions"."""
+    return f"{count} {one if count == 1 else several or f'{one}s'}"

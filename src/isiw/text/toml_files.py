@@ -1,7 +1,8 @@
-"""TOML files, read and checked: what is wrong is told by file, key and value, with the way out."""
+"""TOML and JSON from elsewhere, read and checked: what is wrong is told by file, key and value, with the way out."""
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
@@ -159,3 +160,37 @@ def _explained(kind: Any, error: ErrorDetails, source: str) -> ConfigError:
 
 def _sentences(*sentences: str) -> str:
     return " ".join(filter(None, sentences))
+
+
+_NUMBERS: Final = re.compile(rb":\s*\[[^\[\]{}\"]*\]")
+"""Lists of numbers: they make up most of a waveform, and have no keys."""
+
+
+class DoubledKeyError(ValueError):
+    """A key is there twice."""
+
+
+def read_json(text: str | bytes) -> Any:
+    """The values of a JSON text."""
+    try:
+        return json.loads(text, object_pairs_hook=once_each)
+    except RecursionError as error:
+        raise ValueError("it is nested without end") from error
+
+
+def refuse_doubled(text: bytes) -> None:
+    """Raise where a JSON text has a key twice; quick where it is long because of lists of numbers."""
+    try:
+        read_json(_NUMBERS.sub(b":0", text))
+    except ValueError:  # a text may look like such a list
+        read_json(text)
+
+
+def once_each(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """The values by their keys, none of which may be there twice."""
+    values = dict(pairs)
+    if len(values) < len(pairs):
+        keys = [key for key, _ in pairs]
+        twice = next(key for key in keys if keys.count(key) > 1)
+        raise DoubledKeyError(f"the key {twice[:80]!r} is there twice")
+    return values

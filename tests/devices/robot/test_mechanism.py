@@ -18,7 +18,7 @@ from isiw.devices.robot.mechanism import (
     rebound,
     restitution,
 )
-from isiw.devices.robot.presets import PRESETS, preset
+from isiw.devices.robot.tapper import PRESETS, preset
 from isiw.errors import InvalidValueError
 
 

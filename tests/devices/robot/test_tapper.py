@@ -11,8 +11,7 @@ import pytest
 from isiw.design import DesignSpace
 from isiw.devices.protocol import Device, HasMemory
 from isiw.devices.robot.mechanism import Faults, Geometry
-from isiw.devices.robot.presets import preset
-from isiw.devices.robot.tapper import Evoked, HitDelay, Tapper, TapperSettings, Trigger
+from isiw.devices.robot.tapper import Evoked, HitDelay, Tapper, TapperSettings, Trigger, preset
 from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.findings import Kind

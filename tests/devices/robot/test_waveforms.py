@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from isiw.devices.robot.mechanism import Taps, draw_taps
-from isiw.devices.robot.presets import preset
+from isiw.devices.robot.tapper import preset
 from isiw.devices.robot.waveforms import (
     acceleration_m_s2,
     emg_noise_uv,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from isiw.models.gp.noise import MAX_LOG_VARIANCE, equal_noise, leave_one_out, noise_profile
+from isiw.models.gp.fit import MAX_LOG_VARIANCE, equal_noise, leave_one_out, noise_profile
 
 ISIS_MS = torch.linspace(0.0, 500.0, 80, dtype=torch.float64)
 

@@ -30,8 +30,8 @@ from isiw.models.protocol import (
     SamplesWindows,
     SimulatesPeople,
 )
-from isiw.models.randomness import systematic
 from isiw.models.shared.history import History
+from isiw.models.shared.tables import systematic
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.subject import SimulatedSubject
 from isiw.window import Window

@@ -22,7 +22,7 @@ from isiw.checks import Bounds, from_table, number
 from isiw.devices.protocol import DeviceInfo, require_staged
 from isiw.errors import DeviceError, InvalidValueError, NotDelivered
 from isiw.text import plain
-from isiw.text.numbers import read_number
+from isiw.text.harmless import read_number
 from isiw.trials import Stimulus
 
 LONGEST_REPLY: Final = 65_536

@@ -15,7 +15,7 @@ from typing import TypeVar
 from isiw.checks import check_choice, check_numbers, check_texts, check_wholes
 from isiw.devices.transports.line_table import Connection, Exchange, command_values
 from isiw.errors import DeviceError, DeviceTimeoutError
-from isiw.text.numbers import read_whole
+from isiw.text.harmless import read_whole
 
 _T = TypeVar("_T")
 

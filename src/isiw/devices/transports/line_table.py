@@ -18,7 +18,7 @@ from urllib.parse import urlsplit
 
 from isiw.checks import check_numbers, check_texts, from_table, number
 from isiw.errors import ConfigError, InvalidValueError
-from isiw.text.numbers import read_number
+from isiw.text.harmless import read_number
 
 _TCP = "socket://"
 _MOST_BYTES = 4096

@@ -20,7 +20,7 @@ from isiw.devices.protocol import DeviceInfo
 from isiw.devices.transports.exchange import LONGEST_REPLY, Exchange, Reply, Request, Verb, described
 from isiw.devices.transports.lsl_samples import LATE_S, LslChannel, SampleStream
 from isiw.errors import ConfigError, DeviceError, DeviceTimeoutError, InvalidValueError, NotDelivered
-from isiw.text.json_texts import read_json
+from isiw.text.toml_files import read_json
 from isiw.trials import Channel, Stimulus, Sweep
 
 _GLANCE_S: Final = 0.02

@@ -19,8 +19,7 @@ from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
 from isiw.lazy import botorch, torch
 from isiw.models.gp.fit import Fit, fit, fixed_fit
-from isiw.models.gp.prior import FixedProcess, HyperparameterPrior
-from isiw.models.gp.process import KernelName
+from isiw.models.gp.prior import FixedProcess, HyperparameterPrior, KernelName
 from isiw.models.gp.samples import Paths, ProfileSample, draw_paths
 from isiw.models.gp.scale import Scale, Transform, scale_of
 from isiw.models.protocol import Observation, Tensor

@@ -24,9 +24,8 @@ from isiw.models.parametric.prior import Likelihood, Unknowns, WindowPrior
 from isiw.models.parametric.program import WindowProgram
 from isiw.models.parametric.sampling import Chains, sample_person
 from isiw.models.protocol import Observation, PriorPerson, Tensor
-from isiw.models.randomness import SIMULATED, step_generator, systematic
 from isiw.models.shared.history import History, observed, without_known
-from isiw.models.shared.tables import OUTCOMES, interpolated, table_levels
+from isiw.models.shared.tables import OUTCOMES, SIMULATED, interpolated, step_generator, systematic, table_levels
 from isiw.models.windows import Runs, SampledProfiles, least_excess_mv, profile_grid, sampled_estimate
 from isiw.types import ArrayLike
 from isiw.window import Window

@@ -13,8 +13,8 @@ from isiw.models.parametric.ascent import Modes
 from isiw.models.parametric.importance import Effort, Mixture, WeightedDraws, importance_sample, worth
 from isiw.models.parametric.program import WindowProgram, nuts_sample
 from isiw.models.protocol import Tensor
-from isiw.models.randomness import systematic
 from isiw.models.shared.history import History
+from isiw.models.shared.tables import systematic
 
 WITHOUT_WINDOW: Final = Effort(scouts=256, starts=2, steps=15, draws=300, enough=200.0)
 """Without a window few latents matter, and there is one mode."""

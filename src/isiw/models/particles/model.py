@@ -23,7 +23,7 @@ from isiw.models.particles.predictions import PersonSample
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.swarm import Moving, Swarm
 from isiw.models.protocol import Observation, PriorPerson
-from isiw.models.randomness import NOTED, SIMULATED, step_generator
+from isiw.models.shared.tables import NOTED, SIMULATED, step_generator
 from isiw.models.windows import EXCLUDED_AT, SampledHypotheses, SampledProfiles, profile_grid, sampled_estimate
 from isiw.types import ArrayLike, FloatArray
 from isiw.window import Window

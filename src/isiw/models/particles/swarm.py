@@ -16,8 +16,8 @@ from isiw.models.particles.diagnostics import Health, distinct_share, ess_share,
 from isiw.models.particles.engine import Engine
 from isiw.models.particles.moves import L
 from isiw.models.protocol import Tensor
-from isiw.models.randomness import systematic
 from isiw.models.shared.history import History
+from isiw.models.shared.tables import systematic
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,11 @@
-"""Nodes and tables that several models compute with: of an uncertain ISI, and by facilitation."""
+"""Steps that several models share: streams of randomness, picks of samples, nodes and tables of an uncertain ISI."""
 
 from __future__ import annotations
 
 import math
+from typing import Final
+
+import numpy as np
 
 from isiw.lazy import torch
 from isiw.models.protocol import Tensor
@@ -33,3 +36,23 @@ def interpolated(table: Tensor, level: Tensor) -> Tensor:
     # The weighted sum of each pair of rows in one pass, without the pairs in memory.
     between = torch.nn.functional.embedding_bag(pairs, rows, per_sample_weights=weights, mode="sum")
     return between.view(*level.shape, -1)
+
+
+SIMULATED: Final = 2**31
+NOTED: Final = 2**30
+"""The step whose stream simulated people are drawn from, and that of the first change that is noted: no posterior gets
+there."""
+
+
+def step_generator(device: str, seed: int, step: int) -> torch.Generator:
+    """A stream of its own for each step, so that a posterior depends on its seed and its trials alone."""
+    state = np.random.SeedSequence((seed, step)).generate_state(1, np.uint64)
+    return torch.Generator(device=device).manual_seed(int(state[0] >> np.uint64(1)))
+
+
+def systematic(log_weights: Tensor, size: int) -> Tensor:
+    """Evenly spaced picks of weighted particles, in order."""
+    cumulative = log_weights.double().softmax(-1).cumsum(-1)
+    points = (torch.arange(size, device=log_weights.device, dtype=torch.double) + 0.5) / size
+    picks = torch.searchsorted(cumulative, points.expand(len(cumulative), -1).contiguous())
+    return picks.clamp_max(log_weights.shape[-1] - 1)

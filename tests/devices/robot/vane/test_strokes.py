@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from isiw.devices.robot.vane.actuator import Vane
-from isiw.devices.robot.vane.strokes import UNITS, Variation, draw_strokes, record_strokes
+from isiw.devices.robot.vane.tapper import UNITS, Variation, draw_strokes, record_strokes
 from isiw.errors import InvalidValueError
 
 

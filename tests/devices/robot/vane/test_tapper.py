@@ -7,8 +7,7 @@ import pytest
 
 import isiw
 from isiw.devices.robot.mechanism import Faults
-from isiw.devices.robot.presets import preset
-from isiw.devices.robot.tapper import Tapper, TapperSettings
+from isiw.devices.robot.tapper import Tapper, TapperSettings, preset
 from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import InvalidValueError
 from isiw.session.loop import Session

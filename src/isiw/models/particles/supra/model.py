@@ -21,7 +21,7 @@ from isiw.models.particles.supra.predictions import SupraSample
 from isiw.models.particles.supra.prior import SupraLatents, SupraPrior
 from isiw.models.particles.swarm import Moving, Swarm
 from isiw.models.protocol import Observation, Tensor
-from isiw.models.randomness import step_generator
+from isiw.models.shared.tables import step_generator
 from isiw.models.windows import Runs, SampledProfiles, best_window, profile_grid, sampled_estimate
 
 
