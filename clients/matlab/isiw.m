@@ -78,6 +78,12 @@ classdef isiw < handle
       this.conclude(this.post(this.path('tell'), pairs));
     end
 
+    function tap(this, isi_ms, mep_mv)
+      % A tap alone, as the trial lab.trials: the amplitude of what the MEP window would hold at this ISI [ms], [mV].
+      pairs = {'trial', number(this.trials), 'isi_ms', number(isi_ms), 'mep_mv', number(mep_mv), 'pulse', 'false'};
+      this.conclude(this.post(this.path('tell'), pairs));
+    end
+
     function mistrial(this, trial, reason)
       % A trial was lost: it counts as a stimulus, and nothing is learnt from it.
       this.conclude(this.post(this.path('mistrial'), {'trial', number(trial), 'reason', char(reason)}));

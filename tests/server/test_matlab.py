@@ -58,6 +58,7 @@ try, lab.tell(trial, isi_ms, NaN); catch problem, disp(problem.message); end
 lab.tell(trial, isi_ms, 0.1);
 lab.tell(trial, isi_ms, 0.1);
 lab.tell(lab.trials, [], 0.02);
+lab.tap(40, 0.03);
 lab.resume('P07');
 disp(lab.trials);
 """
@@ -69,5 +70,5 @@ def test_what_is_refused_is_an_error_in_words_and_can_be_put_right(tmp_path: Pat
         ran = octave(client, str(tmp_path / "refused.m"))
     assert ran.returncode == 0, ran.stderr
     first, second, third, words, trials = ran.stdout.splitlines()
-    assert (first, second, third, trials.strip()) == ("isiw:Unauthorized", "isiw:NoSuchSession", "isiw:TrialOpen", "2")
+    assert (first, second, third, trials.strip()) == ("isiw:Unauthorized", "isiw:NoSuchSession", "isiw:TrialOpen", "3")
     assert "mep_mv" in words

@@ -141,6 +141,19 @@ def test_tms_alone_that_was_refused_stays_open_until_it_is_told_rightly(client: 
     assert done(client.post(f"{session}/ask"))["trial"] == 1
 
 
+def test_a_tap_alone_is_told_without_being_asked_and_uses_up_no_budget(
+    client: httpx.Client, session: str, tmp_path: Path
+) -> None:
+    tap = {"trial": 0, "isi_ms": 40.0, "mep_mv": 0.05, "pulse": False}
+    first = done(client.post(f"{session}/tell", json=tap))
+    assert done(client.post(f"{session}/tell", json=tap)) == first
+    refused(client.post(f"{session}/tell", json=tap | {"pulse": True}), 409, "OtherOutcome")
+    assert done(client.get(session))["told"] == 0
+    trial = read_session(tmp_path / "P07.mcap").table[0]
+    assert (trial.tap_alone, trial.commanded_isi_ms, trial.isi_ms, trial.mep_mv) == (True, None, 40.0, 0.05)
+    assert done(client.post(f"{session}/ask"))["trial"] == 1
+
+
 def test_no_window_is_named_where_too_little_was_told(client: httpx.Client, session: str) -> None:
     def estimate() -> dict[str, object]:
         answer = done(client.get(f"{session}/estimate"))

@@ -119,7 +119,7 @@ class DrivenSession:
             raise Refusal(
                 409,
                 "TrialOpen",
-                f"trial {asked.trial} is TMS alone, and its outcome was refused",
+                f"trial {asked.trial} is {'a tap' if asked.tap_alone else 'TMS'} alone, and its outcome was refused",
                 remedy="Tell a valid outcome, or make it a mistrial.",
             )
         if asked is not None and request.trial is None:
@@ -143,12 +143,13 @@ class DrivenSession:
         """What came of a trial; told again it is answered as at first."""
         if request.trial in self._outcomes:
             return self._known(request.trial, _told(request), f"isi_ms={request.isi_ms} mep_mv={request.mep_mv}")
-        self._require_next(request.trial, asked=request.isi_ms is not None)
+        self._require_next(request.trial, asked=request.pulse and request.isi_ms is not None)
         self.recorder.tell(
             request.isi_ms,
             request.mep_mv,
             isi_sd_ms=request.isi_sd_ms,
             background_rms_uv=request.background_rms_uv,
+            pulse=request.pulse,
         )
         return self._concluded()
 
@@ -249,14 +250,14 @@ def _outcomes(record: SessionRecord) -> dict[int, TrialAnswer]:
 
 
 def _told(request: TellRequest) -> tuple[object, ...]:
-    return request.isi_ms, request.mep_mv, request.isi_sd_ms, request.background_rms_uv
+    return request.isi_ms, request.mep_mv, request.isi_sd_ms, request.background_rms_uv, request.pulse
 
 
 def _recorded(trial: Trial) -> tuple[object, ...]:
     """What was told about a trial."""
     if trial.status is Status.MISTRIAL:
         return (trial.reason,)
-    return trial.isi_ms, trial.mep_mv, trial.isi_sd_ms, trial.background_rms_uv
+    return trial.isi_ms, trial.mep_mv, trial.isi_sd_ms, trial.background_rms_uv, not trial.tap_alone
 
 
 def _in_words(trial: Trial) -> str:

@@ -97,6 +97,10 @@ class TellRequest(_Request):
     mep_mv: float = Field(description="Peak-to-peak amplitude [mV]; 0 is below the detection limit.")
     isi_sd_ms: float = Field(default=0.0, description="SD of the realised ISI [ms]; 0 where it was measured.")
     background_rms_uv: float | None = Field(default=None, description="EMG before the pulse [µV RMS], where known.")
+    pulse: bool = Field(
+        default=True,
+        description="False for a tap alone, which needs no ask: mep_mv is what the MEP window would hold at isi_ms.",
+    )
 
 
 class MistrialRequest(_Request):
