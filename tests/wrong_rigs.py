@@ -70,6 +70,21 @@ def _at_another_rate(sweep: Sweep) -> Sweep:
     return dataclasses.replace(sweep, channels=slower)
 
 
+def doubled(gap_ms: float) -> Callable[[Sweep], Sweep]:
+    """A stimulator that is left on paired pulses: another artefact so long after the pulse, or before it."""
+
+    def wrong(sweep: Sweep) -> Sweep:
+        emg, at_ms = sweep.channels["emg"], sweep.t_tms_ms
+        if at_ms is None:
+            return sweep
+        first, other = (round((ms - emg.t0_ms - 1.0) * emg.rate_hz / 1000) for ms in (at_ms, at_ms + gap_ms))
+        values, lasts = emg.values.copy(), round(0.002 * emg.rate_hz)
+        values[other : other + lasts] += emg.values[first : first + lasts]
+        return _with(sweep, emg=dataclasses.replace(emg, values=values))
+
+    return wrong
+
+
 WRONG: Mapping[str, Callable[[Sweep], Sweep]] = {
     "tense muscle": _changed("emg", _tense),
     "inverted accelerometer": _changed("acceleration", np.negative),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,8 @@ import numpy as np
 import pytest
 
 from isiw.log.reader import read_session
+from isiw.log.schema import Event, Intent
+from isiw.session import steps
 from isiw.session.loop import Session
 from isiw.session.resume import resume
 from isiw.session.rig import Safeguards
@@ -95,6 +98,32 @@ def test_a_resumed_session_corrects_and_asks_as_an_uninterrupted_one(log: Path, 
     safeguards = Safeguards(on_pause=lambda _: True)
     again = resume(log, TapRig(reflex(0.3), mep_mv=silent), safeguards=safeguards)
     again.run(progress=False)
+    assert again.trials == whole.trials
+
+
+def test_a_session_that_ends_between_a_trial_and_its_corrections_has_them_once_it_is_resumed(
+    log: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def made() -> TapRig:
+        return TapRig(reflex(0.3), mep_mv=silent)
+
+    def dies(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    whole = ran(made(), tmp_path / "whole.mcap", few(), protocol=NO_TAPS)
+    with monkeypatch.context() as dying:
+        dying.setattr(steps, "correction", dies)
+        with pytest.raises(KeyboardInterrupt):
+            ran(made(), log, few(), protocol=NO_TAPS)
+    before = read_session(log)
+    assert not [event for event in before.events if event.kind == "correction"]
+    safeguards = Safeguards(on_pause=lambda _: True)
+    again = resume(log, made(), safeguards=safeguards)
+    again.run(progress=False)
+    at_once = itertools.takewhile(
+        lambda entry: not isinstance(entry, Intent), read_session(log).history[len(before.history) :]
+    )
+    assert "correction" in [entry.kind for entry in at_once if isinstance(entry, Event)]
     assert again.trials == whole.trials
 
 

@@ -17,7 +17,7 @@ from isiw.signals import judge
 from isiw.signals.rig import remedy_for
 from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial
 from known import instance
-from wrong_rigs import KINDS, SPACE, WRONG, rig
+from wrong_rigs import KINDS, SPACE, WRONG, WrongRig, doubled, rig
 
 ISIS_MS = (40.0, 150.0, 300.0)
 
@@ -39,6 +39,26 @@ def test_a_wrong_rig_is_named_from_each_sweep(wrong: str, seed: int) -> None:
 @pytest.mark.parametrize("accelerometer", [True, False])
 def test_a_right_rig_is_not_accused(*, accelerometer: bool) -> None:
     assert faults_of(rig(seed=3, accelerometer=accelerometer), (*ISIS_MS, None)) == [None] * 4
+
+
+@pytest.mark.parametrize("gap_ms", [-100.0, -12.0, 5.0, 45.0])
+def test_a_stimulator_that_gives_two_pulses_is_named(gap_ms: float) -> None:
+    device = SimulatedDevice(WrongRig(doubled(gap_ms), seed=1))
+    found = [fault for fault in faults_of(device, (250.0, 280.0, 310.0, None)) if fault is not None]
+    assert [fault.kind for fault in found] == [Kind.DOUBLE_PULSE] * 4
+    assert all(f" {abs(gap_ms):.0f} ms " in fault.text for fault in found)
+
+
+@pytest.mark.parametrize("blanked_ms", [2.0, 6.0, 12.0])
+def test_the_end_of_a_blanked_artefact_is_no_second_pulse(blanked_ms: float) -> None:
+    def blanked(sweep: Sweep) -> Sweep:
+        emg = sweep.channels["emg"]
+        times_ms = emg.t0_ms + np.arange(emg.values.size) * 1000 / emg.rate_hz - (sweep.t_tms_ms or 0.0)
+        held = np.where((times_ms >= 0.4) & (times_ms < blanked_ms), 0.5, emg.values)
+        return replace(sweep, channels={**sweep.channels, "emg": replace(emg, values=held)})
+
+    found = faults_of(SimulatedDevice(WrongRig(blanked, seed=1)), (250.0, 280.0, None))
+    assert Kind.DOUBLE_PULSE not in [fault.kind for fault in found if fault is not None]
 
 
 def test_a_wrong_rate_shows_where_no_impact_is_measured() -> None:

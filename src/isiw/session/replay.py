@@ -224,9 +224,9 @@ def _taps(record: SessionRecord, signals: SignalLimits) -> TapResponses:
     """What the sweeps of a log show of the first stimulus alone."""
     taps = TapResponses(signals.mep_window_ms)
     for trial in (entry for entry in record.history if isinstance(entry, Trial)):
+        taps, _ = taps.corrected(record.table)  # after the last trial the session itself does, if it ended before that
         if channels := record.sweep(trial.index):
             taps = taps.after(trial, Sweep(channels, trial.t_valve_ms, trial.t_tms_ms, trial.t_hit_ms))
-            taps, _ = taps.corrected(record.table)
     return taps
 
 

@@ -226,8 +226,10 @@ class Steps:
         return None if self._rig.pulses_left else self._stop_at_limit()
 
     def log_belief(self) -> None:
-        """Log what is known after the last trial."""
-        self._examination.log_belief(self._decision, self._next_isi_ms)
+        """Log what is known after the last trial, which a session that ended then may not have corrected others by."""
+        self._correct()
+        if self._examination.conclude(self._decision, self._next_isi_ms) is None:
+            self._examination.log_belief(self._decision, self._next_isi_ms)
 
     def seen(self) -> None:
         """A person has seen the reason of a pause, and the session goes on."""

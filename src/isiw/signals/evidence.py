@@ -13,8 +13,8 @@ from typing import Final, NamedTuple, TypeAlias
 
 from isiw.findings import ENOUGH_PAIRS, Finding, Kind, Severity
 from isiw.lazy import scipy
+from isiw.signals.disturbance import Disturbance
 from isiw.signals.limits import SignalLimits
-from isiw.signals.waveforms import Hum
 from isiw.trials import RESPONSE_MV, Measurement, Sweep, Trial
 
 SMALL_MV, LARGE_MV = 8e-4, 4.0
@@ -168,7 +168,7 @@ class Told:
         rest_uv: EMG before the pulse [µV RMS]; None where not known.
         outside: the largest clear response outside the MEP window; None where there is none, or no sweep.
         cut_ms: from when to when the EMG responds [ms after the pulse], if it is larger behind the window than within.
-        hum: the mains hum that was subtracted; None if there is none.
+        disturbance: the mains hum and the drift that were subtracted; None if there is none.
         is_tail: whether what is in the window is the end of a larger artefact before it.
         only_falls: whether what is in the window only falls, as a slow decay does and no MEP.
         repeats: whether its EMG is that of the trial before, sample by sample.
@@ -179,7 +179,7 @@ class Told:
     rest_uv: float | None = None
     outside: Response | None = None
     cut_ms: tuple[float, float] | None = None
-    hum: Hum | None = None
+    disturbance: Disturbance | None = None
     is_tail: bool = False
     only_falls: bool = False
     repeats: bool = False

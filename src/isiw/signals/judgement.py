@@ -15,6 +15,7 @@ from isiw.checks import MOST_MEP_MV, choice
 from isiw.design import DesignSpace
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.findings import MISTRIALS, Kind
+from isiw.signals.disturbance import TAP_MS, at_rest, disturbance
 from isiw.signals.impact import impact_time
 from isiw.signals.limits import (
     ACCELERATION_UNITS,
@@ -27,7 +28,7 @@ from isiw.signals.limits import (
     tap_with_tms_alone,
 )
 from isiw.signals.mep import TAP_SPAN_MS, background_rms, mep_amplitudes
-from isiw.signals.waveforms import TAP_MS, at_rest, is_blanked, is_recording, is_saturated, mains_hum
+from isiw.signals.waveforms import is_blanked, is_recording, is_saturated
 from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial
 from isiw.types import FloatArray
 
@@ -63,9 +64,12 @@ def _judge_emg(emg: Channel, timed: Trial, limits: SignalLimits) -> Trial:
     """The MEP and the EMG before it, of a trial whose timing is right."""
     emg_mv = emg.values * _unit_mv(emg)
     pulse = _on_channel(timed.t_tms_ms, emg)
-    quiet_mv = _without_hum(emg_mv, emg, timed)
+    found = disturbance(emg_mv, emg.rate_hz, at_rest(emg, timed))
+    level_mv, quiet_mv = (
+        (emg_mv, emg_mv) if found is None else (emg_mv - found.drift_course_mv, emg_mv - found.course_mv)
+    )
     mep_mv = float(mep_amplitudes(quiet_mv, emg.rate_hz, pulse, limits.mep_window_ms)[0])
-    timed = replace(timed, background_rms_uv=_background_uv(emg_mv, emg, timed))
+    timed = replace(timed, background_rms_uv=_background_uv(level_mv, emg, timed))
     span_ms = (pulse + limits.mep_window_ms[0], pulse + limits.mep_window_ms[1])
     if is_saturated(emg_mv, emg.rate_hz, limits.full_scale_mv, span_ms=span_ms):
         return _mistrial(timed, Kind.SATURATION)
@@ -253,9 +257,3 @@ def _background_uv(emg_mv: FloatArray, emg: Channel, timed: Trial) -> float | No
         except InvalidValueError as error:
             _reason(error)
     return None
-
-
-def _without_hum(emg_mv: FloatArray, emg: Channel, timed: Trial) -> FloatArray:
-    """The EMG without mains hum, if there is any."""
-    found = mains_hum(emg_mv, emg.rate_hz, at_rest(emg, timed))
-    return emg_mv if found is None else emg_mv - found.course_mv

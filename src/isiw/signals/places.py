@@ -15,10 +15,10 @@ from itertools import takewhile
 import numpy as np
 
 from isiw.findings import Finding, Kind, Severity
+from isiw.signals.disturbance import SPAN_S, Disturbance, at_rest, disturbance
 from isiw.signals.evidence import OF_REST, Evidence, Response, Told
 from isiw.signals.limits import ARTEFACT_MS, EMG_UNITS_MV, SignalLimits
 from isiw.signals.rig import tap_span_ms
-from isiw.signals.waveforms import Hum, at_rest, mains_hum
 from isiw.trials import Sweep, Trial
 from isiw.types import BoolArray, FloatArray
 
@@ -55,27 +55,27 @@ VARIES = 1.5
 
 def told_by(sweep: Sweep, trial: Trial, limits: SignalLimits, before_emg: FloatArray | None = None) -> Told:
     """A trial as the checks of several trials look at it, with what its sweep shows."""
-    rest_uv, emg = trial.background_rms_uv, sweep.channels["emg"].values
-    repeats = before_emg is not None and np.array_equal(emg, before_emg)
-    told = Told(trial.mep_mv or 0.0, trial.isi_ms, rest_uv, hum=_hum(sweep, trial), repeats=repeats)
+    rest_uv, emg = trial.background_rms_uv, sweep.channels["emg"]
+    repeats = before_emg is not None and np.array_equal(emg.values, before_emg)
+    found = disturbance(EMG_UNITS_MV[emg.unit] * emg.values, emg.rate_hz, at_rest(emg, trial))
+    told = Told(trial.mep_mv or 0.0, trial.isi_ms, rest_uv, disturbance=found, repeats=repeats)
+    if found is not None:
+        quiet = replace(emg, values=emg.values - found.course_mv / EMG_UNITS_MV[emg.unit])
+        sweep = replace(sweep, channels={**sweep.channels, "emg": quiet})
     if trial.t_tms_ms is None or not rest_uv:
         return told
     if told.stands_out:
         span_ms = limits.mep_window_ms
+        falls = _only_falls(sweep, trial, span_ms, rest_uv)
         return replace(
             told,
-            cut_ms=_cut_ms(sweep, trial, span_ms, rest_uv),
+            cut_ms=None if falls else _cut_ms(sweep, trial, span_ms, rest_uv),
             is_tail=_is_artefact(sweep, trial, span_ms),
-            only_falls=_only_falls(sweep, trial, span_ms, rest_uv),
+            only_falls=falls,
         )
     found = _outside(sweep, trial, limits.mep_window_ms)
     clear = found is not None and found.size_mv >= max(CLEAR * rest_uv / 1000, LEAST_MV)
     return replace(told, outside=found if clear else None)
-
-
-def _hum(sweep: Sweep, trial: Trial) -> Hum | None:
-    emg = sweep.channels["emg"]
-    return mains_hum(EMG_UNITS_MV[emg.unit] * emg.values, emg.rate_hz, at_rest(emg, trial))
 
 
 def repeated(evidence: Evidence) -> Finding | None:
@@ -88,16 +88,36 @@ def repeated(evidence: Evidence) -> Finding | None:
 
 def hum(evidence: Evidence) -> Finding | None:
     """Mains hum, which was subtracted; not if there are few trials."""
-    waves = list(takewhile(lambda wave: wave is not None, (told.hum for told in reversed(evidence.told))))
-    if len(waves) < IN_A_ROW or waves[0] is None:
+    waves = _last_disturbed(evidence.told, "hum_mv")
+    if len(waves) < IN_A_ROW:
         return None
-    size_uv = 1000 * statistics.median(wave.size_mv for wave in waves if wave is not None)
+    size_uv = 1000 * statistics.median(wave.hum_mv for wave in waves)
     text = (
-        f"In {len(waves)} trials in a row most of the EMG at rest is a wave of {waves[0].frequency_hz:.0f} Hz and "
+        f"In {len(waves)} trials in a row most of the EMG at rest is a wave of {waves[0].hum_hz:.0f} Hz and "
         f"{size_uv:.0f} µV peak to peak: mains hum, which is subtracted from each MEP"
     )
     remedy = "Check ground and reference electrodes, shorten their cables, and keep power supplies away."
     return Finding(Kind.HUM, Severity.DOUBT, text, remedy)
+
+
+def drift(evidence: Evidence) -> Finding | None:
+    """A baseline that drifts, which was subtracted; not if there are few trials."""
+    lines = _last_disturbed(evidence.told, "drift_mv_s")
+    if len(lines) < IN_A_ROW:
+        return None
+    size_uv = 1000 * SPAN_S * statistics.median(abs(line.drift_mv_s) for line in lines)
+    text = (
+        f"In {len(lines)} trials in a row the level of the EMG drifts, by {size_uv:.0f} µV in {1000 * SPAN_S:.0f} ms "
+        "before the pulse, which is subtracted"
+    )
+    remedy = "Are the electrodes dry or loose, or does a cable move? Otherwise set a high-pass filter of 10 Hz."
+    return Finding(Kind.DRIFT, Severity.DOUBT, text, remedy)
+
+
+def _last_disturbed(told: Sequence[Told], by: str) -> list[Disturbance]:
+    """What disturbs the last trials, back to the first that this does not disturb."""
+    found = takewhile(lambda one: one is not None and getattr(one, by), (one.disturbance for one in reversed(told)))
+    return [one for one in found if one is not None]
 
 
 def misplaced(evidence: Evidence) -> Finding | None:

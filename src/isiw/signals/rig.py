@@ -18,7 +18,7 @@ from isiw.findings import REST_UV, Finding, Kind, Severity
 from isiw.signals.evidence import Evidence
 from isiw.signals.impact import impact_time
 from isiw.signals.judgement import of_one_length
-from isiw.signals.limits import EMG_UNITS_MV, implausible_amplitude, off_by
+from isiw.signals.limits import ARTEFACT_MS, EMG_UNITS_MV, implausible_amplitude, off_by
 from isiw.signals.mep import MIN_BACKGROUND_MS
 from isiw.signals.waveforms import PULSE_GUARD_MS, is_recording, samples
 from isiw.trials import Channel, Sweep, Trial
@@ -152,6 +152,32 @@ def _driven_impact(channel: Channel, valve_ms: float, sign: float = 1.0) -> floa
     way = values[math.floor((hit - DRIVEN_MS) * rate / 1000) : math.floor((hit - 3.0) * rate / 1000)] - np.median(rest)
     driven = bool((way > 0).mean() > 0.9) and float(np.median(way)) > float(rest.std())
     return hit + channel.t0_ms if driven else None
+
+
+def double_pulse(sweep: Sweep, trial: Trial) -> Finding | None:
+    """A spike like the pulse's artefact at another time, as of a stimulator that is left on paired pulses."""
+    emg = sweep.channels["emg"]
+    if trial.t_tms_ms is None or emg.rate_hz < LEAST_RATE_HZ or steepest_edge(emg) is None:
+        return None
+    tap_ms = tap_span_ms(trial)
+    since_ms = [ms - trial.t_tms_ms for ms in _spikes_ms(emg) if tap_ms is None or not tap_ms[0] <= ms <= tap_ms[1]]
+    other_ms = [ms for ms in since_ms if abs(ms) > ARTEFACT_MS]
+    if not other_ms or len(other_ms) == len(since_ms):
+        return None
+    side = "after" if other_ms[0] > 0 else "before"
+    text = f"the EMG has a spike like that of the pulse {abs(other_ms[0]):.0f} ms {side} it"
+    remedy = "Does the stimulator give two pulses? Set it to single pulses, and look for a trigger that bounces."
+    return _finding(Kind.DOUBLE_PULSE, trial, text, remedy)
+
+
+def _spikes_ms(emg: Channel) -> list[float]:
+    """When the EMG jumps and comes back at once, about as steeply as anywhere [ms on the sweep's clock]."""
+    steps = np.diff(emg.values)
+    most, apart = np.abs(steps).max(), samples(SHARP_MS, emg.rate_hz)
+    steep = np.flatnonzero(np.abs(steps) > 0.3 * most)
+    spikes = np.split(steep, np.flatnonzero(np.diff(steep) > apart) + 1)
+    comes_back = (at for at in spikes if at[-1] - at[0] <= apart and np.ptp(np.sign(steps[at])))
+    return [emg.t0_ms + 1000 * at[0] / emg.rate_hz for at in comes_back if np.abs(steps[at]).max() > 0.5 * most]
 
 
 def stray_edge(sweep: Sweep, trial: Trial) -> Finding | None:

@@ -15,9 +15,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from isiw.signals.disturbance import TAP_MS, at_rest, disturbance
 from isiw.signals.limits import EMG_UNITS_MV
 from isiw.signals.mep import MEP_WINDOW_MS
-from isiw.signals.waveforms import PULSE_GUARD_MS, TAP_MS, at_rest, mains_hum, samples
+from isiw.signals.waveforms import PULSE_GUARD_MS, samples
 from isiw.trials import Sweep, Trial, TrialTable
 from isiw.types import FloatArray
 from isiw.window import Window
@@ -93,8 +94,8 @@ class TapResponses:
         values = emg.values * EMG_UNITS_MV[emg.unit]
         times_ms = emg.t0_ms + np.arange(values.size) * 1000 / emg.rate_hz
         rest = at_rest(emg, trial) if trial.t_tms_ms is not None else times_ms < hit_ms - PULSE_GUARD_MS
-        wave = mains_hum(values, emg.rate_hz, rest)
-        values = values if wave is None else values - wave.course_mv
+        found = disturbance(values, emg.rate_hz, rest)
+        values = values if found is None else values - found.course_mv
         shown, windows = self.shown, dict(self.windows)
         if trial.counts:
             until_ms = times_ms[-1] if trial.t_tms_ms is None else trial.t_tms_ms - PULSE_GUARD_MS

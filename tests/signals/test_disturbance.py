@@ -1,4 +1,4 @@
-"""Mains hum is found, said and subtracted; EMG without it is left as it is."""
+"""Mains hum and a drift are found, said and subtracted; EMG without them is left as it is."""
 
 from __future__ import annotations
 
@@ -8,23 +8,26 @@ import pytest
 from isiw.design import DesignSpace
 from isiw.findings import Kind, Severity
 from isiw.signals import SignalLimits, judge
+from isiw.signals.disturbance import at_rest, disturbance
 from isiw.signals.evidence import Evidence
 from isiw.signals.places import told_by
 from isiw.signals.watch import findings
-from isiw.signals.waveforms import at_rest, mains_hum
 from isiw.trials import Channel, Stimulus, Sweep, Trial
 from known import known
 
 SPACE, LIMITS = DesignSpace(0, 300, reference="impact"), SignalLimits()
 
 
-def sweep(trial: int, isi_ms: float, *, hum_uv: float, hz: float = 50.0, mep_uv: float = 100.0) -> Sweep:
-    """EMG at 5 kHz with an MEP of two lobes 21 to 33 ms after the pulse, and a hum of any phase."""
+def sweep(
+    trial: int, isi_ms: float, *, hum_uv: float = 0.0, hz: float = 50.0, mep_uv: float = 100.0, drift_uv_s: float = 0.0
+) -> Sweep:
+    """EMG at 5 kHz with an MEP of two lobes 21 to 33 ms after the pulse, a hum of any phase, and a drift."""
     rng = np.random.default_rng(trial)
     since_ms = np.arange(-500.0, 100.0, 0.2)
     lobes = np.where((since_ms > 21) & (since_ms < 33), np.sin(np.pi * (since_ms - 21) / 6), 0.0)
     wave = np.sin(2e-3 * np.pi * hz * since_ms + rng.uniform(0, 2 * np.pi))
     emg_uv = 1.5 * rng.standard_normal(since_ms.size) + 0.5 * mep_uv * lobes + 0.5 * hum_uv * wave
+    emg_uv += 1e-3 * drift_uv_s * since_ms
     return Sweep({"emg": Channel(emg_uv, 5000.0, "uV", t0_ms=-500.0)}, t_tms_ms=0.0, t_hit_ms=-isi_ms)
 
 
@@ -60,7 +63,7 @@ def test_hum_is_said_after_four_trials_with_its_frequency_and_size() -> None:
 def test_emg_without_hum_to_speak_of_is_left_as_it_is(hum_uv: float) -> None:
     for trial in range(20):
         one, found = judged(trial, 90.0, hum_uv=hum_uv)
-        assert told_by(one, found, LIMITS).hum is None
+        assert told_by(one, found, LIMITS).disturbance is None
 
 
 def test_too_little_rest_for_three_periods_says_nothing() -> None:
@@ -68,5 +71,29 @@ def test_too_little_rest_for_three_periods_says_nothing() -> None:
     emg = one.channels["emg"]
     short = np.zeros(emg.values.size, dtype=bool)
     short[:290] = True  # 58 ms
-    assert mains_hum(1e-3 * emg.values, emg.rate_hz, short) is None
+    assert disturbance(1e-3 * emg.values, emg.rate_hz, short) is None
     assert at_rest(emg, trial).sum() > 1000
+
+
+@pytest.mark.parametrize("drift_uv_s", [200.0, -2000.0])
+@pytest.mark.parametrize("hum_uv", [0.0, 25.0])
+def test_an_electrode_that_drifts_moves_no_amplitude_and_is_not_taken_for_a_tense_muscle(
+    drift_uv_s: float, hum_uv: float
+) -> None:
+    for isi_ms in (60.0, 250.0):
+        clean = [judged(trial, isi_ms)[1] for trial in range(8)]
+        drifting = [judged(trial, isi_ms, drift_uv_s=drift_uv_s, hum_uv=hum_uv)[1] for trial in range(8)]
+        assert [known(one.mep_mv) for one in drifting] == pytest.approx([known(one.mep_mv) for one in clean], abs=0.003)
+        assert {one.reason for one in drifting} == {None}
+
+
+@pytest.mark.parametrize("mep_uv", [0.0, 100.0])
+def test_a_drift_is_said_after_four_trials_and_nothing_else_is_blamed_for_it(mep_uv: float) -> None:
+    trials = [
+        judged(n, isi_ms, drift_uv_s=1000.0, mep_uv=mep_uv) for n, isi_ms in enumerate((60.0, 90.0, 150.0, 250.0))
+    ]
+    told = [told_by(one, trial, LIMITS) for one, trial in trials]
+    found = list(findings(Evidence(limits=LIMITS, told=told)))
+    assert [(one.kind, one.severity) for one in found] == [(Kind.DRIFT, Severity.DOUBT)]
+    assert "100 µV in 100 ms" in found[0].text
+    assert not list(findings(Evidence(limits=LIMITS, told=told[:3])))
