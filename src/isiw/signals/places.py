@@ -73,9 +73,9 @@ def told_by(sweep: Sweep, trial: Trial, limits: SignalLimits, before_emg: FloatA
             is_tail=_is_artefact(sweep, trial, span_ms),
             only_falls=falls,
         )
-    found = _outside(sweep, trial, limits.mep_window_ms)
-    clear = found is not None and found.size_mv >= max(CLEAR * rest_uv / 1000, LEAST_MV)
-    return replace(told, outside=found if clear else None)
+    response = _outside(sweep, trial, limits.mep_window_ms)
+    clear = response is not None and response.size_mv >= max(CLEAR * rest_uv / 1000, LEAST_MV)
+    return replace(told, outside=response if clear else None)
 
 
 def repeated(evidence: Evidence) -> Finding | None:
