@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import pytest
@@ -13,13 +13,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from isiw.checks import (
+    Checked,
+    Count,
+    Flag,
+    Number,
+    Positive,
+    Share,
     amplitude,
     ascending,
-    check_choice,
-    check_flags,
-    check_numbers,
-    check_probabilities,
-    check_wholes,
     choice,
     deadline,
     number,
@@ -113,36 +114,29 @@ def test_numbers_ascend() -> None:
 
 
 @dataclass(frozen=True)
-class Checked:
-    width_ms: float = 1.0
-    share: float = 0.5
-    trials: int = 1
-    limit: float | None = None
-    most: int | None = None
-    kind: str = "a"
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "width_ms", above=0)
-        check_numbers(self, "limit", optional=True)
-        check_probabilities(self, "share")
-        check_wholes(self, "trials", least=1)
-        check_wholes(self, "most", optional=True)
-        check_choice(self, "kind", ("a", "b"))
+class Declared(Checked):
+    width_ms: Positive = 1.0
+    share: Share = 0.5
+    trials: Count = 1
+    limit: Number | None = None
+    most: Annotated[int, whole] | None = None
+    kind: Literal["a", "b"] = "a"
 
 
 def test_fields_become_plain_values() -> None:
     numpys: dict[str, Any] = {"width_ms": np.float32(2), "trials": np.int64(3)}
-    checked = Checked(**numpys, limit=1)
+    checked = Declared(**numpys, limit=1)
     assert (checked.width_ms, checked.trials, checked.limit, checked.most) == (2.0, 3, 1.0, None)
     assert [type(value) for value in (checked.width_ms, checked.trials, checked.limit)] == [float, int, float]
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"width_ms": 0}, {"share": 1.5}, {"trials": 0}, {"limit": "x"}, {"most": 2.5}, {"kind": "c"}]
+    "wrong",
+    [{"width_ms": 0}, {"share": 1.5}, {"trials": 0}, {"limit": "x"}, {"width_ms": None}, {"most": 2.5}, {"kind": "c"}],
 )
 def test_a_wrong_field_is_named_with_its_class(wrong: dict[str, Any]) -> None:
-    with pytest.raises(InvalidValueError, match=rf"Checked\.{next(iter(wrong))}"):
-        Checked(**wrong)
+    with pytest.raises(InvalidValueError, match=rf"Declared\.{next(iter(wrong))}"):
+        Declared(**wrong)
 
 
 @pytest.mark.parametrize("value", [1e4, 2e3, 1000.1, 4e38, 1e308, 10**400, -1.0, math.nan, "0.5", True])
@@ -165,11 +159,8 @@ def test_arrays_are_no_choices_and_no_deadlines() -> None:
 
 
 @dataclass(frozen=True)
-class Switched:
-    on: Any
-
-    def __post_init__(self) -> None:
-        check_flags(self, "on")
+class Switched(Checked):
+    on: Flag
 
 
 @pytest.mark.parametrize("on", [True, False, np.True_, np.False_])

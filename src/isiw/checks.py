@@ -1,7 +1,7 @@
 """Checks of values that come from outside: a number, a whole number, a choice, each written once.
 
-The plain functions return the value as Python's own type, so that the value that was checked is the one that is kept.
-The others check fields of a frozen dataclass in its `__post_init__`, and put the plain value in their place.
+Each returns the value as Python's own type, so that the value that was checked is the one that is kept. A frozen
+dataclass that is `Checked` declares its checks: `most: Count`, `cells: Annotated[int, partial(whole, least=2)]`.
 """
 
 from __future__ import annotations
@@ -10,8 +10,22 @@ import inspect
 import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping
+from functools import cache, partial
 from numbers import Integral, Real
-from typing import Any, TypedDict, TypeVar, Unpack
+from types import UnionType
+from typing import (
+    Annotated,
+    Any,
+    Literal,
+    TypeAlias,
+    TypedDict,
+    TypeVar,
+    Union,
+    Unpack,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 import numpy as np
 
@@ -69,11 +83,6 @@ def amplitude_interval(ends_mv: object) -> tuple[float, float]:
     raise InvalidValueError(
         "this is no interval of amplitudes", got=ends_mv, expected="two amplitudes in mV that ascend, such as (0, 0.05)"
     )
-
-
-def check_amplitude(owner: object, name: str, *, optional: bool = False) -> None:
-    """Check a field of a frozen dataclass that is the amplitude of an MEP [mV]."""
-    _check(owner, (name,), amplitude, optional=optional)
 
 
 def deadline(what: str, value: object) -> float | None:
@@ -153,40 +162,56 @@ def ascending(what: str, values: Iterable[object], **bounds: Unpack[Bounds]) -> 
     return plain
 
 
-def check_numbers(owner: object, *names: str, optional: bool = False, **bounds: Unpack[Bounds]) -> None:
-    """Check fields of a frozen dataclass that are numbers."""
-    _check(owner, names, lambda what, value: number(what, value, **bounds), optional=optional)
+def share(what: str, value: object, **bounds: Unpack[Bounds]) -> float:
+    """A probability or a share; what is in % is told so."""
+    remedy = SHARE.slip(value) if isinstance(value, int | float) and value <= 100 else None
+    return number(what, value, remedy=remedy, **(bounds or {"least": 0.0, "most": 1.0}))
 
 
-def check_probabilities(owner: object, *names: str, optional: bool = False, **bounds: Unpack[Bounds]) -> None:
-    """Check fields of a frozen dataclass that are probabilities or shares; what is in % is told so."""
-    bounds = bounds or {"least": 0.0, "most": 1.0}
-
-    def share(what: str, value: object) -> float:
-        remedy = SHARE.slip(value) if isinstance(value, int | float) and value <= 100 else None
-        return number(what, value, remedy=remedy, **bounds)
-
-    _check(owner, names, share, optional=optional)
+def flag(what: str, value: object) -> bool:
+    """True or False; a word such as "false" would count as True."""
+    if not isinstance(value, bool | np.bool_):
+        remedy = "Write it without quotes: in a configuration true or false."
+        raise InvalidValueError(f"{what} must be True or False", got=value, remedy=remedy)
+    return bool(value)
 
 
-def check_wholes(owner: object, *names: str, optional: bool = False, **bounds: Unpack[Bounds]) -> None:
-    """Check fields of a frozen dataclass that are whole numbers."""
-    _check(owner, names, lambda what, value: whole(what, value, **bounds), optional=optional)
+Number: TypeAlias = Annotated[float, number]
+Positive: TypeAlias = Annotated[float, partial(number, above=0)]
+NonNegative: TypeAlias = Annotated[float, partial(number, least=0)]
+Share: TypeAlias = Annotated[float, share]
+Amplitude: TypeAlias = Annotated[float, amplitude]
+Count: TypeAlias = Annotated[int, partial(whole, least=1)]
+Natural: TypeAlias = Annotated[int, partial(whole, least=0)]
+Text: TypeAlias = Annotated[str, text]
+Flag: TypeAlias = Annotated[bool, flag]
 
 
-def check_texts(owner: object, *names: str) -> None:
-    """Check fields of a frozen dataclass that are texts."""
-    _check(owner, names, text)
+class Checked:
+    """A frozen dataclass whose fields are checked as their annotations say, and hold plain values."""
+
+    def __post_init__(self) -> None:
+        """Check each field that declares a check, or is a `Literal`; None passes if the annotation allows it."""
+        for name, what, optional, plain in _declared(type(self)):  # type: ignore[arg-type] # a type has a hash
+            value = getattr(self, name)
+            if not (optional and value is None):
+                object.__setattr__(self, name, plain(what, value))
 
 
-def check_flags(owner: object, *names: str) -> None:
-    """Check fields of a frozen dataclass that are True or False; a word such as "false" would count as True."""
-    _check(owner, names, _flag)
-
-
-def check_choice(owner: object, name: str, known: Iterable[Any]) -> None:
-    """Check a field of a dataclass that is one of some known values."""
-    choice(f"{type(owner).__name__}.{name}", getattr(owner, name), known)
+@cache
+def _declared(owner: type) -> tuple[tuple[str, str, bool, Callable[[str, object], object]], ...]:
+    declared = []
+    for name, hint in get_type_hints(owner, include_extras=True).items():
+        kinds = get_args(hint) if get_origin(hint) in {Union, UnionType} else (hint,)
+        kind = next(each for each in kinds if each is not type(None))
+        plain: Callable[[str, object], object] | None = None
+        if get_origin(kind) is Annotated:
+            plain = kind.__metadata__[0]
+        elif get_origin(kind) is Literal:
+            plain = partial(choice, known=get_args(kind))
+        if plain is not None:
+            declared.append((name, f"{owner.__name__}.{name}", type(None) in kinds, plain))
+    return tuple(declared)
 
 
 def _as_float(value: Real) -> float:
@@ -194,23 +219,6 @@ def _as_float(value: Real) -> float:
         return float(value)
     except OverflowError:  # a whole number that no float can hold
         return math.inf
-
-
-def _flag(what: str, value: object) -> bool:
-    if not isinstance(value, bool | np.bool_):
-        remedy = "Write it without quotes: in a configuration true or false."
-        raise InvalidValueError(f"{what} must be True or False", got=value, remedy=remedy)
-    return bool(value)
-
-
-def _check(
-    owner: object, names: Iterable[str], plain: Callable[[str, object], object], *, optional: bool = False
-) -> None:
-    """Put the plain value of some fields in their place."""
-    for name in names:
-        value = getattr(owner, name)
-        if not (optional and value is None):
-            object.__setattr__(owner, name, plain(f"{type(owner).__name__}.{name}", value))
 
 
 def _within(plain: float, bounds: Bounds) -> bool:

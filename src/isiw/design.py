@@ -7,11 +7,11 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, cast, get_args
+from typing import Final, cast
 
 import numpy as np
 
-from isiw.checks import check_choice, check_numbers, number
+from isiw.checks import Checked, NonNegative, Number, Positive, number
 from isiw.errors import InvalidValueError, OutOfSpaceError
 from isiw.text.stimuli import TAP, StimulusWords
 from isiw.types import FloatArray, Reference
@@ -27,7 +27,7 @@ _UNSAID: Final = cast("Reference", "")
 
 
 @dataclass(frozen=True)
-class DesignSpace:
+class DesignSpace(Checked):
     """The ISIs that may be asked: a grid from `low_ms` to `high_ms`, both included, or a list; see `of`.
 
     Args:
@@ -45,11 +45,11 @@ class DesignSpace:
             unknown reference, or none.
     """
 
-    low_ms: float
-    high_ms: float
-    step_ms: float = 1.0
+    low_ms: Number
+    high_ms: Number
+    step_ms: Positive = 1.0
     reference: Reference = _UNSAID
-    tolerance_ms: float = 10.0
+    tolerance_ms: NonNegative = 10.0
     isis_ms: tuple[float, ...] = ()
 
     @classmethod
@@ -72,10 +72,7 @@ class DesignSpace:
     def __post_init__(self) -> None:
         if not self.reference:
             raise missing_reference()
-        check_numbers(self, "low_ms", "high_ms")
-        check_numbers(self, "step_ms", above=0)
-        check_numbers(self, "tolerance_ms", least=0)
-        check_choice(self, "reference", get_args(Reference))
+        super().__post_init__()
         if self.high_ms <= self.low_ms:
             raise InvalidValueError(
                 "the design space is empty", got=(self.low_ms, self.high_ms), expected="low_ms < high_ms"

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from isiw import sentences
 from isiw.change import Change
-from isiw.checks import check_probabilities, number
+from isiw.checks import Checked, Share, number
 from isiw.errors import InvalidValueError
 from isiw.findings import lacking
 from isiw.later import WorkedOut
@@ -72,7 +72,7 @@ class Enhancement(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class WindowEstimate:
+class WindowEstimate(Checked):
     """The estimate of one person's window. What a non-Bayesian method does not have is None.
 
     A stopping rule needs the probability, the edges and the F1 only; bands, the best ISI, what is excluded and what is
@@ -112,7 +112,7 @@ class WindowEstimate:
             sample, or one without a name.
     """
 
-    probability: float | None
+    probability: Share | None
     window: Window | None
     start_ms: float | None = None
     end_ms: float | None = None
@@ -125,16 +125,16 @@ class WindowEstimate:
     split_probability: float | None = None
     hypothesis_samples: IntArray | None = field(default=None, repr=False)
     hypothesis_names: tuple[str, ...] = field(default=(), repr=False)
-    expected_f1: float | None = None
+    expected_f1: Share | None = None
     best_isi: WorkedOut[BestISI | None] = field(default=WorkedOut("best_isi", None))
     largest_excluded: WorkedOut[Enhancement | None] = field(default=WorkedOut("largest_excluded", None))
     unusual: WorkedOut[Mapping[str, float]] = field(default=WorkedOut("unusual", _NOTHING), repr=False)
     pairs: int | None = None
     silent: bool = False
     depressed: Window | None = None
-    depressed_probability: float | None = None
+    depressed_probability: Share | None = None
     change: Change | None = None
-    time_alone: float | None = None
+    time_alone: Share | None = None
     beforehand: float | None = None
     tap_may_explain: bool = False
 
@@ -148,15 +148,14 @@ class WindowEstimate:
         return {each.name: getattr(self, each.name) for each in fields(self)}
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self._check_hypotheses()
-        check_probabilities(self, "expected_f1", "depressed_probability", "time_alone", optional=True)
         if self.depressed is not None and (self.depressed_probability or 0.0) < 0.5:
             raise InvalidValueError(
                 "a depression is reported although none is more probable", got=self.depressed_probability
             )
         if self.probability is None:
             return
-        check_probabilities(self, "probability")
         if self.window is not None and self.probability < 0.5:
             raise InvalidValueError("a window is reported although 'no window' is more probable", got=self.probability)
 

@@ -7,11 +7,24 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import ClassVar, Final
+from functools import partial
+from typing import Annotated, ClassVar, Final
 
 import numpy as np
 
-from isiw.checks import amplitude_interval, check_amplitude, check_numbers, check_texts, check_wholes, choice, text
+from isiw.checks import (
+    Amplitude,
+    Checked,
+    Natural,
+    NonNegative,
+    Number,
+    Positive,
+    Text,
+    amplitude_interval,
+    choice,
+    number,
+    text,
+)
 from isiw.errors import InvalidValueError
 from isiw.findings import MISTRIALS, Kind
 from isiw.lazy import pd
@@ -33,7 +46,7 @@ class Status(StrEnum):
 
 
 @dataclass(frozen=True)
-class Stimulus:
+class Stimulus(Checked):
     """One pair of stimuli to deliver.
 
     Args:
@@ -47,19 +60,18 @@ class Stimulus:
         InvalidValueError: a negative trial number, an ISI that is not finite, or a tap alone with an ISI.
     """
 
-    trial: int
-    isi_ms: float | None
+    trial: Natural
+    isi_ms: Number | None
     tap_alone: bool = False
 
     def __post_init__(self) -> None:
-        check_wholes(self, "trial", least=0)
-        check_numbers(self, "isi_ms", optional=True)
+        super().__post_init__()
         if self.tap_alone and self.isi_ms is not None:
             raise InvalidValueError("a tap alone has no ISI", got=self.isi_ms, expected="None")
 
 
 @dataclass(frozen=True, eq=False)
-class Channel:
+class Channel(Checked):
     """One recorded waveform.
 
     Args:
@@ -73,17 +85,15 @@ class Channel:
     """
 
     values: FloatArray
-    rate_hz: float
-    unit: str
-    t0_ms: float = 0.0
+    rate_hz: Positive
+    unit: Text
+    t0_ms: Number = 0.0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         values = _samples(self.values)
         if values.ndim != 1:
             raise InvalidValueError("a channel holds one waveform", got=values.shape, expected="shape (w,)")
-        check_numbers(self, "rate_hz", above=0)
-        check_numbers(self, "t0_ms")
-        check_texts(self, "unit")
         object.__setattr__(self, "values", values)
 
 
@@ -100,7 +110,7 @@ def _samples(values: object) -> FloatArray:
 
 
 @dataclass(frozen=True, eq=False)
-class Sweep:
+class Sweep(Checked):
     """The waveforms of one trial, and what the device knows of its timing. All times are on the sweep's own clock.
 
     Args:
@@ -117,14 +127,13 @@ class Sweep:
     """
 
     channels: Mapping[str, Channel]
-    t_valve_ms: float | None = None
-    t_tms_ms: float | None = None
-    t_hit_ms: float | None = None
-    isi_sd_ms: float = 0.0
+    t_valve_ms: Number | None = None
+    t_tms_ms: Number | None = None
+    t_hit_ms: Number | None = None
+    isi_sd_ms: Annotated[float, partial(number, least=0, most=MOST_ISI_SD_MS)] = 0.0
 
     def __post_init__(self) -> None:
-        check_numbers(self, "t_valve_ms", "t_tms_ms", "t_hit_ms", optional=True)
-        check_numbers(self, "isi_sd_ms", least=0, most=MOST_ISI_SD_MS)
+        super().__post_init__()
         if not isinstance(self.channels, Mapping):
             raise InvalidValueError(
                 "a sweep has channels by name",
@@ -142,7 +151,7 @@ class Sweep:
 
 
 @dataclass(frozen=True)
-class Measurement:
+class Measurement(Checked):
     """What a device reports that measures the MEP itself.
 
     Args:
@@ -153,29 +162,19 @@ class Measurement:
         t_valve_ms: time of the valve command [ms], where known.
         t_hit_ms: time of the impact [ms], where known.
         t_tms_ms: time of the magnetic pulse [ms], where known.
-
-    Raises:
-        InvalidValueError: a value that is not finite, an amplitude that no amplifier gives, or an SD that is negative
-            or larger than `MOST_ISI_SD_MS`.
     """
 
-    mep_mv: float
-    isi_ms: float | None
-    isi_sd_ms: float = 0.0
-    background_rms_uv: float | None = None
-    t_valve_ms: float | None = None
-    t_hit_ms: float | None = None
-    t_tms_ms: float | None = None
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "isi_ms", "t_valve_ms", "t_hit_ms", "t_tms_ms", optional=True)
-        check_amplitude(self, "mep_mv")
-        check_numbers(self, "isi_sd_ms", least=0, most=MOST_ISI_SD_MS)
-        check_numbers(self, "background_rms_uv", least=0, optional=True)
+    mep_mv: Amplitude
+    isi_ms: Number | None
+    isi_sd_ms: Annotated[float, partial(number, least=0, most=MOST_ISI_SD_MS)] = 0.0
+    background_rms_uv: NonNegative | None = None
+    t_valve_ms: Number | None = None
+    t_hit_ms: Number | None = None
+    t_tms_ms: Number | None = None
 
 
 @dataclass(frozen=True)
-class Trial:
+class Trial(Checked):
     """One delivered pair of stimuli and its outcome, as logged.
 
     Args:
@@ -204,26 +203,27 @@ class Trial:
             with an ISI, or a value that is not finite or that no amplifier gives.
     """
 
-    index: int
+    index: Natural
     status: Status
-    commanded_isi_ms: float | None
+    commanded_isi_ms: Number | None
     reason: Kind | None = None
-    isi_ms: float | None = None
-    isi_sd_ms: float = 0.0
-    mep_mv: float | None = None
-    background_rms_uv: float | None = None
-    t_valve_ms: float | None = None
-    t_hit_ms: float | None = None
-    t_tms_ms: float | None = None
+    isi_ms: Number | None = None
+    isi_sd_ms: NonNegative = 0.0
+    mep_mv: Amplitude | None = None
+    background_rms_uv: NonNegative | None = None
+    t_valve_ms: Number | None = None
+    t_hit_ms: Number | None = None
+    t_tms_ms: Number | None = None
     excluded: bool = False
     tap_alone: bool = False
     overruled: Kind | None = None
-    mep_sd_mv: float = 0.0
+    mep_sd_mv: NonNegative = 0.0
     mep_interval_mv: tuple[float, float] | None = None
-    tap_mv: float | None = None
+    tap_mv: NonNegative | None = None
     __pydantic_config__: ClassVar = {"ser_json_inf_nan": "strings"}  # as JSON knows no infinity
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         object.__setattr__(self, "status", Status(self.status))
         for name in ("reason", "overruled"):
             if getattr(self, name) is not None:
@@ -237,12 +237,6 @@ class Trial:
         measured = self.mep_mv is not None or self.mep_interval_mv is not None
         if self.status is Status.ACCEPTED and not measured and not self.tap_alone:
             raise InvalidValueError("an accepted trial needs its MEP", got=self.index)
-        check_wholes(self, "index", least=0)
-        check_numbers(self, "commanded_isi_ms", "isi_ms", "t_valve_ms", "t_hit_ms", "t_tms_ms", optional=True)
-        check_amplitude(self, "mep_mv", optional=True)
-        check_numbers(self, "background_rms_uv", least=0, optional=True)
-        check_numbers(self, "isi_sd_ms", "mep_sd_mv", least=0)
-        check_numbers(self, "tap_mv", least=0, optional=True)
 
     @classmethod
     def unknown(cls, stimulus: Stimulus) -> Trial:

@@ -7,11 +7,20 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from fractions import Fraction
-from typing import Final
+from functools import partial
+from typing import Annotated, Final
 
 import numpy as np
 
-from isiw.checks import check_numbers, check_probabilities, check_texts, check_wholes, number
+from isiw.checks import (
+    Checked,
+    Count,
+    Natural,
+    Positive,
+    Text,
+    number,
+    share,
+)
 from isiw.errors import InvalidValueError
 from isiw.findings import INTERVAL_S
 
@@ -32,7 +41,7 @@ class Control(StrEnum):
 
 
 @dataclass(frozen=True)
-class Visit:
+class Visit(Checked):
     """What is noted about a visit, for whoever reads its log.
 
     Args:
@@ -42,22 +51,14 @@ class Visit:
         intensity_pct_rmt: intensity of the pulse [% of the resting motor threshold]; None where it is not noted.
         intensity_pct_mso: the same [% of the maximum stimulator output]; None where it is not noted.
         electrodes: which, and where they are.
-
-    Raises:
-        InvalidValueError: a day below 1, an intensity that is not positive, or a text that is none.
     """
 
-    day: int | None = None
-    operator: str = ""
-    muscle: str = ""
-    intensity_pct_rmt: float | None = None
-    intensity_pct_mso: float | None = None
-    electrodes: str = ""
-
-    def __post_init__(self) -> None:
-        check_wholes(self, "day", least=1, optional=True)
-        check_texts(self, "operator", "muscle", "electrodes")
-        check_numbers(self, "intensity_pct_rmt", "intensity_pct_mso", above=0, optional=True)
+    day: Count | None = None
+    operator: Text = ""
+    muscle: Text = ""
+    intensity_pct_rmt: Positive | None = None
+    intensity_pct_mso: Positive | None = None
+    electrodes: Text = ""
 
     def unlike(self, other: Visit) -> str | None:
         """Why the window of this visit is not that of another one, in words; None where nothing that is noted says so.
@@ -84,7 +85,7 @@ PAIRS_FIRST: Final = 4
 
 
 @dataclass(frozen=True)
-class VisitProtocol:
+class VisitProtocol(Checked):
     """How the stimuli of a session follow each other, within its limits.
 
     What is random depends on the seed and the trial's number alone, so that a resumed session goes on as planned.
@@ -105,17 +106,14 @@ class VisitProtocol:
     """
 
     iti_s: tuple[float, float] | None = None
-    tms_alone: float = 0.0
-    tap_alone: float = 0.0
-    taps_first: int = 3
-    block_trials: int | None = None
-    rest_s: float = 120.0
+    tms_alone: Annotated[float, partial(share, least=0, below=1)] = 0.0
+    tap_alone: Annotated[float, partial(share, least=0, below=1)] = 0.0
+    taps_first: Natural = 3
+    block_trials: Count | None = None
+    rest_s: Positive = 120.0
 
     def __post_init__(self) -> None:
-        check_probabilities(self, "tms_alone", "tap_alone", least=0, below=1)
-        check_wholes(self, "block_trials", least=1, optional=True)
-        check_wholes(self, "taps_first", least=0)
-        check_numbers(self, "rest_s", above=0)
+        super().__post_init__()
         if self.iti_s is not None:
             object.__setattr__(self, "iti_s", _interval(self.iti_s))
         if self._share >= 1:

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from isiw.checks import check_numbers, check_wholes
+from isiw.checks import Checked, Count, Positive
 from isiw.design import DesignSpace
 from isiw.lazy import scipy, torch
 from isiw.models.protocol import Posterior, ProposesIsi, Tensor
@@ -75,7 +75,7 @@ class SobolIsi:
 
 
 @dataclass(frozen=True)
-class IncrementalSweep:
+class IncrementalSweep(Checked):
     """From the lowest ISI to the highest, some trials at each: the conventional search; then from the start again.
 
     A strategy follows it on the grid of its space, pair by pair (`FollowsPlan`).
@@ -83,18 +83,11 @@ class IncrementalSweep:
     Args:
         step_ms: from one ISI to the next [ms]; where that is none of the space's, the next multiple of its step.
         trials_per_isi: pairs of stimuli at each.
-
-    Raises:
-        InvalidValueError: a step that is not positive, or no trials.
     """
 
-    step_ms: float = 5.0
-    trials_per_isi: int = 12
+    step_ms: Positive = 5.0
+    trials_per_isi: Count = 12
     needs: ClassVar[tuple[type, ...]] = ()
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "step_ms", above=0)
-        check_wholes(self, "trials_per_isi", least=1)
 
     def planned_isi_ms(self, space: DesignSpace, pairs: int) -> float:
         """The ISI [ms] of the pair of stimuli after so many pairs; see `FollowsPlan`."""

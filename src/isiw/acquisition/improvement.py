@@ -14,7 +14,7 @@ import numpy as np
 
 from isiw.acquisition.protocol import ForeseesProfiles
 from isiw.acquisition.twostep import lookahead
-from isiw.checks import check_numbers
+from isiw.checks import Checked, NonNegative
 from isiw.lazy import torch
 from isiw.models.protocol import Posterior, PredictsOutcomes, SamplesProfiles, Tensor
 
@@ -71,21 +71,15 @@ class LogExpectedImprovement:
 
 
 @dataclass(frozen=True)
-class UpperConfidenceBound:
+class UpperConfidenceBound(Checked):
     """Posterior mean and some SDs.
 
     Args:
         width_sd: how many SDs; larger explores more.
-
-    Raises:
-        InvalidValueError: a negative number of SDs.
     """
 
-    width_sd: float = 2.0
+    width_sd: NonNegative = 2.0
     needs: ClassVar[tuple[type, ...]] = (SamplesProfiles,)
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "width_sd", least=0)
 
     def __call__(self, posterior: SamplesProfiles, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs."""

@@ -7,12 +7,13 @@ it (stepwise uncertainty reduction for excursion sets [Bect2012; Chevalier2014])
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from functools import partial
+from typing import Annotated, ClassVar, Protocol
 
 from isiw.acquisition.kernels import entropy_reductions, variance_reductions
 from isiw.acquisition.protocol import ForeseesWindows
 from isiw.acquisition.twostep import expected_variance_reduction
-from isiw.checks import check_wholes
+from isiw.checks import Checked, whole
 from isiw.compiled import AVAILABLE, first_of
 from isiw.lazy import torch
 from isiw.models.protocol import (
@@ -108,21 +109,15 @@ class MutualInformation:
 
 
 @dataclass(frozen=True)
-class WindowInformation:
+class WindowInformation(Checked):
     """Mutual information of the next MEP and the window alone.
 
     Args:
         cells: into how many cells each edge falls.
-
-    Raises:
-        InvalidValueError: fewer than two cells, which would tell nothing.
     """
 
-    cells: int = 5
+    cells: Annotated[int, partial(whole, least=2)] = 5
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesWindows)
-
-    def __post_init__(self) -> None:
-        check_wholes(self, "cells", least=2)
 
     def __call__(self, posterior: ForeseesWindows, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs."""

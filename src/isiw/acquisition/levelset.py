@@ -12,7 +12,7 @@ from typing import ClassVar
 
 from isiw.acquisition.protocol import ForeseesProfiles
 from isiw.acquisition.twostep import lookahead
-from isiw.checks import check_numbers
+from isiw.checks import Checked, Positive
 from isiw.lazy import torch
 from isiw.models.protocol import PredictsOutcomes, SamplesProfiles, Tensor
 from isiw.window import EDGE_LEVEL
@@ -63,21 +63,15 @@ def integrated_feasibility_reduction(posterior: ForeseesProfiles, isi_ms: Tensor
 
 
 @dataclass(frozen=True)
-class Straddle:
+class Straddle(Checked):
     """Ask where the margin's credible interval reaches furthest across the edge's level.
 
     Args:
         width_sd: half the interval's width [SD]; larger explores more.
-
-    Raises:
-        InvalidValueError: a width that is not positive.
     """
 
-    width_sd: float = 1.96
+    width_sd: Positive = 1.96
     needs: ClassVar[tuple[type, ...]] = (SamplesProfiles,)
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "width_sd", above=0)
 
     def __call__(self, posterior: SamplesProfiles, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs."""
@@ -85,21 +79,15 @@ class Straddle:
 
 
 @dataclass(frozen=True)
-class IntegratedFeasibility:
+class IntegratedFeasibility(Checked):
     """Ask what is expected to leave the fewest ISIs near the edge's level.
 
     Args:
         band_sd: half the width of the band around the level [SD].
-
-    Raises:
-        InvalidValueError: a band that is not positive.
     """
 
-    band_sd: float = 2.0
+    band_sd: Positive = 2.0
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesProfiles)
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "band_sd", above=0)
 
     def __call__(self, posterior: ForeseesProfiles, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs."""

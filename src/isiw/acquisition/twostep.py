@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 from isiw.acquisition.protocol import ForeseesWindows
-from isiw.checks import check_wholes
+from isiw.checks import Checked, Count
 from isiw.lazy import torch
 from isiw.models.protocol import PredictsOutcomes, SamplesWindows, Tensor
 
@@ -47,7 +47,7 @@ def expected_variance_reduction(mass: Tensor, values: Tensor, weights: Tensor | 
 
 
 @dataclass(frozen=True)
-class TwoStep:
+class TwoStep(Checked):
     """Expected reduction of the uncertainty about membership by the next MEP and the best choice after it.
 
     The `WindowGain` of two trials, the second chosen in the light of the first. To be affordable, only the candidates
@@ -59,18 +59,12 @@ class TwoStep:
         shortlist: how many candidates are followed to a second trial.
         groups: into how many groups the first outcome falls.
         stride: every `stride`-th candidate is considered for the second trial.
-
-    Raises:
-        InvalidValueError: a number below one.
     """
 
-    shortlist: int = 8
-    groups: int = 5
-    stride: int = 3
+    shortlist: Count = 8
+    groups: Count = 5
+    stride: Count = 3
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesWindows)
-
-    def __post_init__(self) -> None:
-        check_wholes(self, "shortlist", "groups", "stride", least=1)
 
     def __call__(self, posterior: ForeseesWindows, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs."""

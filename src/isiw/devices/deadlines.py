@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Generic, TypeVar
 
-from isiw.checks import check_numbers, check_wholes
+from isiw.checks import Checked, Count, Positive
 from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, ReportsReadiness, readiness_of, require_staged
 from isiw.errors import DeviceError, DeviceTimeoutError, StillArmedError, told
 from isiw.trials import Stimulus
@@ -22,7 +22,7 @@ _GLANCE_S = 0.05  # Windows lets no signal interrupt a wait, so none is longer
 
 
 @dataclass(frozen=True)
-class Deadlines:
+class Deadlines(Checked):
     """How long each verb of a device may take; how long a delivery may is the session's `timeout_s`.
 
     Args:
@@ -32,21 +32,14 @@ class Deadlines:
         stop_s: each attempt at `stop` [s].
         unstage_s: `unstage` [s].
         stop_attempts: how often `stop` is tried before the device counts as still armed.
-
-    Raises:
-        InvalidValueError: a time that is not positive, or no attempt.
     """
 
-    describe_s: float = 10.0
-    stage_s: float = 60.0
-    readiness_s: float = 5.0
-    stop_s: float = 5.0
-    unstage_s: float = 10.0
-    stop_attempts: int = 3
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "describe_s", "stage_s", "readiness_s", "stop_s", "unstage_s", above=0)
-        check_wholes(self, "stop_attempts", least=1)
+    describe_s: Positive = 10.0
+    stage_s: Positive = 60.0
+    readiness_s: Positive = 5.0
+    stop_s: Positive = 5.0
+    unstage_s: Positive = 10.0
+    stop_attempts: Count = 3
 
 
 class _Call(Generic[_T]):

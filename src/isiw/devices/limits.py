@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from isiw.checks import check_numbers, check_wholes
+from isiw.checks import Checked, Count, NonNegative, Number, Positive
 from isiw.design import DesignSpace, require_space
 from isiw.devices.protocol import Readiness
 from isiw.errors import InvalidValueError, LimitExceededError
@@ -21,7 +21,7 @@ USUAL_ITI_S = 5.0
 
 
 @dataclass(frozen=True)
-class Limits:
+class Limits(Checked):
     """What may be delivered at most.
 
     Args:
@@ -46,29 +46,22 @@ class Limits:
         InvalidValueError: values that are not finite or limit nothing, or a number that is not whole.
     """
 
-    low_ms: float
-    high_ms: float
-    min_iti_s: float | None = None
-    max_pulses: int = 200
-    step_ms: float | None = None
-    max_block_pulses: int | None = None
-    rest_s: float = 120.0
-    max_period_pulses: int | None = None
-    period_s: float = 3600.0
-    max_coil_c: float | None = None
-    intensity_pct_mso: float | None = None
-    max_consecutive_mistrials: int = 3
+    low_ms: Number
+    high_ms: Number
+    min_iti_s: NonNegative | None = None
+    max_pulses: Count = 200
+    step_ms: Positive | None = None
+    max_block_pulses: Count | None = None
+    rest_s: Positive = 120.0
+    max_period_pulses: Count | None = None
+    period_s: Positive = 3600.0
+    max_coil_c: Number | None = None
+    intensity_pct_mso: NonNegative | None = None
+    max_consecutive_mistrials: Count = 3
     isis_ms: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        check_numbers(self, "low_ms", "high_ms")
-        check_numbers(self, "min_iti_s", least=0, optional=True)
-        check_wholes(self, "max_pulses", "max_consecutive_mistrials", least=1)
-        check_wholes(self, "max_block_pulses", "max_period_pulses", least=1, optional=True)
-        check_numbers(self, "rest_s", "period_s", above=0)
-        check_numbers(self, "step_ms", above=0, optional=True)
-        check_numbers(self, "max_coil_c", optional=True)
-        check_numbers(self, "intensity_pct_mso", least=0, optional=True)
+        super().__post_init__()
         if self.low_ms > self.high_ms:
             raise InvalidValueError("the limits of the ISI must ascend", got=(self.low_ms, self.high_ms))
 

@@ -4,9 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol, TypeAlias, get_args, runtime_checkable
+from typing import Protocol, TypeAlias, runtime_checkable
 
-from isiw.checks import check_choice, check_flags, check_numbers, check_texts, mean_and_sd, text
+from isiw.checks import (
+    Checked,
+    Flag,
+    NonNegative,
+    Number,
+    Positive,
+    Text,
+    mean_and_sd,
+    text,
+)
 from isiw.errors import DeviceError, InvalidValueError, NotDelivered
 from isiw.trials import Measurement, Stimulus, Sweep
 from isiw.types import Conditioning, Reference
@@ -16,7 +25,7 @@ Answer: TypeAlias = Sweep | Measurement
 
 
 @dataclass(frozen=True)
-class DeviceInfo:
+class DeviceInfo(Checked):
     """What a device says about itself; the log keeps it.
 
     Args:
@@ -38,19 +47,19 @@ class DeviceInfo:
             positive, a name, version, address or unit that is no text, or a word where True or False is due.
     """
 
-    name: str
+    name: Text
     reference: Reference
-    simulated: bool = False
+    simulated: Flag = False
     channels: Mapping[str, str] = field(default_factory=dict)
-    version: str = ""
-    detection_limit_mv: float | None = None
+    version: Text = ""
+    detection_limit_mv: Positive | None = None
     hit_delay_ms: tuple[float, float] | None = None
-    address: str = ""
-    tap_alone: bool = False
+    address: Text = ""
+    tap_alone: Flag = False
     conditioning: Conditioning = "tap"
 
     def __post_init__(self) -> None:
-        check_texts(self, "name", "version", "address")
+        super().__post_init__()
         if not isinstance(self.channels, Mapping):
             raise InvalidValueError(
                 "DeviceInfo.channels must be a table of units", got=self.channels, expected='such as {"emg": "mV"}'
@@ -58,16 +67,12 @@ class DeviceInfo:
         for channel, unit in self.channels.items():
             text("the name of a channel in DeviceInfo.channels", channel)
             text(f"the unit of {channel!r} in DeviceInfo.channels", unit)
-        check_choice(self, "reference", get_args(Reference))
-        check_choice(self, "conditioning", get_args(Conditioning))
-        check_flags(self, "simulated", "tap_alone")
-        check_numbers(self, "detection_limit_mv", above=0, optional=True)
         if self.hit_delay_ms is not None:
             object.__setattr__(self, "hit_delay_ms", mean_and_sd("DeviceInfo.hit_delay_ms", self.hit_delay_ms))
 
 
 @dataclass(frozen=True)
-class Readiness:
+class Readiness(Checked):
     """What a device says about its state before a stimulus.
 
     Args:
@@ -75,20 +80,12 @@ class Readiness:
         reason: why it is not ready.
         coil_c: temperature of the coil [°C]; None where it is not measured.
         intensity_pct_mso: intensity that is set [% of the maximum stimulator output]; None where it is not known.
-
-    Raises:
-        InvalidValueError: a number that is not finite, a negative intensity, or a word where True or False is due.
     """
 
-    ready: bool = True
+    ready: Flag = True
     reason: str = ""
-    coil_c: float | None = None
-    intensity_pct_mso: float | None = None
-
-    def __post_init__(self) -> None:
-        check_flags(self, "ready")
-        check_numbers(self, "coil_c", optional=True)
-        check_numbers(self, "intensity_pct_mso", least=0, optional=True)
+    coil_c: Number | None = None
+    intensity_pct_mso: NonNegative | None = None
 
 
 @runtime_checkable

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Final, get_args
+from typing import Any, Final, Literal
 
-from isiw.checks import check_choice, check_numbers, check_texts, check_wholes, choice
+from isiw.checks import Checked, Natural, Positive, Text, choice
 from isiw.errors import InvalidValueError
 from isiw.signals.limits import EMG_UNITS_MV
 from isiw.text.toml_files import checked, read_toml
@@ -40,7 +40,7 @@ CHANNELS: Final = ("emg", "acceleration")
 
 
 @dataclass(frozen=True)
-class Layout:
+class Layout(Checked):
     """How a file is laid out; what is not said is found, or asked for.
 
     Args:
@@ -65,31 +65,25 @@ class Layout:
     reference: Reference | None = None
     columns: Mapping[str, str] = field(default_factory=dict)
     units: tuple[str, ...] = ()
-    alone: str | None = None
-    decimal: str | None = None
+    alone: Text | None = None
+    decimal: Literal[".", ","] | None = None
     separator: str | None = None
-    skip_lines: int = 0
+    skip_lines: Natural = 0
     names: tuple[str, ...] = ()
     sheet: str | None = None
     markers: Mapping[str, str] = field(default_factory=dict)
     channels: Mapping[str, str] = field(default_factory=dict)
-    longest_isi_ms: float = 500.0
+    longest_isi_ms: Positive = 500.0
     mep_window_ms: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        if self.reference is not None:
-            check_choice(self, "reference", get_args(Reference))
-        if self.decimal is not None:
-            check_choice(self, "decimal", (".", ","))
+        super().__post_init__()
         for what, table, known in (("column", self.columns, COLUMNS), ("marker", self.markers, MARKERS),
                                    ("channel", self.channels, CHANNELS)):  # fmt: skip
             for key in table:
                 choice(f"what a {what} holds", key, sorted(known))
         for unit in self.units:
             choice("a unit", unit, [*ISI_UNITS_MS, *EMG_UNITS_MV])
-        check_wholes(self, "skip_lines", least=0)
-        check_numbers(self, "longest_isi_ms", above=0)
-        check_texts(self, "alone") if self.alone is not None else None
 
     def unit_of(self, known: Mapping[str, float]) -> str | None:
         """The unit that is stated, of those of one quantity."""

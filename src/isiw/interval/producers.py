@@ -25,11 +25,20 @@ by a few milliseconds.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from functools import partial
+from typing import Annotated, Final, NamedTuple
 
 import numpy as np
 
-from isiw.checks import check_numbers, check_probabilities, check_wholes, whole
+from isiw.checks import (
+    Checked,
+    NonNegative,
+    Number,
+    Positive,
+    Share,
+    number,
+    whole,
+)
 from isiw.errors import InvalidValueError
 from isiw.interval.task import score_pct
 from isiw.lazy import botorch, gpytorch, torch
@@ -43,7 +52,7 @@ TAIL: Final = 3
 
 
 @dataclass(frozen=True)
-class Producer:
+class Producer(Checked):
     """What people have in common who produce intervals.
 
     The defaults are fitted to session 1 of [Kim2020, Table 6.2], target 300 ms, and the share of mode 2 within 20 ms
@@ -59,24 +68,16 @@ class Producer:
         search_ms: S, SD of the search without rewards [ms].
         learning: λ, the share of what feedback shows that is taken over.
         restlessness: ρ, the share of the way back to searching after a trial without reward.
-
-    Raises:
-        InvalidValueError: an SD that is negative, or a share that is not between 0 and 1.
     """
 
-    timing_cv: float = 0.1098
-    motor_ms: float = 10.0
-    offset_ms: float = -16.7
-    offset_sd_ms: float = 38.9
-    start_sd_ms: float = 69.7
-    search_ms: float = 83.2
-    learning: float = 0.233
-    restlessness: float = 0.0108
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "timing_cv", "motor_ms", "offset_sd_ms", "start_sd_ms", "search_ms", least=0.0)
-        check_numbers(self, "offset_ms")
-        check_probabilities(self, "learning", "restlessness")
+    timing_cv: NonNegative = 0.1098
+    motor_ms: NonNegative = 10.0
+    offset_ms: Number = -16.7
+    offset_sd_ms: NonNegative = 38.9
+    start_sd_ms: NonNegative = 69.7
+    search_ms: NonNegative = 83.2
+    learning: Share = 0.233
+    restlessness: Share = 0.0108
 
 
 def produce(block: Block, people: int, seed: int, producer: Producer | None = None) -> FloatArray:
@@ -150,7 +151,7 @@ LIGHT_VARIANCE: Final = 0.1
 
 
 @dataclass(frozen=True)
-class LightSearch:
+class LightSearch(Checked):
     """How the computer searches.
 
     Args:
@@ -165,18 +166,15 @@ class LightSearch:
         InvalidValueError: a number out of range, or a range that is empty.
     """
 
-    low_ms: float = 200.0
-    high_ms: float = 400.0
-    initial: int = 7
-    beta: float = 2.0
-    length_scale_ms: float = 10.0
-    timing_sd_ms: float = 5.0
+    low_ms: Positive = 200.0
+    high_ms: Annotated[float, partial(number, above=0, most=LONGEST_MS)] = 400.0
+    initial: Annotated[int, partial(whole, least=2)] = 7
+    beta: NonNegative = 2.0
+    length_scale_ms: Positive = 10.0
+    timing_sd_ms: NonNegative = 5.0
 
     def __post_init__(self) -> None:
-        check_numbers(self, "low_ms", "length_scale_ms", above=0.0)
-        check_numbers(self, "high_ms", above=0.0, most=LONGEST_MS)
-        check_numbers(self, "beta", "timing_sd_ms", least=0.0)
-        check_wholes(self, "initial", least=2)
+        super().__post_init__()
         if self.high_ms <= self.low_ms:
             raise InvalidValueError("the longest interval must exceed the shortest", got=(self.low_ms, self.high_ms))
 

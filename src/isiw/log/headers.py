@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, TypeAlias
 
@@ -29,7 +30,7 @@ from pydantic import (
     model_validator,
 )
 
-from isiw.checks import check_choice, check_numbers, check_wholes, mean_and_sd, number
+from isiw.checks import Checked, choice, mean_and_sd, number, whole
 from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
@@ -59,7 +60,7 @@ MOST_BLOCK_TRIALS: Final = 10_000
 
 
 @dataclass(frozen=True)
-class Block:
+class Block(Checked):
     """Trials in a row with one target and one kind of feedback.
 
     Args:
@@ -72,16 +73,10 @@ class Block:
         InvalidValueError: a mode that does not exist, or a number out of range.
     """
 
-    mode: int
-    target_ms: float
-    scale_pct: float = 100.0
-    trials: int = 200
-
-    def __post_init__(self) -> None:
-        check_choice(self, "mode", MODES)
-        check_numbers(self, "target_ms", above=0.0, below=LONGEST_MS)
-        check_numbers(self, "scale_pct", least=1.0, most=100.0)
-        check_wholes(self, "trials", least=1, most=MOST_BLOCK_TRIALS)
+    mode: Annotated[int, partial(choice, known=MODES)]
+    target_ms: Annotated[float, partial(number, above=0, below=LONGEST_MS)]
+    scale_pct: Annotated[float, partial(number, least=1.0, most=100.0)] = 100.0
+    trials: Annotated[int, partial(whole, least=1, most=MOST_BLOCK_TRIALS)] = 200
 
 
 class _Record(BaseModel):

@@ -12,11 +12,11 @@ import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
-from typing import Final, TypeAlias
+from typing import Annotated, Final, TypeAlias
 
 import numpy as np
 
-from isiw.checks import check_numbers, check_probabilities, mean_and_sd
+from isiw.checks import Checked, Positive, Share, mean_and_sd, share
 from isiw.errors import DamagedLogError, InvalidValueError, LogError
 from isiw.lazy import sklearn, torch
 from isiw.log.reader import SessionRecord, require_records
@@ -127,11 +127,11 @@ LEAST_PARTICLES: Final = 50
 
 
 @dataclass(frozen=True)
-class DayToDay:
+class DayToDay(Checked):
     """How the same person differs from day to day.
 
     Args:
-        p_stays: probability that the window is that of the day before, moved as a whole; else it is anyone's.
+        p_stays: probability, below 1, that the window is that of the day before, moved as a whole; else it is anyone's.
         shift_sd_ms: SD of the move [ms].
         amplitude_log_sd: SD of the change of MEPs, natural log.
         x50_sd_pct: SD of the change of the input without a tap [% RMT].
@@ -142,17 +142,12 @@ class DayToDay:
         InvalidValueError: an invalid probability or SD.
     """
 
-    p_stays: float = 0.7
-    shift_sd_ms: float = 12.0
-    amplitude_log_sd: float = 0.4
-    x50_sd_pct: float = 3.0
-    floor_log_sd: float = 0.1
-    p_other: float = 0.1
-
-    def __post_init__(self) -> None:
-        check_probabilities(self, "p_stays", "p_other")
-        check_numbers(self, "p_stays", below=1)  # else nothing would be left for whoever's window has moved
-        check_numbers(self, "shift_sd_ms", "amplitude_log_sd", "x50_sd_pct", "floor_log_sd", above=0)
+    p_stays: Annotated[float, partial(share, least=0, below=1)] = 0.7
+    shift_sd_ms: Positive = 12.0
+    amplitude_log_sd: Positive = 0.4
+    x50_sd_pct: Positive = 3.0
+    floor_log_sd: Positive = 0.1
+    p_other: Share = 0.1
 
     def added_sd(self) -> dict[str, float]:
         """What the SDs of latents grow by, in squares."""

@@ -5,13 +5,14 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import Annotated, Any, Final, TypeVar
 
 import numpy as np
 
 import isiw
-from isiw.checks import MOST_OF_A_KIND, check_probabilities, check_wholes, whole
+from isiw.checks import MOST_OF_A_KIND, Checked, share, whole
 from isiw.errors import InvalidValueError, LogError
 from isiw.log.reader import SessionRecord, read_session
 from isiw.models.particles.laws import Floor, Gain, Muscle, NoiseShares
@@ -47,7 +48,7 @@ _EACH_KIND: Final = "Learn a prior from each kind of session."
 
 
 @dataclass(frozen=True)
-class LearntSession:
+class LearntSession(Checked):
     """A session that was learnt from.
 
     Args:
@@ -56,23 +57,17 @@ class LearntSession:
         trials: how many accepted trials it has.
         simulated: whether its device was a simulated one.
         muscle: whose EMG was recorded, as the session notes it.
-
-    Raises:
-        InvalidValueError: no number of trials.
     """
 
     sha256: str
     subject: str
-    trials: int
+    trials: Annotated[int, partial(whole, least=1, most=MOST_OF_A_KIND)]
     simulated: bool = False
     muscle: str = ""
 
-    def __post_init__(self) -> None:
-        check_wholes(self, "trials", least=1, most=MOST_OF_A_KIND)
-
 
 @dataclass(frozen=True)
-class LabPrior:
+class LabPrior(Checked):
     """What a lab's people are like: numbers only. There is no law of what nobody was learnt from.
 
     Args:
@@ -92,7 +87,7 @@ class LabPrior:
     """
 
     sessions: tuple[LearntSession, ...]
-    p_window: float
+    p_window: Annotated[float, partial(share, above=0, below=1.0)]
     shapes: ShapeShares
     noise: NoiseShares
     place: Place | None = None
@@ -103,11 +98,12 @@ class LabPrior:
     isiw_version: str = isiw.__version__
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not self.sessions:
             raise InvalidValueError("a lab's prior is learnt from at least one session", got=self.sessions)
-        check_probabilities(self, "p_window", above=0.0, below=1.0)
-        for component in filter(None, (self.place, self.floor, self.gain, self.muscle)):
-            check_probabilities(component, "share", above=0.0, most=_MOST_OF_OWN)
+        laws: tuple[Any, ...] = (self.place, self.floor, self.gain, self.muscle)
+        for component in filter(None, laws):
+            share(f"{type(component).__name__}.share", component.share, above=0, most=_MOST_OF_OWN)
 
     @property
     def simulated(self) -> bool:

@@ -12,7 +12,7 @@ from urllib.parse import parse_qs, urlsplit
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from isiw.checks import check_numbers, check_texts, check_wholes
+from isiw.checks import Checked, Count, NonNegative, Positive, Text
 from isiw.errors import InvalidValueError
 from isiw.server.answers import Refusal, answered
 
@@ -23,7 +23,7 @@ SHORTEST_TOKEN: Final = 16
 
 
 @dataclass(frozen=True)
-class Rules:
+class Rules(Checked):
     """What is let through.
 
     Args:
@@ -43,22 +43,19 @@ class Rules:
         InvalidValueError: a token that is too short, a limit that is not positive, or a negative wait.
     """
 
-    token: str
+    token: Text
     hosts: frozenset[str] = LOOPBACK
-    most_bytes: int = 2**20
-    body_s: float = 10.0
+    most_bytes: Count = 2**20
+    body_s: Positive = 10.0
     open_paths: frozenset[str] = frozenset()
-    stranger_s: float = 0.05
-    head_s: float = 5.0
-    most_strangers: int = 100
-    most_known: int = 100
+    stranger_s: NonNegative = 0.05
+    head_s: Positive = 5.0
+    most_strangers: Count = 100
+    most_known: Count = 100
     urgent_paths: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
-        check_texts(self, "token")
-        check_wholes(self, "most_bytes", "most_strangers", "most_known", least=1)
-        check_numbers(self, "body_s", "head_s", above=0)
-        check_numbers(self, "stranger_s", least=0)
+        super().__post_init__()
         if len(self.token) < SHORTEST_TOKEN or not self.token.isascii() or not self.token.isprintable():
             raise InvalidValueError(
                 "the token cannot be used",

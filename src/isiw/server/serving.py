@@ -9,13 +9,14 @@ import socket
 import ssl
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Final
 
 import uvicorn
 from fastapi import FastAPI
 
-from isiw.checks import check_texts, check_wholes
+from isiw.checks import Checked, Text, whole
 from isiw.errors import ConfigError
 from isiw.server.app import make_app
 from isiw.server.connections import Connections
@@ -41,7 +42,7 @@ def new_token() -> str:
 
 
 @dataclass(frozen=True)
-class ServerSettings:
+class ServerSettings(Checked):
     """Where and how a folder of sessions is served.
 
     Args:
@@ -59,15 +60,14 @@ class ServerSettings:
     """
 
     folder: Path
-    host: str = "127.0.0.1"
-    port: int = PORT
+    host: Text = "127.0.0.1"
+    port: Annotated[int, partial(whole, least=0, most=65535)] = PORT
     token: str = field(default_factory=new_token, repr=False)
     certificate: Path | None = None
     key: Path | None = None
 
     def __post_init__(self) -> None:
-        check_texts(self, "host")
-        check_wholes(self, "port", least=0, most=65535)
+        super().__post_init__()
         if (self.certificate is None) != (self.key is None):
             raise ConfigError("a certificate and its key belong together", remedy="Give both files, or neither.")
         for path in filter(None, (self.certificate, self.key)):

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Never
 
-from isiw.checks import check_numbers, check_wholes, choice
+from isiw.checks import Checked, Natural, NonNegative, choice
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.deadlines import Deadlines, PunctualDevice
 from isiw.devices.limited import LimitedDevice
@@ -28,7 +28,7 @@ from isiw.visit import VisitProtocol
 
 
 @dataclass(frozen=True)
-class Safeguards:
+class Safeguards(Checked):
     """How a session keeps a person safe besides its limits.
 
     Args:
@@ -40,21 +40,14 @@ class Safeguards:
         dead_man: is called before each stimulus; anything but True refuses it and ends the session.
         earlier_logs: a folder of logs, whose folders are looked into, too; the same subject's stimuli in it count for
             the limits' period and block. A log that cannot be read refuses the session.
-
-    Raises:
-        InvalidValueError: a number of retries or a time that is negative.
     """
 
     deadlines: Deadlines = field(default_factory=Deadlines)
-    retries: int = 3
-    backoff_s: float = 1.0
+    retries: Natural = 3
+    backoff_s: NonNegative = 1.0
     on_pause: Callable[[str], bool] | None = None
     dead_man: Callable[[], bool] | None = None
     earlier_logs: str | Path | None = None
-
-    def __post_init__(self) -> None:
-        check_wholes(self, "retries", least=0)
-        check_numbers(self, "backoff_s", least=0)
 
     @property
     def backoffs_s(self) -> tuple[float, ...]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from isiw.checks import ascending, check_numbers, number
+from isiw.checks import Checked, Positive, ascending, number
 from isiw.design import DesignSpace
 from isiw.errors import DeviceError, InvalidValueError, IsiwError
 from isiw.findings import AMPLITUDE_MV, BACKGROUND_LIMIT_UV, WINDOW_END_MS, Finding, Kind, Severity, refused
@@ -24,7 +24,7 @@ ARTEFACT_MS: Final = 3.0
 
 
 @dataclass(frozen=True)
-class SignalLimits:
+class SignalLimits(Checked):
     """What a sweep must satisfy to be accepted.
 
     Args:
@@ -40,13 +40,12 @@ class SignalLimits:
     """
 
     mep_window_ms: tuple[float, float] = MEP_WINDOW_MS
-    background_uv: float = 10.0
-    full_scale_mv: float | None = None
-    isi_tolerance_ms: float | None = None
+    background_uv: Positive = 10.0
+    full_scale_mv: Positive | None = None
+    isi_tolerance_ms: Positive | None = None
 
     def __post_init__(self) -> None:
-        check_numbers(self, "background_uv", above=0)
-        check_numbers(self, "full_scale_mv", "isi_tolerance_ms", above=0, optional=True)
+        super().__post_init__()
         _check_window(self.mep_window_ms)
         if (slip := BACKGROUND_LIMIT_UV.slip(self.background_uv)) is not None:
             raise InvalidValueError(

@@ -10,7 +10,7 @@ from typing import Final, TypedDict
 
 import numpy as np
 
-from isiw.checks import amplitude_interval, check_amplitude, check_numbers
+from isiw.checks import Amplitude, Checked, NonNegative, amplitude_interval
 from isiw.errors import InvalidValueError
 from isiw.models.protocol import Observation
 from isiw.signals.tap import may_be_the_taps, meets_response
@@ -56,26 +56,24 @@ def details_of(trial: Trial) -> Details:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Outcome(Checked):
     """What came of one pulse; see `Strategy.tell`."""
 
     isi_ms: float | None
-    mep_mv: float | None = None
+    mep_mv: Amplitude | None = None
     response: bool | None = None
-    isi_sd_ms: float = 0.0
-    mep_sd_mv: float = 0.0
+    isi_sd_ms: NonNegative = 0.0
+    mep_sd_mv: NonNegative = 0.0
     mep_interval_mv: tuple[float, float] | None = None
-    tap_mv: float | None = None
+    tap_mv: NonNegative | None = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         told = self.mep_mv, self.mep_interval_mv, self.response
         if sum(value is not None for value in told) != 1:
             raise InvalidValueError("tell needs one of mep_mv, mep_interval_mv and response", got=told)
         if not (self.response is None or isinstance(self.response, bool | np.bool_)):
             raise InvalidValueError("response must be True or False", got=self.response)
-        check_amplitude(self, "mep_mv", optional=True)
-        check_numbers(self, "isi_sd_ms", "mep_sd_mv", least=0)
-        check_numbers(self, "tap_mv", least=0, optional=True)
         if self.mep_interval_mv is not None:
             object.__setattr__(self, "mep_interval_mv", amplitude_interval(self.mep_interval_mv))
 

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import statistics
 from dataclasses import dataclass
-from typing import Literal
+from functools import partial
+from typing import Annotated, Literal
 
-from isiw.checks import check_choice, check_numbers, check_wholes
+from isiw.checks import Checked, Positive, whole
 from isiw.strategy.stopping import Progress, StopDecision, StopKind
 
 
 @dataclass(frozen=True)
-class EdgeVariance:
+class EdgeVariance(Checked):
     """Stop when the reported edges have settled: the dissertation's rule (4.3).
 
     Args:
@@ -23,14 +24,9 @@ class EdgeVariance:
         InvalidValueError: a variance that is not positive, fewer than two values, or another word for the edges.
     """
 
-    variance_ms2: float = 50.0
-    last: int = 5
+    variance_ms2: Positive = 50.0
+    last: Annotated[int, partial(whole, least=2)] = 5
     edges: Literal["both", "either"] = "both"
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "variance_ms2", above=0)
-        check_wholes(self, "last", least=2)
-        check_choice(self, "edges", ("both", "either"))
 
     @property
     def looks_back(self) -> int:
@@ -52,20 +48,14 @@ class EdgeVariance:
 
 
 @dataclass(frozen=True)
-class ParticleSpread:
+class ParticleSpread(Checked):
     """Stop when a particle search has narrowed itself down: the dissertation's rule for its PF (4.6).
 
     Args:
         sd_ms: the largest acceptable SD of the particles [ms].
-
-    Raises:
-        InvalidValueError: an SD that is not positive.
     """
 
-    sd_ms: float = 25.0
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "sd_ms", above=0)
+    sd_ms: Positive = 25.0
 
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""
@@ -79,22 +69,16 @@ class ParticleSpread:
 
 
 @dataclass(frozen=True)
-class SweptPast:
+class SweptPast(Checked):
     """Stop a sweep that has left the window behind: the dissertation's manual termination (4.2.1).
 
     Only an estimate whose `grid_ms` is what was swept so far can be judged by it.
 
     Args:
         quiet_ms: how far behind the window's end nothing was enhanced [ms].
-
-    Raises:
-        InvalidValueError: a distance that is not positive.
     """
 
-    quiet_ms: float = 25.0
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "quiet_ms", above=0)
+    quiet_ms: Positive = 25.0
 
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""

@@ -8,9 +8,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Final, Protocol, runtime_checkable
+from functools import partial
+from typing import Annotated, Final, Protocol, runtime_checkable
 
-from isiw.checks import check_numbers, check_probabilities, check_wholes
+from isiw.checks import Checked, Count, Positive, Share, number
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
 from isiw.text.harmless import counted
@@ -118,20 +119,14 @@ class HasBudget(Protocol):
 
 
 @dataclass(frozen=True)
-class Budget:
+class Budget(Checked):
     """Stop when `max_trials` stimuli have been delivered; mistrials count.
 
     Args:
         max_trials: how many stimuli.
-
-    Raises:
-        InvalidValueError: not a whole number of at least 1.
     """
 
-    max_trials: int
-
-    def __post_init__(self) -> None:
-        check_wholes(self, "max_trials", least=1)
+    max_trials: Count
 
     def stimuli_left(self, delivered: int) -> int:
         """How many stimuli are left after so many; see `HasBudget`."""
@@ -146,7 +141,7 @@ class Budget:
 
 
 @dataclass(frozen=True)
-class CredibleWidth:
+class CredibleWidth(Checked):
     """Stop when the credible intervals of both edges are narrow enough, and a window is likely.
 
     Where the model weighs hypotheses (`WindowEstimate.hypotheses`), the intervals must be narrow and agree under each
@@ -157,20 +152,12 @@ class CredibleWidth:
         level: the credible level of the intervals.
         min_probability: the least probability of a window.
         min_share: the least probability of a hypothesis that must be reckoned with.
-
-    Raises:
-        InvalidValueError: a width that is not positive, or a level, probability or share outside 0–1.
     """
 
-    width_ms: float
-    level: float = 0.9
-    min_probability: float = 0.9
-    min_share: float = 0.02
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "width_ms", above=0)
-        check_numbers(self, "level", above=0, below=1)
-        check_probabilities(self, "min_probability", "min_share")
+    width_ms: Positive
+    level: Annotated[float, partial(number, above=0, below=1)] = 0.9
+    min_probability: Share = 0.9
+    min_share: Share = 0.02
 
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""
@@ -199,20 +186,14 @@ def _known_to(width_ms: float) -> str:
 
 
 @dataclass(frozen=True)
-class NoWindow:
+class NoWindow(Checked):
     """Stop when it is all but certain that there is no window.
 
     Args:
         probability: the least probability of "no window" to stop at.
-
-    Raises:
-        InvalidValueError: a probability outside 0–1.
     """
 
-    probability: float = 0.9
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "probability", above=0, most=1)
+    probability: Annotated[float, partial(number, above=0, most=1)] = 0.9
 
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""
@@ -228,22 +209,16 @@ class NoWindow:
 
 
 @dataclass(frozen=True)
-class ExpectedF1:
+class ExpectedF1(Checked):
     """Stop when the reported window is expected to be right enough.
 
     Args:
         f1: the least expected F1 to stop at; 1 for never, as finitely many samples may all agree on one window.
         min_probability: the least probability of a window.
-
-    Raises:
-        InvalidValueError: an F1 or a probability outside 0–1.
     """
 
-    f1: float = 0.9
-    min_probability: float = 0.9
-
-    def __post_init__(self) -> None:
-        check_probabilities(self, "f1", "min_probability")
+    f1: Share = 0.9
+    min_probability: Share = 0.9
 
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""
@@ -263,7 +238,7 @@ class ExpectedF1:
 
 
 @dataclass(frozen=True)
-class SmallGain:
+class SmallGain(Checked):
     """Stop when another few stimuli would hardly add anything: returns diminish, so the last few tell what they would.
 
     Args:
@@ -271,19 +246,12 @@ class SmallGain:
         last: how many stimuli.
         min_told: the fewest pairs to stop after.
         min_probability: the least probability of a window.
-
-    Raises:
-        InvalidValueError: a gain or a probability outside 0–1, or no trials to look back at.
     """
 
-    gain: float = 0.02
-    last: int = 10
-    min_told: int = 35
-    min_probability: float = 0.97
-
-    def __post_init__(self) -> None:
-        check_probabilities(self, "gain", "min_probability")
-        check_wholes(self, "last", "min_told", least=1)
+    gain: Share = 0.02
+    last: Count = 10
+    min_told: Count = 35
+    min_probability: Share = 0.97
 
     @property
     def looks_back(self) -> int:

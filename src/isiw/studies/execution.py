@@ -25,7 +25,7 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 from loky import ProcessPoolExecutor
 
-from isiw.checks import check_wholes
+from isiw.checks import Checked, Count
 from isiw.errors import StudyError
 from isiw.lazy import torch
 
@@ -102,7 +102,7 @@ class Executor(Protocol):
 
 
 @dataclass(frozen=True)
-class Processes:
+class Processes(Checked):
     """This machine: one worker is this process itself; several are processes of loky's, of one torch thread each.
 
     A worker that dies takes the pool with it. What was running then is run again, each item alone so that the one to
@@ -111,16 +111,10 @@ class Processes:
     Args:
         workers: how many.
         attempts: an item that has taken its worker down so often is given up.
-
-    Raises:
-        InvalidValueError: fewer than one worker or attempt.
     """
 
-    workers: int = 1
-    attempts: int = 3
-
-    def __post_init__(self) -> None:
-        check_wholes(self, "workers", "attempts", least=1)
+    workers: Count = 1
+    attempts: Count = 3
 
     def results(
         self, run: Callable[[_Item], _Result], items: Sequence[_Item]

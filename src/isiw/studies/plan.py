@@ -15,11 +15,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from itertools import groupby, product
 from pathlib import Path
-from typing import Any, Final, Literal, TypeAlias, get_args
+from typing import Annotated, Any, Final, Literal, TypeAlias
 
-from isiw.checks import check_choice, check_numbers, check_wholes, text, whole
+from isiw.checks import Checked, Positive, text, whole
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace, require_space
 from isiw.errors import ConfigError, InvalidValueError
 from isiw.lazy import pd, torch
@@ -132,7 +133,7 @@ def run_unit(unit: Unit) -> pd.DataFrame:
 
 
 @dataclass(frozen=True)
-class Study:
+class Study(Checked):
     """A study.
 
     Args:
@@ -161,39 +162,32 @@ class Study:
 
     strategies: tuple[StudyStrategy, ...]
     cohorts: tuple[str, ...]
-    people: int = 20
-    seed: int = 0
-    trials: int = 40
+    people: Annotated[int, partial(whole, least=1, most=_MOST_SESSIONS)] = 20
+    seed: Annotated[int, partial(whole, least=0, most=_MOST_SEED)] = 0
+    trials: Annotated[int, partial(whole, least=1, most=_MOST_TRIALS)] = 40
     marks: tuple[int, ...] = ()
     space: DesignSpace = VALVE_SPACE
     stopping: Stopping = "noted"
     engine: Engine = "single"
-    batch: int = 50
+    batch: Annotated[int, partial(whole, least=1, most=_MOST_SESSIONS)] = 50
     device: str = "cpu"
-    amplitude: float = 1.0
+    amplitude: Positive = 1.0
     hit_delay: Stated = "unstated"
     intensity: Stated = "unstated"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         object.__setattr__(self, "strategies", tuple(map(_named, _several(self.strategies))))
         object.__setattr__(self, "cohorts", _several(self.cohorts))
         object.__setattr__(self, "marks", tuple(whole("a mark", mark, least=0) for mark in _several(self.marks)))
-        check_wholes(self, "people", "batch", least=1, most=_MOST_SESSIONS)
-        check_wholes(self, "trials", least=1, most=_MOST_TRIALS)
-        check_wholes(self, "seed", least=0, most=_MOST_SEED)
         if not self.marks:
             object.__setattr__(self, "marks", (*range(5, self.trials, 5), self.trials))
-        check_numbers(self, "amplitude", above=0)
         if isinstance(self.space, str) and self.space in _SPACES:
             object.__setattr__(self, "space", _SPACES[self.space])
         require_space(self.space)
         _require_torch_device(self.device)
         if list(self.marks) != sorted(set(self.marks)) or not 0 <= self.marks[0] <= self.marks[-1] <= self.trials:
             raise InvalidValueError("marks ascend from 0 to the number of trials", got=self.marks)
-        check_choice(self, "stopping", get_args(Stopping))
-        check_choice(self, "engine", get_args(Engine))
-        check_choice(self, "hit_delay", get_args(Stated))
-        check_choice(self, "intensity", get_args(Stated))
         require_cohorts(self.cohorts)
         labels = [strategy.label for strategy in self.strategies]
         if (

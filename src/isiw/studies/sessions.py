@@ -9,9 +9,9 @@ import math
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, TypeAlias, get_args
+from typing import Any, Literal, TypeAlias
 
-from isiw.checks import check_choice, check_numbers, check_wholes, whole
+from isiw.checks import Checked, Count, Natural, Positive, whole
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, StudyError
 from isiw.estimate import WindowEstimate
@@ -53,7 +53,7 @@ def require_cohorts(names: Iterable[object]) -> None:
 
 
 @dataclass(frozen=True)
-class SimulatedSession:
+class SimulatedSession(Checked):
     """One session of a study.
 
     Args:
@@ -78,22 +78,19 @@ class SimulatedSession:
 
     strategy: str
     cohort: str
-    person: int
-    seed: int
-    trials: int
+    person: Natural
+    seed: Natural
+    trials: Count
     marks: tuple[int, ...]
     space: DesignSpace = VALVE_SPACE
     settings: tuple[tuple[str, Any], ...] = field(default=())
     label: str = ""
     stopping: Stopping = "ignored"
-    amplitude: float = 1.0
+    amplitude: Positive = 1.0
     own: OwnCode | None = None
 
     def __post_init__(self) -> None:
-        check_wholes(self, "trials", least=1)
-        check_wholes(self, "person", "seed", least=0)
-        check_numbers(self, "amplitude", above=0)
-        check_choice(self, "stopping", get_args(Stopping))
+        super().__post_init__()
         if not isinstance(self.strategy, str):
             what = "a session knows its strategy by a name"
             raise InvalidValueError(what, got=type(self.strategy).__name__, expected="a text", remedy=OWN_STRATEGY)

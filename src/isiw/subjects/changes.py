@@ -12,29 +12,22 @@ from typing import Final
 
 import numpy as np
 
-from isiw.checks import check_numbers, check_wholes
+from isiw.checks import Checked, Count, NonNegative, Number, Positive
 from isiw.errors import InvalidValueError
 from isiw.types import FloatArray
 
 
 @dataclass(frozen=True)
-class Plasticity:
+class Plasticity(Checked):
     """How a person's gain depends on the pairs that they have had.
 
     Args:
         limit: change of the log gain after very many pairs, natural log; above 0 the MEPs grow, below 0 they shrink.
         pairs: after so many pairs at the best ISI, 63 % of the change has come.
-
-    Raises:
-        InvalidValueError: a limit that is not finite, or pairs that are not positive.
     """
 
-    limit: float
-    pairs: float = 100.0
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "limit")
-        check_numbers(self, "pairs", above=0)
+    limit: Number
+    pairs: Positive = 100.0
 
     def log_gain(self, dose: float) -> float:
         """What is added to the log gain.
@@ -58,7 +51,7 @@ _OSCILLATION_HZ: Final = 80.0
 
 
 @dataclass(frozen=True)
-class Change:
+class Change(Checked):
     """A change in the course of a session: none before trial `first`, whole from trial `last` on, linear in between.
 
     Args:
@@ -74,18 +67,15 @@ class Change:
         InvalidValueError: a number that is not finite, trials in the wrong order, or a half-life that is not positive.
     """
 
-    first: int = 1
-    last: int = 1
-    log_gain: float = 0.0
-    intensity_pct_rmt: float = 0.0
-    shift_ms: float = 0.0
-    half_life: float | None = None
+    first: Count = 1
+    last: Count = 1
+    log_gain: Number = 0.0
+    intensity_pct_rmt: Number = 0.0
+    shift_ms: Number = 0.0
+    half_life: Positive | None = None
 
     def __post_init__(self) -> None:
-        check_wholes(self, "first", least=1)
-        check_wholes(self, "last", least=1)
-        check_numbers(self, "log_gain", "intensity_pct_rmt", "shift_ms")
-        check_numbers(self, "half_life", above=0, optional=True)
+        super().__post_init__()
         if self.last < self.first:
             raise InvalidValueError("a change ends before it begins", got=(self.first, self.last))
 
@@ -107,7 +97,7 @@ class Change:
 
 
 @dataclass(frozen=True)
-class TapResponse:
+class TapResponse(Checked):
     """What the tap alone evokes in the muscle that is recorded: a burst of fixed course and varying size.
 
     Args:
@@ -115,20 +105,12 @@ class TapResponse:
         duration_ms: how long it lasts [ms].
         median_mv: median of its peak-to-peak amplitude [mV].
         log_sd: SD of the amplitude from trial to trial, natural log.
-
-    Raises:
-        InvalidValueError: a duration or an amplitude that is not positive, or a negative SD.
     """
 
-    start_ms: float
-    duration_ms: float
-    median_mv: float
-    log_sd: float
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "start_ms")
-        check_numbers(self, "duration_ms", "median_mv", above=0)
-        check_numbers(self, "log_sd", least=0)
+    start_ms: Number
+    duration_ms: Positive
+    median_mv: Positive
+    log_sd: NonNegative
 
     def course(self, after_hit_ms: FloatArray) -> FloatArray:
         """The burst as a share of its peak-to-peak amplitude, which is 1 over its whole length; same shape.

@@ -26,7 +26,7 @@ from typing import Final
 
 import numpy as np
 
-from isiw.checks import check_numbers
+from isiw.checks import Checked, Number, Positive, number
 from isiw.lazy import scipy
 from isiw.subjects.profiles import OpposedProfile, PeakProfile
 from isiw.subjects.responses import EmgFloor, RecruitmentResponse
@@ -49,7 +49,7 @@ MAX_BOOST_PCT_RMT: Final = 60.0
 
 
 @dataclass(frozen=True)
-class MeasuredPerson:
+class MeasuredPerson(Checked):
     """What the text has about one of its subjects.
 
     Args:
@@ -62,15 +62,14 @@ class MeasuredPerson:
         InvalidValueError: an invalid number.
     """
 
-    width_ms: float
-    threshold_mv: float
-    peak_mv: float
-    peak_error_mv: float | None = None
+    width_ms: Positive
+    threshold_mv: Positive
+    peak_mv: Number
+    peak_error_mv: Positive | None = None
 
     def __post_init__(self) -> None:
-        check_numbers(self, "width_ms", "threshold_mv", above=0)
-        check_numbers(self, "peak_mv", above=self.threshold_mv)
-        check_numbers(self, "peak_error_mv", above=0, optional=True)
+        super().__post_init__()
+        number("MeasuredPerson.peak_mv", self.peak_mv, above=self.threshold_mv)
 
     def response(self) -> RecruitmentResponse:
         """Their recruitment curve: half of the MEPs at RMT are responses, and the best ISI has their peak."""

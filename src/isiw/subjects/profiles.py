@@ -9,11 +9,12 @@ facilitation is negative there (8.1.3).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from functools import partial
+from typing import Annotated, Protocol
 
 import numpy as np
 
-from isiw.checks import check_numbers, check_probabilities
+from isiw.checks import Checked, Number, Positive, Share, number
 from isiw.errors import InvalidValueError
 from isiw.types import ArrayLike, FloatArray
 
@@ -26,7 +27,7 @@ class Profile(Protocol):
 
 
 @dataclass(frozen=True)
-class PeakProfile:
+class PeakProfile(Checked):
     """One peak whose flanks fall to exp(-2) at both ends of its span.
 
     Args:
@@ -34,21 +35,12 @@ class PeakProfile:
         width_ms: from there to the same level of the falling flank [ms].
         peak_at: where the peak lies, as a share of the width; 0.5 is symmetric.
         exponent: 2 is Gaussian (SD = width/4 if symmetric), more is flatter on top with steeper flanks.
-
-    Raises:
-        InvalidValueError: an invalid span, peak or exponent.
     """
 
-    start_ms: float
-    width_ms: float
-    peak_at: float = 0.5
-    exponent: float = 2.0
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "start_ms")
-        check_numbers(self, "width_ms", above=0)
-        check_numbers(self, "peak_at", above=0, below=1)
-        check_numbers(self, "exponent", above=0)
+    start_ms: Number
+    width_ms: Positive
+    peak_at: Annotated[float, partial(number, above=0, below=1)] = 0.5
+    exponent: Positive = 2.0
 
     def __call__(self, isi_ms: ArrayLike) -> FloatArray:
         """Facilitation in 0–1 at ISIs counted from the impact [ms], same shape."""
@@ -58,7 +50,7 @@ class PeakProfile:
 
 
 @dataclass(frozen=True)
-class TwoPeakProfile:
+class TwoPeakProfile(Checked):
     """Two Gaussians at 0.27 and 0.73 of the span, each with an SD of width/7.5.
 
     Args:
@@ -71,15 +63,13 @@ class TwoPeakProfile:
         InvalidValueError: an invalid span or height.
     """
 
-    start_ms: float
-    width_ms: float
-    first: float
-    second: float
+    start_ms: Number
+    width_ms: Positive
+    first: Share
+    second: Share
 
     def __post_init__(self) -> None:
-        check_numbers(self, "start_ms")
-        check_numbers(self, "width_ms", above=0)
-        check_probabilities(self, "first", "second")
+        super().__post_init__()
         if 1 not in {self.first, self.second}:
             raise InvalidValueError("the higher peak has height 1", got=(self.first, self.second))
 
@@ -91,24 +81,18 @@ class TwoPeakProfile:
 
 
 @dataclass(frozen=True)
-class OpposedProfile:
+class OpposedProfile(Checked):
     """A segment that facilitates and one that depresses, in either order.
 
     Args:
         facilitated: the facilitation.
         depressed: where the tap depresses, as a share of the deepest depression.
         depth: the deepest depression, in units of the largest facilitation.
-
-    Raises:
-        InvalidValueError: a depth that is not positive.
     """
 
     facilitated: PeakProfile
     depressed: PeakProfile
-    depth: float
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "depth", above=0)
+    depth: Positive
 
     def __call__(self, isi_ms: ArrayLike) -> FloatArray:
         """Facilitation at ISIs counted from the impact [ms], negative where the tap depresses, same shape."""

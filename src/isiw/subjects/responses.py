@@ -11,11 +11,12 @@ Both add an EMG floor: the peak-to-peak amplitude that a sweep has without any r
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from functools import partial
+from typing import Annotated, Protocol
 
 import numpy as np
 
-from isiw.checks import check_numbers
+from isiw.checks import Checked, NonNegative, Positive, number
 from isiw.lazy import scipy
 from isiw.types import ArrayLike, FloatArray
 
@@ -24,7 +25,7 @@ _NODE_WEIGHTS = _NODE_WEIGHTS / _NODE_WEIGHTS.sum()
 
 
 @dataclass(frozen=True)
-class EmgFloor:
+class EmgFloor(Checked):
     """Peak-to-peak amplitude of a sweep without a response: log-normal.
 
     Args:
@@ -32,12 +33,8 @@ class EmgFloor:
         log_sd: its SD from trial to trial, natural log.
     """
 
-    median_mv: float
-    log_sd: float
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "median_mv", above=0)
-        check_numbers(self, "log_sd", least=0)
+    median_mv: Positive
+    log_sd: NonNegative
 
     @property
     def mean_mv(self) -> float:
@@ -79,7 +76,7 @@ class ResponseCurve(Protocol):
 
 
 @dataclass(frozen=True)
-class GainResponse:
+class GainResponse(Checked):
     """The MEP is the facilitation times a gain, with gamma-distributed noise of constant CV.
 
     Args:
@@ -91,14 +88,9 @@ class GainResponse:
     """
 
     floor: EmgFloor
-    gain_mv: float
-    cv: float
-    max_response_probability: float | None = None
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "cv", above=0)
-        check_numbers(self, "gain_mv", least=0)
-        check_numbers(self, "max_response_probability", least=0, most=1, optional=True)
+    gain_mv: NonNegative
+    cv: Positive
+    max_response_probability: Annotated[float, partial(number, least=0, most=1)] | None = None
 
     def response_probability(self, facilitation: ArrayLike) -> FloatArray:
         """Probability that a trial responds, by facilitation; same shape."""
@@ -120,7 +112,7 @@ class GainResponse:
 
 
 @dataclass(frozen=True)
-class RecruitmentResponse:
+class RecruitmentResponse(Checked):
     """The recruitment curve with noise on its input and its output.
 
     `s = A / (1 + exp(-k (x + sigma_x z1 - x50))) exp(sigma_y z2)` with `x = intensity + boost * facilitation`.
@@ -137,17 +129,13 @@ class RecruitmentResponse:
     """
 
     floor: EmgFloor
-    amplitude_mv: float
-    slope_per_pct: float
-    x50_pct_rmt: float
-    boost_pct_rmt: float
-    sigma_x_pct_rmt: float
-    sigma_y: float
-    intensity_pct_rmt: float = 90.0
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "amplitude_mv", "slope_per_pct", "x50_pct_rmt", "intensity_pct_rmt", above=0)
-        check_numbers(self, "boost_pct_rmt", "sigma_x_pct_rmt", "sigma_y", least=0)
+    amplitude_mv: Positive
+    slope_per_pct: Positive
+    x50_pct_rmt: Positive
+    boost_pct_rmt: NonNegative
+    sigma_x_pct_rmt: NonNegative
+    sigma_y: NonNegative
+    intensity_pct_rmt: Positive = 90.0
 
     def evoked_mv(self, facilitation: ArrayLike, input_z: ArrayLike) -> FloatArray:
         """MEP above the floor before output noise [mV], by facilitation and input noise; broadcast shape.

@@ -7,15 +7,18 @@ start-up, serial correlation, plasticity).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Final, get_args
+from functools import partial
+from typing import Annotated, Final, get_args
 
 import numpy as np
 
 from isiw.checks import (
-    check_choice,
-    check_flags,
-    check_numbers,
-    check_probabilities,
+    Checked,
+    Flag,
+    NonNegative,
+    Number,
+    Positive,
+    Share,
     choice,
     mean_and_sd,
     number,
@@ -34,7 +37,7 @@ OUTLIERS_MV: Final = (0.1, 0.5)
 
 
 @dataclass(frozen=True)
-class Drift:
+class Drift(Checked):
     """How a person's log gain wanders: an AR(1) walk from zero, and the start-up of the first trials.
 
     Args:
@@ -46,13 +49,12 @@ class Drift:
         InvalidValueError: a coefficient outside -1 to 1, a negative SD, or a start-up that is not finite.
     """
 
-    persistence: float = 0.97
-    innovation_sd: float = 0.12
+    persistence: Annotated[float, partial(number, least=-1, most=1)] = 0.97
+    innovation_sd: NonNegative = 0.12
     startup: tuple[float, ...] = (0.29, 0.20)
 
     def __post_init__(self) -> None:
-        check_numbers(self, "persistence", least=-1, most=1)
-        check_numbers(self, "innovation_sd", least=0)
+        super().__post_init__()
         object.__setattr__(self, "startup", tuple(number("Drift.startup", each) for each in self.startup))
 
 
@@ -72,7 +74,7 @@ class Response:
 
 
 @dataclass(frozen=True)
-class SimulatedSubject:
+class SimulatedSubject(Checked):
     """One simulated person.
 
     Args:
@@ -103,31 +105,24 @@ class SimulatedSubject:
 
     profile: Profile
     response: ResponseCurve
-    hit_delay_ms: float
-    hit_delay_sd_ms: float
+    hit_delay_ms: Number
+    hit_delay_sd_ms: NonNegative
     drift: Drift | None = None
-    input_correlation: float = 0.0
-    outlier_probability: float = 0.0
-    isi_jitter_ms: float = 0.0
-    jitter_told: bool = True
-    scale: float = 1.0
+    input_correlation: Annotated[float, partial(number, least=-1, most=1)] = 0.0
+    outlier_probability: Share = 0.0
+    isi_jitter_ms: NonNegative = 0.0
+    jitter_told: Flag = True
+    scale: Positive = 1.0
     stated_hit_delay_ms: tuple[float, float] = (180.0, 6.0)
-    stated_intensity_pct_rmt: float | None = None
+    stated_intensity_pct_rmt: Positive | None = None
     conditioning: Conditioning = "tap"
     plasticity: Plasticity | None = None
     change: Change | None = None
     tap_response: TapResponse | None = None
-    amplitude_step_mv: float = 0.0
+    amplitude_step_mv: NonNegative = 0.0
 
     def __post_init__(self) -> None:
-        check_numbers(self, "hit_delay_ms")
-        check_numbers(self, "hit_delay_sd_ms", "isi_jitter_ms", "amplitude_step_mv", least=0)
-        check_numbers(self, "input_correlation", least=-1, most=1)
-        check_probabilities(self, "outlier_probability")
-        check_numbers(self, "scale", above=0)
-        check_numbers(self, "stated_intensity_pct_rmt", above=0, optional=True)
-        check_flags(self, "jitter_told")
-        check_choice(self, "conditioning", get_args(Conditioning))
+        super().__post_init__()
         stated_ms = mean_and_sd("SimulatedSubject.stated_hit_delay_ms", self.stated_hit_delay_ms)
         object.__setattr__(self, "stated_hit_delay_ms", stated_ms)
         retuned = self.change is not None and self.change.intensity_pct_rmt != 0

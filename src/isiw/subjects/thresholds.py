@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 import zlib
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Final
+from functools import cached_property, partial
+from typing import Annotated, Final
 
 import numpy as np
 
-from isiw.checks import check_numbers, choice, number, whole
+from isiw.checks import Checked, Number, Positive, choice, number, whole
 from isiw.errors import InvalidValueError
 from isiw.lazy import scipy
 from isiw.subjects.cohorts import cohort
@@ -39,25 +39,18 @@ _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
 
 
 @dataclass(frozen=True)
-class HotSpot:
+class HotSpot(Checked):
     """Where the coil acts most, and how its effect falls off: as a Gaussian of the distance.
 
     Args:
         x_mm: its place from the middle of the searched area [mm].
         y_mm: the same, across [mm].
         spread_mm: at this distance the intensity acts like 61 % of it [mm].
-
-    Raises:
-        InvalidValueError: a place that is not finite, or a spread that is not positive.
     """
 
-    x_mm: float = 0.0
-    y_mm: float = 0.0
-    spread_mm: float = 28.0
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "x_mm", "y_mm")
-        check_numbers(self, "spread_mm", above=0)
+    x_mm: Number = 0.0
+    y_mm: Number = 0.0
+    spread_mm: Positive = 28.0
 
     def effect(self, x_mm: float, y_mm: float) -> float:
         """The share of the intensity that acts with the coil at a place.
@@ -70,7 +63,7 @@ class HotSpot:
 
 
 @dataclass(frozen=True)
-class StimulatedPerson:
+class StimulatedPerson(Checked):
     """One simulated person, by intensity.
 
     Args:
@@ -83,14 +76,13 @@ class StimulatedPerson:
         InvalidValueError: a threshold that is not positive, or an MEP that never exceeds the criterion.
     """
 
-    rmt_pct_mso: float
+    rmt_pct_mso: Positive
     response: RecruitmentResponse
-    input_correlation: float = 0.0
+    input_correlation: Annotated[float, partial(number, least=0, below=1)] = 0.0
     hot_spot: HotSpot = HotSpot()
 
     def __post_init__(self) -> None:
-        check_numbers(self, "rmt_pct_mso", above=0)
-        check_numbers(self, "input_correlation", least=0, below=1)
+        super().__post_init__()
         if self.response.amplitude_mv < SMALLEST_AMPLITUDE_MV:
             raise InvalidValueError(
                 "a person with such small MEPs has no threshold",

@@ -16,7 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
-from isiw.checks import check_numbers, check_probabilities
+from isiw.checks import Checked, NonNegative, Positive, Share
 from isiw.errors import InvalidValueError
 from isiw.lazy import scipy
 from isiw.types import ArrayLike, FloatArray
@@ -58,27 +58,20 @@ class SensorNoise:
 
 
 @dataclass(frozen=True)
-class Event:
+class Event(Checked):
     """When something happens in a tap, and how it varies from tap to tap.
 
     Args:
         mean_ms: its mean [ms].
         sd_ms: its SD [ms].
-
-    Raises:
-        InvalidValueError: a mean that is not positive, or a negative SD.
     """
 
-    mean_ms: float
-    sd_ms: float
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "mean_ms", above=0)
-        check_numbers(self, "sd_ms", least=0)
+    mean_ms: Positive
+    sd_ms: NonNegative
 
 
 @dataclass(frozen=True)
-class Faults:
+class Faults(Checked):
     """Occasional faults.
 
     Args:
@@ -90,18 +83,18 @@ class Faults:
         InvalidValueError: an invalid probability, or delays that do not ascend from 0.
     """
 
-    stuck_probability: float = 0.0
-    late_probability: float = 0.0
+    stuck_probability: Share = 0.0
+    late_probability: Share = 0.0
     late_ms: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        check_probabilities(self, "stuck_probability", "late_probability")
+        super().__post_init__()
         if not 0 <= self.late_ms[0] <= self.late_ms[1]:
             raise InvalidValueError("Faults.late_ms must ascend from 0", got=self.late_ms)
 
 
 @dataclass(frozen=True)
-class Geometry:
+class Geometry(Checked):
     """One person's wrist under the robot, by its mean event times and how they vary from tap to tap.
 
     Args:
@@ -122,13 +115,13 @@ class Geometry:
     hit: Event
     contact: Event
     memg: Event = Event(20.0, 0.5)
-    artefact_mv: float = 0.1
+    artefact_mv: NonNegative = 0.1
     load_cell: bool = False
     faults: Faults = field(default_factory=Faults)
     noise: SensorNoise = field(default_factory=SensorNoise)
 
     def __post_init__(self) -> None:
-        check_numbers(self, "artefact_mv", least=0)
+        super().__post_init__()
         if not LINE_DELAY_MS < self.descent.mean_ms < self.hit.mean_ms:
             raise InvalidValueError(
                 "a tap's events are out of order",

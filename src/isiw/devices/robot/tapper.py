@@ -6,12 +6,13 @@ import math
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from types import MappingProxyType
-from typing import Any, Literal, Protocol, TypeAlias, get_args
+from typing import Annotated, Any, Literal, Protocol, TypeAlias
 
 import numpy as np
 
-from isiw.checks import MOST_DELAY_MS, check_choice, check_numbers, choice
+from isiw.checks import MOST_DELAY_MS, Checked, choice, number
 from isiw.devices.protocol import DeviceInfo
 from isiw.devices.robot.mechanism import Event, Faults, Geometry, Taps, draw_taps
 from isiw.devices.robot.waveforms import UNITS, record_emg, record_robot, sample_times_ms
@@ -73,7 +74,7 @@ class Evoked(Protocol):
 
 
 @dataclass(frozen=True)
-class TapperSettings:
+class TapperSettings(Checked):
     """How the robot is run.
 
     Args:
@@ -95,19 +96,14 @@ class TapperSettings:
     reference: Reference = "impact"
     trigger: Trigger = "open-loop"
     accelerometer: bool = True
-    rate_hz: float = 5000.0
-    expected_hit_ms: float = 180.0
-    expected_hit_sd_ms: float = 6.0
-    expected_tap_sd_ms: float = 2.5
-    pulse_jitter_ms: float = 0.0
+    rate_hz: Annotated[float, partial(number, above=0, most=MOST_RATE_HZ)] = 5000.0
+    expected_hit_ms: Annotated[float, partial(number, above=0, most=MOST_DELAY_MS)] = 180.0
+    expected_hit_sd_ms: Annotated[float, partial(number, above=0, most=MOST_DELAY_MS)] = 6.0
+    expected_tap_sd_ms: Annotated[float, partial(number, above=0, most=MOST_DELAY_MS)] = 2.5
+    pulse_jitter_ms: Annotated[float, partial(number, least=0, most=MOST_DELAY_MS)] = 0.0
 
     def __post_init__(self) -> None:
-        check_choice(self, "reference", get_args(Reference))
-        check_choice(self, "trigger", get_args(Trigger))
-        check_numbers(self, "rate_hz", above=0, most=MOST_RATE_HZ)
-        times = "expected_hit_ms", "expected_hit_sd_ms", "expected_tap_sd_ms"
-        check_numbers(self, *times, above=0, most=MOST_DELAY_MS)
-        check_numbers(self, "pulse_jitter_ms", least=0, most=MOST_DELAY_MS)
+        super().__post_init__()
         if self.trigger == "impact" and not self.accelerometer:
             raise InvalidValueError("the impact cannot trigger a pulse without an accelerometer to find it")
         if self.reference == "impact" and not self.accelerometer:

@@ -10,9 +10,16 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TypeVar
+from functools import partial
+from typing import Annotated, TypeVar
 
-from isiw.checks import check_choice, check_numbers, check_texts, check_wholes
+from isiw.checks import (
+    Checked,
+    Count,
+    NonNegative,
+    Positive,
+    choice,
+)
 from isiw.devices.transports.line_table import Connection, Exchange, command_values
 from isiw.errors import DeviceError, DeviceTimeoutError
 from isiw.text.harmless import read_whole
@@ -31,7 +38,7 @@ _sequence = itertools.count(secrets.randbelow(900_000) + 1)
 
 
 @dataclass(frozen=True)
-class LineSettings:
+class LineSettings(Checked):
     """How lines are exchanged.
 
     Args:
@@ -46,18 +53,11 @@ class LineSettings:
         InvalidValueError: a time that is not positive, or another end of a line.
     """
 
-    baud: int = 115_200
-    line_end: str = "\n"
-    timeout_s: float = 1.0
-    connect_s: float = 2.5
-    isi_tolerance_ms: float = 0.001
-
-    def __post_init__(self) -> None:
-        check_wholes(self, "baud", least=1)
-        check_texts(self, "line_end")
-        check_choice(self, "line_end", ("\n", "\r", "\r\n"))
-        check_numbers(self, "timeout_s", "connect_s", above=0)
-        check_numbers(self, "isi_tolerance_ms", least=0)
+    baud: Count = 115_200
+    line_end: Annotated[str, partial(choice, known=("\n", "\r", "\r\n"))] = "\n"
+    timeout_s: Positive = 1.0
+    connect_s: Positive = 2.5
+    isi_tolerance_ms: NonNegative = 0.001
 
 
 class Line:

@@ -16,7 +16,7 @@ from string import Formatter
 from typing import Any, Final, Protocol
 from urllib.parse import urlsplit
 
-from isiw.checks import check_numbers, check_texts, from_table, number
+from isiw.checks import Checked, Positive, Text, from_table, number
 from isiw.errors import ConfigError, InvalidValueError
 from isiw.text.harmless import read_number
 
@@ -134,7 +134,7 @@ _NONE: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
-class Exchange:
+class Exchange(Checked):
     r"""A command and the answer that it must get.
 
     Args:
@@ -147,13 +147,12 @@ class Exchange:
         InvalidValueError: text that is no template or no pattern, or a sequence number in only one of the two.
     """
 
-    send: str
-    reply: str
-    timeout_s: float | None = None
+    send: Text
+    reply: Text
+    timeout_s: Positive | None = None
 
     def __post_init__(self) -> None:
-        check_texts(self, "send", "reply")
-        check_numbers(self, "timeout_s", above=0, optional=True)
+        super().__post_init__()
         if not self.send.isascii() or not self.send.isprintable() or not self.send:
             raise InvalidValueError("a command must be one line of ASCII", got=self.send)
         self._require_pattern()

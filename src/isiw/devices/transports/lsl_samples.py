@@ -15,7 +15,7 @@ from typing import Final, Protocol
 
 import numpy as np
 
-from isiw.checks import check_numbers, check_texts, check_wholes
+from isiw.checks import Checked, Natural, Positive, Text
 from isiw.errors import DeviceError, NotDelivered
 from isiw.types import FloatArray
 
@@ -28,7 +28,7 @@ _GLANCE_S: Final = 0.05
 
 
 @dataclass(frozen=True)
-class LslChannel:
+class LslChannel(Checked):
     """Where a channel of a sweep comes from.
 
     Args:
@@ -36,20 +36,12 @@ class LslChannel:
         unit: the unit of its samples, such as "mV".
         rate_hz: the sampling rate of the stream [Hz].
         column: which of the stream's channels it is, from 0.
-
-    Raises:
-        InvalidValueError: a rate that is not positive, or a negative column.
     """
 
-    stream: str
-    unit: str
-    rate_hz: float
-    column: int = 0
-
-    def __post_init__(self) -> None:
-        check_texts(self, "stream", "unit")
-        check_numbers(self, "rate_hz", above=0)
-        check_wholes(self, "column", least=0)
+    stream: Text
+    unit: Text
+    rate_hz: Positive
+    column: Natural = 0
 
 
 class Inlet(Protocol):

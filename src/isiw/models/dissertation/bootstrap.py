@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, get_args
+from functools import partial
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from isiw.checks import check_choice, check_numbers, check_wholes
+from isiw.checks import Checked, NonNegative, Positive, whole
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
 from isiw.lazy import torch
@@ -43,7 +44,7 @@ def resampled(particles: FloatArray, weights: FloatArray, uniform: FloatArray) -
 
 
 @dataclass(frozen=True)
-class BootstrapFilter:
+class BootstrapFilter(Checked):
     """A particle filter over ISIs.
 
     Args:
@@ -56,23 +57,14 @@ class BootstrapFilter:
         half_width_ms: the half width: three SDs of 25 ms in the text (4.3.2), two of them, 50 ms, in the caption of
             Fig. 4.13.
         floor: what is subtracted from an MEP before it becomes a weight; the text has the MEPs as they are.
-
-    Raises:
-        InvalidValueError: an invalid number, or an unknown kind of window.
     """
 
-    particles: int = 30
-    diffusion_ms: float = 10.0
-    lattice_ms: float = 5.0
+    particles: Annotated[int, partial(whole, least=2)] = 30
+    diffusion_ms: NonNegative = 10.0
+    lattice_ms: Positive = 5.0
     window: WindowKind = "expectation"
-    half_width_ms: float = 75.0
+    half_width_ms: Positive = 75.0
     floor: FloorTreatment = field(default_factory=lambda: FloorTreatment("raw"), metadata={"spread": True})
-
-    def __post_init__(self) -> None:
-        check_wholes(self, "particles", least=2)
-        check_numbers(self, "lattice_ms", "half_width_ms", above=0)
-        check_numbers(self, "diffusion_ms", least=0)
-        check_choice(self, "window", get_args(WindowKind))
 
     def begin(self, space: DesignSpace, seed: int, people: int = 1) -> BootstrapPosterior:
         """The first generation: uniform over the range, diffused, not measured."""

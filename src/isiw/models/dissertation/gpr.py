@@ -8,12 +8,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cache, partial
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from isiw.checks import check_numbers, check_wholes
+from isiw.checks import Checked, Count, Number, Positive, number, whole
 from isiw.design import DesignSpace
 from isiw.lazy import scipy, sklearn
 from isiw.models.dissertation.curves import FittedCurve
@@ -27,7 +27,7 @@ SUPPORT_MS = 5.0
 
 
 @dataclass(frozen=True)
-class GaussianProcessRegression:
+class GaussianProcessRegression(Checked):
     """scikit-learn's Gaussian process with a squared-exponential kernel and white noise, about the floor.
 
     The text gives neither kernel nor hyperparameters, only that the covariance is near 1 for close ISIs and 0 for
@@ -45,20 +45,17 @@ class GaussianProcessRegression:
         InvalidValueError: an invalid number.
     """
 
-    length_ms: float = 40.0
-    min_length_ms: float = 25.0
-    max_length_ms: float = 100.0
-    noise: float = 0.3
-    max_fit_iterations: int = 40
-    samples: int = 64
+    length_ms: Number = 40.0
+    min_length_ms: Positive = 25.0
+    max_length_ms: Number = 100.0
+    noise: Annotated[float, partial(number, above=0, below=1)] = 0.3
+    max_fit_iterations: Count = 40
+    samples: Annotated[int, partial(whole, least=2)] = 64
 
     def __post_init__(self) -> None:
-        check_numbers(self, "min_length_ms", above=0)
-        check_numbers(self, "length_ms", least=self.min_length_ms)
-        check_numbers(self, "max_length_ms", least=self.length_ms)
-        check_numbers(self, "noise", above=0, below=1)
-        check_wholes(self, "max_fit_iterations", least=1)
-        check_wholes(self, "samples", least=2)
+        super().__post_init__()
+        number("GaussianProcessRegression.length_ms", self.length_ms, least=self.min_length_ms)
+        number("GaussianProcessRegression.max_length_ms", self.max_length_ms, least=self.length_ms)
 
     def fit(
         self, isi_ms: FloatArray, excess_mv: FloatArray, space: DesignSpace, rng: np.random.Generator

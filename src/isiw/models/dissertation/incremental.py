@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from statistics import NormalDist
-from typing import Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from isiw.checks import check_choice, check_numbers, check_wholes
+from isiw.checks import Checked, Count, Natural, NonNegative, Positive, whole
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
@@ -33,7 +33,7 @@ class _Means(NamedTuple):
 
 
 @dataclass(frozen=True)
-class SweepModel:
+class SweepModel(Checked):
     """The mean MEP of each ISI in turn.
 
     Args:
@@ -52,23 +52,21 @@ class SweepModel:
         InvalidValueError: an invalid number, or an unknown rule.
     """
 
-    step_ms: float = 5.0
-    trials_per_isi: int = 12
-    discarded: int = 2
+    step_ms: Positive = 5.0
+    trials_per_isi: Count = 12
+    discarded: Natural = 2
     rule: SweepRule = "baseline"
-    neighbours: int = 3
-    evidence_se: float = 3.0
+    neighbours: Count = 3
+    evidence_se: NonNegative = 3.0
     floor: FloorTreatment = field(default_factory=FloorTreatment, metadata={"spread": True})
 
     def __post_init__(self) -> None:
-        check_numbers(self, "step_ms", above=0)
-        check_wholes(self, "discarded", least=0)
-        check_wholes(self, "trials_per_isi", least=self.discarded + 2)  # a mean and its error need two that are kept
-        check_choice(self, "rule", get_args(SweepRule))
-        check_wholes(self, "neighbours", least=1)
+        super().__post_init__()
+        whole(
+            "SweepModel.trials_per_isi", self.trials_per_isi, least=self.discarded + 2
+        )  # a mean and its error need two that are kept
         if self.neighbours % 2 == 0:
             raise InvalidValueError("SweepModel.neighbours must be odd", got=self.neighbours)
-        check_numbers(self, "evidence_se", least=0)
 
     def begin(self, space: DesignSpace, seed: int, people: int = 1) -> SweepPosterior:  # noqa: ARG002 - no randomness
         """Nothing measured yet."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal, NamedTuple, get_args
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
-from isiw.checks import check_choice, check_numbers, check_wholes
+from isiw.checks import Checked, Count, NonNegative, Number, Positive, choice, number, whole
 from isiw.design import DesignSpace
 from isiw.lazy import scipy
 from isiw.models.dissertation.curves import FittedCurve
@@ -62,7 +62,7 @@ class _Estimate(NamedTuple):
 
 
 @dataclass(frozen=True)
-class NonlinearRegression:
+class NonlinearRegression(Checked):
     """Least squares of Gaussians, with start values from prior knowledge.
 
     The text starts the mean at mid-range and takes width and amplitude from prior knowledge (5.4.2), whose values it
@@ -86,24 +86,19 @@ class NonlinearRegression:
         InvalidValueError: an invalid number, or an unknown start.
     """
 
-    peaks: int = 1
-    width_ms: float = 108.0
-    min_width_ms: float = 40.0
-    max_width_ms: float = 250.0
-    amplitude_mv: float = 0.05
-    max_evaluations: int = 100
-    samples: int = 64
+    peaks: Annotated[int, partial(choice, known=(1, 2))] = 1
+    width_ms: Number = 108.0
+    min_width_ms: Positive = 40.0
+    max_width_ms: Number = 250.0
+    amplitude_mv: NonNegative = 0.05
+    max_evaluations: Count = 100
+    samples: Annotated[int, partial(whole, least=2)] = 64
     start: Start = "even"
 
     def __post_init__(self) -> None:
-        check_choice(self, "peaks", (1, 2))
-        check_numbers(self, "min_width_ms", above=0)
-        check_numbers(self, "width_ms", least=self.min_width_ms)
-        check_numbers(self, "max_width_ms", least=self.width_ms, above=self.min_width_ms)
-        check_numbers(self, "amplitude_mv", least=0)
-        check_wholes(self, "max_evaluations", least=1)
-        check_wholes(self, "samples", least=2)
-        check_choice(self, "start", get_args(Start))
+        super().__post_init__()
+        number("NonlinearRegression.width_ms", self.width_ms, least=self.min_width_ms)
+        number("NonlinearRegression.max_width_ms", self.max_width_ms, least=self.width_ms, above=self.min_width_ms)
 
     def fit(
         self, isi_ms: FloatArray, excess_mv: FloatArray, space: DesignSpace, rng: np.random.Generator

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol, get_args
+from typing import Protocol
 
 import numpy as np
 
-from isiw.checks import check_choice
+from isiw.checks import Checked
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
 from isiw.lazy import torch
@@ -37,7 +37,7 @@ class RegressionMethod(Protocol):
 
 
 @dataclass(frozen=True)
-class RegressionModel:
+class RegressionModel(Checked):
     """A regression as a model: fits all trials anew after each.
 
     Args:
@@ -45,17 +45,11 @@ class RegressionModel:
         floor: what is subtracted before.
         segments: where the curve crosses its edges' level more than twice: the window is `"all"` that lies above it,
             or the segment that holds the `"peak"`, since a single distribution is expected (4.2.1, 5.4.1).
-
-    Raises:
-        InvalidValueError: an unknown value of the segments.
     """
 
     method: RegressionMethod = field(metadata={"spread": True})
     floor: FloorTreatment = field(default_factory=FloorTreatment, metadata={"spread": True})
     segments: Segments = "peak"
-
-    def __post_init__(self) -> None:
-        check_choice(self, "segments", get_args(Segments))
 
     def begin(self, space: DesignSpace, seed: int, people: int = 1) -> RegressionPosterior:
         """The posterior before the first trial."""

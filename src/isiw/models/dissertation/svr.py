@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
+from typing import Annotated
 
 import numpy as np
 
-from isiw.checks import check_numbers, check_wholes
+from isiw.checks import Checked, NonNegative, Positive, whole
 from isiw.design import DesignSpace
 from isiw.lazy import sklearn
 from isiw.models.dissertation.curves import FittedCurve
@@ -17,7 +19,7 @@ LEAST_SCALE_MV = 1e-3
 
 
 @dataclass(frozen=True)
-class SupportVectorRegression:
+class SupportVectorRegression(Checked):
     """scikit-learn's SVR, and a committee of it on bootstrapped trials.
 
     A support vector regression has no uncertainty of its own: the spread of the committee stands in for it. The text
@@ -28,20 +30,12 @@ class SupportVectorRegression:
         epsilon: residual that costs nothing, as a share of the largest excess.
         length_ms: SD of the kernel [ms]; scikit-learn's gamma is 1 / (2 length²).
         committee: how many regressions on bootstrapped trials.
-
-    Raises:
-        InvalidValueError: an invalid number.
     """
 
-    c: float = 1.0
-    epsilon: float = 0.1
-    length_ms: float = 50.0
-    committee: int = 10
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "c", "length_ms", above=0)
-        check_numbers(self, "epsilon", least=0)
-        check_wholes(self, "committee", least=2)
+    c: Positive = 1.0
+    epsilon: NonNegative = 0.1
+    length_ms: Positive = 50.0
+    committee: Annotated[int, partial(whole, least=2)] = 10
 
     def fit(
         self, isi_ms: FloatArray, excess_mv: FloatArray, space: DesignSpace, rng: np.random.Generator

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import Literal, TypeAlias, get_args
+from functools import cached_property, partial
+from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 
-from isiw.checks import check_choice, check_numbers, check_wholes
+from isiw.checks import Checked, Count, Positive, whole
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
@@ -34,7 +34,7 @@ PATH_STEP_MS = 4.0
 
 
 @dataclass(frozen=True)
-class ProcessSettings:
+class ProcessSettings(Checked):
     """The Gaussian process itself.
 
     Args:
@@ -54,19 +54,16 @@ class ProcessSettings:
     hyperparameters: Literal["marginalised", "map"] = "marginalised"
     prior: HyperparameterPrior = field(default_factory=HyperparameterPrior)
     fixed: FixedProcess | None = None
-    max_evaluations: int = 150
+    max_evaluations: Count = 150
 
     def __post_init__(self) -> None:
-        check_choice(self, "kernel", get_args(KernelName))
-        check_choice(self, "noise", get_args(NoiseKind))
-        check_choice(self, "hyperparameters", ("marginalised", "map"))
-        check_wholes(self, "max_evaluations", least=1)
+        super().__post_init__()
         if self.fixed is not None and self.noise != "equal":
             raise InvalidValueError("fixed hyperparameters are of equal noise", got=self.noise, expected="equal")
 
 
 @dataclass(frozen=True)
-class GaussianProcess:
+class GaussianProcess(Checked):
     """A Gaussian process on the transformed MEP.
 
     It learns from amplitudes only, ignores the SD of an ISI, and takes an amplitude below the detection limit for that
@@ -79,21 +76,13 @@ class GaussianProcess:
             it is the median of what lies low on each path.
         samples: how many paths represent the posterior.
         detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
-
-    Raises:
-        InvalidValueError: an unknown choice, or an invalid number.
     """
 
     process: ProcessSettings = field(default_factory=ProcessSettings, metadata={"spread": True})
     transform: Transform = "log"
     floor: FloorTreatment = field(default_factory=FloorTreatment, metadata={"spread": True})
-    samples: int = 256
-    detection_limit_mv: float = 0.005
-
-    def __post_init__(self) -> None:
-        check_choice(self, "transform", get_args(Transform))
-        check_wholes(self, "samples", least=2)
-        check_numbers(self, "detection_limit_mv", above=0)
+    samples: Annotated[int, partial(whole, least=2)] = 256
+    detection_limit_mv: Positive = 0.005
 
     def begin(self, space: DesignSpace, seed: int, people: int = 1) -> GaussianProcessPosterior:
         """The posterior before the first trial."""

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, TypeAlias
+from functools import partial
+from typing import Annotated, Literal, NamedTuple, TypeAlias
 
-from isiw.checks import check_numbers
+from isiw.checks import Checked, Number, Positive, number
 from isiw.errors import InvalidValueError
 from isiw.lazy import botorch, gpytorch, torch
 from isiw.models.protocol import Tensor
@@ -39,7 +40,7 @@ class Hyperparameters(NamedTuple):
 
 
 @dataclass(frozen=True)
-class HyperparameterPrior:
+class HyperparameterPrior(Checked):
     """Log-normal priors, each a median and a log SD without a tail, and the probability of a profile.
 
     Args:
@@ -53,11 +54,11 @@ class HyperparameterPrior:
     length_ms: Scale = Scale(30.0, 0.5)
     amplitude: Scale = Scale(1.2, 0.3)
     noise: Scale = Scale(0.6, 0.5)
-    p_window: float = 0.75
+    p_window: Annotated[float, partial(number, above=0, most=1)] = 0.75
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         check_scales(self, "length_ms", "amplitude", "noise")
-        check_numbers(self, "p_window", above=0, most=1)
         least = self.noise.median * math.exp(-GRID_SD * self.noise.sd)
         if least < LEAST_NOISE:
             raise InvalidValueError(
@@ -99,7 +100,7 @@ class HyperparameterPrior:
 
 
 @dataclass(frozen=True)
-class FixedProcess:
+class FixedProcess(Checked):
     """Hyperparameters and a scale that are not learnt.
 
     Args:
@@ -113,15 +114,14 @@ class FixedProcess:
         InvalidValueError: a number that is not finite or not positive, or too little noise.
     """
 
-    length_ms: float
-    amplitude: float
-    noise: float
-    centre: float
-    unit: float = 1.0
+    length_ms: Positive
+    amplitude: Positive
+    noise: Positive
+    centre: Number
+    unit: Positive = 1.0
 
     def __post_init__(self) -> None:
-        check_numbers(self, "length_ms", "amplitude", "noise", "unit", above=0)
-        check_numbers(self, "centre")
+        super().__post_init__()
         if self.noise < LEAST_NOISE * self.amplitude:
             raise InvalidValueError(
                 "so little noise makes covariances singular", got=self.noise, expected=f"{LEAST_NOISE:g} amplitudes"

@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-from isiw.checks import check_numbers, check_wholes
+from isiw.checks import Checked, Count, Positive, whole
 from isiw.lazy import torch
 from isiw.models.parametric.ascent import LogDensity, Modes, find_modes
 from isiw.models.protocol import Tensor
@@ -34,7 +34,7 @@ TOO_HEAVY: Final = 0.1
 
 
 @dataclass(frozen=True)
-class Effort:
+class Effort(Checked):
     """How much work a sample is worth.
 
     Args:
@@ -49,17 +49,16 @@ class Effort:
         InvalidValueError: a number not positive and finite, a count that is not whole, or fewer scouts than starts.
     """
 
-    scouts: int = 512
-    starts: int = 12
-    steps: int = 12
-    draws: int = 500
-    fits: int = 10
-    enough: float = 400.0
+    scouts: Count = 512
+    starts: Count = 12
+    steps: Count = 12
+    draws: Count = 500
+    fits: Count = 10
+    enough: Positive = 400.0
 
     def __post_init__(self) -> None:
-        check_wholes(self, "starts", "steps", "draws", "fits", least=1)
-        check_wholes(self, "scouts", least=self.starts)  # every start needs one
-        check_numbers(self, "enough", above=0)
+        super().__post_init__()
+        whole("Effort.scouts", self.scouts, least=self.starts)  # every start needs one
 
 
 @dataclass(frozen=True, eq=False)

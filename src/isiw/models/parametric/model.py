@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import Literal, get_args
+from functools import cached_property, partial
+from typing import Annotated, Literal
 
 import numpy as np
 
-from isiw.checks import check_choice, check_numbers, check_wholes
+from isiw.checks import Checked, Positive, whole
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
 from isiw.lazy import torch
@@ -32,7 +32,7 @@ from isiw.window import Window
 
 
 @dataclass(frozen=True)
-class ParametricModel:
+class ParametricModel(Checked):
     """A Gaussian window on a floor, with gamma, log-normal or input-side noise and outliers.
 
     Args:
@@ -53,17 +53,14 @@ class ParametricModel:
     prior: WindowPrior = field(default_factory=WindowPrior)
     likelihood: Likelihood = "input-noise"
     method: Literal["fast", "nuts"] = "fast"
-    samples: int = 512
+    samples: Annotated[int, partial(whole, least=2)] = 512
     effort: Effort = field(default_factory=Effort)
     chains: Chains = field(default_factory=Chains)
-    detection_limit_mv: float = 0.005
-    response_threshold_mv: float = 0.02
+    detection_limit_mv: Positive = 0.005
+    response_threshold_mv: Positive = 0.02
 
     def __post_init__(self) -> None:
-        check_choice(self, "likelihood", get_args(Likelihood))
-        check_choice(self, "method", ("fast", "nuts"))
-        check_wholes(self, "samples", least=2)
-        check_numbers(self, "detection_limit_mv", "response_threshold_mv", above=0)
+        super().__post_init__()
 
     def program(self, space: DesignSpace) -> WindowProgram:
         """The Pyro program of one person."""

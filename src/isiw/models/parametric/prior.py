@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Final, Literal, NamedTuple
+from functools import partial
+from typing import Annotated, Final, Literal, NamedTuple
 
-from isiw.checks import check_numbers
+from isiw.checks import Checked, number
 from isiw.design import DesignSpace
 from isiw.lazy import torch
 from isiw.models.protocol import Tensor
@@ -109,7 +110,7 @@ class InputNoisePrior:
 
 
 @dataclass(frozen=True)
-class WindowPrior:
+class WindowPrior(Checked):
     """The prior of the parametric window model.
 
     Args:
@@ -126,7 +127,7 @@ class WindowPrior:
         InvalidValueError: an invalid probability or scale.
     """
 
-    p_window: float = 0.75
+    p_window: Annotated[float, partial(number, above=0, most=1)] = 0.75
     start: StartPrior = field(default_factory=lambda: StartPrior((Span(1.0, 0.0, 125.0),), p_anywhere=0.2))
     width_ms: Scale = Scale(100.0, 0.45)
     floor: FloorPrior = field(default_factory=FloorPrior)
@@ -136,7 +137,7 @@ class WindowPrior:
     input_noise: InputNoisePrior = field(default_factory=InputNoisePrior)
 
     def __post_init__(self) -> None:
-        check_numbers(self, "p_window", above=0, most=1)
+        super().__post_init__()
         check_scales(self, "width_ms", "amplitude", "cv")
         check_scales(self, "outliers", positive=False)
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Final
+from typing import Annotated, Final
 
-from isiw.checks import check_numbers, check_wholes
+from isiw.checks import Checked, Count, number
 from isiw.lazy import torch
 from isiw.models.parametric.ascent import Modes
 from isiw.models.parametric.importance import Effort, Mixture, WeightedDraws, importance_sample, worth
@@ -24,7 +24,7 @@ LEAST_WORTH: Final = 50.0
 
 
 @dataclass(frozen=True)
-class Chains:
+class Chains(Checked):
     """How long the no-U-turn sampler runs.
 
     Args:
@@ -32,20 +32,12 @@ class Chains:
         least: a chain has at least so many draws after them.
         least_share: modes with a smaller share of the evidence get no chain.
         max_r_hat: chains that disagree by more [Gelman1992] are trouble.
-
-    Raises:
-        InvalidValueError: an invalid number.
     """
 
-    warmup: int = 150
-    least: int = 50
-    least_share: float = 0.05
-    max_r_hat: float = 1.1
-
-    def __post_init__(self) -> None:
-        check_wholes(self, "warmup", "least", least=1)
-        check_numbers(self, "least_share", least=0, below=1)
-        check_numbers(self, "max_r_hat", above=1)
+    warmup: Count = 150
+    least: Count = 50
+    least_share: Annotated[float, partial(number, least=0, below=1)] = 0.05
+    max_r_hat: Annotated[float, partial(number, above=1)] = 1.1
 
 
 @dataclass(frozen=True, eq=False)

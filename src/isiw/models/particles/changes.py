@@ -14,7 +14,7 @@ from functools import cached_property
 from typing import Final, NamedTuple
 
 from isiw.change import Change as EstimatedChange
-from isiw.checks import check_numbers, check_probabilities
+from isiw.checks import Checked, Positive, Share
 from isiw.errors import InvalidValueError
 from isiw.lazy import torch
 from isiw.models.particles.mixture import Mixture
@@ -46,7 +46,7 @@ class ChangeKind(IntEnum):
 
 
 @dataclass(frozen=True)
-class ChangePrior:
+class ChangePrior(Checked):
     """Of what changes within a session beside a slow drift.
 
     Args:
@@ -63,19 +63,18 @@ class ChangePrior:
         InvalidValueError: probabilities whose sum is above 1, or an invalid number.
     """
 
-    level: float = 0.05
-    intensity: float = 0.03
-    enhancement: float = 0.04
-    scale: float = 0.03
+    level: Share = 0.05
+    intensity: Share = 0.03
+    enhancement: Share = 0.04
+    scale: Share = 0.03
     trial: Scale = Scale(20.0, 1.1)
-    size_sd: float = 1.0
+    size_sd: Positive = 1.0
     noted: tuple[int, ...] = ()
-    noted_share: float = 0.5
+    noted_share: Share = 0.5
 
     def __post_init__(self) -> None:
-        check_probabilities(self, "level", "intensity", "enhancement", "scale", "noted_share")
+        super().__post_init__()
         check_scales(self, "trial", tailed=False)
-        check_numbers(self, "size_sd", above=0)
         if self._usual[0] <= 0:
             raise InvalidValueError(
                 "there must be room for no change at all", got=self._usual[1:], expected="less than 1"

@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass, fields, replace
 from typing import Any, Final, TypeVar
 
-from isiw.checks import check_numbers, check_probabilities, require_sum_of_one
+from isiw.checks import Checked, Positive, Share, require_sum_of_one
 from isiw.models.shared.scales import Scale, check_scales
 
 L = TypeVar("L", bound=Any)
@@ -17,10 +17,9 @@ L = TypeVar("L", bound=Any)
 
 
 def check_shares(shares: object) -> None:
-    """Check a dataclass all of whose fields are probabilities that sum to 1."""
-    names = [f.name for f in fields(shares)]  # type: ignore[arg-type] # a dataclass
-    check_probabilities(shares, *names)
-    require_sum_of_one(f"the probabilities of {type(shares).__name__}", [getattr(shares, name) for name in names])
+    """Check that the fields of a dataclass are probabilities that sum to 1."""
+    values = [getattr(shares, f.name) for f in fields(shares)]  # type: ignore[arg-type] # a dataclass
+    require_sum_of_one(f"the probabilities of {type(shares).__name__}", values)
 
 
 def check_laws(owner: object, *names: str) -> None:
@@ -37,7 +36,7 @@ def with_less_of_others(laws: tuple[L, ...], kept: float) -> tuple[L, ...]:
 
 
 @dataclass(frozen=True)
-class NoiseShares:
+class NoiseShares(Checked):
     """Probabilities of the kinds of noise, in the order of `NoiseKind`.
 
     Args:
@@ -51,18 +50,19 @@ class NoiseShares:
         InvalidValueError: probabilities that do not sum to 1.
     """
 
-    constant_cv: float = 0.36
-    missing: float = 0.11
-    recruitment: float = 0.43
-    all_or_none: float = 0.08
-    rectified: float = 0.02
+    constant_cv: Share = 0.36
+    missing: Share = 0.11
+    recruitment: Share = 0.43
+    all_or_none: Share = 0.08
+    rectified: Share = 0.02
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         check_shares(self)
 
 
 @dataclass(frozen=True)
-class Intensity:
+class Intensity(Checked):
     """A law of the intensity of the pulse.
 
     Args:
@@ -73,16 +73,16 @@ class Intensity:
         InvalidValueError: an invalid share or scale.
     """
 
-    share: float
+    share: Share
     pct_rmt: Scale
 
     def __post_init__(self) -> None:
-        check_probabilities(self, "share")
+        super().__post_init__()
         check_scales(self, "pct_rmt", positive=False, tailed=False)
 
 
 @dataclass(frozen=True)
-class Muscle:
+class Muscle(Checked):
     """A law of recruitment curves: `s = A / (1 + exp(-k (x + sigma_x z1 - x50))) exp(sigma_y z2)` (Goetz et al.).
 
     Args:
@@ -101,18 +101,17 @@ class Muscle:
     """
 
     name: str
-    share: float
+    share: Share
     ratio: Scale
     slope_per_pct: Scale
     input_sd: Scale
     sigma_y: Scale
     boost_pct: Scale
     rest_pct: Scale
-    at_pct_rmt: float | None = None
+    at_pct_rmt: Positive | None = None
 
     def __post_init__(self) -> None:
-        check_probabilities(self, "share")
-        check_numbers(self, "at_pct_rmt", above=0, optional=True)
+        super().__post_init__()
         check_scales(self, "ratio", "slope_per_pct", "input_sd", "sigma_y", "boost_pct", tailed=False)
         check_scales(self, "rest_pct", positive=False, tailed=False)
 
@@ -155,7 +154,7 @@ OTHER_MUSCLE: Final = Muscle(
 
 
 @dataclass(frozen=True)
-class RectifiedPrior:
+class RectifiedPrior(Checked):
     """Of recruitment curves that start at a threshold [Tyagi2024]: what the logistic curve is above its value there.
 
     Such a curve is flat at rest, rises within a few % RMT, and then grows in proportion to the input; a logistic curve
@@ -182,17 +181,17 @@ class RectifiedPrior:
     boost_pct: Scale = Scale(18.0, 0.5)
     rest_pct: Scale = Scale(-6.0, 5.0)
     onset: Scale = Scale(0.1, 0.5)
-    at_pct_rmt: float | None = 90.0
+    at_pct_rmt: Positive | None = 90.0
 
     def __post_init__(self) -> None:
-        check_numbers(self, "at_pct_rmt", above=0, optional=True)
+        super().__post_init__()
         positive = ("ratio", "slope_per_pct", "input_sd", "sigma_y", "boost_pct", "onset")
         check_scales(self, *positive, tailed=False)
         check_scales(self, "rest_pct", positive=False, tailed=False)
 
 
 @dataclass(frozen=True)
-class Gain:
+class Gain(Checked):
     """A law of responses in proportion to the facilitation, with noise of a constant CV.
 
     Args:
@@ -204,12 +203,12 @@ class Gain:
         InvalidValueError: an invalid share or scale.
     """
 
-    share: float
+    share: Share
     ratio: Scale
     cv: Scale
 
     def __post_init__(self) -> None:
-        check_probabilities(self, "share")
+        super().__post_init__()
         check_scales(self, "ratio", "cv", tailed=False)
 
 
@@ -243,7 +242,7 @@ class SwitchPrior:
 
 
 @dataclass(frozen=True)
-class Floor:
+class Floor(Checked):
     """A law of the EMG floor.
 
     Args:
@@ -255,17 +254,17 @@ class Floor:
         InvalidValueError: an invalid share or scale.
     """
 
-    share: float
+    share: Share
     median_mv: Scale
     log_sd: Scale
 
     def __post_init__(self) -> None:
-        check_probabilities(self, "share")
+        super().__post_init__()
         check_scales(self, "median_mv", "log_sd", tailed=False)
 
 
 @dataclass(frozen=True)
-class SessionPrior:
+class SessionPrior(Checked):
     """Of what changes within a session.
 
     Args:
@@ -278,12 +277,11 @@ class SessionPrior:
         InvalidValueError: an SD that is not positive, an invalid share, or an invalid scale.
     """
 
-    drift_sd: float = 0.3
-    far_drift_sd: float = 1.2
-    far_drift_share: float = 0.1
+    drift_sd: Positive = 0.3
+    far_drift_sd: Positive = 1.2
+    far_drift_share: Share = 0.1
     startup: Scale = Scale(0.5, 0.5)
 
     def __post_init__(self) -> None:
-        check_numbers(self, "drift_sd", "far_drift_sd", above=0)
-        check_probabilities(self, "far_drift_share")
+        super().__post_init__()
         check_scales(self, "startup", positive=False, tailed=False)

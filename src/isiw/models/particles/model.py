@@ -4,10 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import get_args
+from functools import cached_property, partial
+from typing import Annotated
 
-from isiw.checks import MOST_OF_A_KIND, check_choice, check_numbers, check_probabilities, check_wholes
+from isiw.checks import (
+    MOST_OF_A_KIND,
+    Checked,
+    NonNegative,
+    Positive,
+    Share,
+    whole,
+)
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
@@ -33,7 +40,7 @@ LEAST_SAMPLES = 20
 
 
 @dataclass(frozen=True)
-class ParticleModel:
+class ParticleModel(Checked):
     """A particle posterior over profile, recruitment and noise; the default model.
 
     Args:
@@ -56,23 +63,18 @@ class ParticleModel:
     """
 
     prior: Prior = field(default_factory=Prior)
-    particles: int = 1000
-    thinned: int = 192
+    particles: Annotated[int, partial(whole, least=2, most=MOST_OF_A_KIND)] = 1000
+    thinned: Annotated[int, partial(whole, least=1, most=MOST_OF_A_KIND)] = 192
     moves: Moving = field(default_factory=Moving)
-    detection_limit_mv: float = 0.005
-    amplitude_step_mv: float | None = None
-    response_threshold_mv: float = 0.02
-    unusual_kept: float = 1 / 3
+    detection_limit_mv: Positive = 0.005
+    amplitude_step_mv: NonNegative | None = None
+    response_threshold_mv: Positive = 0.02
+    unusual_kept: Share = 1 / 3
     device: str = "cpu"
     engine: EngineName = "compiled"
 
     def __post_init__(self) -> None:
-        check_wholes(self, "particles", least=2, most=MOST_OF_A_KIND)  # half of them move at a time
-        check_wholes(self, "thinned", least=1, most=MOST_OF_A_KIND)
-        check_numbers(self, "detection_limit_mv", "response_threshold_mv", above=0)
-        check_numbers(self, "amplitude_step_mv", least=0, optional=True)
-        check_probabilities(self, "unusual_kept")
-        check_choice(self, "engine", get_args(EngineName))
+        super().__post_init__()
         _require_device(self.device)
 
     @cached_property

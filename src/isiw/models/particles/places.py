@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import get_args
 
-from isiw.checks import check_choice, check_probabilities, mean_and_sd
+from isiw.checks import Checked, Share, mean_and_sd
 from isiw.models.particles.mixture import Mixture
 from isiw.models.shared.scales import Scale, check_scales
 from isiw.types import Conditioning, Reference
@@ -16,7 +15,7 @@ MOST_APART_MS = 10.0
 
 
 @dataclass(frozen=True)
-class Place:
+class Place(Checked):
     """A law of the window's start and width together.
 
     Args:
@@ -31,7 +30,7 @@ class Place:
         InvalidValueError: an invalid share, scale, reference, hit delay or conditioning stimulus.
     """
 
-    share: float
+    share: Share
     start_ms: Scale
     width_ms: Scale
     reference: Reference = "valve"
@@ -39,11 +38,9 @@ class Place:
     conditioning: Conditioning = "tap"
 
     def __post_init__(self) -> None:
-        check_probabilities(self, "share")
+        super().__post_init__()
         check_scales(self, "start_ms", positive=False, tailed=False)
         check_scales(self, "width_ms", tailed=False)
-        check_choice(self, "reference", get_args(Reference))
-        check_choice(self, "conditioning", get_args(Conditioning))
         if self.hit_delay_ms is not None:
             object.__setattr__(self, "hit_delay_ms", mean_and_sd("Place.hit_delay_ms", self.hit_delay_ms))
 

@@ -12,7 +12,7 @@ from dataclasses import astuple, dataclass, field, replace
 from functools import cached_property
 from typing import Final, NamedTuple
 
-from isiw.checks import check_numbers, choice
+from isiw.checks import Checked, Positive, choice
 from isiw.design import DesignSpace
 from isiw.lazy import torch
 from isiw.models.particles.changes import Change, Changed, ChangeKind, ChangePrior, Named
@@ -84,7 +84,7 @@ class Person(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Prior:
+class Prior(Checked):
     """The prior over people.
 
     Args:
@@ -126,11 +126,11 @@ class Prior:
     session: SessionPrior = field(default_factory=SessionPrior)
     changes: ChangePrior = field(default_factory=ChangePrior)
     muscle: str | None = None
-    intensity_pct_rmt: float | None = None
+    intensity_pct_rmt: Positive | None = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         check_laws(self, "gains", "muscles", "intensities", "floors")
-        check_numbers(self, "intensity_pct_rmt", above=0, optional=True)
         if self.muscle is not None:
             choice("Prior.muscle", self.muscle, [muscle.name for muscle in self.muscles])
 

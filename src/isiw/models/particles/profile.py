@@ -9,9 +9,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Final, NamedTuple, get_args
+from typing import Final, NamedTuple
 
-from isiw.checks import check_choice, check_probabilities
+from isiw.checks import Checked, Share
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.models.particles.laws import check_laws, check_shares, with_less_of_others
@@ -23,7 +23,7 @@ from isiw.types import Conditioning
 
 
 @dataclass(frozen=True)
-class ShapeShares:
+class ShapeShares(Checked):
     """Probabilities of the families of profiles, in the order of `ShapeKind`.
 
     Most profiles pass a normality test (dissertation, 4.2: 8 of 11), the others are described in its outlook (8.1).
@@ -38,17 +38,18 @@ class ShapeShares:
         InvalidValueError: probabilities that do not sum to 1.
     """
 
-    gaussian: float = 0.68
-    skewed: float = 0.12
-    plateau: float = 0.08
-    two_peak: float = 0.12
+    gaussian: Share = 0.68
+    skewed: Share = 0.12
+    plateau: Share = 0.08
+    two_peak: Share = 0.12
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         check_shares(self)
 
 
 @dataclass(frozen=True)
-class Width:
+class Width(Checked):
     """A law of the window's width.
 
     Args:
@@ -59,11 +60,11 @@ class Width:
         InvalidValueError: an invalid share or scale.
     """
 
-    share: float
+    share: Share
     width_ms: Scale
 
     def __post_init__(self) -> None:
-        check_probabilities(self, "share")
+        super().__post_init__()
         check_scales(self, "width_ms", tailed=False)
 
 
@@ -94,7 +95,7 @@ _AFTER: Final[Mapping[Conditioning | None, _Windows]] = MappingProxyType(
 
 
 @dataclass(frozen=True)
-class ProfilePrior:
+class ProfilePrior(Checked):
     """Of the facilitation by ISI.
 
     Where `start` and `widths` are not a user's own, they are those of the conditioning stimulus.
@@ -114,7 +115,7 @@ class ProfilePrior:
             places that leave nothing to the rest, or that count from different events.
     """
 
-    p_window: float = 0.72
+    p_window: Share = 0.72
     shapes: ShapeShares = field(default_factory=ShapeShares, metadata={"shares": True})
     start: StartPrior = field(default_factory=StartPrior)
     widths: tuple[Width, ...] = _AFTER[None].widths
@@ -122,8 +123,7 @@ class ProfilePrior:
     conditioning: Conditioning | None = None
 
     def __post_init__(self) -> None:
-        check_probabilities(self, "p_window")
-        check_choice(self, "conditioning", (None, *get_args(Conditioning)))
+        super().__post_init__()
         own = _AFTER[self.conditioning]
         if self.start.spans in [each.spans for each in _AFTER.values()]:
             object.__setattr__(self, "start", replace(self.start, spans=own.spans))

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Generic
 
-from isiw.checks import check_probabilities, check_wholes
+from isiw.checks import Checked, Natural, Share
 from isiw.lazy import torch
 from isiw.models.particles.diagnostics import Health, distinct_share, ess_share, trouble_of
 from isiw.models.particles.engine import Engine
@@ -21,7 +21,7 @@ from isiw.models.shared.tables import systematic
 
 
 @dataclass(frozen=True)
-class Moving:
+class Moving(Checked):
     """How often particles move, and when they are resampled.
 
     Args:
@@ -30,18 +30,11 @@ class Moving:
         max_trial_sweeps: sweeps times trials are at most this many, so that a tell stays fast late in a session; where
             there are more trials, one sweep follows every second, third or later one, and each resampling.
         min_ess: effective sample size, as a share of the particles, below which they are resampled.
-
-    Raises:
-        InvalidValueError: an invalid number.
     """
 
-    sweeps: int = 2
-    max_trial_sweeps: int = 240
-    min_ess: float = 0.5
-
-    def __post_init__(self) -> None:
-        check_wholes(self, "sweeps", "max_trial_sweeps", least=0)
-        check_probabilities(self, "min_ess")
+    sweeps: Natural = 2
+    max_trial_sweeps: Natural = 240
+    min_ess: Share = 0.5
 
     def sweeps_after(self, trials: int, *, resampled: bool = True) -> int:
         """How many sweeps follow a trial: more where the history is short, fewer where it has become long."""

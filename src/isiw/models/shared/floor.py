@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Literal, TypeAlias, get_args
+from typing import Final, Literal, TypeAlias
 
 import numpy as np
 
-from isiw.checks import check_choice, check_numbers
+from isiw.checks import Checked, Positive
 from isiw.models.shared.history import PersonTrials
 from isiw.types import FloatArray
 
@@ -18,7 +18,7 @@ GUESSED_AT: Final = {"subtracted": 0.5, "lowest": 0.1}
 
 
 @dataclass(frozen=True)
-class FloorTreatment:
+class FloorTreatment(Checked):
     """How MEPs are corrected for what they amount to where the tap does nothing, before a curve is fitted.
 
     The dissertation's plots have amplitudes of zero outside the window, and it does not say why [Kim2020, 4.3].
@@ -29,17 +29,10 @@ class FloorTreatment:
             `"zeroed"`: an MEP below the threshold is 0. `"raw"`: MEPs as they are; where the floor exceeds 0.135 of the
             peak, such a curve has no edges.
         threshold_mv: of `"zeroed"` [mV]; the dissertation's thresholds of a response are 0.015–0.033 mV (4.1.1).
-
-    Raises:
-        InvalidValueError: an unknown treatment, or a threshold that is not positive.
     """
 
     floor: FloorKind = "subtracted"
-    threshold_mv: float = 0.025
-
-    def __post_init__(self) -> None:
-        check_choice(self, "floor", get_args(FloorKind))
-        check_numbers(self, "threshold_mv", above=0)
+    threshold_mv: Positive = 0.025
 
     def level_mv(self, trials: PersonTrials) -> float:
         """What is subtracted from the MEPs of one person [mV]: the mean of TMS alone, or a guess at it."""

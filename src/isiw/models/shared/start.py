@@ -7,7 +7,15 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final, NamedTuple
 
-from isiw.checks import ascending, check_numbers, check_probabilities, mean_and_sd, require_sum_of_one
+from isiw.checks import (
+    Checked,
+    Number,
+    Positive,
+    Share,
+    ascending,
+    mean_and_sd,
+    require_sum_of_one,
+)
 from isiw.design import DesignSpace
 from isiw.lazy import torch
 from isiw.models.protocol import Tensor
@@ -27,7 +35,7 @@ OTHER_HIT_DELAY_MS: Final = (20.0, 300.0)
 
 
 @dataclass(frozen=True)
-class Span:
+class Span(Checked):
     """Starts that are uniform between two ISIs, with normal blur.
 
     Args:
@@ -40,16 +48,14 @@ class Span:
         InvalidValueError: an empty span, an invalid share, or a blur that is not positive.
     """
 
-    share: float
-    low_ms: float
-    high_ms: float
-    sd_ms: float = 1.0
+    share: Share
+    low_ms: Number
+    high_ms: Number
+    sd_ms: Positive = 1.0
 
     def __post_init__(self) -> None:
-        check_probabilities(self, "share")
+        super().__post_init__()
         ascending("Span.low_ms and Span.high_ms", (self.low_ms, self.high_ms))
-        check_numbers(self, "low_ms", "high_ms")
-        check_numbers(self, "sd_ms", above=0)
 
     def density(self, start_ms: Tensor) -> Tensor:
         """Density at some starts [1/ms], same shape."""
@@ -68,7 +74,7 @@ TAP_SPANS: Final = (Span(0.52, 0.0, 115.0), Span(0.3, -30.0, 260.0, 20.0), Span(
 
 
 @dataclass(frozen=True)
-class StartPrior:
+class StartPrior(Checked):
     """Where windows start.
 
     Args:
@@ -86,11 +92,11 @@ class StartPrior:
 
     spans: tuple[Span, ...] = TAP_SPANS
     hit_delay_ms: tuple[float, float] | None = None
-    p_robot: float = 0.5
-    p_anywhere: float = 0.04
+    p_robot: Share = 0.5
+    p_anywhere: Share = 0.04
 
     def __post_init__(self) -> None:
-        check_probabilities(self, "p_anywhere", "p_robot")
+        super().__post_init__()
         require_sum_of_one("the shares of StartPrior.spans", (span.share for span in self.spans))
         if self.hit_delay_ms is not None:
             object.__setattr__(self, "hit_delay_ms", mean_and_sd("StartPrior.hit_delay_ms", self.hit_delay_ms))

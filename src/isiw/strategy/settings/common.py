@@ -10,15 +10,24 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, fields, is_dataclass, replace
-from functools import reduce
+from functools import partial, reduce
 from numbers import Integral
-from typing import Any, Final, Protocol, TypeVar, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Final, Protocol, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.acquisition.registry import acquisition_named
-from isiw.checks import MOST_OF_A_KIND, check_numbers, check_probabilities, check_wholes, whole
+from isiw.checks import (
+    MOST_OF_A_KIND,
+    Checked,
+    Count,
+    Natural,
+    Positive,
+    Share,
+    share,
+    whole,
+)
 from isiw.design import DesignSpace
 from isiw.errors import ConfigError, StrategyError, did_you_mean
 from isiw.models.protocol import ResponseModel
@@ -73,7 +82,7 @@ class Settings(Protocol):
 
 
 @dataclass(frozen=True)
-class Asking:
+class Asking(Checked):
     """What a strategy with a posterior of the window asks.
 
     Args:
@@ -85,11 +94,11 @@ class Asking:
     """
 
     acquisition: str = "alternating"
-    initial_trials: int = 0
+    initial_trials: Natural = 0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self.function(0)
-        check_wholes(self, "initial_trials", least=0)
 
     def function(self, seed: int) -> AcquisitionFunction:
         """The acquisition function."""
@@ -102,7 +111,7 @@ class Asking:
 
 
 @dataclass(frozen=True)
-class Stopping:
+class Stopping(Checked):
     """When a strategy with a posterior of the window stops.
 
     Args:
@@ -113,22 +122,13 @@ class Stopping:
         stop_gain: stop, after 35 pairs, when a window is probable (.97), and the last ten stimuli added less than this
             to the expected F1; never at 0.
         stop_no_window: stop when "there is no window" is at least this probable.
-
-    Raises:
-        InvalidValueError: an invalid number.
     """
 
-    max_trials: int = 60
-    stop_width_ms: float = 30.0
-    stop_expected_f1: float = 0.92
-    stop_gain: float = 0.02
-    stop_no_window: float = 0.95
-
-    def __post_init__(self) -> None:
-        check_wholes(self, "max_trials", least=1)
-        check_numbers(self, "stop_width_ms", above=0)
-        check_probabilities(self, "stop_no_window", above=0, most=1)
-        check_probabilities(self, "stop_expected_f1", "stop_gain")
+    max_trials: Count = 60
+    stop_width_ms: Positive = 30.0
+    stop_expected_f1: Share = 0.92
+    stop_gain: Share = 0.02
+    stop_no_window: Annotated[float, partial(share, above=0, most=1)] = 0.95
 
     def rule(self, initial: int) -> StoppingRule:  # noqa: ARG002 - the budget counts from the first stimulus
         """Known well enough, nothing left to gain, no window, or the budget used up."""

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from functools import partial
+from typing import Annotated, Literal
 
 import numpy as np
 
 from isiw.acquisition.fixed import OwnProposal
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.acquisition.registry import acquisition_named
-from isiw.checks import check_choice, check_numbers, check_wholes
+from isiw.checks import Checked, Count, NonNegative, Positive, whole
 from isiw.design import DesignSpace
 from isiw.models.dissertation.bootstrap import BootstrapFilter
 from isiw.models.dissertation.gpr import GaussianProcessRegression
@@ -24,7 +25,7 @@ from isiw.strategy.stopping import AnyOf, Budget, StoppingRule
 
 
 @dataclass(frozen=True)
-class EvenStart:
+class EvenStart(Checked):
     """What the dissertation's regressions ask (4.3).
 
     Args:
@@ -36,11 +37,11 @@ class EvenStart:
         InvalidValueError: fewer than two initial ISIs, or an unknown acquisition function.
     """
 
-    initial: int = 7
+    initial: Annotated[int, partial(whole, least=2)] = 7
     acquisition: str = "variance"
 
     def __post_init__(self) -> None:
-        check_wholes(self, "initial", least=2)  # both ends
+        super().__post_init__()
         self.function(0)
 
     def function(self, seed: int) -> AcquisitionFunction:
@@ -71,7 +72,7 @@ ones alone (4.3)."""
 
 
 @dataclass(frozen=True)
-class Settling:
+class Settling(Checked):
     """When the dissertation's regressions stop (4.3).
 
     Args:
@@ -85,16 +86,10 @@ class Settling:
         InvalidValueError: an invalid number, or an unknown value of the edges.
     """
 
-    stop_variance_ms2: float = 50.0
-    stop_last: int = 5
+    stop_variance_ms2: Positive = 50.0
+    stop_last: Annotated[int, partial(whole, least=2)] = 5
     stop_edges: Literal["both", "either"] = "both"
-    max_trials: int | None = None
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "stop_variance_ms2", above=0)
-        check_wholes(self, "stop_last", least=2)
-        check_choice(self, "stop_edges", ("both", "either"))
-        check_wholes(self, "max_trials", least=1, optional=True)
+    max_trials: Count | None = None
 
     def rule(self, initial: int) -> StoppingRule:
         """The edges have settled, or the budget is used up."""
@@ -103,24 +98,17 @@ class Settling:
 
 
 @dataclass(frozen=True)
-class Converging:
+class Converging(Checked):
     """When the particle filter stops.
 
     Args:
         stop_sd_ms: stop when the SD of the particles is at most this [ms] (4.6).
         max_trials: stop after this many stimuli; mistrials count, control trials do not. By default as many as a full
             conventional search has (4.2.1).
-
-    Raises:
-        InvalidValueError: an invalid number.
     """
 
-    stop_sd_ms: float = 25.0
-    max_trials: int = 600
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "stop_sd_ms", above=0)
-        check_wholes(self, "max_trials", least=1)
+    stop_sd_ms: Positive = 25.0
+    max_trials: Count = 600
 
     def rule(self, initial: int) -> StoppingRule:  # noqa: ARG002 - there are no initial ISIs
         """The particles have converged, or the budget is used up."""
@@ -128,24 +116,17 @@ class Converging:
 
 
 @dataclass(frozen=True)
-class Passing:
+class Passing(Checked):
     """When the incremental sweep stops (4.2.1).
 
     Args:
         quiet_ms: stop when nothing was enhanced for so long behind a window [ms]; 0 sweeps the whole budget.
         max_trials: stop after this many stimuli; mistrials count, control trials do not. Twelve at
             each 5 ms of 500 ms are 1212.
-
-    Raises:
-        InvalidValueError: an invalid number.
     """
 
-    quiet_ms: float = 25.0
-    max_trials: int = 1212
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "quiet_ms", least=0)
-        check_wholes(self, "max_trials", least=1)
+    quiet_ms: NonNegative = 25.0
+    max_trials: Count = 1212
 
     def rule(self, initial: int) -> StoppingRule:  # noqa: ARG002 - there are no initial ISIs
         """The window was passed, or the budget is used up."""

@@ -4,27 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from isiw.checks import check_wholes
+from isiw.checks import Checked, Count
 from isiw.models.particles.supra import SupraModel
 from isiw.strategy.settings.common import Asking
 from isiw.strategy.stopping import Budget, StoppingRule
 
 
 @dataclass(frozen=True)
-class SupraStopping:
+class SupraStopping(Checked):
     """When the strategy stops: the rules of the default look at the window alone, and would leave a depression unknown.
 
     Args:
         max_trials: stop after this many stimuli; mistrials count, control trials do not.
-
-    Raises:
-        InvalidValueError: not a whole number of at least 1.
     """
 
-    max_trials: int = 60
-
-    def __post_init__(self) -> None:
-        check_wholes(self, "max_trials", least=1)
+    max_trials: Count = 60
 
     def rule(self, initial: int) -> StoppingRule:  # noqa: ARG002 - the budget counts from the first stimulus
         """The budget used up."""

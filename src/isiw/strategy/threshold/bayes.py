@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
 from statistics import NormalDist
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
 
-from isiw.checks import check_numbers, check_wholes
+from isiw.checks import Checked, Count, Positive, number, whole
 from isiw.lazy import scipy
 from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.strategy.threshold.pulses import IntensityRange, Pulse, ThresholdEstimate
@@ -22,7 +22,7 @@ _DROP: Final = 0.5 * NormalDist().inv_cdf(0.95) ** 2  # of the log-likelihood at
 
 
 @dataclass(frozen=True)
-class MaximumLikelihood:
+class MaximumLikelihood(Checked):
     """Uses only whether there was a response, whose probability is a cumulative normal of the intensity.
 
     When it asks it takes a response at the highest intensity and none at the lowest for granted, so that there is a
@@ -31,17 +31,10 @@ class MaximumLikelihood:
     Args:
         relative_spread: SD of the cumulative normal, as a share of the threshold.
         pulses: stop after so many; usual are 12 to 20.
-
-    Raises:
-        InvalidValueError: a spread that is not positive, or no pulse.
     """
 
-    relative_spread: float = 0.07
-    pulses: int = 17
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "relative_spread", above=0, most=1)
-        check_wholes(self, "pulses", least=1)
+    relative_spread: Annotated[float, partial(number, above=0, most=1)] = 0.07
+    pulses: Count = 17
 
     @property
     def budget(self) -> int:
@@ -82,7 +75,7 @@ def _best(thresholds: FloatArray, log_likelihood: FloatArray) -> float:
 
 
 @dataclass(frozen=True)
-class FiveOfTen:
+class FiveOfTen(Checked):
     """Goes in large steps until one intensity suffices and the next lower one does not, then down in single steps.
 
     At each intensity it goes on until the verdict is certain: with five responses, or six pulses without one. Once no
@@ -98,16 +91,14 @@ class FiveOfTen:
         InvalidValueError: steps that are not positive, or more responses than pulses.
     """
 
-    start_pct_mso: float = 40.0
-    large_step_pct_mso: float = 5.0
-    of: int = 10
-    enough: int = 5
+    start_pct_mso: Annotated[float, partial(number, above=0, most=100)] = 40.0
+    large_step_pct_mso: Positive = 5.0
+    of: Count = 10
+    enough: Count = 5
 
     def __post_init__(self) -> None:
-        check_numbers(self, "start_pct_mso", above=0, most=100)
-        check_numbers(self, "large_step_pct_mso", above=0)
-        check_wholes(self, "of", least=1)
-        check_wholes(self, "enough", least=1, most=self.of)
+        super().__post_init__()
+        whole("FiveOfTen.enough", self.enough, most=self.of)
 
     def ask(self, pulses: Sequence[Pulse], space: IntensityRange) -> float:
         """The intensity whose verdict is still open."""
@@ -175,7 +166,7 @@ THRESHOLDS_PCT_MSO: Final = np.arange(10.0, 130.5, 0.5)
 
 
 @dataclass(frozen=True)
-class BayesThreshold:
+class BayesThreshold(Checked):
     """Asks at the posterior's median, and stops when its SD is small [Qi2011], with amplitudes where there are any.
 
     Args:
@@ -184,21 +175,13 @@ class BayesThreshold:
         stop_sd_pct_mso: stop when the posterior's SD is at most this [% MSO].
         max_pulses: stop after so many pulses in any case.
         curves: which recruitment curves are believed in.
-
-    Raises:
-        InvalidValueError: a mean outside the thresholds that are possible, an SD that is not positive, or no pulse.
     """
 
-    prior_mean_pct_mso: float = 55.0
-    prior_sd_pct_mso: float = 18.0
-    stop_sd_pct_mso: float = 2.0
-    max_pulses: int = 40
+    prior_mean_pct_mso: Annotated[float, partial(number, least=10, most=130)] = 55.0
+    prior_sd_pct_mso: Positive = 18.0
+    stop_sd_pct_mso: Positive = 2.0
+    max_pulses: Count = 40
     curves: RecruitmentBelief = field(default_factory=RecruitmentBelief)
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "prior_mean_pct_mso", least=10, most=130)
-        check_numbers(self, "prior_sd_pct_mso", "stop_sd_pct_mso", above=0)
-        check_wholes(self, "max_pulses", least=1)
 
     @property
     def budget(self) -> int:

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from isiw.checks import check_amplitude, check_numbers, check_wholes
+from isiw.checks import Amplitude, Checked, Count, Number, Positive
 from isiw.errors import InvalidValueError
 from isiw.lazy import scipy
 from isiw.strategy.threshold.recruitment import DISTANCES_PCT, RecruitmentBelief, log_likelihood
@@ -30,25 +30,18 @@ _USEFUL_PCT: Final = (-25.0, 30.0)  # beyond these distances from the threshold 
 
 
 @dataclass(frozen=True)
-class CoilPulse:
+class CoilPulse(Checked):
     """One pulse and what came of it, by the coil's place.
 
     Args:
         x_mm: the coil's place from the middle of the searched area [mm].
         y_mm: the same, across [mm].
         mep_mv: peak-to-peak amplitude of the MEP [mV].
-
-    Raises:
-        InvalidValueError: a place that is not finite, or an amplitude that cannot be.
     """
 
-    x_mm: float
-    y_mm: float
-    mep_mv: float
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "x_mm", "y_mm")
-        check_amplitude(self, "mep_mv")
+    x_mm: Number
+    y_mm: Number
+    mep_mv: Amplitude
 
 
 class HotSpotEstimate(NamedTuple):
@@ -76,25 +69,18 @@ def _require_a_response(pulses: Sequence[CoilPulse]) -> None:
 
 
 @dataclass(frozen=True)
-class WalkedHotSpot:
+class WalkedHotSpot(Checked):
     """The classical way: the same number of pulses at every place of a grid; the largest mean MEP is the hot spot.
 
     Args:
         half_width_mm: of the searched square [mm].
         step_mm: between two places [mm].
         repeats: pulses at each place.
-
-    Raises:
-        InvalidValueError: values that are not positive.
     """
 
-    half_width_mm: float = 25.0
-    step_mm: float = 10.0
-    repeats: int = 3
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "half_width_mm", "step_mm", above=0)
-        check_wholes(self, "repeats", least=1)
+    half_width_mm: Positive = 25.0
+    step_mm: Positive = 10.0
+    repeats: Count = 3
 
     @property
     def pulses(self) -> int:
@@ -117,7 +103,7 @@ class WalkedHotSpot:
 
 
 @dataclass(frozen=True)
-class BayesHotSpot:
+class BayesHotSpot(Checked):
     """A posterior on a grid of places, spreads, intensities and recruitment curves.
 
     It asks where the posterior knows least how much the coil acts.
@@ -126,17 +112,11 @@ class BayesHotSpot:
         half_width_mm: of the searched square [mm].
         step_mm: between two places [mm].
         curves: which recruitment curves are believed in.
-
-    Raises:
-        InvalidValueError: values that are not positive.
     """
 
-    half_width_mm: float = 25.0
-    step_mm: float = 5.0
+    half_width_mm: Positive = 25.0
+    step_mm: Positive = 5.0
     curves: RecruitmentBelief = field(default_factory=RecruitmentBelief)
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "half_width_mm", "step_mm", above=0)
 
     def posterior(self, pulses: Sequence[CoilPulse]) -> FloatArray:
         """Probabilities by place, and by what else is unknown: spread and intensity, shape (t, c)."""

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Protocol, runtime_checkable
+from functools import partial
+from typing import Annotated, Final, Protocol, runtime_checkable
 
 import numpy as np
 
-from isiw.checks import check_amplitude, check_numbers, number
+from isiw.checks import Amplitude, Checked, number
 from isiw.errors import InvalidValueError, LimitExceededError
 from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.trials import RESPONSE_MV
@@ -28,7 +29,7 @@ _GRID_TOLERANCE: Final = 1e-6
 
 
 @dataclass(frozen=True)
-class IntensityRange:
+class IntensityRange(Checked):
     """The intensities that may be asked: a grid from the lowest to the highest, both included; nothing exceeds it.
 
     Args:
@@ -40,13 +41,12 @@ class IntensityRange:
         InvalidValueError: bounds outside 1–100 % or that do not ascend, or a step that does not fit.
     """
 
-    low_pct_mso: float
-    high_pct_mso: float
-    step_pct_mso: float = 1.0
+    low_pct_mso: Annotated[float, partial(number, least=1, most=100)]
+    high_pct_mso: Annotated[float, partial(number, least=1, most=100)]
+    step_pct_mso: Annotated[float, partial(number, least=0.1)] = 1.0
 
     def __post_init__(self) -> None:
-        check_numbers(self, "low_pct_mso", "high_pct_mso", least=1, most=100)
-        check_numbers(self, "step_pct_mso", least=0.1)
+        super().__post_init__()
         steps = (self.high_pct_mso - self.low_pct_mso) / self.step_pct_mso
         if steps < 1 or abs(steps - round(steps)) > _GRID_TOLERANCE:
             raise InvalidValueError(
@@ -102,7 +102,7 @@ class IntensityRange:
 
 
 @dataclass(frozen=True)
-class Pulse:
+class Pulse(Checked):
     """One pulse of TMS and what came of it.
 
     Args:
@@ -115,13 +115,12 @@ class Pulse:
         InvalidValueError: not exactly one of the two, or a value that cannot be.
     """
 
-    intensity_pct_mso: float
-    mep_mv: float | None = None
+    intensity_pct_mso: Annotated[float, partial(number, above=0, most=100)]
+    mep_mv: Amplitude | None = None
     response: bool | None = None
 
     def __post_init__(self) -> None:
-        check_numbers(self, "intensity_pct_mso", above=0, most=100)
-        check_amplitude(self, "mep_mv", optional=True)
+        super().__post_init__()
         if (self.mep_mv is None) == (self.response is None) or not isinstance(self.response, bool | None):
             raise InvalidValueError(
                 "a pulse has either an amplitude or a response that was seen or not",

@@ -8,12 +8,12 @@ The MEP is that of [Goetz2014]: `A / (1 + exp(-k (x + sigma_x z1 - x50))) exp(si
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Final
+from functools import lru_cache, partial
+from typing import Annotated, Final
 
 import numpy as np
 
-from isiw.checks import ascending, check_numbers
+from isiw.checks import Checked, Positive, ascending, number
 from isiw.lazy import scipy
 from isiw.trials import RESPONSE_MV
 from isiw.types import FloatArray
@@ -31,7 +31,7 @@ _FLOOR_WEIGHTS = _FLOOR_WEIGHTS / _FLOOR_WEIGHTS.sum()
 
 
 @dataclass(frozen=True)
-class RecruitmentBelief:
+class RecruitmentBelief(Checked):
     """What recruitment curves are believed in before the first pulse; all combinations are equally likely.
 
     Args:
@@ -50,16 +50,15 @@ class RecruitmentBelief:
     slopes_per_pct: tuple[float, ...] = (0.20, 0.27, 0.36)
     sigmas_x_pct: tuple[float, ...] = (5.0, 8.0, 12.0)
     amplitudes_mv: tuple[float, ...] = (0.1, 0.18, 0.4, 1.0, 2.5)
-    sigma_y: float = 0.4
-    floor_mv: float = 0.010
-    floor_log_sd: float = 0.3
-    visible_mv: float = 0.030
+    sigma_y: Positive = 0.4
+    floor_mv: Positive = 0.010
+    floor_log_sd: Positive = 0.3
+    visible_mv: Annotated[float, partial(number, above=0, most=RESPONSE_MV)] = 0.030
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for name in ("slopes_per_pct", "sigmas_x_pct", "amplitudes_mv"):
             object.__setattr__(self, name, ascending(name, getattr(self, name), above=0))
-        check_numbers(self, "sigma_y", "floor_mv", "floor_log_sd", above=0)
-        check_numbers(self, "visible_mv", above=0, most=RESPONSE_MV)
 
 
 @lru_cache(maxsize=256)

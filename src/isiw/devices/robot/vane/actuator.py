@@ -11,8 +11,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import partial
+from typing import Annotated
 
-from isiw.checks import check_numbers
+from isiw.checks import Checked, NonNegative, Number, Positive, number
 from isiw.errors import InvalidValueError
 
 ATMOSPHERE_BAR = 1.0
@@ -24,7 +26,7 @@ PA_PER_BAR = 1e5
 
 
 @dataclass(frozen=True)
-class Rotor:
+class Rotor(Checked):
     """The vane and its two chambers.
 
     Args:
@@ -35,22 +37,15 @@ class Rotor:
         damping_nm_s: moment by speed, B, which stands for air that leaks past the vane [N m s/rad].
         leak_l_min: air that a chamber at the reservoir's pressure loses [l/min of free air].
         dead_ml: air that is left in a chamber when the vane is at its stop [ml].
-
-    Raises:
-        InvalidValueError: a size that is not positive, or a negative friction, damping or leak.
     """
 
-    height_mm: float
-    depth_mm: float
-    radius_mm: float = 12.5
-    friction_nm: float = 2.7
-    damping_nm_s: float = 0.3
-    leak_l_min: float = 0.5
-    dead_ml: float = 2.0
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "height_mm", "depth_mm", "radius_mm", "dead_ml", above=0)
-        check_numbers(self, "friction_nm", "damping_nm_s", "leak_l_min", least=0)
+    height_mm: Positive
+    depth_mm: Positive
+    radius_mm: Positive = 12.5
+    friction_nm: NonNegative = 2.7
+    damping_nm_s: NonNegative = 0.3
+    leak_l_min: NonNegative = 0.5
+    dead_ml: Positive = 2.0
 
     @property
     def lever_m3(self) -> float:
@@ -69,7 +64,7 @@ class Rotor:
 
 
 @dataclass(frozen=True)
-class Load:
+class Load(Checked):
     """What the rotor turns. The text has the forearm as a cylinder of 0.9 kg and 40 mm that turns about its own axis.
 
     Args:
@@ -80,22 +75,15 @@ class Load:
         shaft_mm: from the axis to the centre of the shaft, l_eq [mm].
         arm_kg_m2: inertia of the forearm, I_arm [kg m²].
         shaft_kg_m2: inertia of the shaft, I_shaft [kg m²].
-
-    Raises:
-        InvalidValueError: a negative weight or length, or an inertia that is not positive.
     """
 
-    payload_n: float = 5.0
-    arm_n: float = 5.0
-    shaft_n: float = 2.0
-    arm_mm: float = 60.0
-    shaft_mm: float = 25.0
-    arm_kg_m2: float = 7.2e-4
-    shaft_kg_m2: float = 3.3e-4
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "payload_n", "arm_n", "shaft_n", "arm_mm", "shaft_mm", least=0)
-        check_numbers(self, "arm_kg_m2", "shaft_kg_m2", above=0)
+    payload_n: NonNegative = 5.0
+    arm_n: NonNegative = 5.0
+    shaft_n: NonNegative = 2.0
+    arm_mm: NonNegative = 60.0
+    shaft_mm: NonNegative = 25.0
+    arm_kg_m2: Positive = 7.2e-4
+    shaft_kg_m2: Positive = 3.3e-4
 
     @property
     def inertia_kg_m2(self) -> float:
@@ -110,7 +98,7 @@ class Load:
 
 
 @dataclass(frozen=True)
-class Supply:
+class Supply(Checked):
     """The air: a reservoir, a valve with two outlets, and from each a line to one of the chambers.
 
     Args:
@@ -127,17 +115,15 @@ class Supply:
             positive.
     """
 
-    reservoir_bar: float = 4.0
-    valve_l_s_bar: float = 0.99
-    fitting_l_s_bar: float = 0.75
-    critical_ratio: float = 0.2
-    line_m: float = 7.5
-    bore_mm: float = 6.0
+    reservoir_bar: Number = 4.0
+    valve_l_s_bar: Positive = 0.99
+    fitting_l_s_bar: Positive = 0.75
+    critical_ratio: Annotated[float, partial(number, least=0, below=1)] = 0.2
+    line_m: Positive = 7.5
+    bore_mm: Positive = 6.0
 
     def __post_init__(self) -> None:
-        check_numbers(self, "valve_l_s_bar", "fitting_l_s_bar", "line_m", "bore_mm", above=0)
-        check_numbers(self, "critical_ratio", least=0, below=1)
-        check_numbers(self, "reservoir_bar")
+        super().__post_init__()
         if self.reservoir_bar <= ATMOSPHERE_BAR:
             raise InvalidValueError(
                 "a reservoir at the room's pressure drives nothing",

@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from isiw.checks import MOST_DELAY_MS, check_numbers, number, whole
+from isiw.checks import MOST_DELAY_MS, Checked, NonNegative, number, whole
 from isiw.devices.protocol import DeviceInfo
 from isiw.devices.robot.tapper import Tapper
 from isiw.devices.robot.vane.actuator import ATMOSPHERE_BAR, PA_PER_BAR, Vane
@@ -32,7 +32,7 @@ LEAST_SHARE = 0.1  # of the mean: neither friction nor pressure ever vanishes
 
 
 @dataclass(frozen=True)
-class Variation:
+class Variation(Checked):
     """How strokes differ, and the noise of the sensors. The dissertation measured neither; these were chosen.
 
     Args:
@@ -40,18 +40,12 @@ class Variation:
         reservoir_cv: SD of what the reservoir has above the room's pressure, as a share of its mean.
         angle_sd_deg: noise of the angle sensor [°].
         pressure_sd_kpa: noise of the pressure difference [kPa].
-
-    Raises:
-        InvalidValueError: a negative value.
     """
 
-    friction_cv: float = 0.1
-    reservoir_cv: float = 0.02
-    angle_sd_deg: float = 0.2
-    pressure_sd_kpa: float = 0.5
-
-    def __post_init__(self) -> None:
-        check_numbers(self, "friction_cv", "reservoir_cv", "angle_sd_deg", "pressure_sd_kpa", least=0)
+    friction_cv: NonNegative = 0.1
+    reservoir_cv: NonNegative = 0.02
+    angle_sd_deg: NonNegative = 0.2
+    pressure_sd_kpa: NonNegative = 0.5
 
 
 def draw_strokes(vane: Vane, n: int, rng: np.random.Generator, variation: Variation | None = None) -> Rotations:

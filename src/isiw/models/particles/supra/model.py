@@ -7,10 +7,10 @@ Each particle has a segment in which the tap enhances the MEP, one in which it d
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import get_args
+from functools import cached_property, partial
+from typing import Annotated
 
-from isiw.checks import MOST_OF_A_KIND, check_choice, check_numbers, check_wholes
+from isiw.checks import MOST_OF_A_KIND, Checked, Positive, whole
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
 from isiw.lazy import torch
@@ -26,7 +26,7 @@ from isiw.models.windows import Runs, SampledProfiles, best_window, profile_grid
 
 
 @dataclass(frozen=True)
-class SupraModel:
+class SupraModel(Checked):
     """A particle posterior over enhancement, depression and recruitment.
 
     Args:
@@ -37,24 +37,15 @@ class SupraModel:
         detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
         response_threshold_mv: what a told response is known to be above [mV].
         engine: `"compiled"` loops, or `"torch"`, which stands in where there are none.
-
-    Raises:
-        InvalidValueError: fewer than two particles or more than a memory holds, or an invalid number.
     """
 
     prior: SupraPrior = field(default_factory=SupraPrior)
-    particles: int = 2000
-    thinned: int = 192
+    particles: Annotated[int, partial(whole, least=2, most=MOST_OF_A_KIND)] = 2000
+    thinned: Annotated[int, partial(whole, least=1, most=MOST_OF_A_KIND)] = 192
     moves: Moving = field(default_factory=Moving)
-    detection_limit_mv: float = 0.005
-    response_threshold_mv: float = 0.02
+    detection_limit_mv: Positive = 0.005
+    response_threshold_mv: Positive = 0.02
     engine: EngineName = "compiled"
-
-    def __post_init__(self) -> None:
-        check_wholes(self, "particles", least=2, most=MOST_OF_A_KIND)  # half of them move at a time
-        check_wholes(self, "thinned", least=1, most=MOST_OF_A_KIND)
-        check_numbers(self, "detection_limit_mv", "response_threshold_mv", above=0)
-        check_choice(self, "engine", get_args(EngineName))
 
     def begin(self, space: DesignSpace, seed: int, people: int = 1) -> SupraPosterior:
         """The posterior before the first trial."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final, NamedTuple
 
-from isiw.checks import check_probabilities
+from isiw.checks import Checked, Share
 from isiw.design import DesignSpace
 from isiw.lazy import torch
 from isiw.models.particles.laws import Floor, SessionPrior, check_laws
@@ -77,7 +77,7 @@ class SupraLatents(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Segment:
+class Segment(Checked):
     """Of the ISIs at which the tap enhances, or depresses, the MEP.
 
     Args:
@@ -89,18 +89,18 @@ class Segment:
         InvalidValueError: an invalid probability or scale, or widths whose shares do not sum to 1.
     """
 
-    probability: float
+    probability: Share
     widths: tuple[Width, ...]
     shift_pct: Scale
 
     def __post_init__(self) -> None:
-        check_probabilities(self, "probability")
+        super().__post_init__()
         check_laws(self, "widths")
         check_scales(self, "shift_pct", tailed=False)
 
 
 @dataclass(frozen=True)
-class Curve:
+class Curve(Checked):
     """A law of recruitment curves above the motor threshold.
 
     Args:
@@ -115,7 +115,7 @@ class Curve:
         InvalidValueError: an invalid share or scale.
     """
 
-    share: float
+    share: Share
     ratio: Scale
     slope_per_pct: Scale
     input_sd: Scale
@@ -123,7 +123,7 @@ class Curve:
     rest_pct: Scale
 
     def __post_init__(self) -> None:
-        check_probabilities(self, "share")
+        super().__post_init__()
         check_scales(self, "ratio", "slope_per_pct", "input_sd", "sigma_y", tailed=False)
         check_scales(self, "rest_pct", positive=False, tailed=False)
 
