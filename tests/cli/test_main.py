@@ -1,16 +1,19 @@
 from __future__ import annotations
 
+import ctypes
 import os
 import re
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
+import typer
 
 from cli.conftest import COMMAND, Command
 from isiw import __version__
-from isiw.cli.console import show_paragraph
+from isiw.cli.console import INTERRUPTED, errors_reported, show_paragraph
 
 
 def test_the_version_is_shown(isiw: Command) -> None:
@@ -81,3 +84,32 @@ def test_a_paragraph_is_as_wide_as_the_terminal_and_its_command_is_in_one_piece(
     assert max(map(len, lines)) <= 24
     assert " ".join(line.strip() for line in lines) == said
     assert last == way_on
+
+
+def test_an_interrupt_before_a_command_begins_ends_in_a_sentence() -> None:
+    script = (
+        "import signal, sys, types, isiw.__main__ as entry\n"
+        "loaded = types.ModuleType('isiw.cli')\n"
+        "loaded.app = lambda: signal.raise_signal(signal.SIGINT)\n"
+        "sys.modules['isiw.cli'] = loaded\n"
+        "entry.main()\n"
+    )
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)  # noqa: S603
+    assert (ended.returncode, ended.stdout, ended.stderr) == (INTERRUPTED, "", "Interrupted.\n")
+
+
+def test_an_interrupt_that_a_compiler_loses_ends_a_command_all_the_same(capsys: pytest.CaptureFixture[str]) -> None:
+    @ctypes.CFUNCTYPE(None)
+    def called_by_a_compiler() -> None:
+        raise KeyboardInterrupt
+
+    def work() -> None:
+        called_by_a_compiler()
+        end_s = time.monotonic() + 60
+        while time.monotonic() < end_s:
+            time.sleep(0.01)
+
+    with pytest.raises(typer.Exit) as ended, errors_reported("Interrupted: give the same command to continue."):
+        work()
+    assert ended.value.exit_code == INTERRUPTED
+    assert capsys.readouterr().err == "Interrupted: give the same command to continue.\n"

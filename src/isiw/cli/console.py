@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import signal
+import sys
+import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
@@ -22,6 +25,7 @@ if TYPE_CHECKING:
     from isiw.log.reader import SessionRecord
 
 _SILENT_S = 1.0
+_AGAIN_S = 0.05
 
 DAMAGED = 3
 NOT_OVER = 5  # a session that a person should look at, or that its operator ended early
@@ -95,7 +99,8 @@ def errors_reported(interrupted: str = "Interrupted.") -> Iterator[None]:
     What a lab's own code raises, or a fault of isiw, is shown with its traceback, and its message again at the end.
     """
     try:
-        yield
+        with _interruptible():
+            yield
     except isiw.errors.IsiwError as error:
         show(f"error: {error}", style="red", stderr=True)
         raise typer.Exit(DAMAGED if isinstance(error, isiw.errors.DamagedLogError) else 1) from error
@@ -116,6 +121,30 @@ def errors_reported(interrupted: str = "Interrupted.") -> Iterator[None]:
         where = f"{Path(place.filename).name}, line {place.lineno}"
         show(f"error: {type(error).__name__}: {error} ({where})", style="red", stderr=True)
         raise typer.Exit(1) from error
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Within, Ctrl-C is a KeyboardInterrupt, also one that comes while a compiler calls Python, which would lose it."""
+    if threading.current_thread() is not threading.main_thread() or signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        yield
+        return
+    handler, hook = signal.signal(signal.SIGINT, signal.default_int_handler), sys.unraisablehook
+
+    def again(lost: sys.UnraisableHookArgs) -> None:
+        if not issubclass(lost.exc_type, KeyboardInterrupt):
+            hook(lost)
+            return
+        later = threading.Timer(_AGAIN_S, signal.raise_signal, (signal.SIGINT,))  # when the callback has returned
+        later.daemon = True
+        later.start()
+
+    sys.unraisablehook = again
+    try:
+        yield
+    finally:
+        sys.unraisablehook = hook
+        signal.signal(signal.SIGINT, handler or signal.SIG_DFL)  # None if it was not set by Python
 
 
 def refuse_ignored(why: str, **options: object) -> None:
