@@ -33,10 +33,12 @@ def test_each_person_of_a_file_gets_a_log_and_called_again_nothing_is_made_twice
     first = isiw(*words)
     assert first.exit_code == 0, first.output
     assert sorted(path.name for path in Path("logs").iterdir()) == ["A.mcap", "A.png", "B.mcap", "B.png"]
+    Path("logs/A.png").unlink()  # as if it had been interrupted between the log and its picture
     Path("logs/B.mcap").unlink()
     again = isiw(*words)
     assert again.exit_code == 0
     assert "A.mcap is there already" in again.output
+    assert Path("logs/A.png").exists()
     assert "A.mcap" not in again.output.replace("A.mcap is there already", "")
     assert library.read_session("logs/B.mcap").header.imported
     other = isiw(*words, "--seed", "5")

@@ -25,8 +25,8 @@ from isiw.log.headers import Header
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Event, Record, Waveform, clock_ns
 from isiw.log.writer import LogWriter
-from isiw.plots.session import save_session_plot, session_figure
-from isiw.plots.style import inline_svg
+from isiw.plots.session import session_figure
+from isiw.plots.style import inline_svg, save_figure
 from isiw.report.page import save_report
 from isiw.report.words import final_statement
 from isiw.session.assembly import header_of
@@ -77,9 +77,10 @@ class Analysis:
         Raises:
             InvalidValueError: a format that matplotlib does not know, or a file that is not to be replaced.
         """
+        figure = session_figure(self.record)
         if path is not None:
-            save_session_plot(self.record, path, overwrite=overwrite)
-        return session_figure(self.record)
+            save_figure(figure, path, overwrite=overwrite)
+        return figure
 
     def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write the page about the trials, as `isiw report` does.
