@@ -49,7 +49,7 @@ def test_a_data_frame_is_read_as_it_is() -> None:
     assert trials_of(read_people(frame(), IMPACT)) == list(zip(ISIS, MEPS, strict=True))
 
 
-@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "cp1252"])
 def test_a_decimal_comma_and_any_encoding_are_read(encoding: str, tmp_path: Path) -> None:
     frame("ISI (ms)", "MEP [µV]", 1000.0).to_csv(
         tmp_path / "a.csv", sep=";", decimal=",", index=False, encoding=encoding
@@ -146,6 +146,100 @@ def test_a_layout_is_read_of_a_file(tmp_path: Path) -> None:
     assert found == [(10.0, 0.5), (20.0, 0.7), (30.0, 0.8)]
 
 
+WRITTEN: dict[str, tuple[str, str, dict[str, Any]]] = {
+    "grouped thousands and a decimal comma": (
+        "ISI (ms);MEP (µV)\n", "10,0;123,456789012\n20,5;200\n30;1.500,0\n40;750\n55,25;0,0\n", {},
+    ),
+    "grouped thousands and a decimal point": (
+        "ISI (ms),MEP (uV)\n", '10.0,123.456789012\n20.5,200\n30,"1,500"\n40,750\n55.25,0\n', {},
+    ),
+    "thousands grouped by blanks": (
+        "ISI (ms);MEP (uV)\n", "10,0;123,456789012\n20,5;200\n30;1 500,0\n40;750\n55,25;0\n", {},
+    ),
+    "units below the names": ("ISI\tMEP\nms\tmV\n", "\t", {}),
+    "units in the cells": (
+        "ISI,MEP\n", "10 ms,0.123456789012 mV\n20.5 ms,0.2 mV\n30 ms,1.5 mV\n40 ms,0.75 mV\n55.25 ms,0 mV\n", {},
+    ),
+    "units as words": ("ISI milliseconds,MEP_in_millivolts\n", ",", {}),
+    "a title and comments above": ("Paired pulses: ISI, MEP\n# of 2024\n\nisi_ms,mep_mv\n", ",", {}),
+    "what Excel writes about the separator": ("sep=;\nisi_ms;mep_mv\n", ";", {}),
+    "bars": ("isi_ms|mep_mv\n", "|", {}),
+    "blanks": ("  isi_ms   mep_mv\n", "   ", {}),
+    "rows that R numbers": (
+        '"isi_ms","mep_mv"\n', '"1",10,0.123456789012\n"2",20.5,0.2\n"3",30,1.5\n"4",40,0.75\n"5",55.25,0\n', {},
+    ),
+    "other names": ("IPI (ms),Peak-to-peak amplitude (mV)\n", ",", {}),
+    "a decimal sign that is stated": (
+        "ISI (ms);MEP (mV)\n", "10;0,123456789012\n20,5;0,2\n30;1,500\n40;0,75\n55,25;0\n", {"decimal": ","},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", WRITTEN)
+def test_tables_as_other_programs_write_them_are_read(kind: str, tmp_path: Path) -> None:
+    head, body, said = WRITTEN[kind]
+    if "\n" not in body:
+        body = "".join(f"{isi_ms}{body}{mep_mv}\n" for isi_ms, mep_mv in zip(ISIS, MEPS, strict=True))
+    (tmp_path / "P01.csv").write_text(head + body, encoding="utf-8")
+    found = trials_of(read_people(tmp_path / "P01.csv", Layout(**{"reference": "impact", **said})))
+    assert np.allclose(np.array(found, dtype=float), np.array([ISIS, MEPS]).T, rtol=1e-12)
+
+
+def test_of_a_workbook_the_sheet_with_trials_is_read_and_several_are_asked_about(tmp_path: Path) -> None:
+    path = tmp_path / "P01.xlsx"
+    with pd.ExcelWriter(path) as book:
+        pd.DataFrame({"note": ["FCR"]}).to_excel(book, sheet_name="About", index=False)
+        frame().to_excel(book, sheet_name="Trials", index=False, startrow=2)
+        book.sheets["Trials"]["A1"] = "Participant 7"
+    assert trials_of(read_people(path, IMPACT)) == list(zip(ISIS, MEPS, strict=True))
+    with pd.ExcelWriter(path) as book:
+        for name in ("one", "two"):
+            frame().to_excel(book, sheet_name=name, index=False)
+    with pytest.raises(IsiwError, match="--sheet NAME"):
+        read_people(path, IMPACT)
+    assert len(read_people(path, Layout(reference="impact", sheet="two"))) == 1
+    with pytest.raises(IsiwError, match="one of one, two"):
+        read_people(path, Layout(reference="impact", sheet="three"))
+
+
+def test_an_index_with_a_name_is_a_column(tmp_path: Path) -> None:
+    table = frame(subject=list("AABBB")).set_index("subject")
+    table.to_parquet(tmp_path / "all.parquet")
+    for source in (table, tmp_path / "all.parquet"):
+        assert [one.subject for one in read_people(source, IMPACT)] == ["A", "B"]
+    nested = pd.DataFrame(frame().to_numpy(), columns=pd.MultiIndex.from_tuples([("isi", "ms"), ("mep", "mV")]))
+    assert trials_of(read_people(nested, IMPACT)) == list(zip(ISIS, MEPS, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("days", "numbers"),
+    [
+        (["ses-01", "ses-02"], [1, 2]),
+        (["pre", "post"], [1, 2]),
+        (["2", "3"], [2, 3]),
+        (["2024-05-01", "2024-06-01"], [1, 2]),
+    ],
+)
+def test_days_are_numbers_in_their_names_or_are_counted(days: list[str], numbers: list[int]) -> None:
+    people = read_people(frame(session_id=[days[0], days[0], days[1], days[1], days[1]]), IMPACT)
+    assert [(one.visit.day, len(one.trials)) for one in people] == list(zip(numbers, [2, 3], strict=True))
+
+
+def test_a_column_of_conditions_says_which_trials_are_tms_alone() -> None:
+    table = pd.DataFrame(
+        {"condition": ["paired", "single-pulse", "paired"], "isi_ms": [10, None, 20], "mep_mv": [0.1, 0.2, 0.3]}
+    )
+    (person,) = read_people(table, IMPACT)
+    assert [trial.is_control and trial.told for trial in person.trials] == [False, True, False]
+
+
+def test_each_column_has_a_unit_of_its_own() -> None:
+    table = frame().assign(**{"nominal ISI (s)": [isi / 1e3 for isi in ISIS], "background (mV)": [0.002] * 5})
+    (person,) = read_people(table, IMPACT)
+    assert [trial.commanded_isi_ms for trial in person.trials] == pytest.approx(ISIS)
+    assert [trial.background_rms_uv for trial in person.trials] == [2.0] * 5
+
+
 HEAD = "isi_ms,mep_mv\n"
 BROKEN: dict[str, tuple[str, dict[str, Any], str]] = {
     "no reference": (HEAD + "10,0.1\n20,0.2\n", {"reference": None}, "--reference"),
@@ -176,6 +270,17 @@ BROKEN: dict[str, tuple[str, dict[str, Any], str]] = {
     "rows in another order": ("trial,isi_ms,mep_mv\n2,10,0.1\n1,20,0.2\n", {}, "not in the order"),
     "no date": ("isi_ms,mep_mv,date\n10,0.1,yesterday\n20,0.3,yesterday\n", {}, "is no date"),
     "more cells than names": (HEAD + "10,0.1\n20,0.3,4,5\n", {}, "no table that can be read"),
+    "a decimal comma that also separates": (HEAD + "10,5,0,1\n20,5,0,2\n", {}, "another separator"),
+    "a point that may be of thousands": ("isi_ms;mep_uv\n10;1.250\n20;980\n", {}, "--decimal"),
+    "a trial in two rows": ("trial,isi_ms,mep_mv\n1,10,0.1\n1,10,0.3\n2,20,0.2\n", {}, "'1'.*Leave one row"),
+    "a mean at the end": ("trial,isi_ms,mep_mv\n1,10,0.1\n2,20,0.3\nMean,15,0.2\n", {}, "Delete the row"),
+    "times that go back": ("time,isi_ms,mep_mv\n09:10,10,0.1\n09:05,20,0.3\n", {}, "not in the order"),
+    "a person in some rows only": ("subject,isi_ms,mep_mv\nA,10,0.1\n,20,0.3\n", {}, "into each row"),
+    "two files in one": (HEAD + "10,0.1\n20,0.3\n" + HEAD + "10,0.2\n", {}, "row 3 of the column 'mep_mv'"),
+    "amplitudes in percent": ("isi_ms,MEP (% of baseline)\n10,120\n20,80\n", {}, "--unit with mV, uV or V"),
+    "milliseconds in a column of seconds": ("isi_s,mep_mv\n10,0.1\n20,0.3\n30,0.2\n", {}, "--unit ms"),
+    "millivolts in a column of microvolts": ("isi_ms,mep_uv\n10,0.1\n20,0.3\n30,0.2\n", {}, "--unit mV"),
+    "bytes": ("\0\1\0\1\2\1\2", {}, "is no text"),
     "one column": ("isi_ms mep_mv;\n10 0.1;\n", {}, "--column"),
 }  # fmt: skip
 
@@ -198,6 +303,27 @@ def test_a_file_that_is_none_of_its_kind_is_refused(name: str, content: bytes | 
         (tmp_path / name).write_bytes(content)
     with pytest.raises(IsiwError):
         read_people(tmp_path / name, IMPACT)
+
+
+@pytest.mark.parametrize(
+    ("table", "says"),
+    [
+        ({"isi_ms": [-5.0, -10.0], "mep_mv": [0.1, 0.2]}, "TMS before impact"),
+        ({"isi_ms": [5.0, 10.0], "mep_mv": [None, None]}, "outcome unknown"),
+        ({"isi_ms": [5.0, 10.0], "mep_mv": [0.1, 0.2], "bad": [1, 1]}, "rejected"),
+    ],
+)
+def test_why_no_trial_counts_is_said(table: dict[str, Any], says: str) -> None:
+    (person,) = read_people(pd.DataFrame(table), IMPACT)
+    with pytest.raises(IsiwError, match=says):
+        person.space()
+
+
+@pytest.mark.parametrize("content", [b"", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"])
+def test_a_workbook_that_is_old_empty_or_has_a_password_is_refused(content: bytes, tmp_path: Path) -> None:
+    (tmp_path / "a.xlsx").write_bytes(content)
+    with pytest.raises(IsiwError, match="without a password"):
+        read_people(tmp_path / "a.xlsx", IMPACT)
 
 
 def test_isis_that_are_all_the_same_make_no_space() -> None:

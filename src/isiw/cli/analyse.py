@@ -32,6 +32,7 @@ Markers = Annotated[
 Channels = Annotated[
     list[str] | None, typer.Option("--channel", metavar="KEY=NAME", help="Which channel holds the EMG: emg=NAME.")
 ]
+Sheet = Annotated[str | None, typer.Option(help="The sheet of a workbook.", **NO_DEFAULT)]
 LayoutFile = Annotated[Path | None, typer.Option("--layout", help="How the files are laid out (TOML).", **NO_DEFAULT)]
 
 
@@ -48,6 +49,7 @@ def analyse(  # noqa: PLR0913, PLR0917 - an option each
     channel: Channels = None,
     alone: Annotated[str | None, typer.Option(help="What stands for the ISI of TMS alone.", **NO_DEFAULT)] = None,
     decimal: Annotated[str | None, typer.Option(help="The decimal sign of the file.", **NO_DEFAULT)] = None,
+    sheet: Sheet = None,
     layout: LayoutFile = None,
     config: Annotated[
         Path | None, typer.Option(help="Space, strategy, seed and visit as for isiw run (TOML).", **NO_DEFAULT)
@@ -71,6 +73,7 @@ def analyse(  # noqa: PLR0913, PLR0917 - an option each
             channels=isiw.existing.pairs_of("--channel", channel or []),
             alone=alone,
             decimal=decimal,
+            sheet=sheet,
         )
         settings = isiw.config.load_config(config).with_overrides(strategy=strategy, seed=seed)
         way = isiw.existing.way_of(settings, read, simulated=simulated)
@@ -87,6 +90,7 @@ def replay(  # noqa: PLR0913, PLR0917 - an option each
     reference: Reference = None,
     column: Columns = None,
     unit: Units = None,
+    sheet: Sheet = None,
     layout: LayoutFile = None,
     only: Annotated[str | None, typer.Option(help="The code of the one person who is wanted.", **NO_DEFAULT)] = None,
     overwrite: Overwrite = False,  # noqa: FBT002 - a flag of the command line
@@ -98,6 +102,7 @@ def replay(  # noqa: PLR0913, PLR0917 - an option each
             reference=reference,
             columns=isiw.existing.pairs_of("--column", column or []),
             units=tuple(unit or ()),
+            sheet=sheet,
         )
         found = isiw.existing.read_files([file], isiw.existing.Way(read), only=only)
         if len(found) > 1:
@@ -125,8 +130,10 @@ def _analyse_all(people: list[Person], way: Way, source: Path) -> None:
 
 def _analyse_one(person: Person, way: Way, source: Path, *, several: bool) -> None:
     name = f"{person.delivered.subject}: " if several else ""
-    if isiw.existing.is_there(person):
+    if person.log is not None and isiw.existing.is_there(person):
         show(f"{name}{person.log} is there already, of the same file and settings.")
+        if not person.log.with_suffix(".png").exists():  # interrupted between the two
+            isiw.plots.save_session_plot(isiw.read_session(person.log), person.log.with_suffix(".png"))
         return
     analysis = isiw.existing.analyse_person(person, way)
     show(f"{name}{analysis}", style=None if several else "bold")

@@ -11,15 +11,21 @@ from typing import Any, Final
 
 from isiw.errors import InvalidValueError
 
-_MISSING: Final = frozenset({"", "nan", "na", "n/a", "none", "null", "<na>", "nat", "-", "--", ".", "?"})
+_MISSING: Final = frozenset({"", "nan", "(null)", "na", "n/a", "none", "null", "<na>", "nat", "-", "--", ".", "?"})
 _YES: Final = frozenset({"1", "1.0", "true", "yes", "y", "x", "accepted", "accept", "ok", "good", "valid", "keep"})
 _NO: Final = frozenset({"0", "0.0", "false", "no", "n", "mistrial", "rejected", "reject", "bad", "invalid", "excluded"})
-_ALONE: Final = frozenset({"tms alone", "tms only", "tms", "single", "single pulse", "sp", "alone", "baseline",
-                           "control", "unconditioned", "ts", "ts alone"})  # fmt: skip
-"""What a cell of ISIs says of TMS alone."""
+_ALONE: Final = frozenset({"tms alone", "tms only", "tms", "single", "single pulse", "single tms", "sp", "alone", "ts",
+                           "baseline", "control", "unconditioned", "unpaired", "ts alone", "ts only", "test",
+                           "test alone", "test only", "test pulse", "test stimulus", "no tap"})  # fmt: skip
+"""What a cell of ISIs says of TMS alone, hyphens and underscores as blanks."""
 
 _NUMBER: Final = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?inf(inity)?", re.IGNORECASE)
-_GROUPED: Final = re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+")
+_GROUPED: Final = {
+    ".": re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d+)?"),
+    ",": re.compile(r"[-+]?[1-9]\d{0,2}(\.\d{3})+(,\d+)?"),
+}
+"""By the decimal sign, numbers whose thousands are grouped by the other sign."""
+_BLANKS: Final = re.compile(r"(?<=\d)[ '\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}](?=\d{3})")
 
 
 def is_missing(cell: Any) -> bool:
@@ -29,11 +35,23 @@ def is_missing(cell: Any) -> bool:
     return cell is None or cell != cell or type(cell).__name__ in {"NAType", "NaTType"}  # noqa: PLR0124 - NaN
 
 
+def _value(text: str, decimal: str) -> float:
+    """The number that a text is; NaN if it is none."""
+    text = _BLANKS.sub("", text.strip().replace("\N{MINUS SIGN}", "-"))
+    group = "," if decimal == "." else "."
+    if group in text:
+        if not _GROUPED[decimal].fullmatch(text):
+            return math.nan
+        text = text.replace(group, "")
+    text = text.replace(decimal, ".")
+    return float(text) if _NUMBER.fullmatch(text) else math.nan
+
+
 def says_alone(cell: Any, mark: str | None) -> bool:
     """Whether a cell of ISIs says that there was TMS alone; an empty one does only if that is the mark."""
     if mark is not None and (is_missing(cell) if not mark.strip() else _same(cell, mark)):
         return True
-    return isinstance(cell, str) and cell.strip().casefold() in _ALONE
+    return isinstance(cell, str) and " ".join(re.split(r"[\s_-]+", cell.strip().casefold())) in _ALONE
 
 
 def _same(cell: Any, mark: str) -> bool:
@@ -64,9 +82,7 @@ class Column:
         if is_missing(cell):
             return None
         if isinstance(cell, str):
-            text = cell.strip().replace("\N{MINUS SIGN}", "-")
-            text = text.replace(",", ".") if self.decimal == "," else text
-            value = float(text) if _NUMBER.fullmatch(text) else math.nan
+            value = _value(cell, self.decimal)
         else:
             value = float(cell) if isinstance(cell, Real) and not isinstance(cell, bool) else math.nan
         if not math.isfinite(value):
@@ -104,17 +120,33 @@ class Column:
 
 
 def decimal_of(columns: Sequence[Column], stated: str | None) -> str:
-    """The decimal sign of some columns' texts; a comma that may also group thousands is asked about."""
+    """The decimal sign of some columns' texts; one that may also group thousands is asked about."""
     if stated is not None:
         return stated
-    texts = [cell.strip() for column in columns for cell in column.cells if isinstance(cell, str) and "," in cell]
-    numbers = [text for text in texts if _NUMBER.fullmatch(text.replace(",", ".", 1))]
-    if not numbers:
-        return "."
-    if all(_GROUPED.fullmatch(text) for text in numbers):
-        raise InvalidValueError(
-            f"the comma in the numbers of {columns[0].of} may be a decimal sign, or group thousands",
-            got=numbers[0],
-            remedy="If it is, say --decimal , and if it groups thousands, write the numbers without it.",
-        )
-    return ","
+    for column in columns:
+        texts = [_BLANKS.sub("", cell.strip()) for cell in column.cells if isinstance(cell, str)]
+        signs = {sign for sign in ".," for text in texts if _is_decimal(text, sign)}
+        if "," in signs:
+            return ","
+        doubtful = [text for text in texts if any(other.fullmatch(text) for other in _GROUPED.values())]
+        bare = any(text.isdigit() for text in texts)
+        if not signs and doubtful and ("," in doubtful[0] or bare) and not _elsewhere(columns, column):
+            raise InvalidValueError(
+                f"the {'comma' if ',' in doubtful[0] else 'point'} in the column {column.name!r} of {column.of} may be "
+                "a decimal sign, or group thousands",
+                got=doubtful[0],
+                remedy="Say --decimal , or --decimal . to name the decimal sign.",
+            )
+    return "."
+
+
+def _is_decimal(text: str, sign: str) -> bool:
+    """Whether a text has this decimal sign, and cannot have the other one."""
+    other = "," if sign == "." else "."
+    return sign in text and not math.isnan(_value(text, sign)) and math.isnan(_value(text, other))
+
+
+def _elsewhere(columns: Sequence[Column], column: Column) -> bool:
+    """Whether the texts of other columns have one decimal sign for certain."""
+    others = [cell.strip() for each in columns if each is not column for cell in each.cells if isinstance(cell, str)]
+    return any(_is_decimal(text, sign) for text in others for sign in ".,")

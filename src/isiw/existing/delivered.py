@@ -10,10 +10,11 @@ from typing import Final
 
 from isiw.design import MOST_ISIS, DesignSpace
 from isiw.errors import InvalidValueError, LogError
+from isiw.existing.layout import ISI_UNITS_MS
 from isiw.findings import AMPLITUDE_MV, Kind
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import MOST_TRIALS
-from isiw.signals.limits import SignalLimits, implausible_scale
+from isiw.signals.limits import EMG_UNITS_MV, SignalLimits, implausible_scale
 from isiw.text.harmless import counted
 from isiw.trials import Channel, Trial, TrialTable
 from isiw.types import Conditioning, Reference
@@ -39,6 +40,7 @@ class Delivered:
         blocks: the first trial of each block, and what the block is called.
         conditioning: the conditioning stimulus.
         simulated: whether nobody was stimulated.
+        units: the units in which ISIs and amplitudes are stated where they are from.
 
     Raises:
         InvalidValueError: no pair of stimuli, more trials than any session has, or numbers that are probably in another
@@ -56,6 +58,7 @@ class Delivered:
     blocks: Mapping[int, str] = field(default_factory=dict)
     conditioning: Conditioning = "tap"
     simulated: bool = False
+    units: tuple[str, str] = ("ms", "mV")
 
     def __post_init__(self) -> None:
         if len(self.trials) >= MOST_TRIALS:
@@ -86,7 +89,12 @@ class Delivered:
         """The range of the ISIs that were delivered, in whole steps."""
         isis_ms = self.isis_ms
         if not isis_ms:
-            raise InvalidValueError(f"{self.named} has no trial that counts", remedy="Look at its status column.")
+            reasons = sorted({str(trial.reason) for trial in self.trials if trial.reason is not None})
+            raise InvalidValueError(
+                f"no trial of {self.named} counts",
+                got=", ".join(reasons) or None,
+                remedy="A trial counts if it has an ISI and an amplitude, and if no column excludes it.",
+            )
         low, high = math.floor(min(isis_ms) / step_ms), math.ceil(max(isis_ms) / step_ms)
         if not 1 <= high - low < MOST_ISIS:
             raise InvalidValueError(
@@ -107,25 +115,30 @@ class Delivered:
             )
 
     def _require_ms(self, isis_ms: Sequence[float]) -> None:
-        longest = max(map(abs, isis_ms))
-        slip = "s" if 0 < longest < 1 else "us" if longest > LONGEST_ISI_MS else None
-        if slip is not None:
-            raise InvalidValueError(
-                f"the ISIs of {self.named} cannot be in ms",
-                got=f"at most {longest:g} ms",
-                remedy=f"If they are in {slip}, say --unit {slip}.",
-            )
+        longest_ms = max(map(abs, isis_ms))
+        if longest_ms == 0 or 1 <= longest_ms <= LONGEST_ISI_MS:
+            return
+        stated = self.units[0]
+        longest = longest_ms / ISI_UNITS_MS[stated]
+        fits = [unit for unit in ("ms", "s", "us") if 1 <= longest * ISI_UNITS_MS[unit] <= LONGEST_ISI_MS]
+        raise self._in_another_unit("ISIs", "isi", f"at most {longest:g} {stated}", stated, fits)
 
     def _require_mv(self, meps_mv: Sequence[float]) -> None:
         seen = [mep_mv for mep_mv in meps_mv if mep_mv > 0]
-        found = implausible_scale(meps_mv)
         usual_mv = statistics.median(seen) if seen else 0.0
-        if found is None and usual_mv <= AMPLITUDE_MV.most:
+        if implausible_scale(meps_mv) is None and usual_mv <= AMPLITUDE_MV.most:
             return
-        raise InvalidValueError(
-            f"the amplitudes of {self.named} cannot be in mV",
-            got=f"{usual_mv:.3g} mV in the median",
-            remedy="If they are in V, say --unit V." if found else "If they are in µV, say --unit uV.",
+        stated = self.units[1]
+        usual = usual_mv / EMG_UNITS_MV[stated]
+        fits = [unit for unit in ("mV", "uV", "V") if 0.01 <= usual * EMG_UNITS_MV[unit] <= AMPLITUDE_MV.most]
+        raise self._in_another_unit("amplitudes", "mep", f"{usual:.3g} {stated} in the median", stated, fits)
+
+    def _in_another_unit(self, what: str, key: str, got: str, stated: str, fits: Sequence[str]) -> InvalidValueError:
+        said = f"If they are in {fits[0]}, say --unit {fits[0]}; if" if fits else "If"
+        return InvalidValueError(
+            f"the {what} of {self.named} cannot be in {stated}",
+            got=got,
+            remedy=f"{said} another column holds them, say --column {key}=NAME.",
         )
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from isiw.checks import Checked, Natural, Positive, Text, choice
+from isiw.checks import Checked, Natural, NonNegative, Positive, Text, choice
 from isiw.errors import InvalidValueError
 from isiw.signals.limits import EMG_UNITS_MV
 from isiw.text.toml_files import checked, read_toml
@@ -16,10 +17,19 @@ from isiw.types import Reference
 ISI_UNITS_MS: Final[Mapping[str, float]] = {"ms": 1.0, "s": 1e3, "us": 1e-3, "µs": 1e-3, "μs": 1e-3}
 """One of each unit in ms."""
 
+UNIT_WORDS: Final[Mapping[str, str]] = {
+    "ms": "ms", "msec": "ms", "millisecond": "ms", "milliseconds": "ms", "s": "s", "sec": "s", "second": "s",
+    "seconds": "s", "us": "us", "µs": "us", "μs": "us", "v": "V", "volt": "V", "volts": "V", "mv": "mV",
+    "millivolt": "mV", "millivolts": "mV", "uv": "uV", "µv": "uV", "μv": "uV", "microvolt": "uV", "microvolts": "uV",
+}  # fmt: skip
+"""Units as files write them, in lower case."""
+
 COLUMNS: Final[Mapping[str, tuple[str, ...]]] = {
-    "isi": ("isi", "realisedisi", "isirealised", "actualisi", "interstimulusinterval", "interval", "delay", "soa"),
-    "mep": ("mep", "mepamplitude", "mepamp", "mepp2p", "meppp", "mepptp", "meppeaktopeak", "ptpmep", "amplitude",
-            "peaktopeak", "p2p", "ptp", "amp"),
+    "isi": ("isi", "realisedisi", "isirealised", "actualisi", "interstimulusinterval", "interpulseinterval", "ipi",
+            "interval", "delay", "soa"),
+    "mep": ("mep", "mepamplitude", "mepamp", "mepp2p", "meppp", "mepptp", "meppeaktopeak", "mepsize", "ptpmep",
+            "amplitude", "peaktopeak", "peaktopeakamplitude", "emgpeaktopeak", "p2pamplitude", "ptpamplitude", "p2p",
+            "ptp", "amp"),
     "asked": ("commandedisi", "askedisi", "nominalisi", "targetisi", "plannedisi", "isicommanded", "isinominal"),
     "isi_sd": ("isisd",),
     "background": ("backgroundrms", "background", "prestimrms", "rmsbackground", "baselinerms"),
@@ -28,7 +38,8 @@ COLUMNS: Final[Mapping[str, tuple[str, ...]]] = {
     "reason": ("reason",),
     "tap_alone": ("tapalone",),
     "subject": ("subject", "subjectid", "participant", "participantid", "subj", "person", "patient", "sub", "id"),
-    "day": ("day", "visit", "session", "ses"),
+    "day": ("day", "visit", "session", "sessionid", "ses"),
+    "condition": ("condition", "trialtype", "stimulus", "type"),
     "block": ("block", "run"),
     "order": ("trial", "trialnumber", "trialno", "trialnr", "index", "onset", "time"),
     "date": ("date", "recordingdate"),
@@ -36,7 +47,16 @@ COLUMNS: Final[Mapping[str, tuple[str, ...]]] = {
 """By what they are called in letters alone, the columns that are found without being named; the first name wins."""
 
 MARKERS: Final = ("pulse", "tap", "valve")
-CHANNELS: Final = ("emg", "acceleration")
+CHANNELS: Final = ("emg", "acceleration", "events", *MARKERS)
+"""What columns and arrays of a recording hold: those of `MARKERS` are triggers, that of events has texts."""
+
+
+def letters(name: str) -> str:
+    """A column's name in letters alone, without its unit."""
+    words = re.findall(r"[^\W_]+", re.sub(r"[\[(].*?[\])]", " ", name.casefold()))
+    while len(words) > 1 and (words[-1] in UNIT_WORDS or words[-1] == "in"):
+        words.pop()
+    return "".join(words)
 
 
 @dataclass(frozen=True)
@@ -54,7 +74,10 @@ class Layout(Checked):
         names: the columns' names, if no line of the file holds them.
         sheet: the sheet of a workbook; by default the first one.
         markers: of a recording, the name of an event by what it marks: `pulse` (of TMS), `tap` or `valve`.
-        channels: of a recording, the name of a channel by what it holds: `emg`, `acceleration`.
+        channels: of a recording, the name of a channel by what it holds: `emg`, `acceleration`; of one in columns of
+            text also `events`, whose texts are events, and the triggers `pulse`, `tap` and `valve`.
+        rate_hz: the sampling rate of a recording in columns of text, or of sweeps in MATLAB [Hz].
+        pulse_at_ms: of sweeps in MATLAB, how long after their first sample the pulse comes [ms].
         longest_isi_ms: the longest ISI of a recording; a pulse that comes later after a tap is TMS alone [ms].
         mep_window_ms: where the MEP of a recording is sought [ms after the pulse]; by default as in a session.
 
@@ -73,6 +96,8 @@ class Layout(Checked):
     sheet: str | None = None
     markers: Mapping[str, str] = field(default_factory=dict)
     channels: Mapping[str, str] = field(default_factory=dict)
+    rate_hz: Positive | None = None
+    pulse_at_ms: NonNegative | None = None
     longest_isi_ms: Positive = 500.0
     mep_window_ms: tuple[float, float] | None = None
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import re
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -28,14 +29,36 @@ def people_of(frame: pd.DataFrame, layout: Layout, source: str, name: str = "") 
     """The people of a table, in the order in which they come first; who has no code is called as the file is."""
     reference = required_reference(layout, source)
     columns = Columns.found(frame, layout, source)
-    rows: dict[tuple[str, str], list[int]] = {}
-    for row in range(columns.rows):
-        if columns.number("mep", row) is None and columns.of["isi"].text(row) == "" and not columns.text("asked", row):
-            continue  # an empty line
-        rows.setdefault((columns.text("subject", row), columns.text("day", row)), []).append(row)
+    rows = [row for row in range(columns.rows) if not _is_empty(columns, row)]
     if not rows:
         raise InvalidValueError(f"{source} has no trials", remedy="Are the right columns named?")
-    return [_person(columns, own, layout, reference, source, key, name) for key, own in rows.items()]
+    subjects = [columns.text("subject", row) for row in rows]
+    if any(subjects) and not all(subjects):
+        empty = rows[subjects.index("")]
+        raise columns.of["subject"].refused(empty, "is empty", "Write the person's code into each row.")
+    people: dict[str, list[int]] = {}
+    for subject, row in zip(subjects, rows, strict=True):
+        people.setdefault(subject, []).append(row)
+    visits = [(own, subject, day) for subject, theirs in people.items() for day, own in _days(columns, theirs).items()]
+    visits.sort(key=lambda visit: visit[0][0])
+    return [_person(columns, own, layout, reference, source, (subject, day), name) for own, subject, day in visits]
+
+
+def _is_empty(columns: Columns, row: int) -> bool:
+    return columns.number("mep", row) is None and not columns.of["isi"].text(row) and not columns.text("asked", row)
+
+
+def _days(columns: Columns, rows: Sequence[int]) -> dict[int | None, list[int]]:
+    """The rows of each day; days without a number of their own are counted as they come."""
+    days: dict[str, list[int]] = {}
+    for row in rows:
+        days.setdefault(columns.text("day", row), []).append(row)
+    if list(days) == [""]:
+        return {None: list(rows)}
+    numbers = [int(found[-1]) if len(found := re.findall(r"\d+", day)) == 1 else 0 for day in days]
+    if len(set(numbers)) < len(numbers) or min(numbers) < 1:
+        numbers = list(range(1, len(days) + 1))
+    return dict(zip(numbers, days.values(), strict=True))
 
 
 def required_reference(layout: Layout, source: str) -> Reference:
@@ -55,7 +78,7 @@ def _person(
     layout: Layout,
     reference: Reference,
     source: str,
-    key: tuple[str, str],
+    key: tuple[str, int | None],
     name: str,
 ) -> Delivered:
     subject, day = key
@@ -68,9 +91,10 @@ def _person(
         renumbered(trials),
         reference,
         subject=subject or name,
-        visit=Visit(day=int(day)) if day.isdigit() and int(day) > 0 else Visit(),
+        visit=Visit(day=day),
         source=source,
         created=_created(columns, rows[0]),
+        units=columns.units,
         blocks={n: block for n, block in enumerate(blocks) if n and block != blocks[n - 1]},
     )
 
@@ -78,9 +102,9 @@ def _person(
 def _trial(columns: Columns, row: int, number: int, layout: Layout, anywhere: DesignSpace) -> Trial:
     """One row as a trial: as the file judges it, or else as a session would."""
     alone = says_alone(columns.of["isi"].cells[row], layout.alone)
-    isi_ms = None if alone else columns.number("isi", row, columns.isi_ms)
-    asked_ms = columns.number("asked", row, columns.isi_ms) if "asked" in columns.of else isi_ms
-    mep_mv, lost = columns.number("mep", row, columns.mep_mv), _lost(columns, row)
+    isi_ms = None if alone else columns.number("isi", row)
+    asked_ms = columns.number("asked", row) if "asked" in columns.of else isi_ms
+    mep_mv, lost = columns.number("mep", row), _lost(columns, row)
     if mep_mv is not None and not 0 <= mep_mv <= MOST_MEP_MV:
         remedy = "It must be from peak to peak, in the unit that is stated; is --unit right?"
         raise columns.of["mep"].refused(row, "is no amplitude", remedy)
@@ -121,7 +145,8 @@ def _require_said(columns: Columns, rows: Sequence[int], layout: Layout, source:
     empty = [
         row
         for row in rows
-        if not says_alone(isi.cells[row], None) and not isi.text(row) and columns.number("mep", row) is not None
+        if not says_alone(isi.cells[row], None) and not says_alone(columns.text("condition", row), None)
+        and not isi.text(row) and columns.number("mep", row) is not None
         and _lost(columns, row) is None and not columns.flag("tap_alone", row)
     ]  # fmt: skip
     if empty:
@@ -135,15 +160,31 @@ def _require_said(columns: Columns, rows: Sequence[int], layout: Layout, source:
 
 def _require_ascending(columns: Columns, rows: Sequence[int], source: str) -> None:
     """Raise if the rows are not in the order of delivery, on which drift and the start depend."""
-    if (order := columns.of.get("order")) is None:
+    if (order := columns.of.get("order")) is None or "block" in columns.of:
         return
-    numbers = [order.number(row) if _is_number(order.text(row)) else None for row in rows]
-    known = [number for number in numbers if number is not None]
-    restarts = "block" in columns.of
-    if known != sorted(known) and not restarts:
+    known = [row for row in rows if order.text(row)]
+    texts = [order.text(row) for row in known]
+    are_numbers = [_is_number(text) for text in texts]
+    if any(are_numbers):
+        if not all(are_numbers):
+            odd = known[are_numbers.index(False)]
+            raise order.refused(odd, "is none of a trial", "Delete the row if it is a sum or a mean.")
+        places = [order.number(row) or 0.0 for row in known]
+    else:  # times of the day, perhaps
+        moments = pd.to_datetime(pd.Series(texts), errors="coerce", format="mixed")
+        places = [] if moments.isna().any() else [moment.timestamp() for moment in moments]
+    repeated = next((text for text, other in zip(texts[1:], places[1:], strict=False) if places.count(other) > 1), None)
+    if places != sorted(places):
         raise InvalidValueError(
             f"the rows of {source} are not in the order of its column {order.name!r}",
             remedy="Sort them as the trials were delivered, or name the column that says so: --column order=NAME.",
+        )
+    if all(are_numbers) and repeated is not None:
+        raise InvalidValueError(
+            f"a trial has two rows and more in {source}, by its column {order.name!r}",
+            got=repeated,
+            remedy="Leave one row for each trial, such as that of one muscle; or name a column of people or blocks: "
+            "--column subject=NAME, --column block=NAME.",
         )
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from isiw.errors import InvalidValueError
-from isiw.existing import recordings, tables
+from isiw.existing import frames, recordings, waves
 from isiw.existing.delivered import Delivered, read_log
 from isiw.existing.layout import Layout
 from isiw.existing.people import people_of
@@ -39,16 +39,23 @@ def read_people(source: str | Path | Any, layout: Layout | None = None, *, subje
     suffix = path.suffix.lower()
     if suffix in recordings.SUFFIXES:
         return [recordings.read_recording(path, layout, subject or path.stem)]
-    if path.is_dir() or suffix not in {*tables.SUFFIXES, ".mat"}:
-        known = sorted({*tables.SUFFIXES, *recordings.SUFFIXES, ".mat"})
-        raise InvalidValueError("this cannot be read", got=path.name, expected=f"a file of {', '.join(known)}")
-    return people_of(tables.read_frame(path, layout), layout, path.name, subject or path.stem)
+    if path.is_dir() or suffix not in frames.SUFFIXES:
+        known = sorted(frames.SUFFIXES | recordings.SUFFIXES)
+        raise InvalidValueError(
+            "this cannot be read",
+            got=path.name,
+            expected=f"a file of {', '.join(known)}",
+            remedy="Save it as one of these, such as CSV.",
+        )
+    if "emg" in layout.channels:
+        return [waves.read_waves(path, layout, subject or path.stem)]
+    return people_of(frames.read_frame(path, layout), layout, path.name, subject or path.stem)
 
 
 def _in_memory(source: Any, layout: Layout, subject: str) -> list[Delivered]:
     """The people of a table, or of a recording that MNE has read."""
     if isinstance(source, pd.DataFrame):
-        return people_of(source, layout, "the table", subject)
+        return people_of(frames.named(source), layout, "the table", subject)
     if hasattr(source, "metadata") and hasattr(source, "get_data"):
         return [recordings.of_epochs(source, layout, subject)]
     if hasattr(source, "annotations"):

@@ -16,9 +16,9 @@ import numpy as np
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.existing.delivered import Delivered, renumbered
+from isiw.existing.frames import extra
 from isiw.existing.layout import Layout
 from isiw.existing.people import required_reference
-from isiw.existing.tables import extra
 from isiw.lazy import pd
 from isiw.signals.judgement import judge
 from isiw.signals.limits import EMG_UNITS_MV, SignalLimits
@@ -42,7 +42,7 @@ _ANYWHERE_MS: Final = 10_000.0
 
 
 @dataclass(frozen=True, eq=False)
-class _Recording:
+class Recording:
     """A recording in memory: EMG and acceleration by name, and events by what they are called [s]."""
 
     channels: Mapping[str, Channel]
@@ -78,13 +78,13 @@ def of_raw(
 ) -> Delivered:
     """The trials of an `mne.io.Raw`; its annotations say when the stimuli came, or a table of events."""
     reference = required_reference(layout, source)
-    recording = _Recording(_channels(raw, layout, source), _annotated(raw) if events is None else events, source)
-    return _delivered(recording, _sweeps(recording, layout, reference), layout, reference, subject)
+    recording = Recording(_channels(raw, layout, source), _annotated(raw) if events is None else events, source)
+    return delivered_of(recording, sweeps_of(recording, layout, reference), layout, reference, subject)
 
 
 def of_epochs(epochs: Any, layout: Layout, subject: str, source: str = "the epochs") -> Delivered:
     """The trials of `mne.Epochs` about the pulse, whose metadata have the ISIs."""
-    reference = required_reference(layout, source)
+    required_reference(layout, source)
     metadata = epochs.metadata
     column = layout.columns.get("isi", "isi_ms")
     if metadata is None or column not in metadata:
@@ -94,23 +94,29 @@ def of_epochs(epochs: Any, layout: Layout, subject: str, source: str = "the epoc
     values_mv = _factor_mv(epochs, name, layout, source) * epochs.get_data(picks=[name], verbose="ERROR")[:, 0]
     rate_hz, t0_ms = float(epochs.info["sfreq"]), 1e3 * float(epochs.tmin)
     isis_ms = metadata[column].astype(float).tolist()
-    sweeps: list[_Found] = []
-    for number, (isi, emg_mv) in enumerate(zip(isis_ms, values_mv, strict=True)):
+    channels = [Channel(emg_mv, rate_hz, "mV", t0_ms) for emg_mv in values_mv]
+    return of_sweeps(channels, isis_ms, layout, subject, source)
+
+
+def of_sweeps(
+    channels: Sequence[Channel], isis_ms: Sequence[float], layout: Layout, subject: str, source: str
+) -> Delivered:
+    """The trials of sweeps whose clocks begin at the pulse; NaN in place of an ISI is TMS alone."""
+    reference = required_reference(layout, source)
+    begin = "t_hit_ms" if reference == "impact" else "t_valve_ms"
+    sweeps: list[Found] = []
+    for number, (isi, emg) in enumerate(zip(isis_ms, channels, strict=True)):
         isi_ms = None if np.isnan(isi) else isi
-        begins: dict[str, Any] = {
-            "t_hit_ms" if reference == "impact" else "t_valve_ms": None if isi_ms is None else -isi_ms
-        }
-        sweep = Sweep({"emg": Channel(emg_mv, rate_hz, "mV", t0_ms)}, t_tms_ms=0.0, **begins)
-        sweeps.append((Stimulus(number, isi_ms), sweep, {}))
-    recording = _Recording({}, pd.DataFrame(), source)
-    return _delivered(recording, sweeps, layout, reference, subject)
+        begins: dict[str, Any] = {begin: None if isi_ms is None else -isi_ms}
+        sweeps.append((Stimulus(number, isi_ms), Sweep({"emg": emg}, t_tms_ms=0.0, **begins), {}))
+    return delivered_of(Recording({}, pd.DataFrame(), source), sweeps, layout, reference, subject)
 
 
-_Found = tuple[Stimulus, Sweep, Mapping[str, Any]]
+Found = tuple[Stimulus, Sweep, Mapping[str, Any]]
 
 
-def _delivered(
-    recording: _Recording, sweeps: Sequence[_Found], layout: Layout, reference: Reference, subject: str
+def delivered_of(
+    recording: Recording, sweeps: Sequence[Found], layout: Layout, reference: Reference, subject: str
 ) -> Delivered:
     """The sweeps as trials, judged as in a session."""
     anywhere = DesignSpace(-_ANYWHERE_MS, _ANYWHERE_MS, 10.0, reference=reference)
@@ -207,7 +213,7 @@ def _bids_events(path: Path) -> pd.DataFrame | None:
     return frame.rename(columns={"trial_type": "name"} if "trial_type" in frame else {"value": "name"})
 
 
-def _marker(recording: _Recording, key: str, layout: Layout) -> str | None:
+def _marker(recording: Recording, key: str, layout: Layout) -> str | None:
     """What the events are called that mark something; None if none of them does."""
     names = [str(name) for name in dict.fromkeys(recording.events["name"])]
     if (stated := layout.markers.get(key)) is None:
@@ -225,7 +231,7 @@ def _plain(name: str) -> str:
     return " ".join(name.rpartition("/")[2].casefold().split())
 
 
-def _required_marker(recording: _Recording, key: str, what: str, layout: Layout) -> str:
+def _required_marker(recording: Recording, key: str, what: str, layout: Layout) -> str:
     found = _marker(recording, key, layout)
     if found is None:
         names = ", ".join(repr(str(name)) for name in dict.fromkeys(recording.events["name"]))
@@ -237,7 +243,7 @@ def _required_marker(recording: _Recording, key: str, what: str, layout: Layout)
     return found
 
 
-def _sweeps(recording: _Recording, layout: Layout, reference: Reference) -> list[_Found]:
+def sweeps_of(recording: Recording, layout: Layout, reference: Reference) -> list[Found]:
     """A stretch of the recording for each pulse, with what came before it."""
     pulses_s = recording.at_s(_required_marker(recording, "pulse", "the pulse of TMS", layout))
     key = "tap" if reference == "impact" else "valve"

@@ -1,0 +1,269 @@
+"""Files as tables: rows of cells, among which the line with the columns' names is found, and one of units below it."""
+
+from __future__ import annotations
+
+import csv
+import importlib
+import io
+import re
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final, cast
+
+import numpy as np
+
+from isiw.errors import ConfigError, InvalidValueError
+from isiw.existing.cells import is_missing
+from isiw.existing.layout import COLUMNS, UNIT_WORDS, Layout, letters
+from isiw.files import opened
+from isiw.lazy import pd, scipy
+
+TEXTS: Final = {".csv", ".tsv", ".txt", ".dat", ".tab"}
+WORKBOOKS: Final = {".xlsx", ".xlsm"}
+SUFFIXES: Final = TEXTS | WORKBOOKS | {".parquet", ".mat"}
+
+_ENCODINGS: Final = ("utf-8-sig", "cp1252", "latin-1")
+_LINES: Final = 100
+"""Within so many lines the columns' names are sought."""
+
+_HEAD: Final = 40
+"""So many bytes show how a text is encoded."""
+
+_NUMBER_BEFORE: Final = re.compile(r"^[-+\d.,\s]*(e[-+]?\d+)?\s*")
+
+Rows = Sequence[Sequence[Any]]
+
+
+def read_frame(path: Path, layout: Layout) -> pd.DataFrame:
+    """The table in a file, its cells as they are."""
+    readers: Mapping[str, Callable[[bytes, Layout], pd.DataFrame]] = {
+        ".mat": lambda content, _: _of_vectors(_arrays(content)),
+        ".parquet": lambda content, _: named(pd.read_parquet(io.BytesIO(content))),
+        **dict.fromkeys(WORKBOOKS, _workbook),
+    }
+    read = readers.get(path.suffix.lower(), _texts)
+    frame: pd.DataFrame = _read(path, lambda content: read(content, layout))
+    if not len(frame):
+        raise InvalidValueError("the table has no rows", got=str(path), remedy="Are the lines before it skipped?")
+    return frame
+
+
+def read_arrays(path: Path) -> dict[str, Any]:
+    """The arrays in a file of MATLAB by name, those in structures among them."""
+    arrays: dict[str, Any] = _read(path, _arrays)
+    return arrays
+
+
+def _read(path: Path, read: Callable[[bytes], Any]) -> Any:
+    with opened(path) as file:
+        content = file.read()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of a workbook's styles; what is in its cells is checked
+            return read(content)
+    except (ConfigError, InvalidValueError):
+        raise
+    except Exception as error:  # each reader has errors of its own
+        why, *_ = str(error).splitlines() or [type(error).__name__]
+        raise InvalidValueError(
+            f"the file is no table that can be read: {why}",
+            got=str(path),
+            remedy="Save it as CSV, with the columns' names in the first line.",
+        ) from error
+
+
+def named(frame: pd.DataFrame) -> pd.DataFrame:
+    """A data frame whose index, if it has a name, is a column as others are, and whose columns have one name each."""
+    if any(name is not None for name in frame.index.names):
+        frame = frame.reset_index()
+    names = [" ".join(map(str, name)) if isinstance(name, tuple) else str(name) for name in frame.columns]
+    return frame.set_axis(names, axis=1)
+
+
+def _texts(content: bytes, layout: Layout) -> pd.DataFrame:
+    text = _decoded(content)
+    if "\0" in text:
+        raise InvalidValueError("the file is no text, and so no table that can be read", remedy="Is it the right one?")
+    lines = text.splitlines(keepends=True)[layout.skip_lines :]
+    first = 0 if layout.names else next((n for n in range(min(_LINES, len(lines))) if _begins(lines, n, layout)), 0)
+    lines = lines[first:]
+    if lines and lines[0].startswith("#"):  # each part of the file begins so, with names of its own
+        ends = (n for n, line in enumerate(lines) if n and line.startswith("#"))
+        lines = [lines[0].lstrip("# "), *lines[1 : next(ends, None)]]
+    separator = layout.separator or _separator(lines[0] if lines else "")
+    return _table([row for row in _split(lines, separator) if row], layout)
+
+
+def _begins(lines: Sequence[str], number: int, layout: Layout) -> bool:
+    """Whether a line holds the columns' names, and those below it as many cells."""
+    line = lines[number].lstrip("# ")
+    separator = layout.separator or _separator(line)
+    names, *below = _split([line, *lines[number + 1 : number + 3]], separator)
+    return _is_header(names, layout) and all(len(row) >= len(names) for row in below if row)
+
+
+def _is_header(cells: Sequence[Any], layout: Layout) -> bool:
+    """Whether cells are the names of columns, those of ISIs and amplitudes among them."""
+    texts = [cell.strip() for cell in cells if isinstance(cell, str)]
+    known = {letters(text) for text in texts}
+    stated = [*layout.columns.values(), *layout.channels.values()]
+    return all(name in texts for name in stated) and (
+        bool(layout.channels)
+        or all(key in layout.columns or not known.isdisjoint(COLUMNS[key]) for key in ("isi", "mep"))
+    )
+
+
+def _table(rows: Rows, layout: Layout) -> pd.DataFrame:
+    """Rows as a table: below the names, or below those that are stated."""
+    if not rows and not layout.names:
+        raise InvalidValueError("the file is empty, and no table that can be read", remedy="Is it the right one?")
+    names, body = ([*layout.names], rows) if layout.names else (_names(rows[0]), rows[1:])
+    units = [_unit_of(cell) for cell in body[0]] if body and not layout.names else []
+    if any(units) and all(unit or is_missing(cell) for unit, cell in zip(units, body[0], strict=True)):
+        names = [f"{name} ({unit})" if unit else name for name, unit in zip(names, units, strict=False)]
+        body = body[1:]
+    if not body:
+        raise InvalidValueError("the table has no rows", got=", ".join(names), remedy="Is the file complete?")
+    if all(len(row) == len(names) + 1 and str(row[0]) == str(n) for n, row in enumerate(body, 1)):
+        body = [row[1:] for row in body]  # R numbers its rows without naming the column of these numbers
+    return pd.DataFrame([_cells(row, names, number) for number, row in enumerate(body, 1)], columns=names)
+
+
+def _names(cells: Sequence[Any]) -> list[str]:
+    return ["" if is_missing(cell) else str(cell).strip() for cell in cells]
+
+
+def _unit_of(cell: Any) -> str | None:
+    """The unit that a cell is, if it is one."""
+    return UNIT_WORDS.get(cell.strip().strip("[]()").casefold()) if isinstance(cell, str) else None
+
+
+def _cells(row: Sequence[Any], names: Sequence[str], number: int) -> list[Any]:
+    """As many cells of a row as there are names."""
+    over = len(row) - len(names)
+    if over > 0 and all(is_missing(cell) for cell in row[len(names) :]):
+        return list(row[: len(names)])
+    if over > 0:
+        raise InvalidValueError(
+            f"row {number} has {len(row)} cells, but there are {len(names)} names, so that this is no table that "
+            "can be read",
+            got=" | ".join(map(str, row[: len(names) + 2])),
+            remedy="Is a decimal comma also what separates the cells? Save the file with another separator.",
+        )
+    return [*row, *[""] * -over]
+
+
+def _decoded(content: bytes) -> str:
+    if content[:2] in {b"\xff\xfe", b"\xfe\xff"}:
+        return content.decode("utf-16")
+    for first, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):  # the same without a mark of the order of its bytes
+        if content[first:_HEAD:2] and not any(content[first:_HEAD:2]):
+            return content.decode(encoding)
+    for encoding in _ENCODINGS[:-1]:
+        try:
+            return content.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+    return content.decode(_ENCODINGS[-1])
+
+
+def _separator(line: str) -> str:
+    """What separates the columns' names; blanks, if nothing else does."""
+    counts = {sign: line.count(sign) for sign in ("\t", ";", ",", "|")}
+    best = max(counts, key=lambda sign: counts[sign])
+    return best if counts[best] else r"\s+"
+
+
+def _split(lines: Sequence[str], separator: str) -> Iterator[list[str]]:
+    """The cells of lines."""
+    if separator == r"\s+":
+        lines, separator = [" ".join(line.split()) for line in lines], " "
+    return csv.reader(lines, delimiter=separator, skipinitialspace=True)
+
+
+def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
+    """The sheet that is named, or the only one with trials, or the first."""
+    extra("openpyxl")
+    if not content.startswith(b"PK"):
+        raise InvalidValueError(
+            "this is no workbook that can be read, or one with a password",
+            remedy="Save it as .xlsx without a password, or as CSV.",
+        )
+    book = pd.ExcelFile(io.BytesIO(content), engine="openpyxl")
+    if layout.sheet is not None and layout.sheet not in book.sheet_names:
+        raise InvalidValueError(
+            "the workbook has no such sheet",
+            got=layout.sheet,
+            expected=f"one of {', '.join(map(str, book.sheet_names))}",
+        )
+    sheets = {
+        str(name): _from_names(book.parse(name, header=None, dtype=object).to_numpy().tolist(), layout)
+        for name in ([layout.sheet] if layout.sheet is not None else book.sheet_names)
+    }
+    with_trials = [name for name, rows in sheets.items() if rows and _is_header(rows[0], layout)]
+    if len(with_trials) > 1:
+        raise InvalidValueError(
+            "several sheets of the workbook hold trials", got=", ".join(with_trials), remedy="Say --sheet NAME."
+        )
+    return _table(sheets[(with_trials or list(sheets))[0]], layout)
+
+
+def _from_names(rows: list[list[Any]], layout: Layout) -> list[list[Any]]:
+    """The rows of a sheet from the columns' names on."""
+    rows = rows[layout.skip_lines :]
+    if layout.names:
+        return rows
+    return rows[next((n for n, row in enumerate(rows[:_LINES]) if _is_header(row, layout)), 0) :]
+
+
+def _arrays(content: bytes) -> dict[str, Any]:
+    if content.startswith(b"MATLAB 7.3"):
+        raise InvalidValueError(
+            "files of MATLAB 7.3 cannot be read", remedy="Save it for 7: save('P01.mat', 'isi_ms', 'mep_mv', '-v7')."
+        )
+    values = scipy.io.loadmat(cast("Any", io.BytesIO(content)), simplify_cells=True)
+    return dict(_flat({name: value for name, value in values.items() if not name.startswith("__")}))
+
+
+def _flat(values: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    for name, value in values.items():
+        if isinstance(value, dict):
+            yield from _flat(value)
+        else:
+            yield name, np.asarray(value)
+
+
+def _of_vectors(arrays: Mapping[str, Any]) -> pd.DataFrame:
+    """The vectors of equal length in a file of MATLAB, as the columns of a table."""
+    squeezed = {name: array.squeeze() if array.size > 1 else array for name, array in arrays.items()}
+    vectors = {name: array for name, array in squeezed.items() if array.ndim == 1}
+    longest = max((len(vector) for vector in vectors.values()), default=0)
+    if longest == 0:
+        raise InvalidValueError(
+            "the file has no vectors that could be the columns of a table",
+            got=", ".join(arrays) or "nothing that can be read",
+            remedy="Save vectors: save('P01.mat', 'isi_ms', 'mep_mv', '-v7').",
+        )
+    return pd.DataFrame({name: vector for name, vector in vectors.items() if len(vector) == longest})
+
+
+def extra(name: str) -> Any:
+    """A library of the extra `import`."""
+    try:
+        return importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        raise ConfigError(f"{name} is not installed", remedy='Install it with: pip install "isiw[import]"') from error
+
+
+def without_unit_in_cells(name: str, cells: list[Any]) -> tuple[str, list[Any]]:
+    """A column whose cells all say the same unit, such as "12.5 ms", as one whose name says it."""
+    texts = [cell for cell in cells if not is_missing(cell)]
+    ends = {
+        re.sub(r"^[-+\d.,\s]*(e[-+]?\d+)?\s*", "", cell.casefold()) if isinstance(cell, str) else "" for cell in texts
+    }
+    (unit,) = ends if len(ends) == 1 else ("",)
+    if unit not in UNIT_WORDS:
+        return name, cells
+    bare = [cell if is_missing(cell) else cell.strip()[: -len(unit)].strip() for cell in cells]
+    return f"{name} ({UNIT_WORDS[unit]})", bare

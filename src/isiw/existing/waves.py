@@ -1,0 +1,130 @@
+"""Recordings that are columns of a text file, or sweeps in arrays of MATLAB: a layout says what each of them holds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from isiw.errors import InvalidValueError, did_you_mean
+from isiw.existing.cells import Column, decimal_of, is_missing, says_alone
+from isiw.existing.delivered import Delivered
+from isiw.existing.frames import read_arrays, read_frame
+from isiw.existing.layout import COLUMNS, ISI_UNITS_MS, MARKERS, Layout, letters
+from isiw.existing.people import required_reference
+from isiw.existing.recordings import Recording, delivered_of, of_sweeps, sweeps_of
+from isiw.existing.tables import required_unit
+from isiw.lazy import pd
+from isiw.signals.limits import EMG_UNITS_MV
+from isiw.trials import Channel
+from isiw.types import FloatArray
+
+
+def read_waves(path: Path, layout: Layout, subject: str) -> Delivered:
+    """The trials of a recording whose layout names the column, or the array, of the EMG."""
+    if path.suffix.lower() == ".mat":
+        arrays = read_arrays(path)
+        if arrays.get(layout.channels["emg"], np.zeros(1)).ndim == 2:
+            return _of_matrix(arrays, layout, subject, path.name)
+    return _of_columns(read_frame(path, layout), layout, subject, path.name)
+
+
+def _required(layout: Layout, key: Literal["rate_hz", "pulse_at_ms"], what: str) -> float:
+    value: float | None = getattr(layout, key)
+    if value is None:
+        raise InvalidValueError(f"nobody says {what}", remedy=f"Write {key} = NUMBER into a layout: --layout FILE.")
+    return value
+
+
+def _of_matrix(arrays: dict[str, FloatArray], layout: Layout, subject: str, source: str) -> Delivered:
+    """Sweeps that are the rows or the columns of a matrix, beside a vector of their ISIs."""
+    rate_hz = _required(layout, "rate_hz", f"at which rate {source} was sampled")
+    pulse_at_ms = _required(layout, "pulse_at_ms", f"how long after its first sample a sweep of {source} has the pulse")
+    named = layout.columns.get("isi") or next((name for name in arrays if letters(name) in COLUMNS["isi"]), None)
+    if named not in arrays:
+        raise InvalidValueError(
+            f"no vector of {source} is known to hold the ISIs", got=", ".join(arrays), remedy="Say --column isi=NAME."
+        )
+    isi = Column(named, np.ravel(arrays[named]).tolist(), of=source)
+    factor = ISI_UNITS_MS[required_unit("ISIs", isi, layout, ISI_UNITS_MS)]
+    name, sweeps = layout.channels["emg"], np.asarray(arrays[layout.channels["emg"]], dtype=np.float64)
+    count = len(isi.cells)
+    if count not in sweeps.shape:
+        raise InvalidValueError(
+            f"the sweeps of {source} are not as many as its ISIs",
+            got=(sweeps.shape, count),
+            remedy="Save one for each.",
+        )
+    factor_mv = EMG_UNITS_MV[required_unit("EMG", Column(name, [], of=source), layout, EMG_UNITS_MV)]
+    values_mv = factor_mv * (sweeps if sweeps.shape[0] == count else sweeps.T)
+    isis = [None if says_alone(cell, layout.alone) else isi.number(row, factor) for row, cell in enumerate(isi.cells)]
+    if layout.alone is None and None in isis:
+        raise InvalidValueError(
+            f"sweeps of {source} have no ISI",
+            got=f"{isis.count(None)} of {count}",
+            remedy="If they are TMS alone, say --alone ''.",
+        )
+    channels = [Channel(each, rate_hz, "mV", -pulse_at_ms) for each in values_mv]
+    return of_sweeps(channels, [np.nan if isi is None else isi for isi in isis], layout, subject, source)
+
+
+def _of_columns(frame: pd.DataFrame, layout: Layout, subject: str, source: str) -> Delivered:
+    """A continuous recording, a row for each sample; blocks, each with lines of its own before it, are sweeps."""
+    reference = required_reference(layout, source)
+    rate_hz = _required(layout, "rate_hz", f"at which rate {source} was sampled")
+    for name in layout.channels.values():
+        if name not in frame:
+            remedy = (
+                did_you_mean(name, list(frame)) or "If no line holds their names, write names = [...] into the layout."
+            )
+            raise InvalidValueError(
+                f"{source} has no such column", got=name, expected=f"one of {', '.join(map(str, frame))}", remedy=remedy
+            )
+    breaks = frame.iloc[:, 0].astype(str).str.endswith("=").to_numpy()
+    frame, block = frame[~breaks], np.cumsum(breaks)[~breaks]
+    name = layout.channels["emg"]
+    unit = required_unit("EMG", Column(name, [], of=source), layout, EMG_UNITS_MV)
+    channels = {"emg": Channel(EMG_UNITS_MV[unit] * _numbers(frame, name, layout, source), rate_hz, "mV")}
+    if "acceleration" in layout.channels:
+        values = _numbers(frame, layout.channels["acceleration"], layout, source)
+        channels["acceleration"] = Channel(values, rate_hz, "V")
+    rows: list[tuple[str, float, float]] = []
+    for key in MARKERS:
+        if key in layout.channels:
+            rows += [(key, at / rate_hz, 0.0) for at in _onsets(_numbers(frame, layout.channels[key], layout, source))]
+    if "events" in layout.channels:
+        texts = frame[layout.channels["events"]].tolist()
+        rows += [(str(text).lstrip("#* "), at / rate_hz, 0.0) for at, text in enumerate(texts) if not is_missing(text)]
+    if not rows:
+        raise InvalidValueError(
+            f"no event was found in {source}",
+            remedy="Under [channels] of the layout, name columns of triggers (pulse, tap, valve) or of texts (events).",
+        )
+    starts = np.flatnonzero(np.diff(block, prepend=-1))
+    if len(starts) > 1:
+        ends = np.append(starts[1:], len(block))
+        rows += [("sweep", first / rate_hz, (end - first) / rate_hz) for first, end in zip(starts, ends, strict=True)]
+    recording = Recording(channels, pd.DataFrame(rows, columns=["name", "onset", "duration"]), source)
+    return delivered_of(recording, sweeps_of(recording, layout, reference), layout, reference, subject)
+
+
+def _numbers(frame: pd.DataFrame, name: str, layout: Layout, source: str) -> FloatArray:
+    """A column of numbers."""
+    cells = frame[name]
+    few = Column(name, cells.iloc[:1000].tolist(), of=source)
+    if not pd.api.types.is_numeric_dtype(cells) and decimal_of([few], layout.decimal) == ",":
+        cells = cells.str.replace(",", ".")
+    numbers = pd.to_numeric(cells, errors="coerce").to_numpy(dtype=np.float64)
+    if (bad := np.flatnonzero(~np.isfinite(numbers))).size:
+        raise Column(name, frame[name].tolist(), of=source).refused(
+            int(bad[0]), "is no number", "Do the names stand for the right columns, and are the lines before skipped?"
+        )
+    return numbers
+
+
+def _onsets(values: FloatArray) -> list[int]:
+    """Where a trigger leaves the level at which it mostly is."""
+    high = values > (values.min() + values.max()) / 2
+    active = high if high.mean() < 0.5 else ~high
+    return [int(at) for at in np.flatnonzero(active[1:] & ~active[:-1]) + 1]
