@@ -52,7 +52,7 @@ QUICK: Final[Mapping[str, str]] = {
     "readme_results": "--out OUT",
     "recorded": "--strategies default,nr --people 1 --trials 8 --out OUT",
     "reduction.redraw": "--out OUT",
-    "replayed": "--people 2",
+    "replayed": "--people 2 --sessions 1",
     "rules_as_printed": "--people 20 --out OUT",
     "same_asks": "--sessions 1 --stimuli 10 --strategies default nr",
     "server": "--number 10",
