@@ -99,12 +99,11 @@ def test_an_interrupt_before_a_command_begins_ends_in_a_sentence() -> None:
 
 
 def test_an_interrupt_that_a_compiler_loses_ends_a_command_all_the_same(capsys: pytest.CaptureFixture[str]) -> None:
-    @ctypes.CFUNCTYPE(None)
-    def called_by_a_compiler() -> None:
+    def lose() -> None:
         raise KeyboardInterrupt
 
     def work() -> None:
-        called_by_a_compiler()
+        ctypes.CFUNCTYPE(None)(lose)()
         end_s = time.monotonic() + 60
         while time.monotonic() < end_s:
             time.sleep(0.01)
