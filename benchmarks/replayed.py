@@ -1,6 +1,6 @@
 """Does a replay of recorded trials say what a session would have said? F1 against the truth, on the same people.
 
-    python -m benchmarks.replayed --people 200 --first 20000 --sessions 3
+    python -m benchmarks.replayed --people 200 --first 20000 --sessions 2
 
 Each person is swept, 20 trials every 5 ms in a random order, and the default asks for these trials. Beside it the
 default examines the person, at the same ISIs. Each is done several times with other noise, so that chance hides less.
@@ -47,7 +47,10 @@ def examined(person: isiw.subjects.SimulatedSubject, seed: int) -> list[float]:
     strategy, responder, truth = isiw.make_strategy(space=SPACE, seed=seed), person.begin(seed), person.window(SPACE)
     scores = []
     for number in range(1, max(AT) + 1):
-        answer = responder.respond(strategy.ask(), "impact")
+        asked_ms = strategy.ask()
+        answer = responder.respond(asked_ms, "impact")
+        while not SPACE.admits(answer.isi_ms):  # a mistrial, of which a replay has none either
+            answer = responder.respond(asked_ms, "impact")
         strategy.learn(answer.isi_ms, answer.mep_mv)
         if number in AT:
             scores.append(isiw.metrics.f1(strategy.estimate(), truth, SPACE))
@@ -60,7 +63,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--people", type=int, default=200)
     parser.add_argument("--first", type=int, default=20_000)
-    parser.add_argument("--sessions", type=int, default=3, help="with each person")
+    parser.add_argument("--sessions", type=int, default=2, help="with each person")
     parser.add_argument("--cohort", default="recruitment")
     given = parser.parse_args()
     people = isiw.subjects.cohort(given.cohort, given.people, given.first)
