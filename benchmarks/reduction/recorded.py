@@ -17,7 +17,7 @@ from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
 from isiw.models.dissertation.incremental import SweepModel, SweepPosterior, SweepRule
 from isiw.models.shared.history import AmplitudeHistory
-from isiw.strategy.settings.dissertation import SweepSettings
+from isiw.strategy.settings.dissertation import SWEEP
 from isiw.strategy.stopping import Progress
 from isiw.subjects.responses import RecruitmentResponse
 from isiw.subjects.subject import Responder, SimulatedSubject
@@ -107,7 +107,7 @@ class RecordedSweep:
 
     def _has_passed(self, first: int, last: int, baseline: str) -> bool:
         estimate = self._measured(first, last, baseline)
-        return SweepSettings().stopping.rule(0)(Progress(0, 0, estimate)).stop
+        return SWEEP.stopping.rule(0)(Progress(0, 0, estimate)).stop
 
     def _measured(self, first: int, last: int, baseline: str, rule: SweepRule = "baseline") -> WindowEstimate:
         """What the strategy `incremental` makes of a part of the sweep, TMS alone before it."""

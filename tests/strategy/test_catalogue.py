@@ -15,21 +15,20 @@ from isiw.models.parametric import ParametricModel
 from isiw.models.particles import ParticleModel
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.profile import ProfilePrior
+from isiw.models.particles.supra import SupraModel
 from isiw.models.particles.swarm import Moving
 from isiw.models.protocol import ResponseModel
 from isiw.models.shared.scales import Scale
 from isiw.strategy.catalogue import known_settings, list_strategies, make_strategy, settings_for
-from isiw.strategy.settings.particles import ParticleSettings
-from isiw.strategy.settings.supra import SupraSettings
 from known import instance, known
 
 NAMES = sorted(list_strategies())
-PARTICLES = [name for name in NAMES if isinstance(settings_for(name), ParticleSettings)]
+PARTICLES = [name for name in NAMES if isinstance(settings_for(name).model, ParticleModel)]
 FEW: dict[str, Any] = {"particles": 64}
 
 
 def few(name: str) -> dict[str, Any]:
-    return FEW if isinstance(settings_for(name), ParticleSettings | SupraSettings) else {}
+    return FEW if isinstance(settings_for(name).model, ParticleModel | SupraModel) else {}
 
 
 def asks(name: str, seed: int, meps_mv: tuple[float, ...] = (0.02, 0.1)) -> list[float]:

@@ -39,9 +39,6 @@ class Recordings:
         time_ms: time from the magnetic pulse [ms], shape (w,).
         quiet_mv: sweeps without an MEP, as recorded [mV], shape (n, w).
         mep_mv: MEPs alone, offset taken out and faded in before their onset [mV], shape (m, w).
-
-    Raises:
-        InvalidValueError: no sweep of one of the two kinds.
     """
 
     time_ms: FloatArray

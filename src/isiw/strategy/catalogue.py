@@ -22,8 +22,8 @@ class _Entry:
 
     Args:
         summary: what it does, in a sentence.
-        family: where in `isiw.strategy.settings` the class of its settings is; loaded, with the libraries that its
-            model needs, only when the strategy is made.
+        family: where in `isiw.strategy.settings` its usual settings are; loaded, with its model, only when the
+            strategy is made.
         meant: the settings that the name stands for.
     """
 
@@ -32,7 +32,7 @@ class _Entry:
     meant: Mapping[str, Any] = field(default_factory=dict)
 
 
-_PARTICLES, _PARAMETRIC, _GP = "particles:ParticleSettings", "parametric:ParametricSettings", "gp:GPSettings"
+_PARTICLES, _PARAMETRIC, _GP = "families:PARTICLES", "families:PARAMETRIC", "families:GAUSSIAN_PROCESS"
 
 _CATALOGUE: Final[dict[str, _Entry]] = {
     "default": _Entry(
@@ -55,7 +55,7 @@ _CATALOGUE: Final[dict[str, _Entry]] = {
     "random": _Entry("Particle posterior; random ISIs, whatever the responses.", _PARTICLES, {"acquisition": "random"}),
     "supra-threshold": _Entry(
         "For TMS above the motor threshold: looks for depressed MEPs as well as for enhanced ones.",
-        "supra:SupraSettings",
+        "families:SUPRA",
     ),
     "parametric-mi": _Entry(
         "Gaussian window in Pyro; chooses the ISI most informative about all unknowns.",
@@ -76,20 +76,20 @@ _CATALOGUE: Final[dict[str, _Entry]] = {
     "gp-ei": _Entry(
         "Gaussian process; seeks the best ISI only, by expected improvement.", _GP, {"acquisition": "log-ei"}
     ),
-    "nr": _Entry("Dissertation: nonlinear regression of one Gaussian.", "dissertation:NRSettings"),
+    "nr": _Entry("Dissertation: nonlinear regression of one Gaussian.", "dissertation:NR"),
     "nr2": _Entry(
         "Dissertation: nonlinear regression of two Gaussians.",
-        "dissertation:NRSettings",
+        "dissertation:NR",
         {"peaks": 2, "initial": 7, "segments": "all"},
     ),
-    "svmr": _Entry("Dissertation: support vector regression.", "dissertation:SVMRSettings"),
-    "gpr": _Entry("Dissertation: Gaussian process regression of the amplitudes.", "dissertation:GPRSettings"),
+    "svmr": _Entry("Dissertation: support vector regression.", "dissertation:SVMR"),
+    "gpr": _Entry("Dissertation: Gaussian process regression of the amplitudes.", "dissertation:GPR"),
     "pf": _Entry(
         "Dissertation: bootstrap particle filter over ISIs, a generation of particles at a time.",
-        "dissertation:PFSettings",
+        "dissertation:PF",
     ),
     "incremental": _Entry(
-        "Conventional search: twelve trials every 5 ms, until the window is passed.", "dissertation:SweepSettings"
+        "Conventional search: twelve trials every 5 ms, until the window is passed.", "dissertation:SWEEP"
     ),
 }
 
@@ -121,14 +121,13 @@ def settings_for(name: str, **settings: Any) -> Settings:
             remedy=did_you_mean(name, _CATALOGUE) or "isiw strategies says what each of them does.",
         )
     entry = _CATALOGUE[name]
-    family = pkgutil.resolve_name(f"isiw.strategy.settings.{entry.family}")
-    chosen: Settings = settings_from(family, {**entry.meant, **settings}, name)
-    return chosen
+    usual: Settings = pkgutil.resolve_name(f"isiw.strategy.settings.{entry.family}")
+    return settings_from(usual, {**entry.meant, **settings}, name)
 
 
 def known_settings(name: str, known: Mapping[str, Any]) -> dict[str, Any]:
     """What is known of a rig or a person, as settings of a strategy: those that it has."""
-    keys = settings_keys(type(settings_for(name)))
+    keys = settings_keys(settings_for(name))
     return {key: value for key, value in known.items() if value is not None and key in keys}
 
 

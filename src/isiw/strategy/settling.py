@@ -19,9 +19,6 @@ class EdgeVariance(Checked):
         variance_ms2: the variance [ms²] of an edge's last values below which it has settled.
         last: how many values.
         edges: whether both edges must have settled, as the text says, or either, as its pseudo-code does.
-
-    Raises:
-        InvalidValueError: a variance that is not positive, fewer than two values, or another word for the edges.
     """
 
     variance_ms2: Positive = 50.0

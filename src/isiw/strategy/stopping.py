@@ -280,9 +280,6 @@ class AnyOf:
 
     Args:
         rules: the rules, asked in order.
-
-    Raises:
-        InvalidValueError: no rules, which would never stop.
     """
 
     rules: tuple[StoppingRule, ...]

@@ -78,9 +78,6 @@ class Faults(Checked):
         stuck_probability: share of taps in which the hammer does not move.
         late_probability: share of taps whose valve opens late.
         late_ms: by how much those are late, uniform between the two [ms].
-
-    Raises:
-        InvalidValueError: an invalid probability, or delays that do not ascend from 0.
     """
 
     stuck_probability: Share = 0.0
@@ -106,9 +103,6 @@ class Geometry(Checked):
         load_cell: whether the hammer taps a load cell.
         faults: occasional faults.
         noise: of the sensors.
-
-    Raises:
-        InvalidValueError: events out of order, a negative amplitude, or a hit SD that the friction alone exceeds.
     """
 
     descent: Event

@@ -48,9 +48,6 @@ class LineSettings(Checked):
         connect_s: how long it may take from opening the connection until it says that it is disarmed [s]; boards that
             start anew when their port is opened need a second or two. `stop` may need this and twice `timeout_s`.
         isi_tolerance_ms: how far the ISI that is read back may be from the one that was set [ms].
-
-    Raises:
-        InvalidValueError: a time that is not positive, or another end of a line.
     """
 
     baud: Count = 115_200

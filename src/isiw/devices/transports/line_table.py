@@ -142,9 +142,6 @@ class Exchange(Checked):
         reply: the regular expression that the whole answer must match, with groups such as (?P<sequence>\d+).
         timeout_s: how long the answer may take [s]; None where the whole line's time holds, and for what fires and
             measures, all the time that a delivery has.
-
-    Raises:
-        InvalidValueError: text that is no template or no pattern, or a sequence number in only one of the two.
     """
 
     send: Text
@@ -219,9 +216,6 @@ class LineCommands:
         status: asks whether it is ready; the answer may say coil_c [°C] and intensity_pct_mso [% MSO].
         refusal: what an answer looks like that refuses any command, with (?P<reason>.*) where it says why; empty where
             it does not refuse in words. It holds (?P<sequence>\d+) where the answers do.
-
-    Raises:
-        InvalidValueError: a command without what it must hold, or an answer without what it must say.
     """
 
     disarm: Exchange

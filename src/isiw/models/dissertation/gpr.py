@@ -40,9 +40,6 @@ class GaussianProcessRegression(Checked):
         noise: noise SD where the search starts, as a share of the largest excess.
         max_fit_iterations: iterations after which the search gives up.
         samples: how many curves are drawn.
-
-    Raises:
-        InvalidValueError: an invalid number.
     """
 
     length_ms: Number = 40.0

@@ -47,9 +47,6 @@ class SweepModel(Checked):
         evidence_se: and a window is reported where the largest exceeds the baseline by so many of its standard errors:
             both stand for the eye of the experimenter, who expected one distribution.
         floor: what the baseline is; without TMS alone, the median of the means.
-
-    Raises:
-        InvalidValueError: an invalid number, or an unknown rule.
     """
 
     step_ms: Positive = 5.0

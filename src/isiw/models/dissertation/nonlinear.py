@@ -81,9 +81,6 @@ class NonlinearRegression(Checked):
         start: where the search starts: `"even"` as above; `"unequal"`: the second Gaussian with a tenth of the first's
             amplitude, which stays at mid-range; `"random"`: anywhere in the range and with any share of the amplitude,
             drawn anew for each fit.
-
-    Raises:
-        InvalidValueError: an invalid number, or an unknown start.
     """
 
     peaks: Annotated[int, partial(choice, known=(1, 2))] = 1

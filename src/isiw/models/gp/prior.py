@@ -109,9 +109,6 @@ class FixedProcess(Checked):
         noise: SD of a trial about it, in units of the scale.
         centre: transformed MEP that is 0 on the scale; the constant is this give or take one unit.
         unit: difference of transformed MEPs that is 1 on the scale.
-
-    Raises:
-        InvalidValueError: a number that is not finite or not positive, or too little noise.
     """
 
     length_ms: Positive

@@ -44,9 +44,6 @@ class Effort(Checked):
         draws: draws of the mixture in each round.
         fits: the mixture is fitted at most this many times.
         enough: further draws of the last mixture make all of them worth as many independent ones as this.
-
-    Raises:
-        InvalidValueError: a number not positive and finite, a count that is not whole, or fewer scouts than starts.
     """
 
     scouts: Count = 512

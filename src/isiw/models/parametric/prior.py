@@ -73,9 +73,6 @@ class FloorPrior:
     Args:
         mean_mv: its expectation [mV]; 6–20 µV measured, and wide enough for rigs with ten times the gain.
         cv: its CV from trial to trial; 0.12–0.35 measured.
-
-    Raises:
-        InvalidValueError: an invalid scale.
     """
 
     mean_mv: Scale = Scale(0.009, 0.8)
@@ -94,9 +91,6 @@ class InputNoisePrior:
         input_sd: SD of the noise on the input: 5–9 % RMT at 0.3 logits a percent, and 1.7 logits a probit.
         boost: shift of the input at the centre: 5–18 % RMT.
         rest: the input without a tap: 90 % RMT, half-maximal at RMT + 4 %.
-
-    Raises:
-        InvalidValueError: an invalid scale.
     """
 
     saturation: Scale = Scale(16.0, 0.6)
@@ -122,9 +116,6 @@ class WindowPrior(Checked):
         cv: CV of what is evoked; 0.36 above 2 mV, 1.1 below 0.1 mV measured.
         outliers: logit of an outlier's probability; about 2 to 7 % of a threshold's false positives.
         input_noise: of the likelihood with noise on the input.
-
-    Raises:
-        InvalidValueError: an invalid probability or scale.
     """
 
     p_window: Annotated[float, partial(number, above=0, most=1)] = 0.75

@@ -58,9 +58,6 @@ class ChangePrior(Checked):
         size_sd: SD of the size of a change: of a level, natural log.
         noted: after how many trials each change was noted that somebody saw.
         noted_share: probability that a change that was noted is one of the amplitudes.
-
-    Raises:
-        InvalidValueError: probabilities whose sum is above 1, or an invalid number.
     """
 
     level: Share = 0.05

@@ -45,9 +45,6 @@ class NoiseShares(Checked):
         recruitment: of a recruitment curve with noise on its input.
         all_or_none: of responses that are all or none: those of a very steep curve.
         rectified: of a recruitment curve that starts at a threshold.
-
-    Raises:
-        InvalidValueError: probabilities that do not sum to 1.
     """
 
     constant_cv: Share = 0.36
@@ -68,9 +65,6 @@ class Intensity(Checked):
     Args:
         share: its probability.
         pct_rmt: the intensity [% RMT].
-
-    Raises:
-        InvalidValueError: an invalid share or scale.
     """
 
     share: Share
@@ -95,9 +89,6 @@ class Muscle(Checked):
         boost_pct: shift of the input at the best ISI [% RMT].
         rest_pct: the input without a tap, intensity − x50 [% RMT].
         at_pct_rmt: the intensity that `rest_pct` is at [% RMT]; None where it is that of the session, whatever it is.
-
-    Raises:
-        InvalidValueError: an invalid share, scale or intensity.
     """
 
     name: str
@@ -169,9 +160,6 @@ class RectifiedPrior(Checked):
         rest_pct: the input without a tap, intensity − threshold [% RMT].
         at_pct_rmt: the intensity that `rest_pct` is at [% RMT]; None where it is that of the session, whatever it is.
         onset: the logistic curve at the threshold, as a share of its largest value.
-
-    Raises:
-        InvalidValueError: an invalid scale or intensity.
     """
 
     ratio: Scale = Scale(200.0, 1.2)
@@ -198,9 +186,6 @@ class Gain(Checked):
         share: its probability.
         ratio: the best expected MEP over the floor; MEPs peak at 0.03–0.3 mV (dissertation, 4.2).
         cv: the CV.
-
-    Raises:
-        InvalidValueError: an invalid share or scale.
     """
 
     share: Share
@@ -223,9 +208,6 @@ class SwitchPrior:
         switched_off: of such a response without a tap; 0.05–0.25 of the trials at 90 % RMT are above 50 µV in the hand,
             next to none in the forearm.
         sizes: of responses that are all or none, a forearm's or a hand's; their ratio is that of the mean response.
-
-    Raises:
-        InvalidValueError: an invalid scale, or sizes whose shares do not sum to 1.
     """
 
     reliability: Scale = Scale(0.2, 0.7)
@@ -249,9 +231,6 @@ class Floor(Checked):
         share: its probability.
         median_mv: its median [mV]; 6–20 µV measured.
         log_sd: its SD from trial to trial, natural log; 0.12–0.35.
-
-    Raises:
-        InvalidValueError: an invalid share or scale.
     """
 
     share: Share
@@ -272,9 +251,6 @@ class SessionPrior(Checked):
         far_drift_sd: the same where they drift far.
         far_drift_share: probability that they do.
         startup: how strongly the first trials startle, 1 being as much as in blocks of plain TMS.
-
-    Raises:
-        InvalidValueError: an SD that is not positive, an invalid share, or an invalid scale.
     """
 
     drift_sd: Positive = 0.3

@@ -25,9 +25,6 @@ class Place(Checked):
         reference: the event that the start counts from.
         hit_delay_ms: mean and SD of the hit delay of the rig that it was learnt with [ms]; None where nobody stated it.
         conditioning: the conditioning stimulus that it was learnt with.
-
-    Raises:
-        InvalidValueError: an invalid share, scale, reference, hit delay or conditioning stimulus.
     """
 
     share: Share

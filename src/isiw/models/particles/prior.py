@@ -100,10 +100,6 @@ class Prior(Checked):
         changes: of what else changes within it.
         muscle: the name of the muscle, where it is known: the others that have a name are left out then.
         intensity_pct_rmt: intensity of the pulse, where it is stated [% RMT].
-
-    Raises:
-        InvalidValueError: shares of gains, muscles, intensities or floors that do not sum to 1, a muscle that is none
-            of the muscles, or an intensity that is not positive.
     """
 
     profile: ProfilePrior = field(default_factory=ProfilePrior)

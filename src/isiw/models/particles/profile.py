@@ -33,9 +33,6 @@ class ShapeShares(Checked):
         skewed: of skewed ones.
         plateau: of flat-topped ones.
         two_peak: of those with two peaks.
-
-    Raises:
-        InvalidValueError: probabilities that do not sum to 1.
     """
 
     gaussian: Share = 0.68
@@ -55,9 +52,6 @@ class Width(Checked):
     Args:
         share: its probability.
         width_ms: the width.
-
-    Raises:
-        InvalidValueError: an invalid share or scale.
     """
 
     share: Share
@@ -109,10 +103,6 @@ class ProfilePrior(Checked):
             `start` and `widths`.
         conditioning: what the first stimulus of a pair is: a tap on the tendon, or an electrical pulse to the nerve;
             None where it is not stated, and a tap is most probable.
-
-    Raises:
-        InvalidValueError: an invalid probability or conditioning stimulus, widths whose shares do not sum to 1,
-            places that leave nothing to the rest, or that count from different events.
     """
 
     p_window: Share = 0.72

@@ -43,9 +43,6 @@ class Span(Checked):
         low_ms: earliest start [ms].
         high_ms: latest start [ms].
         sd_ms: SD of the blur [ms].
-
-    Raises:
-        InvalidValueError: an empty span, an invalid share, or a blur that is not positive.
     """
 
     share: Share
@@ -85,9 +82,6 @@ class StartPrior(Checked):
         p_robot: how probable it is that a rig that does not state its hit delay is the tapping robot.
         p_anywhere: probability that the start lies anywhere in the range instead, or up to 100 ms before it; more in a
             range that only a part of the usual starts lies in.
-
-    Raises:
-        InvalidValueError: shares that do not sum to 1, a hit delay that is not positive, or an invalid probability.
     """
 
     spans: tuple[Span, ...] = TAP_SPANS

@@ -1,6 +1,6 @@
 """What can be set about a named strategy: the fields of its parts, each under a key of its own.
 
-A family of strategies is a frozen dataclass of three parts: the model, what is asked, and when to stop. The keys that a
+A strategy has three parts: the model, what is asked, and when to stop. The keys that a
 configuration, a log and `make_strategy` know are the names of the parts' fields, so that no setting is written down
 twice. A field that a part marks with `metadata={"spread": True}` gives its own fields keys in its place. What a rig or
 a lab knows, `KNOWN`, has short keys of its own.
@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, fields, is_dataclass, replace
-from functools import partial, reduce
+from functools import partial
 from numbers import Integral
-from typing import Annotated, Any, Final, Protocol, TypeVar, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Final, Protocol, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -33,8 +33,6 @@ from isiw.errors import ConfigError, StrategyError, did_you_mean
 from isiw.models.protocol import ResponseModel
 from isiw.strategy.stopping import AnyOf, Budget, CredibleWidth, ExpectedF1, NoWindow, SmallGain, StoppingRule
 from isiw.text.toml_files import checked
-
-_S = TypeVar("_S", bound="Settings")
 
 KNOWN: Final = {
     "hit_delay_ms": (
@@ -65,20 +63,19 @@ class StoppingPart(Protocol):
         """The stopping rule, after so many initial trials."""
 
 
-class Settings(Protocol):
-    """Settings of one family of strategies: a frozen dataclass of three parts, whose fields are TOML values."""
+@dataclass(frozen=True)
+class Settings:
+    """Settings of a strategy: three parts, frozen dataclasses whose fields are TOML values.
 
-    @property
-    def model(self) -> ResponseModel:
-        """The model."""
+    Args:
+        model: the model.
+        asking: what is asked.
+        stopping: when to stop.
+    """
 
-    @property
-    def asking(self) -> AskingPart:
-        """What is asked."""
-
-    @property
-    def stopping(self) -> StoppingPart:
-        """When to stop."""
+    model: ResponseModel
+    asking: AskingPart
+    stopping: StoppingPart
 
 
 @dataclass(frozen=True)
@@ -141,28 +138,23 @@ class Setting:
     """One thing that can be set.
 
     Args:
-        path: the fields that lead to it, from the family's settings on.
+        path: the fields that lead to it, from the settings on.
         owner: the class of the last of them.
         kind: its type.
-        default: its value where nothing is set.
+        value: what it is.
     """
 
     path: tuple[str, ...]
     owner: type
     kind: Any
-    default: Any
-
-    def of(self, settings: Settings) -> Any:
-        """Its value in some settings of the family."""
-        return reduce(getattr, self.path, settings)
+    value: Any
 
 
-def settings_keys(kind: type[Settings]) -> dict[str, Setting]:
-    """What can be set about a family of strategies, by key."""
-    defaults = kind()
-    parts = ((part.name, getattr(defaults, part.name)) for part in fields(kind))  # type: ignore[arg-type] # a dataclass
+def settings_keys(settings: Settings) -> dict[str, Setting]:
+    """What can be set about a strategy, by key."""
+    parts = ((part.name, getattr(settings, part.name)) for part in fields(settings))
     keys = {setting.path[-1]: setting for name, part in parts for setting in _settings_of(part, (name,))}
-    known = ((key, _setting_at(defaults, path)) for key, paths in KNOWN.items() for path in paths)
+    known = ((key, _setting_at(settings, path)) for key, paths in KNOWN.items() for path in paths)
     return keys | {key: setting for key, setting in known if setting is not None}
 
 
@@ -187,17 +179,13 @@ def _settings_of(part: Any, path: tuple[str, ...]) -> Iterator[Setting]:
 
 def settings_values(settings: Settings) -> dict[str, Any]:
     """All settings by key, as TOML values; those of `KNOWN` where they are given."""
-    values = {}
-    for key, setting in settings_keys(type(settings)).items():
-        value = setting.of(settings)
-        if value is not None:  # which TOML does not have
-            values[key] = _plain(value)
-    return values
+    keys = settings_keys(settings).items()
+    return {key: _plain(setting.value) for key, setting in keys if setting.value is not None}  # TOML has no None
 
 
-def settings_from(kind: type[_S], values: Mapping[str, Any], name: str) -> _S:
-    """Settings of a family, by key; what is not given is as by default."""
-    known = settings_keys(kind)
+def settings_from(usual: Settings, values: Mapping[str, Any], name: str) -> Settings:
+    """Settings by key; what is not given is as usual."""
+    known = settings_keys(usual)
     for key in values:
         if key not in known:
             raise StrategyError(
@@ -205,7 +193,7 @@ def settings_from(kind: type[_S], values: Mapping[str, Any], name: str) -> _S:
                 expected=", ".join(known),
                 remedy=f"{did_you_mean(key, known)} Correct it or remove it.".lstrip(),
             )
-    settings = kind()
+    settings = usual
     # What is deep in a part goes into the part that was given.
     for key, value in sorted(values.items(), key=lambda item: len(known[item[0]].path)):
         _require_modest(value, f"the setting {key} of {name}")
@@ -251,7 +239,7 @@ def _converted(setting: Setting, value: Any, source: str) -> Any:
         )
     if kind is None or not isinstance(value, Mapping):
         return value.item() if isinstance(value, np.generic) else value
-    return checked(kind, value if setting.default is None else _merged(setting.default, value), source)
+    return checked(kind, value if setting.value is None else _merged(setting.value, value), source)
 
 
 def _merged(default: Any, given: Mapping[str, Any]) -> dict[str, Any]:

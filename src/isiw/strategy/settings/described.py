@@ -46,8 +46,8 @@ def described(settings: Settings) -> tuple[DescribedSetting, ...]:
     """All that can be set about a strategy, groups before their members."""
     return tuple(
         entry
-        for key, setting in settings_keys(type(settings)).items()
-        for entry in _entries(key, setting.of(settings), _meanings(setting.owner)[key])
+        for key, setting in settings_keys(settings).items()
+        for entry in _entries(key, setting.value, _meanings(setting.owner)[key])
     )
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from isiw.models.dissertation.nonlinear import NonlinearRegression
 from isiw.models.dissertation.regression import RegressionModel
 from isiw.models.dissertation.svr import SupportVectorRegression
 from isiw.models.shared.floor import FloorTreatment
+from isiw.strategy.settings.common import Settings
 from isiw.strategy.settling import EdgeVariance, ParticleSpread, SweptPast
 from isiw.strategy.stopping import AnyOf, Budget, StoppingRule
 
@@ -134,78 +135,9 @@ class Passing(Checked):
         return AnyOf((SweptPast(self.quiet_ms), budget)) if self.quiet_ms else budget
 
 
-@dataclass(frozen=True)
-class NRSettings:
-    """Nonlinear regression.
-
-    Args:
-        model: the regression, and the least squares that fit its curve.
-        asking: what is asked.
-        stopping: when to stop.
-    """
-
-    model: RegressionModel = field(
-        default_factory=lambda: RegressionModel(NonlinearRegression(), FloorTreatment("lowest"))
-    )
-    asking: EvenStart = field(default_factory=lambda: EvenStart(initial=6))
-    stopping: Settling = field(default_factory=Settling)
-
-
-@dataclass(frozen=True)
-class SVMRSettings:
-    """Support vector regression.
-
-    Args:
-        model: the regression, and the support vectors that fit its curve.
-        asking: what is asked.
-        stopping: when to stop.
-    """
-
-    model: RegressionModel = field(default_factory=lambda: RegressionModel(SupportVectorRegression()))
-    asking: EvenStart = field(default_factory=EvenStart)
-    stopping: Settling = field(default_factory=Settling)
-
-
-@dataclass(frozen=True)
-class GPRSettings:
-    """Gaussian process regression.
-
-    Args:
-        model: the regression, and the Gaussian process that fits its curve.
-        asking: what is asked.
-        stopping: when to stop.
-    """
-
-    model: RegressionModel = field(default_factory=lambda: RegressionModel(GaussianProcessRegression()))
-    asking: EvenStart = field(default_factory=EvenStart)
-    stopping: Settling = field(default_factory=Settling)
-
-
-@dataclass(frozen=True)
-class PFSettings:
-    """The bootstrap particle filter.
-
-    Args:
-        model: the filter.
-        asking: nothing can be set.
-        stopping: when to stop.
-    """
-
-    model: BootstrapFilter = field(default_factory=BootstrapFilter)
-    asking: OwnPlan = field(default_factory=OwnPlan)
-    stopping: Converging = field(default_factory=Converging)
-
-
-@dataclass(frozen=True)
-class SweepSettings:
-    """The incremental sweep (4.2.1).
-
-    Args:
-        model: the means by ISI.
-        asking: nothing can be set.
-        stopping: when to stop.
-    """
-
-    model: SweepModel = field(default_factory=SweepModel)
-    asking: OwnPlan = field(default_factory=OwnPlan)
-    stopping: Passing = field(default_factory=Passing)
+NR: Final = Settings(RegressionModel(NonlinearRegression(), FloorTreatment("lowest")), EvenStart(initial=6), Settling())
+SVMR: Final = Settings(RegressionModel(SupportVectorRegression()), EvenStart(), Settling())
+GPR: Final = Settings(RegressionModel(GaussianProcessRegression()), EvenStart(), Settling())
+PF: Final = Settings(BootstrapFilter(), OwnPlan(), Converging())
+SWEEP: Final = Settings(SweepModel(), OwnPlan(), Passing())
+"""The incremental sweep (4.2.1)."""

@@ -109,10 +109,6 @@ class Supply(Checked):
         critical_ratio: pressure ratio below which either flow is choked, C_r; by default that of the same valve.
         line_m: length of a line [m].
         bore_mm: its inner diameter [mm].
-
-    Raises:
-        InvalidValueError: a reservoir at or below the room's pressure, a ratio outside 0 to 1, or a value that is not
-            positive.
     """
 
     reservoir_bar: Number = 4.0

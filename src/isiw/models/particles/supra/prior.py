@@ -84,9 +84,6 @@ class Segment(Checked):
         probability: that there are any.
         widths: how wide they are.
         shift_pct: by how much the input of the recruitment curve is shifted in their middle [% RMT].
-
-    Raises:
-        InvalidValueError: an invalid probability or scale, or widths whose shares do not sum to 1.
     """
 
     probability: Share
@@ -110,9 +107,6 @@ class Curve(Checked):
         input_sd: SD of the noise on the input, in logits.
         sigma_y: SD of the noise on the output, natural log.
         rest_pct: the input without a tap, intensity − intensity of the half-maximal MEP [% RMT].
-
-    Raises:
-        InvalidValueError: an invalid share or scale.
     """
 
     share: Share
@@ -143,9 +137,6 @@ class SupraPrior:
         curves: of recruitment curves, the usual one first.
         floors: of the EMG floor.
         session: of what changes within a session.
-
-    Raises:
-        InvalidValueError: shares of curves or floors that do not sum to 1.
     """
 
     start: StartPrior = _START
