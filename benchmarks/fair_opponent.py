@@ -27,8 +27,8 @@ from benchmarks.reduction.headline import BY_TRUTH, JUDGED, reading_of
 from benchmarks.reduction.sessions import Session, play, recorded_person
 from benchmarks.tables import write_tables
 from isiw.design import DesignSpace
-from isiw.models.dissertation.curves import FittedCurve, curve_masks
-from isiw.models.dissertation.regression import RegressionMethod, RegressionModel
+from isiw.dissertation.curves import FittedCurve, curve_masks
+from isiw.dissertation.regression import RegressionMethod, RegressionModel
 from isiw.models.shared.floor import FloorTreatment
 from isiw.types import FloatArray
 

@@ -13,8 +13,8 @@ from scipy.stats import fisher_exact, norm
 
 from benchmarks.dissertation.claims import Claim, claims_as_json
 from isiw import IMPACT_SPACE, DesignSpace
+from isiw.dissertation.profiles import best_fit, normality, profile_fits
 from isiw.metrics import f1
-from isiw.models.dissertation.profiles import best_fit, normality, profile_fits
 from isiw.subjects import RecruitmentResponse, SimulatedSubject, cohort
 from isiw.types import FloatArray
 

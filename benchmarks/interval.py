@@ -28,7 +28,7 @@ from benchmarks.interval_pictures import draw
 from benchmarks.interval_wrong import PUT_IN, WRONG, WRONG_GROUPS
 from benchmarks.provenance import facts_of
 from benchmarks.quick import understood
-from isiw.interval import Block, LightSearch, Producer, produce, score_pct, search_light
+from isiw.dissertation.interval import Block, LightSearch, Producer, produce, score_pct, search_light
 
 SEED, FIT_SEED = 10_000, 0
 GROUPS, GROUP = 2500, 4

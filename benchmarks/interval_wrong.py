@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from isiw.interval import Producer
+from isiw.dissertation.interval import Producer
 
 __all__ = ["PUT_IN", "WRONG", "WRONG_GROUPS"]
 

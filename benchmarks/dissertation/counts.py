@@ -17,7 +17,7 @@ from benchmarks.reduction.look import OURS, THEIRS, panels
 from benchmarks.waveform_loop import REST_UV_PER_FLOOR_MV
 from isiw.devices.robot.mechanism import Geometry
 from isiw.devices.robot.tapper import preset
-from isiw.response_counts import EFFECTIVE_SHARE, STIMULATION, CountStudy, study_counts
+from isiw.dissertation.response_counts import EFFECTIVE_SHARE, STIMULATION, CountStudy, study_counts
 from isiw.subjects import MEASURED_KIM, WIDTHS_KIM_MS, SimulatedSubject, cohort
 from isiw.types import FloatArray
 

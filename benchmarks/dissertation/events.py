@@ -16,7 +16,7 @@ from benchmarks.dissertation.claims import Claim, put_to_test
 from benchmarks.dissertation.parts import Told, verdict
 from benchmarks.dissertation.size import Size
 from benchmarks.reduction.look import OURS, THEIRS, panels
-from isiw.repeatability import TimingStudy, study_preset
+from isiw.dissertation.repeatability import TimingStudy, study_preset
 
 __all__ = ["tell"]
 

@@ -17,7 +17,7 @@ from benchmarks.dissertation.size import Size
 from benchmarks.reduction.look import OURS, panels
 from isiw.devices.robot.mechanism import Event
 from isiw.devices.robot.tapper import preset
-from isiw.repeatability import STUDY_ISI_MS, TimingStudy, study_preset, study_sweeps
+from isiw.dissertation.repeatability import STUDY_ISI_MS, TimingStudy, study_preset, study_sweeps
 
 __all__ = ["tell"]
 

@@ -14,10 +14,10 @@ from typing import Final
 import numpy as np
 
 from isiw.design import DesignSpace
+from isiw.dissertation.incremental import SweepModel, SweepPosterior, SweepRule
+from isiw.dissertation.strategies import SWEEP
 from isiw.estimate import WindowEstimate
-from isiw.models.dissertation.incremental import SweepModel, SweepPosterior, SweepRule
 from isiw.models.shared.history import AmplitudeHistory
-from isiw.strategy.settings.dissertation import SWEEP
 from isiw.strategy.stopping import Progress
 from isiw.subjects.responses import RecruitmentResponse
 from isiw.subjects.subject import Responder, SimulatedSubject

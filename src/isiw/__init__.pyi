@@ -4,15 +4,12 @@ from . import devices as devices
 from . import errors as errors
 from . import existing as existing
 from . import export as export
-from . import interval as interval
 from . import log as log
 from . import metrics as metrics
 from . import models as models
 from . import plots as plots
 from . import priors as priors
-from . import repeatability as repeatability
 from . import report as report
-from . import response_counts as response_counts
 from . import server as server
 from . import session as session
 from . import signals as signals
@@ -45,6 +42,9 @@ from .devices.transports.folder import FolderDevice as FolderDevice
 from .devices.transports.line import LineDevice as LineDevice
 from .devices.transports.lsl import LslChannel as LslChannel
 from .devices.transports.lsl import LslDevice as LslDevice
+from .dissertation import interval as interval
+from .dissertation import repeatability as repeatability
+from .dissertation import response_counts as response_counts
 from .estimate import WindowEstimate as WindowEstimate
 from .existing.analysis import Analysis as Analysis
 from .existing.analysis import analyse as analyse

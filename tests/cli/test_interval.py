@@ -6,8 +6,8 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from isiw.cli import app
-from isiw.interval.record import begin_log
-from isiw.interval.task import answer, session_blocks
+from isiw.dissertation.interval.record import begin_log
+from isiw.dissertation.interval.task import answer, session_blocks
 
 
 def run(*arguments: object) -> Result:

@@ -13,9 +13,9 @@ if os.name == "nt":
     pytest.skip("a POSIX terminal", allow_module_level=True)
 
 from interval.terminals import Person, somebody
+from isiw.dissertation.interval.record import read_productions
+from isiw.dissertation.interval.task import resume_task, run_task, session_blocks
 from isiw.errors import DeviceError, InvalidValueError
-from isiw.interval.record import read_productions
-from isiw.interval.task import resume_task, run_task, session_blocks
 
 
 @pytest.fixture

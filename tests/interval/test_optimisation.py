@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from isiw.dissertation.interval.producers import LightSearch, search_light
 from isiw.errors import InvalidValueError
-from isiw.interval.producers import LightSearch, search_light
 from isiw.log.headers import Block
 
 

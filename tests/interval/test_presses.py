@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from isiw.interval.task import Presses
+from isiw.dissertation.interval.task import Presses
 
 
 class Times:

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from isiw.dissertation.interval.producers import Producer, produce
 from isiw.errors import InvalidValueError
-from isiw.interval.producers import Producer, produce
 from isiw.log.headers import Block
 
 STEADY = Producer(

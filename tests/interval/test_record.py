@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from isiw.devices.protocol import DeviceInfo
+from isiw.dissertation.interval.record import begin_log, continue_log, read_productions
+from isiw.dissertation.interval.task import answer, session_blocks
 from isiw.errors import DamagedLogError, InvalidValueError, LogError
-from isiw.interval.record import begin_log, continue_log, read_productions
-from isiw.interval.task import answer, session_blocks
 from isiw.log.headers import AnyHeader, Block, StrategyRecipe, ThresholdHeader
 from isiw.log.reader import read_session
 from isiw.log.writer import LogWriter

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from isiw.dissertation.interval.task import SESSIONS, answer, feedback, score_pct, session_blocks
 from isiw.errors import InvalidValueError
-from isiw.interval.task import SESSIONS, answer, feedback, score_pct, session_blocks
 from isiw.log.headers import Block
 
 

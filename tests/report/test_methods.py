@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import isiw
-from isiw.models.dissertation.profiles import best_fit, profile_fits
+from isiw.dissertation.profiles import best_fit, profile_fits
 from isiw.report.methods import method_answers
 
 SPACE = isiw.DesignSpace(0, 150, 5, reference="impact")

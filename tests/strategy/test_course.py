@@ -9,12 +9,12 @@ import torch
 
 from isiw.acquisition.fixed import EvenSpacing, IncrementalSweep
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
-from isiw.models.dissertation.bootstrap import BootstrapPosterior
+from isiw.dissertation.bootstrap import BootstrapPosterior
+from isiw.dissertation.strategies import EdgeVariance
 from isiw.models.particles import ParticlePosterior
 from isiw.models.protocol import Observation, Posterior, Tensor
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.course import Choice, Course, Method, evenly_spaced
-from isiw.strategy.settling import EdgeVariance
 from isiw.strategy.stopping import Budget
 from known import instance
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import isiw
-from isiw.models.dissertation.regression import RegressionPosterior
+from isiw.dissertation.regression import RegressionPosterior
 
 
 def test_nr_finds_a_window_that_holds_most_of_its_trials() -> None:

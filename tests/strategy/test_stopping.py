@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from isiw.dissertation.strategies import EdgeVariance, ParticleSpread, SweptPast
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
 from isiw.findings import NO_MEP
 from isiw.strategy.catalogue import make_strategy
-from isiw.strategy.settling import EdgeVariance, ParticleSpread, SweptPast
 from isiw.strategy.stopping import (
     AnyOf,
     Budget,

@@ -15,10 +15,10 @@ import torch
 from isiw.acquisition.fixed import IncrementalSweep
 from isiw.acquisition.information import MutualInformation, WindowGain
 from isiw.design import VALVE_SPACE, DesignSpace
+from isiw.dissertation.strategies import EdgeVariance
 from isiw.errors import InvalidValueError, OutOfSpaceError, StrategyError
 from isiw.models.protocol import Posterior, Tensor
 from isiw.strategy.catalogue import make_strategy
-from isiw.strategy.settling import EdgeVariance
 from isiw.strategy.stopping import Budget, Progress, StopDecision
 from isiw.strategy.strategy import Recipe, Strategy
 from known import known

@@ -12,9 +12,9 @@ import pandas as pd
 import pytest
 import torch
 
+from isiw.dissertation.strategies import EdgeVariance
 from isiw.errors import InvalidValueError
 from isiw.strategy.catalogue import make_strategy
-from isiw.strategy.settling import EdgeVariance
 from isiw.strategy.strategy import Strategy
 from isiw.studies import SimulatedSession, simulate
 from isiw.studies.batch import simulate_batch

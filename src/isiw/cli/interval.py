@@ -11,7 +11,7 @@ import isiw
 from isiw.cli.console import NO_DEFAULT, SESSIONS, errors_reported, exit_if_damaged, refuse_ignored, show
 
 if TYPE_CHECKING:
-    from isiw.interval import ProductionRecord
+    from isiw.dissertation.interval import ProductionRecord
 
 app = typer.Typer()
 

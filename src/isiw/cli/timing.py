@@ -12,7 +12,7 @@ from isiw.cli.console import NO_DEFAULT, SESSIONS, Overwrite, errors_reported, s
 from isiw.cli.files import log_exists
 
 if TYPE_CHECKING:
-    from isiw.repeatability import TimingStudy
+    from isiw.dissertation.repeatability import TimingStudy
 
 app = typer.Typer()
 

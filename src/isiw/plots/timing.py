@@ -14,7 +14,7 @@ from isiw.signals.impact import VALVE_MS
 from isiw.text import plain
 
 if TYPE_CHECKING:
-    from isiw.repeatability import TimingStudy
+    from isiw.dissertation.repeatability import TimingStudy
 
 _COLOURS = {"fill": FAINT, "descent": GREEN, "hit": BLUE, "away": ORANGE, "memg": RED, "motion": GREEN, "end": BLUE}
 _NAMES = {

@@ -6,12 +6,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from isiw.dissertation.curves import curve_masks
+from isiw.dissertation.profiles import best_fit, normality, profile_fits
+from isiw.dissertation.response_counts import effective_window, response_counts, response_threshold_mv
 from isiw.errors import InvalidValueError
 from isiw.log.reader import SessionRecord
-from isiw.models.dissertation.curves import curve_masks
-from isiw.models.dissertation.profiles import best_fit, normality, profile_fits
 from isiw.report.words import finding_sentences
-from isiw.response_counts import effective_window, response_counts, response_threshold_mv
 from isiw.text.harmless import counted
 from isiw.trials import RESPONSE_MV
 from isiw.types import FloatArray

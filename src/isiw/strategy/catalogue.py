@@ -22,8 +22,7 @@ class _Entry:
 
     Args:
         summary: what it does, in a sentence.
-        family: where in `isiw.strategy.settings` its usual settings are; loaded, with its model, only when the
-            strategy is made.
+        family: where its usual settings are; loaded, with its model, only when the strategy is made.
         meant: the settings that the name stands for.
     """
 
@@ -32,7 +31,8 @@ class _Entry:
     meant: Mapping[str, Any] = field(default_factory=dict)
 
 
-_PARTICLES, _PARAMETRIC, _GP = "families:PARTICLES", "families:PARAMETRIC", "families:GAUSSIAN_PROCESS"
+_CORE: Final = "isiw.strategy.settings.families"
+_PARTICLES, _PARAMETRIC, _GP = f"{_CORE}:PARTICLES", f"{_CORE}:PARAMETRIC", f"{_CORE}:GAUSSIAN_PROCESS"
 
 _CATALOGUE: Final[dict[str, _Entry]] = {
     "default": _Entry(
@@ -55,7 +55,7 @@ _CATALOGUE: Final[dict[str, _Entry]] = {
     "random": _Entry("Particle posterior; random ISIs, whatever the responses.", _PARTICLES, {"acquisition": "random"}),
     "supra-threshold": _Entry(
         "For TMS above the motor threshold: looks for depressed MEPs as well as for enhanced ones.",
-        "families:SUPRA",
+        f"{_CORE}:SUPRA",
     ),
     "parametric-mi": _Entry(
         "Gaussian window in Pyro; chooses the ISI most informative about all unknowns.",
@@ -76,20 +76,21 @@ _CATALOGUE: Final[dict[str, _Entry]] = {
     "gp-ei": _Entry(
         "Gaussian process; seeks the best ISI only, by expected improvement.", _GP, {"acquisition": "log-ei"}
     ),
-    "nr": _Entry("Dissertation: nonlinear regression of one Gaussian.", "dissertation:NR"),
+    "nr": _Entry("Dissertation: nonlinear regression of one Gaussian.", "isiw.dissertation.strategies:NR"),
     "nr2": _Entry(
         "Dissertation: nonlinear regression of two Gaussians.",
-        "dissertation:NR",
+        "isiw.dissertation.strategies:NR",
         {"peaks": 2, "initial": 7, "segments": "all"},
     ),
-    "svmr": _Entry("Dissertation: support vector regression.", "dissertation:SVMR"),
-    "gpr": _Entry("Dissertation: Gaussian process regression of the amplitudes.", "dissertation:GPR"),
+    "svmr": _Entry("Dissertation: support vector regression.", "isiw.dissertation.strategies:SVMR"),
+    "gpr": _Entry("Dissertation: Gaussian process regression of the amplitudes.", "isiw.dissertation.strategies:GPR"),
     "pf": _Entry(
         "Dissertation: bootstrap particle filter over ISIs, a generation of particles at a time.",
-        "dissertation:PF",
+        "isiw.dissertation.strategies:PF",
     ),
     "incremental": _Entry(
-        "Conventional search: twelve trials every 5 ms, until the window is passed.", "dissertation:SWEEP"
+        "Conventional search: twelve trials every 5 ms, until the window is passed.",
+        "isiw.dissertation.strategies:SWEEP",
     ),
 }
 
@@ -121,7 +122,7 @@ def settings_for(name: str, **settings: Any) -> Settings:
             remedy=did_you_mean(name, _CATALOGUE) or "isiw strategies says what each of them does.",
         )
     entry = _CATALOGUE[name]
-    usual: Settings = pkgutil.resolve_name(f"isiw.strategy.settings.{entry.family}")
+    usual: Settings = pkgutil.resolve_name(entry.family)
     return settings_from(usual, {**entry.meant, **settings}, name)
 
 

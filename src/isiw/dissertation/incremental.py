@@ -11,10 +11,10 @@ import numpy as np
 
 from isiw.checks import Checked, Count, Natural, NonNegative, Positive, whole
 from isiw.design import DesignSpace
+from isiw.dissertation.curves import curve_masks
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
 from isiw.lazy import torch
-from isiw.models.dissertation.curves import curve_masks
 from isiw.models.protocol import Observation, Tensor
 from isiw.models.shared.floor import FloorTreatment
 from isiw.models.shared.history import AmplitudeHistory, PersonTrials

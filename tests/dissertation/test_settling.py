@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from isiw.dissertation.strategies import EdgeVariance, ParticleSpread, SweptPast
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
-from isiw.strategy.settling import EdgeVariance, ParticleSpread, SweptPast
 from isiw.strategy.stopping import AnyOf, Budget, Progress, looks_back
 from isiw.window import Window
 

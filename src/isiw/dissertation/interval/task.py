@@ -14,8 +14,8 @@ from typing import Final
 import numpy as np
 
 from isiw.checks import choice, number, whole
+from isiw.dissertation.interval.record import ProductionRecord, begin_log, continue_log, read_productions
 from isiw.errors import DeviceError, InvalidValueError
-from isiw.interval.record import ProductionRecord, begin_log, continue_log, read_productions
 from isiw.log.headers import LONGEST_MS, MODES, Block, Production
 from isiw.log.schema import Event
 from isiw.log.writer import LogWriter

@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from isiw.dissertation.repeatability import detect_rotations
 from isiw.errors import InvalidValueError
-from isiw.signals.rotation import detect_rotations
 
 RNG = np.random.default_rng(4)
 TIMES_MS = np.arange(1500.0)

@@ -5,14 +5,14 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from isiw.errors import InvalidValueError
-from isiw.response_counts import (
+from isiw.dissertation.response_counts import (
     STIMULATION,
     effective_window,
     response_counts,
     response_threshold_mv,
     study_counts,
 )
+from isiw.errors import InvalidValueError
 from known import known
 
 

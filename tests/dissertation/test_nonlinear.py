@@ -10,10 +10,10 @@ import pytest
 from scipy.optimize import curve_fit
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
+from isiw.dissertation.curves import FittedCurve
+from isiw.dissertation.nonlinear import NonlinearRegression, Start, gaussians_mv, gradient_mv
+from isiw.dissertation.regression import RegressionModel
 from isiw.errors import InvalidValueError
-from isiw.models.dissertation.curves import FittedCurve
-from isiw.models.dissertation.nonlinear import NonlinearRegression, Start, gaussians_mv, gradient_mv
-from isiw.models.dissertation.regression import RegressionModel
 from isiw.models.shared.floor import FloorTreatment
 from isiw.testing import check_model
 from isiw.types import FloatArray

@@ -39,8 +39,8 @@ from isiw.checks import (
     number,
     whole,
 )
+from isiw.dissertation.interval.task import score_pct
 from isiw.errors import InvalidValueError
-from isiw.interval.task import score_pct
 from isiw.lazy import botorch, gpytorch, torch
 from isiw.log.headers import LONGEST_MS, Block
 from isiw.types import FloatArray

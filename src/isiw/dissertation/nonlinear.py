@@ -11,8 +11,8 @@ import numpy as np
 
 from isiw.checks import Checked, Count, NonNegative, Number, Positive, choice, number, whole
 from isiw.design import DesignSpace
+from isiw.dissertation.curves import FittedCurve
 from isiw.lazy import scipy
-from isiw.models.dissertation.curves import FittedCurve
 from isiw.types import FloatArray
 
 Start = Literal["even", "unequal", "random"]

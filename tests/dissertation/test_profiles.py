@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.stats import norm, shapiro
 
+from isiw.dissertation.profiles import ProfileFit, best_fit, normality, profile_fits
 from isiw.errors import InvalidValueError
-from isiw.models.dissertation.profiles import ProfileFit, best_fit, normality, profile_fits
 from isiw.types import FloatArray
 
 ISIS_MS = np.arange(30.0, 111.0, 2.0)

@@ -16,10 +16,10 @@ import numpy as np
 
 from isiw.checks import Checked, NonNegative, Positive, whole
 from isiw.design import DesignSpace
+from isiw.dissertation.curves import FittedCurve, curve_masks
+from isiw.dissertation.nonlinear import NonlinearRegression
 from isiw.estimate import WindowEstimate
 from isiw.lazy import torch
-from isiw.models.dissertation.curves import FittedCurve, curve_masks
-from isiw.models.dissertation.nonlinear import NonlinearRegression
 from isiw.models.protocol import Observation, Tensor
 from isiw.models.shared.floor import FloorTreatment
 from isiw.models.shared.history import AmplitudeHistory

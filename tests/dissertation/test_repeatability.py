@@ -11,10 +11,9 @@ from isiw.devices.robot.tapper import Tapper, TapperSettings
 from isiw.devices.robot.vane.actuator import Vane
 from isiw.devices.robot.vane.tapper import draw_strokes
 from isiw.devices.simulated import SimulatedDevice
-from isiw.errors import InvalidValueError
-from isiw.log.reader import read_session
-from isiw.repeatability import (
+from isiw.dissertation.repeatability import (
     STUDY_ISI_MS,
+    RotationEvents,
     TimingStudy,
     error_probabilities,
     error_table,
@@ -25,10 +24,11 @@ from isiw.repeatability import (
     study_vane,
     timing_report,
 )
+from isiw.errors import InvalidValueError
+from isiw.log.reader import read_session
 from isiw.session.loop import Session
 from isiw.signals import TapEvents
 from isiw.signals.impact import VALVE_MS
-from isiw.signals.rotation import RotationEvents
 from isiw.trials import Stimulus, Sweep
 from isiw.visit import VisitProtocol
 from known import instance, known

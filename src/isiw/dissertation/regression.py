@@ -14,9 +14,9 @@ import numpy as np
 
 from isiw.checks import Checked
 from isiw.design import DesignSpace
+from isiw.dissertation.curves import FittedCurve, Segments, curve_masks
 from isiw.estimate import WindowEstimate
 from isiw.lazy import torch
-from isiw.models.dissertation.curves import FittedCurve, Segments, curve_masks
 from isiw.models.protocol import Observation, Tensor
 from isiw.models.shared.floor import FloorTreatment
 from isiw.models.shared.history import AmplitudeHistory

@@ -9,10 +9,10 @@ import pytest
 from sklearn.svm import SVR
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
+from isiw.dissertation.curves import FittedCurve
+from isiw.dissertation.kernel_regressions import SupportVectorRegression
+from isiw.dissertation.regression import RegressionModel
 from isiw.errors import InvalidValueError
-from isiw.models.dissertation.curves import FittedCurve
-from isiw.models.dissertation.regression import RegressionModel
-from isiw.models.dissertation.svr import SupportVectorRegression
 from isiw.testing import check_model
 from known import known
 from models.told_trials import bell_mv, told, trials_of

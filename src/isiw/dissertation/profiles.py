@@ -16,9 +16,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from isiw.checks import number, whole
+from isiw.dissertation.nonlinear import gaussians_mv, gradient_mv
 from isiw.errors import InvalidValueError
 from isiw.lazy import scipy
-from isiw.models.dissertation.nonlinear import gaussians_mv, gradient_mv
 from isiw.text.harmless import counted
 from isiw.types import ArrayLike, FloatArray
 

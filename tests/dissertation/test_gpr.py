@@ -11,10 +11,10 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
+from isiw.dissertation.curves import FittedCurve
+from isiw.dissertation.kernel_regressions import GaussianProcessRegression
+from isiw.dissertation.regression import RegressionModel
 from isiw.errors import InvalidValueError
-from isiw.models.dissertation.curves import FittedCurve
-from isiw.models.dissertation.gpr import GaussianProcessRegression
-from isiw.models.dissertation.regression import RegressionModel
 from isiw.models.shared.floor import FloorTreatment
 from isiw.testing import check_model
 from isiw.window import Window
