@@ -27,9 +27,8 @@ from benchmarks.reduction.headline import BY_TRUTH, JUDGED, reading_of
 from benchmarks.reduction.sessions import Session, play, recorded_person
 from benchmarks.tables import write_tables
 from isiw.design import DesignSpace
-from isiw.dissertation.curves import FittedCurve, curve_masks
-from isiw.dissertation.regression import RegressionMethod, RegressionModel
-from isiw.models.shared.floor import FloorTreatment
+from isiw.dissertation.regression import FittedCurve, RegressionMethod, RegressionModel, curve_masks
+from isiw.models.shared.history import FloorTreatment
 from isiw.types import FloatArray
 
 LOWEST, ROUNDS, NEAR_MV = 0.1, 5, 1e-4

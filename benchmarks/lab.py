@@ -39,9 +39,8 @@ from isiw.models.particles.prior import Prior
 from isiw.models.particles.profile import ShapeShares
 from isiw.models.shared.scales import Scale
 from isiw.priors import LabPrior
-from isiw.priors.components import place
 from isiw.priors.lab import share_of
-from isiw.priors.population import Block, People, hyper_prior
+from isiw.priors.population import Block, People, hyper_prior, place
 from isiw.priors.population import learnt as law_of
 from isiw.studies import SimulatedSession, simulate
 from isiw.subjects import LABS, Lab, SimulatedSubject, cohort, lab

@@ -21,8 +21,7 @@ from scipy.stats import gamma, norm
 
 from isiw.design import DesignSpace
 from isiw.studies import SimulatedSession, play
-from isiw.subjects.labs import LABS, lab
-from isiw.subjects.measured import MEASURED_KIM, WIDTHS_KIM_MS, MeasuredPerson
+from isiw.subjects.measured import LABS, MEASURED_KIM, WIDTHS_KIM_MS, MeasuredPerson, lab
 from isiw.subjects.profiles import PeakProfile
 from isiw.subjects.responses import GainResponse, RecruitmentResponse, ResponseCurve
 from isiw.subjects.subject import OUTLIERS_MV, SimulatedSubject

@@ -14,8 +14,7 @@ from benchmarks.reduction.readings import PEOPLE
 from benchmarks.reduction.recorded import SWEPT
 from benchmarks.zero_trials import best_fixed, masks_of
 from isiw.design import DesignSpace
-from isiw.dissertation.curves import FittedCurve
-from isiw.dissertation.regression import RegressionModel
+from isiw.dissertation.regression import FittedCurve, RegressionModel
 from isiw.subjects.measured import MEASURED_KIM
 from isiw.types import FloatArray
 from isiw.window import Window

@@ -8,7 +8,7 @@ from typing import Any, Final, Literal
 from benchmarks.reduction.dissertation import METHODS
 from benchmarks.reduction.recorded import BASELINES
 from isiw.errors import InvalidValueError
-from isiw.models.shared.floor import FloorKind
+from isiw.models.shared.history import FloorKind
 
 TRUTHS: Final = (*(f"measured, {baseline}" for baseline in BASELINES), "measured, .135", "true")
 """What a window is judged by: the run of measured means above the MEP of TMS alone at 100 % RMT (the text's words,

@@ -14,7 +14,7 @@ from isiw.change import Change
 from isiw.checks import Checked, Share, number
 from isiw.errors import InvalidValueError
 from isiw.findings import lacking
-from isiw.later import WorkedOut
+from isiw.lazy import WorkedOut
 from isiw.types import ArrayLike, FloatArray, IntArray, Number, Numbers
 from isiw.window import Interval, Window
 

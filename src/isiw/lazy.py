@@ -1,4 +1,4 @@
-"""Libraries that take long to import, imported when something of them is first used.
+"""Libraries that are imported when first used, and fields of values that are worked out when somebody looks at them.
 
 Torch takes 2 s and 500 MB, pandas and SciPy half a second each: a command that only reads a log waits for none of them.
 """
@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import importlib
 import warnings
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 __all__ = ["botorch", "gpytorch", "pa", "parquet", "pd", "pyro", "scipy", "sklearn", "torch"]
 
@@ -43,3 +45,37 @@ else:
     botorch, gpytorch, pyro, torch = map(_Library, ("botorch", "gpytorch", "pyro", "torch"))
     pa, parquet, pd = map(_Library, ("pyarrow", "pyarrow.parquet", "pandas"))
     scipy, sklearn = map(_Library, ("scipy", "sklearn"))
+
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, eq=False)
+class Later(Generic[T]):
+    """A value that is worked out when it is first looked at.
+
+    Args:
+        work: gives the value.
+    """
+
+    work: Callable[[], T]
+
+
+class WorkedOut(Generic[T]):
+    """A field that may be given as `Later`."""
+
+    def __init__(self, name: str, default: T) -> None:
+        self.name, self.default = name, default
+
+    def __get__(self, instance: object, owner: type) -> T:
+        if instance is None:  # a dataclass asks for the default
+            return self.default
+        value = instance.__dict__[self.name]
+        if isinstance(value, Later):
+            value = instance.__dict__[self.name] = value.work()
+        known: T = value
+        return known
+
+    def __set__(self, instance: object, value: T | Later[T]) -> None:
+        unset = isinstance(value, WorkedOut)  # a field has it for its default
+        instance.__dict__[self.name] = self.default if unset else value

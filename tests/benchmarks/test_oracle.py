@@ -9,7 +9,7 @@ from benchmarks.oracle import SPANS, Oracle, Spans, outcome_table, spans_of
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.metrics import f1
 from isiw.subjects.cohorts import cohort
-from isiw.subjects.labs import LABS
+from isiw.subjects.measured import LABS
 from isiw.subjects.profiles import PeakProfile
 from isiw.subjects.subject import SimulatedSubject
 

@@ -21,12 +21,12 @@ from isiw.devices.callback import CallbackDevice
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.limited import LimitedDevice
 from isiw.devices.limits import Limits
-from isiw.devices.lock import driven
 from isiw.devices.protocol import DeviceInfo, Readiness
 from isiw.devices.recorded import RecordedPerson, Recordings
 from isiw.devices.robot.tapper import Tapper, TapperSettings
 from isiw.devices.simulated import RecordedTrials, SimulatedDevice, SimulatedPerson
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, LimitExceededError, NotDelivered
+from isiw.session.rig import driven
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.subject import Response
 from isiw.testing import check_device

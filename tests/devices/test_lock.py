@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from isiw.devices.lock import driven
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DeviceError
+from isiw.session.rig import driven
 from known import known
 from scripted import ScriptedDevice
 
@@ -46,7 +46,7 @@ def test_two_objects_of_one_address_are_one_device() -> None:
 
 
 def test_a_lock_that_cannot_be_taken_is_told_with_the_way_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("isiw.devices.lock.tempfile.gettempdir", lambda: str(tmp_path))
+    monkeypatch.setattr("isiw.session.rig.tempfile.gettempdir", lambda: str(tmp_path))
     with driven(ScriptedDevice(), PORT):
         (left,) = tmp_path.iterdir()
         assert os.name == "nt" or left.stat().st_mode & 0o777 == 0o666  # whoever else uses the computer can take it
@@ -58,7 +58,7 @@ def test_a_lock_that_cannot_be_taken_is_told_with_the_way_out(tmp_path: Path, mo
 
 HOLDER = """
 import sys
-from isiw.devices.lock import driven
+from isiw.session.rig import driven
 from isiw.devices.protocol import DeviceInfo
 with driven(object(), DeviceInfo("rig", "valve", address="port of this test")):
     print("held", flush=True)

@@ -14,7 +14,7 @@ from isiw.acquisition.fixed import OwnProposal
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.dissertation.bootstrap import BootstrapFilter, BootstrapPosterior, WindowKind, normalised, resampled
 from isiw.errors import InvalidValueError
-from isiw.models.shared.floor import FloorTreatment
+from isiw.models.shared.history import FloorTreatment
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.stopping import Budget
 from isiw.strategy.strategy import Strategy

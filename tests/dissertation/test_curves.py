@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from isiw.dissertation.curves import FittedCurve, curve_masks
+from isiw.dissertation.regression import FittedCurve, curve_masks
 from isiw.window import Window, window_from_excess
 
 GRID = np.arange(0.0, 501.0)

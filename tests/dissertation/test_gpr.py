@@ -11,11 +11,10 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
-from isiw.dissertation.curves import FittedCurve
 from isiw.dissertation.kernel_regressions import GaussianProcessRegression
-from isiw.dissertation.regression import RegressionModel
+from isiw.dissertation.regression import FittedCurve, RegressionModel
 from isiw.errors import InvalidValueError
-from isiw.models.shared.floor import FloorTreatment
+from isiw.models.shared.history import FloorTreatment
 from isiw.testing import check_model
 from isiw.window import Window
 from known import known

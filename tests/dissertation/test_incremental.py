@@ -13,7 +13,7 @@ from isiw.acquisition.fixed import IncrementalSweep
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.dissertation.incremental import SweepModel, SweepPosterior
 from isiw.errors import InvalidValueError
-from isiw.models.shared.floor import FloorTreatment
+from isiw.models.shared.history import FloorTreatment
 from isiw.strategy.catalogue import make_strategy
 from isiw.testing import check_model
 from isiw.window import Window

@@ -10,11 +10,10 @@ import pytest
 from scipy.optimize import curve_fit
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
-from isiw.dissertation.curves import FittedCurve
 from isiw.dissertation.nonlinear import NonlinearRegression, Start, gaussians_mv, gradient_mv
-from isiw.dissertation.regression import RegressionModel
+from isiw.dissertation.regression import FittedCurve, RegressionModel
 from isiw.errors import InvalidValueError
-from isiw.models.shared.floor import FloorTreatment
+from isiw.models.shared.history import FloorTreatment
 from isiw.testing import check_model
 from isiw.types import FloatArray
 from isiw.window import Window

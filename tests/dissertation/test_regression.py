@@ -11,9 +11,8 @@ import torch
 
 from isiw.acquisition.variance import profile_variance
 from isiw.design import VALVE_SPACE, DesignSpace
-from isiw.dissertation.curves import FittedCurve
 from isiw.dissertation.nonlinear import NonlinearRegression
-from isiw.dissertation.regression import RegressionModel
+from isiw.dissertation.regression import FittedCurve, RegressionModel
 from isiw.errors import InvalidValueError, StrategyError
 from isiw.models.protocol import (
     Conditions,

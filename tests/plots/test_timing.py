@@ -6,7 +6,7 @@ import pytest
 
 from isiw.dissertation.repeatability import study_preset
 from isiw.errors import InvalidValueError
-from isiw.plots.timing import save_timing_plot, timing_figure
+from isiw.plots.timeline import save_timing_plot, timing_figure
 
 
 def test_the_errors_are_drawn_only_where_isis_were_commanded() -> None:

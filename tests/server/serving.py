@@ -15,7 +15,7 @@ from typing import Any
 import httpx
 
 from isiw.server import Rules, make_app
-from isiw.server.serving import Server, listening, settings_of
+from isiw.server.app import Server, listening, settings_of
 from known import known
 
 TOKEN = "a token for the tests"  # noqa: S105 - of the tests

@@ -17,7 +17,7 @@ from scipy import stats
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.subjects.cohorts import COHORTS, another_day, cohort, person_of
-from isiw.subjects.labs import LABS, lab
+from isiw.subjects.measured import LABS, lab
 from isiw.subjects.profiles import OpposedProfile, PeakProfile, TwoPeakProfile
 from isiw.subjects.realities import CHANGED
 from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse

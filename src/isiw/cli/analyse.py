@@ -10,8 +10,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 import isiw
-from isiw.cli.console import LOGS, NO_DEFAULT, STUDIES, Overwrite, errors_reported, show
-from isiw.cli.files import free_beside
+from isiw.cli.console import LOGS, NO_DEFAULT, STUDIES, Overwrite, errors_reported, free_beside, show
 from isiw.text.harmless import command
 
 if TYPE_CHECKING:

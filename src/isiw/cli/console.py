@@ -23,6 +23,8 @@ from isiw.text.harmless import counted
 
 if TYPE_CHECKING:
     from isiw.log.reader import SessionRecord
+import itertools
+import os
 
 _SILENT_S = 1.0
 _AGAIN_S = 0.05
@@ -152,3 +154,16 @@ def refuse_ignored(why: str, **options: object) -> None:
     given = [f"--{name.replace('_', '-')}" for name, value in options.items() if value not in (None, [])]
     if given:
         raise isiw.errors.ConfigError(why, got=", ".join(given), remedy="Leave these options out.")
+
+
+def log_exists(source: str | Path) -> bool:
+    """Whether there is a log of this name, closed or not."""
+    closed = str(source).removesuffix(".part")
+    return Path(closed).is_file() or Path(f"{closed}.part").is_file()
+
+
+def free_beside(log: Path, suffix: str) -> Path:
+    """Where a file of a session goes that nobody gave a place: beside its log, under a name that is free."""
+    stem = Path(log.name.removesuffix(".part")).stem
+    names = itertools.chain([stem], (f"{stem}_{number}" for number in itertools.count(2)))
+    return next(path for path in (log.with_name(f"{name}{suffix}") for name in names) if not os.path.lexists(path))

@@ -16,11 +16,11 @@ from isiw.cli.console import (
     counting,
     errors_reported,
     exit_if_damaged,
+    free_beside,
     say_unread,
     show,
     show_paragraph,
 )
-from isiw.cli.files import free_beside
 from isiw.text.harmless import command, counted
 
 if TYPE_CHECKING:

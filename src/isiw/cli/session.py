@@ -10,8 +10,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import isiw
-from isiw.cli.console import NO_DEFAULT, NOT_OVER, SESSIONS, counting, errors_reported, show, show_paragraph
-from isiw.cli.files import free_beside, log_exists
+from isiw.cli.console import (
+    NO_DEFAULT,
+    NOT_OVER,
+    SESSIONS,
+    counting,
+    errors_reported,
+    free_beside,
+    log_exists,
+    show,
+    show_paragraph,
+)
 from isiw.text.harmless import command
 
 if TYPE_CHECKING:

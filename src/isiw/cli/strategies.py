@@ -11,7 +11,7 @@ import isiw
 from isiw.cli.console import NO_DEFAULT, STUDIES, errors_reported, show, show_entry
 
 if TYPE_CHECKING:
-    from isiw.strategy.settings.described import DescribedSetting
+    from isiw.strategy.settings.common import DescribedSetting
 
 app = typer.Typer()
 

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import isiw
-from isiw.cli.console import NO_DEFAULT, SESSIONS, Overwrite, errors_reported, show
-from isiw.cli.files import log_exists
+from isiw.cli.console import NO_DEFAULT, SESSIONS, Overwrite, errors_reported, log_exists, show
 
 if TYPE_CHECKING:
     from isiw.dissertation.repeatability import TimingStudy

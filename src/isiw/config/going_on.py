@@ -13,9 +13,8 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from isiw.config.robot import person_under
 from isiw.config.run import RunConfig
-from isiw.config.sections import RobotConfig, SimulatedConfig
+from isiw.config.sections import RobotConfig, SimulatedConfig, person_under
 from isiw.config.session import learns_from_earlier, simulated_device
 from isiw.devices.limits import Limits
 from isiw.devices.simulated import SimulatedDevice

@@ -19,7 +19,6 @@ from typing import Any, Self, get_args
 
 from pydantic import Field, model_validator
 
-from isiw.config.robot import robot_for
 from isiw.config.sections import (
     TIMEOUT_S,
     DeviceConfig,
@@ -32,6 +31,7 @@ from isiw.config.sections import (
     VisitConfig,
     require_together,
     require_units,
+    robot_for,
 )
 from isiw.design import DesignSpace, missing_reference
 from isiw.devices.limits import Limits

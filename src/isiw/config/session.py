@@ -10,9 +10,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, Final
 
-from isiw.config.robot import robot_for
 from isiw.config.run import RunConfig, limits_for
-from isiw.config.sections import RobotConfig, SimulatedConfig, SubjectConfig
+from isiw.config.sections import RobotConfig, SimulatedConfig, SubjectConfig, robot_for
 from isiw.design import DesignSpace
 from isiw.devices.protocol import Device, DeviceInfo
 from isiw.devices.recorded import RecordedPerson, load_recordings

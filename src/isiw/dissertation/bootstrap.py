@@ -16,13 +16,12 @@ import numpy as np
 
 from isiw.checks import Checked, NonNegative, Positive, whole
 from isiw.design import DesignSpace
-from isiw.dissertation.curves import FittedCurve, curve_masks
 from isiw.dissertation.nonlinear import NonlinearRegression
+from isiw.dissertation.regression import FittedCurve, curve_masks
 from isiw.estimate import WindowEstimate
 from isiw.lazy import torch
 from isiw.models.protocol import Observation, Tensor
-from isiw.models.shared.floor import FloorTreatment
-from isiw.models.shared.history import AmplitudeHistory
+from isiw.models.shared.history import AmplitudeHistory, FloorTreatment
 from isiw.types import BoolArray, FloatArray, IntArray
 from isiw.window import Window
 

@@ -11,13 +11,12 @@ import numpy as np
 
 from isiw.checks import Checked, Count, Natural, NonNegative, Positive, whole
 from isiw.design import DesignSpace
-from isiw.dissertation.curves import curve_masks
+from isiw.dissertation.regression import curve_masks
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
 from isiw.lazy import torch
 from isiw.models.protocol import Observation, Tensor
-from isiw.models.shared.floor import FloorTreatment
-from isiw.models.shared.history import AmplitudeHistory, PersonTrials
+from isiw.models.shared.history import AmplitudeHistory, FloorTreatment, PersonTrials
 from isiw.types import FloatArray
 from isiw.window import EDGE_LEVEL, Window
 

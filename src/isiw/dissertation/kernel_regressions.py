@@ -15,7 +15,7 @@ from threadpoolctl import ThreadpoolController
 
 from isiw.checks import Checked, Count, NonNegative, Number, Positive, number, whole
 from isiw.design import DesignSpace
-from isiw.dissertation.curves import FittedCurve
+from isiw.dissertation.regression import FittedCurve
 from isiw.lazy import scipy, sklearn
 from isiw.types import FloatArray
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from isiw.checks import Checked, Count, NonNegative, Number, Positive, choice, number, whole
 from isiw.design import DesignSpace
-from isiw.dissertation.curves import FittedCurve
+from isiw.dissertation.regression import FittedCurve
 from isiw.lazy import scipy
 from isiw.types import FloatArray
 

@@ -19,7 +19,7 @@ from isiw.dissertation.incremental import SweepModel
 from isiw.dissertation.kernel_regressions import GaussianProcessRegression, SupportVectorRegression
 from isiw.dissertation.nonlinear import NonlinearRegression
 from isiw.dissertation.regression import RegressionModel
-from isiw.models.shared.floor import FloorTreatment
+from isiw.models.shared.history import FloorTreatment
 from isiw.strategy.settings.common import Settings
 from isiw.strategy.stopping import AnyOf, Budget, Progress, StopDecision, StopKind, StoppingRule
 

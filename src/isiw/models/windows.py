@@ -11,8 +11,7 @@ import numpy as np
 
 from isiw.design import DesignSpace
 from isiw.estimate import BestISI, Enhancement, WindowEstimate
-from isiw.later import Later
-from isiw.lazy import torch
+from isiw.lazy import Later, torch
 from isiw.models.protocol import Tensor
 from isiw.types import FloatArray, IntArray
 from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE, Window

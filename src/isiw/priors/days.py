@@ -25,7 +25,7 @@ from isiw.models.particles.latents import LATENTS, Latents, used_by
 from isiw.models.particles.places import MOST_APART_MS, Place
 from isiw.models.particles.prior import Prior
 from isiw.models.protocol import Tensor
-from isiw.priors.components import Component, beside, columns, floor, gain, mixed, mixed_shares, muscle, place
+from isiw.priors.population import Component, beside, columns, floor, gain, mixed, mixed_shares, muscle, place
 from isiw.strategy.outcomes import Outcomes
 from isiw.text.harmless import command
 from isiw.types import FloatArray

@@ -19,7 +19,6 @@ from isiw.models.particles.laws import Floor, Gain, Muscle, NoiseShares
 from isiw.models.particles.places import MOST_APART_MS, Place
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.profile import ProfilePrior, ShapeShares
-from isiw.priors.components import beside, floor, gain, mixed, mixed_shares, muscle, place
 from isiw.priors.days import (
     recalled,
     require_meps,
@@ -27,7 +26,21 @@ from isiw.priors.days import (
     stated_hit_delay_ms,
     too_far_apart_ms,
 )
-from isiw.priors.population import Law, Population, hyper_prior, learnt, people_of, usual_shares
+from isiw.priors.population import (
+    Law,
+    Population,
+    beside,
+    floor,
+    gain,
+    hyper_prior,
+    learnt,
+    mixed,
+    mixed_shares,
+    muscle,
+    people_of,
+    place,
+    usual_shares,
+)
 from isiw.types import Conditioning, Reference
 from isiw.visit import MOST_APART_PCT_RMT, different_muscles
 

@@ -6,8 +6,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from isiw.dissertation.curves import curve_masks
 from isiw.dissertation.profiles import best_fit, normality, profile_fits
+from isiw.dissertation.regression import curve_masks
 from isiw.dissertation.response_counts import effective_window, response_counts, response_threshold_mv
 from isiw.errors import InvalidValueError
 from isiw.log.reader import SessionRecord

@@ -7,8 +7,7 @@ from isiw.errors import ConfigError
 if any(importlib.util.find_spec(name) is None for name in ("fastapi", "plotly", "uvicorn")):
     raise ConfigError("the server's libraries are not installed", remedy='Install them with: pip install "isiw[serve]"')
 
-from isiw.server.app import make_app
+from isiw.server.app import ServerSettings, make_app, serve
 from isiw.server.guard import Rules
-from isiw.server.serving import ServerSettings, serve
 
 __all__ = ["Rules", "ServerSettings", "make_app", "serve"]

@@ -11,8 +11,14 @@ from isiw.checks import whole
 from isiw.design import VALVE_SPACE, DesignSpace, require_space
 from isiw.errors import StrategyError, did_you_mean
 from isiw.models.particles.profile import ProfilePrior
-from isiw.strategy.settings.common import Settings, settings_from, settings_keys, settings_values
-from isiw.strategy.settings.described import DescribedSetting, described
+from isiw.strategy.settings.common import (
+    DescribedSetting,
+    Settings,
+    described,
+    settings_from,
+    settings_keys,
+    settings_values,
+)
 from isiw.strategy.strategy import Recipe, Strategy
 
 

@@ -2,8 +2,7 @@
 
 from isiw.subjects.changes import Change, Plasticity, TapResponse
 from isiw.subjects.cohorts import COHORTS, another_day, cohort
-from isiw.subjects.labs import LABS, Lab, lab
-from isiw.subjects.measured import MEASURED_KIM, WIDTHS_KIM_MS, MeasuredPerson
+from isiw.subjects.measured import LABS, MEASURED_KIM, WIDTHS_KIM_MS, Lab, MeasuredPerson, lab
 from isiw.subjects.profiles import OpposedProfile, PeakProfile, Profile, TwoPeakProfile
 from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse, ResponseCurve, TrialNoise
 from isiw.subjects.subject import Drift, Responder, Response, SimulatedSubject

@@ -12,8 +12,7 @@ from typing import Final, Literal, TypeAlias
 import numpy as np
 
 from isiw.checks import choice, whole
-from isiw.subjects.labs import LABS, lab
-from isiw.subjects.measured import MEASURED_KIM, WIDTHS_KIM_MS, supra_threshold
+from isiw.subjects.measured import LABS, MEASURED_KIM, WIDTHS_KIM_MS, lab, supra_threshold
 from isiw.subjects.profiles import PeakProfile, Profile, TwoPeakProfile
 from isiw.subjects.realities import CHANGED
 from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse, ResponseCurve

@@ -21,9 +21,16 @@ from isiw.signals import SignalLimits, judge, judge_measurement
 from isiw.signals.evidence import Evidence, Told
 from isiw.signals.rig import too_early_by_chance
 from isiw.signals.watch import findings
-from isiw.testing.device_table import OF_TIMING, Delivery, DeviceTable, device_table, wrong_hit_delay
+from isiw.testing.device_table import (
+    OF_TIMING,
+    Delivery,
+    DeviceTable,
+    artefact_in_window,
+    device_table,
+    late_artefact,
+    wrong_hit_delay,
+)
 from isiw.testing.guarded import Guarded, Pace
-from isiw.testing.phantom import artefact_in_window, late_artefact
 from isiw.testing.requirements import broken, require
 from isiw.text.harmless import shown
 from isiw.trials import Measurement, Stimulus, Sweep, Trial

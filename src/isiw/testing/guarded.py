@@ -10,10 +10,9 @@ from dataclasses import dataclass, field
 from isiw.devices.clock import Clock
 from isiw.devices.deadlines import PunctualDevice
 from isiw.devices.limits import Limits
-from isiw.devices.lock import driven
 from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, readiness_of
 from isiw.errors import DeviceError, DeviceTimeoutError, NotDelivered, StillArmedError, told
-from isiw.session.rig import Rig, Safeguards
+from isiw.session.rig import Rig, Safeguards, driven
 from isiw.session.sink import Sink
 from isiw.testing.requirements import broken, require
 from isiw.trials import Stimulus

@@ -27,7 +27,7 @@ from isiw.models.protocol import (
     SamplesProfiles,
     SamplesWindows,
 )
-from isiw.models.shared.floor import FloorTreatment
+from isiw.models.shared.history import FloorTreatment
 from isiw.studies import SimulatedSession, run_study
 from isiw.subjects.cohorts import cohort
 from isiw.testing import check_model

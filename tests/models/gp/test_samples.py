@@ -12,8 +12,7 @@ from isiw.models.gp.fit import fixed_fit
 from isiw.models.gp.prior import FixedProcess, HyperparameterPrior
 from isiw.models.gp.samples import Paths, ProfileSample, draw_paths
 from isiw.models.gp.scale import Scale
-from isiw.models.shared.floor import FloorKind
-from isiw.models.shared.history import PersonTrials
+from isiw.models.shared.history import FloorKind, PersonTrials
 from isiw.window import Window, window_from_excess
 from known import known
 

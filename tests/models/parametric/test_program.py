@@ -9,7 +9,7 @@ import torch
 from isiw.design import VALVE_SPACE
 from isiw.models.parametric.law import levels, log_likelihood
 from isiw.models.parametric.prior import Likelihood, Unknowns, WindowPrior
-from isiw.models.parametric.program import WindowProgram
+from isiw.models.parametric.sampling import WindowProgram
 from isiw.models.shared.history import History
 from known import known
 

@@ -9,7 +9,7 @@ import pytest
 import torch
 
 import isiw
-from isiw.models.particles.diagnostics import Health, distinct_share, ess_share, trouble_of
+from isiw.models.particles.swarm import Health, distinct_share, ess_share, trouble_of
 from isiw.subjects.cohorts import cohort
 
 

@@ -14,7 +14,7 @@ from isiw.models.particles import ParticleModel
 from isiw.models.particles.places import Place
 from isiw.models.particles.prior import Prior
 from isiw.models.shared.scales import Scale
-from isiw.priors.components import beside
+from isiw.priors.population import beside
 
 MANY = 20_000
 HERE = Place(0.5, Scale(150.0, 5.0), Scale(60.0, 0.1))

@@ -29,7 +29,7 @@ from isiw.models.particles.shapes import ShapeKind
 from isiw.models.particles.supra.prior import SupraPrior
 from isiw.models.shared.scales import Scale
 from isiw.models.shared.start import StartPrior
-from isiw.priors.components import beside
+from isiw.priors.population import beside
 from isiw.types import Conditioning
 
 MANY = 20_000

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from isiw.errors import InvalidValueError
-from isiw.models.shared.floor import FloorKind, FloorTreatment
-from isiw.models.shared.history import PersonTrials
+from isiw.models.shared.history import FloorKind, FloorTreatment, PersonTrials
 
 
 def trials(mep_mv: list[float], baseline_mv: list[float] | None = None) -> PersonTrials:

@@ -23,8 +23,7 @@ from isiw.models.gp.prior import FixedProcess, HyperparameterPrior, KernelName
 from isiw.models.gp.samples import Paths, ProfileSample, draw_paths
 from isiw.models.gp.scale import Scale, Transform, scale_of
 from isiw.models.protocol import Observation, Tensor
-from isiw.models.shared.floor import FloorTreatment
-from isiw.models.shared.history import AmplitudeHistory, PersonTrials
+from isiw.models.shared.history import AmplitudeHistory, FloorTreatment, PersonTrials
 from isiw.models.windows import Runs, SampledProfiles, profile_grid, sampled_estimate
 
 NoiseKind: TypeAlias = Literal["equal", "by-isi"]

@@ -12,7 +12,7 @@ from isiw.lazy import torch
 from isiw.models.gp.fit import Fit
 from isiw.models.gp.scale import Transform, expected_mep_mv
 from isiw.models.protocol import Tensor
-from isiw.models.shared.floor import FloorKind
+from isiw.models.shared.history import FloorKind
 from isiw.models.shared.tables import systematic
 from isiw.models.windows import least_excess_mv
 

@@ -18,8 +18,7 @@ from isiw.checks import (
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
-from isiw.later import Later
-from isiw.lazy import torch
+from isiw.lazy import Later, torch
 from isiw.models.particles.engine import Engine, EngineName, engine_for
 from isiw.models.particles.jumps import WindowTarget
 from isiw.models.particles.latents import Latents, latents_of

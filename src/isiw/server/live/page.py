@@ -12,11 +12,10 @@ from fastapi import FastAPI
 
 import isiw
 from isiw.checks import whole
-from isiw.server.app import guarded
+from isiw.server.app import Server, guarded, listening, new_token, settings_of
 from isiw.server.guard import Rules
 from isiw.server.live.routes import FILES, URGENT, router
 from isiw.server.live.view import View
-from isiw.server.serving import Server, listening, new_token, settings_of
 from isiw.session.loop import Session
 
 _ADDRESS: Final = ipaddress.IPv4Address("127.0.0.1")
