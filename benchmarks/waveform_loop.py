@@ -31,7 +31,7 @@ from rich.progress import track
 import isiw
 from benchmarks.provenance import made_with
 from benchmarks.quick import understood
-from isiw.devices.robot.mechanism import Event, Geometry, SensorNoise
+from isiw.config.sections import own_wrist
 from isiw.devices.robot.tapper import Trigger
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.subject import SimulatedSubject
@@ -44,9 +44,6 @@ SPACES: dict[str, dict[Trigger, isiw.DesignSpace]] = {
     "valve": {"open-loop": isiw.VALVE_SPACE, "impact": isiw.DesignSpace(215, 500, reference="valve")},
 }
 LARGEST_DIFFERENCE = 0.03
-REST_UV_PER_FLOOR_MV = 160.0
-"""EMG at rest [µV RMS] by the EMG floor: in 20 ms it spans 4.8 times its RMS, and is to be below nearly every trial's
-floor, of which it is a part."""
 
 
 @dataclass(frozen=True)
@@ -124,12 +121,10 @@ def by_amplitude(subject: SimulatedSubject, space: isiw.DesignSpace, pair: Pair)
 def by_waveform(subject: SimulatedSubject, space: isiw.DesignSpace, pair: Pair) -> Deliver:
     """The tapping robot on the same person; what varies from tap to tap is now the robot's."""
     person = replace(subject, hit_delay_sd_ms=0.0).begin(pair.session_seed)
-    hit_ms, sd_ms = subject.hit_delay_ms, subject.hit_delay_sd_ms
-    noise = SensorNoise(emg_uv=REST_UV_PER_FLOOR_MV * subject.response.floor.median_mv)
-    events = Event(hit_ms - 55, sd_ms), Event(hit_ms, sd_ms), Event(15.0, 0.5), Event(20.0, 1.0)
-    geometry = Geometry(*events, noise=noise)
     settings = isiw.TapperSettings(reference=space.reference, trigger=pair.trigger)
-    robot = isiw.Tapper(lambda isi_ms: person.respond(isi_ms, "impact"), geometry, settings, seed=pair.session_seed)
+    robot = isiw.Tapper(
+        lambda isi_ms: person.respond(isi_ms, "impact"), own_wrist(subject), settings, seed=pair.session_seed
+    )
     return robot.answer
 
 

@@ -212,14 +212,11 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
         ),
         (
             sentences.moved(0.3, 0.1),
-            (
-                "with probability 0.30 (0.1 where nothing is known) the window moved beyond the usual "
-                "shift from day to day;"
-            ),
+            "the window moved by more than the usual shift from day to day (30 %; 10 % without data);",
         ),
         (
             sentences.later(0.4, 0.6),
-            "it starts later with probability 0.40 and ends later with probability 0.60 (0.5 where nothing is known).",
+            "the window probably starts earlier (60 %) and ends later (60 %); 50 % is no knowledge.",
         ),
         (sentences.later(None, 0.6), ""),
     ],

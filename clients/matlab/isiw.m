@@ -2,7 +2,7 @@ classdef isiw < handle
 % ISIW  Ask an isiw server which inter-stimulus interval comes next, and tell it what came of it.
 %
 %   lab = isiw('http://127.0.0.1:8473', token);
-%   lab.create('P07', struct('seed', 7));      % or lab.resume('P07'), to go on with a session
+%   lab.create('P07', struct('seed', 7));      % or lab.resume('P07'), to continue a session
 %   while ~lab.stop
 %       [trial, isi_ms] = lab.ask();           % waits until the next stimulus is allowed
 %       ...                                    % your hardware delivers the pair at isi_ms
@@ -51,7 +51,7 @@ classdef isiw < handle
     end
 
     function resume(this, id, lost_pulses)
-      % Go on with a session. A trial that was asked for and has no outcome becomes a mistrial.
+      % Continue a session. A trial without an outcome becomes a mistrial.
       if nargin < 3
         lost_pulses = [];
       end

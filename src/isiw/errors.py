@@ -20,7 +20,7 @@ Every message says what is wrong, what was got, what was expected, and the way o
 Warnings, which are no errors:
 
     ImplausibleDataWarning                data that look like a slip of unit; they are learnt all the same
-    OtherVersionsWarning                  a session goes on with other versions, and may ask other ISIs
+    OtherVersionsWarning                  a session continues with other versions, and may choose other ISIs
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ class StudyError(IsiwError):
 
 
 class OtherVersionsWarning(UserWarning):
-    """A session goes on with versions other than those it was logged with, and may ask other ISIs."""
+    """A session continues with versions other than those it was logged with, and may choose other ISIs."""
 
 
 class ImplausibleDataWarning(UserWarning):

@@ -191,7 +191,7 @@ def _taken(target: Path) -> InvalidValueError:
     return InvalidValueError(
         "there is a file already, and it is not overwritten unasked",
         got=str(target),
-        remedy="Choose another path, or ask for it: --overwrite, or overwrite=True.",
+        remedy="Choose another path, or replace it: --overwrite, or overwrite=True.",
     )
 
 

@@ -133,8 +133,8 @@ def tap_unknown(estimate: Estimate) -> str:
     if not estimate.tap_may_explain:
         return ""
     return (
-        "What the first stimulus alone does to the EMG is not known within this window: its own response, rather than "
-        "the MEP, may be what is larger there. Give it alone some times, and tell its amplitude with pulse=False."
+        "The first stimulus alone was not measured within this window: its own response, and not the MEP, may be what "
+        "is larger there. In the next session give it alone some times (in a configuration: [protocol] tap_alone)."
     )
 
 
@@ -144,12 +144,12 @@ def at_a_trial(change: Change, trial: int | None) -> str:
     if change.kind == "intensity":
         sizes = f"{abs(change.size):.0f} % RMT {'higher' if more else 'lower'}"
         interval = f"90 % interval {change.low:+.0f} to {change.high:+.0f}"
-        return f"From trial {trial} on MEPs are as if the intensity were {sizes} ({interval}), whatever the ISI"
+        return f"From trial {trial} on MEPs are as if the intensity were {sizes} ({interval}), at all ISIs"
     sizes = f"×{change.size:.2g} (90 % interval ×{change.low:.2g} to ×{change.high:.2g})"
     if change.kind == "enhancement":
         word = "grown" if more else "faded"
         return f"The enhancement has {word} during the session, {sizes}; the window is that of now"
-    return f"Amplitudes {'rose' if more else 'fell'} {sizes} at trial {trial}, whatever the ISI"
+    return f"Amplitudes {'rose' if more else 'fell'} {sizes} at trial {trial}, at all ISIs"
 
 
 def finding(estimate: Estimate, first: StimulusWords, space: DesignSpace) -> str:
@@ -386,20 +386,20 @@ def moved(probability: float | None, before: float) -> str:
     """How probable it is that a window moved more than it does from day to day."""
     if probability is None:
         return ""
-    return (
-        f"with probability {probability:.2f} ({before:g} where nothing is known) the window moved beyond the "
-        "usual shift from day to day;"
-    )
+    chance = f"({100 * probability:.0f} %; {100 * before:.0f} % without data)"
+    return f"the window moved by more than the usual shift from day to day {chance};"
 
 
 def later(starts_later: float | None, ends_later: float | None) -> str:
     """How probable it is that a window starts later, and ends later, than another one."""
     if starts_later is None or ends_later is None:
         return ""
-    return (
-        f"it starts later with probability {starts_later:.2f} and ends later with probability {ends_later:.2f} "
-        "(0.5 where nothing is known)."
-    )
+    start, end = _direction(starts_later), _direction(ends_later)
+    return f"the window probably starts {start} and ends {end}; 50 % is no knowledge."
+
+
+def _direction(later: float) -> str:
+    return f"{'later' if later >= 0.5 else 'earlier'} ({100 * max(later, 1 - later):.0f} %)"
 
 
 def asked(trial: Trial, first: StimulusWords = TAP) -> str:

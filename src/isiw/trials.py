@@ -39,7 +39,7 @@ RESPONSE_MV: Final = 0.05
 
 
 class Status(StrEnum):
-    """Whether a trial is told to the strategy."""
+    """Whether the strategy learns from a trial."""
 
     ACCEPTED = "accepted"
     MISTRIAL = "mistrial"
@@ -179,7 +179,7 @@ class Trial(Checked):
 
     Args:
         index: number of the trial, from 0.
-        status: accepted trials are told to the strategy, mistrials are not; both count as stimuli.
+        status: the strategy learns from accepted trials and not from mistrials; both count as stimuli.
         commanded_isi_ms: the ISI that was asked for [ms]; None for a control trial.
         reason: why it is a mistrial; None where accepted.
         isi_ms: the realised ISI [ms]; None for a control trial or where unknown. Of a tap alone it is the ISI at which

@@ -45,11 +45,11 @@ class Visit(Checked):
     """What is noted about a visit, for whoever reads its log.
 
     Args:
-        day: the number of the person's visit, from 1; None where it is not noted.
+        day: the number of the person's visit, from 1; None if it is not noted.
         operator: who runs the session, as a code.
         muscle: whose EMG is recorded, such as "FCR".
-        intensity_pct_rmt: intensity of the pulse [% of the resting motor threshold]; None where it is not noted.
-        intensity_pct_mso: the same [% of the maximum stimulator output]; None where it is not noted.
+        intensity_pct_rmt: intensity of the pulse [% of the resting motor threshold]; None if it is not noted.
+        intensity_pct_mso: the same [% of the maximum stimulator output]; None if it is not noted.
         electrodes: which, and where they are.
     """
 

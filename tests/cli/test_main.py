@@ -72,7 +72,7 @@ def test_a_paragraph_is_as_wide_as_the_terminal_and_its_command_is_in_one_piece(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     said, way_on = (
-        "The session is not over, as three trials in a row were lost; go on with:",
+        "The session is not over, as three trials in a row were lost; resume with:",
         "isiw resume P07.mcap a.toml",
     )
     show_paragraph(f"{said} {way_on}")

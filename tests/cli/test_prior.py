@@ -58,8 +58,9 @@ def test_learning_replaces_no_log_and_asks_before_the_work_begins(isiw: Command,
     before = logs[0].read_bytes()
     result = isiw("prior", "learn", *logs, "-o", logs[0], *flags)
     assert result.exit_code == 1
+    assert result.output.startswith("Learning from 2 sessions …\n")
     assert "overwritten" in result.output
-    assert "sessions" not in result.output  # the bar of a work that has begun
+    assert "of 2" not in result.output  # the count of a work that has begun
     assert logs[0].read_bytes() == before
 
 

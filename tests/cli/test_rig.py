@@ -69,7 +69,7 @@ def test_a_session_goes_on_within_the_limits_that_the_configuration_says_now(isi
     assert hot.exit_code == 1
     assert "no temperature" in hot.output
     assert f"The limits are under [limits] in {begun}" in hot.output
-    assert hot.stdout.endswith(f"The log is kept; go on with: isiw resume s.mcap {begun}\n")
+    assert hot.stdout.endswith(f"The log is kept; resume with: isiw resume s.mcap {begun}\n")
     assert len(read_session("s.mcap").trials) == 3
     changed(begun, "\nmax_coil_c = 40.0", "")
     changed(begun, "background_uv = 10.0", "background_uv = 25.0")
@@ -87,7 +87,7 @@ def test_a_session_goes_on_within_the_limits_that_the_configuration_says_now(isi
 
 def test_a_session_that_its_limits_have_ended_says_which_file_to_change(isiw: Command, begun: Path) -> None:
     for output in (isiw("resume", "s.mcap", begun).output, isiw("run", begun, "--log", "new.mcap").output):
-        assert f"a higher max_pulses under [limits] in {begun}, then go on with: isiw resume" in output
+        assert f"a higher max_pulses under [limits] in {begun}, then resume with: isiw resume" in output
         assert output.endswith(f".mcap {begun}\n")
 
 
@@ -197,14 +197,14 @@ def test_a_refusal_before_the_first_trial_says_how_to_go_on_and_one_before_the_l
 ) -> None:
     isiw("new", "rig", ".")
     changed(tmp_path / "rig.py", "self.armed = True", 'raise isiw.errors.DeviceError("no cable")')
-    assert "go on with" not in isiw("run", "session.toml", "--log", "s.mcap").output
+    assert "resume with" not in isiw("run", "session.toml", "--log", "s.mcap").output
     assert not (tmp_path / "s.mcap").exists()
     not_ready = "\n    def readiness(self):\n        return isiw.Readiness(ready=False)\n\n    def deliver("
     changed(tmp_path / "rig.py", 'raise isiw.errors.DeviceError("no cable")', "self.armed = True")
     changed(tmp_path / "rig.py", "\n    def deliver(", not_ready)
     refused = isiw("run", "session.toml", "--log", "s.mcap")
     assert refused.exit_code == 1
-    assert "The log is kept; go on with: isiw resume s.mcap session.toml" in refused.output
+    assert "The log is kept; resume with: isiw resume s.mcap session.toml" in refused.output
     assert "limit (no trial): " in isiw("show", "s.mcap").output
 
 
@@ -246,7 +246,7 @@ def test_a_session_that_pauses_where_nobody_is_ends_with_a_code_of_its_own(isiw:
     result = isiw("run", "session.toml", "--log", "a lab.mcap")
     assert result.exit_code == 5
     assert "The session is paused" in result.output
-    assert "go on with: isiw resume 'a lab.mcap' session.toml" in result.output
+    assert "resume with: isiw resume 'a lab.mcap' session.toml" in result.output
     assert "isiw resume 'a lab.mcap' CONFIG, where CONFIG names your device" in isiw("show", "a lab.mcap").output
 
 
@@ -319,5 +319,5 @@ def test_what_a_rig_raises_is_shown_where_it_happened_and_how_to_go_on_last(
     assert result.exit_code == 1
     assert "Traceback" in result.output
     assert words in result.output
-    last = "The session ended early. Its log is safe; go on with: isiw resume s.mcap session.toml"
+    last = "The session ended early. Its log is safe; resume with: isiw resume s.mcap session.toml"
     assert result.output.splitlines()[-1] == last

@@ -43,7 +43,7 @@ def test_a_search_that_its_limit_ends_says_so_and_what_was_found(tmp_path: Path)
         assert result.exit_code == code
         assert "Resting motor threshold: " in result.output
         assert "Ended by its limit of 3 pulses." in result.output
-        assert "Go on with" not in result.output
+        assert "Resume with" not in result.output
 
 
 def test_by_hand_the_highest_intensity_has_to_be_given(tmp_path: Path) -> None:
@@ -120,3 +120,10 @@ def test_only_five_of_ten_counts_responses(tmp_path: Path) -> None:
     result = run(tmp_path / "t.mcap", "--enough", 6)
     assert result.exit_code == 1
     assert "enough" in result.output
+
+
+def test_the_hot_spot_of_a_simulated_person_is_found_and_shown(tmp_path: Path) -> None:
+    result = run(tmp_path / "t.mcap", "--method", "hot-spot", "--high", 75, "--cohort", "hand", "--seed", 6)
+    assert result.exit_code == 0, result.output
+    assert "75 % MSO, coil " in result.output
+    assert "true hot spot is " in run(tmp_path / "t.mcap", "--show").output

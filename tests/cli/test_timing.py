@@ -20,6 +20,7 @@ def run(*arguments: object) -> Result:
 def test_timing_of_a_preset_is_printed_and_drawn(tmp_path: Path) -> None:
     result = run("subject1", "--taps", 12, "--output", tmp_path / "timing.png")
     assert result.exit_code == 0
+    assert "Simulating 108 taps …" in result.output
     assert "subject1: 108 taps" in result.output
     assert "Pooled SD of the ISI error" in result.output
     assert (tmp_path / "timing.png").stat().st_size > 10_000

@@ -7,12 +7,16 @@ import pytest
 
 from isiw.dissertation.response_counts import (
     STIMULATION,
+    by_isi,
+    count_trials,
     effective_window,
     response_counts,
     response_threshold_mv,
     study_counts,
 )
 from isiw.errors import InvalidValueError
+from isiw.trials import Status, Trial
+from isiw.window import Window
 from known import known
 
 
@@ -114,3 +118,17 @@ def test_a_share_is_no_percentage(share: float) -> None:
 def test_trials_of_a_study_are_counted_in_whole_numbers(trials: Any) -> None:
     with pytest.raises(InvalidValueError, match="trials"):
         study_counts(STIMULATION["mechanical"], [60.0], trials=trials)
+
+
+def test_the_trials_of_a_session_are_counted_by_its_own_tms_alone() -> None:
+    isis_ms = [*np.repeat([10.0, 50.0, 90.0], 4), *[None] * 20]
+    meps_mv = [*[0.02] * 4, *[0.2] * 4, *[0.02] * 4, *np.linspace(0.01, 0.1, 20)]
+    trials = [
+        Trial(index, Status.ACCEPTED, isi_ms, isi_ms=isi_ms, mep_mv=mep_mv)
+        for index, (isi_ms, mep_mv) in enumerate(zip(isis_ms, meps_mv, strict=True))
+    ]
+    study = count_trials(by_isi(trials))
+    assert study.threshold_mv == pytest.approx(sorted(meps_mv[12:])[18])
+    assert study.window == Window(50.0, 50.0)
+    assert study.alone_share == 0.05
+    assert count_trials(by_isi(trials[:12])).threshold_mv == 0.05

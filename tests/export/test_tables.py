@@ -56,6 +56,7 @@ def test_a_session_is_a_row_that_says_what_it_is_and_found(log: Path, tmp_path: 
     assert (row["delivered"], row["told"], row["p_window"], row["window"]) == (6, 6, 0.9, "36–96 ms")
     assert (row["start_ms"], row["end_ms"], row["start_low_ms"]) == (36.0, 96.0, 31.0)
     assert math.isinf(row["end_high_ms"])
+    assert row["counts_threshold_mv"] == 0.05
     assert row["why"] == "The budget of 6 stimuli is used up."
 
 

@@ -116,7 +116,7 @@ def test_the_time_line_has_valve_hit_and_window(record: SessionRecord) -> None:
     assert [text.get_text() for text in axes.texts] == [
         "hit of the hammer", f"valve command\n−{median_ms:.0f} ms (median)",
     ]  # fmt: skip
-    assert {"window", "90 % interval of its start", "ISIs that may be asked"} <= legend(figure)
+    assert {"window", "90 % interval of its start", "ISIs that may be delivered"} <= legend(figure)
 
 
 def test_the_best_isi_is_on_the_time_line(record: SessionRecord) -> None:

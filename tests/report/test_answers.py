@@ -72,7 +72,9 @@ def test_a_device_that_only_repeats_what_was_wanted_is_not_taken_for_exact(recor
 
 def test_an_isi_exactly_as_wanted_is_right_where_the_times_confirm_it(record: SessionRecord) -> None:
     timed = trial(0, t_valve_ms=100.0, t_tms_ms=150.0)
-    assert answer(with_history(record, [timed, trial(1)]), "timing").answer == "yes, where it is known (1 of 2 trials)"
+    assert (
+        answer(with_history(record, [timed, trial(1)]), "timing").answer == "yes, in all trials that show it (1 of 2)"
+    )
     untimed = trial(0, t_hit_ms=100.0, t_tms_ms=150.0)  # the space counts from the valve
     assert answer(with_history(record, [untimed, trial(1)]), "timing").answer == "as the device says"
 
@@ -107,7 +109,7 @@ def test_a_muscle_that_was_never_at_rest_is_not_unknown(record: SessionRecord) -
 
 def test_a_rest_that_is_known_of_some_trials_only_is_not_told_of_all(record: SessionRecord) -> None:
     trials = [trial(0, background_rms_uv=1.0), trial(1)]
-    assert answer(with_history(record, trials), "at rest").answer == "yes, where it is known (1 of 2 trials)"
+    assert answer(with_history(record, trials), "at rest").answer == "yes, in all trials that show it (1 of 2)"
 
 
 def test_a_trial_that_an_operator_accepted_was_still_not_at_rest(record: SessionRecord) -> None:
@@ -167,7 +169,7 @@ def test_what_is_not_known_of_some_stimuli_is_not_told_of_all(record: SessionRec
     trials = [trial(0, isi_ms=51.0, background_rms_uv=2.0), trial(1, isi_ms=48.0, background_rms_uv=2.0)]
     lost = with_history(record, [*trials, Intent(trial=2, isi_ms=50.0)])
     for question in ("timing", "at rest"):
-        assert answer(lost, question).answer == "yes, where it is known (2 of 3 trials)"
+        assert answer(lost, question).answer == "yes, in all trials that show it (2 of 3)"
 
 
 def test_a_device_that_repeats_what_was_wanted_hides_no_trial_that_was_lost_for_its_timing(

@@ -25,9 +25,9 @@ def record(tmp_path: Path) -> SessionRecord:
 
 def test_the_table_has_a_line_a_session_with_its_window_and_intervals(record: SessionRecord) -> None:
     headings, first, second = comparison_table([record, record]).splitlines()
-    assert headings.split() == ["session", "subject", "begun", "told", "P(window)", "window", "start", "end"]
+    assert headings.split() == ["session", "subject", "begun", "trials", "P(window)", "window", "start", "end"]
     assert "P07" in first
-    assert first.endswith("4     0.90       34–94 ms  29–39 ms  150–> ms")
+    assert first.endswith("4       0.90       34–94 ms  29–39 ms  after 150 ms")
     assert second.startswith("2 ")
 
 
@@ -35,7 +35,7 @@ def test_an_edge_that_lies_before_the_range_for_certain_is_said_to_do_so(record:
     update = {"start_low_ms": -math.inf, "start_high_ms": -math.inf}
     entries = tuple(e.model_copy(update=update) if isinstance(e, EstimateRecord) else e for e in record.history)
     early = type(record)(record.path, record.header, entries, {}, (), True)
-    assert "before the range  150–> ms" in comparison_table([early])
+    assert "before the range  after 150 ms" in comparison_table([early])
 
 
 @pytest.mark.parametrize(("probability", "said"), [(0.03, "no window"), (0.25, "undecided"), (None, "no window")])
@@ -76,4 +76,4 @@ def test_a_session_whose_trials_were_judged_anew_says_so(record: SessionRecord) 
     assert len(lines) == 2
     assert said == f"P07 (s.mcap): {JUDGED_SINCE}"
     assert JUDGED_SINCE in comparison_page([judged], [])
-    assert "outdated: trials were judged since" in session_figure(judged).axes[0].get_title(loc="left")
+    assert "trials; outdated: trials were judged since)" in session_figure(judged).axes[0].get_title(loc="left")

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from isiw.change import Change
 from isiw.findings import TOO_FEW
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import EstimateRecord
@@ -104,6 +105,15 @@ def test_a_belief_that_hardly_a_trial_bears_names_no_window(tmp_path: Path) -> N
     last = shown[max(shown)]
     assert last["found"].startswith("The tap probably enhances the MEP at ISIs of")
     assert last["found"].split("ISIs of ")[1].startswith(f"{last['window'][0][0]:g}–")
+
+
+def test_what_changed_during_the_session_is_said_with_what_was_found(tmp_path: Path) -> None:
+    record = tapped(tmp_path / "s.mcap", trials=6)
+    change = Change("amplitudes", 0.97, 4.6, 3.1, 6.7, 2)
+    last = record.estimates[-1].model_copy(update={"change": change})
+    found = drawn(replace(record, history=(*record.history[:-1], last)))["beliefs"][last.trial]["found"]
+    assert "Amplitudes rose ×4.6" in found
+    assert "Amplitudes" not in drawn(record)["beliefs"][last.trial]["found"]
 
 
 def test_scores_and_prediction_are_the_logs_and_old_logs_have_none(record: SessionRecord) -> None:

@@ -16,6 +16,7 @@ from isiw.report.page import report_page, save_report
 from isiw.report.words import finding_sentences
 from isiw.sentences import JUDGED_SINCE
 from isiw.session.again import exclude
+from isiw.trials import Trial
 from isiw.window import Window
 from logs import cut_after
 from report.sessions import HOSTILE, Page, pulsed, tapped
@@ -55,6 +56,13 @@ def test_the_page_begins_with_what_was_found_and_answers_the_first_questions(pag
 def test_who_when_with_what_and_within_which_limits_stands_on_it(page: Page, record: SessionRecord) -> None:
     for said in ("day 2, operator MK", "simulated tapping robot", "at least 5 s apart", record.header.created[:10]):
         assert said in page.words
+
+
+def test_a_session_is_compared_with_other_methods_once_enough_was_measured(page: Page, record: SessionRecord) -> None:
+    assert "Response counts [Kim2020, 3.3.4]" in page.words
+    assert "Threshold of a response" in page.words
+    nothing = replace(record, history=tuple(e for e in record.history if not isinstance(e, Trial)))
+    assert "Response counts" not in report_page(nothing)
 
 
 def test_every_trial_has_a_row_and_a_button(page: Page, record: SessionRecord) -> None:

@@ -84,4 +84,4 @@ def test_stimuli_of_unknown_outcome_are_counted_whether_there_is_a_trial_of_them
     said = counted(replace(record, history=history))
     assert said["stimuli delivered"][0] == "8"
     assert said["of them with an unknown outcome"][0] == "2"
-    assert said["ISIs asked"][0] == "10–190 ms"
+    assert said["ISIs commanded"][0] == "10–190 ms"

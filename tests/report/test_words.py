@@ -164,7 +164,7 @@ def test_a_window_that_trials_hardly_speak_for_is_undecided(
 
 
 def test_a_strategy_that_was_not_told_the_stated_intensity_is_named(record: SessionRecord) -> None:
-    said = "The strategy was not told the intensity, and expects about 90 % of RMT."
+    said = "The strategy does not know the intensity, and assumes about 90 % of RMT."
     visit = Visit(intensity_pct_rmt=110.0)
 
     def statement(**settings: Any) -> str:
@@ -228,7 +228,7 @@ def test_a_hit_delay_that_nobody_stated_is_said_to_have_cost_stimuli(record: Ses
 
 def test_a_hit_delay_that_only_the_device_was_told_is_said_to_have_cost_stimuli(record: SessionRecord) -> None:
     said = final_statement(run_by(record, "default", delay_ms=(150.0, 5.0)))
-    assert "was not told the device's hit delay" in said
+    assert "does not know the device's hit delay" in said
     assert "make_strategy(..., hit_delay_ms=(150, 5))" in said
 
 

@@ -14,7 +14,7 @@ TOLD = [Trial(number, Status.ACCEPTED, 100.0, isi_ms=100.0, mep_mv=0.1) for numb
     [
         (
             Change("amplitudes", 0.97, 4.6, 3.1, 6.7, 2),
-            "Amplitudes rose ×4.6 (90 % interval ×3.1 to ×6.7) at trial 3, whatever the ISI",
+            "Amplitudes rose ×4.6 (90 % interval ×3.1 to ×6.7) at trial 3, at all ISIs",
         ),
         (Change("amplitudes", 0.97, 0.2, 0.1, 0.3, 2), "Amplitudes fell ×0.2"),
         (Change("intensity", 0.97, -9.0, -14.0, -5.0, 2), "MEPs are as if the intensity were 9 % RMT lower"),

@@ -91,7 +91,7 @@ def test_in_a_pause_keys_mean_the_last_trial_and_it_is_named(capsys: pytest.Capt
         assert not desk.goes_on("Paused by the operator.")
         press(desk, "x")
     assert any(
-        "Trial 1 was delivered; its row appears when the session goes on. x, a and j now act on trial 1." in line
+        "Trial 1 was delivered; its row appears when the session continues. x, a and j now act on trial 1." in line
         for line in lines
     )
     assert session.done == [("exclude", 1, "Excluded by the operator.")]

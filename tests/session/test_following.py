@@ -173,7 +173,11 @@ def test_a_session_that_is_ended_just_when_a_pause_was_decided_ends_all_the_same
     monkeypatch.setattr(Interrupts, "settle", ended_meanwhile)
     result = session.run()
     assert len(result.trials) == 1
-    assert [event.text for event in read_session(result.log).events] == ["A break.", "The operator goes on.", "Enough."]
+    assert [event.text for event in read_session(result.log).events] == [
+        "A break.",
+        "The operator continued.",
+        "Enough.",
+    ]
 
 
 def test_who_fails_in_two_threads_at_once_is_let_go_of_once() -> None:

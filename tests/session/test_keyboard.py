@@ -180,7 +180,7 @@ def test_every_key_is_an_event_and_a_killed_and_resumed_session_has_them_all(ope
     operator.press("ncoil moved\n")
     operator.sees("The note is in the log.")
     operator.press("p")
-    operator.sees("r goes on")
+    operator.sees("r continues")
     assert not operator.armed
     operator.press("r")
     operator.waits(lambda: operator.armed, "arming")
@@ -233,13 +233,13 @@ def test_arrows_and_function_keys_decide_nothing(operator: Operator) -> None:
 def test_ctrl_c_disarms_pauses_and_asks_and_twice_ends(operator: Operator) -> None:
     operator.let(0)
     operator.press(CTRL_C)
-    operator.sees("Interrupted by the operator. The device is disarmed. r goes on")
+    operator.sees("Interrupted by the operator. The device is disarmed. r continues")
     assert not operator.armed
     operator.press("r")
     operator.waits(lambda: operator.armed, "arming")
     operator.let(1)
     operator.press(CTRL_C)
-    operator.sees("r goes on")
+    operator.sees("r continues")
     operator.press(CTRL_C)
     operator.waits(lambda: operator.keeps_its_settings, "the settings")
     assert operator.ends() != 0
@@ -257,7 +257,7 @@ def test_a_terminal_that_takes_no_output_delays_no_disarming(operator: Operator,
     stopped = operator.folder / "stopped"
     operator.waits(lambda: not operator.armed and stopped.exists() and stopped.read_text() == "stop\n", "disarming")
     operator.press(CTRL_Q)
-    operator.sees("r goes on")
+    operator.sees("r continues")
 
 
 def test_a_request_to_end_gives_the_terminal_back(operator: Operator) -> None:
@@ -275,7 +275,7 @@ def test_while_suspended_the_terminal_is_as_it_was_and_the_device_disarmed(opera
     assert operator.keeps_its_settings
     assert not operator.armed
     os.kill(operator.process, signal.SIGCONT)
-    operator.sees("r goes on")
+    operator.sees("r continues")
     operator.press("r")
     operator.waits(lambda: operator.armed, "arming")
     operator.let(1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -19,9 +20,12 @@ from isiw.session import (
     resume_threshold,
     run_by_hand,
     run_simulated,
+    search_of,
 )
 from isiw.session.threshold_loops import amplitude_of
 from isiw.strategy.threshold import IntensityRange, make_threshold_search
+from isiw.subjects.thresholds import StimulatedResponder, threshold_cohort
+from known import known
 
 
 @pytest.fixture
@@ -181,3 +185,34 @@ def test_a_log_that_does_not_say_who_is_simulated_is_refused(recorder: Threshold
 def test_where_nobody_is_simulated_nobody_answers(recorder: ThresholdRecorder) -> None:
     with pytest.raises(ConfigError, match="no simulated person"):
         run_simulated(recorder, print)
+
+
+def test_a_hot_spot_is_sought_by_hand_with_every_place_on_disk_before_it_is_read(tmp_path: Path) -> None:
+    person = threshold_cohort("hand", 1, 6)[0].begin(1)
+    at = float(round(1.2 * person.person.rmt_pct_mso))
+    search = make_threshold_search("hot-spot", IntensityRange(20, at), stop_sd_mm=6.0)
+    with open_threshold(search, tmp_path / "t.mcap", device=DeviceInfo("nobody", "impact", simulated=True)) as opened:
+        opened.ask()
+        opened.tell(person.respond(at, *known(opened.place_mm)))
+        opened.ask()
+        opened.lost("the coil slipped")
+        opened.ask()
+        place_mm = opened.place_mm
+    record = read_threshold(tmp_path / "t.mcap")
+    assert record.intents[-1].place_mm == place_mm
+    assert [outcome.reason for outcome in record.outcomes] == ["", "the coil slipped"]
+    with resume_threshold(tmp_path / "t.mcap") as resumed:
+        questions, said = typed(resumed, "y", "q")
+        assert f"set {at:g} % MSO, coil " in questions[0]
+        assert "the hot spot is found by amplitudes" in said[1]
+        run_simulated_by(resumed, person)
+        x_mm, y_mm = known(resumed.estimate().hot_spot_mm)
+        assert resumed.decision().stop
+        assert resumed.given < 30
+    assert math.hypot(x_mm - person.person.hot_spot.x_mm, y_mm - person.person.hot_spot.y_mm) < 10
+    assert str(search_of(read_threshold(tmp_path / "t.mcap")).estimate()).startswith("Hot spot: ")
+
+
+def run_simulated_by(recorder: ThresholdRecorder, person: StimulatedResponder) -> None:
+    while not recorder.decision().stop:
+        recorder.tell(person.respond(recorder.ask(), *known(recorder.place_mm)))

@@ -53,12 +53,12 @@ def analyse(  # noqa: PLR0913, PLR0917 - an option each
     config: Annotated[
         Path | None, typer.Option(help="Space, strategy, seed and visit as for isiw run (TOML).", **NO_DEFAULT)
     ] = None,
-    strategy: Annotated[str | None, typer.Option(help="Whose belief it is; see isiw strategies.", **NO_DEFAULT)] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of the belief.", **NO_DEFAULT)] = None,
+    strategy: Annotated[str | None, typer.Option(help="The strategy; see isiw strategies.", **NO_DEFAULT)] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the analysis.", **NO_DEFAULT)] = None,
     only: Annotated[str | None, typer.Option(help="The code of the one person who is wanted.", **NO_DEFAULT)] = None,
     simulated: Annotated[bool, typer.Option("--simulated", help="Nobody was stimulated.")] = False,  # noqa: FBT002 - a flag
 ) -> None:
-    """Say what trials that were delivered without isiw tell about the window; with -o, make a log of them.
+    """Estimate the window from trials that were delivered without isiw; with -o, make a log of them.
 
     Called again with the same files and folder, it continues where it was interrupted.
     """
@@ -94,7 +94,7 @@ def replay(  # noqa: PLR0913, PLR0917 - an option each
     only: Annotated[str | None, typer.Option(help="The code of the one person who is wanted.", **NO_DEFAULT)] = None,
     overwrite: Overwrite = False,  # noqa: FBT002 - a flag of the command line
 ) -> None:
-    """How many stimuli would it have taken? Strategies ask, and the trials of a file answer."""
+    """How many stimuli would it have taken? Strategies choose ISIs, and the trials of a file answer."""
     with errors_reported("Interrupted."):
         read = isiw.existing.read_layout(layout) if layout is not None else isiw.existing.Layout()
         read = read.saying(

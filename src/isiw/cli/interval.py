@@ -33,11 +33,11 @@ def interval(  # noqa: PLR0913, PLR0917 - an option each
     subject: Annotated[str | None, typer.Option(help="The person's code, for the log.", **NO_DEFAULT)] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the lights; default 0.", **NO_DEFAULT)] = None,
     rest_s: Annotated[float, typer.Option(help="Seconds of rest between two modes.")] = 120.0,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with this log.")] = False,  # noqa: FBT002 - a flag
+    resume: Annotated[bool, typer.Option("--resume", help="Continue this log.")] = False,  # noqa: FBT002 - a flag
     look: Annotated[bool, typer.Option("--show", help="Print what is in this log.")] = False,  # noqa: FBT002 - a flag
 ) -> None:
     """Produce time intervals by two key presses, with feedback after each, at a terminal; see docs/interval.md."""
-    with errors_reported(f"Interrupted. Every trial whose feedback was shown is kept; go on with: {_way_on(log)}"):
+    with errors_reported(f"Interrupted. Every trial whose feedback was shown is kept; resume with: {_way_on(log)}"):
         if resume or look:
             refuse_ignored(
                 "a task keeps what its log says", session=session, mode=mode, trials=trials, subject=subject, seed=seed
@@ -60,7 +60,7 @@ def _way_on(log: Path) -> str:
 def _end(record: ProductionRecord) -> None:
     """What is said at the end; a hidden target stays hidden while trials are left."""
     if record.left:
-        show(f"{len(record.left)} trials are left; go on with: {_way_on(record.path)}", style="bold")
+        show(f"{len(record.left)} trials are left; resume with: {_way_on(record.path)}", style="bold")
     else:
         _say(record)
 

@@ -6,11 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import Progress
 
 import isiw
-from isiw.cli.console import NO_DEFAULT, Overwrite, errors_reported, exit_if_damaged, show
+from isiw.cli.console import NO_DEFAULT, Overwrite, counting, errors_reported, exit_if_damaged, show
 from isiw.text.harmless import command, counted
 
 if TYPE_CHECKING:
@@ -31,28 +29,24 @@ def learn(
     seed: Annotated[int, typer.Option(help="Seed of the sampler.")] = 0,
     overwrite: Overwrite = False,  # noqa: FBT002 - a flag
 ) -> None:
-    """Learn what a lab's people are like from sessions already run. Exit code 3 where a log is damaged."""
-    losses: list[str] = []
-    imported: list[str] = []
+    """Learn what a lab's people are like from sessions already run. Exit code 3 if a log is damaged."""
+    done: list[SessionRecord] = []
     with errors_reported("Interrupted: nothing was written."):
-        isiw.priors.check_lab_output(output, overwrite=overwrite)
-        show(f"Learning from {counted(len(logs), 'session')} …", stderr=True)
-        with Progress(console=Console(stderr=True)) as progress:
-            task = progress.add_task("sessions", total=len(logs))
+        with counting("Learning from", len(logs), "session") as count:
+            isiw.priors.check_lab_output(output, overwrite=overwrite)  # the import takes a second
 
             def note(record: SessionRecord) -> None:
-                progress.advance(task)
-                imported.extend([record.path.name] if record.header.imported else [])
-                losses.extend(f"{record.path.name}: {loss}" for loss in record.losses)
+                done.append(record)
+                count(len(done))
 
             lab = isiw.priors.learn(logs, again=again, damaged=damaged, seed=seed, on_done=note)
         isiw.priors.write_lab_prior(lab, output, overwrite=overwrite)
         _print(lab)
-        if imported:
+        if imported := [record.path.name for record in done if record.header.imported]:
             show(isiw.session.imported_sentence(imported))
         show(f"prior: {output}")
         show(f"Run a session with it, and with your rig's CONFIG: {command('run', 'CONFIG', '--prior', output)}")
-        exit_if_damaged(losses)
+        exit_if_damaged([f"{record.path.name}: {loss}" for record in done for loss in record.losses])
 
 
 @app.command("show")

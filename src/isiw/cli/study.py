@@ -43,14 +43,14 @@ def run(
     scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to run on.", **NO_DEFAULT)] = None,
     retry: Annotated[bool, typer.Option(help="Run what failed again.")] = False,  # noqa: FBT002 - a flag
 ) -> None:
-    """Run a study, or what is left of it. The exit code is 1 where sessions failed."""
+    """Run a study, or what is left of it. The exit code is 1 if sessions failed."""
     with errors_reported():
         show(f"Running the study of {source} …", stderr=True)
         studies, store = isiw.studies, _store(source, out)
         folder = store.folder
         processes = (os.cpu_count() or 1) if workers is None else workers
         executor = studies.DaskCluster(scheduler) if scheduler else studies.Processes(processes)
-        kept = f"Interrupted. All that is finished is kept; go on with: {command('study', 'run', folder)}"
+        kept = f"Interrupted. All that is finished is kept; continue with: {command('study', 'run', folder)}"
         with errors_reported(kept), _bar(store.left(retry=retry)) as on_done:
             studies.conduct(store.study, folder, executor, retry=retry, on_done=on_done)
         _say_what_is_there(store)

@@ -33,7 +33,10 @@ def threshold(  # noqa: PLR0913, PLR0917 - an option each
         float | None, typer.Option(help="The step between intensities [% MSO]; default 1.", **NO_DEFAULT)
     ] = None,
     method: Annotated[
-        str | None, typer.Option(help="bayes, maximum-likelihood or five-of-ten; default bayes.", **NO_DEFAULT)
+        str | None,
+        typer.Option(
+            help="bayes (default), maximum-likelihood, five-of-ten; or hot-spot, which moves the coil.", **NO_DEFAULT
+        ),
     ] = None,
     enough: Annotated[
         int | None,
@@ -51,10 +54,10 @@ def threshold(  # noqa: PLR0913, PLR0917 - an option each
         typer.Option(help="The cohort that a simulated person comes from; default recruitment.", **NO_DEFAULT),
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the simulated person; default 0.", **NO_DEFAULT)] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with the log, as it was begun.")] = False,  # noqa: FBT002 - a flag
+    resume: Annotated[bool, typer.Option("--resume", help="Continue the log, as it was begun.")] = False,  # noqa: FBT002 - a flag
     show_only: Annotated[bool, typer.Option("--show", help="Only say what the log holds.")] = False,  # noqa: FBT002 - a flag
 ) -> None:
-    """Find the resting motor threshold of a simulated person, or of a person whose stimulator you set by hand."""
+    """Find the resting motor threshold, or the hot spot, of a simulated person, or by hand with a real stimulator."""
     settings: dict[str, Any] = {
         "method": method,
         "enough": enough,
@@ -65,11 +68,11 @@ def threshold(  # noqa: PLR0913, PLR0917 - an option each
         "seed": seed,
     }
     settings |= {"max_pulses": max_pulses, "min_iti_s": min_iti_s, "subject": subject}
-    with errors_reported(f"Interrupted. The log is safe; go on with: {_resuming(log)}"):
+    with errors_reported(f"Interrupted. The log is safe; resume with: {_resuming(log)}"):
         if resume or show_only:
             refuse_ignored("a search keeps what its log says", **settings)
         if by_hand:
-            refuse_ignored("nobody is simulated where a stimulator is set by hand", cohort=cohort, seed=seed)
+            refuse_ignored("nobody is simulated if a stimulator is set by hand", cohort=cohort, seed=seed)
         if not show_only:
             given = {name: value for name, value in settings.items() if value is not None}
             recorder = isiw.session.resume_threshold(log) if resume else _begun(log, by_hand=by_hand, **given)
@@ -136,9 +139,13 @@ def _say_what_is_there(log: Path) -> None:
         show(f"Ended by its limit of {counted(most, 'pulse')}. {decision.reason}")
         show("For more pulses begin a new log with --max-pulses.")
     else:
-        show(f"Not over: {decision.reason} Go on with: {_resuming(log)}")
+        show(f"Not over: {decision.reason} Resume with: {_resuming(log)}")
     person = isiw.session.simulated_person(record.header)
     if person is not None:
-        show(f"The simulated person's true threshold is {person.rmt_pct_mso:.1f} % MSO.")
+        spot, whose = person.hot_spot, "The simulated person's true"
+        if search.place_mm is None:
+            show(f"{whose} threshold is {person.rmt_pct_mso:.1f} % MSO.")
+        else:
+            show(f"{whose} hot spot is {spot.x_mm:+.0f} mm forward and {spot.y_mm:+.0f} mm to the right.")
     show(f"{counted(given, 'pulse')}, learnt from {len(search.pulses)}. Log: {record.path}")
     exit_if_damaged(record.losses)

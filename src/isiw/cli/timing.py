@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import isiw
-from isiw.cli.console import NO_DEFAULT, SESSIONS, Overwrite, errors_reported, log_exists, show
+from isiw.cli.console import NO_DEFAULT, SESSIONS, Overwrite, counting, errors_reported, log_exists, show
 
 if TYPE_CHECKING:
     from isiw.dissertation.repeatability import TimingStudy
@@ -42,4 +42,5 @@ def _timing_study(source: str, taps: int, seed: int) -> TimingStudy:
         raise isiw.errors.LogError("there is no such log", got=source, remedy="Give the path of a session's log.")
     if source == "vane":
         return isiw.repeatability.study_vane(rotations=taps, seed=seed)
-    return isiw.repeatability.study_preset(source, taps=taps, seed=seed)
+    with counting("Simulating", taps * len(isiw.repeatability.STUDY_ISI_MS), "tap") as count:
+        return isiw.repeatability.study_preset(source, taps=taps, seed=seed, on_done=count)

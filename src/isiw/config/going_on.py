@@ -1,4 +1,4 @@
-"""Going on with a logged session and a configuration: what it says holds, is refused, or is said to be left aside.
+"""Continuing a logged session with a configuration: what it says holds, is refused, or is said to be left aside.
 
 Whom a logged session simulated is read as names and numbers; nothing that a log names is imported or opened.
 """
@@ -105,11 +105,11 @@ def device_of_log(record: SessionRecord, data: Path | None = None) -> SimulatedD
 
 
 def read_to_resume(log: Path, config: Path | None) -> SessionRecord:
-    """The session to go on with.
+    """The session to continue.
 
     Args:
         log: its log.
-        config: the configuration to go on with; None where there is none.
+        config: the configuration to continue with; None if there is none.
 
     Raises:
         ConfigError: the two are swapped.
@@ -137,7 +137,7 @@ def _is_session(path: Path) -> bool:
 
 
 def changes_on_resume(config: RunConfig, record: SessionRecord) -> dict[str, Any]:
-    """What a session goes on with, as arguments of `isiw.resume`: limits, signals and the device's time-out.
+    """The limits, signals and time-out a session continues with, as arguments of `isiw.resume`.
 
     `[limits]` and `[signals]` count as wholes, as for `isiw run`; without one of them it stays as it was logged last,
     as `isiw.resume` says. The intensity that the session is bound to stays, unless the configuration names another one.
@@ -200,7 +200,7 @@ def _require_space(config: RunConfig, header: Header) -> None:
         return
     differing = [(key, was, now) for key, was, now in _differing("space", header.space, space) if was != now]
     raise ConfigError(
-        "a session goes on in the design space that it began with",
+        "a session continues in the design space that it began with",
         got=", ".join(f"{key} = {now}" for key, _, now in differing),
         expected=", ".join(f"{key} = {was}" for key, was, _ in differing),
         remedy="Correct [space], or start a new session with isiw run.",
@@ -256,9 +256,9 @@ def _told(value: object) -> object:
 
 
 def after_error(session: Session, config: Path | None, error: BaseException | None, *, delivered: bool) -> list[str]:
-    """How to go on with a session that an error has ended, in lines; the command comes last.
+    """The way to resume a session that an error has ended, in lines; the command comes last.
 
-    A session that was over when the error came, as where the device could not be let go of, has nothing to go on with.
+    A session that was over when the error came, as where the device could not be let go of, cannot be resumed.
 
     Args:
         session: the session.
@@ -276,7 +276,7 @@ def after_error(session: Session, config: Path | None, error: BaseException | No
         else []
     )
     safe = "The session ended early. Its log is safe" if delivered else "No stimulus was delivered. The log is kept"
-    return [*lines, f"{safe}; go on with: {continued_by(session.log_path, session.header, config, changed=limited)}"]
+    return [*lines, f"{safe}; resume with: {continued_by(session.log_path, session.header, config, changed=limited)}"]
 
 
 def _is_over(log: Path) -> bool:
@@ -299,7 +299,7 @@ def after_end(session: Session, config: Path | None, *, delivered: bool) -> str 
     if not session.strategy.decision().stop:  # so that it was the limits
         where = f"in {config}" if config is not None else "of a configuration"
         way_on = continued_by(session.log_path, session.header, config, changed=True)
-        return f"For more pulses set a higher max_pulses under [limits] {where}, then go on with: {way_on}"
+        return f"For more pulses set a higher max_pulses under [limits] {where}, then resume with: {way_on}"
     if delivered:
         return None
     same = "" if config else ", with the same configuration if there was one"

@@ -49,6 +49,7 @@ class RunConfig(Section):
         log: the file of the log; by default a new one in `isiw-sessions`.
         prior: a lab's prior, as `isiw prior learn` writes it.
         after: logs of earlier sessions of the same person, earliest first.
+        earlier: logs of earlier trials of this visit, which are learnt before the first ISI.
     """
 
     seed: int = Field(default=0, ge=0)

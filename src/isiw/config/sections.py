@@ -317,11 +317,11 @@ def _under(robot: RobotConfig, simulated: SimulatedConfig, seed: int) -> tuple[S
             expected="subject.kind simulated, and a cohort that is tapped",
         )
     name = robot.settings.get("geometry")
-    geometry = _own_wrist(person) if name is None else preset(name)
+    geometry = own_wrist(person) if name is None else preset(name)
     return replace(person, hit_delay_ms=geometry.hit.mean_ms, hit_delay_sd_ms=0.0), geometry
 
 
-def _own_wrist(person: SimulatedSubject) -> Geometry:
+def own_wrist(person: SimulatedSubject) -> Geometry:
     """A wrist with a person's own hit delay and EMG at rest."""
     hit_ms, sd_ms = person.hit_delay_ms, person.hit_delay_sd_ms
     if hit_ms - _DESCENT_MS <= LINE_DELAY_MS:

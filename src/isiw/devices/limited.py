@@ -95,7 +95,7 @@ class LimitedDevice:
         if not state.ready:
             raise NotDelivered(
                 f"the device is not ready: {state.reason or 'it does not say why'}",
-                remedy="This stimulus was not delivered. Go on when the device is ready.",
+                remedy="This stimulus was not delivered. Continue when the device is ready.",
             )
         self._limits.require_state(state)
 

@@ -30,10 +30,10 @@ class Limits(Checked):
         min_iti_s: shortest time between two deliveries [s]; where it is not stated, 5 s if isiw delivers, and none in a
             loop of your own, as of `isiw.open_session`.
         max_pulses: largest number of deliveries in a session, failed ones included.
-        step_ms: ISIs are whole multiples of it above the shortest [ms]; None where any ISI of the range is allowed.
-        max_block_pulses: most deliveries in a row without a rest; None where none is needed.
+        step_ms: ISIs are whole multiples of it above the shortest [ms]; None if any ISI of the range is allowed.
+        max_block_pulses: most deliveries in a row without a rest; None if none is needed.
         rest_s: a pause of this length is a rest [s].
-        max_period_pulses: most deliveries in any period; None where they are not limited.
+        max_period_pulses: most deliveries in any period; None if they are not limited.
         period_s: length of that period [s].
         max_coil_c: highest temperature of the coil at which to deliver [°C]; the device must report it.
         intensity_pct_mso: the only intensity at which to deliver [% of the maximum stimulator output]; the device must

@@ -152,6 +152,6 @@ def readiness_of(device: Device) -> Readiness:
 
 
 def require_staged(name: str, *, staged: bool) -> None:
-    """Raise NotDelivered where a device is told to deliver without being armed."""
+    """Raise NotDelivered if a device is to deliver without being armed."""
     if not staged:
         raise NotDelivered(f"{name} is not staged, so it delivers nothing", remedy="Call stage() first.")

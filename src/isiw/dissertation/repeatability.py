@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -199,8 +199,9 @@ def study_preset(
     seed: int = 0,
     rate_hz: float = 5000.0,
     pulse_jitter_ms: float = 0.0,
+    on_done: Callable[[int], None] = lambda _taps: None,
 ) -> TimingStudy:
-    """Run the repeatability study on a preset of the tapping robot, open loop."""
+    """Run the repeatability study on a preset of the tapping robot, open loop; `on_done` hears how many taps are."""
     taps, seed = whole("taps", taps, least=1), whole("seed", seed, least=0)
     geometry, rng = preset(name), np.random.default_rng(seed)
     predicted_ms = float(np.nanmedian(_tap(geometry, np.full(CALIBRATION_TAPS, np.nan), rate_hz, rng).hit_ms))
@@ -208,7 +209,10 @@ def study_preset(
     pulse = predicted_ms + commanded
     if number("pulse_jitter_ms", pulse_jitter_ms, least=0):
         pulse = pulse + pulse_jitter_ms * rng.standard_normal(len(pulse))
-    parts = [_tap(geometry, pulse[i : i + BATCH], rate_hz, rng) for i in range(0, len(pulse), BATCH)]
+    parts = []
+    for first in range(0, len(pulse), BATCH):
+        parts.append(_tap(geometry, pulse[first : first + BATCH], rate_hz, rng))
+        on_done(min(first + BATCH, len(pulse)))
     events = _joined(parts)
     return TimingStudy(name, events, commanded, pulse - events.hit_ms)
 
@@ -285,7 +289,7 @@ def timing_report(study: TimingStudy) -> str:
         mean_ms, sd_ms = hit_delay
         lines += [
             "",
-            "For ISIs that count from the valve command, tell the strategy when the tap hits:",
+            "For ISIs that count from the valve command, state when the tap hits:",
             f"    hit_delay_ms = [{mean_ms:.1f}, {sd_ms:.1f}]",
             "Write it into the DeviceInfo of your rig, or under [strategy.settings] of a configuration.",
         ]

@@ -8,10 +8,10 @@ their trials of TMS alone. Chapter 4 gives all this up for amplitudes, because t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Literal, TypeAlias, get_args
+from typing import Final, Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from isiw.signals.limits import require_amplitude
 from isiw.subjects.profiles import PeakProfile
 from isiw.subjects.responses import EmgFloor, RecruitmentResponse
 from isiw.subjects.subject import SimulatedSubject
+from isiw.trials import RESPONSE_MV, Trial
 from isiw.types import ArrayLike, FloatArray
 from isiw.window import Window
 
@@ -30,6 +31,9 @@ Segments: TypeAlias = Literal["all", "peak"]
 
 EFFECTIVE_SHARE = 0.40
 """An ISI is effective when more than this share of its trials respond (3.3.4)."""
+
+BIN_MS: Final = 5.0
+"""Into such steps ISIs are put that hardly repeat; the dissertation's own step [Kim2020, 4.2.1]."""
 
 _FLOOR = EmgFloor(0.008, 0.2)
 
@@ -69,6 +73,34 @@ class CountStudy:
     window: Window | None
     threshold_mv: float
     alone_share: float
+
+
+class TrialsByIsi(NamedTuple):
+    """The trials that count: ISIs in steps [ms] and MEPs [mV] of pairs, shape (n,), and MEPs of TMS alone [mV]."""
+
+    isi_ms: FloatArray
+    mep_mv: FloatArray
+    alone_mv: FloatArray
+
+
+def by_isi(trials: Iterable[Trial]) -> TrialsByIsi:
+    """The trials that count, with ISIs that hardly repeat put into steps."""
+    measured = [trial for trial in trials if trial.told and trial.mep_mv is not None]
+    pairs = [trial for trial in measured if trial.isi_ms is not None]
+    commanded_ms = np.array([trial.commanded_isi_ms for trial in pairs], dtype=np.float64)
+    if len(np.unique(commanded_ms)) > len(commanded_ms) / 2:
+        commanded_ms = BIN_MS * np.round(commanded_ms / BIN_MS)
+    alone_mv = np.array([trial.mep_mv for trial in measured if trial.isi_ms is None], dtype=np.float64)
+    return TrialsByIsi(commanded_ms, np.array([trial.mep_mv for trial in pairs], dtype=np.float64), alone_mv)
+
+
+def count_trials(trials: TrialsByIsi) -> CountStudy:
+    """The response counts of a session, by its own trials of TMS alone if it has any, else by the usual 50 µV."""
+    known = len(trials.alone_mv) > 0
+    threshold_mv = max(response_threshold_mv(trials.alone_mv), 1e-6) if known else RESPONSE_MV
+    counts = response_counts(trials.isi_ms, trials.mep_mv, threshold_mv)
+    share = float((trials.alone_mv > threshold_mv).mean()) if known else float("nan")
+    return CountStudy(counts, effective_window(counts, segments="peak"), threshold_mv, share)
 
 
 def response_counts(isi_ms: ArrayLike, mep_mv: ArrayLike, threshold_mv: float) -> pd.DataFrame:

@@ -313,7 +313,7 @@ def log_losses(record: SessionRecord) -> list[str]:
     has_onsets = not record.header.imported
     timeless = [str(trial.index) for trial in record.table if has_onsets and trial.index not in record.onsets]
     said: Sequence[tuple[object, str]] = (
-        (record.end_lost, "The end of the log is missing; nobody knows how many stimuli it told of."),
+        (record.end_lost, "The end of the log is missing, so the number of stimuli is not known."),
         (unknown, f"The outcome of stimuli that may have been given is not known: trials {', '.join(unknown)}."),
         (timeless, f"The onset is not known of trials {', '.join(timeless)}."),
         (not record.finished and not record.losses, "The session had not closed its log."),

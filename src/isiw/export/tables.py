@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from isiw.dissertation.response_counts import by_isi, count_trials
+from isiw.errors import InvalidValueError
 from isiw.export.collection import Part, log_losses, stimulus_of
 from isiw.files import write_output
 from isiw.lazy import pd
@@ -28,32 +30,34 @@ _SESSION_COLUMNS: Final[Columns] = {
     "device": ("", "what the device calls itself"),
     "conditioning": ("", "what comes first: {0.given}"),
     "reference": ("", "the event that ISIs count from: the {0.moment}, or the command that opens the valve"),
-    "low_ms": ("ms", "the first ISI that could be asked"),
-    "high_ms": ("ms", "the last ISI that could be asked"),
+    "low_ms": ("ms", "the first ISI that could be delivered"),
+    "high_ms": ("ms", "the last ISI that could be delivered"),
     "strategy": ("", "the strategy's name; none for one of a user's own objects"),
     "seed": ("", "the seed of the session"),
     "isiw_version": ("", "the version of isiw that wrote the log"),
-    "day": ("", "the number of the person's visit, where it was noted"),
-    "operator": ("", "who ran the session, where it was noted"),
-    "muscle": ("", "whose EMG was recorded, where it was noted"),
-    "electrodes": ("", "which, and where they were, where it was noted"),
+    "day": ("", "the number of the person's visit, if noted"),
+    "operator": ("", "who ran the session, if noted"),
+    "muscle": ("", "whose EMG was recorded, if noted"),
+    "electrodes": ("", "which, and where they were, if noted"),
     "intensity_pct_rmt": ("%", "intensity of the pulse, of the resting motor threshold"),
     "intensity_pct_mso": ("%", "intensity of the pulse, of the maximum stimulator output"),
     "delivered": ("", "stimuli that were given, or may have been"),
     "told": ("", "trials that the strategy learnt from"),
     "mistrials": ("", "trials that were judged to be mistrials"),
     "p_window": ("", "probability that there is a window, at the end; empty, as the result, after too few trials"),
-    "window": ("", "the window that was reported, its segments; empty where none was"),
-    "start_ms": ("ms", "where the reported window starts; empty where none was reported"),
+    "window": ("", "the window that was reported, its segments; empty if none was"),
+    "start_ms": ("ms", "where the reported window starts; empty if none was reported"),
     "end_ms": ("ms", "where it ends"),
     "start_low_ms": ("ms", "lower end of the 90 % interval of its start; infinite beyond the range"),
     "start_high_ms": ("ms", "upper end of the 90 % interval of its start"),
     "end_low_ms": ("ms", "lower end of the 90 % interval of its end"),
     "end_high_ms": ("ms", "upper end of the 90 % interval of its end"),
+    "counts_threshold_mv": ("mV", "what an MEP has to exceed to be a response, for the response counts"),
+    "counts_window": ("", "the window by response counts [Kim2020, 3.3.4]; empty if no ISI is effective"),
     "stopped": ("", "whether the strategy had stopped"),
-    "why": ("", "why it stopped, or went on"),
+    "why": ("", "why it stopped, or continued"),
     "judged_since": ("", "whether trials were excluded, included or judged after this result, which is then outdated"),
-    "lacks": ("", "what the log lacks; empty where it is whole"),
+    "lacks": ("", "what the log lacks; empty if it is whole"),
 }
 
 EVENT_COLUMNS: Final[Columns] = {
@@ -172,4 +176,13 @@ def _what_came_of_it(record: SessionRecord) -> dict[str, Any]:
     found = {"p_window": last.probability, "window": ""}
     if (window := last.window) is not None:
         found |= {"window": str(window), "start_ms": window.start_ms, "end_ms": window.end_ms}
-    return counts | found | {name: getattr(last, name) for name in edges} | ended
+    return counts | found | {name: getattr(last, name) for name in edges} | _by_counts(record) | ended
+
+
+def _by_counts(record: SessionRecord) -> dict[str, Any]:
+    """What response counts say; nothing of values that are no MEPs."""
+    try:
+        study = count_trials(by_isi(record.table))
+    except InvalidValueError:
+        return {}
+    return {"counts_threshold_mv": study.threshold_mv, "counts_window": str(study.window or "")}

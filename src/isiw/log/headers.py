@@ -173,7 +173,7 @@ class Header(_Header):
     """What a session is, written before anything else, and again before it goes on: the last one holds.
 
     `asks_from` is the first trial that was asked with these versions. `belief_version` and `engine_version` grow where
-    the same settings come to believe something else, or compute it otherwise; 1 is what older logs mean. An "imported"
+    the same settings come to another estimate, or compute it otherwise; 1 is what older logs mean. An "imported"
     one is of trials that were delivered without isiw, and `source` says where they are from: it was no session, and has
     no intents. `earlier` are trials that were learnt before the first ask, and count against nothing.
     """
@@ -201,7 +201,7 @@ class Header(_Header):
 
     @property
     def conditioning(self) -> Conditioning:
-        """The conditioning stimulus, as the strategy was told, or as the device says."""
+        """The conditioning stimulus, as the strategy's settings or the device state it."""
         told: Conditioning = self.strategy.settings.get("conditioning", self.device.conditioning)
         return told
 
@@ -212,7 +212,7 @@ class Header(_Header):
 
     @property
     def detection_limit_mv(self) -> float | None:
-        """What an amplitude of 0 is known to be below [mV]: as the device states it, or as the strategy was told."""
+        """What an amplitude of 0 is known to be below [mV]: as the device or the strategy's settings state it."""
         told = self.strategy.settings.get("detection_limit_mv")
         return self.device.detection_limit_mv if told is None else float(told)
 

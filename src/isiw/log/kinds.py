@@ -97,8 +97,8 @@ def require_session(path: Path, header: Header) -> None:
         raise LogError(
             f"the log is of {LogKind.IMPORTED}, and stays as it was imported",
             got=str(path),
-            remedy="To leave a trial out, mark it in the file that it is from, and analyse that again. To go on with "
-            f"the person, begin a session that knows the trials: {LogKind.IMPORTED.continued_by(path)}",
+            remedy="To leave a trial out, mark it in the file that it is from, and analyse that again. To continue "
+            f"with the person, begin a session that knows the trials: {LogKind.IMPORTED.continued_by(path)}",
         )
 
 

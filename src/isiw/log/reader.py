@@ -132,7 +132,7 @@ class SessionRecord:
 
     @property
     def is_judged_since(self) -> bool:
-        """Whether trials were judged anew after the last estimate, so that it does not know of it."""
+        """Whether trials were judged after the last estimate, which is then outdated."""
         since = itertools.takewhile(lambda entry: not isinstance(entry, EstimateRecord), reversed(self.history))
         return any(isinstance(entry, Event) and entry.kind in VERDICTS for entry in since)
 
@@ -143,7 +143,7 @@ class SessionRecord:
 
     @property
     def estimates(self) -> tuple[EstimateRecord, ...]:
-        """What was believed, trial by trial."""
+        """The estimates, trial by trial."""
         return tuple(r for r in self.history if isinstance(r, EstimateRecord))
 
     @property
@@ -244,10 +244,10 @@ _COLUMNS: Final[Mapping[str, tuple[str, str]]] = {
     "onset_s": ("s", "when it was about to be delivered, since the first stimulus of the log"),
     "intent_utc": ("", "the same by the computer's clock, UTC"),
     "status": ("", "accepted, or mistrial: nothing is learnt from it"),
-    "commanded_isi_ms": ("ms", "the ISI that was asked for; none for a control trial"),
+    "commanded_isi_ms": ("ms", "the commanded ISI; none for a control trial"),
     "reason": ("", "why it is a mistrial"),
     "isi_ms": ("ms", "the realised ISI"),
-    "isi_sd_ms": ("ms", "SD of the realised ISI; 0 where it was measured"),
+    "isi_sd_ms": ("ms", "SD of the realised ISI; 0 if it was measured"),
     "mep_mv": ("mV", "peak-to-peak amplitude of the MEP; 0 is below the detection limit"),
     "background_rms_uv": ("uV", "RMS of the EMG before the magnetic pulse"),
     "t_valve_ms": ("ms", "the valve command, on the sweep's clock"),
@@ -266,7 +266,7 @@ _COLUMNS: Final[Mapping[str, tuple[str, str]]] = {
     "end_low_ms": ("ms", "lower end of its 90 % interval"),
     "end_high_ms": ("ms", "upper end of its 90 % interval"),
     "expected_f1": ("", "posterior mean of the F1 of the reported window"),
-    "next_isi_ms": ("ms", "the ISI that was asked for next"),
+    "next_isi_ms": ("ms", "the ISI that was chosen next"),
 }
 
 

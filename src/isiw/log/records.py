@@ -41,10 +41,10 @@ class Onset(NamedTuple):
 
 
 class Onsets:
-    """The onsets of a log whose intents are told one after the other.
+    """The onsets of a log whose intents come one after the other.
 
-    A session's clock begins anew where the session is resumed, so the time between the stimuli before and after that is
-    the log's, as it is where the session's clock stood still.
+    A session's clock begins again where the session is resumed, so the time between the stimuli before and after
+    that is the log's, as it is where the session's clock stood still.
     """
 
     def __init__(self) -> None:
@@ -53,7 +53,7 @@ class Onsets:
         self._clock_s: float | None = None
 
     def take(self, intent: Intent, at_ns: int) -> None:
-        """Take the next intent; one that is told once more for the same trial counts."""
+        """Take the next intent; a second one for the same trial counts."""
         self._last = Onset(self._onset_s(intent.t_s, at_ns), at_ns)
         self._clock_s = intent.t_s
         self.by_trial[intent.trial] = self._last
@@ -138,7 +138,7 @@ class Records:
     Args:
         salvaged: what was read from the log.
         header: the last header.
-        history: all other records but waveforms, in order; of a trial that is told of twice, the first.
+        history: all other records but waveforms, in order; of a trial that is there twice, the first.
         waveforms: the recorded channels, by trial and name.
         losses: what was left out, a sentence each.
         onsets: when each stimulus was about to be delivered.

@@ -60,6 +60,7 @@ class Intent(LogRecord):
     t_s: float = 0.0
     tap_alone: bool = False
     intensity_pct_mso: float | None = None
+    place_mm: tuple[float, float] | None = None
 
     @classmethod
     def of(cls, stimulus: Stimulus, t_s: float) -> Self:
@@ -78,6 +79,7 @@ class PulseOutcome(LogRecord):
     mep_mv: float | None = None
     response: bool | None = None
     reason: str = ""
+    place_mm: tuple[float, float] | None = None
 
 
 class ThresholdBelief(LogRecord):

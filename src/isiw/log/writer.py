@@ -90,13 +90,13 @@ class LogWriter:
     def continuing(
         cls, path: str | Path, salvage: Salvage, header: AnyHeader, as_resumed: AnyHeader | None = None
     ) -> Self:
-        """Go on with a log: everything that was salvaged, and then what comes.
+        """Continue a log: everything that was salvaged, and then what comes.
 
         The old file keeps its place until the copy is durable. Where something was lost it is kept for good, as
         `FILE.damaged`.
         """
         target = log_of(Path(path))
-        with claimed(salvage.path) as source, disk_errors(target, "the log cannot go on", "It stays as it was."):
+        with claimed(salvage.path) as source, disk_errors(target, "the log cannot be continued", "It stays as it was."):
             _require_unchanged(source, salvage)
             replaces = _own_file(target, salvage)
             _require_unchanged(source, salvage)  # again, for a session that went on with it and ended just now
@@ -155,7 +155,9 @@ class LogWriter:
         with self._lock:
             if not self.is_open:
                 raise LogError(
-                    "the log is closed, so nothing can be added to it", got=str(self.path), remedy="Resume it to go on."
+                    "the log is closed, so nothing can be added to it",
+                    got=str(self.path),
+                    remedy="Resume it to continue.",
                 )
             self._writer.flush()
             self._file.sync()
@@ -334,7 +336,7 @@ def _foreign(path: Path, salvage: Salvage) -> LogError:
     return LogError(
         "another session's file is where this log would be, and it is never replaced",
         got=str(path),
-        remedy=f"Give {salvage.path.name} or {path.name} another name or folder, and go on from there.",
+        remedy=f"Give {salvage.path.name} or {path.name} another name or folder, and continue from there.",
     )
 
 

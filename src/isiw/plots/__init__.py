@@ -1,4 +1,4 @@
-"""Pictures: of sessions, of a study, and of the timing of taps. They draw, and compute nothing anew."""
+"""Pictures: of sessions, of a study, and of the timing of taps. They draw, and compute nothing."""
 
 from isiw.plots.comparison import comparison_figure, prior_figure, save_comparison_plot, save_prior_plot
 from isiw.plots.session import save_session_plot, session_figure

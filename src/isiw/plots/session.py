@@ -33,6 +33,7 @@ from isiw.plots.style import (
     tidied,
 )
 from isiw.sentences import titled
+from isiw.text.harmless import counted
 from isiw.trials import Trial
 from isiw.types import FloatArray
 from isiw.window import Window
@@ -99,7 +100,7 @@ def session_figure(record: SessionRecord, *, truth: Window | None = None) -> Fig
 
 def _say_what_is_missing(profile: Axes, edges: Axes, chance: Axes, record: SessionRecord) -> None:
     told = len(record.table.told)
-    saying(profile, f"too few trials count ({told}): no belief is drawn" if told else "no trial counts")
+    saying(profile, f"too few trials count ({told}): no estimate is drawn" if told else "no trial counts")
     for axes in (edges, chance):
         saying(axes, "no estimate that rests on trials")
 
@@ -169,7 +170,7 @@ def _finish_profile(axes: Axes, record: SessionRecord) -> None:
     _finish_isis(axes, record)
     axes.set_xlabel(record.header.stimulus.isi_axis(space.reference), fontsize=9)
     axes.set_ylabel("MEP [µV]", fontsize=9)
-    axes.set_title(f"{_title(record)} after {len(record.table)} trials", fontsize=11, loc="left", color=INK, pad=12)
+    axes.set_title(_title(record), fontsize=11, loc="left", color=INK, pad=12)
 
 
 def _finish_isis(axes: Axes, record: SessionRecord) -> None:
@@ -208,14 +209,16 @@ def _alone_ms(record: SessionRecord) -> float:
 
 
 def _title(record: SessionRecord) -> str:
+    since = "; outdated: trials were judged since" if record.found and record.is_judged_since else ""
+    return f"{_found(record)} ({counted(len(record.table), 'trial')}{since})"
+
+
+def _found(record: SessionRecord) -> str:
     if record.is_silent:
         return "No MEP was seen"
     if not record.rests_on_data:
-        return f"Too little was measured (pairs that count: {record.pairs})"
-    if record.found is None:
-        return "No estimate"
-    since = " (outdated: trials were judged since)" if record.is_judged_since else ""
-    return f"{titled(record.found)}{since}"
+        return f"Too little was measured: {counted(record.pairs, 'pair counts', 'pairs count')}"
+    return "No estimate" if record.found is None else titled(record.found)
 
 
 def _draw_edges(axes: Axes, record: SessionRecord, truth: Window | None) -> None:

@@ -54,7 +54,7 @@ def timeline_figure(record: SessionRecord) -> Figure:
     low, high = min(space.low_ms, *events.values()), max(space.high_ms, *events.values())
     margin = 0.06 * (high - low)
     axes.axvspan(
-        space.low_ms, space.high_ms, ymin=0, ymax=0.05, color=FAINT, alpha=0.5, lw=0, label="ISIs that may be asked"
+        space.low_ms, space.high_ms, ymin=0, ymax=0.05, color=FAINT, alpha=0.5, lw=0, label="ISIs that may be delivered"
     )
     axes.set_xlim(low - margin, high + margin)
     axes.set_ylim(0, 1)

@@ -123,7 +123,7 @@ def _verdict(record: SessionRecord, wrong: int, known: int) -> str:
         return f"not in {wrong} of {given} trials"
     if not known:
         return "not known"
-    return "yes" if known == given else f"yes, where it is known ({known} of {given} trials)"
+    return "yes" if known == given else f"yes, in all trials that show it ({known} of {given})"
 
 
 def _listed(rejected: list[str]) -> str:

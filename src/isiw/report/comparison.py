@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from isiw.report.tables import first_facts
 from isiw.report.words import counts_sentence, finding_sentences
 from isiw.text import one_line
 
-HEADINGS = ("session", "subject", "begun", "told", "P(window)", "window", "start", "end")
+HEADINGS = ("session", "subject", "begun", "trials", "P(window)", "window", "start", "end")
 """What the rows of the table hold."""
 
 
@@ -65,7 +66,11 @@ def _cell(estimate: Estimate, edge: Edge) -> str:
         return ""
     if edge.low_ms is None or edge.high_ms is None:
         return "–"
-    return sentences.edge_text(edge.low_ms) if edge.low_ms == edge.high_ms else f"{sentences.interval_cell(edge)} ms"
+    if edge.low_ms == edge.high_ms:
+        return sentences.edge_text(edge.low_ms)
+    if math.isinf(edge.low_ms) or math.isinf(edge.high_ms):
+        return f"before {edge.high_ms:.0f} ms" if math.isinf(edge.low_ms) else f"after {edge.low_ms:.0f} ms"
+    return f"{sentences.interval_cell(edge)} ms"
 
 
 def comparison_sentence(difference: Difference) -> str:

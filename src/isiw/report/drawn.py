@@ -13,6 +13,7 @@ from isiw.log.reader import SessionRecord
 from isiw.log.schema import EstimateRecord
 from isiw.report.tables import trial_row
 from isiw.sentences import finding
+from isiw.session.examination import change_found
 from isiw.signals.limits import EMG_UNITS_MV
 from isiw.text import plain
 from isiw.trials import Channel, Trial
@@ -82,10 +83,12 @@ def _trial(record: SessionRecord, trial: Trial) -> dict[str, Any]:
 
 
 def _belief(record: SessionRecord, estimate: EstimateRecord) -> dict[str, Any]:
-    pairs = sum(trial.index <= estimate.trial and trial.isi_ms is not None for trial in record.table.told)
+    pairs = sum(trial.isi_ms is not None for trial in _known_by(record, estimate.trial))
     nothing = lacking(pairs, silent=record.is_silent)
     window = estimate.window if nothing is None else None
-    found = finding(estimate, record.header.stimulus, record.header.space) if nothing is None else f"{nothing}"
+    found = f"{nothing or finding(estimate, record.header.stimulus, record.header.space)}"
+    if nothing is None and (changed := change_found(estimate.change, _known_by(record, estimate.trial))):
+        found += f" {changed}"
     kept = slice(None, None, max(1, math.ceil(len(estimate.grid_ms) / MOST_ISIS)))
     bands = {
         "profile": estimate.profile_mv,
@@ -108,6 +111,11 @@ def _belief(record: SessionRecord, estimate: EstimateRecord) -> dict[str, Any]:
         "isiMs": [_number(isi_ms) for isi_ms in estimate.grid_ms[kept]],
         **{name: _rounded(1e3 * np.asarray(values)[kept], FINE) for name, values in bands.items()},
     }
+
+
+def _known_by(record: SessionRecord, number: int) -> list[Trial]:
+    """The trials that an estimate after this one rests on."""
+    return [trial for trial in record.table.told if trial.index <= number]
 
 
 def _sweep(channels: dict[str, Channel], trial: Trial, mep_window_ms: tuple[float, float]) -> list[dict[str, Any]]:

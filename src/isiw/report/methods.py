@@ -8,17 +8,13 @@ import numpy as np
 
 from isiw.dissertation.profiles import best_fit, normality, profile_fits
 from isiw.dissertation.regression import curve_masks
-from isiw.dissertation.response_counts import effective_window, response_counts, response_threshold_mv
+from isiw.dissertation.response_counts import TrialsByIsi, by_isi, count_trials
 from isiw.errors import InvalidValueError
 from isiw.log.reader import SessionRecord
 from isiw.report.words import finding_sentences
 from isiw.text.harmless import counted
-from isiw.trials import RESPONSE_MV
 from isiw.types import FloatArray
 from isiw.window import Window
-
-BIN_MS: Final = 5.0
-"""Into such steps ISIs are put that hardly repeat; the dissertation's own step [Kim2020, 4.2.1]."""
 
 USUAL_TRIALS: Final = 10
 """Trials at each ISI that the dissertation takes means of [Kim2020, 4.2.1]."""
@@ -33,49 +29,31 @@ class MethodAnswer(NamedTuple):
     cannot: str
 
 
-class _Trials(NamedTuple):
-    """The trials that count: ISIs in steps [ms] and MEPs [mV] of pairs, shape (n,), and MEPs of TMS alone [mV]."""
-
-    isi_ms: FloatArray
-    mep_mv: FloatArray
-    alone_mv: FloatArray
-
-
 def method_answers(record: SessionRecord) -> list[MethodAnswer]:
     """The belief, the dissertation's rule on mean MEPs, response counts, and the form of the profile.
 
     Args:
-        record: the trials and what is believed of them.
+        record: the trials and their estimate.
     """
-    trials = _trials_of(record)
+    trials = by_isi(record.table)
     belief = MethodAnswer(
-        "isiw's belief",
+        "isiw's estimate",
         " ".join(finding_sentences(record)[:2]),
         "Single trials at any ISIs, in their order; TMS alone helps, and is not needed.",
-        "Anything about people unlike all that it knows of; it expects a law of people and of noise (docs/model.md).",
+        "Anything reliable about people and noise that its prior does not allow for (docs/model.md).",
     )
     if not len(trials.isi_ms):
         return [belief]
     return [belief, _by_means(trials), _by_counts(trials), _by_form(trials)]
 
 
-def _trials_of(record: SessionRecord) -> _Trials:
-    told = [trial for trial in record.table.told if trial.mep_mv is not None]
-    pairs = [trial for trial in told if trial.isi_ms is not None]
-    asked_ms = np.array([trial.commanded_isi_ms for trial in pairs], dtype=np.float64)
-    if len(np.unique(asked_ms)) > len(asked_ms) / 2:
-        asked_ms = BIN_MS * np.round(asked_ms / BIN_MS)
-    alone_mv = np.array([trial.mep_mv for trial in told if trial.isi_ms is None], dtype=np.float64)
-    return _Trials(asked_ms, np.array([trial.mep_mv for trial in pairs], dtype=np.float64), alone_mv)
-
-
-def _means(trials: _Trials) -> tuple[FloatArray, FloatArray, int]:
+def _means(trials: TrialsByIsi) -> tuple[FloatArray, FloatArray, int]:
     """The ISIs [ms], the mean MEP at each [mV], and the fewest trials at one."""
     at_ms, which, counts = np.unique(trials.isi_ms, return_inverse=True, return_counts=True)
     return at_ms, np.bincount(which, trials.mep_mv) / counts, int(counts.min())
 
 
-def _by_means(trials: _Trials) -> MethodAnswer:
+def _by_means(trials: TrialsByIsi) -> MethodAnswer:
     """ISIs about the largest mean whose mean has .135 of its excess over TMS alone."""
     at_ms, mean_mv, fewest = _means(trials)
     known = len(trials.alone_mv) > 0
@@ -93,25 +71,25 @@ def _by_means(trials: _Trials) -> MethodAnswer:
     )
 
 
-def _by_counts(trials: _Trials) -> MethodAnswer:
+def _by_counts(trials: TrialsByIsi) -> MethodAnswer:
     """ISIs at which more than 40 % of the trials respond."""
     known = len(trials.alone_mv) > 0
-    threshold_mv = response_threshold_mv(trials.alone_mv) if known else RESPONSE_MV
-    of = "95 % of the trials with TMS alone are not larger" if known else "nobody's own: there is no TMS alone"
+    of = "95 % of the trials with TMS alone are not larger" if known else "a usual value: there is no TMS alone"
     try:
-        counts = response_counts(trials.isi_ms, trials.mep_mv, max(threshold_mv, 1e-6))
-        answer = _told(effective_window(counts, segments="peak"))
+        study = count_trials(trials)
     except InvalidValueError as error:
         answer = f"No answer: {error.what}."
+    else:
+        answer = f"{_told(study.window)} Threshold of a response {1e3 * study.threshold_mv:.3g} µV ({of})."
     return MethodAnswer(
         "Response counts [Kim2020, 3.3.4]",
-        f"{answer} Threshold of a response {1e3 * threshold_mv:.3g} µV ({of}).",
+        answer,
         "A threshold of the person's own, and some ten trials at every ISI.",
         "How large the enhancement is, and how sure it is; the window depends on the threshold.",
     )
 
 
-def _by_form(trials: _Trials) -> MethodAnswer:
+def _by_form(trials: TrialsByIsi) -> MethodAnswer:
     """How many Gaussians the mean MEPs by ISI are made of, and whether they are normal."""
     at_ms, mean_mv, _ = _means(trials)
     said = []

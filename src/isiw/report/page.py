@@ -88,7 +88,7 @@ def _contents(record: SessionRecord) -> dict[str, Any]:
         "findings": finding_sentences(record),
         "fit": fit_sentence(record),
         "answers": answers(record),
-        "methods": method_answers(record) if record.header.imported else [],
+        "methods": method_answers(record) if record.rests_on_data else [],
         "facts": first_facts(record),
         "further": further_facts(record),
         "settings": settings_facts(record),

@@ -217,7 +217,7 @@ def counted_rows(record: SessionRecord) -> list[Counted]:
         Counted("of them with an unknown outcome", f"{unknown}", ""),
         Counted("shortest time between two stimuli", "not known" if shortest_s is None else f"{shortest_s:.2f} s",
                 f"at least {limits.iti_s:g} s" if kept else ""),
-        Counted("ISIs asked", asked_ms, f"{limits.low_ms:g}–{limits.high_ms:g} ms" if kept else ""),
+        Counted("ISIs commanded", asked_ms, f"{limits.low_ms:g}–{limits.high_ms:g} ms" if kept else ""),
         Counted("most mistrials in a row", f"{_mistrials_in_a_row(record)}",
                 f"a pause after {limits.max_consecutive_mistrials}" if kept else ""),
         Counted("refused before delivery", f"{kinds['refused']}", ""),

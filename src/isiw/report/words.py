@@ -18,7 +18,7 @@ from isiw.strategy.stopping import OF_THE_WINDOW
 from isiw.text.harmless import command
 from isiw.window import Window
 
-TRIAL_HEADINGS = ("trial", "asked", "outcome", "realised")
+TRIAL_HEADINGS = ("trial", "commanded", "outcome", "realised")
 """What `trial_rows` hold."""
 
 
@@ -27,7 +27,7 @@ def final_statement(record: SessionRecord, config: Path | None = None) -> str:
 
     Args:
         record: the session.
-        config: the configuration that it was run with, for the command that goes on with it; None where not known.
+        config: the configuration that it was run with, for the command that resumes it; None if not known.
 
     Raises:
         InvalidValueError: no record of a session.
@@ -48,10 +48,10 @@ def final_statement(record: SessionRecord, config: Path | None = None) -> str:
     if record.end_lost:
         said.append(
             "The end of the log is missing. Find out, with the stimulator's counter, the number N of pulses that isiw "
-            f"show does not list; then go on with: {way_on}"
+            f"show does not list; then resume with: {way_on}"
         )
     elif last is not None and not last.stop:
-        said.append(f"The session is not over; go on with: {way_on}")
+        said.append(f"The session is not over; resume with: {way_on}")
     if last is not None and record.is_judged_since:
         said.append(sentences.JUDGED_SINCE)
     return " ".join(sentence for sentence in said if sentence)
@@ -119,7 +119,7 @@ def _unstated_hit_delay(record: SessionRecord) -> str:
         return ""
     if (stated_ms := header.device.hit_delay_ms) is not None:
         call = f"make_strategy(..., hit_delay_ms=({stated_ms[0]:g}, {stated_ms[1]:g}))"
-        said = "The strategy was not told the device's hit delay; telling it usually saves stimuli."
+        said = "The strategy does not know the device's hit delay; stating it usually saves stimuli."
         return f"{said} Next time: {call}."
     said = "The device does not state its hit delay (DeviceInfo.hit_delay_ms); stating it usually saves stimuli."
     if not any(name == "acceleration" for _, name in record.waveforms):
@@ -135,11 +135,11 @@ def _unstated_intensity(record: SessionRecord) -> str:
     if not known_settings(recipe.name, {"intensity_pct_rmt": stated_pct}):
         return ""
     call = f"make_strategy(..., intensity_pct_rmt={stated_pct:g})"
-    return f"The strategy was not told the intensity, and expects about 90 % of RMT. Next time: {call}."
+    return f"The strategy does not know the intensity, and assumes about 90 % of RMT. Next time: {call}."
 
 
 def _expects_a_tap(record: SessionRecord) -> str:
-    """That what a strategy believes of windows is true of those after a tap, where an electrical pulse came first."""
+    """That a strategy expects windows as after a tap, if an electrical pulse came first."""
     name, estimate = record.header.strategy.name, record.estimates[-1]
     states_beliefs = estimate.probability is not None and estimate.depressed_probability is None
     if record.header.conditioning == "tap" or not states_beliefs or name not in list_strategies():

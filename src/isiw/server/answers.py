@@ -99,7 +99,7 @@ class Error(_Answer):
     """What is wrong, and the way out."""
 
     type: str = Field(description="What kind of error, for software.")
-    status: int = Field(description="The HTTP status, also where the answer has another one by errors=200.")
+    status: int = Field(description="The HTTP status, also if the answer has another one by errors=200.")
     message: str = Field(description="All of it in words, for people.")
     got: str | None = None
     expected: str | None = None
@@ -131,15 +131,15 @@ class SessionAnswer(OkAnswer):
     """How a session stands."""
 
     id: str
-    open: bool = Field(description="Whether it can be asked; otherwise it has to be resumed.")
+    open: bool = Field(description="Whether it is open; otherwise it has to be resumed.")
     subject: str
     trials: int = Field(description="How many have an outcome; the next one has this number.")
     told: int = Field(description="How many of these count.")
-    open_trial: int | None = Field(default=None, description="The trial that was asked for and has no outcome.")
+    open_trial: int | None = Field(default=None, description="The trial that began and has no outcome yet.")
     open_isi_ms: float | None = Field(default=None, description="Its ISI [ms].")
     wait_s: float = Field(default=0.0, description="How long until the next stimulus is allowed [s].")
     stop: bool
-    reason: str = Field(description="Why to stop, or to go on.")
+    reason: str = Field(description="Why to stop, or to continue.")
 
 
 class SessionEntry(BaseModel):
@@ -215,7 +215,7 @@ class TrialsAnswer(OkAnswer):
 
 
 class EstimateAnswer(Reported, OkAnswer):
-    """What is believed about the window; the names are those of the log's `/estimate`."""
+    """The estimate of the window; the names are those of the log's `/estimate`."""
 
     model_config = ConfigDict(json_schema_serialization_defaults_required=True)
 

@@ -96,7 +96,7 @@ class DrivenSession:
         return [TrialRow.of(trial) for trial in self.recorder.trials]
 
     def estimate(self) -> EstimateAnswer:
-        """What is believed about the window now."""
+        """The estimate of the window now."""
         estimate = self.recorder.estimate()
         return EstimateAnswer.about(Estimate.of(estimate), estimate.too_little)
 
@@ -108,7 +108,7 @@ class DrivenSession:
                 429,
                 "TooEarly",
                 f"the next stimulus is allowed in {wait_s:.1f} s",
-                remedy="Wait that long and send the request again. Nothing was asked for.",
+                remedy="Wait that long and send the request again. No trial began.",
                 retry_s=wait_s,
             )
 

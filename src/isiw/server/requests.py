@@ -62,13 +62,13 @@ class CreateRequest(_Request):
 
 
 class ResumeRequest(_Request):
-    """Going on with a session from its log."""
+    """Resuming a session from its log."""
 
     lost_pulses: int | None = Field(
         default=None,
         ge=0,
         lt=MOST_TRIALS,
-        description="Needed where the log's end is missing: how many stimuli were given that are not in it.",
+        description="Needed if the log's end is missing: how many stimuli were given that are not in it.",
     )
 
 
@@ -95,8 +95,8 @@ class TellRequest(_Request):
         description="The realised ISI [ms]; null for TMS alone, which needs no ask, as the trial that comes next."
     )
     mep_mv: float = Field(description="Peak-to-peak amplitude [mV]; 0 is below the detection limit.")
-    isi_sd_ms: float = Field(default=0.0, description="SD of the realised ISI [ms]; 0 where it was measured.")
-    background_rms_uv: float | None = Field(default=None, description="EMG before the pulse [µV RMS], where known.")
+    isi_sd_ms: float = Field(default=0.0, description="SD of the realised ISI [ms]; 0 if it was measured.")
+    background_rms_uv: float | None = Field(default=None, description="EMG before the pulse [µV RMS], if known.")
     pulse: bool = Field(
         default=True,
         description="False for a tap alone, which needs no ask: mep_mv is what the MEP window would hold at isi_ms.",

@@ -43,7 +43,7 @@ from isiw.server.sessions import Sessions
 
 POLL_S: Final = 0.1
 QUIET_S: Final = 15.0
-"""After so long without a trial, a client that follows is told that the server is still there [s]."""
+"""After so long without a trial, a client that follows hears that the server is still there [s]."""
 
 _drawing = threading.Lock()
 """Matplotlib draws one picture at a time."""
@@ -99,7 +99,7 @@ def stands(folder: Folder, name: Name) -> Response:
 
 @router.post("/sessions/{id}/resume", responses=_errors(400, 404, 409, 415), response_model=SessionAnswer)
 def resume(folder: Folder, name: Name, body: Annotated[ResumeRequest, Depends(body_of(ResumeRequest))]) -> Response:
-    """Go on with a session. What was asked for and has no outcome becomes a mistrial "outcome unknown"."""
+    """Continue a session. A trial without an outcome becomes a mistrial "outcome unknown"."""
     return _json(folder.resume(name, body.lost_pulses))
 
 
@@ -171,7 +171,7 @@ def close(folder: Folder, name: Name) -> Response:
 
 @router.get("/sessions/{id}/estimate", responses=_errors(404, 409), response_model=EstimateAnswer)
 def estimate(folder: Folder, name: Name) -> Response:
-    """What is believed about the window."""
+    """The estimate of the window."""
     return _json(folder.estimate(name))
 
 

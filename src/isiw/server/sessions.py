@@ -73,7 +73,7 @@ class Sessions:
             return self._begin(request)
 
     def resume(self, name: str, lost_pulses: int | None = None) -> SessionAnswer:
-        """Go on with a session; what was asked for and has no outcome becomes a mistrial, as nobody knows of it."""
+        """Continue a session; a trial without an outcome becomes a mistrial, since it may have been delivered."""
         if self._is_open(name):
             with self.driving(name) as session:
                 session.give_up()
@@ -129,7 +129,7 @@ class Sessions:
         return [TrialRow.of(trial) for trial in self.record(name).table]
 
     def estimate(self, name: str) -> EstimateAnswer:
-        """What is believed about the window, in a session that is open or not."""
+        """The estimate of the window, in a session that is open or not."""
         if self._is_open(name):
             with self.driving(name) as session:
                 return session.estimate()

@@ -1,4 +1,4 @@
-"""A session: the closed loop from the first ask to the decision, and going on with one from its log."""
+"""A session: the closed loop from the first ask to the decision, and resuming one from its log."""
 
 from isiw.log.kinds import LogKind, imported_sentence
 from isiw.session.again import estimate_again

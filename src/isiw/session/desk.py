@@ -210,11 +210,11 @@ class Desk:
 
     def goes_on(self, reason: str) -> bool:
         """Wait for the key that says whether a paused session goes on."""
-        self.screen.say(f"{reason} The device is disarmed. r goes on, q ends the session, which can be resumed later.")
+        self.screen.say(f"{reason} The device is disarmed. r continues, q ends the session; it can be resumed later.")
         if self.shown is not None and self.shown != (last := self._session.trials[-1].index):
             self.shown = last
             self.screen.say(
-                f"Trial {last} was delivered; its row appears when the session goes on. x, a and j now act on "
+                f"Trial {last} was delivered; its row appears when the session continues. x, a and j now act on "
                 f"trial {last}."
             )
         if self._note is not None:

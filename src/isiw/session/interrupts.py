@@ -50,7 +50,7 @@ def end_process(reason: str, log: LogWriter | None, code: int) -> Never:
 
 def _show(text: str, log: LogWriter | None) -> None:
     restore()
-    safe = "" if log is None else f"\nThe log is safe; go on with {log.path}."
+    safe = "" if log is None else f"\nThe log is safe; resume with {log.path}."
     alarm(f"\n{text}{safe}")
 
 

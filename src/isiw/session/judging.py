@@ -48,11 +48,11 @@ class Judging(ABC):
         return self._examination.last_excluded
 
     def exclude(self, trial: int, reason: str = "") -> None:
-        """Let a trial not count from here on: an event is appended, and the strategy learns anew without it."""
+        """Let a trial not count from here on: an event is appended, and the strategy learns again without it."""
         self._judge(lambda trials: exclusion(trials, trial, reason))
 
     def include(self, trial: int) -> None:
-        """Let a trial count again that was excluded, and learn anew with it."""
+        """Let a trial count again that was excluded, and learn again with it."""
         self._judge(lambda trials: inclusion(trials, trial))
 
     def reject(self, trial: int) -> None:

@@ -145,7 +145,7 @@ class Recorder(Judging):
             LogError: the log cannot be written.
 
         Warns:
-            ImplausibleDataWarning: what looks like a slip of unit; it is told and logged all the same.
+            ImplausibleDataWarning: what looks like a slip of unit; it is learnt and logged all the same.
         """
         with self._lock:
             self._examination.conclude()
@@ -216,7 +216,7 @@ class Recorder(Judging):
             self._examination.conclude()
 
     def estimate(self) -> WindowEstimate:
-        """What is believed about the window now."""
+        """The estimate of the window now."""
         with self._lock:
             self._examination.conclude()
             return self.strategy.estimate()

@@ -247,7 +247,7 @@ def require_as_real(info: DeviceInfo, was: DeviceInfo) -> None:
     """Raise where the session would go on without waiting or with answers from nobody, or a simulation on a person."""
     if info.simulated and not was.simulated:
         raise DeviceError(
-            "the session was run with a real device, and cannot go on with a simulated one",
+            "the session was run with a real device, and cannot be continued with a simulated one",
             got=info.name,
             expected=f"a real one, as {was.name} was",
             remedy="If this device is the real rig, set simulated = false (in its settings or DeviceInfo). If it is a "

@@ -51,7 +51,7 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
     Args:
         strategy: proposes ISIs and learns; of a session that goes on, made with the same settings and seed.
         log: where the log is; it must not exist yet, unless the session goes on.
-        resume: whether to go on with the log where there is one. What was asked and has no outcome in it becomes a
+        resume: whether to continue the log if there is one. A trial without an outcome in it becomes a
             mistrial.
         earlier: trials of this person that were delivered before, such as the `record.table` of a log or an analysis:
             the strategy learns them before its first ask, as `Strategy.learn_all` does, and nothing counts them.
@@ -216,7 +216,7 @@ def resume(
 
     Args:
         path: the log, with or without `.part`; finished, torn or damaged.
-        device: the device to go on with; one with a memory is brought to where the logged stimuli left it. None for a
+        device: the device; one with a memory is brought to where the logged stimuli left it. None for a
             loop of your own, and for a search for a motor threshold.
         strategy: needed where the session's strategy was built from a user's own objects: the same again.
         lost_pulses: needed where the end of a closed log is missing: how many stimuli were given that are not in it any
@@ -224,7 +224,7 @@ def resume(
         verify: whether the strategy must ask again what the log says it asked, at first and at last. With other
             versions than those that were logged a difference is a warning; without verification the logged trials are
             told as they are.
-        replayed: with a device, called after each logged trial that the strategy is told again, with how many it knows.
+        replayed: with a device, called after each logged trial that the strategy learns again, with how many it knows.
         **options: what holds from here on instead of what was logged last: `limits` (else those that `limits_of_log`
             says), `signals` (trials that were judged stay as they are), `timeout_s` and `ask_deadline_s`; and `clock`,
             `on_trial` and `safeguards`. All are as for `Session`.

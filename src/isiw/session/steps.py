@@ -81,7 +81,7 @@ class Pausing:
                 raise KeyboardInterrupt
             return self._last(reason)
         interrupts.settle()
-        self._examination.event("pause", "The operator goes on.")
+        self._examination.event("pause", "The operator continued.")
         if not self.due:
             rig.stage()
         return None

@@ -283,7 +283,7 @@ def goes_on(reason: str) -> bool:
     """Ask in the terminal whether to go on; no, where there is no terminal."""
     if not (is_terminal(sys.stdin) and is_terminal(sys.stderr)):
         return False
-    alarm(f"\n{reason} The device is disarmed. Go on? [y/N] ", end="")
+    alarm(f"\n{reason} The device is disarmed. Continue? [y/N] ", end="")
     return sys.stdin.readline().strip().lower() in {"y", "yes"}
 
 

@@ -88,7 +88,7 @@ def _clock_for(device: DeviceInfo, clock: Clock | None) -> Clock:
 def resume_threshold(
     log: str | Path, search: ThresholdSearch | None = None, *, clock: Clock | None = None
 ) -> ThresholdRecorder:
-    """Go on with a search where its log ends. A pulse without an outcome in it counts, and nothing is learnt from it.
+    """Continue a search where its log ends. A pulse without an outcome in it counts, and nothing is learnt from it.
 
     Args:
         log: the log, finished or not.
@@ -166,7 +166,7 @@ def _a_reason(reason: str) -> str:
 def _learnable(outcomes: Iterable[PulseOutcome]) -> tuple[Pulse, ...]:
     """What is learnt from some outcomes."""
     return tuple(
-        Pulse(number("intensity_pct_mso", each.intensity_pct_mso), each.mep_mv, each.response)
+        Pulse(number("intensity_pct_mso", each.intensity_pct_mso), each.mep_mv, each.response, each.place_mm)
         for each in outcomes
         if not each.reason
     )
@@ -243,6 +243,7 @@ class ThresholdRecorder:
         )
         self._pacing = Pacing(Limits(0.0, 0.0, header.min_iti_s), clock, ages_s)  # a pulse alone has no ISI
         self._asked: float | None = None
+        self.place_mm: tuple[float, float] | None = None
 
     @property
     def search(self) -> ThresholdSearch:
@@ -262,18 +263,18 @@ class ThresholdRecorder:
     def conclude_open(self, intents: Sequence[Intent]) -> None:
         """Log that nobody knows the outcome of pulses that were given by the log, or may have been."""
         for intent in intents:
-            at = intent.intensity_pct_mso
-            self._conclude(PulseOutcome(trial=intent.trial, intensity_pct_mso=at, reason=UNKNOWN))
+            known = intent.model_dump(include={"trial", "intensity_pct_mso", "place_mm"})
+            self._conclude(PulseOutcome(**known, reason=UNKNOWN))
         self._examination.event("resume", f"Went on after {self.given} pulses.", durable=True)
 
     def ask(self) -> float:
         """The next intensity [% MSO], the same until its outcome; on disk as about to be given before this returns."""
         if self._asked is None:
             self._require_left()
-            intensity = self.search.ask()
+            intensity, self.place_mm = self.search.ask(), self.search.place_mm
             self._clock.sleep_s(self._pacing.wait_s())
-            now_s = self._clock.now_s()
-            self._examination.intend(Intent(trial=self.given, isi_ms=None, t_s=now_s, intensity_pct_mso=intensity))
+            now_s, at = self._clock.now_s(), {"intensity_pct_mso": intensity, "place_mm": self.place_mm}
+            self._examination.intend(Intent.model_validate({"trial": self.given, "isi_ms": None, "t_s": now_s, **at}))
             self._log.require_in_place()
             self._asked = intensity
         return self._asked
@@ -340,7 +341,7 @@ class ThresholdRecorder:
         self._examination.conclude()
 
     def estimate(self) -> ThresholdEstimate:
-        """What is believed about the threshold now."""
+        """The estimate of the threshold now."""
         return self.search.estimate()
 
     def decision(self) -> StopDecision:
@@ -366,7 +367,7 @@ class ThresholdRecorder:
     def _require_left(self) -> None:
         if self.given >= self.header.max_pulses:
             raise LimitExceededError(
-                f"the limit of {self.header.max_pulses} pulses is reached, so no further pulse is asked for",
+                f"the limit of {self.header.max_pulses} pulses is reached, so no further pulse follows",
                 remedy="For more pulses begin a new log with a larger --max-pulses (max_pulses in Python).",
             )
 
@@ -384,6 +385,7 @@ class ThresholdRecorder:
             mep_mv=mep_mv,
             response=response,
             reason=reason,
+            place_mm=self.place_mm,
         )
 
     def _conclude(self, outcome: PulseOutcome) -> None:

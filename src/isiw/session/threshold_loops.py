@@ -14,6 +14,7 @@ from isiw.errors import ConfigError, InvalidValueError, LimitExceededError
 from isiw.log.headers import ThresholdHeader
 from isiw.session.threshold import ThresholdRecorder, open_threshold
 from isiw.strategy.stopping import StopDecision
+from isiw.strategy.threshold.pulses import place_text
 from isiw.strategy.threshold.search import ThresholdSearch
 from isiw.subjects.thresholds import StimulatedPerson, threshold_cohort
 
@@ -92,12 +93,12 @@ def run_simulated(recorder: ThresholdRecorder, say: Callable[[str], None]) -> St
     responder = person.begin(recorder.header.config[_SIMULATED]["seed"])
     for outcome in recorder.outcomes:  # so that the person's noise goes on where it was
         if outcome.intensity_pct_mso is not None:
-            responder.respond(outcome.intensity_pct_mso)
+            responder.respond(outcome.intensity_pct_mso, *(outcome.place_mm or ()))
     while not (decision := recorder.decision()).stop:
         intensity = recorder.ask()
-        mep_mv = responder.respond(intensity)
+        mep_mv = responder.respond(intensity, *(recorder.place_mm or ()))
         recorder.tell(mep_mv)
-        say(f"Pulse {recorder.given}: {intensity:g} % MSO, MEP {mep_mv:.3f} mV. {recorder.estimate()}")
+        say(f"Pulse {recorder.given}: {intensity:g} % MSO{_at(recorder)}, MEP {mep_mv:.3f} mV. {recorder.estimate()}")
     return decision
 
 
@@ -136,7 +137,11 @@ def _answer(recorder: ThresholdRecorder, read: Callable[[str], str], say: Callab
             if _typed(read, f"{limit} {_LAST_WORD}") == "u":
                 _take_back(recorder, say)
         raise
-    return _typed(read, f"Pulse {recorder.given + 1}: set {intensity:g} % MSO, give one pulse. MEP: ")
+    return _typed(read, f"Pulse {recorder.given + 1}: set {intensity:g} % MSO{_at(recorder)}, give one pulse. MEP: ")
+
+
+def _at(recorder: ThresholdRecorder) -> str:
+    return f", coil {place_text(recorder.place_mm)}" if recorder.place_mm else ""
 
 
 def _typed(read: Callable[[str], str], question: str) -> str:

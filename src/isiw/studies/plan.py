@@ -143,7 +143,7 @@ class Study(Checked):
         seed: seed of the people, their trial noise and the strategies; 0–999 are for development.
         trials: how many trials a session has at most.
         marks: after which trials the estimate is recorded, 0 being before any; by default each fifth and the last.
-            Trials that were told count, no mistrials.
+            Trials that were learnt count, no mistrials.
         space: the design space; `"valve"` and `"impact"` are those of all benchmarks.
         stopping: whether a strategy's stopping rule is `"ignored"`, or it is `"noted"` when it fires (an estimate
             after each trial), or `"ends"` the session.
@@ -151,7 +151,7 @@ class Study(Checked):
         batch: how many people side by side.
         device: torch device of the batched engine, for the models that have one.
         amplitude: factor on all amplitudes of the people.
-        hit_delay: whether strategies that can use it are told the hit delay as the rig states it (`"stated"`), or
+        hit_delay: whether strategies that can use it get the hit delay as the rig states it (`"stated"`), or
             nothing (`"unstated"`).
         intensity: the same of the intensity, as the visit states it.
 

@@ -32,7 +32,7 @@ class Player(Protocol):
         """
 
     def estimate(self) -> Reported:
-        """What is believed about the window now."""
+        """The estimate of the window now."""
 
 
 class Crowd(Protocol):
@@ -52,7 +52,7 @@ class Crowd(Protocol):
         """Count a pair of stimuli that was delivered in vain, and say what is asked of the person instead."""
 
     def estimate(self, person: int) -> Reported:
-        """What is believed about the window of a person."""
+        """The estimate of a person's window."""
 
     def decision(self, person: int) -> StopDecision:
         """Whether to stop with a person; asked only where there is a rule."""

@@ -1,4 +1,4 @@
-"""Running a study into its folder, going on with it, and running one of its units once more."""
+"""Running a study into its folder, continuing it, and running one of its units once more."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def replay(store: Store, key: str, person: int | None = None) -> Replay:
     unit, rows = store.unit(key), store.rows()
     kept = rows[rows["unit"] == key] if len(rows) else rows
     if not len(kept):
-        raise StudyError("the unit is not finished", got=key, remedy="Go on with the study, and see its errors.")
+        raise StudyError("the unit is not finished", got=key, remedy="Continue the study, and see its errors.")
     again = run_unit(unit)
     if person is not None:
         kept, again = (table[table["person"] == person] for table in (kept, again))

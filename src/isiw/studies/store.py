@@ -231,7 +231,7 @@ def _same(store: Store, kept: Store) -> Store:
         going_on = command("study", "run", store.folder)
         raise StudyError(
             f"{store.folder} holds another study: {'; '.join(differing)}",
-            remedy=f"Choose another folder, or go on with the study that is there: {going_on}",
+            remedy=f"Choose another folder, or continue the study that is there: {going_on}",
         )
     return store
 

@@ -31,7 +31,7 @@ def another_day(person: SimulatedSubject, stranger: SimulatedSubject, rng: np.ra
 
     Args:
         person: with a profile of one peak and a recruitment curve.
-        stranger: whose window the person has where it was drawn anew.
+        stranger: whose window the person has if it was drawn again.
         rng: source of randomness.
 
     Raises:

@@ -86,7 +86,7 @@ class SimulatedSubject(Checked):
         input_correlation: lag-1 correlation of the input noise.
         outlier_probability: share of trials replaced by an artefact of 0.1–0.5 mV.
         isi_jitter_ms: SD of the realised about the commanded ISI, beside the hit delay's [ms].
-        jitter_told: whether the jittered ISI is told, or the commanded one with its SD.
+        jitter_told: whether the jittered ISI is reported, or the commanded one with its SD.
         scale: factor on every amplitude.
         stated_hit_delay_ms: mean and SD of the hit delay that the rig states, where it knows itself [ms]; by default
             the tapping robot's, over people.
@@ -219,7 +219,7 @@ class Responder:
         Args:
             isi_ms: the commanded ISI on the reference [ms]; None for TMS alone.
             reference: the event that the ISI counts from. From the valve command the hit delay's variation stays
-                unseen; from the impact it moves the realised ISI, which is told.
+                unseen; from the impact it moves the realised ISI, which is reported.
             pulse: whether the magnetic pulse is given; without it, the amplitude is of what the MEP window would hold.
 
         Raises:

@@ -82,7 +82,7 @@ class FaultyDevice:
     since the device has been disarmed meanwhile.
 
     Args:
-        device: what answers where nothing fails; it is told to deliver for every pair that is fired.
+        device: what answers where nothing fails; it delivers every pair that is fired.
         seed: seed of the faults.
         clock: tells when a pair is fired.
         rate: the share of calls that fail.

@@ -129,7 +129,7 @@ def test_the_buttons_are_events_in_the_log(watched: Watched) -> None:
         ("exclusion", "Excluded on the live page."),
         ("inclusion", "Included again by the operator."),
         ("pause", "Paused on the live page."),
-        ("pause", "The operator goes on."),
+        ("pause", "The operator continued."),
         ("exclusion", "Excluded on the live page."),
         ("pause", "Ended on the live page."),
     ]

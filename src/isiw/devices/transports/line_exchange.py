@@ -46,7 +46,7 @@ class LineSettings(Checked):
         line_end: what ends a command. Answers may end by a line feed, a carriage return, or both.
         timeout_s: how long the instrument may take to answer where nothing else is said, and to take a command [s].
         connect_s: how long it may take from opening the connection until it says that it is disarmed [s]; boards that
-            start anew when their port is opened need a second or two. `stop` may need this and twice `timeout_s`.
+            start again when their port is opened need a second or two. `stop` may need this and twice `timeout_s`.
         isi_tolerance_ms: how far the ISI that is read back may be from the one that was set [ms].
     """
 

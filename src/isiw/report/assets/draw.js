@@ -123,7 +123,7 @@ const draw = (() => {
       ...intervals(belief).map(([name, hue]) => key(`90 % interval of its ${name}`, { width: 6, color: colour(hue) })),
     ] : [];
     const next = belief && belief.nextMs !== null
-      ? [key("asked next", { width: 1.5, dash: "dash", color: colour("ink") })] : [];
+      ? [key("next ISI", { width: 1.5, dash: "dash", color: colour("ink") })] : [];
     return [...found, ...next];
   }
 

@@ -12,7 +12,7 @@
   function tellTrial(trial) {
     const realised = trial.realised === "–" ? "" : `, realised ${trial.realised}`;
     element("told-trial").textContent =
-      `Trial ${trial.number} (${position + 1} of ${trials.length}): asked ${trial.asked}${realised}, ${trial.outcome}.`;
+      `Trial ${trial.number} (${position + 1} of ${trials.length}): commanded ${trial.asked}${realised}, ${trial.outcome}.`;
   }
 
   function tellBelief(belief) {
@@ -20,11 +20,11 @@
       element("told-belief").textContent = "The log holds no estimate after this trial.";
       return;
     }
-    element("told-belief").textContent = `Believed after it: ${belief.found} ${belief.reason}`;
+    element("told-belief").textContent = `Estimate after it: ${belief.found} ${belief.reason}`;
   }
 
   const reasons = {
-    initial: ", one of the ISIs that are asked first.", plan: ", by the strategy's own plan.",
+    initial: ", one of the ISIs that every session begins with.", plan: ", by the strategy's own plan.",
     acquisition: ", where the score is highest.", again: " again, as its trial was lost.", fallback: ", by a fallback.",
   };
   const why = (belief) => reasons[belief.chosenBy] ?? ".";
@@ -34,9 +34,9 @@
     const fallback = next && session.fallbacks[next.number];
     const told = element("told-next");
     if (!belief) told.textContent = "";
-    else if (belief.stop && !next) told.textContent = "Nothing was asked after it: the session stopped.";
-    else if (belief.nextMs !== null) told.textContent = `Asked next: ${ms(belief.nextMs)}${fallback ? `, by a fallback: ${fallback}` : why(belief)}`;
-    else told.textContent = next ? `Next came trial ${next.number}: ${next.asked}.` : "No ISI was asked after it.";
+    else if (belief.stop && !next) told.textContent = "No ISI came next: the session stopped.";
+    else if (belief.nextMs !== null) told.textContent = `Next ISI: ${ms(belief.nextMs)}${fallback ? `, by a fallback: ${fallback}` : why(belief)}`;
+    else told.textContent = next ? `Next came trial ${next.number}: ${next.asked}.` : "No ISI was chosen next.";
   }
 
   // ---- one chosen trial for all of it

@@ -32,7 +32,7 @@
   function tellLast(trial) {
     said("last", trial ? `${trial.number}: ${trial.outcome}` : "none yet");
     const realised = trial && trial.realised !== "–" ? `, realised ${trial.realised}` : "";
-    said("last-more", trial ? `asked ${trial.asked}${realised}` : "");
+    said("last-more", trial ? `commanded ${trial.asked}${realised}` : "");
   }
 
   function tellNext(belief, last) {
@@ -204,7 +204,7 @@
   }
 
   element("pause").addEventListener("click", () => send("pause", {}, "The device is disarmed; the session pauses."));
-  element("resume").addEventListener("click", () => send("resume", { pause: shown.pause.number }, "The session goes on."));
+  element("resume").addEventListener("click", () => send("resume", { pause: shown.pause.number }, "The session continues."));
   element("stop").addEventListener("click", () => askStop(true));
   element("stop-not").addEventListener("click", () => askStop(false));
   element("stop-sure").addEventListener("click", () => send("stop", {}, "The device is disarmed; the session ends before another stimulus."));

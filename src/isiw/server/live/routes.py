@@ -23,7 +23,7 @@ GLANCE_S, MOST_S = 0.05, 0.5
 """How often is looked for news, and how long at most where none is put together for a while [s]."""
 
 QUIET_S: Final = 2.0
-"""After so long without news, the page is told that the session is still there [s]."""
+"""After so long without news, the page hears that the session is still there [s]."""
 
 BY_PAGE: Final = "on the live page"
 

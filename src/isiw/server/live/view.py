@@ -43,7 +43,7 @@ class Shown(NamedTuple):
 class View:
     """Follows one session. It keeps the last sweep, the last estimate and the last events, and no others.
 
-    The session's threads call what a follower is told, the server's thread everything else.
+    The session's threads call a follower's methods, the server's thread everything else.
     """
 
     def __init__(self, session: Session) -> None:

@@ -162,7 +162,7 @@ def _on(reason: str) -> StopDecision:
 
 
 THRESHOLDS_PCT_MSO: Final = np.arange(10.0, 130.5, 0.5)
-"""Thresholds that are believed possible; those above 100 are beyond any stimulator."""
+"""Possible thresholds; those above 100 are beyond any stimulator."""
 
 
 @dataclass(frozen=True)
@@ -174,7 +174,7 @@ class BayesThreshold(Checked):
         prior_sd_pct_mso: its SD [% MSO].
         stop_sd_pct_mso: stop when the posterior's SD is at most this [% MSO].
         max_pulses: stop after so many pulses in any case.
-        curves: which recruitment curves are believed in.
+        curves: the possible recruitment curves.
     """
 
     prior_mean_pct_mso: Annotated[float, partial(number, least=10, most=130)] = 55.0
@@ -192,7 +192,7 @@ class BayesThreshold(Checked):
         """Probability of each of `THRESHOLDS_PCT_MSO`.
 
         Args:
-            pulses: what was told so far.
+            pulses: the pulses so far.
         """
         told = sum((_told(self.curves, pulse) for pulse in pulses), start=np.zeros((1, 1)))
         prior = scipy.stats.norm.logpdf(THRESHOLDS_PCT_MSO, self.prior_mean_pct_mso, self.prior_sd_pct_mso)

@@ -1,7 +1,7 @@
 """The hot spot: where the coil evokes an MEP at the lowest intensity, sought with pulses of one intensity.
 
-In simulation: no log, and nobody moves a coil. The effect of the coil falls off as a Gaussian of its distance from the
-hot spot; an MEP then says how far the pulse was above or below the threshold, as on the way to the threshold itself.
+The effect of the coil falls off as a Gaussian of its distance from the hot spot; an MEP then says how far the pulse was
+above or below the threshold, as on the way to the threshold itself.
 """
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ import numpy as np
 from isiw.checks import Amplitude, Checked, Count, Number, Positive
 from isiw.errors import InvalidValueError
 from isiw.lazy import scipy
+from isiw.strategy.stopping import StopDecision, StopKind
+from isiw.strategy.threshold.pulses import IntensityRange, Pulse, ThresholdEstimate
 from isiw.strategy.threshold.recruitment import DISTANCES_PCT, RecruitmentBelief, log_likelihood
 from isiw.trials import RESPONSE_MV
 from isiw.types import FloatArray
@@ -24,7 +26,7 @@ INTENSITIES_PCT: Final = (95.0, 105.0, 115.0, 125.0, 135.0, 150.0)
 """What the intensity may be at the hot spot [% of the threshold there], which nobody knows yet."""
 
 SPREADS_MM: Final = (18.0, 24.0, 30.0, 37.0)
-"""SDs of the fall-off that are believed possible [mm]."""
+"""SDs of the fall-off that are possible [mm]."""
 
 _USEFUL_PCT: Final = (-25.0, 30.0)  # beyond these distances from the threshold an MEP says little
 
@@ -45,7 +47,7 @@ class CoilPulse(Checked):
 
 
 class HotSpotEstimate(NamedTuple):
-    """Where the hot spot is believed to be.
+    """The estimated place of the hot spot.
 
     Args:
         x_mm: its place [mm].
@@ -111,7 +113,7 @@ class BayesHotSpot(Checked):
     Args:
         half_width_mm: of the searched square [mm].
         step_mm: between two places [mm].
-        curves: which recruitment curves are believed in.
+        curves: the possible recruitment curves.
     """
 
     half_width_mm: Positive = 25.0
@@ -140,6 +142,51 @@ class BayesHotSpot(Checked):
         mean = belief @ places
         sd_mm = float(np.sqrt(belief @ ((places - mean) ** 2).sum(axis=1)))
         return HotSpotEstimate(float(mean[0]), float(mean[1]), sd_mm)
+
+
+@dataclass(frozen=True)
+class HotSpotSearch(Checked):
+    """Seeks the hot spot at the highest intensity of the range: the coil goes where its effect is least known.
+
+    Args:
+        half_width_mm: of the searched square [mm].
+        stop_sd_mm: stop when the hot spot is known this well [mm].
+        max_pulses: stop after so many pulses in any case.
+    """
+
+    half_width_mm: Positive = 25.0
+    stop_sd_mm: Positive = 4.0
+    max_pulses: Count = 30
+
+    def ask(self, _: Sequence[Pulse], space: IntensityRange) -> float:
+        """The highest intensity."""
+        return space.high_pct_mso
+
+    def place_mm(self, pulses: Sequence[Pulse]) -> tuple[float, float]:
+        """The next place of the coil; see `PlacesCoil`."""
+        return BayesHotSpot(self.half_width_mm).ask(_by_place(pulses))
+
+    def estimate(self, pulses: Sequence[Pulse], _: IntensityRange) -> ThresholdEstimate:
+        """The hot spot, once a pulse evoked an MEP."""
+        if not any(pulse.responded for pulse in pulses):
+            return ThresholdEstimate(None, reason="No pulse evoked an MEP yet, so the hot spot is not known either.")
+        x_mm, y_mm, sd_mm = BayesHotSpot(self.half_width_mm).estimate(_by_place(pulses))
+        return ThresholdEstimate(None, hot_spot_mm=(x_mm, y_mm), hot_spot_sd_mm=sd_mm)
+
+    def decision(self, pulses: Sequence[Pulse], space: IntensityRange) -> StopDecision:
+        """Stop when the place is known well, or the budget is used up."""
+        sd_mm = self.estimate(pulses, space).hot_spot_sd_mm
+        if sd_mm is not None and sd_mm <= self.stop_sd_mm:
+            return StopKind.THRESHOLD.stop(f"The hot spot is known to {sd_mm:.1f} mm.")
+        if len(pulses) >= self.max_pulses:
+            higher = "" if sd_mm is not None else " Search with a higher intensity, or in another area."
+            return StopKind.BUDGET.stop(f"The budget of {self.max_pulses} pulses is used up.{higher}")
+        known = "No pulse evoked an MEP yet" if sd_mm is None else f"The hot spot is known to {sd_mm:.1f} mm"
+        return StopKind.THRESHOLD.go_on(f"{known}; {self.stop_sd_mm:g} mm are wanted.")
+
+
+def _by_place(pulses: Sequence[Pulse]) -> list[CoilPulse]:
+    return [CoilPulse(*each.place_mm, each.mep_mv) for each in pulses if each.place_mm and each.mep_mv is not None]
 
 
 def _places(half_width_mm: float, step_mm: float) -> FloatArray:

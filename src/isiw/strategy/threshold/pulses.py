@@ -97,7 +97,7 @@ class IntensityRange(Checked):
                 "the intensity is beyond the limits, or not on their grid",
                 got=intensity_pct_mso,
                 expected=str(self),
-                remedy="Ask for an intensity within the range.",
+                remedy="Choose an intensity within the range.",
             )
 
 
@@ -110,6 +110,7 @@ class Pulse(Checked):
         mep_mv: peak-to-peak amplitude of the MEP [mV]; 0 is below the detection limit. None where it was only seen
             whether there was a response.
         response: whether there was a response; None where the amplitude says it.
+        place_mm: the coil's place from the middle of the searched area [mm], if the hot spot is sought.
 
     Raises:
         InvalidValueError: not exactly one of the two, or a value that cannot be.
@@ -118,6 +119,7 @@ class Pulse(Checked):
     intensity_pct_mso: Annotated[float, partial(number, above=0, most=100)]
     mep_mv: Amplitude | None = None
     response: bool | None = None
+    place_mm: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -134,16 +136,23 @@ class Pulse(Checked):
         return bool(self.response) if self.mep_mv is None else self.mep_mv > RESPONSE_MV
 
 
+def place_text(place_mm: tuple[float, float]) -> str:
+    """A place of the coil, in words."""
+    return f"{round(place_mm[0]):+d} mm forward, {round(place_mm[1]):+d} mm to the right of the middle"
+
+
 @dataclass(frozen=True)
 class ThresholdEstimate:
-    """What is believed about the resting motor threshold.
+    """The estimate of the resting motor threshold.
 
     Args:
         threshold_pct_mso: the threshold [% MSO]; None where there is no number to report, and `reason` says why.
         low_pct_mso: lower end of its 90 % interval; None where the method has none.
         high_pct_mso: upper end of its 90 % interval.
-        sd_pct_mso: SD of what is believed; None where the method has none.
+        sd_pct_mso: SD of the posterior; None where the method has none.
         reason: why there is no number; empty where there is one.
+        hot_spot_mm: in a search for the hot spot, its place from the middle of the searched area [mm].
+        hot_spot_sd_mm: root of the mean squared distance from there [mm].
     """
 
     threshold_pct_mso: float | None
@@ -151,8 +160,12 @@ class ThresholdEstimate:
     high_pct_mso: float | None = None
     sd_pct_mso: float | None = None
     reason: str = ""
+    hot_spot_mm: tuple[float, float] | None = None
+    hot_spot_sd_mm: float | None = None
 
     def __str__(self) -> str:
+        if self.hot_spot_mm is not None:
+            return f"Hot spot: {place_text(self.hot_spot_mm)}, within about {self.hot_spot_sd_mm or 0.0:.0f} mm."
         if self.threshold_pct_mso is None:
             return f"No threshold can be stated. {self.reason}"
         told = f"Resting motor threshold: {self.threshold_pct_mso:.1f} % MSO"
@@ -177,15 +190,15 @@ class ThresholdMethod(Protocol):
         """The next intensity [% MSO], on the grid.
 
         Args:
-            pulses: what was told so far, in order.
+            pulses: the pulses so far, in order.
             space: the intensities that may be asked.
         """
 
     def estimate(self, pulses: Sequence[Pulse], space: IntensityRange) -> ThresholdEstimate:
-        """What is believed now; only asked for where there were responses and pulses without one.
+        """The estimate now; only called if there were responses and pulses without one.
 
         Args:
-            pulses: what was told so far, in order.
+            pulses: the pulses so far, in order.
             space: the intensities that may be asked.
         """
 
@@ -193,8 +206,20 @@ class ThresholdMethod(Protocol):
         """Whether to stop, and why.
 
         Args:
-            pulses: what was told so far, in order.
+            pulses: the pulses so far, in order.
             space: the intensities that may be asked.
+        """
+
+
+@runtime_checkable
+class PlacesCoil(Protocol):
+    """Capability: a method that varies the coil's place instead of the intensity, and learns from amplitudes."""
+
+    def place_mm(self, pulses: Sequence[Pulse]) -> tuple[float, float]:
+        """The next place of the coil [mm].
+
+        Args:
+            pulses: the pulses so far, in order.
         """
 
 

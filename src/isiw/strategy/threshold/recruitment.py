@@ -32,7 +32,7 @@ _FLOOR_WEIGHTS = _FLOOR_WEIGHTS / _FLOOR_WEIGHTS.sum()
 
 @dataclass(frozen=True)
 class RecruitmentBelief(Checked):
-    """What recruitment curves are believed in before the first pulse; all combinations are equally likely.
+    """The possible recruitment curves before the first pulse; all combinations are equally likely.
 
     Args:
         slopes_per_pct: k [1 / % of the threshold].

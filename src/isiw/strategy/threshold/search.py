@@ -7,12 +7,15 @@ from dataclasses import asdict, is_dataclass
 from typing import Any, Final
 
 from isiw.checks import choice, number
+from isiw.errors import InvalidValueError
 from isiw.signals.limits import implausible_scale, require_amplitude
 from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.strategy.threshold.bayes import BayesThreshold, FiveOfTen, MaximumLikelihood
+from isiw.strategy.threshold.hotspot import HotSpotSearch
 from isiw.strategy.threshold.pulses import (
     HasPulseBudget,
     IntensityRange,
+    PlacesCoil,
     Pulse,
     ThresholdEstimate,
     ThresholdMethod,
@@ -31,6 +34,9 @@ METHODS: Final[Mapping[str, type[BayesThreshold | MaximumLikelihood | FiveOfTen]
 _LOOK: Final = "Do the amplitudes grow with the intensity? If they do not, look for hum or an artefact in the EMG."
 """What to do where the budget is used up and the pulses give no number."""
 
+HOT_SPOT: Final = "hot-spot"
+"""The method that seeks the hot spot instead of a threshold."""
+
 
 def list_threshold_methods() -> dict[str, str]:
     """The named ways to a threshold and what each does in a sentence."""
@@ -41,7 +47,7 @@ def make_threshold_search(name: str, space: IntensityRange, **settings: Any) -> 
     """Make a named search.
 
     Args:
-        name: one of `list_threshold_methods()`.
+        name: one of `list_threshold_methods()`, or "hot-spot".
         space: the intensities that may be asked.
         **settings: what differs from the defaults of the method.
 
@@ -49,8 +55,9 @@ def make_threshold_search(name: str, space: IntensityRange, **settings: Any) -> 
         ConfigError: a setting that the method does not have, or an invalid one.
         InvalidValueError: an unknown name.
     """
-    choice("the method", name, METHODS)
-    return ThresholdSearch(name, checked(METHODS[name], settings, f"the settings of {name}"), space)
+    methods: Mapping[str, type[Any]] = {**METHODS, HOT_SPOT: HotSpotSearch}
+    choice("the method", name, methods)
+    return ThresholdSearch(name, checked(methods[name], settings, f"the settings of {name}"), space)
 
 
 class ThresholdSearch:
@@ -77,6 +84,11 @@ class ThresholdSearch:
         intensity = self.method.ask(self.pulses, self.space)
         self.space.require(intensity)
         return intensity
+
+    @property
+    def place_mm(self) -> tuple[float, float] | None:
+        """The next place of the coil from the middle of the searched area [mm]; None if a threshold is sought."""
+        return self.method.place_mm(self.pulses) if isinstance(self.method, PlacesCoil) else None
 
     def tell(self, intensity_pct_mso: float, mep_mv: float | None = None, *, response: bool | None = None) -> None:
         """Learn from one pulse.
@@ -110,10 +122,13 @@ class ThresholdSearch:
             mep_mv = number("mep_mv", mep_mv, least=0)
             told_mv = [pulse.mep_mv for pulse in self.pulses if pulse.mep_mv is not None]
             require_amplitude(mep_mv, implausible_scale([*told_mv, mep_mv]))
-        return Pulse(intensity_pct_mso, mep_mv, response)
+        pulse = Pulse(intensity_pct_mso, mep_mv, response, self.place_mm)
+        if pulse.place_mm and mep_mv is None:
+            raise InvalidValueError("the hot spot is found by amplitudes", got=response, expected="an amplitude in mV")
+        return pulse
 
     def estimate(self) -> ThresholdEstimate:
-        """What is believed now.
+        """The estimate now.
 
         There is no number before a pulse was answered at a higher intensity than one that was not, nor where answered
         pulses are hardly larger than the others.
@@ -129,6 +144,8 @@ class ThresholdSearch:
 
     def _refused(self) -> StopDecision | None:
         """Why the pulses give no number, whatever the method says; None where they may."""
+        if isinstance(self.method, PlacesCoil):
+            return None
         refused = one_sided(self.pulses, self.space) or self._like_hum()
         budget = self._budget
         if refused is None or refused.stop or budget is None or len(self.pulses) < budget:
