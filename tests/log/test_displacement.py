@@ -169,7 +169,7 @@ def test_a_log_that_cannot_go_on_for_its_name_stays_as_it_was(
     before = finished_log.read_bytes()
     with monkeypatch.context() as patched:
         patched.setattr(Path, "replace", no_rename)
-        with pytest.raises(LogError, match=r"cannot go on.*as it was"):
+        with pytest.raises(LogError, match=r"cannot be continued.*as it was"):
             LogWriter.continuing(finished_log, salvage(finished_log), header)
     assert finished_log.read_bytes() == before
     assert list(finished_log.parent.iterdir()) == [finished_log]

@@ -60,7 +60,7 @@ def test_the_picture_shows_profile_trials_window_and_truth(record: SessionRecord
     }  # fmt: skip
     assert profile.get_xlim() == (-4, 204)  # points at the ends of the range are whole
     assert profile.get_xlabel() == "ISI after the valve command [ms]"
-    assert "(6 trials)" in profile.get_title(loc="left")
+    assert "(6 trials" in profile.get_title(loc="left")
 
 
 def test_isis_after_an_electrical_pulse_count_from_it(record: SessionRecord) -> None:
