@@ -1,4 +1,4 @@
-"""What the dissertation's regressions should take for the EMG floor where nobody has told them TMS alone.
+"""What the dissertation's regressions should take for the EMG floor, without TMS alone and with ten trials of it.
 
     python -m benchmarks.fair_opponent --out benchmarks/results/fair_opponent
 
@@ -81,8 +81,8 @@ FITTED: Final = {
     "lowest value of the curve": of_the_curve,
     "MEPs outside the window": outside,
 }
-SET: Final = {"median of all MEPs": "subtracted", "lowest tenth of all MEPs": "lowest", "as they are": "raw"}
-TOLD: Final = f"{ALONE} TMS alone told"
+SET: Final = {"median of all MEPs": "median", "lowest tenth of all MEPs": "lowest", "as they are": "raw"}
+TOLD: Final = f"mean of {ALONE} TMS alone"
 TREATMENTS: Final = (*SET, *FITTED, TOLD)
 
 
@@ -122,7 +122,7 @@ def treated(usual: isiw.Strategy, treatment: str) -> isiw.Strategy:
 
 def f1_by_trial(method: str, cohort: str, person: int, seed: int, treatment: str, trials: int) -> list[float]:
     """One session of so many trials: F1 after each."""
-    settings = (("floor", SET[treatment]),) if treatment in SET else ()
+    settings = () if treatment in FITTED else (("floor", SET.get(treatment, "subtracted")),)
     alone = ALONE if treatment == TOLD else 0
     session = Session(method, cohort, person, seed, reading_of(cohort), horizon=trials, alone=alone, settings=settings)
     change = (lambda usual: treated(usual, treatment)) if treatment in FITTED else (lambda usual: usual)

@@ -88,7 +88,7 @@ _ALONE: Final[dict[str, dict[str, Any]]] = {
     "observation: mean of ten": {"observation": "mean"},
     "outside the window: zero": {"outside": "zero"},
     "floor: raw": {"floor": "raw"},
-    "floor: median of all MEPs": {"floor": "subtracted"},
+    "floor: median of all MEPs": {"floor": "median"},
     "pseudo-code: either edge, six": {"edges": "either", "last": 6},
     "range end: hit + 500": {"range_end": "hit"},
 }

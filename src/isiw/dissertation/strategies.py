@@ -212,8 +212,8 @@ class Passing(Checked):
 
 
 NR: Final = Settings(RegressionModel(NonlinearRegression(), FloorTreatment("lowest")), EvenStart(initial=6), Settling())
-SVMR: Final = Settings(RegressionModel(SupportVectorRegression()), EvenStart(), Settling())
-GPR: Final = Settings(RegressionModel(GaussianProcessRegression()), EvenStart(), Settling())
+SVMR: Final = Settings(RegressionModel(SupportVectorRegression(), FloorTreatment("median")), EvenStart(), Settling())
+GPR: Final = Settings(RegressionModel(GaussianProcessRegression(), FloorTreatment("median")), EvenStart(), Settling())
 PF: Final = Settings(BootstrapFilter(), OwnPlan(), Converging())
 SWEEP: Final = Settings(SweepModel(), OwnPlan(), Passing())
 """The incremental sweep (4.2.1)."""

@@ -28,7 +28,12 @@ def test_the_lowest_tenth_is_no_higher_where_most_trials_lie_inside_the_window()
     inside = [0.01, 0.012, 0.2, 0.25, 0.3, 0.22, 0.28, 0.31, 0.26, 0.24, 0.27]
     assert FloorTreatment("lowest").level_mv(trials(inside)) == pytest.approx(0.012)
     assert FloorTreatment("subtracted").level_mv(trials(inside)) > 0.2
-    assert FloorTreatment("lowest").level_mv(trials(inside, [0.02])) == 0.02
+
+
+@pytest.mark.parametrize("kind", ["median", "lowest"])
+def test_tms_alone_does_not_change_a_floor_that_is_guessed_from_the_pairs(kind: FloorKind) -> None:
+    pairs = [0.01, 0.012, 0.2, 0.25, 0.3]
+    assert FloorTreatment(kind).level_mv(trials(pairs, [0.05])) == FloorTreatment(kind).level_mv(trials(pairs))
 
 
 @pytest.mark.parametrize("kind", ["zeroed", "raw"])

@@ -180,10 +180,10 @@ class AmplitudeHistory:
         return PersonTrials(isi_ms[~alone], mep_mv[~alone], mep_mv[alone])
 
 
-FloorKind: TypeAlias = Literal["subtracted", "lowest", "zeroed", "raw"]
+FloorKind: TypeAlias = Literal["subtracted", "median", "lowest", "zeroed", "raw"]
 
-GUESSED_AT: Final = {"subtracted": 0.5, "lowest": 0.1}
-"""Which quantile of all MEPs is the guess where TMS alone was not told."""
+GUESSED_AT: Final = {"subtracted": 0.5, "median": 0.5, "lowest": 0.1}
+"""Which quantile of all MEPs is the guess."""
 
 
 @dataclass(frozen=True)
@@ -193,10 +193,10 @@ class FloorTreatment(Checked):
     The dissertation's plots have amplitudes of zero outside the window, and it does not say why [Kim2020, 4.3].
 
     Args:
-        floor: `"subtracted"`, `"lowest"`: the expected MEP of TMS alone is subtracted; where that was not told, the
-            median or the lowest tenth of all MEPs. The median is too high where a method asks mostly inside the window.
-            `"zeroed"`: an MEP below the threshold is 0. `"raw"`: MEPs as they are; where the floor exceeds 0.135 of the
-            peak, such a curve has no edges.
+        floor: `"subtracted"`: the mean MEP of TMS alone is subtracted; without TMS alone, the median of all MEPs.
+            `"median"`, `"lowest"`: the median or the lowest tenth of all MEPs is, with or without TMS alone; the
+            median is too high where a method asks mostly inside the window. `"zeroed"`: an MEP below the threshold
+            is 0. `"raw"`: MEPs as they are; where the floor exceeds 0.135 of the peak, such a curve has no edges.
         threshold_mv: of `"zeroed"` [mV]; the dissertation's thresholds of a response are 0.015–0.033 mV (4.1.1).
     """
 
@@ -207,7 +207,7 @@ class FloorTreatment(Checked):
         """What is subtracted from the MEPs of one person [mV]: the mean of TMS alone, or a guess at it."""
         if self.floor not in GUESSED_AT:
             return 0.0
-        if len(trials.baseline_mv):
+        if self.floor == "subtracted" and len(trials.baseline_mv):
             return float(trials.baseline_mv.mean())
         return float(np.quantile(trials.mep_mv, GUESSED_AT[self.floor])) if len(trials.mep_mv) else 0.0
 
