@@ -1,6 +1,6 @@
 """The default on people whom its prior was written for, and on unusual people.
 
-    python -m benchmarks.people --cohorts recruitment,gaussian,late --hit-delay stated --out benchmarks/results/people
+    python -m benchmarks.people --cohorts recruitment,gaussian --people 200 --out benchmarks/results/people_usual
     python -m benchmarks.people --cohorts electrical --space impact --out benchmarks/results/people_electrical
 
 writes tables (Markdown) and their figures with versions, command and seeds (JSON): F1 and coverage by trial, what the
@@ -11,6 +11,7 @@ seeds below 1,000 are for work.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -97,6 +98,13 @@ def _means(groups: pd.core.groupby.DataFrameGroupBy, names: list[str]) -> pd.Dat
     return both[["n", *(column for name in names for column in (name, f"{name}_se"))]]
 
 
+def kept(path: Path, run_all: Callable[[], pd.DataFrame]) -> pd.DataFrame:
+    """Rows from a file in the study's folder, so that a run that was interrupted does not repeat them."""
+    if not path.is_file():
+        run_all().to_parquet(path)
+    return pd.read_parquet(path)
+
+
 def main(  # noqa: PLR0913, PLR0917 - an option each
     cohorts: Annotated[str, typer.Option(help="Cohorts, comma-separated.")] = "recruitment,gaussian,nonresponder",
     people: Annotated[int, typer.Option(help="People a cohort.")] = 100,
@@ -123,9 +131,10 @@ def main(  # noqa: PLR0913, PLR0917 - an option each
         space=space_of(space),
     )
     with Progress() as progress:
-        rows = run(study, out.with_suffix(".study"), workers, progress)
-        oracle = run_oracle(study, workers, progress)
-        second = run_oracle(study, workers, progress, simulate_second_oracle)
+        folder = out.with_suffix(".study")
+        rows = run(study, folder, workers, progress)
+        oracle = kept(folder / "oracle.parquet", lambda: run_oracle(study, workers, progress))
+        second = kept(folder / "second.parquet", lambda: run_oracle(study, workers, progress, simulate_second_oracle))
     tables = {
         "By trial": by_trial(rows, oracle, second).reset_index(),
         "Without any trial": without_any_trial(study.cohorts, people, seed, study.space),

@@ -1,16 +1,14 @@
-"""Three rules of the dissertation as they are printed, each beside ours, and what the difference does.
+"""Rules of the dissertation as they are printed, each beside ours, and what the difference does.
 
     python -m benchmarks.rules_as_printed --out benchmarks/results/rules_as_printed
 
-- The resting motor threshold: the lowest intensity at which *more than* five of ten pulses evoke an MEP (4.2.1), beside
-  at least five; `isiw threshold --method five-of-ten --enough 6`.
 - The conventional sweep: 500 ms in steps of 5 ms, twelve trials each, "a maximum of 600 trials" (4.2.1), which end at
   245 ms, beside the 1,212 that the range has.
 - The impact: the first falling crossing of the first reading, within a hysteresis, after the hammer has begun to move
   (5.2.2), and the first zero crossing after that (4.2.1), beside `isiw.signals.impact_times`. The text gives neither
   the hysteresis nor the threshold of the motion.
 
-Simulated people and taps, whose true threshold, window and impact are known.
+Simulated people and taps, whose true window and impact are known.
 """
 
 from __future__ import annotations
@@ -30,7 +28,6 @@ from benchmarks.provenance import facts_of
 from benchmarks.quick import understood
 from benchmarks.reduction.recorded import STEP_MS, SWEPT, TRIALS_PER_ISI, RecordedSweep, record
 from benchmarks.tables import write_tables
-from benchmarks.threshold import Way, made, threshold_row
 from isiw.devices.robot.mechanism import draw_taps
 from isiw.devices.robot.tapper import preset
 from isiw.devices.robot.waveforms import record_robot, sample_times_ms
@@ -51,16 +48,6 @@ HYSTERESIS: Final = (0.0, 0.02, 0.1)
 LATE_MS: Final = 2.0
 BUDGETS: Final = (1212, 600)
 COHORTS: Final = ("kim11-measured", "recruitment", "kim11")
-
-
-def thresholds(people: int, seed: int) -> pd.DataFrame:
-    """Five of ten, at least and more than, by cohort."""
-    ways = (
-        Way("at least five of ten", made("five-of-ten")),
-        Way("more than five of ten, as printed", made("five-of-ten", enough=6)),
-    )
-    cohorts = isiw.subjects.THRESHOLD_COHORTS
-    return pd.DataFrame([threshold_row(cohort, way, people, seed) for cohort in cohorts for way in ways])
 
 
 def sweeps(people: int, seed: int) -> pd.DataFrame:
@@ -149,9 +136,8 @@ def main(
     seed: Annotated[int, typer.Option(help="Seed of people and taps.")] = 10_000,
     out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("rules_as_printed"),
 ) -> None:
-    """Compare the three rules."""
+    """Compare the rules."""
     tables = {
-        "The resting motor threshold: errors in % MSO": thresholds(people, seed),
         "The budget of the conventional sweep": sweeps(people, seed),
         "The impact: errors against the true one": impacts(2 * people, seed),
     }
