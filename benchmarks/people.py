@@ -1,6 +1,6 @@
 """The default on people whom its prior was written for, and on unusual people.
 
-    python -m benchmarks.people --cohorts recruitment,gaussian --people 200 --out benchmarks/results/people_usual
+    python -m benchmarks.people --cohorts recruitment,gaussian,late --people 200 --out benchmarks/results/people
     python -m benchmarks.people --cohorts electrical --space impact --out benchmarks/results/people_electrical
 
 writes tables (Markdown) and their figures with versions, command and seeds (JSON): F1 and coverage by trial, what the
@@ -12,6 +12,7 @@ seeds below 1,000 are for work.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -21,7 +22,7 @@ import typer
 from rich.progress import Progress
 
 from benchmarks.acquisition import run, run_oracle, space_of
-from benchmarks.oracle import simulate_second_oracle
+from benchmarks.oracle import simulate_oracle, simulate_second_oracle
 from benchmarks.provenance import facts_of
 from benchmarks.quick import understood
 from benchmarks.tables import write_tables
@@ -33,17 +34,24 @@ from isiw.studies import Study, StudyStrategy
 MARKS = (5, 10, 15, 20, 25, 30, 40, 50, 60, 80)
 TENTHS = 10
 NONRESPONDER = "nonresponder"
+ORACLES = {"oracle": simulate_oracle, "second": simulate_second_oracle}
 
 
-def by_trial(rows: pd.DataFrame, oracle: pd.DataFrame, second: pd.DataFrame) -> pd.DataFrame:
-    """F1, by how much that of both oracles is larger on the same people, and coverage; with their standard errors."""
+def by_trial(rows: pd.DataFrame, *oracles: pd.DataFrame) -> pd.DataFrame:
+    """F1, by how much that of oracles is larger on the same people, and coverage; with their standard errors.
+
+    Args:
+        rows: of the default.
+        oracles: rows of those of `ORACLES`, in their order, as far as they were run.
+    """
     keys = ["cohort", "person", "trial"]
     same = pd.MultiIndex.from_frame(rows[keys])
     found = rows.assign(called_none=~rows["reported_window"].astype(bool))
-    for name, others in (("behind_oracle", oracle), ("behind_second", second)):
+    behind = [f"behind_{name}" for name, _ in zip(ORACLES, oracles, strict=False)]
+    for name, others in zip(behind, oracles, strict=True):
         found[name] = others.set_index(keys)["f1"].reindex(same).to_numpy() - rows["f1"]
     grouped = found.groupby(["cohort", "trial"])
-    names = ["f1", "behind_oracle", "behind_second", "expected_f1", "start_covered", "end_covered"]
+    names = ["f1", *behind, "expected_f1", "start_covered", "end_covered"]
     return _means(grouped, names).assign(called_none=grouped["called_none"].mean())
 
 
@@ -115,6 +123,8 @@ def main(  # noqa: PLR0913, PLR0917 - an option each
     space: Annotated[str, typer.Option(help="valve or impact, or with another high end [ms]: impact:100.")] = "valve",
     workers: Annotated[int, typer.Option(help="Processes.")] = 2,
     out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("people"),
+    *,
+    oracles: Annotated[bool, typer.Option(help="Run both oracles on the same people.")] = True,
 ) -> None:
     """Run the default on simulated people."""
     study = Study(
@@ -133,10 +143,13 @@ def main(  # noqa: PLR0913, PLR0917 - an option each
     with Progress() as progress:
         folder = out.with_suffix(".study")
         rows = run(study, folder, workers, progress)
-        oracle = kept(folder / "oracle.parquet", lambda: run_oracle(study, workers, progress))
-        second = kept(folder / "second.parquet", lambda: run_oracle(study, workers, progress, simulate_second_oracle))
+        found = [
+            kept(folder / f"{name}.parquet", partial(run_oracle, study, workers, progress, simulate))
+            for name, simulate in ORACLES.items()
+            if oracles
+        ]
     tables = {
-        "By trial": by_trial(rows, oracle, second).reset_index(),
+        "By trial": by_trial(rows, *found).reset_index(),
         "Without any trial": without_any_trial(study.cohorts, people, seed, study.space),
         "At the stopping rule": at_stopping(rows).reset_index(),
         "Expected F1": foretold(rows).reset_index(),

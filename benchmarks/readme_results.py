@@ -80,21 +80,20 @@ def reproduction() -> str:
 def curves_of(cohort: str) -> pd.DataFrame:
     """What the picture shows of a cohort: trial, F1 and its standard error of each method, a row a marked trial.
 
-    The oracles have no standard error of their own: what is known is by how much the default is behind them.
+    The oracles have no standard error of their own: they are there to be compared on the same people.
     """
     default = (
         _table("people.json", "By trial").assign(strategy="default").rename(columns={"start_covered": "start_coverage"})
     )
-    oracle = default.assign(strategy="oracle", f1=default["f1"] + default["behind_oracle"], f1_se=0.0)
-    both = _table("two_oracles.json", "Both oracles").assign(strategy="second", f1_se=0.0)
-    second = both.drop(columns="f1").rename(columns={"second": "f1"})
-    rows = pd.concat([default, oracle, second[["cohort", "trial", "strategy", "f1", "f1_se"]], opponents()])
+    both = _table("two_oracles.json", "Both oracles").assign(f1_se=0.0)
+    oracles = both.melt(["cohort", "trial", "f1_se"], ["oracle", "second"], var_name="strategy", value_name="f1")
+    rows = pd.concat([default, oracles, opponents()])
     return rows[(rows["cohort"] == cohort) & (rows["trial"] <= LAST)]
 
 
 def opponents() -> pd.DataFrame:
-    """The dissertation's methods, as the reproduction ran them without TMS alone: a row a marked trial."""
-    sections = json.loads((RESULTS / "trial_reduction.json").read_text(encoding="utf-8"))["sections"]
+    """The dissertation's methods without TMS alone: a row a marked trial."""
+    sections = json.loads((RESULTS / "headline.json").read_text(encoding="utf-8"))["sections"]
     tables = [table for section in sections for table in section["tables"]]
     equal = pd.DataFrame(next(table["rows"] for table in tables if table["caption"].startswith("Equal trials")))
     names = {NAMES[method]: method for method in ("nr", "svmr", "gpr", "pf")}
@@ -135,7 +134,7 @@ def picture() -> Figure:
     return figure
 
 
-def _table(name: str, title: str = "F1 by trial") -> pd.DataFrame:
+def _table(name: str, title: str) -> pd.DataFrame:
     return pd.DataFrame(json.loads((RESULTS / name).read_text(encoding="utf-8"))[title])
 
 

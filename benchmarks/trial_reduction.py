@@ -1,4 +1,4 @@
-"""The dissertation's reduction of trials, reproduced, and the default strategy beside it.
+"""The dissertation's reduction of trials, reproduced.
 
     python -m benchmarks.trial_reduction --quick
     python -m benchmarks.trial_reduction
@@ -26,11 +26,9 @@ from benchmarks.dissertation.claims import claims_as_json
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
 from benchmarks.reduction import (
-    before,
     comparison,
     conventional,
     gaussians,
-    headline,
     initial,
     online,
     particles,
@@ -48,7 +46,8 @@ Measured = tuple[dict[str, pd.DataFrame], list[Any]]
 """The sessions' rows by part, and the sessions on waveforms."""
 
 RESULTS = Path("benchmarks/results/trial_reduction")
-PARTS = (comparison, reading_table, pf_readings, headline, initial, particles, gaussians, wrong)
+TITLE = "The dissertation's reduction of trials, reproduced"
+PARTS = (comparison, reading_table, pf_readings, initial, particles, gaussians, wrong)
 VERSIONS = ("numpy", "scipy", "torch", "scikit-learn", "statsmodels")
 
 
@@ -66,11 +65,8 @@ def report(found: Measured, facts: dict[str, Any], out: Path) -> None:
     named, waveforms = found
     rows = {part: named[part.__name__] for part in PARTS}
     claims = verdicts.all_claims(rows, waveforms)
-    zero = before.table(rows[headline], facts["seed"])
     sections = [
         verdicts.section(claims),
-        before.section(zero),
-        headline.section(rows[headline]),
         comparison.section(rows[comparison]),
         reading_table.section(rows[reading_table]),
         pf_readings.section(rows[pf_readings]),
@@ -81,8 +77,8 @@ def report(found: Measured, facts: dict[str, Any], out: Path) -> None:
         gaussians.section(rows[gaussians], rows[comparison]),
         online.section(waveforms),
     ]
-    opening = verdicts.opening(claims, rows[comparison], zero)
-    write(sections, facts, out, opening, claims_as_json(claims))
+    opening = verdicts.opening(claims, rows[comparison])
+    write(sections, facts, out, TITLE, opening, claims_as_json(claims))
 
 
 def facts(size: Size, seed: int, processes: int, took: str) -> dict[str, object]:

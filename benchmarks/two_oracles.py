@@ -2,14 +2,12 @@
 
     python -m benchmarks.two_oracles --cohorts recruitment,gaussian --people 200 --out benchmarks/results/two_oracles
 
-writes tables (Markdown, JSON) of both on the same people, paired, and of the default where `people.json` has it of as
-many of the same people. What is behind the second oracle can still be gained; the first knows more than anybody can
-before a person's first MEP.
+writes a table (Markdown, JSON) of both on the same people, paired. What is behind the second oracle can still be
+gained; the first knows more than anybody can before a person's first MEP.
 """
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -24,7 +22,6 @@ from benchmarks.tables import write_tables
 from isiw.design import VALVE_SPACE
 from isiw.studies import paired_sessions, run_study
 
-PEOPLE = Path(__file__).parent / "results" / "people.json"
 MARKS = (5, 10, 15, 20, 30, 40)
 TITLE = "Both oracles"
 KEYS = ["cohort", "person", "trial"]
@@ -51,25 +48,12 @@ def both(cohorts: list[str], people: int, seed: int, trials: int, workers: int, 
     return pd.DataFrame(found).reset_index()
 
 
-def table(rows: pd.DataFrame, default: pd.DataFrame) -> pd.DataFrame:
-    """Means by cohort and trial, what the knowledge is worth with its standard error, and the default behind both.
-
-    Args:
-        rows: as `both` gives them.
-        default: cohort, trial, n and f1 of the default on the same people; rows of another number are left out.
-    """
+def table(rows: pd.DataFrame) -> pd.DataFrame:
+    """Means by cohort and trial, and what the knowledge is worth with its standard error; rows as `both` gives them."""
     groups = rows.assign(knowledge=rows["oracle"] - rows["second"]).groupby(["cohort", "trial"], sort=False)
     means = groups[["oracle", "second", "knowledge"]].mean().assign(knowledge_se=groups["knowledge"].sem())
     means.insert(0, "n", groups.size())
-    merged = means.reset_index().merge(default, on=["cohort", "trial", "n"], how="left")
-    return merged.assign(behind_oracle=merged["oracle"] - merged["f1"], behind_second=merged["second"] - merged["f1"])
-
-
-def of_the_default(seed: int) -> pd.DataFrame:
-    """The committed F1 of the default on people of this seed; none of another."""
-    content = json.loads(PEOPLE.read_text(encoding="utf-8"))
-    rows = pd.DataFrame(content["By trial"])[["cohort", "trial", "n", "f1"]]
-    return rows if content["facts"]["seed"] == seed else rows[:0]
+    return means.reset_index()
 
 
 def main(
@@ -84,7 +68,7 @@ def main(
     with Progress() as progress:
         rows = both(cohorts.split(","), people, seed, trials, workers, progress)
     facts = facts_of("two_oracles", "numpy", seed=seed, people=people, p_window=P_WINDOW)
-    write_tables({TITLE: table(rows, of_the_default(seed))}, facts, out)
+    write_tables({TITLE: table(rows)}, facts, out)
     print(out.with_suffix(".md").read_text(encoding="utf-8"))
 
 

@@ -45,7 +45,12 @@ class Section:
 
 
 def write(
-    sections: Sequence[Section], facts: Mapping[str, Any], out: Path, opening: str = "", claims: Sequence[Any] = ()
+    sections: Sequence[Section],
+    facts: Mapping[str, Any],
+    out: Path,
+    title: str,
+    opening: str = "",
+    claims: Sequence[Any] = (),
 ) -> None:
     """Write `out`.md, `out`.json and the figures `out`_NAME.png.
 
@@ -53,12 +58,13 @@ def write(
         sections: the parts.
         facts: command, versions and seeds, for the top.
         out: path without suffix.
+        title: of the whole.
         opening: the first paragraph.
         claims: what the text claims, with verdicts, as records of strings.
     """
     out.parent.mkdir(parents=True, exist_ok=True)
     header = [f"- {key}: {value}" for key, value in facts.items()]
-    lines = ["# The dissertation's reduction of trials, reproduced", "", fill(opening, 120), "", *header, ""]
+    lines = [f"# {title}", "", fill(opening, 120), "", *header, ""]
     for section in sections:
         lines += _markdown(section, out)
     out.with_suffix(".md").write_text("\n".join(lines).rstrip() + "\n")

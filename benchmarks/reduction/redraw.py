@@ -20,36 +20,37 @@ from benchmarks.quick import understood
 from benchmarks.reduction import comparison, headline, initial, particles
 from benchmarks.reduction.document import DPI
 
-RESULTS = Path(__file__).parents[1] / "results" / "trial_reduction.json"
+RESULTS = Path(__file__).parents[1] / "results"
 
 
 def redrawn(results: Path = RESULTS) -> dict[str, Figure]:
     """The figures by name.
 
     Args:
-        results: the tables, as `document.write` writes them.
+        results: folder of the tables, as `document.write` writes them.
     """
-    sections = json.loads(results.read_text(encoding="utf-8"))["sections"]
     tables = {
         section["title"].partition(" (")[0]: [pd.DataFrame(table["rows"]) for table in section["tables"]]
-        for section in sections
+        for name in ("trial_reduction", "headline")
+        for section in json.loads((results / f"{name}.json").read_text(encoding="utf-8"))["sections"]
     }
-    told = tables["The headline: equal trials, equal F1"]
+    told = tables["Equal trials, equal F1"]
     duels, equal = dict(zip(headline.NOISE, told, strict=False)), told[2 * len(headline.NOISE)]
     return {
-        "headline": headline.figure(equal[equal["TMS alone"] == 0], duels),
-        "methods": comparison.figure(tables["The methods side by side"][0]),
-        "initial": initial.figure(tables["How many initial observations"][0]),
-        "particles": particles.figure(*tables["How many particles"]),
+        "headline_by_trial": headline.figure(equal[equal["TMS alone"] == 0], duels),
+        "trial_reduction_methods": comparison.figure(tables["The methods side by side"][0]),
+        "trial_reduction_initial": initial.figure(tables["How many initial observations"][0]),
+        "trial_reduction_particles": particles.figure(*tables["How many particles"]),
     }
 
 
-def main(out: Annotated[Path, typer.Option(help="Path of the figures, without their names.")] = RESULTS) -> None:
+def main(out: Annotated[Path, typer.Option(help="Folder of the figures.")] = RESULTS) -> None:
     """Draw the figures again."""
+    out.mkdir(parents=True, exist_ok=True)
     for name, figure in redrawn().items():
         for axes in figure.axes:
             axes.title.set_fontsize(9)
-        figure.savefig(out.with_name(f"{out.stem}_{name}.png"), dpi=DPI)
+        figure.savefig(out / f"{name}.png", dpi=DPI)
 
 
 if __name__ == "__main__":

@@ -17,11 +17,8 @@ class Size:
         kim_default: how many of those of `kim11-measured` the default plays too, which takes longer than all others.
         people: people of `recruitment` in the main comparison.
         people_default: how many of them, and of `kim11`, the default plays too.
-        headline: people of each cohort of the headline.
-        headline_default: how many of those the default plays too.
         sweep: sessions for each number of initial observations or particles.
         readings: sessions for each reading.
-        horizon: trials of the default's learning curve in the headline.
         online: sessions on waveforms with each of two people.
         default: settings of the default; none of its own where everything is run.
     """
@@ -30,11 +27,8 @@ class Size:
     kim_default: int
     people: int
     people_default: int
-    headline: int
-    headline_default: int
     sweep: int
     readings: int
-    horizon: int
     online: int
     default: tuple[tuple[str, int], ...] = ()
 
@@ -44,11 +38,8 @@ FULL: Final = Size(
     kim_default=0,
     people=11,
     people_default=0,
-    headline=22,
-    headline_default=11,
     sweep=6,
     readings=11,
-    horizon=40,
     online=1,
 )
 FEW: Final = Size(
@@ -56,11 +47,8 @@ FEW: Final = Size(
     kim_default=2,
     people=2,
     people_default=2,
-    headline=2,
-    headline_default=2,
     sweep=2,
     readings=1,
-    horizon=6,
     online=1,
     default=(("max_trials", 6),),
 )

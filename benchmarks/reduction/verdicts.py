@@ -11,7 +11,6 @@ import pandas as pd
 
 from benchmarks.dissertation.claims import KINDS, REPRODUCED, Claim, by_kind, claims_as_json, put_to_test
 from benchmarks.reduction import (
-    before,
     comparison,
     gaussians,
     initial,
@@ -143,13 +142,12 @@ def caught_by(claims: Sequence[Claim]) -> pd.DataFrame:
     )
 
 
-def opening(claims: Sequence[Claim], main: pd.DataFrame, zero: pd.DataFrame) -> str:
-    """What comes out as printed, what does not, and what F1 there is before any trial.
+def opening(claims: Sequence[Claim], main: pd.DataFrame) -> str:
+    """What comes out as printed, and what does not.
 
     Args:
         claims: all of them.
         main: sessions of the comparison.
-        zero: as from `before.table`.
     """
     table = comparison.summary(main[main["cohort"] == PEOPLE])
     counts = by_kind(claims)
@@ -169,7 +167,6 @@ def opening(claims: Sequence[Claim], main: pd.DataFrame, zero: pd.DataFrame) -> 
         f"Trials: {in_words(trials, 0)} (text: {in_words(theirs['trials'], 0)}).",
         f"Runs that converge: {in_words(converged, 0)} % (text: {in_words(shares, 0)} %).",
         "Which method a bar of Fig. 4.24 (trials) and 4.25 (F1) belongs to was inferred: likely, not certain.",
-        before.in_words(zero[zero["cohort"] == PEOPLE]),
     )
     return " ".join(sentences)
 

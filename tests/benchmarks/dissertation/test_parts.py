@@ -21,7 +21,8 @@ def told(_size: Size, seed: int) -> Told:
     return Told("Simulated.", [claim], {"Fig. 3.8": Figure()})
 
 
-def test_a_part_is_kept_with_its_claims_pictures_and_command(tmp_path: Path) -> None:
+def test_a_part_is_kept_with_its_claims_pictures_and_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.argv", ["dissertation"])
     path = tmp_path / "gallery" / "events.json"
     keep(told, path, FEW, 7)
     assert [claim.ours for claim in read_claims(path)] == ["7"]

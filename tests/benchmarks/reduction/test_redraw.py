@@ -16,14 +16,17 @@ def figures() -> dict[str, Figure]:
 
 
 def test_no_legend_stands_over_a_panel(figures: dict[str, Figure]) -> None:
-    assert set(figures) == {"headline", "methods", "initial", "particles"}
+    assert set(figures) == {
+        "headline_by_trial",
+        *(f"trial_reduction_{name}" for name in ("methods", "initial", "particles")),
+    }
     for figure in figures.values():
         assert len(figure.legends) == 1
         assert all(axes.get_legend() is None for axes in figure.axes)
 
 
 def test_a_method_has_the_colour_that_it_has_everywhere(figures: dict[str, Figure]) -> None:
-    lines = {str(line.get_label()): line for line in figures["headline"].axes[0].lines}
+    lines = {str(line.get_label()): line for line in figures["headline_by_trial"].axes[0].lines}
     assert {name: lines[name].get_color() for name in ("NR", "SVMR", "GPR", "default")} == {
         "NR": STRATEGY_COLOURS["nr"], "SVMR": STRATEGY_COLOURS["svmr"], "GPR": STRATEGY_COLOURS["gpr"],
         "default": STRATEGY_COLOURS["default"],
