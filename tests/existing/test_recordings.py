@@ -139,6 +139,38 @@ def test_recordings_in_memory_are_read_too() -> None:
         require_as_written(person)
 
 
+@pytest.mark.parametrize("date", [None, 1_700_000_000])
+def test_a_recording_that_was_cropped_is_read_as_the_whole_one(date: int | None, tmp_path: Path) -> None:
+    made = raw()
+    made.set_meas_date(date)
+    made.crop(0.5, None).save(tmp_path / "P01_raw.fif.gz")
+    for source in (made, tmp_path / "P01_raw.fif.gz"):
+        (person,) = read_people(source, KNOWN)
+        require_as_written(person)
+
+
+def test_a_trigger_channel_has_events_too() -> None:
+    emg_mv, events = recording()
+    trigger = np.zeros_like(emg_mv)
+    for at_s, name in events:
+        trigger[round(at_s * RATE_HZ) :][:8] = int(name[-1])
+    info = mne.create_info(["FCR", "STI 014"], RATE_HZ, ["emg", "stim"])
+    made = mne.io.RawArray(np.stack([1e-3 * emg_mv, trigger]), info)
+    (person,) = read_people(made, Layout(reference="impact", markers={"tap": "1", "pulse": "2"}))
+    require_as_written(person)
+
+
+def test_the_metadata_of_epochs_say_units_and_tms_alone() -> None:
+    for cells in ({"ISI (s)": [isi / 1e3 for isi in (*ISIS_MS, np.nan)]}, {"isi_ms": [*map(str, ISIS_MS), "TMS"]}):
+        made = epochs()
+        made.metadata = pd.DataFrame(cells)
+        (person,) = read_people(made, KNOWN)
+        require_as_written(person)
+    made.metadata = None
+    with pytest.raises(IsiwError, match="isi_ms in their metadata"):
+        read_people(made, KNOWN)
+
+
 def test_what_was_recorded_is_in_the_log_and_in_what_is_exported_and_read_again(tmp_path: Path) -> None:
     (person,) = read_people(as_edf(tmp_path), KNOWN)
     space = isiw.DesignSpace(20, 130, reference="impact")
@@ -161,6 +193,8 @@ BROKEN: dict[str, tuple[dict[str, Any], str]] = {
     "no marker of the pulse": ({"markers": {}}, "--marker pulse=NAME"),
     "no marker of the tap": ({"markers": {"pulse": "S  2"}}, "--marker tap=NAME"),
     "a marker that is not there": ({"markers": {"pulse": "S 99"}}, "no event of this name"),
+    "one marker for both": ({"markers": {"tap": "S 2", "pulse": "S2"}}, "cannot mark both"),
+    "markers swapped": ({"markers": {"tap": "S 2", "pulse": "S 1"}}, "which marker is of the tap"),
     "a channel that is not there": ({"channels": {"emg": "FDI"}}, "no such channel"),
     "no valve": ({"reference": "valve"}, "--marker valve=NAME"),
 }

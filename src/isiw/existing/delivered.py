@@ -65,7 +65,10 @@ class Delivered:
             raise InvalidValueError(f"{self.named} has more trials than any session", got=len(self.trials))
         isis_ms = [trial.isi_ms for trial in self.trials if trial.isi_ms is not None]
         if not isis_ms:
-            raise InvalidValueError(f"{self.named} has no pair of stimuli", remedy="Which column holds the ISIs?")
+            raise InvalidValueError(
+                f"{self.named} has no pair of stimuli",
+                remedy="Which column holds the ISIs, or which marker is of the tap?",
+            )
         judged = [trial for trial in self.trials if trial.told or trial.reason is Kind.IMPLAUSIBLE]
         meps_mv = [trial.mep_mv for trial in judged if trial.mep_mv is not None]
         self._require_not_swapped(isis_ms, meps_mv)

@@ -36,7 +36,9 @@ def read_people(source: str | Path | Any, layout: Layout | None = None, *, subje
         return [read_log(path)]
     if not path.exists():
         raise InvalidValueError("there is no such file", got=str(path), remedy="Check the path.")
-    suffix = path.suffix.lower()
+    suffix = (
+        Path(path.name.lower().removesuffix(".gz")).suffix if path.name.endswith(".fif.gz") else path.suffix.lower()
+    )
     if suffix in recordings.SUFFIXES:
         return [recordings.read_recording(path, layout, subject or path.stem)]
     if path.is_dir() or suffix not in frames.SUFFIXES:
@@ -45,7 +47,7 @@ def read_people(source: str | Path | Any, layout: Layout | None = None, *, subje
             "this cannot be read",
             got=path.name,
             expected=f"a file of {', '.join(known)}",
-            remedy="Save it as one of these, such as CSV.",
+            remedy="Save or export it as one of these, such as CSV; of BrainVision's files name the .vhdr.",
         )
     if "emg" in layout.channels:
         return [waves.read_waves(path, layout, subject or path.stem)]

@@ -19,6 +19,7 @@ from isiw.existing.delivered import Delivered, renumbered
 from isiw.existing.frames import extra
 from isiw.existing.layout import Layout
 from isiw.existing.people import required_reference
+from isiw.existing.tables import isis_of
 from isiw.lazy import pd
 from isiw.signals.judgement import judge
 from isiw.signals.limits import EMG_UNITS_MV, SignalLimits
@@ -28,11 +29,11 @@ from isiw.types import FloatArray, Reference
 SUFFIXES: Final = {".vhdr", ".edf", ".bdf", ".fif", ".set", ".cnt", ".gdf", ".mff"}
 
 _KNOWN: Final[Mapping[str, tuple[str, ...]]] = {
-    "pulse": ("tms", "pulse", "tms pulse", "magnetic pulse"),
-    "tap": ("tap", "impact", "hit", "electrical pulse", "conditioning", "pns"),
-    "valve": ("valve", "valve command"),
+    "pulse": ("tms", "pulse", "tmspulse", "magneticpulse"),
+    "tap": ("tap", "impact", "hit", "electricalpulse", "conditioning", "pns"),
+    "valve": ("valve", "valvecommand"),
 }
-"""What events are called that need not be named."""
+"""What events are called that need not be named, without blanks."""
 
 _BEFORE_MS: Final = 150.0
 _AFTER_MS: Final = 100.0
@@ -66,7 +67,9 @@ def read_recording(path: Path, layout: Layout, subject: str) -> Delivered:
     except Exception as error:  # each format has errors of its own
         why, *_ = str(error).splitlines() or [type(error).__name__]
         raise InvalidValueError(
-            f"the recording cannot be read: {why}", got=str(path), remedy="Are all of its files in one folder?"
+            f"the recording cannot be read: {why}",
+            got=str(path),
+            remedy="Are all of its files in one folder, and is it continuous?",
         ) from error
     if is_epochs:
         return of_epochs(found, layout, subject, path.name)
@@ -85,28 +88,25 @@ def of_raw(
 def of_epochs(epochs: Any, layout: Layout, subject: str, source: str = "the epochs") -> Delivered:
     """The trials of `mne.Epochs` about the pulse, whose metadata have the ISIs."""
     required_reference(layout, source)
-    metadata = epochs.metadata
-    column = layout.columns.get("isi", "isi_ms")
-    if metadata is None or column not in metadata:
-        expected = f"a column {column!r} of their metadata, in ms; empty for TMS alone"
-        raise InvalidValueError(f"{source} do not hold the ISIs", expected=expected)
+    if epochs.metadata is None:
+        raise InvalidValueError(f"{source} do not hold the ISIs", expected="a column isi_ms in their metadata")
+    told = replace(layout, alone="") if layout.alone is None else layout
+    isis_ms = isis_of({str(key): cells.tolist() for key, cells in epochs.metadata.items()}, told, source)
     name = _channel_name(epochs, "emg", layout, source)
     values_mv = _factor_mv(epochs, name, layout, source) * epochs.get_data(picks=[name], verbose="ERROR")[:, 0]
     rate_hz, t0_ms = float(epochs.info["sfreq"]), 1e3 * float(epochs.tmin)
-    isis_ms = metadata[column].astype(float).tolist()
     channels = [Channel(emg_mv, rate_hz, "mV", t0_ms) for emg_mv in values_mv]
     return of_sweeps(channels, isis_ms, layout, subject, source)
 
 
 def of_sweeps(
-    channels: Sequence[Channel], isis_ms: Sequence[float], layout: Layout, subject: str, source: str
+    channels: Sequence[Channel], isis_ms: Sequence[float | None], layout: Layout, subject: str, source: str
 ) -> Delivered:
-    """The trials of sweeps whose clocks begin at the pulse; NaN in place of an ISI is TMS alone."""
+    """The trials of sweeps whose clocks begin at the pulse; one without an ISI is TMS alone."""
     reference = required_reference(layout, source)
     begin = "t_hit_ms" if reference == "impact" else "t_valve_ms"
     sweeps: list[Found] = []
-    for number, (isi, emg) in enumerate(zip(isis_ms, channels, strict=True)):
-        isi_ms = None if np.isnan(isi) else isi
+    for number, (isi_ms, emg) in enumerate(zip(isis_ms, channels, strict=True)):
         begins: dict[str, Any] = {begin: None if isi_ms is None else -isi_ms}
         sweeps.append((Stimulus(number, isi_ms), Sweep({"emg": emg}, t_tms_ms=0.0, **begins), {}))
     return delivered_of(Recording({}, pd.DataFrame(), source), sweeps, layout, reference, subject)
@@ -190,9 +190,12 @@ def _factor_mv(raw: Any, name: str, layout: Layout, source: str) -> float:
 def _annotated(raw: Any) -> pd.DataFrame:
     """What is annotated in a recording, or on its trigger channel."""
     mne = extra("mne")
-    first_s = raw.first_time if raw.annotations.orig_time is not None else 0.0
     rows = [
-        {"name": str(each["description"]), "onset": float(each["onset"]) - first_s, "duration": float(each["duration"])}
+        {
+            "name": str(each["description"]),
+            "onset": float(each["onset"]) - raw.first_time,
+            "duration": float(each["duration"]),
+        }
         for each in raw.annotations
     ]
     if not rows and "stim" in raw.get_channel_types():
@@ -228,7 +231,7 @@ def _marker(recording: Recording, key: str, layout: Layout) -> str | None:
 
 def _plain(name: str) -> str:
     """An event's name without what BrainVision puts before it and between its parts."""
-    return " ".join(name.rpartition("/")[2].casefold().split())
+    return "".join(name.rpartition("/")[2].casefold().split())
 
 
 def _required_marker(recording: Recording, key: str, what: str, layout: Layout) -> str:
@@ -245,10 +248,15 @@ def _required_marker(recording: Recording, key: str, what: str, layout: Layout) 
 
 def sweeps_of(recording: Recording, layout: Layout, reference: Reference) -> list[Found]:
     """A stretch of the recording for each pulse, with what came before it."""
-    pulses_s = recording.at_s(_required_marker(recording, "pulse", "the pulse of TMS", layout))
+    pulse = _required_marker(recording, "pulse", "the pulse of TMS", layout)
     key = "tap" if reference == "impact" else "valve"
     what = "the tap (its impact), or the electrical pulse" if key == "tap" else "the valve command"
-    origins_s = recording.at_s(_required_marker(recording, key, what, layout))
+    origin = _required_marker(recording, key, what, layout)
+    if origin == pulse:
+        raise InvalidValueError(
+            f"one event of {recording.source} cannot mark both stimuli", got=pulse, remedy=f"Say --marker {key}=NAME."
+        )
+    pulses_s, origins_s = recording.at_s(pulse), recording.at_s(origin)
     epochs = recording.events[recording.events["name"] == "sweep"]
     before_s = _BEFORE_MS / 1e3 + max(
         (_after_s(origins_s, pulse_s, layout) or 0.0 for pulse_s in pulses_s), default=0.0

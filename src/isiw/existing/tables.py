@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from isiw.errors import InvalidValueError, did_you_mean
-from isiw.existing.cells import Column, decimal_of
+from isiw.existing.cells import Column, decimal_of, says_alone
 from isiw.existing.frames import without_unit_in_cells
 from isiw.existing.layout import COLUMNS, ISI_UNITS_MS, UNIT_WORDS, Layout, letters
 from isiw.lazy import pd
@@ -106,6 +107,21 @@ def _missing(key: str, names: list[str], source: str) -> InvalidValueError:
         got=", ".join(names),
         remedy=f'Say --column "{key}=NAME"; if the names are not in the first line, describe the file: --layout FILE.',
     )
+
+
+def isis_of(vectors: Mapping[str, Sequence[Any]], layout: Layout, source: str) -> list[float | None]:
+    """The ISIs among the vectors that come with sweeps [ms]; None is TMS alone."""
+    name = _named("isi", list(vectors), layout, source)
+    if name is None:
+        raise _missing("isi", list(vectors), source)
+    cells = list(vectors[name])
+    column = Column(name, cells, layout.decimal or ".", source)
+    factor = ISI_UNITS_MS[required_unit("ISIs", column, layout, ISI_UNITS_MS)]
+    alone = [says_alone(cell, layout.alone) for cell in cells]
+    isis_ms = [None if alone[row] else column.number(row, factor) for row in range(len(cells))]
+    if lost := [row for row, isi_ms in enumerate(isis_ms) if isi_ms is None and not alone[row]]:
+        raise column.refused(lost[0], "is empty", "If it is TMS alone, say --alone ''.")
+    return isis_ms
 
 
 def _told(name: str, known: Mapping[str, float]) -> str | None:

@@ -8,13 +8,13 @@ from typing import Literal
 import numpy as np
 
 from isiw.errors import InvalidValueError, did_you_mean
-from isiw.existing.cells import Column, decimal_of, is_missing, says_alone
+from isiw.existing.cells import Column, decimal_of, is_missing
 from isiw.existing.delivered import Delivered
 from isiw.existing.frames import read_arrays, read_frame
-from isiw.existing.layout import COLUMNS, ISI_UNITS_MS, MARKERS, Layout, letters
+from isiw.existing.layout import MARKERS, Layout
 from isiw.existing.people import required_reference
 from isiw.existing.recordings import Recording, delivered_of, of_sweeps, sweeps_of
-from isiw.existing.tables import required_unit
+from isiw.existing.tables import isis_of, required_unit
 from isiw.lazy import pd
 from isiw.signals.limits import EMG_UNITS_MV
 from isiw.trials import Channel
@@ -41,15 +41,12 @@ def _of_matrix(arrays: dict[str, FloatArray], layout: Layout, subject: str, sour
     """Sweeps that are the rows or the columns of a matrix, beside a vector of their ISIs."""
     rate_hz = _required(layout, "rate_hz", f"at which rate {source} was sampled")
     pulse_at_ms = _required(layout, "pulse_at_ms", f"how long after its first sample a sweep of {source} has the pulse")
-    named = layout.columns.get("isi") or next((name for name in arrays if letters(name) in COLUMNS["isi"]), None)
-    if named not in arrays:
-        raise InvalidValueError(
-            f"no vector of {source} is known to hold the ISIs", got=", ".join(arrays), remedy="Say --column isi=NAME."
-        )
-    isi = Column(named, np.ravel(arrays[named]).tolist(), of=source)
-    factor = ISI_UNITS_MS[required_unit("ISIs", isi, layout, ISI_UNITS_MS)]
+    vectors = {
+        name: array.ravel().tolist() for name, array in arrays.items() if max(array.shape, default=0) == array.size
+    }
+    isis_ms = isis_of(vectors, layout, source)
     name, sweeps = layout.channels["emg"], np.asarray(arrays[layout.channels["emg"]], dtype=np.float64)
-    count = len(isi.cells)
+    count = len(isis_ms)
     if count not in sweeps.shape:
         raise InvalidValueError(
             f"the sweeps of {source} are not as many as its ISIs",
@@ -58,15 +55,8 @@ def _of_matrix(arrays: dict[str, FloatArray], layout: Layout, subject: str, sour
         )
     factor_mv = EMG_UNITS_MV[required_unit("EMG", Column(name, [], of=source), layout, EMG_UNITS_MV)]
     values_mv = factor_mv * (sweeps if sweeps.shape[0] == count else sweeps.T)
-    isis = [None if says_alone(cell, layout.alone) else isi.number(row, factor) for row, cell in enumerate(isi.cells)]
-    if layout.alone is None and None in isis:
-        raise InvalidValueError(
-            f"sweeps of {source} have no ISI",
-            got=f"{isis.count(None)} of {count}",
-            remedy="If they are TMS alone, say --alone ''.",
-        )
     channels = [Channel(each, rate_hz, "mV", -pulse_at_ms) for each in values_mv]
-    return of_sweeps(channels, [np.nan if isi is None else isi for isi in isis], layout, subject, source)
+    return of_sweeps(channels, isis_ms, layout, subject, source)
 
 
 def _of_columns(frame: pd.DataFrame, layout: Layout, subject: str, source: str) -> Delivered:
