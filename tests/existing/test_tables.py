@@ -153,6 +153,9 @@ WRITTEN: dict[str, tuple[str, str, dict[str, Any]]] = {
     "grouped thousands and a decimal point": (
         "ISI (ms),MEP (uV)\n", '10.0,123.456789012\n20.5,200\n30,"1,500"\n40,750\n55.25,0\n', {},
     ),
+    "points among words, and commas among numbers alone": (
+        "ISI (ms);MEP (µV)\n", "10.0;123,456789012\n20.5;200,0\n30.0;1500,0\n40.0;750,0\n55.25;0,0\n", {},
+    ),
     "thousands grouped by blanks": (
         "ISI (ms);MEP (uV)\n", "10,0;123,456789012\n20,5;200\n30;1 500,0\n40;750\n55,25;0\n", {},
     ),

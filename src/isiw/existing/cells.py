@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from numbers import Real
 from typing import Any, Final
 
@@ -119,34 +119,40 @@ class Column:
         )
 
 
-def decimal_of(columns: Sequence[Column], stated: str | None) -> str:
-    """The decimal sign of some columns' texts; one that may also group thousands is asked about."""
-    if stated is not None:
-        return stated
-    for column in columns:
-        texts = [_BLANKS.sub("", cell.strip()) for cell in column.cells if isinstance(cell, str)]
-        signs = {sign for sign in ".," for text in texts if _is_decimal(text, sign)}
-        if "," in signs:
-            return ","
-        doubtful = [text for text in texts if any(other.fullmatch(text) for other in _GROUPED.values())]
-        bare = any(text.isdigit() for text in texts)
-        if not signs and doubtful and ("," in doubtful[0] or bare) and not _elsewhere(columns, column):
+def with_decimals(columns: Mapping[str, Column], stated: str | None) -> dict[str, Column]:
+    """Columns with the decimal sign of each one's texts; one that may also group thousands is asked about."""
+    signs = {key: _signs(column) for key, column in columns.items()}
+    all_signs = set[str]().union(*signs.values())
+    usual = stated or (all_signs.pop() if len(all_signs) == 1 else None)
+    found = {}
+    for key, column in columns.items():
+        if usual is None and not signs[key] and (doubtful := _doubtful(column)):
             raise InvalidValueError(
-                f"the {'comma' if ',' in doubtful[0] else 'point'} in the column {column.name!r} of {column.of} may be "
-                "a decimal sign, or group thousands",
-                got=doubtful[0],
+                f"the {'comma' if ',' in doubtful else 'point'} in the column {column.name!r} of {column.of} may be a "
+                "decimal sign, or group thousands",
+                got=doubtful,
                 remedy="Say --decimal , or --decimal . to name the decimal sign.",
             )
-    return "."
+        found[key] = replace(column, decimal=max(signs[key], key=",.".find, default=usual or "."))
+    return found
 
 
-def _is_decimal(text: str, sign: str) -> bool:
-    """Whether a text has this decimal sign, and cannot have the other one."""
-    other = "," if sign == "." else "."
-    return sign in text and not math.isnan(_value(text, sign)) and math.isnan(_value(text, other))
+def _signs(column: Column) -> set[str]:
+    """The decimal signs that texts of a column have for certain."""
+    texts = [cell for cell in column.cells if isinstance(cell, str)]
+    return {
+        sign
+        for sign, other in (".,", ",.")
+        if any(
+            sign in text and not math.isnan(_value(text, sign)) and math.isnan(_value(text, other)) for text in texts
+        )
+    }
 
 
-def _elsewhere(columns: Sequence[Column], column: Column) -> bool:
-    """Whether the texts of other columns have one decimal sign for certain."""
-    others = [cell.strip() for each in columns if each is not column for cell in each.cells if isinstance(cell, str)]
-    return any(_is_decimal(text, sign) for text in others for sign in ".,")
+def _doubtful(column: Column) -> str | None:
+    """A text whose sign may be a decimal one, or group thousands; whole numbers beside points say that they group."""
+    texts = [cell.strip() for cell in column.cells if isinstance(cell, str)]
+    doubtful = [text for text in texts if any(grouped.fullmatch(text) for grouped in _GROUPED.values())]
+    if doubtful and ("," in doubtful[0] or any(text.isdigit() for text in texts)):
+        return doubtful[0]
+    return None

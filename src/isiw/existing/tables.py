@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from isiw.errors import InvalidValueError, did_you_mean
-from isiw.existing.cells import Column, decimal_of, says_alone
+from isiw.existing.cells import Column, says_alone, with_decimals
 from isiw.existing.frames import without_unit_in_cells
 from isiw.existing.layout import COLUMNS, ISI_UNITS_MS, UNIT_WORDS, Layout, letters
 from isiw.lazy import pd
@@ -44,9 +44,8 @@ class Columns:
             if name is not None:
                 said, cells = without_unit_in_cells(name, frame.iloc[:, names.index(name)].tolist())
                 columns[key] = Column(said, cells, of=source)
-        numeric = [columns[key] for key in ("isi", "mep", "asked", "isi_sd", "background") if key in columns]
-        decimal = decimal_of(numeric, layout.decimal)
-        columns = {key: Column(each.name, each.cells, decimal, source) for key, each in columns.items()}
+        numeric = ("isi", "mep", "asked", "isi_sd", "background")
+        columns |= with_decimals({key: columns[key] for key in numeric if key in columns}, layout.decimal)
         isi_unit = required_unit("ISIs", columns["isi"], layout, ISI_UNITS_MS)
         mep_unit = required_unit("amplitudes", columns["mep"], layout, EMG_UNITS_MV)
         factors = {"isi": ISI_UNITS_MS[isi_unit], "mep": EMG_UNITS_MV[mep_unit]}
@@ -115,7 +114,7 @@ def isis_of(vectors: Mapping[str, Sequence[Any]], layout: Layout, source: str) -
     if name is None:
         raise _missing("isi", list(vectors), source)
     cells = list(vectors[name])
-    column = Column(name, cells, layout.decimal or ".", source)
+    column = with_decimals({"isi": Column(name, cells, of=source)}, layout.decimal)["isi"]
     factor = ISI_UNITS_MS[required_unit("ISIs", column, layout, ISI_UNITS_MS)]
     alone = [says_alone(cell, layout.alone) for cell in cells]
     isis_ms = [None if alone[row] else column.number(row, factor) for row in range(len(cells))]

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from isiw.errors import InvalidValueError, did_you_mean
-from isiw.existing.cells import Column, decimal_of, is_missing
+from isiw.existing.cells import Column, is_missing, with_decimals
 from isiw.existing.delivered import Delivered
 from isiw.existing.frames import read_arrays, read_frame
 from isiw.existing.layout import MARKERS, Layout
@@ -102,8 +102,8 @@ def _of_columns(frame: pd.DataFrame, layout: Layout, subject: str, source: str) 
 def _numbers(frame: pd.DataFrame, name: str, layout: Layout, source: str) -> FloatArray:
     """A column of numbers."""
     cells = frame[name]
-    few = Column(name, cells.iloc[:1000].tolist(), of=source)
-    if not pd.api.types.is_numeric_dtype(cells) and decimal_of([few], layout.decimal) == ",":
+    few = {name: Column(name, cells.iloc[:1000].tolist(), of=source)}
+    if not pd.api.types.is_numeric_dtype(cells) and with_decimals(few, layout.decimal)[name].decimal == ",":
         cells = cells.str.replace(",", ".")
     numbers = pd.to_numeric(cells, errors="coerce").to_numpy(dtype=np.float64)
     if (bad := np.flatnonzero(~np.isfinite(numbers))).size:
