@@ -222,7 +222,7 @@ def test_a_clear_responder_is_found_and_a_non_responder_is_not_given_a_window() 
 @pytest.mark.parametrize(
     "factor",
     [
-        pytest.param(10.0, marks=pytest.mark.xfail(reason="decision 25: the gap is 1.1 posterior SDs of either edge")),
+        10.0,
         1 / 3,
     ],
 )

@@ -9,6 +9,7 @@ import torch
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
 from isiw.errors import InvalidValueError
+from isiw.models.particles.changes import ChangeKind, ChangePrior
 from isiw.models.particles.latents import BLOCKS, LATENTS, latents_of, used_by
 from isiw.models.particles.laws import (
     FOREARM,
@@ -282,17 +283,34 @@ def test_as_usual_unusual_windows_keep_a_part_of_their_probability(hit_delay_ms:
 
 
 def test_as_usual_unusual_intensities_keep_a_part_of_their_probability_and_curves_tell_by_how_much() -> None:
-    prior = Prior()
+    prior = Prior(session=SessionPrior(far_drift_share=0.0), changes=ChangePrior(0.0, 0.0, 0.0, 0.0))
     usual = prior.as_usual(1 / 3)
     assert [each.share for each in usual.intensities] == pytest.approx([1 - 0.25 / 3, 0.25 / 3])
     latents = prior.sample(1, MANY, torch.Generator().manual_seed(1), VALVE_SPACE)
-    ratio = usual.log_curves(latents) - prior.log_curves(latents)
+    ratio = usual.log_beside(latents) - prior.log_beside(latents)
     rest, curved = latents.values[..., LATENTS.index("rest")], latents.noise == NoiseKind.RECRUITMENT
     assert bool((ratio[~curved & (latents.noise != NoiseKind.RECTIFIED)] == 0).all())
     assert ratio[curved & (rest > 5)].mean().item() == pytest.approx(math.log(1 / 3), abs=0.1)
     assert ratio.exp().mean().item() == pytest.approx(1.0, abs=0.01)
     stated = replace(prior, intensity_pct_rmt=110.0)
-    assert bool((stated.as_usual(1 / 3).log_curves(latents) == stated.log_curves(latents)).all())
+    assert bool((stated.as_usual(1 / 3).log_beside(latents) == stated.log_beside(latents)).all())
+
+
+def test_as_usual_changes_and_far_drifts_keep_a_part_of_their_probability() -> None:
+    prior = Prior(intensity_pct_rmt=90.0)
+    usual = prior.as_usual(0.2)
+    latents = prior.sample(1, MANY, torch.Generator().manual_seed(1), VALVE_SPACE)
+    ratio, drift = usual.log_beside(latents) - prior.log_beside(latents), latents.values[..., LATENTS.index("drift")]
+    changed, far = latents.change != ChangeKind.NONE, drift.abs() > 1.5
+    assert ratio[changed & (drift.abs() < 0.5)].mean().item() == pytest.approx(math.log(0.2), abs=0.15)
+    assert ratio[~changed & far].mean().item() == pytest.approx(math.log(0.2 * 0.97 / 0.85), abs=0.05)
+    assert ratio.exp().mean().item() == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_prior_without_steps_has_a_density() -> None:
+    prior = Prior(changes=ChangePrior(0.0, 0.0, 0.0, 0.0))
+    latents = prior.sample(1, 100, torch.Generator().manual_seed(1), VALVE_SPACE)
+    assert bool(prior.log_density(latents.values, VALVE_SPACE).isfinite().all())
 
 
 def test_after_an_electrical_pulse_windows_are_believed_narrow_and_early() -> None:

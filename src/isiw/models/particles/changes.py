@@ -104,7 +104,7 @@ class ChangePrior(Checked):
     @cached_property
     def mixtures(self) -> dict[str, Mixture]:
         """Of the log of the trial before which a change comes, and of its size."""
-        steps = self._unnoted * self._steps
+        steps = self._unnoted * max(self._steps, 1e-9)  # a law is needed where no change comes, too
         left, shares = 1.0, []
         for _ in self.noted:  # the last note first
             shares.append(left * self.noted_share)
@@ -123,6 +123,15 @@ class ChangePrior(Checked):
     def noting(self, trials: int) -> ChangePrior:
         """The same where somebody noted a change after so many trials."""
         return replace(self, noted=(*self.noted, trials))
+
+    def as_usual(self, kept: float) -> ChangePrior:
+        """The same with less probability of changes that nobody noted.
+
+        Args:
+            kept: the part of it that they keep.
+        """
+        level, intensity, enhancement, scale = (kept * share for share in self._usual[1:])
+        return replace(self, level=level, intensity=intensity, enhancement=enhancement, scale=scale)
 
     def untouched(self, trials: int) -> float:
         """Probability that nothing has changed any of so many trials."""

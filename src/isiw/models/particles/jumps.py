@@ -17,7 +17,15 @@ from isiw.lazy import torch
 from isiw.models.particles.changes import ChangeKind
 from isiw.models.particles.kernels.building import prior_tables
 from isiw.models.particles.kernels.target import Tables
-from isiw.models.particles.latents import LATENTS, PROFILE_BLOCKS, RESPONSE_BLOCKS, Latents, latents_of, used_by
+from isiw.models.particles.latents import (
+    LATENTS,
+    PLACE_AND_SIZES,
+    PROFILE_BLOCKS,
+    RESPONSE_BLOCKS,
+    Latents,
+    latents_of,
+    used_by,
+)
 from isiw.models.particles.mixture import drawn
 from isiw.models.particles.moves import A_LITTLE, ANOTHER_KIND, NEARLY, OF_STEPS, RECENT, STEP_SD
 from isiw.models.particles.noise import NoiseKind
@@ -26,12 +34,12 @@ from isiw.models.particles.prior import Person, Prior
 from isiw.models.protocol import Tensor
 
 JUMPS: Final = {
-    "form": 0.18,
-    "noise": 0.15,
-    "window": 0.25,
+    "form": 0.12,
+    "noise": 0.22,
+    "window": 0.27,
     "place": 0.09,
     "response": 0.06,
-    "change": 0.15,
+    "change": 0.12,
     "time or window": 0.12,
 }
 """Shares of the jumps. They draw anew: the profile's kind and form; the noise's kind and all that belongs to it;
@@ -225,7 +233,8 @@ def _no_and_yes(probability: float) -> tuple[float, float]:
 def _shifted(device: torch.device) -> Tensor:
     """Which latents a difference moves by its part, shape (parts, d)."""
     of_profile, changed = (latents_of(*blocks, device=device) for blocks in (PROFILE_BLOCKS, ("changed",)))
-    return torch.stack([~changed, of_profile, ~of_profile & ~changed])
+    sizes = torch.tensor([name in PLACE_AND_SIZES for name in LATENTS], device=device)
+    return torch.stack([~changed, of_profile, ~of_profile & ~changed, sizes])
 
 
 @cache

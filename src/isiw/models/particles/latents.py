@@ -38,6 +38,9 @@ LATENTS: Final = tuple(name for names in BLOCKS.values() for name in names)
 PROFILE_BLOCKS: Final = ("start", "width", "form")
 RESPONSE_BLOCKS: Final = ("gain", "reliability", "switch", "recruitment", "rectified")
 
+_SIZES: Final = ("log_gain", "log_size", "log_ceiling", RECTIFIED["log_ceiling"])
+PLACE_AND_SIZES: Final = ("start_ms", "log_width_ms", "log_floor_mv", *_SIZES)
+
 _COMMON: Final = ("floor", "session")
 _USED: Final = {
     NoiseKind.CONSTANT_CV: ("gain",),

@@ -51,8 +51,8 @@ class ParticleModel(Checked):
         amplitude_step_mv: the step of the converter or display that amplitudes come from [mV]; an amplitude then stands
             for the interval of a step about it. None to have it found in the amplitudes, 0 for none.
         response_threshold_mv: what a told response is known to be above [mV].
-        unusual_kept: the part of their probability that unusual starts and widths of the window, and intensities, keep
-            where the next ISI is chosen; what is believed and reported keeps all of it.
+        unusual_kept: the part of their probability that unusual starts and widths of the window, intensities, drifts
+            and changes keep where the next ISI is chosen; what is believed and reported keeps all of it.
         device: torch device.
         engine: `"compiled"` loops on the CPU, or `"torch"`, which stands in where there are none; the same seed asks
             other ISIs with each.
@@ -68,7 +68,7 @@ class ParticleModel(Checked):
     detection_limit_mv: Positive = 0.005
     amplitude_step_mv: NonNegative | None = None
     response_threshold_mv: Positive = 0.02
-    unusual_kept: Share = 1 / 3
+    unusual_kept: Share = 0.2
     device: str = "cpu"
     engine: EngineName = "compiled"
 
@@ -129,8 +129,8 @@ class ParticlePosterior(SwarmPosterior[ParticleModel, Latents]):
         """The same with the prior that ISIs are chosen with; see `ExpectsTheUsual`."""
         latents = self.swarm.latents
         places = self.usual.log_places(latents) - self.engine.log_places(latents)
-        curves = self.model.prior_where_asking.log_curves(latents) - self.model.prior.log_curves(latents)
-        return replace(self, swarm=self.swarm.times(torch.where(latents.present, places, 0.0) + curves))
+        beside = self.model.prior_where_asking.log_beside(latents) - self.model.prior.log_beside(latents)
+        return replace(self, swarm=self.swarm.times(torch.where(latents.present, places, 0.0) + beside))
 
     def noting_change(self) -> ParticlePosterior:
         """The posterior if somebody has seen that something changes now; see `NotesChanges`."""

@@ -19,8 +19,9 @@ from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
 
 JUMP_PROBABILITY = 0.3
-PART_PROBABILITY = (0.35, 0.35, 0.30)
-"""How often a difference moves all latents, those of the profile alone, and those of the response alone."""
+PART_PROBABILITY = (0.25, 0.30, 0.25, 0.20)
+"""How often a difference moves all latents, those of the profile alone, those of the response alone, and place, floor
+and size alone: particles whose floor is far off have another window and gain as well, and leave that with all three."""
 
 RECENT = 0.8
 """How often the trial of another change is proposed among those so far."""

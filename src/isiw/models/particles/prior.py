@@ -225,19 +225,32 @@ class Prior(Checked):
         return JointMixture([mixture for name, mixture in self.mixtures.items() if name != "width"])
 
     def as_usual(self, kept: float) -> Prior:
-        """The same with less probability of unusual starts, widths and intensities."""
+        """The same with less probability of unusual starts, widths and intensities, far drifts and changes.
+
+        Args:
+            kept: the part of their probability that they keep.
+        """
+        far = kept * self.session.far_drift_share
         return replace(
-            self, profile=self.profile.as_usual(kept), intensities=with_less_of_others(self.intensities, kept)
+            self,
+            profile=self.profile.as_usual(kept),
+            intensities=with_less_of_others(self.intensities, kept),
+            session=replace(self.session, far_drift_share=far),
+            changes=self.changes.as_usual(kept),
         )
 
-    def log_curves(self, latents: Latents) -> Tensor:
-        """Log density of each particle's recruitment curve but for a constant, 0 without a curve, shape (b, p)."""
-        own, rectified = (
-            self.mixtures[name].log_density(latents.values[..., latents_of(name, device=latents.values.device)])
-            for name in ("recruitment", "rectified")
+    def log_beside(self, latents: Latents) -> Tensor:
+        """Log density of a particle's recruitment curve, drift and change but for a constant, shape (b, p)."""
+        device = latents.values.device
+        blocks = "recruitment", "rectified", "session", "changed"
+        own, rectified, session, changed = (
+            self.mixtures[name].log_density(latents.values[..., latents_of(name, device=device)]) for name in blocks
         )
-        without = torch.where(latents.noise == NoiseKind.RECTIFIED, rectified, 0.0)
-        return torch.where(latents.noise == NoiseKind.RECRUITMENT, own, without)
+        curve = torch.where(latents.noise == NoiseKind.RECTIFIED, rectified, 0.0)
+        curve = torch.where(latents.noise == NoiseKind.RECRUITMENT, own, curve)
+        stepped = (latents.change != ChangeKind.NONE) & (latents.change != ChangeKind.ENHANCEMENT)
+        share = torch.tensor(self.changes.shares, device=device).log()[latents.change]
+        return curve + session + share + torch.where(stepped, changed, 0.0)
 
     @property
     def possible_muscles(self) -> tuple[Muscle, ...]:

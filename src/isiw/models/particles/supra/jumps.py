@@ -41,6 +41,8 @@ REDRAWN: Final = {
 }
 """The latents that each jump draws anew."""
 
+_PLACES_AND_SIZES: Final = (*REDRAWN["both places"], "log_floor_mv", "log_ceiling")
+
 _OF_A_DEPRESSION: Final = ("depressed_start_ms", "depressed_log_width_ms", "depressed_log_shift")
 _AS_THE_DEFAULT: Final = tuple("log_shift" if n == "log_boost" else n for n in (*DEFAULT_LATENTS, *_OF_A_DEPRESSION))
 """What the kernels know latents by, in their order."""
@@ -146,7 +148,8 @@ def _latents(*names: str, device: torch.device) -> Tensor:
 def _shifted(device: torch.device) -> Tensor:
     """Which latents a difference moves by its part, those of the segments being the profile's, shape (parts, d)."""
     of_segments = _latents(*BLOCKS["enhanced"], *BLOCKS["depressed"], device=device)
-    return torch.stack([torch.ones_like(of_segments), of_segments, ~of_segments])
+    sizes = _latents(*_PLACES_AND_SIZES, device=device)
+    return torch.stack([torch.ones_like(of_segments), of_segments, ~of_segments, sizes])
 
 
 @cache
