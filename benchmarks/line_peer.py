@@ -2,7 +2,7 @@
 
     python -m benchmarks.line_peer --sessions 1000 > benchmarks/results/line_peer.md
 
-Each session has a peer (`isiw.testing.PulsePeer`) on the loopback that meets a share of all commands with a lie, and
+Each session has a peer (`benchmarks/pulse_peer.py`) on the loopback that meets a share of all commands with a lie, and
 keeps a ledger of what it gave. What ends a session is resumed, with a new `isiw.LineDevice`, until its stimuli are used
 up. Then ledger and log are compared pair by pair, and each MEP that counts with the one that belongs to what was given.
 It is the line that is tried, so the strategy costs next to nothing, and depends on all it was told.
@@ -25,10 +25,11 @@ from rich.console import Console
 from rich.progress import track
 
 import isiw
+from benchmarks.faulty_device import check_ledger
 from benchmarks.provenance import command_of, made_with
+from benchmarks.pulse_peer import PEER_COMMANDS, Lie, PulsePeer
 from benchmarks.quick import understood
 from benchmarks.remembering import SPACE, answer, strategy
-from isiw.testing import PEER_COMMANDS, Lie, PulsePeer, check_ledger
 
 MOST_RUNS = 100
 LINE = {"timeout_s": 0.1, "connect_s": 1.0}

@@ -2,8 +2,8 @@
 
     python -m benchmarks.soak --sessions 2000 --keep soak.json > benchmarks/results/soak.md
 
-Each session has a device that fails at random (`isiw.testing.FaultyDevice`), from a stage that hangs to an answer that
-comes too late. What ends a session is resumed until its stimuli are used up. Then what the device has really fired is
+Each session has a device that fails at random (`faulty_device.py`), from a stage that hangs to an answer that comes
+too late. What ends a session is resumed until its stimuli are used up. Then what the device has really fired is
 compared with the log, pair by pair, and what was asked with what the strategy asks again when it is told the log.
 
 It is the loop that is tried, so most sessions have a strategy that depends on all it was told and costs almost nothing.
@@ -28,10 +28,10 @@ from rich.console import Console
 from rich.progress import track
 
 import isiw
+from benchmarks.faulty_device import Fault, FaultyDevice, check_ledger
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
 from benchmarks.remembering import SPACE, answer, strategy
-from isiw.testing import Fault, FaultyDevice, check_ledger
 
 STUCK_S = 3600.0  # by the clock, so long that a busy machine does not reach it
 MOST_RUNS = 100

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 from benchmarks.line_peer import check, run
+from benchmarks.pulse_peer import Lie
 from benchmarks.remembering import SPACE
 
 import isiw
-from isiw.testing import Lie
 
 
 @pytest.mark.slow

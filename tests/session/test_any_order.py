@@ -9,6 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from benchmarks.faulty_device import Fired, check_ledger
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
@@ -22,7 +23,6 @@ from isiw.session.loop import Session
 from isiw.session.resume import resume
 from isiw.session.rig import Safeguards
 from isiw.session.sink import SessionUpdate
-from isiw.testing import Fired, check_ledger
 from isiw.trials import Measurement, Stimulus
 from known import known
 from scripted import SPACE, ScriptedDevice, scripted_strategy

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import pytest
+from benchmarks.faulty_device import Fault, FaultyDevice, Fired, check_ledger
 from benchmarks.soak import Soaked, check
 
 from isiw.devices.clock import VirtualClock
@@ -16,7 +17,6 @@ from isiw.devices.protocol import Readiness
 from isiw.errors import DeviceError, NotDelivered
 from isiw.log.reader import SessionRecord, read_session
 from isiw.session.loop import Session
-from isiw.testing import Fault, FaultyDevice, Fired, check_ledger
 from isiw.trials import Stimulus
 from scripted import ScriptedDevice, scripted_strategy
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
+from benchmarks.pulse_peer import PulsePeer
 
 import isiw
 from devices.transports.line.parts import HASTY, made, over, staged
-from isiw.testing import PulsePeer
 
 
 @pytest.fixture

@@ -8,9 +8,9 @@ from contextlib import AbstractContextManager
 from typing import Any
 
 import pytest
+from benchmarks.pulse_peer import PEER_COMMANDS, PulsePeer
 
 import isiw
-from isiw.testing import PEER_COMMANDS, PulsePeer
 from isiw.trials import Stimulus
 
 INFO = {"name": "peer", "reference": "valve"}

@@ -9,11 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from benchmarks.faulty_device import check_ledger
+from benchmarks.pulse_peer import PEER_COMMANDS, Lie, PulsePeer
 
 import isiw
 from devices.transports.line.parts import PAIR, made, staged, unnumbered
 from isiw.errors import ConfigError, DeviceError, InvalidValueError, LogError, NotDelivered
-from isiw.testing import PEER_COMMANDS, Lie, PulsePeer, check_device, check_ledger
+from isiw.testing import check_device
 from isiw.trials import Measurement, Stimulus, Sweep
 from scripted import SPACE, scripted_strategy
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from benchmarks.faulty_device import check_ledger
+from benchmarks.pulse_peer import Lie, PulsePeer
 
 import isiw
 from devices.transports.line.parts import HASTY, PAIR, TIMEOUT_S, made, staged
@@ -12,7 +14,6 @@ from isiw.errors import DeviceError, DeviceTimeoutError, NotDelivered
 from isiw.findings import Kind
 from isiw.session.rig import Safeguards
 from isiw.signals.judgement import judge_measurement
-from isiw.testing import Lie, PulsePeer, check_ledger
 from isiw.trials import Measurement, Status, Stimulus
 from scripted import SPACE, scripted_strategy
 

@@ -6,11 +6,12 @@ import re
 from pathlib import Path
 
 import pytest
+from benchmarks.faulty_device import check_ledger
+from benchmarks.pulse_peer import PulsePeer
 
 import isiw
 from isiw.config import RunConfig, load_config, session_for
 from isiw.devices.transports.line_table import LineCommands
-from isiw.testing import PulsePeer, check_ledger
 
 PAGE = (Path(__file__).parents[4] / "docs" / "lab" / "line.md").read_text(encoding="utf-8")
 CHEAP = '[strategy]\nname = "random"\nsettings = { max_trials = 4, particles = 100 }\n'

@@ -9,13 +9,13 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
+from benchmarks.pulse_peer import PEER_COMMANDS, Lie, PulsePeer
 
 import isiw
 from devices.transports.line.parts import HASTY, PAIR, TIMEOUT_S, made, over, staged, unnumbered
 from isiw.devices.transports.line_exchange import Line
 from isiw.devices.transports.line_table import Exchange
 from isiw.errors import DeviceError, NotDelivered
-from isiw.testing import PEER_COMMANDS, Lie, PulsePeer
 from isiw.trials import Measurement, Stimulus
 
 NOT_POSITIVE = [

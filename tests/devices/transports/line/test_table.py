@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from benchmarks.pulse_peer import PEER_COMMANDS
 
 import isiw
 from isiw.devices.transports.line_exchange import LineSettings
 from isiw.devices.transports.line_table import Exchange, LineCommands, command_values, isi_ms_of
 from isiw.errors import InvalidValueError
-from isiw.testing import PEER_COMMANDS
 
 
 @pytest.mark.parametrize(

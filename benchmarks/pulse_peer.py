@@ -19,8 +19,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from benchmarks.faulty_device import Fired
 from isiw.checks import number
-from isiw.testing.faults import Fired
 
 _NUMBERED = r"(?P<sequence>\d+) "
 
