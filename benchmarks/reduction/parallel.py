@@ -58,8 +58,8 @@ def run_sessions(sessions: Iterable[Session], workers: Workers) -> Outcomes:
     return dict(zip(unique, in_parallel(run, unique, workers, "sessions"), strict=True))
 
 
-def _of_person(session: Session) -> tuple[str, int, int]:
-    return session.cohort, session.person, session.seed
+def _of_person(session: Session) -> tuple[int, str, int]:
+    return session.person, session.cohort, session.seed
 
 
 def frame(sessions: Iterable[Session], outcomes: Outcomes) -> pd.DataFrame:
