@@ -123,7 +123,7 @@ def test_of_long_series_every_trial_is_logged_and_some_of_the_beliefs() -> None:
     isis_ms, meps_mv = told(130)
     record = isiw.analyse(isis_ms, meps_mv, space=SPACE, particles=50).record
     assert len(record.table) == 130
-    assert len(record.estimates) == 100
+    assert len(record.estimates) == 50
     assert record.estimates[-1].trial == 129
 
 

@@ -190,7 +190,8 @@ def test_vectors_of_matlab_are_a_table(tmp_path: Path) -> None:
 
 BROKEN: dict[str, tuple[dict[str, Any], str]] = {
     "no reference": ({"reference": None}, "--reference"),
-    "no marker of the pulse": ({"markers": {}}, "--marker pulse=NAME"),
+    "no marker": ({"markers": {}}, "--marker pulse=NAME --marker tap=NAME"),
+    "no marker of the pulse": ({"markers": {"tap": "S  1"}}, "--marker pulse=NAME"),
     "no marker of the tap": ({"markers": {"pulse": "S  2"}}, "--marker tap=NAME"),
     "a marker that is not there": ({"markers": {"pulse": "S 99"}}, "no event of this name"),
     "one marker for both": ({"markers": {"tap": "S 2", "pulse": "S2"}}, "cannot mark both"),

@@ -39,7 +39,7 @@ from isiw.trials import Measurement, Status, Sweep, Trial, TrialTable
 from isiw.types import ArrayLike, FloatArray
 from isiw.visit import Visit
 
-MOST_ESTIMATES: Final = 100
+MOST_ESTIMATES: Final = 50
 """Of a long series of trials the belief is logged after so many of them, evenly spread, and after the last."""
 
 _END: Final = StopKind.OWN.stop("All trials are analysed. They were delivered without isiw, so none can follow.")

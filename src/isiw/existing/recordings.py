@@ -234,24 +234,26 @@ def _plain(name: str) -> str:
     return "".join(name.rpartition("/")[2].casefold().split())
 
 
-def _required_marker(recording: Recording, key: str, what: str, layout: Layout) -> str:
-    found = _marker(recording, key, layout)
-    if found is None:
+def _required_markers(recording: Recording, marked: Mapping[str, str], layout: Layout) -> list[str]:
+    """What the events are called that mark each of several things."""
+    found = {key: _marker(recording, key, layout) for key in marked}
+    missing = [key for key, name in found.items() if name is None]
+    if missing:
         names = ", ".join(repr(str(name)) for name in dict.fromkeys(recording.events["name"]))
+        said = " ".join(f"--marker {key}=NAME" for key in missing)
         raise InvalidValueError(
-            f"no event of {recording.source} is known to mark {what}",
+            f"no event of {recording.source} is known to mark {', nor '.join(marked[key] for key in missing)}",
             got=names or "no events",
-            remedy=f"Say --marker {key}=NAME." if names else "Is there a file with the events beside it?",
+            remedy=f"Say {said}." if names else "Is there a file with the events beside it?",
         )
-    return found
+    return [name for name in found.values() if name is not None]
 
 
 def sweeps_of(recording: Recording, layout: Layout, reference: Reference) -> list[Found]:
     """A stretch of the recording for each pulse, with what came before it."""
-    pulse = _required_marker(recording, "pulse", "the pulse of TMS", layout)
     key = "tap" if reference == "impact" else "valve"
-    what = "the tap (its impact), or the electrical pulse" if key == "tap" else "the valve command"
-    origin = _required_marker(recording, key, what, layout)
+    what = "the tap (its impact) or the electrical pulse" if key == "tap" else "the valve command"
+    pulse, origin = _required_markers(recording, {"pulse": "the pulse of TMS", key: what}, layout)
     if origin == pulse:
         raise InvalidValueError(
             f"one event of {recording.source} cannot mark both stimuli", got=pulse, remedy=f"Say --marker {key}=NAME."
