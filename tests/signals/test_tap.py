@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 
 from isiw.devices.robot.tapper import Tapper, TapperSettings, preset
 from isiw.signals import judge
-from isiw.signals.tap import TapResponses
-from isiw.trials import Channel, Stimulus, Sweep
+from isiw.signals.tap import LONGER_MS, TapResponses
+from isiw.subjects.changes import TapResponse
+from isiw.trials import Channel, Stimulus, Sweep, TrialTable
+from isiw.window import Window
 from known import known
 from tapped import IMPACT, TapRig, reflex
 
@@ -89,6 +91,35 @@ def test_earlier_trials_are_corrected_when_the_course_is_known_and_when_twice_as
     assert corrected_after[:2] == [(0, 5), (1, 5)]
     assert {after for _, after in corrected_after} <= {5, 8, 14}
     assert known(trials[1].mep_mv) - known(trials[1].tap_mv) < 0.25
+
+
+def test_the_isis_that_would_show_what_is_not_known_within_a_window_are_longer_than_its_trials() -> None:
+    rig, window = TapRig(reflex(0.3)), Window(10.0, 60.0)
+    trials = TrialTable(tuple(rig.trials([20.0, 50.0, 90.0, 100.0])))
+    assert rig.taps.shown_from_ms(window, trials) == 50.0 + 35.0 + LONGER_MS
+    assert rig.taps.shown_from_ms(None, trials) is None
+    tried = tuple(replace(trial, index=10 + n) for n, trial in enumerate(rig.trials([100.0] * 3)))
+    assert rig.taps.shown_from_ms(window, TrialTable((*trials, *tried))) is None
+    for trial in rig.trials(LONG_MS[:3]):
+        trials = trials.appended(trial)
+    assert rig.taps.shown_from_ms(window, trials) is None
+
+
+@pytest.mark.parametrize("isi_ms", [0.0, 1.0, 3.0, 15.0])
+def test_an_electrical_pulse_is_known_by_its_own_times_and_nothing_is_blanked_for_a_tap(isi_ms: float) -> None:
+    shock = TapResponse(-0.5, 12.0, 1.0, 0.1)  # its artefact and M-wave, over before any MEP
+    rig = TapRig(shock)
+    rig.trials(LONG_MS)
+    told = rig.trials([isi_ms] * 12)
+    assert np.median([known(trial.mep_mv) for trial in told]) == pytest.approx(0.155, rel=0.06)
+    assert {trial.tap_mv for trial in told} == {0.0}
+
+
+def test_a_late_response_to_an_electrical_pulse_is_subtracted_as_one_to_a_tap() -> None:
+    rig = TapRig(TapResponse(28.0, 10.0, 0.3, 0.0))  # an H-reflex
+    rig.trials(LONG_MS * 3)
+    told = rig.trials([5.0] * 10)
+    assert np.median([known(trial.mep_mv) for trial in told]) == pytest.approx(0.155, rel=0.1)
 
 
 def test_a_rig_without_a_response_gets_no_correction() -> None:

@@ -11,26 +11,25 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from functools import partial
 from typing import Final, NamedTuple
 
 from isiw.devices.protocol import Answer
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, LimitExceededError, NotDelivered, told
 from isiw.findings import Finding, Kind
 from isiw.log.headers import Header
-from isiw.log.schema import Correction, Event, Intent, Waveform
-from isiw.log.verdicts import correction
+from isiw.log.schema import Event, Intent, Waveform
 from isiw.session.examination import WindowExamination
+from isiw.session.own_response import LONGER, OwnResponse
 from isiw.session.rig import Rig
 from isiw.session.sink import SessionUpdate, Sink
 from isiw.signals.judgement import judge, judge_measurement
-from isiw.signals.tap import OWN_RESPONSE, TapResponses
+from isiw.signals.tap import TapResponses
 from isiw.signals.watch import Watch
 from isiw.strategy.stopping import StopDecision, StopKind, stimuli_left
 from isiw.strategy.strategy import Strategy
 from isiw.text.harmless import shown
 from isiw.trials import Measurement, Stimulus, Sweep, Trial
-from isiw.visit import PAIRS_FIRST, Control
+from isiw.visit import Control
 
 _INTERRUPTED = "Interrupted by the operator."
 
@@ -201,7 +200,7 @@ class Steps:
     ) -> None:
         self._examination, self._rig, self._sink, self._pausing = examination, rig, sink, pausing
         self._watch, self._header, self._backoffs_s = watch, header, backoffs_s
-        self._taps = taps
+        self._own_response = OwnResponse(examination, header, taps)
         self._pace, self._freely = Pace(), rig.interrupts.freely
 
     @property
@@ -221,13 +220,13 @@ class Steps:
 
     def at_the_end(self) -> StopDecision | None:
         """The decision to stop, by the strategy or the limits; None where there is a stimulus to deliver."""
-        if (decision := self._freely(self._strategy.decision)).stop:
+        if (decision := self._own_response.decided(self._freely(self._strategy.decision))).stop:
             return decision
         return None if self._rig.pulses_left else self._stop_at_limit()
 
     def log_belief(self) -> None:
         """Log what is known after the last trial, which a session that ended then may not have corrected others by."""
-        self._correct()
+        self._own_response.correct()
         if self._examination.conclude(self._decision, self._next_isi_ms) is None:
             self._examination.log_belief(self._decision, self._next_isi_ms)
 
@@ -266,7 +265,9 @@ class Steps:
     def _decision(self) -> StopDecision:
         """The strategy's decision; none is made on data that a person should look at first."""
         pause = self._watch.pause
-        return self._strategy.decision() if pause is None or not self._stimuli_left() else paused(f"{pause}")
+        if pause is not None and self._stimuli_left():
+            return paused(f"{pause}")
+        return self._own_response.decided(self._strategy.decision())
 
     def _stimuli_left(self) -> int:
         budget = stimuli_left(self._strategy.stopping, self._strategy.spent)
@@ -287,17 +288,17 @@ class Steps:
 
     @property
     def _next_control(self) -> Control | None:
-        number, protocol, device = len(self._examination.trials), self._header.protocol, self._header.device
-        if number >= PAIRS_FIRST and protocol.taps_first and device.tap_alone and "emg" in device.channels:
-            window = self._strategy.estimate().window
-            few = number < PAIRS_FIRST + protocol.taps_first
-            if few or self._taps.wants_taps(window, self._examination.trials):
-                return Control.TAP_ALONE
-        return protocol.control(number, self._header.seed)
+        if self._own_response.wants_tap:
+            return Control.TAP_ALONE
+        return self._header.protocol.control(len(self._examination.trials), self._header.seed)
 
     def _next_isi_ms(self) -> float | None:
         """What is asked next [ms]; None where a control trial comes next."""
-        return None if self._next_control else self._freely(self._strategy.ask, self._header.ask_deadline_s)
+        if self._next_control:
+            return None
+        isi_ms: float = self._freely(self._strategy.ask, self._header.ask_deadline_s)
+        least_ms = self._own_response.least_isi_ms
+        return isi_ms if least_ms is None or isi_ms >= least_ms else self._strategy.ask_longer(least_ms, LONGER)
 
     def _deliver_in_time(self, stimulus: Stimulus) -> None:
         self._freely(self._wait)
@@ -339,8 +340,7 @@ class Steps:
             answer = self._answer(stimulus)
             trial = self._judged(stimulus, answer)
             if isinstance(answer, Sweep):
-                self._taps = self._taps.after(trial, answer)
-                trial = self._taps.measured(trial)
+                trial = self._own_response.after(trial, answer)
             self._watch = self._watch.after(trial, answer)
             doubt = self._watch.doubts.new
         except Exception as error:
@@ -356,16 +356,9 @@ class Steps:
                 self._examination.came(trial)
                 if doubt is not None:
                     self._examination.event("doubt", f"{doubt}", finding=doubt.kind)
-                self._correct()
+                self._own_response.correct()
             self._examination.log_faults()
             self._sink.log.sync()
-
-    def _correct(self) -> None:
-        """Correct earlier amplitudes by what is known now of the tap's own response."""
-        self._taps, others = self._taps.corrected(self._examination.trials)
-        for trial in others:
-            right = Correction(mep_mv=trial.mep_mv, mep_sd_mv=trial.mep_sd_mv, tap_mv=trial.tap_mv)
-            self._examination.judge(partial(correction, number=trial.index, why=OWN_RESPONSE, corrected=right))
 
     def _require_allowed(self, stimulus: Stimulus) -> None:
         """Raise where the limits or the device do not allow a stimulus, before anything is logged of it."""

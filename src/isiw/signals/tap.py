@@ -34,6 +34,9 @@ LEAST_SHOWN: Final = 3
 ENOUGH_SHOWN, TAP_EVERY = 12, 4
 """With fewer sweeps that show a response within a window, every so many-th trial is one more tap alone."""
 
+LONGER_MS: Final = 10.0
+"""So much longer is an ISI than those whose MEP windows it is to show, as hits come some ms sooner or later."""
+
 CLEAR: Final = 0.7
 """By this share, over the root of the number of sweeps, EMG after the hit is larger than at rest by chance at most."""
 
@@ -42,9 +45,6 @@ USUAL_VARIANCE, USUAL_COUNTS = 0.43, 3.0
 
 SAME_MV, SAME_SHARE = 0.003, 0.1
 """What changes an amplitude by less is not worth a correction."""
-
-
-OWN_RESPONSE: Final = "What the first stimulus alone does to the EMG is known now, and was subtracted."
 
 
 class Left(NamedTuple):
@@ -145,6 +145,23 @@ class TapResponses:
         lefts = (self._left(self.windows[number].since_hit_ms) for number in inside if number in self.windows)
         return any(left is None or (left.mean_mv > 0 and left.shown < ENOUGH_SHOWN) for left in lefts)
 
+    def shown_from_ms(self, window: Window | None, trials: TrialTable) -> float | None:
+        """From which ISI on a pair would show the response at all trials within a window; None if it is known there.
+
+        Sweeps that begin too late, or have no rest, never show it: after a few tries nothing more is asked for it.
+        """
+        unknown_ms = [
+            trial.isi_ms
+            for trial in trials.told
+            if window is not None and trial.isi_ms is not None and _inside(window, trial.isi_ms)
+            if (own := self.windows.get(trial.index)) is not None and self._left(own.since_hit_ms) is None
+        ]
+        if not unknown_ms:
+            return None
+        least_ms = max(unknown_ms) + self.mep_window_ms[1] + LONGER_MS
+        tried = sum(abs((trial.isi_ms or 0.0) - least_ms - LONGER_MS) <= LONGER_MS for trial in trials.told)
+        return least_ms if tried < LEAST_SHOWN else None
+
     def _covering(self, since_hit_ms: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The courses that show some times, as far as a response lasts, shape (k, t), and what they have at rest."""
         meets = (since_hit_ms[0] - STEP_MS <= GRID_MS) & (since_hit_ms[-1] + STEP_MS >= GRID_MS)
@@ -164,6 +181,8 @@ class TapResponses:
             return Left(0.0, 0.0, LEAST_SHOWN)
         waves, rests = self._covering(since_hit_ms)
         count = len(waves)
+        if np.isnan(rests).all():
+            rests = np.array([one.rest_mv for one in self.shown])
         if count < LEAST_SHOWN or np.isnan(rests).all():
             return None
         rest, size, mean = float(np.nanmean(rests)), float(np.ptp(waves, axis=-1).mean()), waves.mean(axis=0)
