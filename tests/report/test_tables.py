@@ -31,9 +31,9 @@ def counted(record: SessionRecord) -> dict[str, tuple[str, str]]:
 
 def test_a_trial_is_told_with_what_was_asked_realised_and_measured() -> None:
     trial = Trial(3, Status.ACCEPTED, 50.0, isi_ms=51.26, mep_mv=0.0512, background_rms_uv=2.04)
-    assert trial_row(trial) == (3, "50 ms", "51.3 ms", "51 µV", "2 µV", "")
+    assert trial_row(trial) == (3, "50 ms", "51.3 ms", "51 µV", "–", "2 µV", "")
     lost = Trial(4, Status.MISTRIAL, 50.0, Kind.BACKGROUND_ACTIVITY, mep_mv=0.07)
-    assert trial_row(lost)[3:] == ("mistrial: background activity", "–", "70 µV were measured")
+    assert trial_row(lost)[3:] == ("mistrial: background activity", "–", "–", "70 µV were measured")
     assert trial_row(lost.accepted_anyway()).remark == "accepted by the operator; had been: background activity"
 
 

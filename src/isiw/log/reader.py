@@ -22,6 +22,7 @@ from isiw.log.threshold import ThresholdRecord
 from isiw.log.verdicts import VERDICTS, under_all
 from isiw.sentences import JUDGED_SINCE
 from isiw.signals.evidence import is_silent
+from isiw.signals.measures import Measures, measures
 from isiw.strategy.stopping import StopDecision
 from isiw.text.stimuli import TAP, StimulusWords, meanings
 from isiw.trials import Channel, Stimulus, Trial, TrialTable
@@ -96,7 +97,13 @@ class SessionRecord:
 
         The columns are those of `isiw.log.reader.TRIAL_COLUMNS`.
         """
-        return trial_frame(self.table, self.onsets, self.estimates)
+        return trial_frame(self.table, self.onsets, self.estimates, self.measures)
+
+    @cached_property
+    def measures(self) -> Mapping[int, Measures]:
+        """What the sweeps of the trials that count show beside the amplitude, by the trial's number."""
+        emg = {trial: channel for (trial, name), channel in self.waveforms.items() if name == "emg"}
+        return {t.index: measures(emg[t.index], t, self.header.signals) for t in self.table.told if t.index in emg}
 
     def require_end(self) -> None:
         """Raise where nobody knows how many stimuli were given."""
@@ -249,6 +256,15 @@ _COLUMNS: Final[Mapping[str, tuple[str, str]]] = {
     "isi_ms": ("ms", "the realised ISI"),
     "isi_sd_ms": ("ms", "SD of the realised ISI; 0 if it was measured"),
     "mep_mv": ("mV", "peak-to-peak amplitude of the MEP; 0 is below the detection limit"),
+    "mep_sd_mv": (
+        "mV",
+        "SD of the amplitude, as what {0.one} alone evokes varies",
+    ),
+    "tap_mv": ("mV", "what is left in it of what {0.one} alone evokes, in the mean; empty if that is not known"),
+    "mep_onset_ms": ("ms", "onset of the MEP after the magnetic pulse; empty without a sweep or an MEP"),
+    "mep_duration_ms": ("ms", "from its onset to its end"),
+    "mep_area_mv_ms": ("mV.ms", "area of the rectified EMG from its onset to its end"),
+    "silent_period_ms": ("ms", "of a contracted muscle, from the magnetic pulse until the EMG is back"),
     "background_rms_uv": ("uV", "RMS of the EMG before the magnetic pulse"),
     "t_valve_ms": ("ms", "the valve command, on the sweep's clock"),
     "t_hit_ms": ("ms", "the {0.moment}, on the sweep's clock"),
@@ -284,10 +300,21 @@ _NUMBERS: Final = tuple(name for name in TRIAL_COLUMNS if name not in {*_TEXTS, 
 _BELIEF: Final = tuple(TRIAL_COLUMNS)[tuple(TRIAL_COLUMNS).index("p_window") :]
 
 
-def trial_frame(table: TrialTable, onsets: Mapping[int, Onset], estimates: Iterable[EstimateRecord]) -> pd.DataFrame:
+def trial_frame(
+    table: TrialTable,
+    onsets: Mapping[int, Onset],
+    estimates: Iterable[EstimateRecord],
+    measured: Mapping[int, Measures],
+) -> pd.DataFrame:
     """All trials as a DataFrame, a row a trial, columns as in `TRIAL_COLUMNS`, indexed by `index`."""
     beliefs = {estimate.trial: estimate for estimate in estimates}
-    rows = [_timing(onsets.get(trial.index)) | _outcome(trial) | _belief(beliefs.get(trial.index)) for trial in table]
+    rows = [
+        _timing(onsets.get(trial.index))
+        | _outcome(trial)
+        | measured.get(trial.index, Measures())._asdict()
+        | _belief(beliefs.get(trial.index))
+        for trial in table
+    ]
     index = pd.Index([trial.index for trial in table], name="index", dtype=int)
     frame = pd.DataFrame(rows, index=index, columns=list(TRIAL_COLUMNS))
     kinds = dict.fromkeys(_NUMBERS, "float64") | dict.fromkeys(_FLAGS, "bool")

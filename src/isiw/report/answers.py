@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import statistics
 from collections import Counter
 from collections.abc import Sequence
@@ -92,7 +93,9 @@ def _known(record: SessionRecord, *, measured: bool) -> int:
 
 
 def _rest(record: SessionRecord) -> Answer:
-    question, limit_uv = "Was the muscle at rest?", record.header.signals.background_uv
+    limit_uv = record.header.signals.most_background_uv
+    contracted = math.isinf(limit_uv)
+    question = "How contracted was the muscle?" if contracted else "Was the muscle at rest?"
     levels_uv = [t.background_rms_uv for t in record.table if t.background_rms_uv is not None]
     reasons = frozenset({Kind.BACKGROUND_ACTIVITY})
     rejected = _rejected_for(record, reasons)
@@ -101,7 +104,8 @@ def _rest(record: SessionRecord) -> Answer:
     if not levels_uv:
         return Answer(question, verdict, f"The log has no background EMG. {_listed(rejected)}")
     sizes = f"{statistics.median(levels_uv):.2g} µV RMS (median), at most {max(levels_uv):.2g} µV"
-    return Answer(question, verdict, f"EMG before the pulse: {sizes}; {limit_uv:g} µV are allowed. {_listed(rejected)}")
+    allowed = "the muscle was to be contracted" if contracted else f"{limit_uv:g} µV are allowed"
+    return Answer(question, verdict, f"EMG before the pulse: {sizes}; {allowed}. {_listed(rejected)}")
 
 
 def _rejected_for(record: SessionRecord, reasons: frozenset[Kind]) -> list[str]:

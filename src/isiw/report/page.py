@@ -95,7 +95,7 @@ def _contents(record: SessionRecord) -> dict[str, Any]:
         "lost": lost_rows(record),
         "events": event_rows(record),
         "counted": counted_rows(record),
-        "trials": [trial_row(trial, record.header.stimulus) for trial in record.table],
+        "trials": [trial_row(t, record.header.stimulus, record.measures.get(t.index)) for t in record.table],
         "drawn": drawn(record),
         "log": record.path.name,
     }

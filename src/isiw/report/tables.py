@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from collections import Counter
 from collections.abc import Mapping
 from itertools import groupby, pairwise
@@ -15,6 +16,7 @@ from isiw.log.headers import Header
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Event, Intent
 from isiw.sentences import asked, outcome
+from isiw.signals.measures import Measures
 from isiw.text.harmless import counted
 from isiw.text.stimuli import TAP, StimulusWords
 from isiw.trials import Trial
@@ -155,6 +157,7 @@ class TrialRow(NamedTuple):
     asked: str
     realised: str
     outcome: str
+    shape: str
     background: str
     remark: str
 
@@ -167,15 +170,26 @@ class Counted(NamedTuple):
     limit: str
 
 
-def trial_row(trial: Trial, first: StimulusWords = TAP) -> TrialRow:
+def trial_row(trial: Trial, first: StimulusWords = TAP, measured: Measures | None = None) -> TrialRow:
     """One trial of the table of all trials."""
     return TrialRow(
         trial.index,
         asked(trial, first),
         "–" if trial.isi_ms is None else f"{trial.isi_ms:.1f} ms",
         outcome(trial),
+        _shape(measured),
         "–" if trial.background_rms_uv is None else f"{trial.background_rms_uv:.2g} µV",
         _remark(trial, first),
+    )
+
+
+def _shape(measured: Measures | None) -> str:
+    """The measures of an MEP beside its amplitude."""
+    if measured is None or math.isnan(measured.mep_onset_ms):
+        return "–"
+    silent_ms = measured.silent_period_ms
+    return f"{measured.mep_onset_ms:.1f} ms, {measured.mep_duration_ms:.1f} ms, {measured.mep_area_mv_ms:.3g} mV·ms" + (
+        "" if math.isnan(silent_ms) else f", silent until {silent_ms:.0f} ms"
     )
 
 

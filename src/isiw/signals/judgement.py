@@ -89,7 +89,7 @@ def _reason(error: InvalidValueError) -> Kind:
 
 
 def _is_tense(judged: Trial | Measurement, limits: SignalLimits) -> bool:
-    return (judged.background_rms_uv or 0.0) > limits.background_uv
+    return (judged.background_rms_uv or 0.0) > limits.most_background_uv
 
 
 def _judge_tap(sweep: Sweep, stimulus: Stimulus, limits: SignalLimits) -> Trial:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
-from isiw.checks import Checked, Positive, ascending, number
+from isiw.checks import Checked, Flag, Positive, ascending, number
 from isiw.design import DesignSpace
 from isiw.errors import DeviceError, InvalidValueError, IsiwError
 from isiw.findings import AMPLITUDE_MV, BACKGROUND_LIMIT_UV, WINDOW_END_MS, Finding, Kind, Severity, refused
@@ -30,6 +30,7 @@ class SignalLimits(Checked):
     Args:
         mep_window_ms: where the MEP is sought [ms after the pulse]; `MEP_WINDOWS_MS` has one for each muscle group.
         background_uv: the most EMG at rest before the pulse [µV RMS]; above it the muscle was not relaxed.
+        contracted: whether the muscle is to be contracted, so that no EMG before the pulse is too much.
         full_scale_mv: the largest EMG that the amplifier can show [mV]; None to look for flat tops only, which are
             looked for in any case.
         isi_tolerance_ms: how far the realised ISI may be from the commanded one [ms], where that is less than the
@@ -43,6 +44,7 @@ class SignalLimits(Checked):
     background_uv: Positive = 10.0
     full_scale_mv: Positive | None = None
     isi_tolerance_ms: Positive | None = None
+    contracted: Flag = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -70,6 +72,11 @@ class SignalLimits(Checked):
                 expected=f"from {ARTEFACT_MS:g} ms after the pulse on, such as {MEP_WINDOW_MS}",
                 remedy="Set when MEPs of this muscle begin [ms].",
             )
+
+    @property
+    def most_background_uv(self) -> float:
+        """The most EMG before the pulse [µV RMS]; infinite if the muscle is to be contracted."""
+        return math.inf if self.contracted else self.background_uv
 
     def tolerance_ms(self, space: DesignSpace) -> float:
         """How far a realised ISI may be from the commanded one [ms]."""

@@ -55,7 +55,8 @@ _REMEDIES: Mapping[Kind, str] = MappingProxyType(
         Kind.TMS_BEFORE_IMPACT: "Check the hit delay that the rig assumes, and the sampling rate.",
         Kind.BACKGROUND_ACTIVITY: (
             "Ask the person to relax the muscle; check the electrodes and the ground, and look for mains hum. Where "
-            "the tap alone evokes a reflex before the pulse, begin the space at larger ISIs."
+            "the tap alone evokes a reflex before the pulse, begin the space at larger ISIs. If the muscle is to be "
+            "contracted, say so: contracted = true under [signals]."
         ),
         Kind.SATURATION: "Lower the amplifier's gain, or keep cables away from the coil.",
         Kind.MISSING_CHANNEL: (

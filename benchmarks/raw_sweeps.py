@@ -1,0 +1,241 @@
+"""Sessions with raw sweeps: reflexes evoked by the tap, right rigs that must not be accused, and amplitudes by ISI.
+
+    OMP_NUM_THREADS=1 python -m benchmarks.raw_sweeps reflex --people 20 --out benchmarks/results
+    OMP_NUM_THREADS=1 python -m benchmarks.raw_sweeps plain --people 20 --out benchmarks/results
+    OMP_NUM_THREADS=1 python -m benchmarks.raw_sweeps rigs --people 100 --out benchmarks/results
+    OMP_NUM_THREADS=1 python -m benchmarks.raw_sweeps sizes --out benchmarks/results
+    OMP_NUM_THREADS=1 python -m benchmarks.raw_sweeps random --people 20000 --out benchmarks/results
+
+`reflex`: people with and without a window, each with reflexes of three sizes at two times after the hit, without a tap
+alone and with six. `plain`: the same people without a reflex, in a session and in a loop that tells amplitudes as they
+are judged. `rigs`: sessions of rigs that are right. `sizes`: MEPs of .15 mV at ISIs of 0 to 60 ms. `random`: sweeps of
+any rate, length and offset.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import math
+import os
+import statistics
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import numpy as np
+
+import isiw
+from benchmarks.provenance import command_of, made_with
+from benchmarks.quick import understood
+from isiw.signals.tap import TapResponses
+from isiw.subjects import SimulatedSubject, TapResponse, cohort
+
+SPACE: Final = isiw.DesignSpace(0, 320, reference="impact")
+TRIALS: Final = 40
+REFLEXES: Final = tuple(itertools.product((0.05, 0.1, 0.3), ((20.0, 25.0), (50.0, 50.0)), (0, 6)))
+"""Median size [mV], start and duration [ms], and how many taps alone are given after the first trials."""
+
+MUSCLES: Final = {"forearm": (17.5, 8.0), "hand": (23.0, 12.0)}
+"""When an MEP begins after the pulse, and how long it lasts [ms]."""
+
+
+class Rig:
+    """Records the EMG of a person from 500 ms before the pulse until 200 ms after it."""
+
+    def __init__(
+        self,
+        mep_mv: Callable[[float | None], float],
+        tap: TapResponse | None = None,
+        seed: int = 0,
+        *,
+        rate_hz: float = 5000.0,
+        muscle: str = "forearm",
+        tap_alone: bool = True,
+    ) -> None:
+        self.mep_mv, self.tap, self.seed, self.rate_hz = mep_mv, tap, seed, rate_hz
+        self.muscle, self.tap_alone = muscle, tap_alone
+
+    def describe(self) -> isiw.DeviceInfo:
+        """What the rig is."""
+        return isiw.DeviceInfo("own", "impact", channels={"emg": "mV"}, simulated=True, tap_alone=self.tap_alone)
+
+    def stage(self) -> None:
+        """Nothing is to be armed."""
+
+    stop = unstage = stage
+
+    def deliver(self, stimulus: isiw.Stimulus, timeout_s: float = 1.0) -> isiw.Sweep:  # noqa: ARG002 - answers at once
+        """A sweep of a pair, of a pulse alone, or of a tap alone."""
+        rng = np.random.default_rng([self.seed, stimulus.trial])
+        times_ms, alone = np.arange(-500.0, 200.0, 1000 / self.rate_hz), stimulus.tap_alone
+        isi_ms = 150.0 if alone else stimulus.isi_ms
+        emg = 0.002 * rng.standard_normal(times_ms.size)
+        if not alone:
+            first_ms, lasts_ms = MUSCLES[self.muscle]
+            phase = (times_ms - first_ms) / lasts_ms
+            emg += self.mep_mv(isi_ms) / 2 * np.where((phase > 0) & (phase < 1), np.sin(2 * np.pi * phase), 0)
+            emg += 0.3 * (np.abs(times_ms) < 0.3)
+        if self.tap is not None and isi_ms is not None:
+            emg += self.tap.sample_mv(rng) * self.tap.course(times_ms + isi_ms)
+        channels = {"emg": isiw.Channel(emg, self.rate_hz, "mV", t0_ms=-500.0)}
+        return isiw.Sweep(channels, None, None if alone else 0.0, None if isi_ms is None else -isi_ms)
+
+
+def session_of(rig: Rig, seed: int, taps: int, signals: isiw.signals.SignalLimits | None = None) -> isiw.SessionResult:
+    """A session of 40 pairs; whatever it pauses for is answered with going on."""
+    strategy = isiw.make_strategy(space=SPACE, seed=seed, max_trials=TRIALS)
+    with tempfile.TemporaryDirectory() as folder:
+        return isiw.Session(
+            rig,
+            strategy,
+            log=Path(folder) / "one.mcap",
+            signals=signals,
+            protocol=isiw.VisitProtocol(taps_first=taps),
+            safeguards=isiw.Safeguards(on_pause=lambda _: True),
+        ).run(progress=False)
+
+
+def person_rig(person: SimulatedSubject, seed: int, tap: TapResponse | None, *, tap_alone: bool = False) -> Rig:
+    """A rig that records this person."""
+    responder = person.begin(seed)
+    return Rig(lambda isi_ms: responder.respond(isi_ms, "impact").mep_mv, tap, seed, tap_alone=tap_alone)
+
+
+def reflex(people: int, seed: int) -> Iterator[str]:
+    """How often people without a window get a probable one, and the F1 of those with one."""
+    sure = 0
+    found: dict[tuple[str, str], list[tuple[float, float]]] = {}
+    flat, with_window = (cohort(name, people, seed) for name in ("nonresponder", "recruitment"))
+    cases = [("none", None, 0), *((f"{size} mV at {start:.0f}-{start + lasts:.0f} ms, {taps} taps",
+              TapResponse(start, lasts, size, 0.5), taps) for size, (start, lasts), taps in REFLEXES)]  # fmt: skip
+    for name, tap, taps in cases:
+        for group, persons in (("without", flat), ("with", with_window)):
+            for number, person in enumerate(persons):
+                rig = person_rig(person, seed + number, tap, tap_alone=taps > 0)
+                estimate = session_of(rig, seed + number, taps).estimate
+                f1 = isiw.metrics.f1(estimate, person.window(SPACE), SPACE)
+                found.setdefault((group, name), []).append((estimate.probability or 0.0, f1))
+        probable = sum(p >= 0.9 for p, _ in found["without", name])
+        sure += probable if tap is not None else 0
+        means = [statistics.fmean(f1 for _, f1 in found["with", each]) for each in (name, "none")]
+        yield (
+            f"{name:34} without a window: P >= .9 in {probable} of {people}; with one: F1 {means[0]:.3f}, "
+            f"{means[0] - means[1]:+.3f} to no reflex"
+        )
+    yield f"pooled, without a window: P >= .9 in {sure} of {people * len(REFLEXES)}"
+
+
+def plain(people: int, seed: int) -> Iterator[str]:
+    """The F1 of a session with taps alone and of a loop that tells amplitudes as they are judged; no reflex."""
+    differences, lost = [], 0
+    for name in ("recruitment", "gaussian"):
+        for number, person in enumerate(cohort(name, people, seed)):
+            truth, own = person.window(SPACE), seed + number
+            result = session_of(person_rig(person, own, None), own, 0)
+            lost += sum(trial.reason is not None for trial in result.trials)
+            strategy, rig = isiw.make_strategy(space=SPACE, seed=own, max_trials=TRIALS), person_rig(person, own, None)
+            while not strategy.decision().stop:
+                stimulus = isiw.Stimulus(strategy.delivered, strategy.ask())
+                trial = isiw.signals.judge(rig.deliver(stimulus), stimulus, SPACE)
+                strategy.learn(trial.isi_ms, trial.mep_mv)
+            f1s = [isiw.metrics.f1(estimate, truth, SPACE) for estimate in (result.estimate, strategy.estimate())]
+            differences.append(f1s[0] - f1s[1])
+    error = statistics.stdev(differences) / math.sqrt(len(differences))
+    yield f"{len(differences)} people: F1 {statistics.fmean(differences):+.4f} ± {error:.4f} (SE), {lost} trials lost"
+
+
+def rigs(people: int, seed: int) -> Iterator[str]:
+    """How many sessions of rigs that are right are paused."""
+    accused: list[str] = []
+    for number in range(people):
+        muscle = list(MUSCLES)[number % 2]
+        rate_hz = (1000.0, 2000.0, 3000.0, 5000.0, 10000.0)[number // 2 % 5]
+        tap = (None, TapResponse(30.0, 30.0, 0.1, 0.5))[number // 10 % 2]
+        rng = np.random.default_rng([seed, number])
+        rig = Rig(lambda _, rng=rng: 0.12 * rng.gamma(2.0, 0.5), tap, number, rate_hz=rate_hz, muscle=muscle)
+        signals = isiw.signals.SignalLimits(mep_window_ms=isiw.signals.MEP_WINDOWS_MS[muscle])
+        strategy = isiw.make_strategy("even", space=SPACE, seed=number, max_trials=30, particles=100)
+        with tempfile.TemporaryDirectory() as folder:
+            guards = isiw.Safeguards(on_pause=lambda why: accused.append(why) or True)
+            log = Path(folder) / "one.mcap"
+            isiw.Session(rig, strategy, log=log, signals=signals, safeguards=guards).run(progress=False)
+    yield f"right rigs: {len(accused)} pauses in {people} sessions of 30 trials"
+    yield from accused
+
+
+class Told:
+    """What a rig's trials are told as, once what a tap alone evokes is learnt from each."""
+
+    def __init__(self, rig: Rig) -> None:
+        self.rig, self.taps, self.count = rig, TapResponses(), 0
+
+    def mv(self, isi_ms: float | None, *, alone: bool = False) -> float:
+        """The amplitude of the next trial without what is left of the response in it [mV]."""
+        stimulus = isiw.Stimulus(self.count, isi_ms, tap_alone=alone)
+        self.count += 1
+        sweep = self.rig.deliver(stimulus)
+        trial = isiw.signals.judge(sweep, stimulus, SPACE)
+        self.taps = self.taps.after(trial, sweep)
+        trial = self.taps.measured(trial)
+        return (trial.mep_mv or 0.0) - (trial.tap_mv or 0.0)
+
+
+def sizes(_: int, seed: int) -> Iterator[str]:
+    """The median amplitude of MEPs of .15 mV at ISIs of 0 to 60 ms, as a share of that at 200 ms."""
+    for name, tap in (("no response", None), ("an artefact of .1 mV at 18-23 ms", TapResponse(18.0, 5.0, 0.1, 0.2))):
+        told = Told(Rig(lambda _: 0.15, tap, seed))
+        for _ in range(12):
+            told.mv(None, alone=True)
+        usual = statistics.median(told.mv(200.0) for _ in range(20))
+        ratios = [statistics.median(told.mv(float(isi_ms)) for _ in range(20)) / usual for isi_ms in range(61)]
+        off = [isi_ms for isi_ms, ratio in enumerate(ratios) if abs(ratio - 1) > 0.05]
+        yield f"{name}: {len(off)} of 61 ISIs off by more than 5 %: {off}; {min(ratios):.3f} to {max(ratios):.3f}"
+
+
+def random(sweeps: int, seed: int) -> Iterator[str]:
+    """How many sweeps of any rate, length and offset raise an error."""
+    rng, raised, accepted = np.random.default_rng(seed), 0, 0
+    for _ in range(sweeps):
+        rate_hz, before_ms = float(np.exp(rng.uniform(np.log(500), np.log(50_000)))), rng.uniform(-40, 300)
+        count = max(2, round((before_ms + rng.uniform(0, 120)) * rate_hz / 1000))
+        emg = isiw.Channel(0.003 * rng.standard_normal(count), rate_hz, "mV", t0_ms=rng.uniform(-1e4, 1e4))
+        pulse_ms, isi_ms = emg.t0_ms + before_ms, rng.uniform(0, 320)
+        stimulus = isiw.Stimulus(0, isi_ms)
+        sweep = isiw.Sweep({"emg": emg}, t_tms_ms=pulse_ms, t_hit_ms=pulse_ms - isi_ms)
+        try:
+            trial = isiw.signals.judge(sweep, stimulus, SPACE)
+            taps = TapResponses().after(trial, sweep)
+            taps.measured(replace(trial, index=0))
+            accepted += trial.reason is None
+        except Exception:  # noqa: BLE001 - it is what is counted
+            raised += 1
+    yield f"{sweeps} random sweeps: {raised} raised, {accepted} accepted"
+
+
+PARTS: Final = {"reflex": reflex, "plain": plain, "rigs": rigs, "sizes": sizes, "random": random}
+
+
+def main() -> None:
+    """Run one part, and print or write its lines."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("part", choices=PARTS)
+    parser.add_argument("--people", type=int, default=10)
+    parser.add_argument("--seed", type=int, default=10_000)
+    parser.add_argument("--out", type=Path)
+    asked = parser.parse_args()
+    lines = [command_of("raw_sweeps"), made_with("numpy", "numba")]
+    for line in PARTS[asked.part](asked.people, asked.seed):
+        lines.append(line)
+        print(line, flush=True)
+        if asked.out:
+            (asked.out / f"raw_sweeps_{asked.part}.txt").write_text("\n".join(lines) + "\n", "utf-8")
+
+
+if __name__ == "__main__":
+    understood("raw_sweeps")
+    main()
