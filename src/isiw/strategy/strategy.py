@@ -198,14 +198,16 @@ class Strategy:
         """The next ISI [ms] as `ask` has it, or the first of the grid that is at least so long.
 
         Args:
-            least_ms: the shortest [ms]; a plan, and a space that ends before it, stay as they are.
+            least_ms: the shortest [ms]; what is asked whatever the responses stays as it is, and so does all in a space
+                that ends before.
             reason: why, as its `fallback_reason`.
         """
         isi_ms, longer = self.ask(), self.space.grid_ms[self.space.grid_ms >= least_ms]
-        if self._choice is None or self._choice.by in {"initial", "plan"} or isi_ms >= least_ms or not longer.size:
+        fixed = self._choice is None or self._choice.by in {"initial", "plan"} or not self.acquisition.needs
+        if fixed or isi_ms >= least_ms or not longer.size:
             return isi_ms
         self._choice, self._fallback_reason = Choice(float(longer[0]), reason, by="fallback"), reason
-        return self._choice.isi_ms
+        return float(longer[0])
 
     def _next_choice(self, deadline_s: float | None) -> Choice:
         course = self._course
