@@ -169,7 +169,7 @@ def test_no_session_stops_on_a_window_that_a_longer_isi_could_show_to_be_a_refle
 
 
 def test_where_all_isis_are_too_short_to_show_a_reflex_the_estimate_says_so(log: Path) -> None:
-    session = of_a_reflex(0.3, 0, log.parent, NO_TAPS, DesignSpace(0, 60, reference="impact"), 20)
+    session = of_a_reflex(0.3, 3, log.parent, NO_TAPS, DesignSpace(0, 60, reference="impact"), 20)
     estimate = session.strategy.estimate()
     assert known(estimate.probability) >= 0.9
     assert estimate.tap_may_explain
