@@ -133,7 +133,8 @@ def _limits(limits: Limits) -> str:
 def _fields(settings: Any) -> str:
     """The fields of a dataclass that are set, in words."""
     values = dataclasses.asdict(settings)
-    return ", ".join(f"{name} {_value(value)}" for name, value in values.items() if value not in (None, ""))
+    said = {name: value for name, value in values.items() if value not in (None, "") and value is not False}
+    return ", ".join(f"{name} {_value(value)}" for name, value in said.items())
 
 
 def _value(value: Any) -> str:
