@@ -16,7 +16,7 @@ def test_the_next_longer_isi_of_the_grid_is_asked_until_it_is_told() -> None:
     assert first < 300.0
     assert strategy.ask_longer(299.5, "why") == 300.0
     assert strategy.ask() == 300.0
-    assert strategy.fallback_reason == "why"
+    assert str(strategy.fallback_reason) == "why"
     strategy.tell(300.0, 0.05)
     assert not strategy.fallback_reason
 
