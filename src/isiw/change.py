@@ -32,5 +32,5 @@ class Change:
 
     @property
     def is_sure(self) -> bool:
-        """Whether it is said outright."""
+        """True if it is said outright."""
         return self.probability >= SURE_OF_A_CHANGE

@@ -35,7 +35,7 @@ _SAFE: Final = {"contract", "arcp", "afn", "nsz"}
 """What the compiler may do to numbers. It may not reorder sums: p a + (1 - p) b would lose a small a."""
 
 AVAILABLE: Final = importlib.util.find_spec("numba") is not None and os.environ.get("ISIW_ENGINE") != "torch"
-"""Whether there are compiled kernels here; the environment variable ISIW_ENGINE=torch does without them."""
+"""True if there are compiled kernels here; the environment variable ISIW_ENGINE=torch does without them."""
 
 
 def version() -> str:

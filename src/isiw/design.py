@@ -178,7 +178,7 @@ class DesignSpace(Checked):
         return isis_ms
 
     def admits(self, isi_ms: float) -> bool:
-        """Whether a realised ISI [ms] can have come from this space."""
+        """True if a realised ISI [ms] can have come from this space."""
         return self.low_ms - self.tolerance_ms <= isi_ms <= self.high_ms + self.tolerance_ms
 
     def check_realised(self, isi_ms: float) -> float:

@@ -132,7 +132,7 @@ def _cut(text: str, most: int) -> str:
     return text if len(text) <= most else f"{text[:half]} … {text[-half:]}"
 
 
-def told(error: BaseException) -> str:
+def error_text(error: BaseException) -> str:
     """An error's type and message, whatever its `__str__` does, as text that any file can hold."""
     try:
         text = str(error)

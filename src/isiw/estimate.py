@@ -36,7 +36,7 @@ class Edge(NamedTuple):
 
     @property
     def is_known(self) -> bool:
-        """Whether it has an interval."""
+        """True if it has an interval."""
         return self.low_ms is not None and self.high_ms is not None
 
     def within(self, low_ms: float, high_ms: float) -> Interval:
@@ -187,13 +187,13 @@ class WindowEstimate(Checked):
 
     @property
     def has_answer(self) -> bool:
-        """Whether anything is said about a window; not where a method waits for more trials, nor without any MEP."""
+        """True if anything is said about a window; not where a method waits for more trials, nor without any MEP."""
         says = self.window is not None or self.probability is not None or self.grid_ms is not None
         return says and not self.silent
 
     @property
     def rests_on_data(self) -> bool:
-        """Whether enough was measured to speak of a window; with less it is the prior."""
+        """True if enough was measured to speak of a window; with less it is the prior."""
         return self.too_little is None
 
     @property
@@ -370,7 +370,7 @@ class Estimate(Reported):
 
     @property
     def has_answer(self) -> bool:
-        """Whether the method has one: some have none before they have measured enough."""
+        """True if the method has one: some have none before they have measured enough."""
         return self.probability is not None or self.window is not None or bool(self.grid_ms)
 
     @property

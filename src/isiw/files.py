@@ -38,7 +38,7 @@ _KINDS: Final = {
 
 
 def is_reserved(name: str) -> bool:
-    """Whether Windows takes a file's name for a device, or for another name: `CON`, `aux.mcap`, `log.`."""
+    """True if Windows takes a file's name for a device, or for another name: `CON`, `aux.mcap`, `log.`."""
     return bool(_RESERVED.fullmatch(name)) or name.endswith((".", " "))
 
 
@@ -196,7 +196,7 @@ def _taken(target: Path) -> InvalidValueError:
 
 
 def is_mcap(path: Path) -> bool:
-    """Whether a file begins as every log does, whatever its name."""
+    """True if a file begins as every log does, whatever its name."""
     if not path.is_file():
         return False
     with opened(path) as file:

@@ -67,7 +67,7 @@ def true_edges_ms(truth: Window, space: DesignSpace) -> Interval:
 def covers(
     estimate: WindowEstimate, truth: Window | None, space: DesignSpace, level: float = 0.9
 ) -> tuple[bool, bool] | None:
-    """Whether the credible intervals of start and end hold the true edges; None where there are none of either."""
+    """True if the credible intervals of start and end hold the true edges; None where there are none of either."""
     _require(estimate, "the estimate", WindowEstimate)
     intervals = estimate.interval(level)
     if intervals is None or truth is None:

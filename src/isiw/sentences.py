@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from isiw.change import Change
 from isiw.design import DesignSpace
-from isiw.text.harmless import counted
+from isiw.text.sanitize import counted
 from isiw.text.stimuli import TAP, StimulusWords
 from isiw.trials import Trial
 from isiw.window import LEAST_FACTOR, MIN_EXCESS_MV, SURE, Window, bayes_factor, rules_out
@@ -88,7 +88,7 @@ def titled(estimate: Estimate) -> str:
 
 
 def _is_guess(estimate: Estimate) -> bool:
-    """Whether a window is reported that the trials hardly speak for, so that it is undecided whether there is one."""
+    """True if a window is reported that the trials hardly speak for, so that it is undecided whether there is one."""
     factor = bayes_factor(estimate.probability, estimate.beforehand)
     unsure = factor is not None and factor < LEAST_FACTOR and not _is_sure(estimate)
     return estimate.window is not None and unsure
@@ -153,7 +153,7 @@ def at_a_trial(change: Change, trial: int | None) -> str:
 
 
 def finding(estimate: Estimate, first: StimulusWords, space: DesignSpace) -> str:
-    """Whether there is a window, and which."""
+    """The reported window, or none."""
     window, probability = estimate.window, estimate.probability
     after = f"after the {first.origin(space.reference)}"
     if probability is None:
@@ -186,7 +186,7 @@ def _without_probability(estimate: Estimate, first: StimulusWords, after: str, s
 
 
 def is_unfinished(estimate: Estimate, space: DesignSpace) -> bool:
-    """Whether a scan of ISIs has reported nothing, and has not come to the end of the range yet."""
+    """True if a scan of ISIs has reported nothing, and has not come to the end of the range yet."""
     grid_ms = estimate.grid_ms
     if estimate.window is not None or estimate.probability is not None or grid_ms is None or not len(grid_ms):
         return False
@@ -224,7 +224,7 @@ def best_isi(estimate: Estimate) -> str:
 
 
 def _is_sure(estimate: Estimate) -> bool:
-    """Whether a reported window goes without saying "if there is one"."""
+    """True if a reported window goes without saying "if there is one"."""
     return estimate.probability is None or estimate.probability >= SURE
 
 

@@ -39,7 +39,7 @@ RESPONSE_MV: Final = 0.05
 
 
 class Status(StrEnum):
-    """Whether the strategy learns from a trial."""
+    """True if the strategy learns from a trial."""
 
     ACCEPTED = "accepted"
     MISTRIAL = "mistrial"
@@ -251,17 +251,17 @@ class Trial(Checked):
 
     @property
     def counts(self) -> bool:
-        """Whether it was accepted, and not excluded afterwards."""
+        """True if it was accepted, and not excluded afterwards."""
         return self.status is Status.ACCEPTED and not self.excluded
 
     @property
     def told(self) -> bool:
-        """Whether the strategy learns from it."""
+        """True if the strategy learns from it."""
         return self.counts and not self.tap_alone
 
     @property
     def is_control(self) -> bool:
-        """Whether it was TMS alone or a tap alone; of what nobody knows the outcome of, it may have been a pair."""
+        """True if it was TMS alone or a tap alone; of what nobody knows the outcome of, it may have been a pair."""
         return self.commanded_isi_ms is None and self.reason is not Kind.OUTCOME_UNKNOWN
 
     @property

@@ -149,7 +149,7 @@ class VisitProtocol(Checked):
             )
 
     def rests_before(self, trial: int) -> bool:
-        """Whether a rest comes before this trial."""
+        """True if a rest comes before this trial."""
         return self.block_trials is not None and trial > 0 and trial % self.block_trials == 0
 
     def interval_s(self, trial: int, seed: int) -> float:

@@ -32,7 +32,7 @@ Interval: TypeAlias = tuple[float, float]
 
 
 def rules_out(probability: float | None) -> bool:
-    """Whether nothing reported means that there is none; with more probability than this it is undecided."""
+    """True if nothing reported means that there is none; with more probability than this it is undecided."""
     return probability is None or 1 - probability >= SURE
 
 

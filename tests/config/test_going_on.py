@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from isiw.config import load_config
-from isiw.config.going_on import changes_on_resume, differences_on_resume
+from isiw.config.resume import changes_on_resume, differences_on_resume
 from isiw.devices.protocol import Readiness
 from isiw.log.reader import SessionRecord, read_session
 from isiw.session.loop import Session

@@ -26,7 +26,7 @@ from isiw.devices.recorded import RecordedPerson, Recordings
 from isiw.devices.robot.tapper import Tapper, TapperSettings
 from isiw.devices.simulated import RecordedTrials, SimulatedDevice, SimulatedPerson
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, LimitExceededError, NotDelivered
-from isiw.session.rig import driven
+from isiw.session.rig import exclusive
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.subject import Response
 from isiw.testing import check_device
@@ -500,7 +500,7 @@ def test_the_suite_finds_a_stop_that_fails_before_anything_is_armed(space: Desig
 
 def test_no_device_is_checked_that_a_session_drives(space: DesignSpace) -> None:
     device = Hardware()
-    with driven(device, device.describe()), pytest.raises(DeviceError, match="driven by another session"):
+    with exclusive(device, device.describe()), pytest.raises(DeviceError, match="driven by another session"):
         check_device(lambda: device, space, clock=VirtualClock())
     assert not device.taken
 

@@ -9,7 +9,7 @@ import pytest
 
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DeviceError
-from isiw.session.rig import driven
+from isiw.session.rig import exclusive
 from known import known
 from scripted import ScriptedDevice
 
@@ -19,48 +19,48 @@ PORT = DeviceInfo("rig", "valve", address="port of this test")
 
 def test_one_device_is_driven_once_at_a_time() -> None:
     device = ScriptedDevice()
-    with driven(device, PLAIN):
-        with pytest.raises(DeviceError, match="driven by another session"), driven(device, PLAIN):
+    with exclusive(device, PLAIN):
+        with pytest.raises(DeviceError, match="driven by another session"), exclusive(device, PLAIN):
             pass
-        with driven(ScriptedDevice(), PLAIN):
+        with exclusive(ScriptedDevice(), PLAIN):
             pass
-    with driven(device, PLAIN):
+    with exclusive(device, PLAIN):
         pass
 
 
 def test_a_device_is_free_again_after_an_error() -> None:
     device = ScriptedDevice()
-    with pytest.raises(ZeroDivisionError), driven(device, PORT):
+    with pytest.raises(ZeroDivisionError), exclusive(device, PORT):
         raise ZeroDivisionError
-    with driven(device, PORT):
+    with exclusive(device, PORT):
         pass
 
 
 def test_two_objects_of_one_address_are_one_device() -> None:
     with (
-        driven(ScriptedDevice(), PORT),
+        exclusive(ScriptedDevice(), PORT),
         pytest.raises(DeviceError, match="port of this test"),
-        driven(ScriptedDevice(), PORT),
+        exclusive(ScriptedDevice(), PORT),
     ):
         pass
 
 
 def test_a_lock_that_cannot_be_taken_is_told_with_the_way_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("isiw.session.rig.tempfile.gettempdir", lambda: str(tmp_path))
-    with driven(ScriptedDevice(), PORT):
+    with exclusive(ScriptedDevice(), PORT):
         (left,) = tmp_path.iterdir()
         assert os.name == "nt" or left.stat().st_mode & 0o777 == 0o666  # whoever else uses the computer can take it
     left.unlink(missing_ok=True)
     left.mkdir()
-    with pytest.raises(DeviceError, match=r"taken.*delete it once"), driven(ScriptedDevice(), PORT):
+    with pytest.raises(DeviceError, match=r"taken.*delete it once"), exclusive(ScriptedDevice(), PORT):
         pass
 
 
 HOLDER = """
 import sys
-from isiw.session.rig import driven
+from isiw.session.rig import exclusive
 from isiw.devices.protocol import DeviceInfo
-with driven(object(), DeviceInfo("rig", "valve", address="port of this test")):
+with exclusive(object(), DeviceInfo("rig", "valve", address="port of this test")):
     print("held", flush=True)
     sys.stdin.read()
 """
@@ -71,9 +71,9 @@ def test_an_address_is_driven_by_one_process() -> None:
         [sys.executable, "-c", HOLDER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as holder:
         assert known(holder.stdout).readline() == "held\n"
-        with pytest.raises(DeviceError, match="driven by another session"), driven(ScriptedDevice(), PORT):
+        with pytest.raises(DeviceError, match="driven by another session"), exclusive(ScriptedDevice(), PORT):
             pass
         holder.kill()  # as a crash would: what it held is free again
         holder.wait()
-        with driven(ScriptedDevice(), PORT):
+        with exclusive(ScriptedDevice(), PORT):
             pass

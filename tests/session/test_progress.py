@@ -12,7 +12,7 @@ import pytest
 from isiw.estimate import WindowEstimate
 from isiw.findings import Kind
 from isiw.log.reader import read_session
-from isiw.session.desk import PROGRESS_HEADINGS, PROGRESS_LEGEND, fitted, progress_row, standing
+from isiw.session.console import PROGRESS_HEADINGS, PROGRESS_LEGEND, fitted, progress_row, standing
 from isiw.session.loop import Session
 from isiw.session.sink import SessionUpdate
 from isiw.session.terminal import COLUMNS
@@ -125,7 +125,7 @@ def test_a_table_that_cannot_be_shown_any_more_ends_no_session(
         if len(rows) == 2:
             raise error
 
-    monkeypatch.setattr("isiw.session.desk.show_progress", show)
+    monkeypatch.setattr("isiw.session.console.show_progress", show)
     session = Session(ScriptedDevice(), scripted_strategy(5), log=tmp_path / "s.mcap")
     session.run(progress=True, keys=False)
     record = read_session(tmp_path / "s.mcap")

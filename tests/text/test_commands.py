@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from isiw.text.harmless import command
+from isiw.text.sanitize import command
 
 
 def test_a_path_with_a_space_is_one_word() -> None:
@@ -26,5 +26,5 @@ def test_what_needs_no_quotes_has_none() -> None:
 
 
 def test_windows_takes_double_quotes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("isiw.text.harmless.os.name", "nt")
+    monkeypatch.setattr("isiw.text.sanitize.os.name", "nt")
     assert command("show", "P 07.mcap") == 'isiw show "P 07.mcap"'

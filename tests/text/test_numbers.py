@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from isiw.text.harmless import read_number, read_whole
+from isiw.text.sanitize import read_number, read_whole
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from isiw.text.harmless import shown
+from isiw.text.sanitize import shown
 
 
 class Unprintable:

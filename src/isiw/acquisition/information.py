@@ -159,7 +159,7 @@ def mutual_information(posterior: PredictsOutcomes, isi_ms: Tensor) -> Tensor:
 
 
 def _is_for_kernels(mass: Tensor) -> bool:
-    """Whether compiled loops are there for it: in single precision, on the CPU."""
+    """True if compiled loops are there for it: in single precision, on the CPU."""
     return AVAILABLE and mass.dtype == torch.float32 and mass.device.type == "cpu"
 
 

@@ -11,7 +11,7 @@ from rich.progress import Progress
 
 import isiw
 from isiw.cli.console import LOGS, NO_DEFAULT, STUDIES, Overwrite, errors_reported, free_beside, show
-from isiw.text.harmless import command
+from isiw.text.sanitize import command
 
 if TYPE_CHECKING:
     from isiw.existing.batch import Person, Way

@@ -19,7 +19,7 @@ from rich.text import Text
 
 import isiw
 from isiw.text import plain
-from isiw.text.harmless import counted
+from isiw.text.sanitize import counted
 
 if TYPE_CHECKING:
     from isiw.log.reader import SessionRecord

@@ -21,7 +21,7 @@ from isiw.cli.console import (
     show,
     show_paragraph,
 )
-from isiw.text.harmless import command, counted
+from isiw.text.sanitize import command, counted
 
 if TYPE_CHECKING:
     from isiw.log.schema import Event

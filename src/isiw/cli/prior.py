@@ -9,7 +9,7 @@ import typer
 
 import isiw
 from isiw.cli.console import NO_DEFAULT, Overwrite, counting, errors_reported, exit_if_damaged, show
-from isiw.text.harmless import command, counted
+from isiw.text.sanitize import command, counted
 
 if TYPE_CHECKING:
     from isiw.log.reader import SessionRecord

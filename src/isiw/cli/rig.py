@@ -9,7 +9,7 @@ import typer
 
 import isiw
 from isiw.cli.console import SESSIONS, errors_reported, show
-from isiw.text.harmless import command
+from isiw.text.sanitize import command
 
 app = typer.Typer()
 new = typer.Typer(help="Write a template for your own rig.", no_args_is_help=True)

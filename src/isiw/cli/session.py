@@ -21,7 +21,7 @@ from isiw.cli.console import (
     show,
     show_paragraph,
 )
-from isiw.text.harmless import command
+from isiw.text.sanitize import command
 
 if TYPE_CHECKING:
     from isiw.devices.protocol import Device

@@ -15,7 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 import isiw
 from isiw.cli.console import NO_DEFAULT, errors_reported, show
 from isiw.text import plain
-from isiw.text.harmless import command, read_whole
+from isiw.text.sanitize import command, read_whole
 
 if TYPE_CHECKING:
     from isiw.studies import Store, Unit

@@ -10,7 +10,7 @@ from rich.console import Console
 
 import isiw
 from isiw.cli.console import NO_DEFAULT, SESSIONS, errors_reported, exit_if_damaged, refuse_ignored, show
-from isiw.text.harmless import counted
+from isiw.text.sanitize import counted
 
 if TYPE_CHECKING:
     from isiw.session import ThresholdRecorder

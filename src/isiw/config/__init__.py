@@ -1,6 +1,6 @@
 """Configuration files, and the sessions that they describe."""
 
-from isiw.config.going_on import (
+from isiw.config.resume import (
     Truth,
     after_end,
     after_error,

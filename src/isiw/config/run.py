@@ -81,7 +81,7 @@ class RunConfig(Section):
 
     @property
     def own_rig(self) -> bool:
-        """Whether the device is the lab's own."""
+        """True if the device is the lab's own."""
         return self.device is not None and self.robot is None
 
     @property
@@ -91,7 +91,7 @@ class RunConfig(Section):
 
     @property
     def space_named(self) -> bool:
-        """Whether the design space was given."""
+        """True if the design space was given."""
         return "space" in self.model_fields_set
 
     def design(self) -> DesignSpace:

@@ -76,7 +76,7 @@ def write_rig_template(folder: str | Path) -> tuple[Path, ...]:
     return files
 
 
-def settings_with_taught(config: RunConfig, device: DeviceInfo) -> dict[str, Any]:
+def settings_with_prior(config: RunConfig, device: DeviceInfo) -> dict[str, Any]:
     """The strategy's settings, with what earlier sessions taught as its prior."""
     settings = dict(config.strategy.settings)
     if config.prior is None and not config.after:
@@ -91,11 +91,11 @@ def settings_with_taught(config: RunConfig, device: DeviceInfo) -> dict[str, Any
             f"the strategy {config.strategy.name} learns nothing from earlier sessions",
             remedy="Leave out the prior and the earlier sessions, or choose another strategy, such as default.",
         )
-    return settings | {"prior": _taught(config, device)}
+    return settings | {"prior": _learned_prior(config, device)}
 
 
 def learns_from_earlier(name: str) -> bool:
-    """Whether a strategy has a prior for what earlier sessions teach."""
+    """True if a strategy has a prior for what earlier sessions teach."""
     try:
         settings_for(name, prior=Prior())
     except StrategyError:  # no prior, or that of another model
@@ -103,7 +103,7 @@ def learns_from_earlier(name: str) -> bool:
     return True
 
 
-def _taught(config: RunConfig, device: DeviceInfo) -> Prior:
+def _learned_prior(config: RunConfig, device: DeviceInfo) -> Prior:
     """What the lab's people and the person's earlier sessions taught."""
     lab = None if config.prior is None else read_lab_prior(config.prior)
     earlier = [read_session(path) for path in config.after]
@@ -288,7 +288,7 @@ def session_for(config: RunConfig) -> Session:
         "conditioning": None if info.conditioning == "tap" else info.conditioning,  # a tap may be nothing stated
         "intensity_pct_rmt": config.visit.intensity_pct_rmt,
     }
-    settings = known_settings(config.strategy.name, known) | settings_with_taught(config, info)
+    settings = known_settings(config.strategy.name, known) | settings_with_prior(config, info)
     strategy = make_strategy(config.strategy.name, space=space, seed=config.seed, **settings)
     if config.earlier:
         strategy.learn_all(earlier_trials(config, info))

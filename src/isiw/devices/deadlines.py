@@ -13,7 +13,7 @@ from typing import Any, Generic, TypeVar
 
 from isiw.checks import Checked, Count, Positive
 from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, ReportsReadiness, readiness_of, require_staged
-from isiw.errors import DeviceError, DeviceTimeoutError, StillArmedError, told
+from isiw.errors import DeviceError, DeviceTimeoutError, StillArmedError, error_text
 from isiw.trials import Stimulus
 
 _T = TypeVar("_T")
@@ -69,7 +69,7 @@ class _Call(Generic[_T]):
         return time.monotonic() - self._began_s
 
     def kept(self, deadline_s: float) -> bool:
-        """Whether it ended in time."""
+        """True if it ended in time."""
         return self.ended and self._ended_s - self._began_s <= deadline_s
 
     def wait(self, deadline_s: float, given_up: Callable[[], bool] = lambda: False) -> None:
@@ -204,7 +204,7 @@ class PunctualDevice:
         try:
             return late.result() if late.ended else None
         except Exception as error:  # noqa: BLE001 - whatever a device fails with too late is told
-            self._report(f"After its deadline the delivery failed: {told(error)}")
+            self._report(f"After its deadline the delivery failed: {error_text(error)}")
             return None
 
     def stop(self) -> None:
@@ -304,7 +304,7 @@ class PunctualDevice:
         try:
             call.result()
         except BaseException as error:  # noqa: BLE001 - whatever it is, the device may still be armed
-            return told(error)
+            return error_text(error)
         return None
 
 

@@ -210,7 +210,7 @@ class Limits(Checked):
             )
 
     def _is_own(self, intensity_pct_mso: float | None) -> bool:
-        """Whether an intensity is the one to deliver at, up to what a conversion on the way may lose."""
+        """True if an intensity is the one to deliver at, up to what a conversion on the way may lose."""
         own = self.intensity_pct_mso
         return own is not None and intensity_pct_mso is not None and abs(intensity_pct_mso - own) <= _SAME_PCT_MSO
 

@@ -186,7 +186,7 @@ class BootstrapPosterior:
 
     @property
     def trouble(self) -> str | None:
-        """Whether the last generation taught nothing; see `ReportsTrouble`."""
+        """True if the last generation taught nothing; see `ReportsTrouble`."""
         if not self.weightless.any():
             return None
         return "No MEP of the last generation was above the floor: all of its particles were given the same weight."

@@ -19,7 +19,7 @@ from isiw.checks import number, whole
 from isiw.dissertation.nonlinear import gaussians_mv, gradient_mv
 from isiw.errors import InvalidValueError
 from isiw.lazy import scipy
-from isiw.text.harmless import counted
+from isiw.text.sanitize import counted
 from isiw.types import ArrayLike, FloatArray
 
 MOST_GAUSSIANS: Final = 5

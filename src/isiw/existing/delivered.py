@@ -15,7 +15,7 @@ from isiw.findings import AMPLITUDE_MV, Kind
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import MOST_TRIALS
 from isiw.signals.limits import EMG_UNITS_MV, SignalLimits, implausible_scale
-from isiw.text.harmless import counted
+from isiw.text.sanitize import counted
 from isiw.trials import Channel, Trial, TrialTable
 from isiw.types import Conditioning, Reference
 from isiw.visit import Visit

@@ -17,7 +17,7 @@ from isiw.existing.tables import Columns
 from isiw.findings import Kind
 from isiw.lazy import pd
 from isiw.signals.judgement import judge_measurement
-from isiw.text.harmless import counted
+from isiw.text.sanitize import counted
 from isiw.trials import Measurement, Status, Stimulus, Trial
 from isiw.types import Reference
 from isiw.visit import Visit

@@ -23,7 +23,7 @@ from isiw.log.records import Onset
 from isiw.log.salvage import only_in, salvage_file
 from isiw.log.schema import Event
 from isiw.log.verdicts import VERDICTS
-from isiw.text.harmless import counted
+from isiw.text.sanitize import counted
 from isiw.text.stimuli import StimulusWords, words_of
 
 _FIRST_DAY: Final = dt.date(1900, 1, 1)
@@ -137,7 +137,7 @@ class _Copy:
 
     @property
     def is_left_out(self) -> bool:
-        """Whether the fuller log stands for it."""
+        """True if the fuller log stands for it."""
         if not self.alone:
             return True
         has_lost = _lacks(self.record) or _lacks(self.fuller)
@@ -145,13 +145,13 @@ class _Copy:
 
     @property
     def _has_verdicts_alone(self) -> bool:
-        """Whether an operator said something about its trials that the fuller log does not know of."""
+        """True if an operator said something about its trials that the fuller log does not know of."""
         known = self.fuller.events
         return any(event.kind in VERDICTS and event not in known for event in self.record.events)
 
     @property
     def is_gone_on_from(self) -> bool:
-        """Whether the fuller log is its continuation, which is beside it until that is closed."""
+        """True if the fuller log is its continuation, which is beside it until that is closed."""
         return self.fuller.path == part_of(self.record.path) and not self.alone
 
     def __str__(self) -> str:
@@ -185,7 +185,7 @@ def _begun(record: SessionRecord) -> tuple[str, str, int]:
 
 
 def _lacks(record: SessionRecord) -> bool:
-    """Whether a log has lost something that a copy of it may still have."""
+    """True if a log has lost something that a copy of it may still have."""
     return _is_damaged(record) or bool(record.unknown or _unknown(record))
 
 
@@ -198,7 +198,7 @@ def _unknown(record: SessionRecord) -> list[int]:
 
 
 def _of_same_stimuli(one: SessionRecord, other: SessionRecord) -> bool:
-    """Whether two logs tell of the same stimuli, as far as both tell of them."""
+    """True if two logs tell of the same stimuli, as far as both tell of them."""
     first, second = stimuli(one), stimuli(other)
     common = first.keys() & second.keys()
     return all(first[trial] == second[trial] for trial in common) and bool(common or not first or not second)

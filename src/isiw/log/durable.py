@@ -54,7 +54,7 @@ def log_of(path: Path) -> Path:
 
 
 def log_exists(log: Path) -> bool:
-    """Whether there is a log of this name, finished or still being written."""
+    """True if there is a log of this name, finished or still being written."""
     return log.exists() or part_of(log).exists()
 
 
@@ -95,7 +95,7 @@ class DurableFile:
 
     @property
     def closed(self) -> bool:
-        """Whether it is closed."""
+        """True if it is closed."""
         return self._file.closed
 
     def write(self, data: bytes) -> int:

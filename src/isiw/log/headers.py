@@ -196,7 +196,7 @@ class Header(_Header):
 
     @property
     def imported(self) -> bool:
-        """Whether its trials were delivered without isiw."""
+        """True if its trials were delivered without isiw."""
         return self.kind == "imported"
 
     @property

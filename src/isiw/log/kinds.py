@@ -10,7 +10,7 @@ from typing import Final
 from isiw.errors import LogError
 from isiw.log.durable import log_of
 from isiw.log.headers import RUN_KEY, SERVED_KEY, AnyHeader, Header
-from isiw.text.harmless import command
+from isiw.text.sanitize import command
 
 OWN_LOOP: Final = "a loop of the lab's own"
 """What the log calls the device of a session whose loop is not isiw's."""

@@ -101,7 +101,7 @@ def _raise(error: OSError) -> None:
 
 
 def _went_on(damaged: Salvage) -> bool:
-    """Whether a damaged file is only kept, and its log was resumed with all that was left: its pulses count there."""
+    """True if a damaged file is only kept, and its log was resumed with all that was left: its pulses count there."""
     log = kept_for(damaged.path)
     if log is None or not log_exists(log):
         return False

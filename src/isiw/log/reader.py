@@ -117,7 +117,7 @@ class SessionRecord:
 
     @property
     def rests_on_data(self) -> bool:
-        """Whether enough pairs of stimuli count to speak of a window, and any trial showed an MEP."""
+        """True if enough pairs of stimuli count to speak of a window, and any trial showed an MEP."""
         return self.too_little is None
 
     @property
@@ -133,13 +133,13 @@ class SessionRecord:
 
     @property
     def is_silent(self) -> bool:
-        """Whether enough trials count, and each amplitude was 0, where the detection limit is too low for that."""
+        """True if enough trials count, and each amplitude was 0, where the detection limit is too low for that."""
         meps_mv = [trial.mep_mv for trial in self.table.told if trial.mep_mv is not None]
         return is_silent(meps_mv, self.header.detection_limit_mv)
 
     @property
     def is_judged_since(self) -> bool:
-        """Whether trials were judged after the last estimate, which is then outdated."""
+        """True if trials were judged after the last estimate, which is then outdated."""
         since = itertools.takewhile(lambda entry: not isinstance(entry, EstimateRecord), reversed(self.history))
         return any(isinstance(entry, Event) and entry.kind in VERDICTS for entry in since)
 
@@ -234,7 +234,7 @@ def read_any(salvaged: Salvage, wanted: LogKind = LogKind.SEARCH) -> SessionReco
 
 
 def of_production(salvaged: Salvage) -> bool:
-    """Whether a log is of an interval production task."""
+    """True if a log is of an interval production task."""
     return any(message.topic in {"/production_header", "/production"} for message in salvaged.messages)
 
 

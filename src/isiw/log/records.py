@@ -23,7 +23,7 @@ from isiw.log.salvage import Salvage
 from isiw.log.schema import MOST_TRIALS, EstimateRecord, Event, Intent, Message, PulseOutcome, Record, Waveform, decode
 from isiw.log.writer import CONFIGURATION
 from isiw.strategy.stopping import StopKind
-from isiw.text.harmless import counted
+from isiw.text.sanitize import counted
 from isiw.text.toml_files import parsed, read_json
 from isiw.trials import Channel, Trial
 
@@ -233,7 +233,7 @@ def _decoded(message: Message) -> tuple[Record, dict[str, str]]:
 
 
 def _is_beyond(message: Message) -> bool:
-    """Whether a record is of a later trial than is read."""
+    """True if a record is of a later trial than is read."""
     try:
         values = read_json(message.data)
     except ValueError:

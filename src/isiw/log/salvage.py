@@ -20,7 +20,7 @@ from isiw.files import opened
 from isiw.log.blocks import RECORD_HEAD_BYTES, UNREADABLE, LostBlockError, Unpacking, counted_records, marked
 from isiw.log.durable import Fingerprint, disk_errors, log_of, part_of
 from isiw.log.schema import ANNOUNCEMENT, CHANNEL_IDS, Message
-from isiw.text.harmless import counted
+from isiw.text.sanitize import counted
 
 
 @dataclass
@@ -94,7 +94,7 @@ def _continuation(part: Path, closed: Path) -> Salvage:
 
 
 def holds(later: Salvage, earlier: Salvage) -> bool:
-    """Whether a log holds every record of another, as its continuation does."""
+    """True if a log holds every record of another, as its continuation does."""
     return not only_in(earlier, later)
 
 
@@ -144,9 +144,9 @@ class _Reading:
     def __init__(self, file: IO[bytes], found: Salvage) -> None:
         self.file, self.found = file, found
         self.sealed = False
-        """Whether the end of the records was reached."""
+        """True if the end of the records was reached."""
         self.whole = False
-        """Whether everything up to there agrees with its checksum."""
+        """True if everything up to there agrees with its checksum."""
         self._readable_to = 0
         self._met: set[int] = set()
         """Where the chunks are that were met."""
@@ -196,7 +196,7 @@ class _Reading:
         found.finished = found.finished or isinstance(record, mcap.Footer)
 
     def _is_as_long_as_it_says(self) -> bool:
-        """Whether the record that has just been read has the length that it states."""
+        """True if the record that has just been read has the length that it states."""
         end = self.file.tell()
         self.file.seek(self._readable_to + 1)
         length = int.from_bytes(self.file.read(8), "little")
@@ -217,7 +217,7 @@ class _Reading:
         found.losses.insert(0, f"The log is torn or damaged at byte {self._readable_to} of {found.size}.")
 
     def _has_missed_some(self) -> bool:
-        """Whether there are chunks that were not met, as a damaged record was taken for another or for a longer one."""
+        """True if there are chunks that were not met, as a damaged record was taken for another or for a longer one."""
         return not self._met.issuperset(start for start, _ in self._marked())
 
     def _search(self) -> None:

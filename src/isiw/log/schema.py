@@ -36,7 +36,7 @@ from pydantic import (
 from pydantic_core import PydanticSerializationError
 
 from isiw.checks import MOST_MEP_MV
-from isiw.errors import InvalidValueError, LogError, told
+from isiw.errors import InvalidValueError, LogError, error_text
 from isiw.estimate import Estimate, WindowEstimate
 from isiw.findings import Kind
 from isiw.log.headers import ANY_HEADER, AnyHeader, Header, LogRecord, Production, ProductionHeader, ThresholdHeader
@@ -145,7 +145,7 @@ class EstimateRecord(Estimate):
 
     @property
     def decision(self) -> StopDecision:
-        """Whether the session stops here, and why."""
+        """The decision to stop here or not, with its reason."""
         return StopDecision(self.stop, self.reason, self.stop_kind)
 
 
@@ -253,7 +253,7 @@ def adapter(topic: str) -> TypeAdapter[Any]:
 
 
 def is_of_isiw(topic: str) -> bool:
-    """Whether a topic carries records of isiw's own, and not the waveforms of a channel."""
+    """True if a topic carries records of isiw's own, and not the waveforms of a channel."""
     return topic in _KINDS
 
 
@@ -281,7 +281,7 @@ def encode(topic: str, record: Record) -> bytes:
     except (PydanticSerializationError, UnicodeEncodeError) as error:
         raise InvalidValueError(
             f"a record of {topic} cannot be written as JSON",
-            got=told(error),
+            got=error_text(error),
             remedy="Look at the names, units and texts that the device gives.",
         ) from error
 

@@ -114,7 +114,7 @@ def _require_of_a_muscle(trial: Trial, mep_mv: float) -> None:
 
 
 def _placed(trial: Trial, space: DesignSpace) -> bool:
-    """Whether a strategy could learn where the trial's pulse came."""
+    """True if a strategy could learn where the trial's pulse came."""
     return trial.commanded_isi_ms is None or (trial.isi_ms is not None and space.admits(trial.isi_ms))
 
 

@@ -140,7 +140,7 @@ class LogWriter:
 
     @property
     def is_open(self) -> bool:
-        """Whether anything can still be added."""
+        """True if anything can still be added."""
         return not self._file.closed
 
     def append(self, record: Record, channel_name: str | None = None) -> None:

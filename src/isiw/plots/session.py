@@ -33,7 +33,7 @@ from isiw.plots.style import (
     tidied,
 )
 from isiw.sentences import titled
-from isiw.text.harmless import counted
+from isiw.text.sanitize import counted
 from isiw.trials import Trial
 from isiw.types import FloatArray
 from isiw.window import Window

@@ -1,4 +1,4 @@
-"""Whether windows differ: of one person on two days, or of two people."""
+"""A comparison of windows that may differ: of one person on two days, or of two people."""
 
 from __future__ import annotations
 

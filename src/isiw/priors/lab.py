@@ -120,7 +120,7 @@ class LabPrior(Checked):
 
     @property
     def simulated(self) -> bool:
-        """Whether it was learnt from simulated people."""
+        """True if it was learnt from simulated people."""
         return any(session.simulated for session in self.sessions)
 
     @property

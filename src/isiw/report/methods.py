@@ -12,7 +12,7 @@ from isiw.dissertation.response_counts import TrialsByIsi, by_isi, count_trials
 from isiw.errors import InvalidValueError
 from isiw.log.reader import SessionRecord
 from isiw.report.words import finding_sentences
-from isiw.text.harmless import counted
+from isiw.text.sanitize import counted
 from isiw.types import FloatArray
 from isiw.window import Window
 

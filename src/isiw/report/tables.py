@@ -17,7 +17,7 @@ from isiw.log.reader import SessionRecord
 from isiw.log.schema import Event, Intent
 from isiw.sentences import asked, outcome
 from isiw.signals.measures import Measures
-from isiw.text.harmless import counted
+from isiw.text.sanitize import counted
 from isiw.text.stimuli import TAP, StimulusWords
 from isiw.trials import Trial
 

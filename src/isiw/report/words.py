@@ -15,7 +15,7 @@ from isiw.report.evidence import changed_with_time, contradiction, no_comparison
 from isiw.session.examination import change_found
 from isiw.strategy.catalogue import known_settings, list_strategies
 from isiw.strategy.stopping import OF_THE_WINDOW
-from isiw.text.harmless import command
+from isiw.text.sanitize import command
 from isiw.window import Window
 
 TRIAL_HEADINGS = ("trial", "commanded", "outcome", "realised")

@@ -9,7 +9,7 @@ from typing import Final, Literal, Self
 from fastapi import Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from isiw.errors import IsiwError, LimitExceededError, LogError, RequestError, told
+from isiw.errors import IsiwError, LimitExceededError, LogError, RequestError, error_text
 from isiw.estimate import Estimate, Reported
 from isiw.findings import Kind
 from isiw.strategy.stopping import StopDecision
@@ -54,7 +54,7 @@ def failed(error: BaseException) -> Refusal:
     return Refusal(
         500,
         "InternalError",
-        f"the server has failed: {told(error)}",
+        f"the server has failed: {error_text(error)}",
         remedy="Deliver nothing. The log is safe; resume the session.",
     )
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from isiw.devices.limits import Limits
-from isiw.errors import told
+from isiw.errors import error_text
 from isiw.files import made_folder
 from isiw.log.durable import log_exists, log_of, part_of
 from isiw.log.headers import SERVED_KEY
@@ -100,7 +100,7 @@ class Sessions:
                 self.close(name)
             except Exception as error:  # noqa: BLE001 - the others are to be closed all the same
                 with suppress(OSError, ValueError):  # the screen is gone
-                    alarm(f"The session {name} was not closed ({told(error)}). It can be resumed.")
+                    alarm(f"The session {name} was not closed ({error_text(error)}). It can be resumed.")
 
     def stands(self, name: str) -> SessionAnswer:
         """How a session stands, open or not."""

@@ -2,7 +2,7 @@
 
 from isiw.log.kinds import LogKind, imported_sentence
 from isiw.session.again import estimate_again
-from isiw.session.desk import PROGRESS_HEADINGS, aligned, progress_row
+from isiw.session.console import PROGRESS_HEADINGS, aligned, progress_row
 from isiw.session.loop import Session
 from isiw.session.recorder import Recorder
 from isiw.session.resume import open_session, resume

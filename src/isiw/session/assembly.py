@@ -22,7 +22,7 @@ from isiw.log.durable import log_of
 from isiw.log.headers import Header, StrategyRecipe
 from isiw.log.schema import Event, Record, now
 from isiw.log.writer import LogWriter
-from isiw.session.desk import Desk, Operated
+from isiw.session.console import Operated, OperatorConsole
 from isiw.session.examination import WindowExamination, examination_of
 from isiw.session.rig import Rig, Safeguards, require_matching
 from isiw.session.sink import SessionUpdate, Sink
@@ -159,7 +159,7 @@ class Parts(NamedTuple):
     asking: Asking
     pausing: Pausing
     steps: Steps
-    desk: Desk
+    console: OperatorConsole
 
 
 def assembled(
@@ -180,8 +180,8 @@ def assembled(
     safeguards, protocol = options.get("safeguards") or Safeguards(), protocol or VisitProtocol()
     limits = (limits or Limits.of_space(strategy.space)).stated(USUAL_ITI_S)
     asking, sink = Asking(), Sink(options.get("on_trial"))
-    desk = Desk(operated, asking)
-    rig = Rig(device, limits, options.get("clock"), safeguards, sink, away=desk.away)
+    console = OperatorConsole(operated, asking)
+    rig = Rig(device, limits, options.get("clock"), safeguards, sink, away=console.away)
     require_matching(rig.info, strategy, protocol)
     header = header_of(
         strategy,
@@ -206,4 +206,4 @@ def assembled(
         paused_for = [event.finding for event in earlier.events if event.kind == "pause" and event.finding is not None]
         watch = watch.resumed(earlier.trials, paused_for)
     steps = Steps(examination, rig, sink, pausing, watch, header, safeguards.backoffs_s, earlier.taps(header.signals))
-    return Parts(path, header, limits, safeguards, sink, rig, examination, asking, pausing, steps, desk)
+    return Parts(path, header, limits, safeguards, sink, rig, examination, asking, pausing, steps, console)

@@ -14,7 +14,7 @@ from typing import Any, Generic, NamedTuple, ParamSpec, Protocol, TypeAlias, Typ
 
 from isiw import checks, sentences
 from isiw.change import Change
-from isiw.errors import LimitExceededError, told
+from isiw.errors import LimitExceededError, error_text
 from isiw.findings import Finding, Kind, Severity
 from isiw.log.schema import EstimateRecord, Event, EventKind, Intent, Record
 from isiw.log.verdicts import excluded_by, under_all
@@ -133,7 +133,7 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
 
     def log_refusal(self, kind: EventKind, error: Exception, trial: int | None = None) -> None:
         """Log that a stimulus was refused; if that ends the session, it is not logged again."""
-        self.event(kind, told(error), trial)
+        self.event(kind, error_text(error), trial)
         self._refusal = error
 
     def log_failure(self, error: BaseException) -> None:
@@ -141,7 +141,7 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
         if error is self._refusal:
             return
         kind: EventKind = "limit" if isinstance(error, LimitExceededError) else "fault"
-        self.event(kind, "Interrupted by the operator." if isinstance(error, KeyboardInterrupt) else told(error))
+        self.event(kind, "Interrupted by the operator." if isinstance(error, KeyboardInterrupt) else error_text(error))
 
     def intend(self, intent: Intent, fallback: str | None = None) -> bool:
         """Put on disk what is about to be delivered; False, and nothing is, if a trial was judged since the ask."""

@@ -125,17 +125,17 @@ class Interrupts:
 
     @property
     def heard(self) -> bool:
-        """Whether a signal came that is not settled."""
+        """True if a signal came that is not settled."""
         return self._handled > self._settled
 
     @property
     def insisted(self) -> bool:
-        """Whether more than one did."""
+        """True if more than one did."""
         return self._handled > self._settled + 1
 
     @property
     def ending(self) -> bool:
-        """Whether the session is to end, and not only to pause."""
+        """True if the session is to end, and not only to pause."""
         return self._ended > self._settled or self.insisted
 
     def acknowledge(self) -> None:

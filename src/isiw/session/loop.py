@@ -19,7 +19,7 @@ from isiw.log.pulses import earlier_pulses_s
 from isiw.log.schema import Event
 from isiw.log.writer import LogWriter
 from isiw.session.assembly import Earlier, Options, assembled, require_room
-from isiw.session.desk import Table
+from isiw.session.console import Table
 from isiw.session.judging import Judging
 from isiw.session.sink import Follower, SessionResult
 from isiw.session.steps import Pause, ended, paused
@@ -73,7 +73,7 @@ class Session(Judging):
         self.log_path, self._header = parts.log_path, parts.header
         self._limits, self._safeguards = parts.limits, parts.safeguards
         self._sink, self._rig, self._examination, self._steps = parts.sink, parts.rig, parts.examination, parts.steps
-        self._asking, self._pausing, self._desk = parts.asking, parts.pausing, parts.desk
+        self._asking, self._pausing, self._console = parts.asking, parts.pausing, parts.console
 
     @property
     def header(self) -> Header:
@@ -130,8 +130,8 @@ class Session(Judging):
         self._require_effect()
         earlier_s, sink = self._earlier_s(), self._sink
         shown = sink.on_trial is None and is_terminal(sys.stdout) if progress is None else progress
-        table = Table(self._desk, self._header, sink.faults, shown=shown)
-        with self._rig.driven(), self._earlier.open_log(self._header) as log, sink.writing(log, table):
+        table = Table(self._console, self._header, sink.faults, shown=shown)
+        with self._rig.exclusive(), self._earlier.open_log(self._header) as log, sink.writing(log, table):
             try:
                 self._log_beginning()
                 self._rig.begin(len(self.trials), earlier_s)
@@ -155,8 +155,8 @@ class Session(Judging):
         if self._safeguards.on_pause is not None:
             yield self._safeguards.on_pause
         elif keys and somebody_there():
-            with self._desk.staffed():
-                yield self._desk.goes_on
+            with self._console.reading_keys():
+                yield self._console.goes_on
         elif self._sink.followers:
             yield lambda _: self._asking.wait(self._sink.nobody)
         else:
@@ -197,7 +197,7 @@ class Session(Judging):
 
     @property
     def running(self) -> bool:
-        """Whether its log is open."""
+        """True if its log is open."""
         return self._sink.is_open
 
     def _judge(self, verdict: Callable[[TrialTable], Event]) -> None:

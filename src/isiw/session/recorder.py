@@ -222,7 +222,7 @@ class Recorder(Judging):
             return self.strategy.estimate()
 
     def decision(self) -> StopDecision:
-        """Whether to stop now, and why."""
+        """The decision to stop now or not, with its reason."""
         with self._lock:
             self._examination.conclude()
             return self.strategy.decision()

@@ -20,7 +20,7 @@ from isiw.devices.deadlines import Deadlines, PunctualDevice
 from isiw.devices.limited import LimitedDevice
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Answer, Device, DeviceInfo
-from isiw.errors import DeviceError, StillArmedError, told
+from isiw.errors import DeviceError, StillArmedError, error_text
 from isiw.log.schema import waveform_topic
 from isiw.session.interrupts import INTERRUPTED, STILL_ARMED, Interrupts, end_process
 from isiw.session.sink import Sink
@@ -35,7 +35,7 @@ _guard = threading.Lock()
 
 
 @contextmanager
-def driven(device: Device, info: DeviceInfo) -> Iterator[None]:
+def exclusive(device: Device, info: DeviceInfo) -> Iterator[None]:
     """Within, no other session drives this device: the same object, or any of the same address on this computer."""
     with ExitStack() as held:
         held.enter_context(_object_claimed(device, info))
@@ -169,9 +169,9 @@ class Rig:
         return self._limited.pulses_left
 
     @contextmanager
-    def driven(self) -> Iterator[None]:
+    def exclusive(self) -> Iterator[None]:
         """Within, no other session drives the device, and every signal disarms it."""
-        with driven(self._raw, self.info), self.interrupts:
+        with exclusive(self._raw, self.info), self.interrupts:
             yield
 
     def begin(self, delivered: int, earlier_s: Sequence[float]) -> None:
@@ -231,14 +231,14 @@ class Rig:
         except Exception as another:
             if error is None:
                 raise
-            failed = f"unstage failed, too: {told(another)}"
+            failed = f"unstage failed, too: {error_text(another)}"
             self._sink.faults.append(failed)
             error.add_note(failed)
         finally:
             self._punctual.release_thread()
 
     def _end_armed(self, error: StillArmedError) -> Never:
-        end_process(told(error), self._sink.writer, STILL_ARMED)
+        end_process(error_text(error), self._sink.writer, STILL_ARMED)
 
     def _end_stuck(self) -> None:
         end_process("The session does not react. The device is disarmed.", self._sink.writer, INTERRUPTED)

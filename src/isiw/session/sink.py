@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from isiw.errors import InvalidValueError, told
+from isiw.errors import InvalidValueError, error_text
 from isiw.estimate import WindowEstimate
 from isiw.log.schema import Record
 from isiw.log.writer import LogWriter
@@ -72,7 +72,7 @@ class Follower(Protocol):
         """The session has ended, and its log is closed."""
 
     def is_attended(self) -> bool:
-        """Whether somebody is there who can say how a pause ends."""
+        """True if somebody is there who can say how a pause ends."""
 
 
 class _Screen(Protocol):
@@ -105,7 +105,7 @@ class Sink:
 
     @property
     def is_open(self) -> bool:
-        """Whether the log is open."""
+        """True if the log is open."""
         return self.writer is not None and self.writer.is_open
 
     @property
@@ -147,7 +147,7 @@ class Sink:
         self._each(lambda follower: follower.ended())
 
     def nobody(self) -> bool:
-        """Whether none of the followers is attended."""
+        """True if none of the followers is attended."""
         attended: list[bool] = []
         self._each(lambda follower: attended.append(follower.is_attended()))
         return not any(attended)
@@ -159,4 +159,4 @@ class Sink:
             except Exception as error:  # noqa: BLE001 - who looks on must not stop a session
                 with suppress(ValueError):  # another thread, in which it failed as well, was first
                     self.followers.remove(follower)
-                    self.faults.append(f"A viewer failed and gets no further updates: {told(error)}")
+                    self.faults.append(f"A viewer failed and gets no further updates: {error_text(error)}")

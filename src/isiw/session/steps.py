@@ -14,7 +14,7 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 from isiw.devices.protocol import Answer
-from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, LimitExceededError, NotDelivered, told
+from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, LimitExceededError, NotDelivered, error_text
 from isiw.findings import Finding, Kind
 from isiw.log.headers import Header
 from isiw.log.schema import Event, Intent, Waveform
@@ -27,7 +27,7 @@ from isiw.signals.tap import TapResponses
 from isiw.signals.watch import Watch
 from isiw.strategy.stopping import StopDecision, StopKind, stimuli_left
 from isiw.strategy.strategy import Strategy
-from isiw.text.harmless import shown
+from isiw.text.sanitize import shown
 from isiw.trials import Measurement, Stimulus, Sweep, Trial
 from isiw.visit import Control
 
@@ -42,7 +42,7 @@ class Pause(NamedTuple):
 
 
 class Pausing:
-    """Whether and why a session is to pause, and how it goes on."""
+    """The reasons to pause a session, and how it goes on."""
 
     def __init__(self, rig: Rig, examination: WindowExamination, asking: Asking) -> None:
         self._rig, self._examination, self._asking = rig, examination, asking
@@ -52,7 +52,7 @@ class Pausing:
 
     @property
     def due(self) -> bool:
-        """Whether the session is to pause before the next stimulus."""
+        """True if the session is to pause before the next stimulus."""
         return self.reason is not None or self._rig.interrupts.heard
 
     def now(self, reason: str) -> None:
@@ -350,7 +350,7 @@ class Steps:
                 raise
             if not self._pausing.due:
                 raise
-            self._sink.faults.append(f"While the device was being disarmed: {told(error)}")
+            self._sink.faults.append(f"While the device was being disarmed: {error_text(error)}")
         finally:
             if trial is not None:
                 self._examination.came(trial)

@@ -47,7 +47,7 @@ _as_they_were: dict[int, Any] = {}
 
 
 def is_terminal(stream: object) -> bool:
-    """Whether somebody sits at the other end of a stream."""
+    """True if somebody sits at the other end of a stream."""
     return bool(getattr(stream, "isatty", lambda: False)())
 
 
@@ -71,7 +71,7 @@ def folded(text: str) -> str:
 
 
 def somebody_there() -> bool:
-    """Whether an operator at a terminal sees what is shown, and can press keys."""
+    """True if an operator at a terminal sees what is shown, and can press keys."""
     here = threading.current_thread() is threading.main_thread()  # a program with threads of its own has its own keys
     return here and is_terminal(sys.stdin) and is_terminal(sys.stderr)
 

@@ -345,7 +345,7 @@ class ThresholdRecorder:
         return self.search.estimate()
 
     def decision(self) -> StopDecision:
-        """Whether to stop now, and why."""
+        """The decision to stop now or not, with its reason."""
         return self.search.decision()
 
     def close(self) -> None:

@@ -252,7 +252,7 @@ class Course:
 
     @property
     def plans_ahead(self) -> bool:
-        """Whether the model or the design has a plan of ISIs, so that a lost one is asked again."""
+        """True if the model or the design has a plan of ISIs, so that a lost one is asked again."""
         acquisition = self.method.acquisition
         proposes = ProposesIsi in acquisition.needs and isinstance(self.posterior, ProposesIsi)
         return proposes or isinstance(acquisition, FollowsPlan)
@@ -289,7 +289,7 @@ class Course:
         return self.belief.estimate(person)
 
     def decision(self, person: int = 0, mistrials: int = 0, *, silent: bool = False) -> StopDecision:
-        """Whether to stop with one person, and why."""
+        """The decision to stop with one person or not, with its reason."""
         past = tuple(belief.estimate(person) for belief in self.past)
         estimate = self.estimate(person).noting(silent=silent)
         progress = Progress(self.paired_trials + mistrials, self.paired_trials, estimate, past=past)

@@ -170,7 +170,7 @@ class Outcomes:
         return mean, math.sqrt((variance + USUAL_COUNTS * (USUAL_SHARE * mean) ** 2) / (count + USUAL_COUNTS))
 
     def tap_may_explain(self, window: Window | None) -> bool:
-        """Whether the tap's own response could be what is larger within a window, since nobody knows it there."""
+        """True if the tap's own response could be what is larger within a window, since nobody knows it there."""
         met = [one for one in self.pulses if one.isi_ms is not None and meets_response(one.isi_ms, self.reference)]
         known = {one: self._tap_mv(one) is not None for one in met}
         unknown_ms, known_ms = ([one.isi_ms or 0.0 for one in met if known[one] is yes] for yes in (False, True))

@@ -14,7 +14,7 @@ from typing import Annotated, Final, Protocol, runtime_checkable
 from isiw.checks import Checked, Count, Positive, Share, number
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
-from isiw.text.harmless import counted
+from isiw.text.sanitize import counted
 from isiw.window import SURE
 
 
@@ -49,7 +49,7 @@ OF_THE_WINDOW: Final = frozenset(
 
 @dataclass(frozen=True)
 class StopDecision:
-    """Whether to stop, and why.
+    """The decision to stop or not, with its reason.
 
     Args:
         stop: whether to stop.

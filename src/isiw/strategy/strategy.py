@@ -457,7 +457,7 @@ class Strategy:
         return self.posterior.prediction_mv(0.9) if isinstance(self.posterior, PredictsMeps) else None
 
     def decision(self) -> StopDecision:
-        """Whether to stop now, and why."""
+        """The decision to stop now or not, with its reason."""
         decision = self._course.decision(mistrials=self._mistrials, silent=self._is_silent)
         return StopKind.TOO_LITTLE.go_on(f"{NO_MEP}") if self._is_silent and not decision.stop else decision
 

@@ -31,7 +31,7 @@ from isiw.lazy import pa, parquet, pd, torch
 from isiw.log.durable import claim
 from isiw.studies.execution import Failure
 from isiw.studies.plan import Study, Unit, begun_study, study_values
-from isiw.text.harmless import command
+from isiw.text.sanitize import command
 from isiw.text.toml_files import read_toml
 
 

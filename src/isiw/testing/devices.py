@@ -32,7 +32,7 @@ from isiw.testing.device_table import (
 )
 from isiw.testing.guarded import Guarded, Pace
 from isiw.testing.requirements import broken, require
-from isiw.text.harmless import shown
+from isiw.text.sanitize import shown
 from isiw.trials import Measurement, Stimulus, Sweep, Trial
 
 _VERBS: Final = ("describe", "stage", "deliver", "stop", "unstage")
@@ -140,7 +140,7 @@ class _Rules:
 
 def _check_delivery(device: Device, rules: _Rules, pace: Pace) -> list[Delivery]:
     guarded = Guarded(device, pace)
-    with guarded.driven():
+    with guarded.exclusive():
         guarded.require_stop()
         with guarded.armed(kept_disarmed=True):
             guarded.require_refusal("before stage()")
@@ -247,7 +247,7 @@ def _check_memory(make: Callable[[], Device], space: DesignSpace, pace: Pace) ->
 
 def _answers(device: Device, stimuli: Sequence[Stimulus], pace: Pace) -> list[Answer]:
     guarded = Guarded(device, pace)
-    with guarded.driven(), guarded.armed():
+    with guarded.exclusive(), guarded.armed():
         return [guarded.deliver(stimulus)[0] for stimulus in stimuli]
 
 

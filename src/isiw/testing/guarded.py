@@ -11,8 +11,8 @@ from isiw.devices.clock import Clock
 from isiw.devices.deadlines import PunctualDevice
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, readiness_of
-from isiw.errors import DeviceError, DeviceTimeoutError, NotDelivered, StillArmedError, told
-from isiw.session.rig import Rig, Safeguards, driven
+from isiw.errors import DeviceError, DeviceTimeoutError, NotDelivered, StillArmedError, error_text
+from isiw.session.rig import Rig, Safeguards, exclusive
 from isiw.session.sink import Sink
 from isiw.testing.requirements import broken, require
 from isiw.trials import Stimulus
@@ -52,9 +52,9 @@ class Guarded:
         return self._rig.info
 
     @contextmanager
-    def driven(self) -> Iterator[None]:
+    def exclusive(self) -> Iterator[None]:
         """Within, no session drives the device, and every signal disarms it and ends the check."""
-        with driven(self._device, self._rig.info), self._rig.interrupts:
+        with exclusive(self._device, self._rig.info), self._rig.interrupts:
             yield
         faults = "; ".join(self._sink.faults)
         require(not faults, "stop and unstage work in any state", faults)
@@ -100,7 +100,7 @@ class Guarded:
         try:
             punctual.stop()
         except StillArmedError as error:
-            raise broken("stop works in any state", told(error)) from error
+            raise broken("stop works in any state", error_text(error)) from error
         finally:
             punctual.release_thread()
 
@@ -152,7 +152,7 @@ class _KeptDisarmed:
         except DeviceError as error:
             if not self.now:
                 raise
-            raise NotDelivered(told(error)) from error  # disarmed, it has delivered nothing
+            raise NotDelivered(error_text(error)) from error  # disarmed, it has delivered nothing
 
     def stop(self) -> None:
         self._device.stop()

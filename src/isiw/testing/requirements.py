@@ -9,7 +9,7 @@ import numpy as np
 
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
-from isiw.text.harmless import shown
+from isiw.text.sanitize import shown
 
 Trials = tuple[tuple[float | None, float], ...]
 """ISIs [ms] (None is TMS alone) and MEPs [mV], in the order of telling."""
@@ -71,7 +71,7 @@ def check_estimate(estimate: object, space: DesignSpace, when: str) -> None:
 
 
 def same_estimates(one: WindowEstimate, other: WindowEstimate) -> bool:
-    """Whether two estimates are the same to the last bit."""
+    """True if two estimates are the same to the last bit."""
     arrays = ("grid_ms", "edge_samples_ms", "profile_quantiles_mv", "hypothesis_samples")
     plain = ("probability", "window", "start_ms", "end_ms", "spread_ms", "expected_f1", "best_isi", "largest_excluded")
     return all(getattr(one, name) == getattr(other, name) for name in plain) and all(

@@ -22,7 +22,7 @@ from isiw.checks import Bounds, from_table, number
 from isiw.devices.protocol import DeviceInfo, require_staged
 from isiw.errors import DeviceError, InvalidValueError, NotDelivered
 from isiw.text import plain
-from isiw.text.harmless import read_number
+from isiw.text.sanitize import read_number
 from isiw.trials import Stimulus
 
 LONGEST_REPLY: Final = 65_536
@@ -57,7 +57,7 @@ class Reply:
                 raise self.broken("unknown key", got=str(key), expected=f"one of {', '.join(known)}")
 
     def has(self, key: str) -> bool:
-        """Whether there is a value of this key."""
+        """True if there is a value of this key."""
         return self.values.get(key) is not None
 
     def text(self, key: str) -> str:
@@ -181,7 +181,7 @@ class Exchange:
 
     @property
     def may_be_armed(self) -> bool:
-        """Whether arming was asked for since the last time that something was known to be disarmed."""
+        """True if arming was asked for since the last time that something was known to be disarmed."""
         return self._arming > self._disarmed
 
     def arm(self, timeout_s: float) -> None:

@@ -26,7 +26,7 @@ from isiw.devices.transports.line_table import (
     open_connection,
     require_address,
 )
-from isiw.errors import DeviceError, InvalidValueError, IsiwError, LimitExceededError, NotDelivered, told
+from isiw.errors import DeviceError, InvalidValueError, IsiwError, LimitExceededError, NotDelivered, error_text
 from isiw.trials import Measurement, Stimulus
 
 _SPARE_S = 0.1
@@ -213,7 +213,7 @@ class LineDevice:
         raise NotDelivered(f"{self._info.name} was stopped", remedy="Call stage() first.")
 
     def _stands(self) -> bool:
-        """Whether the connection that there is can be trusted, and did not break while nothing was in flight."""
+        """True if the connection that there is can be trusted, and did not break while nothing was in flight."""
         with self._busy, suppress(DeviceError):
             if self._line is not None and self._line.trusted:
                 self._line.drain()
@@ -253,7 +253,7 @@ class LineDevice:
                 return
 
     def _disarmed_over_this(self) -> bool:
-        """Whether the instrument confirms over the present connection that it is disarmed, or was never reached."""
+        """True if the instrument confirms over the present connection that it is disarmed, or was never reached."""
         line = self._line
         if line is None:
             return not self._may_be_armed
@@ -292,5 +292,5 @@ def _outcome_unknown() -> Iterator[None]:
             raise
         raise DeviceError(
             "the command to fire was sent, so the stimulus may have been given; its outcome is not known: "
-            f"{told(error)}"
+            f"{error_text(error)}"
         ) from error

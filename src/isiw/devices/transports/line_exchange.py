@@ -22,7 +22,7 @@ from isiw.checks import (
 )
 from isiw.devices.transports.line_table import Connection, Exchange, command_values
 from isiw.errors import DeviceError, DeviceTimeoutError
-from isiw.text.harmless import read_whole
+from isiw.text.sanitize import read_whole
 
 _T = TypeVar("_T")
 
@@ -159,7 +159,7 @@ class Line:
 
 
 def _is(number: int, stated: str | None) -> bool:
-    """Whether an answer states the number of its command."""
+    """True if an answer states the number of its command."""
     return stated is not None and read_whole(stated) == number
 
 

@@ -18,7 +18,7 @@ from urllib.parse import urlsplit
 
 from isiw.checks import Checked, Positive, Text, from_table, number
 from isiw.errors import ConfigError, InvalidValueError
-from isiw.text.harmless import read_number
+from isiw.text.sanitize import read_number
 
 _TCP = "socket://"
 _MOST_BYTES = 4096
@@ -187,7 +187,7 @@ class Exchange(Checked):
 
     @property
     def numbered(self) -> bool:
-        """Whether the answer says which command it answers."""
+        """True if the answer says which command it answers."""
         return "sequence" in self.groups
 
     def command(self, values: Mapping[str, float]) -> str:
@@ -271,12 +271,12 @@ class LineCommands:
 
     @property
     def some_measure(self) -> bool:
-        """Whether an answer says an MEP."""
+        """True if an answer says an MEP."""
         return any(each.groups & _MEP for each in self.firing) or bool(self._result_groups & _MEP)
 
     @property
     def all_measure(self) -> bool:
-        """Whether the MEP of every kind of trial is said."""
+        """True if the MEP of every kind of trial is said."""
         return all((each.groups | self._result_groups) & _MEP for each in self.firing)
 
 

@@ -41,7 +41,7 @@ class Markers:
 
     @property
     def connected(self) -> bool:
-        """Whether there is somebody to ask."""
+        """True if there is somebody to ask."""
         return self._inlet is not None
 
     def open(self) -> None:

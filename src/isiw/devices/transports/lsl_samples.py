@@ -140,7 +140,7 @@ class SampleStream:
         return pulled
 
     def _pulled(self) -> bool:
-        """Whether samples were there; they are added to what is kept."""
+        """True if samples were there; they are added to what is kept."""
         chunks = [(self._values, self._stamps_s)] if self._stamps_s.size else []
         before = len(chunks)
         while not chunks[before:] or len(chunks[-1][1]) == _CHUNK:

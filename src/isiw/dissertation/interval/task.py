@@ -20,7 +20,7 @@ from isiw.log.headers import LONGEST_MS, MODES, Block, Production
 from isiw.log.schema import Event
 from isiw.log.writer import LogWriter
 from isiw.session.terminal import Keys, Screen, somebody_there
-from isiw.text.harmless import counted
+from isiw.text.sanitize import counted
 from isiw.types import ArrayLike, FloatArray
 
 START: Final = "f"

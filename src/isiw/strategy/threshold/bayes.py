@@ -116,7 +116,7 @@ class FiveOfTen(Checked):
         return self._course(pulses, space)[1]
 
     def _verdicts(self, pulses: Sequence[Pulse]) -> dict[float, bool]:
-        """Whether an intensity suffices, for those whose verdict is certain."""
+        """True if an intensity suffices, for those whose verdict is certain."""
         told = Counter((pulse.intensity_pct_mso, pulse.responded) for pulse in pulses)
         suffices = {at: True for (at, responded), n in told.items() if responded and n >= self.enough}
         return suffices | {at: False for (at, yes), n in told.items() if not yes and n > self.of - self.enough}

@@ -132,7 +132,7 @@ class Pulse(Checked):
 
     @property
     def responded(self) -> bool:
-        """Whether there was a response: an MEP above 50 µV."""
+        """True if there was a response: an MEP above 50 µV."""
         return bool(self.response) if self.mep_mv is None else self.mep_mv > RESPONSE_MV
 
 
@@ -203,7 +203,7 @@ class ThresholdMethod(Protocol):
         """
 
     def decision(self, pulses: Sequence[Pulse], space: IntensityRange) -> StopDecision:
-        """Whether to stop, and why.
+        """The decision to stop or not, with its reason.
 
         Args:
             pulses: the pulses so far, in order.

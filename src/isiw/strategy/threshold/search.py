@@ -139,7 +139,7 @@ class ThresholdSearch:
         return self.method.estimate(self.pulses, self.space)
 
     def decision(self) -> StopDecision:
-        """Whether to stop now, and why; without a number only where the range is wrong or the budget used up."""
+        """The decision to stop or not, with its reason; no number if the range is wrong or the budget used up."""
         return self._refused() or self.method.decision(self.pulses, self.space)
 
     def _refused(self) -> StopDecision | None:

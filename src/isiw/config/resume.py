@@ -26,7 +26,7 @@ from isiw.session.loop import Session
 from isiw.session.resume import limits_of_log
 from isiw.strategy.catalogue import make_strategy
 from isiw.subjects.cohorts import person_of
-from isiw.text.harmless import command
+from isiw.text.sanitize import command
 from isiw.text.toml_files import checked
 from isiw.window import Window
 
@@ -280,7 +280,7 @@ def after_error(session: Session, config: Path | None, error: BaseException | No
 
 
 def _is_over(log: Path) -> bool:
-    """Whether the log's last decision was to stop, so that nothing is missing in it."""
+    """True if the log's last decision was to stop, so that nothing is missing in it."""
     try:
         decision = read_session(log).decision
     except IsiwError:

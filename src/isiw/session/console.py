@@ -1,4 +1,4 @@
-"""The operator's desk: what each key does while a session runs, how a pause is decided, and what the screen shows."""
+"""The operator's console: the keys while a session runs, how a pause is decided, and what the screen shows."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Final, Protocol
 import numpy as np
 
 from isiw.design import DesignSpace
-from isiw.errors import InvalidValueError, LogError, told
+from isiw.errors import InvalidValueError, LogError, error_text
 from isiw.estimate import WindowEstimate
 from isiw.log.headers import Header
 from isiw.sentences import asked, interval_cell, outcome
@@ -170,7 +170,7 @@ class Operated(Protocol):
         """Let a trial not count whose MEP was looked at."""
 
 
-class Desk:
+class OperatorConsole:
     """Turns keys into what a session does, and answers it when it has paused."""
 
     def __init__(self, session: Operated, asking: Asking | None = None) -> None:
@@ -184,7 +184,7 @@ class Desk:
         self.shown: int | None = None
 
     @contextmanager
-    def staffed(self) -> Iterator[None]:
+    def reading_keys(self) -> Iterator[None]:
         """Within, keys of the terminal are heard."""
         self.screen = Screen()
         with self.screen, Keys(self.press, self.leave) as keys:
@@ -196,8 +196,8 @@ class Desk:
                 self._keys = None
 
     @property
-    def is_staffed(self) -> bool:
-        """Whether keys of the terminal are heard."""
+    def reads_keys(self) -> bool:
+        """True if keys of the terminal are heard."""
         return self._keys is not None
 
     def away(self) -> AbstractContextManager[None]:
@@ -316,8 +316,8 @@ class Desk:
 class Table:
     """The table of trials on the screen; if it cannot be shown any more, a fault says so, and the session goes on."""
 
-    def __init__(self, desk: Desk, header: Header, faults: deque[str], *, shown: bool) -> None:
-        self._desk, self._header, self._faults, self._shown = desk, header, faults, shown
+    def __init__(self, console: OperatorConsole, header: Header, faults: deque[str], *, shown: bool) -> None:
+        self._console, self._header, self._faults, self._shown = console, header, faults, shown
         if shown:
             show_legend()
 
@@ -328,23 +328,23 @@ class Table:
         try:
             self._show(update)
         except (OSError, UnicodeError) as error:  # a full disk, a reader who has gone, a sign that is lacking
-            self._faults.append(f"the table of trials cannot be shown any more: {told(error)}")
+            self._faults.append(f"the table of trials cannot be shown any more: {error_text(error)}")
             self._shown = False
 
     def _show(self, update: SessionUpdate) -> None:
         row = progress_row(update, self._header.stimulus)
-        if self._desk.is_staffed and is_terminal(sys.stdout):
-            self._desk.show(fitted(row)[: columns()], standing(update, self._header.space))
+        if self._console.reads_keys and is_terminal(sys.stdout):
+            self._console.show(fitted(row)[: columns()], standing(update, self._header.space))
         else:
             show_progress(row)
-        self._desk.shown = update.trial.index
+        self._console.shown = update.trial.index
 
     def waiting(self, left_s: float, text: str) -> None:
         """Count down until the next stimulus."""
-        if self._desk.is_staffed:
-            self._desk.count_down(left_s, text)
+        if self._console.reads_keys:
+            self._console.count_down(left_s, text)
 
     def waited(self) -> None:
         """The wait is over."""
-        if self._desk.is_staffed:
-            self._desk.counted_down()
+        if self._console.reads_keys:
+            self._console.counted_down()

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 import pytest
 
 from isiw.errors import InvalidValueError, LogError
-from isiw.session.desk import Desk
+from isiw.session.console import OperatorConsole
 from isiw.session.steps import Asking
 from isiw.trials import Status, Trial, TrialTable
 
@@ -51,45 +51,45 @@ def trial(index: int, *, excluded: bool = False) -> Trial:
     return Trial(index, Status.ACCEPTED, 50.0, isi_ms=50.0, mep_mv=0.1, excluded=excluded)
 
 
-def press(desk: Desk, keys: str) -> None:
+def press(console: OperatorConsole, keys: str) -> None:
     for key in keys:
-        desk.press(key)
+        console.press(key)
 
 
 @contextmanager
-def shown(desk: Desk, capsys: pytest.CaptureFixture[str]) -> Iterator[list[str]]:
+def shown(console: OperatorConsole, capsys: pytest.CaptureFixture[str]) -> Iterator[list[str]]:
     lines: list[str] = []
-    with desk.screen:
+    with console.screen:
         yield lines
     lines += capsys.readouterr().err.splitlines()
 
 
 def test_keys_mean_the_trial_on_the_screen_not_one_delivered_since() -> None:
     session = Operated(trial(0), trial(1))
-    desk = Desk(session)
-    desk.shown = 1
+    console = OperatorConsole(session)
+    console.shown = 1
     session.trials = TrialTable((trial(0), trial(1), trial(2)))
-    press(desk, "xj")
+    press(console, "xj")
     assert session.done == [("exclude", 1, "Excluded by the operator."), ("reject", 1)]
-    desk.shown = 2
-    press(desk, "j")
+    console.shown = 2
+    press(console, "j")
     assert session.done[-1] == ("reject", 2)
 
 
 def test_where_no_row_is_shown_keys_mean_the_last_trial() -> None:
     session = Operated(trial(0), trial(1))
-    press(Desk(session), "x")
+    press(OperatorConsole(session), "x")
     assert session.done == [("exclude", 1, "Excluded by the operator.")]
 
 
 def test_in_a_pause_keys_mean_the_last_trial_and_it_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     session = Operated(trial(0), trial(1))
-    desk = Desk(session)
-    desk.shown = 0
-    desk.leave()
-    with shown(desk, capsys) as lines:
-        assert not desk.goes_on("Paused by the operator.")
-        press(desk, "x")
+    console = OperatorConsole(session)
+    console.shown = 0
+    console.leave()
+    with shown(console, capsys) as lines:
+        assert not console.goes_on("Paused by the operator.")
+        press(console, "x")
     assert any(
         "Trial 1 was delivered; its row appears when the session continues. x, a and j now act on trial 1." in line
         for line in lines
@@ -99,9 +99,9 @@ def test_in_a_pause_keys_mean_the_last_trial_and_it_is_named(capsys: pytest.Capt
 
 def test_each_key_does_what_it_stands_for(capsys: pytest.CaptureFixture[str]) -> None:
     session = Operated(trial(0), trial(1, excluded=True), trial(2))
-    desk = Desk(session)
-    with shown(desk, capsys) as lines:
-        press(desk, "pxuj")
+    console = OperatorConsole(session)
+    with shown(console, capsys) as lines:
+        press(console, "pxuj")
     assert session.done == [
         ("pause", "Paused by the operator."),
         ("exclude", 2, "Excluded by the operator."),
@@ -116,24 +116,24 @@ def test_each_key_does_what_it_stands_for(capsys: pytest.CaptureFixture[str]) ->
 
 
 def test_what_cannot_be_done_is_said(capsys: pytest.CaptureFixture[str]) -> None:
-    desk = Desk(Operated(trial(0)))
-    with shown(desk, capsys) as lines:
-        press(desk, "aur")
-        press(Desk(Operated()), "z")
+    console = OperatorConsole(Operated(trial(0)))
+    with shown(console, capsys) as lines:
+        press(console, "aur")
+        press(OperatorConsole(Operated()), "z")
     assert lines == ["no MEP was measured; got 0", "no trial is excluded", "The session is not paused; p pauses it."]
 
 
 def test_a_note_is_typed_and_its_letters_are_no_commands() -> None:
     session = Operated(trial(0))
-    press(Desk(session), "nprexy\x7f caf\u00e9\n")
+    press(OperatorConsole(session), "nprexy\x7f caf\u00e9\n")
     assert session.done == [("note", "prex caf\u00e9")]
 
 
 def test_a_change_is_typed_as_a_note_is(capsys: pytest.CaptureFixture[str]) -> None:
     session = Operated(trial(0))
-    desk = Desk(session)
-    with shown(desk, capsys) as lines:
-        press(desk, "ccoil\nnwell\n")
+    console = OperatorConsole(session)
+    with shown(console, capsys) as lines:
+        press(console, "ccoil\nnwell\n")
     assert session.done == [("change", "coil"), ("note", "well")]
     assert [line for line in lines if "in the log" in line] == ["The change is in the log.", "The note is in the log."]
 
@@ -141,10 +141,10 @@ def test_a_change_is_typed_as_a_note_is(capsys: pytest.CaptureFixture[str]) -> N
 @pytest.mark.parametrize("keys", ["nnever\x1b", "n  \n", "n\x7f\n"])
 def test_a_note_can_be_dropped(keys: str) -> None:
     session = Operated(trial(0))
-    desk = Desk(session)
-    press(desk, keys)
+    console = OperatorConsole(session)
+    press(console, keys)
     assert session.done == []
-    press(desk, "p")
+    press(console, "p")
     assert session.done == [("pause", "Paused by the operator.")]
 
 
@@ -155,29 +155,29 @@ class FullDisk(Operated):
 
 def test_a_note_that_cannot_be_logged_is_told_and_the_next_key_is_heard(capsys: pytest.CaptureFixture[str]) -> None:
     session = FullDisk(trial(0))
-    desk = Desk(session)
-    with shown(desk, capsys) as lines:
-        press(desk, "ncoil moved\np")
+    console = OperatorConsole(session)
+    with shown(console, capsys) as lines:
+        press(console, "ncoil moved\np")
     assert "the log cannot be written; got 'coil moved'" in lines[-1]
     assert session.done == [("pause", "Paused by the operator.")]
 
 
 @pytest.mark.parametrize(("key", "goes_on"), [("r", True), ("q", False)])
 def test_a_pause_lasts_until_it_is_decided(key: str, goes_on: bool) -> None:  # noqa: FBT001
-    desk = Desk(Operated(trial(0)))
+    console = OperatorConsole(Operated(trial(0)))
     answers: list[bool] = []
-    paused = threading.Thread(target=lambda: answers.append(desk.goes_on("A break.")))
+    paused = threading.Thread(target=lambda: answers.append(console.goes_on("A break.")))
     paused.start()
     while not answers:
-        press(desk, key)
+        press(console, key)
         paused.join(0.01)
     assert answers == [goes_on]
 
 
 def test_a_pause_is_decided_by_whoever_answers_first() -> None:
     asking, answers = Asking(), list[bool]()
-    desk = Desk(Operated(trial(0)), asking)
-    paused = threading.Thread(target=lambda: answers.append(desk.goes_on("A break.")))
+    console = OperatorConsole(Operated(trial(0)), asking)
+    paused = threading.Thread(target=lambda: answers.append(console.goes_on("A break.")))
     paused.start()
     while not asking.asked:
         paused.join(0.01)
@@ -187,21 +187,21 @@ def test_a_pause_is_decided_by_whoever_answers_first() -> None:
 
 
 def test_where_nobody_is_left_a_pause_is_answered_with_no() -> None:
-    desk = Desk(Operated(trial(0)))
-    desk.leave()
-    assert desk.goes_on("A break.") is False
+    console = OperatorConsole(Operated(trial(0)))
+    console.leave()
+    assert console.goes_on("A break.") is False
 
 
 def test_a_rest_is_counted_down_by_the_second_and_a_short_wait_is_not(capsys: pytest.CaptureFixture[str]) -> None:
-    desk = Desk(Operated(trial(0)))
-    with shown(desk, capsys) as lines:
+    console = OperatorConsole(Operated(trial(0)))
+    with shown(console, capsys) as lines:
         for left_s in (8.0, 7.0):
-            desk.count_down(left_s, "Next stimulus")
-        desk.counted_down()
+            console.count_down(left_s, "Next stimulus")
+        console.counted_down()
         for left_s in (63.2, 63.0, 62.0, 9.0):
-            desk.count_down(left_s, "Rest after 12 trials")
-        desk.counted_down()
-        desk.screen.say("next")
+            console.count_down(left_s, "Rest after 12 trials")
+        console.counted_down()
+        console.screen.say("next")
     said = [part.replace("\x1b[K", "") for part in "\n".join(lines).replace("\r", "\n").splitlines()]
     rest = "Rest after 12 trials"
     assert [part for part in said if part] == [f"{rest}: 1:03 left", f"{rest}: 1:02 left", f"{rest}: 0:09 left", "next"]
