@@ -1,10 +1,10 @@
 """Sessions with raw sweeps: reflexes evoked by the tap, right rigs that must not be accused, and amplitudes by ISI.
 
     OMP_NUM_THREADS=1 python -m benchmarks.raw_sweeps reflex --people 20 --out benchmarks/results
-    OMP_NUM_THREADS=1 python -m benchmarks.raw_sweeps plain --people 20 --out benchmarks/results
+    OMP_NUM_THREADS=1 python -m benchmarks.raw_sweeps plain --people 10 --out benchmarks/results
     OMP_NUM_THREADS=1 python -m benchmarks.raw_sweeps rigs --people 100 --out benchmarks/results
     OMP_NUM_THREADS=1 python -m benchmarks.raw_sweeps sizes --out benchmarks/results
-    OMP_NUM_THREADS=1 python -m benchmarks.raw_sweeps random --people 20000 --out benchmarks/results
+    OMP_NUM_THREADS=1 python -m benchmarks.raw_sweeps random --people 6000 --out benchmarks/results
 
 `reflex`: people with and without a window, each with reflexes of three sizes at two times after the hit, without a tap
 alone and with six. `plain`: the same people without a reflex, in a session and in a loop that tells amplitudes as they
@@ -33,6 +33,7 @@ import isiw
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
 from isiw.signals.tap import TapResponses
+from isiw.signals.watch import Watch
 from isiw.subjects import SimulatedSubject, TapResponse, cohort
 
 SPACE: Final = isiw.DesignSpace(0, 320, reference="impact")
@@ -150,7 +151,7 @@ def plain(people: int, seed: int) -> Iterator[str]:
 
 
 def rigs(people: int, seed: int) -> Iterator[str]:
-    """How many sessions of rigs that are right are paused."""
+    """For how many trials of rigs that are right a session would pause; 30 trials a rig, at ISIs all over the range."""
     accused: list[str] = []
     for number in range(people):
         muscle = list(MUSCLES)[number % 2]
@@ -159,12 +160,15 @@ def rigs(people: int, seed: int) -> Iterator[str]:
         rng = np.random.default_rng([seed, number])
         rig = Rig(lambda _, rng=rng: 0.12 * rng.gamma(2.0, 0.5), tap, number, rate_hz=rate_hz, muscle=muscle)
         signals = isiw.signals.SignalLimits(mep_window_ms=isiw.signals.MEP_WINDOWS_MS[muscle])
-        strategy = isiw.make_strategy("even", space=SPACE, seed=number, max_trials=30, particles=100)
-        with tempfile.TemporaryDirectory() as folder:
-            guards = isiw.Safeguards(on_pause=lambda why: accused.append(why) or True)
-            log = Path(folder) / "one.mcap"
-            isiw.Session(rig, strategy, log=log, signals=signals, safeguards=guards).run(progress=False)
-    yield f"right rigs: {len(accused)} pauses in {people} sessions of 30 trials"
+        watch = Watch(SPACE, signals, max_in_a_row=3)
+        for trial, isi_ms in enumerate(rng.uniform(0.0, 320.0, 30)):
+            stimulus = isiw.Stimulus(trial, float(isi_ms))
+            sweep = rig.deliver(stimulus)
+            watch = watch.after(isiw.signals.judge(sweep, stimulus, SPACE, signals), sweep)
+            if watch.pause is not None:
+                accused.append(f"{muscle}, {rate_hz:g} Hz, {'a' if tap else 'no'} response: {watch.pause}")
+                watch = watch.seen()
+    yield f"right rigs: {len(accused)} pauses in {people} times 30 trials"
     yield from accused
 
 
