@@ -11,9 +11,10 @@ import hashlib
 import importlib.util
 import os
 import sys
+import tempfile
 import threading
 from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, Final, TypeVar
@@ -30,6 +31,9 @@ LANES: Final = 16
 
 SLOW_S: Final = 1.5
 """Kernels that are on disk are loaded faster than this."""
+
+PATIENCE_S: Final = 120.0
+"""So long a process waits for another that compiles."""
 
 _SAFE: Final = {"contract", "arcp", "afn", "nsz"}
 """What the compiler may do to numbers. It may not reorder sums: p a + (1 - p) b would lose a small a."""
@@ -88,20 +92,52 @@ def _compiled(function: F, fastmath: set[str], **more: bool) -> F:
 
 @contextmanager
 def first_of(family: str) -> Generator[None, None, None]:
-    """Write a line to standard error if the first call of some kernels takes so long that they are being compiled."""
+    """Let one process at a time compile kernels when they are first called; the others load what it has compiled.
+
+    The first that is compiled for long is said on standard error.
+    """
     if family in _CALLED or not AVAILABLE:
         yield
         return
+    from numba.core import event  # noqa: PLC0415 - see above
+
+    with _one_process(), event.install_recorder("numba:compile") as compiled:
+        said = threading.Timer(SLOW_S, _say, (compiled,))
+        said.daemon = True
+        said.start()
+        try:
+            yield
+        finally:
+            said.cancel()
     _CALLED.add(family)
-    said = threading.Timer(SLOW_S, sys.stderr.write, (f"isiw compiles its {family}, once on this machine …\n",))
-    said.daemon = True
-    said.start()
+
+
+@contextmanager
+def _one_process() -> Generator[None, None, None]:
+    """Wait until no other process of this user compiles kernels; not for ever, and not where no file can be locked."""
+    from filelock import FileLock, Timeout  # noqa: PLC0415 - few commands compute
+
+    lock = FileLock(_lock_file())
+    with suppress(OSError, Timeout, NotImplementedError):
+        lock.acquire(timeout=PATIENCE_S)
     try:
         yield
     finally:
-        said.cancel()
+        lock.release()
 
 
+def _lock_file() -> Path:
+    user = os.getuid() if hasattr(os, "getuid") else 0  # elsewhere each user has an own folder
+    return Path(tempfile.gettempdir()) / f"isiw-{_sources()}-{user}.lock"
+
+
+def _say(compiled: Any) -> None:
+    if compiled.buffer and _SAID not in _CALLED:
+        _CALLED.add(_SAID)
+        sys.stderr.write("isiw compiles its loops, once on this machine: about half a minute …\n")
+
+
+_SAID: Final = "said"
 _CALLED: Final[set[str]] = set()
 
 if AVAILABLE:
