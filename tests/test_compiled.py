@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import threading
+from pathlib import Path
 
 import pytest
 from filelock import FileLock
@@ -51,3 +53,17 @@ def test_a_process_waits_for_another_that_compiles() -> None:
         assert not entered.wait(0.2)
     assert entered.wait(30.0)
     thread.join()
+
+
+def test_kernels_are_compiled_again_where_constants_change_that_they_have_compiled_in() -> None:
+    folder = Path(compiled.__file__).parent
+    imported = set[str]()
+    for file in (*folder.glob("models/particles/kernels/*.py"), folder / "acquisition" / "kernels.py"):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            constants = isinstance(node, ast.ImportFrom) and any(
+                a.name.isupper() or "Kind" in a.name for a in node.names
+            )
+            if constants and isinstance(node, ast.ImportFrom) and node.module and "kernels" not in node.module:
+                imported.add(node.module)
+    known = {"isiw.compiled", "isiw.window", *(f"isiw.models.{name.replace('/', '.')}" for name in compiled._CONSTANTS)}  # noqa: SLF001
+    assert imported <= known

@@ -66,11 +66,17 @@ def inlined(function: F) -> F:
     return _compiled(function, _SAFE, _nrt=False, forceinline=True)
 
 
+_CONSTANTS: Final = *(f"particles/{name}" for name in ("changes", "moves", "noise", "prior", "shapes")), "shared/tables"
+"""Modules of `isiw.models` whose constants kernels have compiled in."""
+
+
 @cache
 def _sources() -> str:
     """What the kernels depend on, in short: Numba itself notices changes of a function's own file only."""
     folder = Path(__file__).parent
-    files = sorted([Path(__file__), *folder.glob("models/particles/**/*.py"), *folder.glob("acquisition/kernels.py")])
+    constants = ("window", *(f"models/{name}" for name in _CONSTANTS))
+    files = [*folder.glob("models/particles/kernels/*.py"), *(folder / f"{name}.py" for name in constants)]
+    files = sorted([Path(__file__), folder / "acquisition/kernels.py", *files])
     return hashlib.blake2b(b"".join(file.read_bytes() for file in files), digest_size=6).hexdigest()
 
 

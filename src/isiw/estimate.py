@@ -75,8 +75,8 @@ class Enhancement(NamedTuple):
 class WindowEstimate(Checked):
     """The estimate of one person's window. What a non-Bayesian method does not have is None.
 
-    A stopping rule needs the probability, the edges and the F1 only; bands, the best ISI, what is excluded and what is
-    unusual may be given as `Later`.
+    A stopping rule needs the probability, the edges and the F1 only; bands, the best ISI, what is excluded, unusual or
+    changed may be given as `Later`.
 
     Args:
         probability: probability that there is a window.
@@ -133,8 +133,8 @@ class WindowEstimate(Checked):
     silent: bool = False
     depressed: Window | None = None
     depressed_probability: Share | None = None
-    change: Change | None = None
-    time_alone: Share | None = None
+    change: WorkedOut[Change | None] = field(default=WorkedOut("change", None))
+    time_alone: WorkedOut[float | None] = field(default=WorkedOut("time_alone", None))
     beforehand: float | None = None
     tap_may_explain: bool = False
 

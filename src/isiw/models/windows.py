@@ -86,8 +86,10 @@ class Runs:
         return self.first[self._leads], self.behind[lasts] - 1
 
     def summed(self, values: FloatArray) -> FloatArray:
-        """Sum of what each window has at its runs, shape (..., w)."""
-        return np.add.reduceat(values, self._leads, axis=-1) if len(self._leads) else values[..., :0]
+        """Sum of what each window has at its runs (r, ...), shape (w, ...)."""
+        if len(self._leads) == len(values):  # each has one
+            return values
+        return np.add.reduceat(values, self._leads, axis=0)
 
     @cached_property
     def sizes(self) -> FloatArray:
@@ -104,12 +106,14 @@ class Runs:
 def best_window(windows: Runs, grid_ms: FloatArray) -> tuple[Window | None, float]:
     """The window of largest expected F1 among the level sets of the posterior's membership, and that F1."""
     membership = windows.membership
-    candidates = membership >= (np.linspace(0.1, 0.9, 17) * membership.max())[:, None]
-    below = np.pad(np.cumsum(candidates, axis=-1), ((0, 0), (1, 0)))
-    overlap = windows.summed((below[:, windows.behind] - below[:, windows.first]).astype(float))
-    expected_f1 = (2.0 * overlap / (below[:, -1:] + windows.sizes)).mean(-1)
+    candidates = membership[:, None] >= np.linspace(0.1, 0.9, 17) * membership.max()
+    # Candidates are last, so that what a run adds is looked up at once.
+    below = np.zeros((windows.points + 1, candidates.shape[1]), dtype=np.float32)
+    np.cumsum(candidates, axis=0, out=below[1:])
+    overlap = windows.summed(below[windows.behind] - below[windows.first])
+    expected_f1 = (2.0 * overlap / (below[-1] + windows.sizes[:, None])).mean(0, dtype=float)
     best = int(expected_f1.argmax())
-    return Window.from_mask(grid_ms, candidates[best]), float(expected_f1[best])
+    return Window.from_mask(grid_ms, candidates[:, best]), float(expected_f1[best])
 
 
 def edge_samples(windows: Runs, space: DesignSpace) -> FloatArray:
@@ -120,8 +124,9 @@ def edge_samples(windows: Runs, space: DesignSpace) -> FloatArray:
     return np.stack((start, end), axis=-1)
 
 
+@cache
 def profile_grid(space: DesignSpace) -> Tensor:
-    """The ISIs at which profiles are reported [ms], shape (t,)."""
+    """The ISIs at which profiles are reported [ms], shape (t,); one tensor for all callers, who leave it as it is."""
     every = max(1, min(len(space.grid_ms) // PROFILE_POINTS, int(PROFILE_STEP_MS / space.step_ms)))
     return torch.tensor(sorted({*space.grid_ms[::every], space.grid_ms[-1]}), dtype=torch.float32)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Literal, TypeAlias
 
 from isiw.acquisition.batch import own_plan
@@ -60,8 +60,12 @@ class Choice:
     scores: Tensor | None = field(default=None, compare=False, repr=False)
 
 
+@cache
 def candidate_isis(space: DesignSpace) -> Tensor:
-    """Evenly spaced ISIs of the design grid to score [ms], both ends included, shape (t,); at most `MAX_CANDIDATES`."""
+    """Evenly spaced ISIs of the design grid to score [ms], both ends included, shape (t,); at most `MAX_CANDIDATES`.
+
+    One tensor for all callers, who leave it as it is.
+    """
     grid = space.grid_ms
     stride = max(1, math.ceil((len(grid) - 1) / (MAX_CANDIDATES - 1)))
     picked = sorted({*range(0, len(grid), stride), len(grid) - 1})
@@ -158,7 +162,8 @@ class Belief:
 
     def looked_back_on(self, people: int) -> Belief:
         """The same, without a posterior where the estimates of all people are made."""
-        return replace(self, posterior=None) if len(self.estimates) == people else self
+        done = self.posterior is None or len(self.estimates) < people
+        return self if done else replace(self, posterior=None)
 
 
 @dataclass(frozen=True, eq=False)

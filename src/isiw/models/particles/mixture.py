@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import NamedTuple
 
 from isiw.lazy import torch
@@ -51,7 +51,16 @@ class Mixture:
 
     def component(self, x: Tensor) -> Tensor:
         """The component that most probably explains x (..., d), shape (...)."""
-        return self.log_parts(x).argmax(-1)
+        squares, lines, constants = self._squares
+        return (x.square() @ squares + x @ lines + constants).argmax(-1)
+
+    @cached_property
+    def _squares(self) -> tuple[Tensor, Tensor, Tensor]:
+        """Factors of x² and of x, each (d, k), and constants (k,), whose sum is the log density of each component."""
+        precisions = self.sds.double().square().reciprocal()
+        lines, spent = precisions * self.means, (0.5 * precisions * self.means.double().square()).sum(-1)
+        constants = self.shares.double().log() - self.sds.double().log().sum(-1) - spent
+        return (-0.5 * precisions).T.float(), lines.T.float(), constants.float()
 
 
 class JointMixture:
