@@ -49,6 +49,7 @@ def test_the_second_oracle_says_no_window_only_where_that_is_likelier_than_any_i
     assert unsure.estimate() is not None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*SPANS, *LABS])
 def test_its_spans_are_those_of_the_cohort(name: str) -> None:
     # Shares of 3,000 people have standard errors below .01; what is left is the distance of the values.

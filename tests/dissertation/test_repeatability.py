@@ -56,6 +56,7 @@ TABLE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TABLE)
 def test_the_presets_reproduce_the_event_table_by_detection_on_their_waveforms(name: str) -> None:
     expected, taps = TABLE[name]
@@ -67,6 +68,7 @@ def test_the_presets_reproduce_the_event_table_by_detection_on_their_waveforms(n
         assert table.loc[event, "n"] == taps, event
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_the_gaussian_preset_has_the_pooled_isi_error_and_no_mistrials(seed: int) -> None:
     study = study_preset("cushion", seed=seed)
@@ -76,6 +78,7 @@ def test_the_gaussian_preset_has_the_pooled_isi_error_and_no_mistrials(seed: int
     assert study.mistrials == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_the_timing_fault_preset_has_negative_isis_at_10_ms_only(seed: int) -> None:
     table = study_preset("timing-fault", seed=seed).error_table

@@ -37,6 +37,7 @@ def people_at(mean: float, count: int, sd: float = 1.0) -> np.ndarray:
     return mean + sd * stats.norm.ppf((np.arange(count) + 0.5) / count)
 
 
+@pytest.mark.slow
 def test_the_law_of_many_people_is_theirs() -> None:
     law = law_of(people_at(6.0, 100))
     assert law.mean[0] == pytest.approx(6.0, abs=0.3)
@@ -44,6 +45,7 @@ def test_the_law_of_many_people_is_theirs() -> None:
     assert law.members > 90
 
 
+@pytest.mark.slow
 def test_fewer_people_leave_a_wider_law() -> None:
     spreads = [law_of(people_at(6.0, count)).sd[0] for count in (2, 10, 60)]
     assert spreads[0] > 1.15 * spreads[1] > 1.15**2 * spreads[2]

@@ -84,6 +84,7 @@ def test_nothing_is_larger_where_everything_is_equal() -> None:
     assert p_of_larger([0.02] * 4, [0.02] * 5) == 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cohort", ["recruitment", "gaussian"])
 def test_a_usual_person_whose_isis_are_asked_by_the_default_has_no_change_with_time(cohort: str) -> None:
     said = 0

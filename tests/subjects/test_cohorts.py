@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -98,6 +99,7 @@ class LinearProfile:
         return np.asarray(isi_ms, dtype=float) / 1000.0
 
 
+@cache
 def people(name: str) -> list[SimulatedSubject]:
     return cohort(name, PEOPLE, seed=3)
 

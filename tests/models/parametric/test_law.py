@@ -77,6 +77,7 @@ def test_the_probability_of_an_interval_is_the_integral_of_the_density(likelihoo
         torch.testing.assert_close(got, expected, atol=0.005 if likelihood == "gamma" else 1e-4, rtol=0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("likelihood", LIKELIHOODS)
 def test_draws_have_the_distribution_that_the_likelihood_is_of(likelihood: Likelihood) -> None:
     unknowns = people(likelihood, 2000, 1.0)

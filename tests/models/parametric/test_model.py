@@ -100,6 +100,7 @@ def test_the_prior_is_sampled_as_it_is_stated() -> None:
     assert posterior.log_evidence().item() == pytest.approx(0.0, abs=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("likelihood", LIKELIHOODS)
 def test_the_posterior_agrees_with_plain_importance_sampling_from_the_prior(likelihood: Likelihood) -> None:
     # The reference weights 200,000 draws of the prior by the likelihood of three trials.

@@ -159,6 +159,7 @@ def test_an_estimate_knows_the_noise_that_its_samples_suppose() -> None:
     assert widths_ms[wide].min() > widths_ms[~wide].max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", get_args(EngineName))
 def test_moves_that_learn_nothing_leave_the_prior_as_it_is(engine: EngineName) -> None:
     # 8,000 particles, 20 sweeps. Quantiles stay within 0.03, 3 standard errors of a share among 2,500 independent
@@ -184,6 +185,7 @@ def test_moves_that_learn_nothing_leave_the_prior_as_it_is(engine: EngineName) -
         assert (shares - torch.tensor(probabilities)).abs().max() < 0.025
 
 
+@pytest.mark.slow
 def test_moved_particles_agree_with_plain_importance_sampling() -> None:
     # The reference weights 100,000 particles of the prior by the likelihood of all trials at once.
     trials = evenly(cohort("gaussian", 3, 0)[2], 6)[:4]
@@ -298,6 +300,7 @@ def test_a_long_history_is_swept_now_and_then(trials: int, *, resampled: bool, s
     assert Moving(sweeps=0).sweeps_after(trials, resampled=resampled) == 0
 
 
+@pytest.mark.slow
 def test_people_of_its_own_have_windows_as_often_as_believed_and_meps_of_their_own() -> None:
     # A small excess does not count as a window, so that a few less have one than believed.
     model = ParticleModel()

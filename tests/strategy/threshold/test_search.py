@@ -67,6 +67,7 @@ def test_hum_at_one_intensity_gives_no_number_and_ends_with_the_budget() -> None
     assert "hum or an artefact" in search.decision().reason
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["bayes", "maximum-likelihood", "five-of-ten"])
 def test_hum_that_answers_at_several_intensities_gives_no_number(method: str) -> None:
     for seed in range(20):
