@@ -42,9 +42,15 @@ import isiw
 from benchmarks.earlier import logged_session
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
-from isiw.studies import Processes, Study, StudyStrategy, conduct, run_unit
-from isiw.studies.summary import SURE_F1, WRONG_F1
-from isiw.window import LEAST_FACTOR, SURE
+from isiw import window
+from isiw.studies import (
+    Processes,
+    Study,
+    StudyStrategy,
+    conduct,
+    run_unit,
+    summary,  # whose constants earlier versions lack
+)
 
 MARKS = (5, 10, 15, 20, 25, 30, 40)
 LATER = (50, 60, 80)
@@ -103,7 +109,8 @@ def honest(
 ) -> None:
     """Compare how often each version is sure and wrong, on the people that both measured."""
     tables = [honesty(before / path.name, path) for path in sorted(now.glob("*.parquet"))]
-    how = f"sure and wrong: an expected F1 of at least {SURE_F1:g}, and at least {WRONG_F1:g} above the actual one"
+    sure_f1, wrong_f1 = summary.SURE_F1, summary.WRONG_F1
+    how = f"sure and wrong: an expected F1 of at least {sure_f1:g}, and at least {wrong_f1:g} above the actual one"
     _write(pd.concat(tables), now, out, how)
 
 
@@ -123,12 +130,14 @@ def honesty(before: Path, now: Path) -> pd.DataFrame:
     for which in ("before", "now"):
         f1, expected = both[f"f1_{which}"], both[f"expected_f1_{which}"]
         rows[f"f1_{which}"], rows[f"expected_{which}"] = f1, expected
-        rows[f"sure_and_wrong_{which}"] = ((expected >= SURE_F1) & (expected - f1 >= WRONG_F1)).astype(float)
+        rows[f"sure_and_wrong_{which}"] = ((expected >= summary.SURE_F1) & (expected - f1 >= summary.WRONG_F1)).astype(
+            float
+        )
         rows[f"start_{which}"], rows[f"end_{which}"] = both[f"start_covered_{which}"], both[f"end_covered_{which}"]
         rows[f"false_window_{which}"] = both[f"reported_window_{which}"].astype(float).mask(there)
         rows[f"false_sure_{which}"] = (both[f"probability_{which}"] >= 0.9).astype(float).mask(there)
-    unclear = both["reported_window_now"].astype(bool) & (both["bayes_factor"] < LEAST_FACTOR)
-    rows["undecided_now"] = (unclear & (both["probability_now"] < SURE)).astype(float)
+    unclear = both["reported_window_now"].astype(bool) & (both["bayes_factor"] < window.LEAST_FACTOR)
+    rows["undecided_now"] = (unclear & (both["probability_now"] < window.SURE)).astype(float)
     groups = pd.DataFrame(rows).groupby([both["cohort"], both["trial"]])
     table = groups.mean().assign(people=groups["people"].sum())
     for name in ("f1_more", "f1_more_with_window"):

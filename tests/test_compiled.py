@@ -58,7 +58,7 @@ def test_a_process_waits_for_another_that_compiles() -> None:
 def test_kernels_are_compiled_again_where_constants_change_that_they_have_compiled_in() -> None:
     folder = Path(compiled.__file__).parent
     imported = set[str]()
-    for file in (*folder.glob("models/particles/kernels/*.py"), folder / "acquisition" / "kernels.py"):
+    for file in (*folder.glob("models/particles/kernels/*.py"), folder / "acquisition" / "information.py"):
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             constants = isinstance(node, ast.ImportFrom) and any(
                 a.name.isupper() or "Kind" in a.name for a in node.names

@@ -76,7 +76,7 @@ def _sources() -> str:
     folder = Path(__file__).parent
     constants = ("window", *(f"models/{name}" for name in _CONSTANTS))
     files = [*folder.glob("models/particles/kernels/*.py"), *(folder / f"{name}.py" for name in constants)]
-    files = sorted([Path(__file__), folder / "acquisition/kernels.py", *files])
+    files = sorted([Path(__file__), folder / "acquisition/information.py", *files])
     return hashlib.blake2b(b"".join(file.read_bytes() for file in files), digest_size=6).hexdigest()
 
 
