@@ -83,15 +83,17 @@ def test_durations_agree_with_the_reference_toolbox(
     assert (apart_ms <= 5.0).mean() >= share
 
 
-def test_the_table_of_trials_has_them_for_the_trials_with_sweeps(log: Path) -> None:
+def test_the_table_of_trials_has_them_for_the_trials_with_sweeps(tmp_path: Path) -> None:
     strategy = make_strategy("even", space=IMPACT, max_trials=3, particles=100)
-    Session(TapRig(), strategy, log=log).run(progress=False)
-    trials = read_session(log).trials
+    Session(TapRig(), strategy, log=tmp_path / "s.mcap").run(progress=False)
+    trials = read_session(tmp_path / "s.mcap").trials
     assert trials.mep_onset_ms[:3].between(20.0, 23.0).all()
     assert trials.silent_period_ms.isna().all()
 
 
-def test_a_log_of_a_robots_sweeps_is_measured_too(log: Path) -> None:
-    Session(rig(), make_strategy("even", space=SPACE, max_trials=3, particles=100), log=log).run(progress=False)
-    record = read_session(log)
+def test_a_log_of_a_robots_sweeps_is_measured_too(tmp_path: Path) -> None:
+    Session(rig(), make_strategy("even", space=SPACE, max_trials=3, particles=100), log=tmp_path / "s.mcap").run(
+        progress=False
+    )
+    record = read_session(tmp_path / "s.mcap")
     assert set(record.measures) == {trial.index for trial in record.table.told}
