@@ -189,13 +189,13 @@ def test_doubts_come_with_the_answer_and_are_logged(client: httpx.Client, sessio
 
 
 def test_the_inter_trial_interval_is_waited_for_or_the_client_told_how_long_it_is(client: httpx.Client) -> None:
-    session = created(client, limits={"min_iti_s": 0.3})
-    begun_s = time.monotonic()
+    begun_s = time.monotonic()  # the interval counts from the creation of the session on
+    session = created(client, limits={"min_iti_s": 1.0})
     done(client.post(f"{session}/ask"))
-    assert time.monotonic() - begun_s > 0.25
+    assert time.monotonic() - begun_s > 0.95
     done(client.post(f"{session}/mistrial", json={"trial": 0}))
     response = client.post(f"{session}/ask", json={"wait_s": 0})
-    assert 0 < refused(response, 429, "TooEarly")["retry_s"] <= 0.3
+    assert 0 < refused(response, 429, "TooEarly")["retry_s"] <= 1.0
     assert response.headers["Retry-After"] == "1"
     assert done(client.get(session))["open_trial"] is None
 
