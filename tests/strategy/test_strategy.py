@@ -352,7 +352,7 @@ def test_a_cost_is_taken_off_the_scores() -> None:
 
 
 def test_a_batch_begins_with_what_is_asked_and_repeats_no_isi_that_has_been_learnt() -> None:
-    strategy = make_strategy("particles-window", particles=200)
+    strategy = make_strategy("particles-window", particles=500)
     for isi_ms, mep_mv in ((100.0, 0.01), (250.0, 0.2), (400.0, 0.01)):
         strategy.tell(isi_ms, mep_mv)
     batch = strategy.ask_batch(4)
