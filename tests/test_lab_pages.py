@@ -39,6 +39,7 @@ def example(page: str, place: Path) -> Iterator[None]:
             process.kill()
 
 
+@pytest.mark.slow
 def test_the_example_of_the_folder_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     with example("folder.md", tmp_path):

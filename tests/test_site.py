@@ -62,6 +62,7 @@ def test_every_command_and_its_options_are_in_the_reference() -> None:
     assert [option for option in options if option.startswith("-") and f"`{option}`" not in page] == []
 
 
+@pytest.mark.slow
 def test_every_configuration_key_is_in_the_reference_with_its_meaning() -> None:
     page = dict(configuration.pages())["configuration.md"]
     for name, field in RunConfig.model_fields.items():

@@ -97,6 +97,7 @@ def test_what_botorch_draws_is_the_same_each_time_and_disturbs_nobody() -> None:
     assert torch.equal(torch.get_rng_state(), state)
 
 
+@pytest.mark.slow
 def test_a_strategy_asks_by_it() -> None:
     def make() -> Strategy:
         acquisition = BotorchAcquisition(reduced_variance)

@@ -40,6 +40,7 @@ def enumerated(posterior: HandMadePosterior) -> np.ndarray:
     return np.array([[now[b] - after(equal, b, t, 2) for t in range(mass.shape[2])] for b in range(mass.shape[0])])
 
 
+@pytest.mark.slow
 @given(seeds)
 def test_two_steps_are_those_of_an_enumeration(seed: int) -> None:
     p = some_posterior(seed)

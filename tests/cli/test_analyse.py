@@ -28,6 +28,7 @@ def people(tmp_path: Path) -> Path:
     return tmp_path / "people.csv"
 
 
+@pytest.mark.slow
 def test_each_person_of_a_file_gets_a_log_and_called_again_nothing_is_made_twice(isiw: Command, people: Path) -> None:
     words = ("analyse", people, "--reference", "impact", "--config", "few.toml", "-o", "logs")
     first = isiw(*words)
@@ -46,6 +47,7 @@ def test_each_person_of_a_file_gets_a_log_and_called_again_nothing_is_made_twice
     assert "another log already" in other.output
 
 
+@pytest.mark.slow
 def test_what_reads_logs_reads_imported_ones_and_says_what_they_are(isiw: Command, people: Path) -> None:
     isiw("analyse", people, "--reference", "impact", "--config", "few.toml", "-o", "logs")
     logs = ("logs/A.mcap", "logs/B.mcap")

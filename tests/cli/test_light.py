@@ -25,6 +25,7 @@ LEARNING = {"torch", "gpytorch", "botorch", "pyro", "sklearn"}
 TABLES = {"pandas", "pyarrow", "matplotlib"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("absent", "command"),
     [

@@ -38,6 +38,7 @@ def test_show_says_first_who_when_with_what_and_within_which_limits(isiw: Comman
     assert f"isiw {__version__}" in lines[5]
 
 
+@pytest.mark.slow
 def test_report_writes_a_page_beside_the_log_or_where_it_is_told(isiw: Command, log: Path, tmp_path: Path) -> None:
     assert isiw("report", log).output.endswith(f"{log.stem}.html\n")
     assert "<title>Session of" in log.with_suffix(".html").read_text("utf-8")
@@ -100,6 +101,7 @@ def test_a_session_of_lab_software_with_its_own_configuration_is_drawn_without_a
     assert isiw("show", "lab.mcap").exit_code == 0
 
 
+@pytest.mark.slow
 def test_a_picture_replaces_no_log_and_nothing_else_unasked(isiw: Any, log: Path, tmp_path: Path) -> None:
     for name in ("log.pdf", "picture.png"):
         (tmp_path / name).write_bytes(log.read_bytes() if name == "log.pdf" else b"precious")

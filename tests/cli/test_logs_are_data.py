@@ -44,6 +44,7 @@ def test_resuming_a_log_imports_no_module_from_a_folder_that_it_names(isiw: Comm
     assert not (tmp_path / "IMPORTED").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("person", [{"cohort": "of-an-older-version"}, {"number": -1}, {"kind": "cloned"}, "nobody"])
 @pytest.mark.parametrize("command", ["plot", "report"])
 def test_a_log_of_an_unknown_person_is_drawn_without_the_truth(

@@ -58,6 +58,7 @@ def test_what_the_operating_system_refuses_is_a_message(isiw: Command, log: Path
     assert "picture.png" in result.output
 
 
+@pytest.mark.slow
 def test_a_sign_that_the_output_lacks_ends_nothing(short: Path, tmp_path: Path) -> None:
     environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
     ended = subprocess.run(  # noqa: S603

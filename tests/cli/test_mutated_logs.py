@@ -21,6 +21,7 @@ CHEAP = (
 """Commands that draw nothing and learn nothing; the benchmark has the others as well."""
 
 
+@pytest.mark.slow
 def test_a_hundred_mutated_logs_are_shown_and_resumed_or_refused_in_words(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -64,6 +64,7 @@ def test_learning_replaces_no_log_and_asks_before_the_work_begins(isiw: Command,
     assert logs[0].read_bytes() == before
 
 
+@pytest.mark.slow
 def test_a_prior_and_its_picture_are_replaced_only_where_that_is_asked_for(
     isiw: Command, lab: Any, folder: Path
 ) -> None:
@@ -97,6 +98,7 @@ def test_a_session_starts_from_earlier_ones_of_the_person(isiw: Command, logs: A
     assert header.config["isiw_run"]["after"] == [str(logs[0])]
 
 
+@pytest.mark.slow
 def test_a_session_with_a_prior_from_earlier_ones_is_resumed_without_their_files(
     isiw: Command, logs: Any, folder: Path
 ) -> None:

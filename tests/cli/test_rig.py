@@ -33,6 +33,7 @@ def changed(path: Path, old: str, new: str) -> None:
     path.write_text(text.replace(old, new), encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_from_nothing_to_a_session_and_on(isiw: Command, tmp_path: Path) -> None:
     assert "rig.py" in isiw("new", "rig", "lab").output
     checked = isiw("check", "lab/session.toml")

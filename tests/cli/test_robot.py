@@ -58,6 +58,7 @@ def killed_after(log: Path, trials: int, torn: Path) -> SessionRecord:
     raise AssertionError("no such place")
 
 
+@pytest.mark.slow
 def test_the_closed_loop_on_raw_sweeps_runs_and_goes_on_after_a_kill(isiw: Command, tmp_path: Path) -> None:
     config = configured(tmp_path)
     ran = isiw("run", config, "--log", "whole.mcap")

@@ -130,6 +130,7 @@ def test_summary_prints_the_table_and_writes_it_with_a_figure(folder: Path) -> N
         assert "<svg" in (folder / f"summary_{name}.svg").read_text()
 
 
+@pytest.mark.slow
 def test_sessions_that_failed_are_told_by_their_error(folder: Path) -> None:
     store: Store = open_store(folder)
     for unit in store.study.units()[:2]:

@@ -168,6 +168,7 @@ def test_the_sketch_refuses_what_it_cannot_do(board: Board, said: bytes, answer:
     assert board.edges == []
 
 
+@pytest.mark.slow
 def test_arming_is_for_two_seconds_and_for_one_stimulus(board: Board) -> None:
     with open_port(board) as port:
         port.write(b"1 ARM\n")

@@ -94,6 +94,7 @@ def test_a_log_that_is_there_is_not_replaced(tmp_path: Path) -> None:
         analysis.to_log(tmp_path / "P01.mcap")
 
 
+@pytest.mark.slow
 def test_pages_and_pictures_are_made_of_an_analysis(tmp_path: Path) -> None:
     analysis = isiw.analyse(*told(), space=SPACE, subject="P01", **FEW)
     analysis.plot(tmp_path / "P01.png")

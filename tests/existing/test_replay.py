@@ -23,6 +23,7 @@ def swept(trials: int = 4) -> Delivered:
     return Delivered(isiw.analyse(isis_ms, meps_mv, space=SPACE, particles=50).record.table, "impact")
 
 
+@pytest.mark.slow
 def test_strategies_are_answered_by_recorded_trials_and_compared_with_all_of_them() -> None:
     replayed = replay(swept(), ["default", "random"], space=SPACE, seeds=2, trials=20, **FEW)
     scores = replayed.f1_by_trial("default")

@@ -60,6 +60,7 @@ def read(path: Path, content: str, layout: str) -> Delivered:
     return person
 
 
+@pytest.mark.slow
 def test_columns_of_samples_with_triggers_are_a_recording(tmp_path: Path) -> None:
     samples = lines(EMG_MV, trigger("tap"), trigger("pulse", 5.0, 0.0))  # which of the levels is rest does not matter
     for head in (LABCHART, BIOPAC):

@@ -65,6 +65,7 @@ def test_a_flipped_bit_costs_no_more_than_its_own_block(finished_log: Path) -> N
         assert len(all_trials - kept) <= 1
 
 
+@pytest.mark.slow
 def test_a_record_taken_for_another_kind_costs_no_more_than_itself(finished_log: Path) -> None:
     whole, all_trials = finished_log.read_bytes(), set(range(8))
     for start in record_starts(whole):

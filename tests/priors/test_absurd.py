@@ -53,6 +53,7 @@ def leaves(values: Any, way: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
         yield from leaves(inner, (*way, key))
 
 
+@pytest.mark.slow
 def test_a_prior_with_an_absurd_value_anywhere_is_refused_or_asks(values: dict[str, Any], tmp_path: Path) -> None:
     file = tmp_path / "lab.toml"
     file.write_text(tomli_w.dumps(values))

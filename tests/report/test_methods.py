@@ -20,6 +20,7 @@ def analysed(alone: int = 12, trials: int = 4) -> isiw.Analysis:
     return isiw.analyse(isis_ms, meps_mv, space=SPACE, particles=100)
 
 
+@pytest.mark.slow
 def test_three_methods_and_the_form_of_the_profile_are_told_side_by_side() -> None:
     belief, means, counts, form = method_answers(analysed().record)
     assert "enhances the MEP" in belief.answer

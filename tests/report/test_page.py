@@ -156,6 +156,7 @@ def test_a_verdict_after_the_last_estimate_is_said(tmp_path: Path) -> None:
     assert JUDGED_SINCE in Page(report_page(read_session(tmp_path / "s.mcap"))).words
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", OLD_LOGS)
 def test_logs_of_every_kind_have_a_page(name: str) -> None:
     record = read_session(LOGS / name)
@@ -193,6 +194,7 @@ def test_without_its_libraries_the_extra_is_named(
         report_page(record)
 
 
+@pytest.mark.slow
 def test_three_hundred_trials_with_raw_sweeps_take_less_than_15_mb_and_10_s(record: SessionRecord) -> None:
     begin = time.process_time()
     page = report_page(many(record, 300))

@@ -30,6 +30,7 @@ def octave(client: httpx.Client, *arguments: str) -> subprocess.CompletedProcess
     )
 
 
+@pytest.mark.slow
 def test_the_example_of_forty_lines_runs_and_its_log_has_what_the_rig_delivered(tmp_path: Path) -> None:
     script = (CLIENT / "example.m").read_text("utf-8")
     assert len([line for line in script.splitlines() if line.strip()]) <= 40

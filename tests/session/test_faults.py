@@ -285,6 +285,7 @@ GONE = """import os
     os.dup2(writing, 2)"""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("screen", [FULL, GONE], ids=["takes nothing", "is gone"])
 def test_a_process_that_must_end_does_so_where_the_screen_takes_nothing_or_is_gone(log: Path, screen: str) -> None:
     with Forked(LOST.format(tests=str(TESTS), how="fails", screen=screen, log=str(log))) as child:

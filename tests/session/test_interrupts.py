@@ -168,6 +168,7 @@ def test_what_comes_after_it_was_acknowledged_is_not_forgotten_with_it(number: s
     assert heard == [(True, number == signal.SIGTERM)]
 
 
+@pytest.mark.slow
 def test_signals_that_come_at_once_do_not_pass_for_a_session_that_does_not_react(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -91,6 +91,7 @@ def test_earlier_amplitudes_are_corrected_in_the_log_and_learnt_again(log: Path)
     assert fresh.estimate().probability == session.strategy.estimate().probability
 
 
+@pytest.mark.slow
 def test_a_resumed_session_corrects_and_asks_as_an_uninterrupted_one(log: Path, tmp_path: Path) -> None:
     strategy = make_strategy(space=IMPACT, max_trials=12, particles=100)
     whole = ran(TapRig(reflex(0.3), mep_mv=silent), tmp_path / "whole.mcap", strategy.restarted(), protocol=NO_TAPS)
@@ -128,6 +129,7 @@ def test_a_session_that_ends_between_a_trial_and_its_corrections_has_them_once_i
     assert again.trials == whole.trials
 
 
+@pytest.mark.slow
 def test_a_person_whose_tap_evokes_no_response_and_who_has_no_window_gets_no_sure_one(log: Path) -> None:
     strategy = make_strategy(space=IMPACT, seed=1, max_trials=40)
     session = ran(TapRig(seed=1, mep_mv=on_nothing, tap_alone=False), log, strategy)
@@ -149,6 +151,7 @@ def test_people_without_a_window_get_no_sure_one_from_a_reflex(
     assert sure <= 1
 
 
+@pytest.mark.slow
 def test_where_a_reflex_may_explain_a_window_a_longer_isi_is_asked_that_shows_it(log: Path) -> None:
     asked = 0
     for seed in (3, 4, 5, 6):
@@ -166,6 +169,7 @@ def test_where_a_reflex_may_explain_a_window_a_longer_isi_is_asked_that_shows_it
     assert again.trials == session.trials  # what it asked is verified, and these asks are replayed as they were
 
 
+@pytest.mark.slow
 def test_no_session_stops_on_a_window_that_a_longer_isi_could_show_to_be_a_reflex(log: Path) -> None:
     session = of_a_reflex(0.1, 3, log.parent, NO_TAPS)
     assert not session.strategy.estimate().tap_may_explain

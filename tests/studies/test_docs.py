@@ -19,6 +19,7 @@ def blocks(language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", TEXT, flags=re.DOTALL)
 
 
+@pytest.mark.slow
 def test_the_study_is_valid() -> None:
     block, _ = blocks("toml")
     study = study_from(tomllib.loads(block), "docs")

@@ -18,6 +18,7 @@ from studies.tiny import double, double_or_die, double_or_die_once, process_id
 posix = pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("workers", [1, 2])
 def test_what_raises_is_a_failure_among_the_results(workers: int) -> None:
     results = dict(Processes(workers).results(double, range(6)))
@@ -44,6 +45,7 @@ def test_what_runs_while_a_worker_dies_is_run_again(tmp_path: Path) -> None:
     assert sorted(results) == [(number, 2 * number) for number in range(6)]
 
 
+@pytest.mark.slow
 @posix
 def test_a_worker_leaves_ctrl_c_to_the_process_that_it_works_for() -> None:
     results = Processes(2).results(process_id, range(20))

@@ -158,6 +158,7 @@ def test_people_side_by_side_need_a_model_with_an_acquisition_function(tmp_path:
         run_unit(study.units()[0])
 
 
+@pytest.mark.slow
 def test_processes_run_code_of_ones_own(tmp_path: Path, module: str) -> None:
     study = load_study(written(tmp_path, f"{module}:Player"))
     apart = conduct(study, tmp_path / "apart.study", Processes(2)).rows()

@@ -117,6 +117,7 @@ def test_a_session_that_fails_ends_none_of_the_others() -> None:
     assert {person: set(rows["person"]) for person, rows in kept.items()} == {0: {0}, 2: {2}}
 
 
+@pytest.mark.slow
 def test_a_study_is_the_same_in_one_process_and_in_two() -> None:
     sessions = [small(strategy, person=person) for strategy in ("even", "random") for person in (0, 1)]
     done: list[SimulatedSession] = []

@@ -31,6 +31,7 @@ def test_what_a_terminal_would_obey_is_taken_out_and_the_rest_stays(text: str, s
     assert plain(text) == shown
 
 
+@pytest.mark.slow
 @given(st.text())
 def test_what_is_left_can_be_printed(text: str) -> None:
     assert not any(unicodedata.category(character) in ("Cf", "Cs") for character in plain(text))

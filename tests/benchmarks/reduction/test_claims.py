@@ -133,6 +133,7 @@ def test_initial_observations_are_judged_on_either_kind_of_people() -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_marks_of_significance_are_of_paired_tests_over_people() -> None:
     rng = np.random.default_rng(1)
     correlation = {"nr": 0.4, "svmr": 0.6, "gpr": 0.9, "pf": 0.6, "incremental": 0.5}

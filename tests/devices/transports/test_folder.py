@@ -169,6 +169,7 @@ def test_another_realised_isi_is_left_to_the_judgement_of_the_session(tmp_path: 
         assert instance(Measurement, made.deliver(Stimulus(1, 50.0), 5.0)).isi_ms == 1050.0
 
 
+@pytest.mark.slow
 def test_whatever_fails_a_session_goes_on_and_its_log_has_each_pair_that_was_fired_once(tmp_path: Path) -> None:
     rng, trials = random.Random(20), 30  # noqa: S311 - which trials fail
     lies = [lie for lie in LIES if lie not in {"refuses", "late"}]

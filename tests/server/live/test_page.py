@@ -44,6 +44,7 @@ def test_who_shows_no_token_cannot_ask_without_a_pause(watched: Watched) -> None
             assert time.monotonic() - begun_s > 3 * 0.05
 
 
+@pytest.mark.slow
 def test_a_browser_that_has_a_file_is_not_sent_it_again(watched: Watched) -> None:
     for path in FILES:
         url = watched.client.base_url.join(path)
@@ -68,6 +69,7 @@ def test_a_file_is_made_once_however_often_it_is_asked_for(monkeypatch: pytest.M
     assert made == ["made"]
 
 
+@pytest.mark.slow
 def test_what_is_of_the_session_needs_the_token_and_the_pages_own_origin(watched: Watched) -> None:
     for path in ("updates", "pause", "stop", "exclude", "note", "resume", "include"):
         method = "GET" if path == "updates" else "POST"
@@ -218,6 +220,7 @@ def test_where_nobody_looks_on_and_there_is_no_terminal_a_pause_ends_the_session
     assert watched.events == [("pause", "A look at the coil.")]
 
 
+@pytest.mark.slow
 def test_viewers_that_never_read_or_vanish_do_not_hold_a_session_up(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
