@@ -83,7 +83,9 @@ def curves_of(cohort: str) -> pd.DataFrame:
     The oracles have no standard error of their own: they are there to be compared on the same people.
     """
     default = (
-        _table("people.json", "By trial").assign(strategy="default").rename(columns={"start_covered": "start_coverage"})
+        _table("people_usual.json", "By trial")
+        .assign(strategy="default")
+        .rename(columns={"start_covered": "start_coverage"})
     )
     both = _table("two_oracles.json", "Both oracles").assign(f1_se=0.0)
     oracles = both.melt(["cohort", "trial", "f1_se"], ["oracle", "second"], var_name="strategy", value_name="f1")
