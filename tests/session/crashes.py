@@ -15,6 +15,8 @@ from typing import Any, Self
 
 import pytest
 
+from forked import fork
+
 DIED = 77
 
 
@@ -130,7 +132,7 @@ def run_until(step: int, ending: Ending, folder: Path, shadow: Path, act: Callab
     reading, writing = os.pipe()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # of forking beside idle threads
-        child = os.fork()
+        child = fork()
     if child == 0:
         disk = Disk(folder, shadow, step, ending)
         try:
