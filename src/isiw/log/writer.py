@@ -307,7 +307,9 @@ def _header_of(found: Salvage) -> AnyHeader | None:
 
 
 def _require_unchanged(source: IO[bytes], salvage: Salvage) -> None:
-    there = Fingerprint.of(salvage.path) if salvage.path.exists() else None
+    there = None
+    with suppress(FileNotFoundError):  # of a session that has just finished it, which may be between any two calls
+        there = Fingerprint.of(salvage.path)
     if not Fingerprint.of(source) == salvage.fingerprint == there:
         raise LogError(
             "the log has changed since it was read", got=str(salvage.path), remedy="Begin again by reading it."
