@@ -13,9 +13,11 @@ from isiw.design import DesignSpace
 from isiw.findings import Kind
 from isiw.log.reader import read_session
 from isiw.session.loop import Session
+from isiw.session.rig import Safeguards
 from isiw.signals import MEP_WINDOWS_MS, SignalLimits, judge
 from isiw.signals.measures import Measures, measures
 from isiw.strategy.catalogue import make_strategy
+from isiw.subjects.changes import TapResponse
 from isiw.trials import Channel, Status, Stimulus, Sweep, Trial
 from tapped import IMPACT, TapRig
 from wrong_rigs import rig
@@ -97,3 +99,17 @@ def test_a_log_of_a_robots_sweeps_is_measured_too(tmp_path: Path) -> None:
     )
     record = read_session(tmp_path / "s.mcap")
     assert set(record.measures) == {trial.index for trial in record.table.told}
+
+
+def test_measures_are_without_the_taps_own_response_as_the_amplitude_is(tmp_path: Path) -> None:
+    rig, strategy = (
+        TapRig(TapResponse(30.0, 100.0, 0.3, 0.0)),
+        make_strategy("even", space=IMPACT, max_trials=14, particles=100),
+    )
+    Session(rig, strategy, log=tmp_path / "s.mcap", safeguards=Safeguards(on_pause=lambda _: True)).run(progress=False)
+    trials = read_session(tmp_path / "s.mcap").trials
+    pairs = trials[trials.commanded_isi_ms.notna()]
+    assert (pairs.tap_mv > 0).sum() >= 4
+    assert pairs.mep_onset_ms.between(20.0, 23.0).all()
+    assert pairs.mep_duration_ms.to_numpy() == pytest.approx(8.0, abs=1.5)
+    assert pairs.mep_area_mv_ms.to_numpy() == pytest.approx(0.15 * 8 / math.pi, rel=0.1)

@@ -23,9 +23,10 @@ from isiw.log.verdicts import VERDICTS, under_all
 from isiw.sentences import JUDGED_SINCE
 from isiw.signals.evidence import is_silent
 from isiw.signals.measures import Measures, measures
+from isiw.signals.tap import TapResponses
 from isiw.strategy.stopping import StopDecision
 from isiw.text.stimuli import TAP, StimulusWords, meanings
-from isiw.trials import Channel, Stimulus, Trial, TrialTable
+from isiw.trials import Channel, Stimulus, Sweep, Trial, TrialTable
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +104,10 @@ class SessionRecord:
     def measures(self) -> Mapping[int, Measures]:
         """What the sweeps of the trials that count show beside the amplitude, by the trial's number."""
         emg = {trial: channel for (trial, name), channel in self.waveforms.items() if name == "emg"}
-        return {t.index: measures(emg[t.index], t, self.header.signals) for t in self.table.told if t.index in emg}
+        signals, taps = self.header.signals, TapResponses(self.header.signals.mep_window_ms)
+        for trial in self.table if any(trial.tap_mv for trial in self.table) else ():
+            taps = taps.after(trial, Sweep({"emg": emg[trial.index]} if trial.index in emg else {}))
+        return {t.index: measures(emg[t.index], t, signals, taps) for t in self.table.told if t.index in emg}
 
     def require_end(self) -> None:
         """Raise where nobody knows how many stimuli were given."""

@@ -16,6 +16,7 @@ from isiw.errors import InvalidValueError
 from isiw.signals.disturbance import at_rest, disturbance
 from isiw.signals.limits import EMG_UNITS_MV, SignalLimits
 from isiw.signals.mep import ONSET_SD, SURE_SD, SURE_SHARE, mep_onset
+from isiw.signals.tap import TapResponses, hit_of
 from isiw.signals.waveforms import level_and_noise, samples
 from isiw.trials import Channel, Trial
 from isiw.types import FloatArray
@@ -37,8 +38,8 @@ class Measures(NamedTuple):
     silent_period_ms: float = math.nan
 
 
-def measures(emg: Channel, trial: Trial, limits: SignalLimits) -> Measures:
-    """The measures of a trial that counts and whose EMG shows an MEP."""
+def measures(emg: Channel, trial: Trial, limits: SignalLimits, taps: TapResponses | None = None) -> Measures:
+    """The measures of a trial that counts and whose EMG shows an MEP, without the mean of what the tap alone evokes."""
     if not trial.told or trial.t_tms_ms is None:
         return Measures()
     emg_mv = EMG_UNITS_MV[emg.unit] * emg.values
@@ -46,6 +47,8 @@ def measures(emg: Channel, trial: Trial, limits: SignalLimits) -> Measures:
     emg_mv = emg_mv if found is None else emg_mv - found.course_mv
     pulse_ms = trial.t_tms_ms - emg.t0_ms
     since_ms = np.arange(emg_mv.size) * 1000 / emg.rate_hz - pulse_ms
+    if taps is not None and (hit_ms := hit_of(trial)) is not None:
+        emg_mv = taps.without(emg_mv, since_ms + trial.t_tms_ms - hit_ms)
     try:
         onset_ms = mep_onset(emg_mv, emg.rate_hz, pulse_ms, limits.mep_window_ms)
     except InvalidValueError:  # too little rest before the pulse

@@ -86,7 +86,7 @@ class TapResponses:
 
     def after(self, trial: Trial, sweep: Sweep) -> TapResponses:
         """The same after one more trial; of TMS alone, and of a trial that was lost, nothing is learnt."""
-        hit_ms = _origin_ms(trial)
+        hit_ms = hit_of(trial)
         is_control = trial.commanded_isi_ms is None and not trial.tap_alone
         if hit_ms is None or is_control or "emg" not in sweep.channels:
             return self
@@ -96,6 +96,7 @@ class TapResponses:
         rest = at_rest(emg, trial) if trial.t_tms_ms is not None else times_ms < hit_ms - PULSE_GUARD_MS
         found = disturbance(values, emg.rate_hz, rest)
         values = values if found is None else values - found.course_mv
+        values = values - np.median(values[rest]) if rest.any() else values
         shown, windows = self.shown, dict(self.windows)
         if trial.counts:
             until_ms = times_ms[-1] if trial.t_tms_ms is None else trial.t_tms_ms - PULSE_GUARD_MS
@@ -122,6 +123,13 @@ class TapResponses:
             return trial
         mep_mv = float(np.ptp(window.emg_mv - self._mean(window.since_hit_ms))) if left.mean_mv else trial.mep_mv
         return replace(trial, mep_mv=mep_mv, mep_sd_mv=left.sd_mv, tap_mv=left.mean_mv)
+
+    def without(self, emg_mv: FloatArray, since_hit_ms: FloatArray) -> FloatArray:
+        """Some EMG without the mean course, as far as it is known [mV], shape (w,)."""
+        courses = np.array([one.course_mv for one in self.shown]).reshape(-1, GRID_MS.size)
+        count = np.isfinite(courses).sum(axis=0)
+        mean_mv = np.where(count >= LEAST_SHOWN, np.nansum(courses, axis=0) / np.maximum(count, 1), 0.0)
+        return np.asarray(emg_mv - np.interp(since_hit_ms, GRID_MS, mean_mv, left=0.0, right=0.0))
 
     def corrected(self, trials: Iterable[Trial]) -> tuple[TapResponses, list[Trial]]:
         """The trials whose amplitudes are others by what is known now; each is looked at when twice as much is."""
@@ -205,7 +213,7 @@ def _left_of_varying_size(waves: FloatArray, mean: FloatArray) -> tuple[float, f
     return left, math.sqrt(math.expm1(log_sd**2) - left**2)
 
 
-def _origin_ms(trial: Trial) -> float | None:
+def hit_of(trial: Trial) -> float | None:
     """The hit, as it was measured or is to be expected [ms on the sweep's clock]; None without a time of the tap."""
     if trial.t_hit_ms is None and trial.t_valve_ms is not None:
         return trial.t_valve_ms + HIT_DELAY_MS
