@@ -1,15 +1,17 @@
 """Sessions with raw sweeps: reflexes evoked by the tap, right rigs that must not be accused, and amplitudes by ISI.
 
-    OMP_NUM_THREADS=1 python -m benchmarks.raw_sweeps reflex --people 20 --out benchmarks/results
-    OMP_NUM_THREADS=1 python -m benchmarks.raw_sweeps plain --people 10 --out benchmarks/results
-    OMP_NUM_THREADS=1 python -m benchmarks.raw_sweeps rigs --people 100 --out benchmarks/results
+    OMP_NUM_THREADS=1 python -m benchmarks.raw_sweeps reflex --people 100 --minutes 20 --out benchmarks/results
+    OMP_NUM_THREADS=1 python -m benchmarks.raw_sweeps flat --people 100 --minutes 20 --out benchmarks/results
+    OMP_NUM_THREADS=1 python -m benchmarks.raw_sweeps plain --people 100 --minutes 10 --out benchmarks/results
+    OMP_NUM_THREADS=1 python -m benchmarks.raw_sweeps rigs --people 400 --out benchmarks/results
     OMP_NUM_THREADS=1 python -m benchmarks.raw_sweeps sizes --out benchmarks/results
-    OMP_NUM_THREADS=1 python -m benchmarks.raw_sweeps random --people 6000 --out benchmarks/results
+    OMP_NUM_THREADS=1 python -m benchmarks.raw_sweeps random --people 20000 --out benchmarks/results
 
-`reflex`: people with and without a window, each with reflexes of three sizes at two times after the hit, without a tap
-alone and with six. `plain`: the same people without a reflex, in a session and in a loop that tells amplitudes as they
-are judged. `rigs`: sessions of rigs that are right. `sizes`: MEPs of .15 mV at ISIs of 0 to 60 ms. `random`: sweeps of
-any rate, length and offset.
+`reflex`: people with a window, with reflexes of three sizes at two times after the hit, without a tap alone and with
+six. `flat`: people without a window, with the same reflexes. `plain`: people without a reflex, in a session and in a
+loop that tells amplitudes as they are judged. `rigs`: sessions of rigs that are right. `sizes`: MEPs of .15 mV at ISIs
+of 0 to 60 ms. `random`: sweeps of any rate, length and offset. With `--minutes` a run has as many people as there is
+time for.
 """
 
 from __future__ import annotations
@@ -20,10 +22,11 @@ import math
 import os
 import statistics
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple, TypeAlias
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
@@ -35,11 +38,28 @@ from benchmarks.quick import understood
 from isiw.signals.tap import TapResponses
 from isiw.signals.watch import Watch
 from isiw.subjects import SimulatedSubject, TapResponse, cohort
+from isiw.types import FloatArray
 
 SPACE: Final = isiw.DesignSpace(0, 320, reference="impact")
 TRIALS: Final = 40
-REFLEXES: Final = tuple(itertools.product((0.05, 0.1, 0.3), ((20.0, 25.0), (50.0, 50.0)), (0, 6)))
-"""Median size [mV], start and duration [ms], and how many taps alone are given after the first trials."""
+Reflex: TypeAlias = tuple[float, float, float, int]
+"""Median size [mV], 0 for none; start and duration [ms]; and how many taps alone follow on the first four trials."""
+
+ORACLE_TAPS: Final = 100
+"""So many taps alone before the fifth pair leave nothing to learn of the response's mean and spread."""
+
+_CASES: Final = tuple(itertools.product((0.05, 0.1, 0.3), ((20.0, 25.0), (50.0, 50.0)), (0, 6)))
+REFLEXES: Final[tuple[Reflex, ...]] = tuple((size_mv, *when, taps) for size_mv, when, taps in _CASES)
+NO_REFLEX: Final[tuple[Reflex, ...]] = ((0.0, 0.0, 0.0, 0), (0.0, 0.0, 0.0, 6))
+ORACLES: Final[tuple[Reflex, ...]] = ((0.3, 20.0, 25.0, ORACLE_TAPS), (0.3, 50.0, 50.0, ORACLE_TAPS))
+SURE: Final = 0.9
+
+
+def tap_of(case: Reflex) -> TapResponse | None:
+    """What the tap alone evokes."""
+    size_mv, start_ms, lasts_ms, _ = case
+    return TapResponse(start_ms, lasts_ms, size_mv, 0.5) if size_mv else None
+
 
 MUSCLES: Final = {"forearm": (17.5, 8.0), "hand": (23.0, 12.0)}
 """When an MEP begins after the pulse, and how long it lasts [ms]."""
@@ -107,50 +127,107 @@ def person_rig(person: SimulatedSubject, seed: int, tap: TapResponse | None, *, 
     return Rig(lambda isi_ms: responder.respond(isi_ms, "impact").mep_mv, tap, seed, tap_alone=tap_alone)
 
 
-def reflex(people: int, seed: int) -> Iterator[str]:
-    """How often people without a window get a probable one, and the F1 of those with one."""
-    sure = 0
-    found: dict[tuple[str, str], list[tuple[float, float]]] = {}
-    flat, with_window = (cohort(name, people, seed) for name in ("nonresponder", "recruitment"))
-    cases = [("none", None, 0), *((f"{size} mV at {start:.0f}-{start + lasts:.0f} ms, {taps} taps",
-              TapResponse(start, lasts, size, 0.5), taps) for size, (start, lasts), taps in REFLEXES)]  # fmt: skip
-    for name, tap, taps in cases:
-        for group, persons in (("without", flat), ("with", with_window)):
-            for number, person in enumerate(persons):
-                rig = person_rig(person, seed + number, tap, tap_alone=taps > 0)
-                estimate = session_of(rig, seed + number, taps).estimate
-                f1 = isiw.metrics.f1(estimate, person.window(SPACE), SPACE)
-                found.setdefault((group, name), []).append((estimate.probability or 0.0, f1))
-        probable = sum(p >= 0.9 for p, _ in found["without", name])
-        sure += probable if tap is not None else 0
-        means = [statistics.fmean(f1 for _, f1 in found["with", each]) for each in (name, "none")]
-        yield (
-            f"{name:34} without a window: P >= .9 in {probable} of {people}; with one: F1 {means[0]:.3f}, "
-            f"{means[0] - means[1]:+.3f} to no reflex"
-        )
-    yield f"pooled, without a window: P >= .9 in {sure} of {people * len(REFLEXES)}"
+class Outcome(NamedTuple):
+    """What a session says of one person: probability of a window, F1, and whether its intervals hold the true edges."""
+
+    probability: float
+    f1: float
+    covered: tuple[bool, bool] | None
 
 
-def plain(people: int, seed: int) -> Iterator[str]:
+def outcome(person: SimulatedSubject, seed: int, tap: TapResponse | None, taps: int) -> Outcome:
+    """What a session of this person ends with, and so many taps alone after the first trials."""
+    truth, estimate = person.window(SPACE), session_of(person_rig(person, seed, tap, tap_alone=taps > 0), seed, taps)
+    known = estimate.estimate
+    return Outcome(
+        known.probability or 0.0, isiw.metrics.f1(known, truth, SPACE), isiw.metrics.covers(known, truth, SPACE)
+    )
+
+
+def name_of(case: Reflex) -> str:
+    """A case in a table."""
+    size_mv, start_ms, lasts_ms, taps = case
+    how = f"{taps} taps alone" if taps else "no tap alone"
+    return (
+        f"no reflex, {how}"
+        if not size_mv
+        else f"{size_mv:.2f} mV at {start_ms:.0f}-{start_ms + lasts_ms:.0f} ms, {how}"
+    )
+
+
+def in_time(persons: list[SimulatedSubject], minutes: float) -> Iterator[tuple[int, SimulatedSubject]]:
+    """The number of each person and the person, as long as there is time."""
+    ends_s = time.monotonic() + 60 * minutes
+    for number, person in enumerate(persons):
+        if time.monotonic() > ends_s:
+            return
+        yield number, person
+
+
+def reflex(people: int, seed: int, minutes: float) -> Iterator[str]:
+    """F1 and coverage of people with a window: with reflexes, without, and of an oracle that has seen 100 taps."""
+    found: dict[Reflex, list[Outcome]] = {case: [] for case in (*NO_REFLEX, *REFLEXES, *ORACLES)}
+    for number, person in in_time(cohort("recruitment", people, seed), minutes):
+        for case, outcomes in found.items():
+            outcomes.append(outcome(person, seed + number, tap_of(case), case[-1]))
+    f1s = {case: np.array([one.f1 for one in outcomes]) for case, outcomes in found.items()}
+    usual = {case: f1s[case] - f1s[0.0, 0.0, 0.0, case[-1]] for case in REFLEXES}
+    best = {case: f1s[case] - f1s[*case[:-1], ORACLE_TAPS] for case in REFLEXES if case[0] == ORACLES[0][0]}
+    for case, outcomes in found.items():
+        held = [each for one in outcomes if one.covered is not None for each in one.covered]
+        less = f", {told(usual[case])} to no reflex" if case in usual else ""
+        less += f", {told(best[case])} to the oracle" if case in best else ""
+        mean = f"{f1s[case].mean():.3f} ± {error(f1s[case]):.3f}"
+        yield f"{name_of(case):40} F1 {mean}, edges covered {np.mean(held):.2f}, {len(outcomes)} people{less}"
+    for size_mv in dict.fromkeys(case[0] for case in REFLEXES):
+        pooled = np.mean([each for case, each in usual.items() if case[0] == size_mv], axis=0)
+        yield f"{size_mv:.2f} mV, pooled: F1 {told(pooled)} to no reflex"
+    yield f"the oracle's cases, pooled: F1 {told(np.mean(list(best.values()), axis=0))} to the oracle"
+
+
+def flat(people: int, seed: int, minutes: float) -> Iterator[str]:
+    """How often people without a window, and with a reflex, get a probable one."""
+    found: dict[Reflex, list[Outcome]] = {case: [] for case in REFLEXES}
+    for number, person in in_time(cohort("nonresponder", people, seed), minutes):
+        for case, outcomes in found.items():
+            outcomes.append(outcome(person, seed + number, tap_of(case), case[-1]))
+    sure = {case: sum(one.probability >= SURE for one in outcomes) for case, outcomes in found.items()}
+    for case, outcomes in found.items():
+        yield f"{name_of(case):40} without a window: P >= {SURE} in {sure[case]} of {len(outcomes)}"
+    yield f"pooled: P >= {SURE} in {sum(sure.values())} of {sum(map(len, found.values()))}"
+
+
+def error(values: FloatArray) -> float:
+    """The standard error of a mean."""
+    return float(np.std(values, ddof=1) / math.sqrt(len(values))) if len(values) > 1 else math.nan
+
+
+def told(differences: FloatArray) -> str:
+    """The mean of some differences, and its standard error."""
+    return f"{differences.mean():+.3f} ± {error(differences):.3f}"
+
+
+def plain(people: int, seed: int, minutes: float) -> Iterator[str]:
     """The F1 of a session with taps alone and of a loop that tells amplitudes as they are judged; no reflex."""
     differences, lost = [], 0
-    for name in ("recruitment", "gaussian"):
-        for number, person in enumerate(cohort(name, people, seed)):
-            truth, own = person.window(SPACE), seed + number
-            result = session_of(person_rig(person, own, None), own, 0)
-            lost += sum(trial.reason is not None for trial in result.trials)
-            strategy, rig = isiw.make_strategy(space=SPACE, seed=own, max_trials=TRIALS), person_rig(person, own, None)
-            while not strategy.decision().stop:
-                stimulus = isiw.Stimulus(strategy.delivered, strategy.ask())
-                trial = isiw.signals.judge(rig.deliver(stimulus), stimulus, SPACE)
-                strategy.learn(trial.isi_ms, trial.mep_mv)
-            f1s = [isiw.metrics.f1(estimate, truth, SPACE) for estimate in (result.estimate, strategy.estimate())]
-            differences.append(f1s[0] - f1s[1])
-    error = statistics.stdev(differences) / math.sqrt(len(differences))
-    yield f"{len(differences)} people: F1 {statistics.fmean(differences):+.4f} ± {error:.4f} (SE), {lost} trials lost"
+    both = itertools.chain(
+        *zip(*(cohort(name, people // 2, seed) for name in ("recruitment", "gaussian")), strict=True)
+    )
+    for number, person in in_time(list(both), minutes):
+        truth, own = person.window(SPACE), seed + number
+        result = session_of(person_rig(person, own, None), own, 0)
+        lost += sum(trial.reason is not None for trial in result.trials)
+        strategy, rig = isiw.make_strategy(space=SPACE, seed=own, max_trials=TRIALS), person_rig(person, own, None)
+        while not strategy.decision().stop:
+            stimulus = isiw.Stimulus(strategy.delivered, strategy.ask())
+            trial = isiw.signals.judge(rig.deliver(stimulus), stimulus, SPACE)
+            strategy.learn(trial.isi_ms, trial.mep_mv)
+        f1s = [isiw.metrics.f1(estimate, truth, SPACE) for estimate in (result.estimate, strategy.estimate())]
+        differences.append(f1s[0] - f1s[1])
+    yield f"{len(differences)} people: F1 {told(np.array(differences))} (SE), {lost} trials lost"
 
 
-def rigs(people: int, seed: int) -> Iterator[str]:
+def rigs(people: int, seed: int, _: float) -> Iterator[str]:
     """For how many trials of rigs that are right a session would pause; 30 trials a rig, at ISIs all over the range."""
     accused: list[str] = []
     for number in range(people):
@@ -189,7 +266,7 @@ class Told:
         return (trial.mep_mv or 0.0) - (trial.tap_mv or 0.0)
 
 
-def sizes(_: int, seed: int) -> Iterator[str]:
+def sizes(_: int, seed: int, __: float) -> Iterator[str]:
     """The median amplitude of MEPs of .15 mV at ISIs of 0 to 60 ms, as a share of that at 200 ms."""
     for name, tap in (("no response", None), ("an artefact of .1 mV at 18-23 ms", TapResponse(18.0, 5.0, 0.1, 0.2))):
         told = Told(Rig(lambda _: 0.15, tap, seed))
@@ -201,7 +278,7 @@ def sizes(_: int, seed: int) -> Iterator[str]:
         yield f"{name}: {len(off)} of 61 ISIs off by more than 5 %: {off}; {min(ratios):.3f} to {max(ratios):.3f}"
 
 
-def random(sweeps: int, seed: int) -> Iterator[str]:
+def random(sweeps: int, seed: int, _: float) -> Iterator[str]:
     """How many sweeps of any rate, length and offset raise an error."""
     rng, raised, accepted = np.random.default_rng(seed), 0, 0
     for _ in range(sweeps):
@@ -221,7 +298,7 @@ def random(sweeps: int, seed: int) -> Iterator[str]:
     yield f"{sweeps} random sweeps: {raised} raised, {accepted} accepted"
 
 
-PARTS: Final = {"reflex": reflex, "plain": plain, "rigs": rigs, "sizes": sizes, "random": random}
+PARTS: Final = {"reflex": reflex, "flat": flat, "plain": plain, "rigs": rigs, "sizes": sizes, "random": random}
 
 
 def main() -> None:
@@ -230,10 +307,11 @@ def main() -> None:
     parser.add_argument("part", choices=PARTS)
     parser.add_argument("--people", type=int, default=10)
     parser.add_argument("--seed", type=int, default=10_000)
+    parser.add_argument("--minutes", type=float, default=math.inf, help="begin with no person after this time")
     parser.add_argument("--out", type=Path)
     asked = parser.parse_args()
     lines = [command_of("raw_sweeps"), made_with("numpy", "numba")]
-    for line in PARTS[asked.part](asked.people, asked.seed):
+    for line in PARTS[asked.part](asked.people, asked.seed, asked.minutes):
         lines.append(line)
         print(line, flush=True)
         if asked.out:
