@@ -84,6 +84,8 @@ FITTED: Final = {
 SET: Final = {"median of all MEPs": "median", "lowest tenth of all MEPs": "lowest", "as they are": "raw"}
 TOLD: Final = f"mean of {ALONE} TMS alone"
 TREATMENTS: Final = (*SET, *FITTED, TOLD)
+PAIRS_TOLD: Final = f"lowest tenth of all pairs beside {ALONE} TMS alone"
+"""What NR does where there is TMS alone; on request, since it is no treatment of its own."""
 
 
 @dataclass(frozen=True)
@@ -122,25 +124,47 @@ def treated(usual: isiw.Strategy, treatment: str) -> isiw.Strategy:
 
 def f1_by_trial(method: str, cohort: str, person: int, seed: int, treatment: str, trials: int) -> list[float]:
     """One session of so many trials: F1 after each."""
-    settings = () if treatment in FITTED else (("floor", SET.get(treatment, "subtracted")),)
-    alone = ALONE if treatment == TOLD else 0
+    floors = SET | {TOLD: "subtracted", PAIRS_TOLD: "lowest"}
+    settings = () if treatment in FITTED else (("floor", floors[treatment]),)
+    alone = ALONE if treatment in (TOLD, PAIRS_TOLD) else 0
     session = Session(method, cohort, person, seed, reading_of(cohort), horizon=trials, alone=alone, settings=settings)
     change = (lambda usual: treated(usual, treatment)) if treatment in FITTED else (lambda usual: usual)
     found = play(session, recorded_person(cohort, person, seed), change)
     return list(found[JUDGED.get(cohort, BY_TRUTH)[1]][:trials])
 
 
-def row(method: str, cohort: str, treatment: str, people: int, seed: int, trials: int) -> dict[str, object]:
+def played(method: str, cohort: str, treatment: str, people: int, seed: int, trials: int) -> FloatArray:
+    """F1 by person and trial; NaN for whoever's sweep shows no window, since nothing can be judged by it."""
+    return np.array([f1_by_trial(method, cohort, person, seed, treatment, trials) for person in range(people)])
+
+
+def row(f1: FloatArray) -> dict[str, float]:
     """Mean F1 of one treatment after some trials, and how it changes from 10 trials to the last."""
-    f1 = np.array([f1_by_trial(method, cohort, person, seed, treatment, trials) for person in range(people)])
-    f1 = f1[~np.isnan(f1).any(axis=1)]  # whose sweep shows no window cannot be judged
-    change = f1[:, -1] - f1[:, min(10, trials) - 1]
+    f1 = f1[~np.isnan(f1).any(axis=1)]
+    marks = [mark for mark in MARKS if mark <= f1.shape[1]]
+    change = f1[:, -1] - f1[:, min(10, f1.shape[1]) - 1]
     return (
-        {"method": method, "cohort": cohort, "floor": treatment, "n": len(f1)}
-        | {str(mark): float(f1[:, mark - 1].mean()) for mark in MARKS if mark <= trials}
-        | {"SE": float(f1[:, -1].std(ddof=1) / np.sqrt(len(f1)))}
-        | {"from 10 on": float(change.mean()), "its SE": float(change.std(ddof=1) / np.sqrt(len(f1)))}
+        {"n": len(f1)}
+        | {str(mark): float(f1[:, mark - 1].mean()) for mark in marks}
+        | {"SE": _error(f1[:, -1])}
+        | {"from 10 on": float(change.mean()), "its SE": _error(change)}
     )
+
+
+def difference(f1: FloatArray, other: FloatArray) -> dict[str, float]:
+    """Mean differences of F1 to those of the same people with another treatment, each with its standard error."""
+    change = f1 - other
+    change = change[~np.isnan(change).any(axis=1)]
+    marks = [mark for mark in MARKS if mark <= f1.shape[1]]
+    return {"n": len(change)} | {
+        name: value
+        for mark in marks
+        for name, value in ((str(mark), float(change[:, mark - 1].mean())), (f"SE {mark}", _error(change[:, mark - 1])))
+    }
+
+
+def _error(values: FloatArray) -> float:
+    return float(values.std(ddof=1) / np.sqrt(len(values)))
 
 
 def main(
@@ -149,14 +173,24 @@ def main(
     floors: Annotated[str, typer.Option(help="Treatments, comma-separated.")] = ",".join(TREATMENTS),
     people: Annotated[int, typer.Option(help="People a cohort.")] = 11,
     trials: Annotated[int, typer.Option(help="Trials a session.")] = 40,
-    seed: Annotated[int, typer.Option(help="Seed of the cohorts, below 1,000.")] = 500,
+    seed: Annotated[int, typer.Option(help="Seed of the cohorts; below 1,000 for a choice.")] = 500,
     out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("fair_opponent"),
 ) -> None:
     """Compare the treatments."""
     plan = list(itertools.product(methods.split(","), cohorts.split(","), floors.split(",")))
-    rows = [row(*one, people, seed, trials) for one in track(plan, "treatments", console=Console(stderr=True))]
+    f1 = {one: played(*one, people, seed, trials) for one in track(plan, "treatments", console=Console(stderr=True))}
+    keys = [dict(zip(("method", "cohort", "floor"), one, strict=True)) for one in plan]
+    first = floors.split(",")[0]
+    tables = {
+        "F1 by the treatment of the floor": [key | row(f1[one]) for key, one in zip(keys, plan, strict=True)],
+        f"Paired with {first}": [
+            key | difference(f1[one], f1[*one[:2], first])
+            for key, one in zip(keys, plan, strict=True)
+            if one[2] != first
+        ],
+    }
     facts = facts_of("fair_opponent", "numpy", "scipy", "scikit-learn", seed=seed, people=people)
-    write_tables({"F1 by the treatment of the floor": pd.DataFrame(rows)}, facts, out)
+    write_tables({title: pd.DataFrame(rows) for title, rows in tables.items() if rows}, facts, out)
     print(out.with_suffix(".md").read_text(encoding="utf-8"))
 
 
