@@ -13,7 +13,8 @@ from isiw.devices.robot.tapper import Tapper, TapperSettings, preset
 from isiw.signals import judge
 from isiw.signals.tap import LONGER_MS, TapResponses
 from isiw.subjects.changes import TapResponse
-from isiw.trials import Channel, Stimulus, Sweep, TrialTable
+from isiw.trials import Channel, Stimulus, Sweep, Trial, TrialTable
+from isiw.types import FloatArray
 from isiw.window import Window
 from known import known
 from tapped import IMPACT, TapRig, reflex
@@ -91,6 +92,25 @@ def test_earlier_trials_are_corrected_when_the_course_is_known_and_when_twice_as
     assert corrected_after[:2] == [(0, 5), (1, 5)]
     assert {after for _, after in corrected_after} <= {5, 8, 14}
     assert known(trials[1].mep_mv) - known(trials[1].tap_mv) < 0.25
+
+
+def test_a_trial_of_a_long_session_is_corrected_without_a_look_at_all_courses_for_each_trial(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rig, looked = TapRig(reflex(0.3)), 0
+    covering = TapResponses._covering  # noqa: SLF001 - its calls are counted
+
+    def counted(responses: TapResponses, since_hit_ms: FloatArray) -> tuple[FloatArray, FloatArray]:
+        nonlocal looked
+        looked += 1
+        return covering(responses, since_hit_ms)
+
+    monkeypatch.setattr(TapResponses, "_covering", counted)
+    trials: list[Trial] = []
+    for _ in range(60):
+        trials.append(rig.trial(100.0))
+        rig.taps, _ = rig.taps.corrected(trials)
+    assert looked < 60 * 10
 
 
 def test_the_isis_that_would_show_what_is_not_known_within_a_window_are_longer_than_its_trials() -> None:

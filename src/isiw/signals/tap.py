@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ from isiw.signals.limits import EMG_UNITS_MV
 from isiw.signals.mep import MEP_WINDOW_MS
 from isiw.signals.waveforms import PULSE_GUARD_MS, samples
 from isiw.trials import Sweep, Trial, TrialTable
-from isiw.types import FloatArray
+from isiw.types import BoolArray, FloatArray
 from isiw.window import Window
 
 STEP_MS: Final = 0.25
@@ -56,9 +57,11 @@ class Left(NamedTuple):
 
 
 class _Shown(NamedTuple):
-    """The EMG of one sweep after the hit at `GRID_MS`, NaN from the pulse on, and its peak-to-peak size at rest."""
+    """The EMG of one sweep after the hit at `GRID_MS`, between which times it shows it, and its size at rest."""
 
     course_mv: FloatArray
+    from_ms: float
+    until_ms: float
     rest_mv: float
 
 
@@ -99,10 +102,10 @@ class TapResponses:
         values = values - np.median(values[rest]) if rest.any() else values
         shown, windows = self.shown, dict(self.windows)
         if trial.counts:
-            until_ms = times_ms[-1] if trial.t_tms_ms is None else trial.t_tms_ms - PULSE_GUARD_MS
+            from_ms = times_ms[0] - hit_ms
+            until_ms = (times_ms[-1] if trial.t_tms_ms is None else trial.t_tms_ms - PULSE_GUARD_MS) - hit_ms
             course = np.interp(GRID_MS, times_ms - hit_ms, values)
-            course[(hit_ms + GRID_MS < times_ms[0]) | (hit_ms + GRID_MS > until_ms)] = math.nan
-            shown = (*shown, _Shown(course, self._size_mv(values[rest], emg.rate_hz)))
+            shown = (*shown, _Shown(course, from_ms, until_ms, self._size_mv(values[rest], emg.rate_hz)))
         if trial.mep_mv is not None and trial.t_tms_ms is not None:
             first, last = (trial.t_tms_ms + edge for edge in self.mep_window_ms)
             within = (times_ms >= first - 1e-6) & (times_ms <= last + 1e-6)
@@ -136,8 +139,10 @@ class TapResponses:
         windows, found = dict(self.windows), []
         for trial in trials:
             window = windows.get(trial.index)
-            left = None if window is None else self._left(window.since_hit_ms)
-            if window is None or left is None or left.shown < 2 * window.told_by:
+            if window is None or self._count(window.since_hit_ms) < 2 * window.told_by:
+                continue
+            left = self._left(window.since_hit_ms)
+            if left is None or left.shown < 2 * window.told_by:
                 continue
             windows[trial.index] = window._replace(told_by=left.shown)
             again = self.measured(trial)
@@ -150,8 +155,9 @@ class TapResponses:
         if window is None or any(trial.tap_alone for trial in trials.trials[-TAP_EVERY + 1 :]):
             return False
         inside = (trial.index for trial in trials.told if trial.isi_ms is not None and _inside(window, trial.isi_ms))
-        lefts = (self._left(self.windows[number].since_hit_ms) for number in inside if number in self.windows)
-        return any(left is None or (left.mean_mv > 0 and left.shown < ENOUGH_SHOWN) for left in lefts)
+        times_ms = (self.windows[number].since_hit_ms for number in inside if number in self.windows)
+        lefts = (self._left(each_ms) for each_ms in times_ms if self._count(each_ms) < ENOUGH_SHOWN)
+        return any(left is None or left.mean_mv > 0 for left in lefts)
 
     def shown_from_ms(self, window: Window | None, trials: TrialTable) -> float | None:
         """From which ISI on a pair would show the response at all trials within a window; None if it is known there.
@@ -162,7 +168,7 @@ class TapResponses:
             trial.isi_ms
             for trial in trials.told
             if window is not None and trial.isi_ms is not None and _inside(window, trial.isi_ms)
-            if (own := self.windows.get(trial.index)) is not None and self._left(own.since_hit_ms) is None
+            if (own := self.windows.get(trial.index)) is not None and not self._is_known(own.since_hit_ms)
         ]
         if not unknown_ms:
             return None
@@ -170,10 +176,33 @@ class TapResponses:
         tried = sum(abs((trial.isi_ms or 0.0) - least_ms - LONGER_MS) <= LONGER_MS for trial in trials.told)
         return least_ms if tried < LEAST_SHOWN else None
 
+    @cached_property
+    def _spans_ms(self) -> FloatArray:
+        """Between which times each sweep shows the EMG after the hit, shape (k, 2)."""
+        return np.array([(one.from_ms, one.until_ms) for one in self.shown]).reshape(-1, 2)
+
+    def _which(self, since_hit_ms: FloatArray) -> tuple[BoolArray, BoolArray]:
+        """The times of `GRID_MS` that some times meet, and the sweeps that show all of these."""
+        meets = (since_hit_ms[0] - STEP_MS <= GRID_MS) & (since_hit_ms[-1] + STEP_MS >= GRID_MS)
+        times_ms = GRID_MS[meets]
+        if not times_ms.size:
+            return meets, np.ones(len(self.shown), dtype=bool)
+        return meets, (self._spans_ms[:, 0] <= times_ms[0]) & (self._spans_ms[:, 1] >= times_ms[-1])
+
+    def _count(self, since_hit_ms: FloatArray) -> int:
+        """How many sweeps show some times."""
+        return int(self._which(since_hit_ms)[1].sum())
+
+    def _is_known(self, since_hit_ms: FloatArray) -> bool:
+        """Whether enough sweeps show what the tap does at some times, or these lie outside the response."""
+        if _is_outside(since_hit_ms):
+            return True
+        return self._count(since_hit_ms) >= LEAST_SHOWN and not all(math.isnan(one.rest_mv) for one in self.shown)
+
     def _covering(self, since_hit_ms: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The courses that show some times, as far as a response lasts, shape (k, t), and what they have at rest."""
-        meets = (since_hit_ms[0] - STEP_MS <= GRID_MS) & (since_hit_ms[-1] + STEP_MS >= GRID_MS)
-        courses = [one for one in self.shown if not np.isnan(one.course_mv[meets]).any()]
+        meets, which = self._which(since_hit_ms)
+        courses = [self.shown[number] for number in np.flatnonzero(which)]
         waves = np.array([one.course_mv[meets] for one in courses]).reshape(len(courses), int(meets.sum()))
         return waves, np.array([one.rest_mv for one in courses])
 
@@ -185,14 +214,14 @@ class TapResponses:
 
     def _left(self, since_hit_ms: FloatArray) -> Left | None:
         """What subtracting the mean course leaves of the response at some times after the hit; None where unknown."""
-        if since_hit_ms[-1] < 0 or since_hit_ms[0] > GRID_MS[-1]:
+        if _is_outside(since_hit_ms):
             return Left(0.0, 0.0, LEAST_SHOWN)
+        if not self._is_known(since_hit_ms):
+            return None
         waves, rests = self._covering(since_hit_ms)
         count = len(waves)
         if np.isnan(rests).all():
             rests = np.array([one.rest_mv for one in self.shown])
-        if count < LEAST_SHOWN or np.isnan(rests).all():
-            return None
         rest, size, mean = float(np.nanmean(rests)), float(np.ptp(waves, axis=-1).mean()), waves.mean(axis=0)
         whole = float(np.ptp(mean))
         if size <= rest * (1 + CLEAR / math.sqrt(count)) and whole <= 2 * rest / math.sqrt(count):
@@ -201,6 +230,11 @@ class TapResponses:
         excess = max(0.0, float(apart.mean()) - rest * math.sqrt(count / (count - 1)))
         mean_share, sd_share = _left_of_varying_size(waves, mean)
         return Left(max(excess, whole * mean_share), max(float(apart.std()), whole * sd_share), count)
+
+
+def _is_outside(since_hit_ms: FloatArray) -> bool:
+    """Whether the tap does nothing at some times after the hit: they are before it, or long after it."""
+    return bool(since_hit_ms[-1] < 0 or since_hit_ms[0] > GRID_MS[-1])
 
 
 def _left_of_varying_size(waves: FloatArray, mean: FloatArray) -> tuple[float, float]:
