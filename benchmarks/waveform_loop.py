@@ -4,10 +4,10 @@
     python -m benchmarks.waveform_loop --reference valve > benchmarks/results/waveform_loop_valve.txt
 
 The same people of the `recruitment` cohort are examined twice by the default strategy, with the same seeds: once by a
-device that reports the amplitude itself, and once by the simulated tapping robot, with waveforms. Both are judged by
-the same rules. Paired, for both trigger modes. Each session ends when the strategy says so. The robot's hit delay and
-its variation are the person's, and so is the EMG at rest. Every person has several sessions, which differ in trial
-noise; their mean is one value of that person, so that the interval is about people.
+device that reports the amplitude itself, and once in a session on the simulated tapping robot, with waveforms, which
+learns what the tap itself does to the EMG. Paired, for both trigger modes. Each session ends when the strategy says so.
+The robot's hit delay and its variation are the person's, and so is the EMG at rest. Every person has several sessions,
+which differ in trial noise; their mean is one value of that person, so that the interval is about people.
 """
 
 from __future__ import annotations
@@ -16,10 +16,12 @@ import argparse
 import math
 import multiprocessing
 import os
+import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
@@ -36,7 +38,7 @@ from isiw.devices.robot.tapper import Trigger
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.subject import SimulatedSubject
 
-Deliver = Callable[[isiw.Stimulus], isiw.Measurement | isiw.Sweep]
+Deliver = Callable[[isiw.Stimulus], isiw.Measurement]
 
 SPACES: dict[str, dict[Trigger, isiw.DesignSpace]] = {
     "impact": {"open-loop": isiw.IMPACT_SPACE, "impact": isiw.DesignSpace(5, 320, reference="impact")},
@@ -81,28 +83,49 @@ def run(pair: Pair) -> tuple[Examined, Examined]:
     torch.set_num_threads(1)
     subject = cohort("recruitment", pair.person + 1, pair.seed)[pair.person]
     space = SPACES[pair.reference][pair.trigger]
-    arms = (by_amplitude, by_waveform)
-    plain, waves = (examine(subject, space, pair, arm(subject, space, pair)) for arm in arms)
-    return plain, waves
+    strategies = [
+        isiw.make_strategy("default", space=space, seed=pair.session_seed, max_trials=pair.trials) for _ in range(2)
+    ]
+    plain = examine(strategies[0], by_amplitude(subject, space, pair))
+    waves = session_of(robot(subject, pair), strategies[1])
+    outcomes = Counter("accepted" if each.reason is None else each.reason.value for each in waves.trials)
+    truth = subject.window(space)
+    return (
+        Examined(
+            isiw.metrics.f1(strategies[0].estimate(), truth, space), strategies[0].estimate().window is None, plain
+        ),
+        Examined(isiw.metrics.f1(waves.estimate, truth, space), waves.estimate.window is None, outcomes),
+    )
 
 
-def examine(subject: SimulatedSubject, space: isiw.DesignSpace, pair: Pair, deliver: Deliver) -> Examined:
-    """One person's session."""
-    strategy = isiw.make_strategy("default", space=space, seed=pair.session_seed, max_trials=pair.trials)
+def examine(strategy: isiw.Strategy, deliver: Deliver) -> Counter[str]:
+    """The outcomes of a loop on amplitudes, until the strategy stops."""
     outcomes: Counter[str] = Counter()
     while not strategy.decision().stop:
         stimulus = isiw.Stimulus(outcomes.total(), strategy.ask())
-        answer = deliver(stimulus)
-        judge = isiw.signals.judge if isinstance(answer, isiw.Sweep) else isiw.signals.judge_measurement
-        judged = judge(answer, stimulus, space)
+        judged = isiw.signals.judge_measurement(deliver(stimulus), stimulus, strategy.space)
         if judged.reason is not None:
             outcomes[judged.reason.value] += 1
             strategy.count_mistrial()
         else:
             outcomes["accepted"] += 1
             strategy.tell(judged.isi_ms, judged.mep_mv, isi_sd_ms=judged.isi_sd_ms)
-    estimate = strategy.estimate()
-    return Examined(isiw.metrics.f1(estimate, subject.window(space), space), estimate.window is None, outcomes)
+    return outcomes
+
+
+def session_of(device: isiw.Device, strategy: isiw.Strategy) -> isiw.SessionResult:
+    """A session whose pauses are answered with going on, and whose plan fits its limits."""
+    protocol = isiw.VisitProtocol()
+    pulses = max(protocol.stimuli_for(strategy.stimuli_planned or 0), 200)
+    with tempfile.TemporaryDirectory() as folder:
+        return isiw.Session(
+            device,
+            strategy,
+            log=Path(folder) / "one.mcap",
+            limits=isiw.Limits.of_space(strategy.space, min_iti_s=0.0, max_pulses=pulses),
+            protocol=protocol,
+            safeguards=isiw.Safeguards(on_pause=lambda _: True),
+        ).run(progress=False)
 
 
 def by_amplitude(subject: SimulatedSubject, space: isiw.DesignSpace, pair: Pair) -> Deliver:
@@ -118,14 +141,15 @@ def by_amplitude(subject: SimulatedSubject, space: isiw.DesignSpace, pair: Pair)
     return deliver
 
 
-def by_waveform(subject: SimulatedSubject, space: isiw.DesignSpace, pair: Pair) -> Deliver:
+def robot(subject: SimulatedSubject, pair: Pair) -> isiw.Device:
     """The tapping robot on the same person; what varies from tap to tap is now the robot's."""
     person = replace(subject, hit_delay_sd_ms=0.0).begin(pair.session_seed)
-    settings = isiw.TapperSettings(reference=space.reference, trigger=pair.trigger)
-    robot = isiw.Tapper(
-        lambda isi_ms: person.respond(isi_ms, "impact"), own_wrist(subject), settings, seed=pair.session_seed
+    settings = isiw.TapperSettings(reference=pair.reference, trigger=pair.trigger)
+    return isiw.SimulatedDevice(
+        isiw.Tapper(
+            lambda isi_ms: person.respond(isi_ms, "impact"), own_wrist(subject), settings, seed=pair.session_seed
+        )
     )
-    return robot.answer
 
 
 def results(pairs: list[Pair], workers: int) -> Iterator[tuple[Pair, tuple[Examined, Examined]]]:

@@ -14,7 +14,7 @@ from benchmarks.dissertation.claims import Claim, put_to_test
 from benchmarks.dissertation.parts import Told, verdict
 from benchmarks.dissertation.size import Size
 from benchmarks.reduction.look import OURS, THEIRS, panels
-from benchmarks.waveform_loop import REST_UV_PER_FLOOR_MV
+from isiw.config.sections import own_wrist
 from isiw.devices.robot.mechanism import Geometry
 from isiw.devices.robot.tapper import preset
 from isiw.dissertation.response_counts import EFFECTIVE_SHARE, STIMULATION, CountStudy, study_counts
@@ -30,7 +30,7 @@ THRESHOLDS_MV: Final = tuple(person.threshold_mv for person in MEASURED_KIM)
 TRIALS: Final = 12
 ALONE: Final = 100
 ARTEFACT_MS: Final = 8.0
-"""How long the tap shows in the EMG; it is left out, as everywhere."""
+"""How long the tap shows in the EMG."""
 
 FIXED_MV: Final = 0.03
 EXAMPLE_MV: Final = (0.0, 0.08)
@@ -183,9 +183,7 @@ def _taps_alone(own: list[CountStudy], seed: int, *, blank: bool = True) -> Clai
 
 def _wrist(person: SimulatedSubject) -> Geometry:
     """Subject 4 under the robot, with a person's EMG at rest."""
-    geometry = preset("subject4")
-    noise = replace(geometry.noise, emg_uv=REST_UV_PER_FLOOR_MV * person.response.floor.median_mv)
-    return replace(geometry, noise=noise)
+    return replace(preset("subject4"), noise=own_wrist(person).noise)
 
 
 def _false(sweep: isiw.Sweep, study: CountStudy, number: int, *, blank: bool) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 import isiw
 from benchmarks.reduction.guess import UNRELATED, unrelated
 from benchmarks.reduction.wrong import MISREAD, MISREAD_SETTINGS
-from benchmarks.waveform_loop import Pair, by_waveform
+from benchmarks.waveform_loop import Pair, robot, session_of
 from isiw.design import IMPACT_SPACE, DesignSpace
 from isiw.subjects import SimulatedSubject
 from isiw.types import FloatArray
@@ -24,7 +24,7 @@ INITIAL: Final = 7
 GENERATION: Final = 30
 """Particles of the filter (4.3.2)."""
 
-Answer = Callable[[float], tuple[float, float] | None]
+Answer = Callable[[float], tuple[float, float]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,9 +82,6 @@ def _followed(strategy: isiw.Strategy, answer: Answer, person: int) -> Course:
     generation: list[float] = []
     while not strategy.decision().stop:
         answered = answer(strategy.ask())
-        if answered is None:
-            strategy.count_mistrial()
-            continue
         course.told.append(answered)
         strategy.tell(*answered)
         estimate = strategy.estimate()
@@ -109,12 +106,10 @@ def online(people: Sequence[SimulatedSubject], person: int, seed: int) -> Course
         person: which of them.
         seed: of the session; the person's number is added.
     """
-    deliver = by_waveform(people[person], IMPACT_SPACE, Pair("impact", "open-loop", seed, person, seed + person, 0))
-    trials = iter(range(10_000))
-
-    def answer(isi_ms: float) -> tuple[float, float] | None:
-        stimulus = isiw.Stimulus(next(trials), isi_ms)
-        judged = isiw.signals.judge(deliver(stimulus), stimulus, IMPACT_SPACE)
-        return None if judged.reason is not None else (judged.isi_ms, judged.mep_mv)
-
-    return _followed(isiw.make_strategy("nr", IMPACT_SPACE, seed + person), answer, person)
+    pair = Pair("impact", "open-loop", seed, person, seed + person, 0)
+    played = session_of(robot(people[person], pair), isiw.make_strategy("nr", IMPACT_SPACE, seed + person))
+    told = [(trial.isi_ms, trial.mep_mv) for trial in played.trials if trial.reason is None and not trial.tap_alone]
+    # The same strategy once more, on what the session measured: a session does not keep its profiles.
+    again = isiw.make_strategy("nr", IMPACT_SPACE, seed + person, max_trials=len(told))
+    measured = iter(told)
+    return _followed(again, lambda _: next(measured), person)

@@ -15,7 +15,7 @@ from benchmarks.reduction import dissertation as text
 from benchmarks.reduction.document import Section, Table
 from benchmarks.reduction.look import COLOURS, NAMES, panels
 from benchmarks.reduction.sessions import correlation
-from benchmarks.waveform_loop import Pair, by_waveform
+from benchmarks.waveform_loop import Pair, robot, session_of
 from isiw.design import IMPACT_SPACE
 from isiw.plots.style import explain
 from isiw.subjects.cohorts import cohort
@@ -30,8 +30,9 @@ SETTINGS: Final[dict[str, dict[str, Any]]] = {"nr": {"initial": 7}, "default": {
 
 PROSE = """\
 The simulated tapping robot in open loop, with waveforms, ISIs from 0 to 320 ms from the impact; two people of
-`kim11-measured`. NR begins with seven ISIs, as online in the text. Conventional: the sweep from the impact, on
-waveforms as well, until the window was passed. Means over sessions; the figure has the first."""
+`kim11-measured`, each strategy in a session, which learns what the tap itself does to the EMG. NR begins with seven
+ISIs, as online in the text. Conventional: the sweep from the impact, on waveforms as well, until the window was passed.
+Means over sessions; the figure has the first."""
 
 
 @dataclass(frozen=True)
@@ -61,26 +62,17 @@ def examine(online: Online) -> dict[str, Any]:
     subject = cohort(COHORT, online.person + 1, online.seed)[online.person]
     seed = online.seed + 11 * online.session + online.person
     strategy = isiw.make_strategy(online.method, IMPACT_SPACE, seed, **dict(online.settings))
-    # The robot of the waveform loop takes what it needs from a pair of sessions.
-    deliver = by_waveform(subject, IMPACT_SPACE, Pair("impact", "open-loop", online.seed, online.person, seed, 0))
-    told: list[tuple[float, float]] = []
-    mistrials = 0
-    while not strategy.decision().stop:
-        stimulus = isiw.Stimulus(len(told) + mistrials, strategy.ask())
-        judged = isiw.signals.judge(deliver(stimulus), stimulus, IMPACT_SPACE)
-        if judged.reason is not None:
-            mistrials += 1
-            strategy.count_mistrial()
-            continue
-        told.append((judged.isi_ms, judged.mep_mv))
-        strategy.tell(judged.isi_ms, judged.mep_mv, isi_sd_ms=judged.isi_sd_ms)
-    estimate, truth = strategy.estimate(), subject.window(IMPACT_SPACE)
+    pair = Pair("impact", "open-loop", online.seed, online.person, seed, 0)
+    result = session_of(robot(subject, pair), strategy)
+    pairs = [trial for trial in result.trials if not trial.tap_alone]
+    told = [(trial.isi_ms, trial.mep_mv) for trial in pairs if trial.reason is None]
+    estimate, truth = result.estimate, subject.window(IMPACT_SPACE)
     return {
         "person": online.person,
         "session": online.session,
         "method": online.method,
-        "trials": len(told) + mistrials,
-        "mistrials": mistrials,
+        "trials": len(pairs),
+        "mistrials": len(pairs) - len(told),
         "f1": isiw.metrics.f1(estimate, truth, IMPACT_SPACE),
         "told": told,
         "grid_ms": estimate.grid_ms,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 import resource
 import subprocess
@@ -17,6 +18,7 @@ BENCHMARKS = {
     for path in sorted((ROOT / "benchmarks").rglob("*.py"))
     if (match := re.search(r'^    understood\("(.+)"\)$', path.read_text(encoding="utf-8"), re.MULTILINE))
 }
+MODULES = sorted(path for path in (ROOT / "benchmarks").rglob("*.py") if not path.name.startswith("__"))
 MOST_S = 120.0
 NOT_HERE = {"before_and_now compare", "before_and_now stops", "before_and_now speed"}
 """They compare with another version."""
@@ -31,6 +33,12 @@ def test_every_benchmark_that_can_be_run_understands_quick() -> None:
     run = {path for path in (ROOT / "benchmarks").rglob("*.py") if "\nif __name__ ==" in path.read_text("utf-8")}
     assert set(BENCHMARKS.values()) == run - {ROOT / "benchmarks" / "server_strangers.py"}  # which `server` starts
     assert set(BENCHMARKS) == {command.partition(" ")[0] for command in QUICK}
+
+
+def test_every_benchmark_finds_what_it_imports() -> None:
+    names = [f"benchmarks.{'.'.join(path.relative_to(ROOT / 'benchmarks').with_suffix('').parts)}" for path in MODULES]
+    for name in names:
+        importlib.import_module(name)
 
 
 def test_quick_stands_for_small_sizes_and_a_folder_of_its_own() -> None:
