@@ -53,7 +53,7 @@ def equal(evidence: Evidence) -> Finding | None:
     for in_a_row, cv in ALIKE:
         last = meps_mv[-in_a_row:]
         mean_mv = statistics.fmean(last) if len(last) == in_a_row else 0.0
-        if mean_mv >= RESPONSE_MV and statistics.stdev(last) < cv * mean_mv:
+        if mean_mv >= RESPONSE_MV and math.dist(last, [mean_mv] * in_a_row) < cv * mean_mv * math.sqrt(in_a_row - 1):
             text = f"The last {in_a_row} amplitudes are almost equal ({mean_mv:.3g} mV), and MEPs vary more"
             return _doubt(Kind.EQUAL, text, "Is it an artefact of the stimulator? Is the pulse's time right?")
     return None

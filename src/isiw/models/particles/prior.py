@@ -281,12 +281,17 @@ class Prior(Checked):
         names = dict.fromkeys(f"recruitment curve, {muscle.name}" for muscle in self.possible_muscles)
         return (*_WITHOUT_MUSCLE.values(), *names)
 
+    @cached_property
+    def _muscle_numbers(self) -> Tensor:
+        """Which muscle each of the possible curves is of, shape (k,)."""
+        names = [muscle.name for muscle, *_ in self._possible_curves]
+        return torch.tensor([list(dict.fromkeys(names)).index(name) for name in names])
+
     def hypothesis(self, latents: Latents) -> Tensor:
         """Which of `hypotheses` each particle belongs to, shape (b, p)."""
         recruitment = latents.values[..., latents_of("recruitment", device=latents.values.device)]
-        names = [muscle.name for muscle, *_ in self._possible_curves]
-        numbers = torch.tensor([list(dict.fromkeys(names)).index(name) for name in names], device=recruitment.device)
-        kind = len(_WITHOUT_MUSCLE) + numbers[self.mixtures["recruitment"].component(recruitment)]
+        muscles = self._muscle_numbers.to(recruitment.device)
+        kind = len(_WITHOUT_MUSCLE) + muscles[self.mixtures["recruitment"].component(recruitment)]
         for number, noise in enumerate(_WITHOUT_MUSCLE):
             kind = torch.where(latents.noise == noise, number, kind)
         return kind
