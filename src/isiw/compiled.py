@@ -23,7 +23,7 @@ import numpy as np
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-KERNELS: Final = 1
+KERNELS: Final = 2
 """Version of the kernels: it grows if the same draws come to other numbers."""
 
 LANES: Final = 16
@@ -56,14 +56,27 @@ def kernel(function: F) -> F:
     return _compiled(function, _SAFE)
 
 
-def loop(function: F) -> F:
+def writer(function: F) -> F:
     """As `kernel`, for functions that make no arrays: looking at a part of one costs nothing there."""
     return _compiled(function, _SAFE, _nrt=False)
 
 
+def loop(function: F) -> F:
+    """As `writer`, for functions that only others like it call: nothing is compiled that would let Python call them."""
+    return _compiled(function, _SAFE, _nrt=False, no_cpython_wrapper=True)
+
+
 def inlined(function: F) -> F:
-    """As `loop`, for functions that become a part of those that call them: with many arrays a call is dear."""
+    """As `writer`, for small functions that become a part of those that call them."""
     return _compiled(function, _SAFE, _nrt=False, forceinline=True)
+
+
+def part(function: F) -> F:
+    """As `loop`, for long functions that are compiled as a part of those that call them, and not on their own.
+
+    With many arrays a call is dear, and whatever is compiled on its own is optimised again in all that call it.
+    """
+    return _compiled(function, _SAFE, _nrt=False, inline="always")
 
 
 _CONSTANTS: Final = *(f"particles/{name}" for name in ("changes", "moves", "noise", "prior", "shapes")), "shared/tables"
@@ -80,7 +93,7 @@ def _sources() -> str:
     return hashlib.blake2b(b"".join(file.read_bytes() for file in files), digest_size=6).hexdigest()
 
 
-def _compiled(function: F, fastmath: set[str], **more: bool) -> F:
+def _compiled(function: F, fastmath: set[str], **more: bool | str) -> F:
     if not AVAILABLE:
         return function
     import numba  # noqa: PLC0415 - see above
@@ -88,7 +101,8 @@ def _compiled(function: F, fastmath: set[str], **more: bool) -> F:
     function.__qualname__ = f"{function.__name__}_{_sources()}"  # which the file on disk is named after
 
     # Errors are numpy's: a check of each divisor is no vector instruction.
-    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": fastmath, **more}
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": fastmath, "no_cfunc_wrapper": True}
+    options |= more
     try:
         compiled: F = numba.njit(cache=True, **options)(function)
     except RuntimeError:  # there is no folder to keep it in
@@ -188,9 +202,21 @@ _ROOT_HALF, _FAR = np.float32(0.70710678), np.float32(9.0)
 
 
 @inlined
+def larger(a: Any, b: Any) -> Any:
+    """The larger of two numbers; Numba would compile `max` again wherever it is called."""
+    return max(a, b)
+
+
+@inlined
+def smaller(a: Any, b: Any) -> Any:
+    """The smaller of two numbers, likewise."""
+    return min(a, b)
+
+
+@inlined
 def exp2(x: Any) -> Any:
     """Power of 2, in single precision; beyond ±126 as at ±126."""
-    inside = min(max(x, -_MOST), _MOST)
+    inside = smaller(larger(x, -_MOST), _MOST)
     whole = np.floor(inside + _HALF)
     f = inside - whole
     power = _ONE + f * (_E1 + f * (_E2 + f * (_E3 + f * (_E4 + f * (_E5 + f * _E6)))))
@@ -206,7 +232,7 @@ def exp(x: Any) -> Any:
 @inlined
 def log(x: Any) -> Any:
     """Natural logarithm of a positive number, in single precision."""
-    bits = _bits_of(max(x, _TINY))
+    bits = _bits_of(larger(x, _TINY))
     exponent = np.float32(np.int32((bits >> 23) - 126))
     mantissa = _float_of(np.int32((bits & 0x007FFFFF) | 0x3F000000))
     low = mantissa < _SQRT_HALF
@@ -239,7 +265,7 @@ def per_root(x: Any) -> Any:
 @inlined
 def ndtr(x: Any) -> Any:
     """Probability that a standard normal variable is below x, in single precision (relative error 2e-7)."""
-    z = min(abs(x), _FAR) * _ROOT_HALF
+    z = smaller(abs(x), _FAR) * _ROOT_HALF
     t = _ONE / (_ONE + _HALF * z)
     tail = _N4 + t * (_N5 + t * (_N6 + t * (_N7 + t * (_N8 + t * _N9))))
     beyond = _HALF * t * exp(_N0 - z * z + t * (_N1 + t * (_N2 + t * (_N3 + t * tail))))
@@ -254,4 +280,4 @@ def _total(values: Any, count: int) -> Any:
     return total
 
 
-total = _compiled(_total, _SAFE | {"reassoc"}, _nrt=False)
+total = _compiled(_total, _SAFE | {"reassoc"}, _nrt=False, no_cpython_wrapper=True)

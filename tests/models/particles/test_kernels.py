@@ -13,11 +13,13 @@ from isiw import compiled
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.models.particles import ParticleModel
 from isiw.models.particles.changes import Change
-from isiw.models.particles.engine import Compiled, EngineName, TorchEngine, engine_for
+from isiw.models.particles.engine import Compiled, EngineName, TorchEngine, engine_for, log_likelihood_of
 from isiw.models.particles.jumps import WindowTarget
-from isiw.models.particles.kernels.likelihood import likelihoods
-from isiw.models.particles.kernels.records import columns_of, people_of
+from isiw.models.particles.kernels.likelihood import ROOM
+from isiw.models.particles.kernels.moves import SCRATCH, UNKNOWN, sweeps
+from isiw.models.particles.kernels.records import columns_of, people_of, trial_records
 from isiw.models.particles.likelihood import total_log_likelihood
+from isiw.models.particles.moves import steps_of
 from isiw.models.particles.noise import NoiseKind, Response
 from isiw.models.particles.places import Place
 from isiw.models.particles.predictions import PersonSample
@@ -97,7 +99,7 @@ def test_long_histories_are_summed_piece_by_piece() -> None:
     draws = generator(1)
     person = Prior().person(Prior().sample(1, 20, draws, VALVE_SPACE))
     told = history(person, 400, draws)
-    got = likelihoods(people_of(person), columns_of(told))
+    got = log_likelihood_of(people_of(person), told).numpy()
     expected = total_log_likelihood(in_double(person), told.to("cpu", torch.double))
     np.testing.assert_allclose(got, expected.numpy(), rtol=1e-5)
 
@@ -168,7 +170,7 @@ def test_both_engines_hold_the_usual_for_as_probable_where_isis_are_chosen(profi
     latents = model.prior.sample(1, 500, generator(8), VALVE_SPACE)
     targets = [WindowTarget(prior, VALVE_SPACE) for prior in (model.prior_where_asking, model.prior)]
     ours, theirs = (
-        one(targets[0]).log_places(latents) - one(targets[1]).log_places(latents)
+        one(targets[0]).log_usual(latents) - one(targets[1]).log_usual(latents)
         for one in (partial(engine_for, "compiled"), TorchEngine)
     )
     torch.testing.assert_close(ours, theirs, atol=1e-3, rtol=1e-3)
@@ -226,7 +228,7 @@ def with_circumstances(told: History, **fields: float) -> History:
 
 
 def log_likelihood(person: Person, told: History) -> Any:
-    return likelihoods(people_of(person), columns_of(told))
+    return log_likelihood_of(people_of(person), told).numpy()
 
 
 def response_with(person: Person, **changes: Callable[[Response], torch.Tensor]) -> Person:
@@ -321,3 +323,24 @@ def test_the_elementary_functions_are_those_of_numpy() -> None:
     got = [float(compiled.ndtr(np.float32(value))) for value in x]
     expected = scipy.special.ndtr(x.astype(np.float32).astype(float))
     np.testing.assert_allclose(got, expected, rtol=2e-5, atol=1e-18)
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_sweeps_one_by_one_lead_where_sweeps_at_once_do(name: str) -> None:
+    # Within a call log densities of blocks are kept from sweep to sweep; each call works them out again.
+    target, found = TARGETS[name], list[tuple[Any, ...]]()
+    latents = target.prior.sample(1, 300, generator(3), target.space)
+    told = history(target.person(latents), 8, generator(4))
+    tables, start = target.tables(), engine_for("compiled", target).log_likelihood(latents, told).numpy()
+    for number, calls in ((6, 1), (1, 6)):
+        values, kinds = latents.values.numpy().copy(), target.kinds(latents).numpy().copy()
+        log_likelihood, dice = start.copy(), np.full((1, 1), 7, dtype=np.uint64)
+        room, scratch, counts = (np.zeros(shape, dtype=np.float32) for shape in (ROOM, SCRATCH, (1, 4)))
+        for _ in range(calls):
+            densities = np.full((1, 300, len(tables.first)), UNKNOWN)
+            state = values, kinds, log_likelihood, densities, np.zeros(5, dtype=int)
+            trials, steps = trial_records(columns_of(told)), steps_of(told).numpy()
+            sweeps(number, tables, trials, steps, state, dice, (room, scratch), counts)
+        found.append((values, kinds, log_likelihood, counts))
+    for together, one_by_one in zip(*found, strict=True):
+        np.testing.assert_array_equal(together, one_by_one)

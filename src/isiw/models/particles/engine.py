@@ -8,12 +8,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Generic, Literal, Protocol, TypeAlias
 
+import numpy as np
+
 from isiw.compiled import AVAILABLE, first_of
 from isiw.lazy import torch
-from isiw.models.particles.kernels import likelihood as compiled
-from isiw.models.particles.kernels.moves import OWN_DRAWS, log_places, records, sweep
-from isiw.models.particles.kernels.records import columns_of, person_of
-from isiw.models.particles.kernels.target import Tables
+from isiw.models.particles.kernels.likelihood import ROOM, likelihoods
+from isiw.models.particles.kernels.moves import SCRATCH, UNKNOWN, log_usual, records, sweeps
+from isiw.models.particles.kernels.records import columns_of, person_of, trial_records
+from isiw.models.particles.kernels.target import KINDS, Tables
 from isiw.models.particles.likelihood import total_log_likelihood
 from isiw.models.particles.moves import L, Moved, Mover, Target, steps_of
 from isiw.models.particles.prior import Person
@@ -33,8 +35,8 @@ class Engine(Protocol[L]):
     def log_likelihood(self, latents: L, history: History) -> Tensor:
         """Log likelihood of a history under each particle, shape (b, p)."""
 
-    def log_places(self, latents: L) -> Tensor:
-        """Log prior density of start and width of each particle but for a constant, shape (b, p)."""
+    def log_usual(self, latents: L) -> Tensor:
+        """Log prior density of what ISIs are chosen with another law of, but for a constant, shape (b, p)."""
 
     def sweeps(
         self, number: int, latents: L, log_likelihood: Tensor, history: History, generator: torch.Generator
@@ -80,9 +82,9 @@ class TorchEngine(Generic[L]):
         """Log likelihood of a history under each particle; see `Engine`."""
         return total_log_likelihood(self.target.person(latents), history)
 
-    def log_places(self, latents: L) -> Tensor:
-        """Log prior density of start and width of each particle but for a constant; see `Engine`."""
-        return self.target.log_place(latents)
+    def log_usual(self, latents: L) -> Tensor:
+        """Log prior density of what ISIs are chosen with another law of; see `Engine`."""
+        return self.target.log_usual(latents)
 
     def sweeps(
         self, number: int, latents: L, log_likelihood: Tensor, history: History, generator: torch.Generator
@@ -112,33 +114,39 @@ class Compiled(Generic[L]):
     def log_likelihood(self, latents: L, history: History) -> Tensor:
         """Log likelihood of a history under each particle; see `Engine`."""
         with first_of("view of particles"):
-            particles = records(self.tables, *self._arrays(latents), -1)
-            return torch.from_numpy(compiled.likelihoods(particles, columns_of(history)))
+            return log_likelihood_of(records(self.tables, *self._arrays(latents), -1), history)
 
-    def log_places(self, latents: L) -> Tensor:
-        """Log prior density of start and width of each particle but for a constant; see `Engine`."""
+    def log_usual(self, latents: L) -> Tensor:
+        """Log prior density of what ISIs are chosen with another law of; see `Engine`."""
+        found, parts = np.empty(latents.values.shape[:2], dtype=np.float32), np.empty(SCRATCH[1], dtype=np.float32)
         with first_of("prior"):
-            return torch.from_numpy(log_places(self.tables, latents.values.contiguous().numpy()))
+            log_usual(self.tables, *self._arrays(latents), parts, found)
+        return torch.from_numpy(found)
 
     def sweeps(
         self, number: int, latents: L, log_likelihood: Tensor, history: History, generator: torch.Generator
     ) -> Moved[L]:
         """Move every particle some times; see `Engine`."""
-        people, size = log_likelihood.shape
+        people, particles = log_likelihood.shape
         values, kinds = (array.copy() for array in self._arrays(latents))
-        found, trials = log_likelihood.numpy().copy(), columns_of(history)
-        steps = steps_of(history).contiguous().numpy()
-        counts = torch.zeros((people, 4), dtype=torch.float32)
-        width = OWN_DRAWS + len(self.tables.first) + 4
+        densities = np.full((people, particles, len(self.tables.first)), UNKNOWN)
+        found, steps = log_likelihood.numpy().copy(), steps_of(history).contiguous().numpy()
+        dice = torch.randint(2**63 - 1, (people, 1), generator=generator).numpy().view(np.uint64)
+        counts, room, scratch = (np.zeros(shape, dtype=np.float32) for shape in ((people, 4), ROOM, SCRATCH))
         with first_of("moves"):
-            for _ in range(number):
-                uniform = torch.rand((people, size, width), generator=generator, dtype=torch.float32)
-                normal = torch.randn(values.shape, generator=generator, dtype=torch.float32)
-                draws = uniform.numpy(), normal.numpy()
-                counts += torch.from_numpy(sweep(self.tables, trials, steps, (values, kinds, found), *draws))
-        shifts, shifted, jumps, jumped = counts.T
+            told, state = trial_records(columns_of(history)), (values, kinds, found, densities, np.zeros(KINDS, int))
+            sweeps(number, self.tables, told, steps, state, dice, (room, scratch), counts)
+        shifts, shifted, jumps, jumped = torch.from_numpy(counts).T
         moved = self.target.latents(torch.from_numpy(values), torch.from_numpy(kinds))
         return Moved(moved, torch.from_numpy(found), shifted / shifts, jumped / jumps)
 
     def _arrays(self, latents: L) -> tuple[FloatArray, IntArray]:
         return latents.values.contiguous().numpy(), self.target.kinds(latents).contiguous().numpy()
+
+
+def log_likelihood_of(particles: FloatArray, history: History) -> Tensor:
+    """Log likelihood of a history under each of some particles as kernels have them, shape (b, p)."""
+    found, room = np.empty(particles.shape[:2], dtype=np.float32), np.empty(ROOM, dtype=np.float32)
+    trials, sizes = trial_records(columns_of(history))
+    likelihoods(particles, trials, sizes, room, found)
+    return torch.from_numpy(found)

@@ -141,9 +141,10 @@ class WindowTarget:
         """Log prior density of their latents but for a constant, shape (b, p)."""
         return self.prior.log_density(latents.values, self.space)
 
-    def log_place(self, latents: Latents) -> Tensor:
-        """Log prior density of start and width, shape (b, p)."""
-        return self.prior.log_place(latents.values, self.space)
+    def log_usual(self, latents: Latents) -> Tensor:
+        """Log prior density of start and width of those with a window, and of curve, drift and change, shape (b, p)."""
+        place = self.prior.log_place(latents.values, self.space)
+        return torch.where(latents.present, place, 0.0) + self.prior.log_beside(latents)
 
     def shifted(self, latents: Latents, part: Tensor) -> Tensor:
         """Which latents a difference moves, shape (b, p, d)."""

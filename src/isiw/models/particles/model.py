@@ -128,9 +128,7 @@ class ParticlePosterior(SwarmPosterior[ParticleModel, Latents]):
     def as_usual(self) -> ParticlePosterior:
         """The same with the prior that ISIs are chosen with; see `ExpectsTheUsual`."""
         latents = self.swarm.latents
-        places = self.usual.log_places(latents) - self.engine.log_places(latents)
-        beside = self.model.prior_where_asking.log_beside(latents) - self.model.prior.log_beside(latents)
-        return replace(self, swarm=self.swarm.times(torch.where(latents.present, places, 0.0) + beside))
+        return replace(self, swarm=self.swarm.times(self.usual.log_usual(latents) - self.engine.log_usual(latents)))
 
     def noting_change(self) -> ParticlePosterior:
         """The posterior if somebody has seen that something changes now; see `NotesChanges`."""

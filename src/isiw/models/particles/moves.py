@@ -71,8 +71,8 @@ class Target(Protocol[L]):
     def log_prior(self, latents: L) -> Tensor:
         """Log prior density of their latents but for a constant, shape (b, p)."""
 
-    def log_place(self, latents: L) -> Tensor:
-        """Log prior density of where and how wide their windows are but for a constant, shape (b, p)."""
+    def log_usual(self, latents: L) -> Tensor:
+        """Log prior density of what ISIs are chosen with another law of, but for a constant, shape (b, p)."""
 
     def shifted(self, latents: L, part: Tensor) -> Tensor:
         """Which latents a difference moves: those of a part that mean anything to the particle, shape (b, p, d)."""

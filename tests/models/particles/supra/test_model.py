@@ -65,19 +65,20 @@ def test_both_kinds_of_segment_are_found_where_they_are_clear() -> None:
     assert f1(estimate.window, Window(58, 92), SPACE) > 0.75
 
 
+@pytest.mark.slow
 def test_a_depression_becomes_less_probable_where_meps_are_as_large_as_without_a_tap() -> None:
-    before = [known(MODEL.begin(SPACE, seed).estimate().depressed_probability) for seed in SEEDS]
-    after = [posterior_after(0.6, seed).estimate() for seed in SEEDS]
+    before = [known(MODEL.begin(SPACE, seed).estimate().depressed_probability) for seed in range(12)]
+    after = [told(MODEL, 2 * clear_trials(0.6), SPACE, seed).estimate() for seed in range(12)]
     assert np.mean([known(each.depressed_probability) for each in after]) < np.mean(before) - 0.05
     assert np.mean([f1(each.window, Window(58, 92), SPACE) for each in after]) > 0.75
 
 
 def test_meps_near_the_floor_are_not_called_depressed() -> None:
     person = cohort("recruitment", 1, 4)[0].begin(4)
-    isis_ms = [None] * 5 + np.linspace(0, 120, 25).tolist()
+    isis_ms = [None] * 10 + 2 * np.linspace(0, 120, 25).tolist()
     trials = [(trial.isi_ms, trial.mep_mv) for trial in (person.respond(isi_ms, "impact") for isi_ms in isis_ms)]
-    estimates = [told(MODEL, trials, SPACE, seed).estimate() for seed in range(6)]
-    assert [estimate.depressed for estimate in estimates] == [None] * 6
+    estimates = [told(MODEL, trials, SPACE, seed).estimate() for seed in SEEDS]
+    assert [estimate.depressed for estimate in estimates] == [None] * len(SEEDS)
     assert np.mean([estimate.depressed_probability for estimate in estimates]) < 0.2
 
 

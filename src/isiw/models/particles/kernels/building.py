@@ -19,6 +19,9 @@ from isiw.models.shared.start import StartPrior
 _NOT_REACHED: Final = 2.0
 """No uniform draw is above it."""
 
+_NO_SHARE: Final = -1e30
+"""Log share of a component that is missing."""
+
 
 def prior_tables(
     space: DesignSpace,
@@ -36,12 +39,12 @@ def prior_tables(
     sizes = [mixture.means.shape[-1] for mixture in mixtures]
     first = [*range(starts), *(starts + np.cumsum([0, *sizes[:-1]]))]
     size, components = [1] * starts + sizes, [0] * starts + [len(mixture.shares) for mixture in mixtures]
-    log_shares, below = (np.zeros((len(first), most), dtype=np.float32) for _ in range(2))
+    log_shares, below = (np.full((len(first), most), filled, dtype=np.float32) for filled in (_NO_SHARE, _NOT_REACHED))
     means, sds = np.zeros((most, latents), dtype=np.float32), np.ones((most, latents), dtype=np.float32)
     for block, mixture in enumerate(mixtures, start=starts):
         count, span = components[block], slice(first[block], first[block] + size[block])
         log_shares[block, :count] = (mixture.shares.log() - mixture.sds.log().sum(-1)).numpy()
-        below[block, :count] = mixture.shares.cumsum(-1).numpy()
+        below[block, : count - 1] = mixture.shares.cumsum(-1).numpy()[:-1]
         means[:count, span], sds[:count, span] = mixture.means.numpy(), mixture.sds.numpy()
     if places is not None:
         # Start and width are one block: anywhere, or in one of the places; only here do the constants matter.

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from isiw.compiled import exp, exp2, kernel, log, loop, ndtr, per, per_root, total
+from isiw.compiled import exp, exp2, larger, log, loop, ndtr, part, per, per_root, smaller, total, writer
 from isiw.models.particles.kernels.records import (
     BOOST,
     CHANGED,
@@ -54,7 +54,6 @@ from isiw.models.particles.kernels.records import (
     STEP_SCALE,
     WIDTH,
     enhancement_after,
-    trial_records,
 )
 from isiw.models.particles.noise import (
     BETWEEN_NODES,
@@ -71,7 +70,7 @@ from isiw.models.particles.noise import (
 from isiw.models.particles.shapes import APART_SD, PEAK_SD, PEAKS_AT, TOGETHER, ShapeKind
 from isiw.models.shared.tables import ISI_NODES
 
-ROOM: Final = 14
+ROOM: Final = 14, PIECE
 """Rows of numbers that the likelihood of a history needs in between; the last three are of the nodes."""
 
 _f = np.float32
@@ -122,7 +121,7 @@ def facilitations(particle: Any, isi_ms: Any, level: Any, count: int) -> None:
         for i in range(count):
             share = (isi_ms[i] - start) / width
             a, b = (share - _FIRST_PEAK) * per_sd, (share - _SECOND_PEAK) * per_sd
-            a, b = min(a * a, _f(150.0)), min(b * b, _f(150.0))
+            a, b = smaller(a * a, _f(150.0)), smaller(b * b, _f(150.0))
             level[i] = first * exp2(_BELL * a) + second * exp2(_BELL * b)
     else:
         peak_at = _HALF + _f(0.33) * form if kind == _SKEWED else _HALF
@@ -132,20 +131,20 @@ def facilitations(particle: Any, isi_ms: Any, level: Any, count: int) -> None:
             power = exp(_f(0.75) * (form + _ONE))
             for i in range(count):
                 offset = isi_ms[i] - peak
-                offset = max(offset * rise, offset * fall)
-                square = exp(power * log(min(max(offset * offset, _f(1e-12)), _f(1e6))))
-                level[i] = exp2(_SQUARED * min(square, _FURTHEST))
+                offset = larger(offset * rise, offset * fall)
+                square = exp(power * log(smaller(larger(offset * offset, _f(1e-12)), _f(1e6))))
+                level[i] = exp2(_SQUARED * smaller(square, _FURTHEST))
         else:
             for i in range(count):
                 offset = isi_ms[i] - peak
-                offset = max(offset * rise, offset * fall)
-                level[i] = exp2(_SQUARED * min(offset * offset, _FURTHEST))
+                offset = larger(offset * rise, offset * fall)
+                level[i] = exp2(_SQUARED * smaller(offset * offset, _FURTHEST))
     if particle[DEPTH] > _NIL:
         per_flank, depth = _TWO / particle[LOW_WIDTH], particle[DEPTH]
         middle = particle[LOW_START] + _HALF * particle[LOW_WIDTH]
         for i in range(count):
             offset = (isi_ms[i] - middle) * per_flank
-            level[i] -= depth * exp2(_SQUARED * min(offset * offset, _FURTHEST))
+            level[i] -= depth * exp2(_SQUARED * smaller(offset * offset, _FURTHEST))
 
 
 @loop
@@ -160,8 +159,8 @@ def curve_of(particle: Any, spread: Any, between: Any, room: Any) -> None:
     nodes = len(spread)  # not a constant to the compiler, which would unroll these loops instead of making vectors
     for q in range(nodes):
         root = _ONE - width * width / _f(9.0) + NODES_AT[q] * width / _f(3.0)
-        slope = _BETWEEN * width / max(root, _STEEPEST)
-        spread[q] = _f(3.0) * log(max(root, _f(0.02)))
+        slope = _BETWEEN * width / larger(root, _STEEPEST)
+        spread[q] = _f(3.0) * log(larger(root, _f(0.02)))
         between[q] = slope * slope
     for q in range(nodes):
         room[q] = NODE_WEIGHTS[q] * exp(spread[q] + _HALF * between[q])
@@ -239,7 +238,7 @@ def _inputs(particle: Any, trials: Any, count: int, node: Any, work: Any) -> Non
             responds[i] = least + (most - least) * level[i]
     else:
         for i in range(count):
-            drive[i] = log(max(level[i], _LEAST_SIZE))
+            drive[i] = log(larger(level[i], _LEAST_SIZE))
             responds[i] = most * math.sqrt(level[i]) if kind == _MISSING else _ONE
 
 
@@ -266,12 +265,12 @@ def _density(particle: Any, trials: Any, count: int, curve: Any, work: Any, like
                 steep = sigmoid * (_ONE - sigmoid)
                 variance = steep * steep * between
                 over = sigmoid - start
-                reach = max(over * over + _CORNER * variance, _LEAST_REACH)
+                reach = larger(over * over + _CORNER * variance, _LEAST_REACH)
                 share = (math.sqrt(reach) + over) * rescaled * scale[i]
                 total = _ONE + share + known[i]
                 varied = share * share * (variance / reach + output) + floor_variance + varies[i]
                 inverse_sd = total * per_root(varied)
-                z = min(max((log(total) - relative[i]) * inverse_sd, -_END), _END)
+                z = smaller(larger((log(total) - relative[i]) * inverse_sd, -_END), _END)
                 evoked[i] += weight * inverse_sd * exp2(_BELL * z * z)
         else:
             for i in range(count):
@@ -281,11 +280,11 @@ def _density(particle: Any, trials: Any, count: int, curve: Any, work: Any, like
                 total = _ONE + share + known[i]
                 varied = share * share * (flat * flat * between + output) + floor_variance + varies[i]
                 inverse_sd = total * per_root(varied)
-                z = min(max((log(total) - relative[i]) * inverse_sd, -_END), _END)
+                z = smaller(larger((log(total) - relative[i]) * inverse_sd, -_END), _END)
                 evoked[i] += weight * inverse_sd * exp2(_BELL * z * z)
     for i in range(count):
         still = (_ONE + known[i]) / math.sqrt(floor_variance + varies[i])
-        z = min(max((log(_ONE + known[i]) - relative[i]) * still, -_END), _END)
+        z = smaller(larger((log(_ONE + known[i]) - relative[i]) * still, -_END), _END)
         silent = still * exp2(_BELL * z * z)
         outlier = (_OUT_DENSITY if _OUT_LOW < relative[i] < _OUT_HIGH else _NIL) + _TINY
         density = _ROOT * (responds[i] * evoked[i] + (_ONE - responds[i]) * silent)
@@ -310,9 +309,9 @@ def _inside(particle: Any, trials: Any, count: int, curve: Any, work: Any, likel
     start = particle[ONSET]
     rectified, rescaled = start > _NIL, _HALF / (_ONE - start)
     for i in range(count):  # a power of 40 stands in for infinity
-        low[i] = max(told_low[i], -_EVER) - floor
+        low[i] = larger(told_low[i], -_EVER) - floor
     for i in range(count):
-        high[i] = min(told_high[i], _EVER) - floor
+        high[i] = smaller(told_high[i], _EVER) - floor
         evoked[i] = _NIL
     _step(trials, count, particle[CHANGED], -particle[STEP_SCALE], low)
     _step(trials, count, particle[CHANGED], -particle[STEP_SCALE], high)
@@ -323,7 +322,7 @@ def _inside(particle: Any, trials: Any, count: int, curve: Any, work: Any, likel
             flat = _ONE - sigmoid
             variance = sigmoid * flat * (sigmoid * flat) * between
             over = sigmoid - start
-            reach = max(over * over + _CORNER * variance, _LEAST_REACH)
+            reach = larger(over * over + _CORNER * variance, _LEAST_REACH)
             share = scale[i] * ((math.sqrt(reach) + over) * rescaled if rectified else sigmoid)
             varied = share * share * ((variance / reach if rectified else flat * flat * between) + output)
             total = _ONE + share + known[i]
@@ -332,13 +331,13 @@ def _inside(particle: Any, trials: Any, count: int, curve: Any, work: Any, likel
     for i in range(count):
         still, mean = (_ONE + known[i]) / math.sqrt(floor_variance + varies[i]), log(_ONE + known[i])
         silent = _between((low[i] - mean) * still, (high[i] - mean) * still)
-        first = min(max((low[i] - _OUT_LOW) * _OUT_DENSITY, _NIL), _ONE)
-        outlier = min(max((high[i] - _OUT_LOW) * _OUT_DENSITY, _NIL), _ONE) - first
+        first = smaller(larger((low[i] - _OUT_LOW) * _OUT_DENSITY, _NIL), _ONE)
+        outlier = smaller(larger((high[i] - _OUT_LOW) * _OUT_DENSITY, _NIL), _ONE) - first
         mixed = responds[i] * evoked[i] + (_ONE - responds[i]) * silent
-        likelihood[i] = max(_IN * mixed + _OUT * outlier, _LEAST_MASS)
+        likelihood[i] = larger(_IN * mixed + _OUT * outlier, _LEAST_MASS)
 
 
-@loop
+@part
 def _total(particle: Any, trials: Any, count: int, censored: Any, curve: Any, work: Any) -> float:
     """Log likelihood of a piece of the trials of one sort."""
     real, isi_sd, likelihood, summed = trials[REAL], trials[ISI_SD], work[9], work[10]
@@ -346,9 +345,9 @@ def _total(particle: Any, trials: Any, count: int, censored: Any, curve: Any, wo
     for i in range(count):
         uncertain |= isi_sd[i] > _NIL
         summed[i] = _NIL
+    _gains(particle, trials, count, work)
     for node in range(3 if uncertain else 1):
         _inputs(particle, trials, count, _SHIFTS[node] if uncertain else _NIL, work)
-        _gains(particle, trials, count, work)
         if censored:
             _inside(particle, trials, count, curve, work, likelihood)
         else:
@@ -362,31 +361,21 @@ def _total(particle: Any, trials: Any, count: int, censored: Any, curve: Any, wo
 
 
 @loop
-def history_likelihood(particle: Any, known: Any, sizes: Any, censored: Any, more_sizes: Any, room: Any) -> float:
-    """Log likelihood of one person's history under a particle."""
-    curve, nodes = room[ROOM - 3 :], NODES
+def history_likelihood(particle: Any, records: Any, sizes: Any, room: Any) -> float:
+    """Log likelihood of one person's history under a particle; see `trial_records`."""
+    curve, nodes = room[ROOM[0] - 3 :], NODES
     curve_of(particle, curve[0, :nodes], curve[1, :nodes], curve[2])
     summed = 0.0
-    for piece in range(len(sizes)):
-        summed += _total(particle, known[piece], sizes[piece], False, curve, room)  # noqa: FBT003
-    for piece in range(len(more_sizes)):
-        summed += _total(particle, censored[piece], more_sizes[piece], True, curve, room)  # noqa: FBT003
+    for sort in range(2):
+        for piece in range(sizes.shape[1]):
+            if sizes[sort, piece]:
+                summed += _total(particle, records[sort, piece], sizes[sort, piece], sort == 1, curve, room)
     return summed
 
 
-@loop
-def _all(particles: Any, known: Any, sizes: Any, censored: Any, more_sizes: Any, room: Any, found: Any) -> None:
-    """Write the log likelihood of one person's history under each particle; arguments as for `history_likelihood`."""
-    for number in range(particles.shape[0]):
-        found[number] = history_likelihood(particles[number], known, sizes, censored, more_sizes, room)
-
-
-@kernel
-def likelihoods(particles: Any, history: Any) -> Any:
-    """Log likelihood of each person's history under each particle, shape (b, p)."""
-    found, room = np.zeros(particles.shape[:2], dtype=np.float32), np.empty((ROOM, PIECE), dtype=np.float32)
+@writer
+def likelihoods(particles: Any, records: Any, sizes: Any, room: Any, found: Any) -> None:
+    """Write the log likelihood of each person's history under each particle, shape (b, p)."""
     for person in range(particles.shape[0]):
-        known, sizes = trial_records(history[person], False)  # noqa: FBT003
-        censored, more_sizes = trial_records(history[person], True)  # noqa: FBT003
-        _all(particles[person], known, sizes, censored, more_sizes, room, found[person])
-    return found
+        for i in range(particles.shape[1]):
+            found[person, i] = history_likelihood(particles[person, i], records[person], sizes[person], room)

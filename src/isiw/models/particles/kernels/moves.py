@@ -1,6 +1,6 @@
 """Markov chain moves of particles in loops: proposal, prior of the blocks that change, likelihood, acceptance.
 
-They are those of `isiw.models.particles.moves`; the draws come from outside.
+They are those of `isiw.models.particles.moves`; only the blur of a shift is not quite normal.
 """
 
 from __future__ import annotations
@@ -10,10 +10,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from isiw.compiled import inlined, kernel, loop
-from isiw.models.particles.kernels.likelihood import ROOM, history_likelihood
-from isiw.models.particles.kernels.records import PARTICLE, PIECE, settle, trial_records
-from isiw.models.particles.kernels.target import KINDS, fresh_values, log_block, meant
+from isiw.compiled import kernel, larger, loop, part, smaller, writer
+from isiw.models.particles.changes import ChangeKind
+from isiw.models.particles.kernels.draws import blur, normal, uniform
+from isiw.models.particles.kernels.likelihood import history_likelihood
+from isiw.models.particles.kernels.records import PARTICLE, settle
+from isiw.models.particles.kernels.target import KINDS, fresh_values, log_block, log_line, meant, which
 from isiw.models.particles.moves import (
     A_LITTLE,
     ANOTHER_KIND,
@@ -24,83 +26,92 @@ from isiw.models.particles.moves import (
     RECENT,
     STEP_SD,
 )
+from isiw.models.particles.noise import NoiseKind
 
-OWN_DRAWS: Final = 7 + KINDS + 7
-"""Uniform draws of a move besides those that fresh latents take: acceptance, jump or not, which, and so on."""
+SCRATCH: Final = 7, 64
+"""Rows of numbers that moves need in between, and how many latents or blocks a row has room for."""
 
 _f = np.float32
-_BLUR, _LEAST = _f(BLUR), _f(1e-30)
+_BLUR, _LEAST, _NIL, _ONE = _f(BLUR), _f(1e-30), _f(0.0), _f(1.0)
 _ROOT_TURN = math.sqrt(2.0 * math.pi)
-
-
-@inlined
-def _which(quantile: Any, edges: Any) -> int:
-    """Which of some alternatives is drawn, by the sums of the probabilities of earlier ones."""
-    drawn = 0
-    for number in range(len(edges)):
-        drawn += quantile > edges[number]
-    return drawn
-
-
-@inlined
-def _step_at(after: float, steps: Any) -> float:
-    """The step of the amplitudes at the trial before which a change comes."""
-    return float(steps[int(min(math.ceil(after), len(steps) - 1.0))])
+_RECRUITMENT, _RECTIFIED = NoiseKind.RECRUITMENT, NoiseKind.RECTIFIED
+_UNCHANGED, _ENHANCEMENT = ChangeKind.NONE, ChangeKind.ENHANCEMENT
+UNKNOWN: Final = _f(1e30)
+"""In place of the log density of a block that was not worked out yet."""
 
 
 @loop
-def _favour(tables: Any, z: Any, kind: int, steps: Any, parts: Any) -> float:
-    """Log of the prior of a change, or of none, by how `_change` proposes it."""
-    none, span = float(tables.kinds[4, 0]), max(1.0, len(steps) - 1.0)
+def _step_at(after: float, steps: Any) -> float:
+    """The step of the amplitudes at the trial before which a change comes."""
+    return float(steps[int(smaller(math.ceil(after), len(steps) - 1.0))])
+
+
+@loop
+def _log_change(law: Any, of: Any, z: Any) -> Any:
+    """Log density of when a change comes, and of its size."""
+    log_shares, means, sds = law
+    when, size, changed = of
+    of_when = log_line(z[when], log_shares[changed], means[:, when], sds[:, when])
+    return of_when, log_line(z[size], log_shares[changed + 1], means[:, size], sds[:, size])
+
+
+@loop
+def _favour(law: Any, of: Any, none: float, z: Any, kind: int, steps: Any) -> float:
+    """Log of the prior of a change, or of none, by how `_other_change` proposes it."""
+    span = larger(1.0, len(steps) - 1.0)
     if kind == 0:
         return math.log(2.0 * none)
-    after, size, recent = math.exp(z[tables.at[27]]), float(z[tables.at[28]]), 0.0
+    after, recent = math.exp(z[of[0]]), 0.0
     if after < span:
-        apart = (size - _step_at(after, steps)) / STEP_SD
-        of_size = log_block(z, tables.changed + 1, tables, parts)
+        of_when, of_size = _log_change(law, of, z)
+        apart = (z[of[1]] - _step_at(after, steps)) / STEP_SD
         near = math.exp(-0.5 * apart * apart - math.log(STEP_SD) - of_size)
-        recent = math.exp(z[tables.at[27]] - math.log(span) - log_block(z, tables.changed, tables, parts))
+        recent = math.exp(z[of[0]] - math.log(span) - of_when)
         recent *= _ROOT_TURN * (1.0 - OF_STEPS + OF_STEPS * near)
     return math.log((1.0 - none) / (RECENT * recent + 1.0 - RECENT))
 
 
 @loop
-def _change(tables: Any, steps: Any, draws: Any, normal: Any, z: Any, kinds: Any, fresh: Any, parts: Any) -> float:
+def _moved_change(law: Any, of: Any, edges: Any, steps: Any, dice: Any, z: Any, kinds: Any) -> float:
+    """Move a change a little, or to another trial; the log ratio of prior to proposal. See `WindowTarget`."""
+    (when, size, _), span, none = of, larger(1.0, len(steps) - 1.0), edges[0]
+    of_when, of_size = _log_change(law, of, z)
+    before, after = of_when + of_size - z[when], math.exp(z[when])
+    if uniform(dice) < 0.5:
+        after = span * uniform(dice) if after < span else after
+    else:
+        after += NEARLY * normal(dice)
+    if after <= 0.0:
+        return -math.inf
+    share = uniform(dice)
+    z[when], z[size] = _f(math.log(after)), z[size] + _f(A_LITTLE) * share * share * normal(dice)
+    if uniform(dice) < ANOTHER_KIND:
+        kinds[4] = which(none + (_ONE - none) * uniform(dice), edges)
+    of_when, of_size = _log_change(law, of, z)
+    return float(of_when + of_size - z[when] - before)
+
+
+@loop
+def _other_change(law: Any, of: Any, below: Any, edges: Any, steps: Any, dice: Any, z: Any, kinds: Any) -> float:
     """Let a particle have another change, or none; the log ratio of prior to proposal. See `WindowTarget`."""
-    when, size, changed = tables.at[27], tables.at[28], tables.changed
-    uniform, none, span = draws[7 + KINDS : OWN_DRAWS], tables.kinds[4, 0], max(1.0, len(steps) - 1.0)
-    if kinds[4] and uniform[0] < 0.5:
-        before = log_block(z, changed, tables, parts) + log_block(z, changed + 1, tables, parts) - z[when]
-        after, anywhere = math.exp(z[when]), uniform[1] < 0.5
-        if anywhere and after < span:
-            after = span * uniform[4]
-        elif not anywhere:
-            after += NEARLY * normal[when]
-        if after <= 0.0:
-            return -math.inf
+    (when, size, changed), (_, means, sds), span, none = of, law, larger(1.0, len(steps) - 1.0), edges[0]
+    before = _favour(law, of, none, z, kinds[4], steps)
+    for number in range(2):
+        latent, component = of[number], which(uniform(dice), below[changed + number])
+        z[latent] = means[component, latent] + sds[component, latent] * normal(dice)
+    kinds[4] = 0 if uniform(dice) < 0.5 else which(none + (_ONE - none) * uniform(dice), edges)
+    if kinds[4] and uniform(dice) < RECENT:
+        after = larger(span * uniform(dice), 1e-3)
         z[when] = _f(math.log(after))
-        z[size] += _f(A_LITTLE) * uniform[5] * uniform[5] * normal[size]
-        if uniform[3] < ANOTHER_KIND:
-            kinds[4] = _which(none + (_f(1.0) - none) * uniform[2], tables.kinds[4])
-        now = log_block(z, changed, tables, parts) + log_block(z, changed + 1, tables, parts) - z[when]
-        return float(now - before)
-    before = _favour(tables, z, kinds[4], steps, parts)
-    fresh_values(changed, tables, draws[OWN_DRAWS:], normal, fresh)
-    fresh_values(changed + 1, tables, draws[OWN_DRAWS:], normal, fresh)
-    kinds[4] = 0 if uniform[1] < 0.5 else _which(none + (_f(1.0) - none) * uniform[2], tables.kinds[4])
-    z[when], z[size] = fresh[when], fresh[size]
-    if kinds[4] and uniform[3] < RECENT:
-        after = max(span * uniform[4], 1e-3)
-        z[when] = _f(math.log(after))
-        if uniform[6] < OF_STEPS:
-            z[size] = _f(_step_at(after, steps)) + _f(STEP_SD) * normal[size]
-    return _favour(tables, z, kinds[4], steps, parts) - before
+        if uniform(dice) < OF_STEPS:
+            z[size] = _f(_step_at(after, steps)) + _f(STEP_SD) * normal(dice)
+    return _favour(law, of, none, z, kinds[4], steps) - before
 
 
-@inlined
-def _jump(tables: Any, steps: Any, uniform: Any, normal: Any, z: Any, kinds: Any, fresh: Any, parts: Any) -> Any:
+@loop
+def _jump(tables: Any, steps: Any, dice: Any, z: Any, kinds: Any, scratch: Any) -> Any:
     """Draw some latents and kinds of a particle again; which jump it is, and the log ratio of prior to proposal."""
-    jump, ratio = _which(uniform[2], tables.jumps), 0.0
+    jump, ratio, fresh = which(uniform(dice), tables.jumps), 0.0, scratch[2]
     redrawn = tables.redrawn[jump]
     for block in range(len(tables.first)):
         first = tables.first[block]
@@ -108,133 +119,123 @@ def _jump(tables: Any, steps: Any, uniform: Any, normal: Any, z: Any, kinds: Any
         for latent in range(first, first + tables.size[block]):
             wanted |= redrawn[latent]
         if wanted:
-            fresh_values(block, tables, uniform[OWN_DRAWS:], normal, fresh)
+            fresh_values(block, tables, dice, fresh)
             for latent in range(first, first + tables.size[block]):
                 z[latent] = fresh[latent] if redrawn[latent] else z[latent]
     for kind in range(KINDS - 1):
         if tables.renewed[jump, kind]:
-            kinds[kind] = _which(uniform[7 + kind], tables.kinds[kind])
+            kinds[kind] = which(uniform(dice), tables.kinds[kind])
     if tables.renewed[jump, KINDS - 1]:
-        ratio = _change(tables, steps, uniform, normal, z, kinds, fresh, parts)
+        law, of = (tables.log_shares, tables.means, tables.sds), (tables.at[27], tables.at[28], tables.changed)
+        if kinds[KINDS - 1] and uniform(dice) < 0.5:
+            ratio = _moved_change(law, of, tables.kinds[4], steps, dice, z, kinds)
+        else:
+            ratio = _other_change(law, of, tables.below, tables.kinds[4], steps, dice, z, kinds)
     return jump, ratio
 
 
-@inlined
-def _shift(tables: Any, theirs: Any, uniform: Any, normal: Any, moves: Any, z: Any) -> None:
-    """Add a scaled difference of two of the others to the latents that move."""
-    others = theirs.shape[0]
-    one = theirs[min(int(uniform[5] * _f(others)), others - 1)]
-    other = theirs[min(int(uniform[6] * _f(others)), others - 1)]
-    scale = _f(1.0) if uniform[3] < _f(0.1) else _f(0.15) + _f(0.7) * uniform[4]
+@loop
+def _shift(tables: Any, theirs: Any, dice: Any, moves: Any, densities: Any, scratch: Any) -> float:
+    """Add a scaled difference of two of the others to the latents that move; log of the ratio of prior densities."""
+    others, z, found, ratio = theirs.shape[0], scratch[1], scratch[5], 0.0
+    one = theirs[smaller(int(uniform(dice) * _f(others)), others - 1)]
+    other = theirs[smaller(int(uniform(dice) * _f(others)), others - 1)]
+    scale = _ONE if uniform(dice) < _f(0.1) else _f(0.15) + _f(0.7) * uniform(dice)
     for latent in range(len(moves)):
         if moves[latent]:
-            z[latent] += scale * (one[latent] - other[latent]) + _BLUR * tables.spreads[latent] * normal[latent]
-
-
-@inlined
-def _log_ratio(tables: Any, moves: Any, old: Any, new: Any, parts: Any) -> float:
-    """Log of the ratio of the prior densities, of the blocks that have moved alone."""
-    ratio = 0.0
+            z[latent] += scale * (one[latent] - other[latent]) + _BLUR * tables.spreads[latent] * blur(dice)
     for block in range(len(tables.first)):
-        first = tables.first[block]
         moved = False
-        for latent in range(first, first + tables.size[block]):
+        for latent in range(tables.first[block], tables.first[block] + tables.size[block]):
             moved |= moves[latent]
+        found[block] = UNKNOWN
         if moved:
-            ratio += log_block(new, block, tables, parts) - log_block(old, block, tables, parts)
+            for side in range(0 if densities[block] == UNKNOWN else 1, 2):
+                found[block] = log_block(scratch[side], block, tables, scratch[4])
+                if side == 0:
+                    densities[block] = found[block]
+            ratio += found[block] - densities[block]
     return ratio
 
 
 @loop
-def _log_place(tables: Any, z: Any, parts: Any) -> float:
-    """Log density of the blocks that hold start and width."""
-    summed, block = 0.0, 0
-    while tables.first[block] < 2 and block < len(tables.first):
-        summed += log_block(z, block, tables, parts)
-        block += 1
-    return summed
-
-
-@inlined
-def _overlap(tables: Any, z: Any) -> bool:
-    """Whether enhancement and depression overlap where they may not."""
-    if not tables.apart:
-        return False
-    at = tables.at
+def _overlap(at: Any, z: Any) -> bool:
+    """Whether enhancement and depression overlap."""
     start, end = z[at[0]], z[at[0]] + math.exp(z[at[1]])
     low_start, low_end = z[at[29]], z[at[29]] + math.exp(z[at[30]])
     return not (end <= low_start or low_end <= start)
 
 
-@inlined
-def _proposed(tables: Any, steps: Any, theirs: Any, kinds: Any, u: Any, n: Any, chosen: Any, scratch: Any) -> Any:
+@part
+def _proposed(tables: Any, steps: Any, theirs: Any, own: Any, jumps: Any, dice: Any, scratch: Any) -> Any:
     """Write what a particle may move to, and return the log ratio of prior densities and whether it stays as it is."""
-    old, new, fresh, parts = scratch[0], scratch[1], scratch[2], scratch[4]
-    state = 0
+    (kinds, densities, chosen), state, ratio, same, new = own, 0, 0.0, True, scratch[1]
     for kind in range(KINDS):
         chosen[kind] = kinds[kind]
         state += tables.states[kind] * kinds[kind]
-    if u[1] < JUMP_PROBABILITY:
-        jump, ratio = _jump(tables, steps, u, n, new, chosen, fresh, parts)
+    if jumps:
+        jump, ratio = _jump(tables, steps, dice, new, chosen, scratch)
         same = tables.of_profile[jump] and not (kinds[2] or chosen[2])
     else:
-        moves = tables.shifted[state, _which(u[2], tables.parts)]
-        ratio, same = 0.0, True
+        moves = tables.shifted[state, which(uniform(dice), tables.parts)]
         for latent in range(len(moves)):
             same &= not moves[latent]
         if not same:
-            _shift(tables, theirs, u, n, moves, new)
-            ratio = _log_ratio(tables, moves, old, new, parts)
-    return -math.inf if _overlap(tables, new) else ratio, same
+            ratio = _shift(tables, theirs, dice, moves, densities, scratch)
+    if tables.apart and _overlap(tables.at, new):
+        ratio = -math.inf
+    return ratio, same
 
 
-@loop
-def _move_half(
-    tables: Any, state: Any, mine: Any, theirs: Any, draws: Any, trials: Any, rooms: Any, counts: Any
-) -> None:
-    """Move half of the particles of one person once, in place."""
-    values, kinds, log_likelihood, chosen = state
-    (uniform, normal), (room, scratch) = draws, rooms
-    known, sizes, censored, more_sizes, steps = trials
+@part
+def _move(tables: Any, state: Any, i: int, theirs: Any, trials: Any, dice: Any, rooms: Any, counts: Any) -> None:
+    """Move a particle once, in place."""
+    values, kinds, log_likelihood, densities, chosen = state
+    records, sizes, steps = trials
+    room, scratch = rooms
     old, new, particle = scratch[0], scratch[1], scratch[3]
-    for i in range(mine[0], mine[1]):
+    for latent in range(values.shape[1]):
+        old[latent] = new[latent] = values[i, latent]
+    jumps = uniform(dice) < JUMP_PROBABILITY
+    own = kinds[i], densities[i], chosen
+    ratio, same = _proposed(tables, steps, theirs, own, jumps, dice, scratch)
+    before = log_likelihood[i]
+    after = before
+    if ratio > -math.inf and not same:
+        meant(new, chosen, tables.at, particle)
+        after = _f(history_likelihood(particle, records, sizes, room))
+    sort = 2 if jumps else 0
+    counts[sort] += 1
+    if math.log(larger(uniform(dice), _LEAST)) < after - before + ratio:
+        counts[sort + 1] += 1
+        log_likelihood[i] = after
         for latent in range(values.shape[1]):
-            old[latent] = new[latent] = values[i, latent]
-        ratio, same = _proposed(tables, steps, theirs, kinds[i], uniform[i], normal[i], chosen, scratch)
-        before = log_likelihood[i]
-        after = before
-        if ratio > -math.inf and not same:
-            meant(new, chosen, tables.at, particle)
-            after = np.float32(history_likelihood(particle, known, sizes, censored, more_sizes, room))
-        sort = 2 if uniform[i, 1] < JUMP_PROBABILITY else 0
-        counts[sort] += 1
-        if math.log(max(uniform[i, 0], _LEAST)) < after - before + ratio:
-            counts[sort + 1] += 1
-            log_likelihood[i] = after
-            for latent in range(values.shape[1]):
-                values[i, latent] = new[latent]
-            for kind in range(KINDS):
-                kinds[i, kind] = chosen[kind]
+            values[i, latent] = new[latent]
+        for kind in range(KINDS):
+            kinds[i, kind] = chosen[kind]
+        for block in range(len(tables.first)):
+            if jumps:
+                densities[i, block] = UNKNOWN
+            elif not same and scratch[5, block] != UNKNOWN:
+                densities[i, block] = scratch[5, block]
 
 
-@kernel
-def sweep(tables: Any, history: Any, steps: Any, state: Any, uniform: Any, normal: Any) -> Any:
-    """Move every particle once, in place, one half by differences within the other."""
-    values, kinds, log_likelihood = state
-    people, size = values.shape[:2]
-    counts, chosen = np.zeros((people, 4), dtype=np.float32), np.zeros(KINDS, dtype=np.int64)
-    room, scratch = np.empty((ROOM, PIECE), dtype=np.float32), np.zeros((5, 64), dtype=np.float32)
-    half = size // 2
-    for person in range(people):
-        told = history[person]
-        trials = (*trial_records(told, False), *trial_records(told, True), steps[person])  # noqa: FBT003
-        own = values[person], kinds[person], log_likelihood[person], chosen
-        draws = uniform[person], normal[person]
-        for first, behind in ((0, half), (half, size)):
-            theirs = values[person, half:] if first == 0 else values[person, :half]
-            mine = first, behind
-            _move_half(tables, own, mine, theirs, draws, trials, (room, scratch), counts[person])
-    return counts
+@writer
+def sweeps(number: int, tables: Any, history: Any, steps: Any, state: Any, dice: Any, rooms: Any, counts: Any) -> None:
+    """Move every particle some times, in place, one half by differences within the other.
+
+    The state are latents, kinds, log likelihoods and log densities of the blocks, and room for the kinds of one.
+    """
+    values, kinds, log_likelihood, densities, chosen = state
+    records, sizes = history
+    half = values.shape[1] // 2
+    for person in range(values.shape[0]):
+        own = values[person], kinds[person], log_likelihood[person], densities[person], chosen
+        trials = records[person], sizes[person], steps[person]
+        for _ in range(number):
+            for i in range(values.shape[1]):
+                theirs = values[person, half:] if i < half else values[person, :half]
+                _move(tables, own, i, theirs, trials, dice[person], rooms, counts[person])
 
 
 @kernel
@@ -251,12 +252,28 @@ def records(tables: Any, values: Any, kinds: Any, trials: int) -> Any:
     return found
 
 
-@kernel
-def log_places(tables: Any, values: Any) -> Any:
-    """Log prior density of start and width but for a constant, shape (b, p)."""
-    people, size = values.shape[:2]
-    found, parts = np.empty((people, size), dtype=np.float32), np.empty(64, dtype=np.float32)
-    for person in range(people):
-        for i in range(size):
-            found[person, i] = _log_place(tables, values[person, i], parts)
-    return found
+@loop
+def _weighed(tables: Any, block: int, kinds: Any) -> Any:
+    """Whether a block is one that ISIs are chosen with another law of, and means anything to a particle."""
+    first, noise, change = tables.first[block], kinds[1], kinds[4]
+    stepped = change != _UNCHANGED and change != _ENHANCEMENT  # noqa: PLR1714 - kernels know no enumerations in tuples
+    curve = (noise == _RECRUITMENT and first == tables.at[14]) or (noise == _RECTIFIED and first == tables.at[20])
+    place, change_comes = first < 2 and kinds[2] != 0, stepped and block == tables.changed
+    return place or curve or first == tables.at[5] or change_comes
+
+
+@writer
+def log_usual(tables: Any, values: Any, kinds: Any, parts: Any, found: Any) -> None:
+    """Write the log prior density of what ISIs are chosen with another law of, but for a constant, shape (b, p).
+
+    Start and width of particles with a window, the recruitment curve, the drift, and what changes.
+    """
+    edges = tables.kinds[4]
+    for person in range(values.shape[0]):
+        for i in range(values.shape[1]):
+            change = kinds[person, i, 4]
+            share = (edges[change] if change < len(edges) else _ONE) - (edges[change - 1] if change else _NIL)
+            found[person, i] = math.log(larger(share, _LEAST))
+            for block in range(len(tables.first)):
+                if _weighed(tables, block, kinds[person, i]):
+                    found[person, i] += log_block(values[person, i], block, tables, parts)

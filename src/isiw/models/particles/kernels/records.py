@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from isiw.compiled import LANES, exp, exp2, kernel, log, loop
+from isiw.compiled import LANES, exp, exp2, kernel, larger, log, loop
 from isiw.lazy import torch
 from isiw.models.particles.changes import GROWN_AFTER, Change
 from isiw.models.particles.noise import PERSISTENCE, STARTUP, NoiseKind, Response
@@ -93,7 +93,7 @@ def gain_of(order: Any) -> Any:
 @loop
 def enhancement_after(fading: Any, order: Any) -> Any:
     """The share of the enhancement that there is after so many trials; see `Change.at`."""
-    age = order if fading > _NIL else max(_GROWN_AFTER - order, _NIL)
+    age = order if fading > _NIL else larger(_GROWN_AFTER - order, _NIL)
     return exp2(-abs(fading) * age)
 
 
@@ -117,27 +117,33 @@ def settle(particle: Any, order: Any) -> None:
 
 
 @kernel
-def trial_records(columns: Any, censored: bool) -> Any:  # noqa: FBT001 - kernels know no keywords
-    """The trials of one person whose amplitude is known, or those that are censored."""
-    count = 0
-    for n in range(columns.shape[0]):
-        count += (columns[n, LOW] != columns[n, HIGH]) == censored
-    pieces = (count + PIECE - 1) // PIECE
-    records = np.zeros((pieces, TRIAL, PIECE), dtype=np.float32)
-    counts = np.full(pieces, PIECE)
-    if pieces:
-        counts[-1] = (count - (pieces - 1) * PIECE + LANES - 1) // LANES * LANES
-    number = 0
-    for n in range(columns.shape[0]):
-        if (columns[n, LOW] != columns[n, HIGH]) != censored:
-            continue
-        record, i = records[number // PIECE], number % PIECE
-        for field in range(10):
-            record[field, i] = columns[n, field]
-        if np.isnan(columns[n, ISI]):
-            record[ISI, i] = record[FACTOR, i] = _NIL
-        record[NUMBER, i] = columns[n, ORDER]
-        record[STARTLE, i], record[RELAXED, i] = gain_of(columns[n, ORDER])
-        record[REAL, i] = _ONE
-        number += 1
-    return records, counts
+def trial_records(columns: Any) -> Any:
+    """The trials of each person in pieces, those whose amplitude is known and those that are censored.
+
+    Records of shape (b, 2, pieces, TRIAL, PIECE), and how many trials each piece has, in whole lanes.
+    """
+    people, trials = columns.shape[:2]
+    pieces = (trials + PIECE - 1) // PIECE
+    records = np.zeros((people, 2, pieces, TRIAL, PIECE), dtype=np.float32)
+    sizes = np.zeros((people, 2, pieces), dtype=np.int64)
+    for person in range(people):
+        for n in range(trials):
+            column = columns[person, n]
+            sort = 1 if column[LOW] != column[HIGH] else 0
+            piece = 0
+            while sizes[person, sort, piece] == PIECE:
+                piece += 1
+            i = sizes[person, sort, piece]
+            record = records[person, sort, piece]
+            for field in range(10):
+                record[field, i] = column[field]
+            if np.isnan(column[ISI]):
+                record[ISI, i] = record[FACTOR, i] = _NIL
+            record[NUMBER, i] = column[ORDER]
+            record[STARTLE, i], record[RELAXED, i] = gain_of(column[ORDER])
+            record[REAL, i] = _ONE
+            sizes[person, sort, piece] += 1
+        for sort in range(2):
+            for piece in range(pieces):
+                sizes[person, sort, piece] = (sizes[person, sort, piece] + LANES - 1) // LANES * LANES
+    return records, sizes

@@ -10,9 +10,10 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from isiw.compiled import exp, inlined, log, loop
+from isiw.compiled import exp, larger, log, loop, part, smaller
 from isiw.models.particles.changes import FADING as FADING_RATE
 from isiw.models.particles.changes import INTENSITY_PCT, ChangeKind
+from isiw.models.particles.kernels.draws import normal, uniform
 from isiw.models.particles.kernels.records import (
     BOOST,
     CHANGED,
@@ -55,7 +56,7 @@ MEANINGS: Final = 32
 _f = np.float32
 _NIL, _HALF, _ONE, _TWO = _f(0.0), _f(0.5), _f(1.0), _f(2.0)
 _ROOT_HALF, _LEAST_RUN, _LEAST_DENSITY, _NEVER = _f(math.sqrt(0.5)), _f(1e-12), _f(1e-30), _f(-1e30)
-_MOST_ONSET = _f(MOST_ONSET)
+_MOST_ONSET, _INFINITE = _f(MOST_ONSET), _f(math.inf)
 _INTENSITY, _ENHANCEMENT, _SCALE = ChangeKind.INTENSITY, ChangeKind.ENHANCEMENT, ChangeKind.SCALE
 _INTENSITY_PCT, _FADING = _f(INTENSITY_PCT), _f(FADING_RATE)
 _ALL_OR_NONE, _RECTIFIED, _RECRUITMENT = NoiseKind.ALL_OR_NONE, NoiseKind.RECTIFIED, NoiseKind.RECRUITMENT
@@ -72,7 +73,7 @@ class Tables(NamedTuple):
         components: of how many components its mixture is, shape (k,); 0 for a start, -1 for start and width that may be
             those of a place.
         log_shares: of the components, less the logs of their SDs, shape (k, c).
-        below: sums of the shares of earlier components, shape (k, c).
+        below: sums of the shares of earlier components, from the second on, shape (k, c).
         means: of the latents in each component, shape (c, d).
         sds: their SDs, shape (c, d).
         start_ms: knots of the density of a start [ms], evenly spaced, shape (s,).
@@ -140,7 +141,7 @@ def meant(z: Any, kinds: Any, at: Any, particle: Any) -> None:
         particle[OUTPUT_SD], particle[SLOPE] = exp(z[at[first + 3]]), slope
         particle[BOOST], particle[REST] = slope * exp(z[at[first + 4]]), slope * z[at[first + 5]]
         if rectified:
-            onset = min(exp(z[at[26]]), _MOST_ONSET)
+            onset = smaller(exp(z[at[26]]), _MOST_ONSET)
             particle[ONSET] = onset
             particle[REST] += log(onset) - log(_ONE - onset)
     else:
@@ -165,19 +166,19 @@ def meant(z: Any, kinds: Any, at: Any, particle: Any) -> None:
         particle[STEP] = size
 
 
-@inlined
+@loop
 def _start_density(x: Any, start_ms: Any, density: Any) -> Any:
     """Density of a start, 0 where none can be; straight between the knots."""
     last = len(start_ms) - 1
     if not start_ms[0] <= x <= start_ms[last]:
         return _NIL
     place = (x - start_ms[0]) * (_f(last) / (start_ms[last] - start_ms[0]))
-    left = min(int(place), last - 1)
+    left = smaller(int(place), last - 1)
     share = place - _f(left)
-    return max(density[left] + share * (density[left + 1] - density[left]), _LEAST_DENSITY)
+    return larger(density[left] + share * (density[left + 1] - density[left]), _LEAST_DENSITY)
 
 
-@inlined
+@loop
 def _start_at(quantile: Any, start_ms: Any, quantiles: Any) -> Any:
     """The start at a quantile of the prior [ms]."""
     low, high = 0, len(quantiles) - 1
@@ -187,35 +188,46 @@ def _start_at(quantile: Any, start_ms: Any, quantiles: Any) -> Any:
             low = middle
         else:
             high = middle
-    share = (quantile - quantiles[low]) / max(quantiles[high] - quantiles[low], _LEAST_RUN)
-    return start_ms[low] + min(max(share, _NIL), _ONE) * (start_ms[high] - start_ms[low])
+    share = (quantile - quantiles[low]) / larger(quantiles[high] - quantiles[low], _LEAST_RUN)
+    return start_ms[low] + smaller(larger(share, _NIL), _ONE) * (start_ms[high] - start_ms[low])
 
 
-@inlined
+@loop
 def _log_sum(parts: Any, count: int) -> Any:
     """Log of the sum of the exponentials of the first parts."""
     most = parts[0]
     for k in range(1, count):
-        most = max(most, parts[k])
+        most = larger(most, parts[k])
     summed = _NIL
     for k in range(count):
         summed += exp(parts[k] - most)
     return most + log(summed)
 
 
-@inlined
-def log_block(z: Any, block: int, tables: Any, parts: Any) -> float:
+@loop
+def log_line(x: Any, log_shares: Any, means: Any, sds: Any) -> Any:
+    """Log density of a mixture of one latent but for a constant; a component that is missing has no share."""
+    most, summed = _NEVER, _NIL
+    for k in range(len(means)):
+        distance = (x - means[k]) / sds[k]
+        most = larger(most, log_shares[k] - _HALF * distance * distance)
+    for k in range(len(means)):
+        distance = (x - means[k]) / sds[k]
+        summed += exp(log_shares[k] - _HALF * distance * distance - most)
+    return most + log(summed)
+
+
+@part
+def log_block(z: Any, block: int, tables: Any, parts: Any) -> Any:
     """Log density of the latents of a block but for a constant; -inf where there can be none."""
     first, size, components = tables.first[block], tables.size[block], tables.components[block]
+    anywhere, places = _NIL, 0
     if components <= 0:
         density = _start_density(z[first], tables.start_ms, tables.density)
         anywhere = _NEVER if density == _NIL else log(density)
-        if components == 0:
-            return float(anywhere) if density > _NIL else -math.inf
-        first, size, places = first + 1, 1, len(tables.places)
-    else:
-        anywhere, places = _NIL, 0
-    count = max(components, -components)
+        first, size = first + 1, 1 if components < 0 else 0
+        places = len(tables.places) if components < 0 else 0
+    count = larger(components, -components)
     for k in range(count):
         squares = _NIL
         for latent in range(first, first + size):
@@ -226,29 +238,36 @@ def log_block(z: Any, block: int, tables: Any, parts: Any) -> float:
         law = tables.places[place]
         a, b = (z[0] - law[1]) / law[2], (z[1] - law[3]) / law[4]
         parts[count + place] = law[0] - _HALF * (a * a + b * b)
-    found = _log_sum(parts, count + places)
-    return float(found) if found > _NEVER * _HALF else -math.inf
+    if count + places == 0:
+        parts[0] = anywhere
+    found = parts[0] if count + places < 2 else _log_sum(parts, count + places)
+    return found if found > _NEVER * _HALF else -_INFINITE
 
 
-@inlined
-def fresh_values(block: int, tables: Any, uniform: Any, normal: Any, z: Any) -> None:
+@loop
+def which(quantile: Any, edges: Any) -> int:
+    """Which of some alternatives is drawn, by the sums of the probabilities of earlier ones."""
+    drawn = 0
+    for number in range(len(edges)):
+        drawn += quantile > edges[number]
+    return drawn
+
+
+@part
+def fresh_values(block: int, tables: Any, dice: Any, z: Any) -> None:
     """Draw the latents of a block from the prior."""
     first, size, components = tables.first[block], tables.size[block], tables.components[block]
-    blocks = len(tables.first)
-    if components <= 0:
-        z[first] = _start_at(uniform[blocks + 2 + first % 2], tables.start_ms, tables.quantiles)
-        if components == 0:
-            return
-        first, size = first + 1, 1
-        if uniform[blocks] < tables.place_share:
-            place = 0
-            while place < len(tables.places) - 1 and uniform[blocks + 1] > tables.place_below[place]:
-                place += 1
-            law = tables.places[place]
-            z[0], z[1] = law[1] + law[2] * normal[0], law[3] + law[4] * normal[1]
-            return
-    component, count = 0, max(components, -components)
-    while component < count - 1 and uniform[block] > tables.below[block, component]:
-        component += 1
-    for latent in range(first, first + size):
-        z[latent] = tables.means[component, latent] + tables.sds[component, latent] * normal[latent]
+    in_place = components < 0 and uniform(dice) < tables.place_share
+    if in_place:
+        place, quantile = 0, uniform(dice)
+        while place < len(tables.places) - 1 and quantile > tables.place_below[place]:
+            place += 1
+        law = tables.places[place]
+        z[0], z[1] = law[1] + law[2] * normal(dice), law[3] + law[4] * normal(dice)
+    else:
+        if components <= 0:
+            z[first] = _start_at(uniform(dice), tables.start_ms, tables.quantiles)
+            first, size = first + 1, size - 1
+        component = which(uniform(dice), tables.below[block])
+        for latent in range(first, first + size):
+            z[latent] = tables.means[component, latent] + tables.sds[component, latent] * normal(dice)

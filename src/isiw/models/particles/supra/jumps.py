@@ -109,8 +109,8 @@ class SupraTarget:
         """Log prior density of their latents but for a constant, -inf where the segments overlap, shape (b, p)."""
         return self.prior.log_density(latents.values, self.space)
 
-    def log_place(self, latents: SupraLatents) -> Tensor:
-        """Log prior density of the latents, as places have none of their own here, shape (b, p)."""
+    def log_usual(self, latents: SupraLatents) -> Tensor:
+        """Log prior density of the latents, as ISIs are chosen with the same law, shape (b, p)."""
         return self.log_prior(latents)
 
     def shifted(self, latents: SupraLatents, part: Tensor) -> Tensor:
