@@ -13,7 +13,9 @@ from isiw.errors import InvalidValueError
 from isiw.models.particles import ParticleModel
 from isiw.models.particles.places import Place
 from isiw.models.particles.prior import Prior
+from isiw.models.particles.profile import ProfilePrior
 from isiw.models.shared.scales import Scale
+from isiw.models.shared.start import StartPrior
 from isiw.priors.population import beside
 
 MANY = 20_000
@@ -57,11 +59,39 @@ def test_each_place_has_its_part_of_the_density() -> None:
     assert parts.mean(0).tolist() == pytest.approx([0.3, 0.5, 0.2], abs=0.02)
 
 
-def test_without_places_the_prior_is_what_it_was() -> None:
-    values = drawn(Prior())
-    start = Prior().profile.start.log_density(values[..., 0], VALVE_SPACE)
-    width = Prior().mixtures["width"].log_density(values[..., 1:2])
-    torch.testing.assert_close(Prior().log_densities(values, VALVE_SPACE)["place"], start + width)
+def test_without_places_and_early_windows_start_and_width_do_not_depend_on_each_other() -> None:
+    prior = Prior(ProfilePrior(early=()))
+    values = drawn(prior)
+    start = prior.profile.start.log_density(values[..., 0], VALVE_SPACE)
+    width = prior.mixtures["width"].log_density(values[..., 1:2])
+    torch.testing.assert_close(prior.log_densities(values, VALVE_SPACE)["place"], start + width)
+
+
+def test_windows_that_start_before_the_hit_are_wide_and_others_start_when_they_like() -> None:
+    prior = Prior(ProfilePrior(start=StartPrior(p_anywhere=0.0)))
+    start, width = prior.sample(1, MANY, torch.Generator().manual_seed(1), IMPACT_SPACE).values[0, :, :2].T
+    early, wide = (start > -40) & (start < 0), width.exp() > 160
+    assert (early & wide).float().mean() > 0.08
+    assert (wide & early).sum() / wide.sum() > 0.25
+    assert (~wide & early).sum() / (~wide).sum() < 0.1
+
+
+@pytest.mark.parametrize("hit_delay_ms", [None, (180.0, 5.0)])
+def test_early_windows_have_a_density_that_is_the_law_of_the_draws(hit_delay_ms: tuple[float, float] | None) -> None:
+    # The mean over draws of any density over that of the law is 1.
+    prior = Prior(ProfilePrior(start=StartPrior(hit_delay_ms=hit_delay_ms)))
+    values = drawn(prior)
+    for start_ms, log_width in ((165.0, 5.3), (230.0, 4.7)):
+        other = torch.distributions.Normal(start_ms, 10.0).log_prob(values[..., 0])
+        other = other + torch.distributions.Normal(log_width, 0.3).log_prob(values[..., 1])
+        ratio = (other - prior.log_densities(values, VALVE_SPACE)["place"]).exp()
+        assert ratio.mean().item() == pytest.approx(1.0, abs=0.06)
+
+
+def test_early_windows_leave_something_to_others() -> None:
+    early = ProfilePrior().early[0]
+    with pytest.raises(InvalidValueError, match="less than 1"):
+        ProfilePrior(early=(replace(early, share=1.0),))
 
 
 def test_something_is_left_to_anywhere_else() -> None:

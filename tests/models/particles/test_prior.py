@@ -275,8 +275,9 @@ def test_a_usual_start_is_usual_with_whatever_rig_where_none_is_stated() -> None
 def test_as_usual_unusual_windows_keep_a_part_of_their_probability(hit_delay_ms: Any) -> None:
     profile = ProfilePrior(start=StartPrior(hit_delay_ms=hit_delay_ms))
     usual = profile.as_usual(1 / 3)
-    assert [span.share for span in usual.start.spans] == pytest.approx([0.84, 0.1, 0.06])
-    assert [width.share for width in usual.widths] == pytest.approx([1 - 0.42 / 3, 0.32 / 3, 0.1 / 3])
+    assert [span.share for span in usual.start.spans] == pytest.approx([1 - 0.365 / 3, 0.365 / 3])
+    assert [width.share for width in usual.widths] == pytest.approx([1 - 0.345 / 3, 0.23 / 3, 0.115 / 3])
+    assert [law.share for law in usual.early] == pytest.approx([0.13 / 3])
     assert usual.start.p_anywhere == pytest.approx(0.04 / 3)
     assert (usual.p_window, usual.start.hit_delay_ms) == (profile.p_window, hit_delay_ms)
     assert profile.as_usual(1.0) == profile

@@ -29,7 +29,6 @@ from isiw.models.particles.latents import (
 from isiw.models.particles.mixture import drawn
 from isiw.models.particles.moves import A_LITTLE, ANOTHER_KIND, NEARLY, OF_STEPS, RECENT, STEP_SD
 from isiw.models.particles.noise import NoiseKind
-from isiw.models.particles.places import mixture_of
 from isiw.models.particles.prior import Person, Prior
 from isiw.models.protocol import Tensor
 
@@ -96,6 +95,7 @@ class WindowTarget:
     def tables(self) -> Tables:
         """What kernels know of the prior and of what moves may do."""
         profile = self.prior.profile
+        joint = profile.joint(self.space)
         change, present, noise = torch.meshgrid(
             torch.arange(len(ChangeKind)), torch.arange(2), torch.arange(len(NoiseKind)), indexing="ij"
         )
@@ -121,7 +121,7 @@ class WindowTarget:
             profile.start,
             list(self.prior.mixtures.values()),
             starts=1,
-            places=(profile.p_place, mixture_of(profile.places)) if profile.p_place else None,
+            places=None if joint is None else (joint.share, joint.mixture),
             at=range(len(LATENTS)),
             spreads=self.spreads,
             moves=moves,

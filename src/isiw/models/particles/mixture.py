@@ -35,9 +35,10 @@ class Mixture:
 
     def log_parts(self, x: Tensor) -> Tensor:
         """Log density of each component times its share at x (..., d), shape (..., k)."""
-        z = (x.unsqueeze(-2) - self.means) / self.sds
-        scale = self.sds.log().sum(-1) + 0.5 * math.log(2.0 * math.pi) * self.sds.shape[-1]
-        return self.shares.log() - scale - 0.5 * z.square().sum(-1)
+        shares, means, sds = (law.to(x.device) for law in (self.shares, self.means, self.sds))
+        z = (x.unsqueeze(-2) - means) / sds
+        scale = sds.log().sum(-1) + 0.5 * math.log(2.0 * math.pi) * sds.shape[-1]
+        return shares.log() - scale - 0.5 * z.square().sum(-1)
 
     def log_density(self, x: Tensor) -> Tensor:
         """Log density at x (..., d), shape (...)."""

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from isiw.checks import Checked, Share, mean_and_sd
-from isiw.models.particles.mixture import Mixture
 from isiw.models.shared.scales import Scale, check_scales
 from isiw.types import Conditioning, Reference
 
@@ -47,10 +45,3 @@ class Place(Checked):
             return True
         return abs(self.hit_delay_ms[0] - hit_delay_ms[0]) <= MOST_APART_MS
 
-
-def mixture_of(places: tuple[Place, ...]) -> Mixture:
-    """The places as a mixture over start and log width."""
-    latents = [
-        (p.share, [(p.start_ms.median, p.start_ms.sd), (math.log(p.width_ms.median), p.width_ms.sd)]) for p in places
-    ]
-    return Mixture.of(latents, "cpu")

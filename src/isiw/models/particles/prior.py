@@ -34,7 +34,6 @@ from isiw.models.particles.laws import (
 )
 from isiw.models.particles.mixture import JointMixture, Mixture, drawn
 from isiw.models.particles.noise import PERSISTENCE, NoiseKind, Response, recruits
-from isiw.models.particles.places import mixture_of
 from isiw.models.particles.profile import ProfilePrior
 from isiw.models.particles.shapes import Shape
 from isiw.models.protocol import Tensor
@@ -175,9 +174,10 @@ class Prior(Checked):
         uniform = torch.rand((5, *size), generator=generator, dtype=torch.float32, device=generator.device)
         start_ms = self.profile.start.start_ms(uniform[3], space).unsqueeze(-1)
         values = torch.cat([start_ms, self._joint.sample(size, generator)], dim=-1)
-        if self.profile.p_place:
+        joint = self.profile.joint(space)
+        if joint is not None:
             chance = torch.rand((*size, 1), generator=generator, dtype=torch.float32, device=generator.device)
-            known, place = chance < self.profile.p_place, self._joint_place.sample(size, generator)
+            known, place = chance < joint.share, joint.drawn.sample(size, generator)
             values = torch.cat([torch.where(known, place, values[..., :2]), values[..., 2:]], dim=-1)
         shape, noise = drawn(astuple(self.profile.shapes), uniform[0]), drawn(astuple(self.noise), uniform[1])
         change = drawn(self.changes.shares, uniform[4])
@@ -185,7 +185,7 @@ class Prior(Checked):
 
     def log_density(self, values: Tensor, space: DesignSpace) -> Tensor:
         """Log density of latents but for a constant, shape (b, p)."""
-        if not self.profile.p_place:
+        if self.profile.joint(space) is None:
             return self.profile.start.log_density(values[..., 0], space) + self._joint.log_density(values[..., 1:])
         return self.log_place(values, space) + self._beside_place.log_density(values[..., 2:])
 
@@ -201,24 +201,18 @@ class Prior(Checked):
         """Log density of start and width, times its probability: anywhere, and in each place, shape (b, p, 1 + k)."""
         start, width = self.profile.start.log_density(values[..., 0], space), self.mixtures["width"]
         anywhere = (start + width.log_density(values[..., 1:2])).unsqueeze(-1)
-        share = self.profile.p_place
-        if not share:
+        joint = self.profile.joint(space)
+        if joint is None:
             return anywhere
-        places = math.log(share) + self._places.log_parts(values[..., :2])
-        return torch.cat([math.log1p(-share) + anywhere, places], dim=-1)
+        parts = math.log(joint.share) + joint.mixture.log_parts(values[..., :2])
+        early = parts.shape[-1] - len(self.profile.places)
+        anywhere = torch.cat([math.log1p(-joint.share) + anywhere, parts[..., :early]], dim=-1)
+        return torch.cat([torch.logsumexp(anywhere, dim=-1, keepdim=True), parts[..., early:]], dim=-1)
 
     def log_place(self, values: Tensor, space: DesignSpace) -> Tensor:
         """Log density of start and width, shape (b, p)."""
         density: Tensor = torch.logsumexp(self.log_places(values, space), dim=-1)
         return density
-
-    @cached_property
-    def _places(self) -> Mixture:
-        return mixture_of(self.profile.places)
-
-    @cached_property
-    def _joint_place(self) -> JointMixture:
-        return JointMixture([self._places])
 
     @cached_property
     def _beside_place(self) -> JointMixture:

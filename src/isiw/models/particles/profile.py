@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
@@ -15,6 +16,7 @@ from isiw.checks import Checked, Share
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.models.particles.laws import check_laws, check_shares, with_less_of_others
+from isiw.models.particles.mixture import JointMixture, Mixture
 from isiw.models.particles.places import Place
 from isiw.models.shared.scales import Scale, check_scales
 from isiw.models.shared.start import TAP_SPANS, Span, StartPrior
@@ -62,11 +64,32 @@ class Width(Checked):
         check_scales(self, "width_ms", tailed=False)
 
 
+@dataclass(frozen=True)
+class Early(Checked):
+    """A law of wide windows that start before the hit: of start and width together.
+
+    Args:
+        share: its probability.
+        start_ms: the start from the impact [ms].
+        width_ms: the width.
+    """
+
+    share: Share
+    start_ms: Scale
+    width_ms: Scale
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_scales(self, "start_ms", positive=False, tailed=False)
+        check_scales(self, "width_ms", tailed=False)
+
+
 class _Windows(NamedTuple):
     """Where windows start, and how wide they are."""
 
     spans: tuple[Span, ...]
     widths: tuple[Width, ...]
+    early: tuple[Early, ...]
 
 
 _AFTER: Final[Mapping[Conditioning | None, _Windows]] = MappingProxyType(
@@ -74,33 +97,59 @@ _AFTER: Final[Mapping[Conditioning | None, _Windows]] = MappingProxyType(
         # A tap most probably; but windows of 15–40 ms, as after an electrical pulse, too.
         None: _Windows(
             TAP_SPANS,
-            (Width(0.58, Scale(100.0, 0.42)), Width(0.32, Scale(190.0, 0.45)), Width(0.10, Scale(28.0, 0.35))),
+            (Width(0.655, Scale(100.0, 0.42)), Width(0.23, Scale(190.0, 0.45)), Width(0.115, Scale(28.0, 0.35))),
+            (Early(0.13, Scale(-20.0, 12.0), Scale(190.0, 0.45)),),
         ),
         # 60–220 ms, mean 108 measured (dissertation, Table 4.1).
-        "tap": _Windows(TAP_SPANS, (Width(0.7, Scale(100.0, 0.42)), Width(0.3, Scale(170.0, 0.5)))),
+        "tap": _Windows(
+            TAP_SPANS,
+            (Width(0.8, Scale(100.0, 0.42)), Width(0.2, Scale(170.0, 0.5))),
+            (Early(0.12, Scale(-20.0, 12.0), Scale(170.0, 0.5)),),
+        ),
         # 15–20 ms measured, with TMS below the threshold (dissertation, 3.3.4); most studies use an ISI of 25 ms.
         "electrical": _Windows(
             (Span(0.7, 0.0, 60.0, 3.0), Span(0.3, -30.0, 260.0, 20.0)),
             (Width(0.75, Scale(20.0, 0.4)), Width(0.25, Scale(60.0, 0.7))),
+            (Early(0.01, Scale(-15.0, 10.0), Scale(60.0, 0.7)),),
         ),
     }
 )
 """The law of windows after each kind of conditioning stimulus, and if it is not stated."""
 
 
+LEAST_KEPT: Final = 1e-6
+"""A law whose probability were 0 would be none."""
+
+
+class JointPlaces(NamedTuple):
+    """Windows whose start and width depend on each other.
+
+    Args:
+        share: their probability.
+        mixture: of start and log width.
+        drawn: the same, to draw from.
+    """
+
+    share: float
+    mixture: Mixture
+    drawn: JointMixture
+
+
 @dataclass(frozen=True)
 class ProfilePrior(Checked):
     """Of the facilitation by ISI.
 
-    Where `start` and `widths` are not a user's own, they are those of the conditioning stimulus.
+    Where `start`, `widths` and `early` are not a user's own, they are those of the conditioning stimulus.
 
     Args:
         p_window: probability that there is any facilitation.
         shapes: probabilities of the families.
         start: where windows start.
         widths: how wide they are.
+        early: windows that start before the hit, which are wide; the rest of the probability is that of `start` and
+            `widths`, which do not depend on each other.
         places: where and how wide they are as far as earlier sessions say; the rest of the probability is that of
-            `start` and `widths`.
+            all others.
         conditioning: what the first stimulus of a pair is: a tap on the tendon, or an electrical pulse to the nerve;
             None where it is not stated, and a tap is most probable.
     """
@@ -109,6 +158,7 @@ class ProfilePrior(Checked):
     shapes: ShapeShares = field(default_factory=ShapeShares, metadata={"shares": True})
     start: StartPrior = field(default_factory=StartPrior)
     widths: tuple[Width, ...] = _AFTER[None].widths
+    early: tuple[Early, ...] = _AFTER[None].early
     places: tuple[Place, ...] = ()
     conditioning: Conditioning | None = None
 
@@ -117,9 +167,12 @@ class ProfilePrior(Checked):
         own = _AFTER[self.conditioning]
         if self.start.spans in [each.spans for each in _AFTER.values()]:
             object.__setattr__(self, "start", replace(self.start, spans=own.spans))
-        if self.widths in [each.widths for each in _AFTER.values()]:
-            object.__setattr__(self, "widths", own.widths)
+        for name in ("widths", "early"):
+            if getattr(self, name) in [getattr(each, name) for each in _AFTER.values()]:
+                object.__setattr__(self, name, getattr(own, name))
         check_laws(self, "widths")
+        if math.fsum(law.share for law in self.early) >= 1.0:
+            raise InvalidValueError("the shares of ProfilePrior.early must sum to less than 1", got=self.early)
         if self.p_place >= 1.0:
             raise InvalidValueError("the shares of ProfilePrior.places must sum to less than 1", got=self.p_place)
         if len(references := {place.reference for place in self.places}) > 1:
@@ -141,7 +194,13 @@ class ProfilePrior(Checked):
 
     def as_usual(self, kept: float) -> ProfilePrior:
         """The same with less probability of unusual starts and widths."""
-        return replace(self, start=self.start.as_usual(kept), widths=with_less_of_others(self.widths, kept))
+        early = tuple(replace(law, share=max(kept, LEAST_KEPT) * law.share) for law in self.early)
+        start, widths = self.start.as_usual(kept), with_less_of_others(self.widths, kept)
+        return replace(self, start=start, widths=widths, early=early)
+
+    def joint(self, space: DesignSpace) -> JointPlaces | None:
+        """The windows whose start and width depend on each other: `early`, then `places`; None where there are none."""
+        return _joint(self, space)
 
     def require_rig(self, space: DesignSpace) -> None:
         """Check that the rig of a new session fits its space; what an earlier log says goes on as it was."""
@@ -187,3 +246,21 @@ class ProfilePrior(Checked):
                 expected=f"about {others[0]} ms",
                 remedy="Learn a prior from sessions with this rig; or correct hit_delay_ms, if it is not this rig's.",
             )
+
+
+@lru_cache(maxsize=64)
+def _joint(profile: ProfilePrior, space: DesignSpace) -> JointPlaces | None:
+    delays, left = profile.start.hit_delays(space), 1.0 - profile.p_place
+    laws = [
+        (
+            left * share * law.share,
+            [(law.start_ms.median + mean_ms, math.hypot(law.start_ms.sd, sd_ms)), law.width_ms.log_law],
+        )
+        for law in profile.early
+        for share, mean_ms, sd_ms in delays
+    ]
+    laws += [(place.share, [place.start_ms.law, place.width_ms.log_law]) for place in profile.places]
+    if not laws:
+        return None
+    mixture = Mixture.of(laws, "cpu")
+    return JointPlaces(math.fsum(share for share, _ in laws), mixture, JointMixture([mixture]))

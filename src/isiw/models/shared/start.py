@@ -66,8 +66,8 @@ class Span(Checked):
         return Span(share * self.share, self.low_ms + mean_ms, self.high_ms + mean_ms, blur_ms)
 
 
-TAP_SPANS: Final = (Span(0.52, 0.0, 115.0), Span(0.3, -30.0, 260.0, 20.0), Span(0.18, -40.0, 0.0))
-"""Where windows start after a tap."""
+TAP_SPANS: Final = (Span(0.635, 0.0, 115.0), Span(0.365, -30.0, 260.0, 20.0))
+"""Where windows start after a tap; some wide ones start before it (`isiw.models.particles.profile`)."""
 
 
 @dataclass(frozen=True)
@@ -128,6 +128,16 @@ class StartPrior(Checked):
         less = tuple(replace(span, share=kept * span.share) for span in others)
         usual = replace(first, share=1.0 - math.fsum(span.share for span in less))
         return replace(self, spans=(usual, *less), p_anywhere=kept * self.p_anywhere)
+
+    def hit_delays(self, space: DesignSpace) -> list[tuple[float, float, float]]:
+        """Probability, mean and SD of the impact on the clock of a space [ms], as far as it is known."""
+        if space.reference == "impact":
+            return [(1.0, 0.0, 0.0)]
+        if self.hit_delay_ms is not None:
+            return [(1.0, *self.hit_delay_ms)]
+        low_ms, high_ms = OTHER_HIT_DELAY_MS
+        other = 0.5 * (low_ms + high_ms), (high_ms - low_ms) / math.sqrt(12.0)
+        return [(self.p_robot, *ROBOT_HIT_DELAY_MS), (1.0 - self.p_robot, *other)]
 
     def in_space(self, space: DesignSpace) -> tuple[Span, ...]:
         """The spans on the clock of a space."""
