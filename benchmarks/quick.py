@@ -65,6 +65,8 @@ QUICK: Final[Mapping[str, str]] = {
     "signals": "",
     "silence": "--people 3 --out OUT",
     "soak": "--sessions 10",
+    "steps report": "--out OUT",
+    "steps run": "--people 2 --trials 10 --out OUT",
     "threshold": "--n 4 --spots 1",
     "throughput": "--single 1 --batches 1 --batch 4 --gpu-batch 4",
     "trial_cost": "--trials 60",

@@ -1,0 +1,202 @@
+"""How soon steps of the amplitudes are named, beside a detector that knows the person: `python -m benchmarks.steps`.
+
+`run` keeps two tables a cohort: the rows of `before_and_now run` on the same people, and what was named after each
+trial. `report` compares that with a CUSUM that knows the person's law, the size and the direction of the step, and
+whose threshold no more than 3 % of the sessions without a step reach. Reported people come from seed 200,000 on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Final
+
+import numpy as np
+import pandas as pd
+import torch
+import typer
+
+from benchmarks.before_and_now import LATER, MARKS, study_of
+from benchmarks.provenance import command_of, made_with
+from benchmarks.quick import understood
+from isiw.studies.batch import _Batch
+from isiw.studies.sessions import SimulatedSession, examine
+from isiw.subjects.responses import RecruitmentResponse
+from isiw.subjects.subject import Response, SimulatedSubject
+from isiw.types import FloatArray
+
+WITHIN: Final = 15
+"""A step is named in time within so many trials."""
+
+LEAST_FACTOR: Final = 3.0
+"""Smaller steps do not count."""
+
+FALSE_ALARMS: Final = 0.03
+DRAWS: Final = 2000
+BANDWIDTH: Final = 0.1
+"""Of the density of a log MEP, natural log."""
+
+app = typer.Typer(help=__doc__)
+
+
+class Noting(_Batch):
+    """People side by side, and what is named after each trial of each of them.
+
+    Args:
+        sessions: the sessions.
+    """
+
+    def __init__(self, sessions: Sequence[SimulatedSession]) -> None:
+        super().__init__(sessions, "cpu")
+        self.sessions, self.named, self.told = sessions, list[dict[str, object]](), 0
+
+    def tell(self, responses: Sequence[Response]) -> None:
+        """Learn from one trial of each person."""
+        super().tell(responses)
+        self.told += 1
+        for number, (session, told) in enumerate(zip(self.sessions, responses, strict=True)):
+            change = self.estimate(number).change
+            found = {} if change is None else {"kind": change.kind, "share": change.probability}
+            who = {"cohort": session.cohort, "person": session.person, "seed": session.seed, "trial": self.told}
+            self.named.append(who | {"isi_ms": told.isi_ms, "mep_mv": told.mep_mv, "kind": "", "share": 0.0} | found)
+
+
+@app.command()
+def run(
+    cohorts: Annotated[str, typer.Option(help="Cohorts, comma-separated.")] = "step",
+    people: Annotated[int, typer.Option(help="People a cohort.")] = 200,
+    seed: Annotated[int, typer.Option(help="Seed of the people.")] = 220_000,
+    trials: Annotated[int, typer.Option(help="Trials a session.")] = 60,
+    out: Annotated[Path, typer.Option(help="Folder of the tables.")] = Path("steps"),
+) -> None:
+    """Run the default, 25 people at a time; a cohort's tables grow with each 25, and it goes on behind them."""
+    torch.set_num_threads(1)
+    (out / "named").mkdir(parents=True, exist_ok=True)
+    marks = tuple(sorted({*(m for m in (*MARKS, *LATER) if m <= trials), trials}))
+    for name in cohorts.split(","):
+        files = out / f"{name}.parquet", out / "named" / f"{name}.parquet"
+        tables = [[pd.read_parquet(file)] if file.exists() else [] for file in files]
+        done = set() if not tables[0] else set(tables[0][0]["person"])
+        for unit in study_of(name, people, seed, marks, "noted").units():
+            if {session.person for session in unit.sessions} <= done:
+                continue
+            crowd = Noting(unit.sessions)
+            tables[0].append(examine(unit.sessions, crowd))
+            tables[1].append(pd.DataFrame(crowd.named))
+            for file, rows in zip(files, tables, strict=True):
+                pd.concat(rows).to_parquet(file)
+
+
+def log_ratios(
+    subject: SimulatedSubject, isi_ms: FloatArray, mep_mv: FloatArray, rng: np.random.Generator
+) -> FloatArray:
+    """Log of the density of each MEP after the person's step over that without it, shape (r, n) for MEPs (r, n)."""
+    response, change = subject.response, subject.change
+    if not isinstance(response, RecruitmentResponse) or change is None:
+        raise TypeError(response, change)
+    found = np.empty(mep_mv.shape)
+    for trial, isi in enumerate(isi_ms):
+        z, output, floor = rng.standard_normal((3, DRAWS))
+        level = float(subject.facilitation(np.asarray(isi), "valve"))
+        evoked = response.evoked_mv(level, z) * np.exp(response.sigma_y * output)
+        floor_mv = response.floor.median_mv * np.exp(response.floor.log_sd * floor)
+        x = np.log(mep_mv[:, trial, None] / subject.scale)
+        density = [
+            np.exp(-0.5 * ((x - np.log(floor_mv + factor * evoked)) / BANDWIDTH) ** 2).mean(-1) + 1e-4
+            for factor in (1.0, np.exp(change.log_gain))
+        ]
+        found[:, trial] = np.log(density[1] / density[0])
+    return found
+
+
+def cusum(ratios: FloatArray) -> FloatArray:
+    """The largest sum of the last log ratios, or 0, after each trial, same shape."""
+    sums = np.cumsum(ratios, axis=-1)
+    lowest = np.minimum.accumulate(np.concatenate([np.zeros_like(sums[..., :1]), sums], axis=-1), axis=-1)[..., :-1]
+    return np.maximum(sums - lowest, 0.0)
+
+
+def without_step(subject: SimulatedSubject, isi_ms: FloatArray, sessions: int, seed: int) -> FloatArray:
+    """MEPs of sessions at the same ISIs in which nothing changes [mV], shape (r, n)."""
+    still = replace(subject, change=None)
+    responders = [still.begin(1_000_000 * (1 + number) + seed) for number in range(sessions)]
+    return np.array([[responder.respond(float(isi), "valve").mep_mv for isi in isi_ms] for responder in responders])
+
+
+@app.command()
+def report(
+    folder: Annotated[Path, typer.Argument(help="Folder of the tables.")],
+    out: Annotated[Path, typer.Option(help="Path of the result, without suffix.")] = Path("steps"),
+    sessions: Annotated[int, typer.Option(help="Sessions without a step, of each person, for the threshold.")] = 10,
+) -> None:
+    """Say how many steps are named in time, and how many that are none."""
+    named = pd.concat([pd.read_parquet(file) for file in sorted((folder / "named").glob("*.parquet"))])
+    lines = [f"- command: `{command_of('steps')}`, after `run`", f"- {made_with('torch', 'scipy')}"]
+    stepped = named[named["cohort"] == "step"]
+    if len(stepped):
+        lines += ["", _in_time(stepped, sessions).to_markdown(index=False, floatfmt=".3f")]
+    others = named[~named["cohort"].isin(("step", "retuned", "ramp", "fading", "moving"))]
+    if len(others):
+        lines += ["", _without(others).to_markdown(index=False, floatfmt=".3f")]
+    out.with_suffix(".md").write_text("\n".join([*lines, ""]), encoding="utf-8")
+    print("\n".join(lines))
+
+
+def _in_time(stepped: pd.DataFrame, sessions: int) -> pd.DataFrame:
+    """Of steps of at least `LEAST_FACTOR`: shares named within `WITHIN` trials, and by the detector."""
+    rows, still = [], []
+    for (seed, person), session in stepped.groupby(["seed", "person"]):
+        subject = SimulatedSession("default", "step", int(person), int(seed), 60, (60,)).subject()
+        change = subject.change
+        if change is None or abs(change.log_gain) < np.log(LEAST_FACTOR):
+            continue
+        isi_ms, rng = session["isi_ms"].to_numpy(float), np.random.default_rng([int(seed), int(person)])
+        usual = without_step(subject, isi_ms, sessions, int(seed + person))
+        score = cusum(log_ratios(subject, isi_ms, np.vstack([session["mep_mv"].to_numpy(float), usual]), rng))
+        still.append(score[1:].max(-1))
+        after = (session["trial"] >= change.first) & (session["trial"] < change.first + WITHIN)
+        if not after.any():
+            continue
+        first = session["trial"] < change.first
+        rows.append(
+            {
+                "up": change.log_gain > 0,
+                "window": person % 2 == 0,
+                "score": score[0, after].max(),
+                "named": bool((session["kind"][after] != "").any()),
+                "sure": bool((session["share"][after] >= 0.9).any()),
+                "too soon": bool((session["kind"][first] != "").any()),
+            }
+        )
+    if not rows:
+        return pd.DataFrame({"steps": [], "n": []})
+    table = pd.DataFrame(rows)
+    threshold = float(np.quantile(np.concatenate(still), 1.0 - FALSE_ALARMS))
+    table["detector"] = table.pop("score") >= threshold
+    table["named of detected"] = table["named"].where(table["detector"])
+    groups = [("all", table)]
+    for column, names in (("up", ("down", "up")), ("window", ("without a window", "with a window"))):
+        groups += [(names[int(value)], part) for value, part in table.groupby(column)]
+    columns = ["detector", "named", "sure", "named of detected", "too soon"]
+    return pd.DataFrame(
+        [{"steps": name, "n": len(part)} | dict(part[columns].astype(float).mean()) for name, part in groups]
+    )
+
+
+def _without(named: pd.DataFrame) -> pd.DataFrame:
+    """In how many sessions without a step of the amplitudes one is named after any trial."""
+    steps = named.assign(
+        named=named["kind"].isin(("amplitudes", "intensity")),
+        sure=named["kind"].isin(("amplitudes", "intensity")) & (named["share"] >= 0.9),
+        enhancement=named["kind"] == "enhancement",
+    )
+    columns = ["named", "sure", "enhancement"]
+    any_trial = steps.groupby(["cohort", "seed", "person"])[columns].any().groupby("cohort")
+    last = steps[steps["trial"] == steps["trial"].max()].groupby("cohort")[columns].mean().add_suffix(" at the end")
+    return any_trial.mean().join(last).assign(n=any_trial.size()).reset_index()
+
+
+if __name__ == "__main__":
+    understood("steps")
+    app()
