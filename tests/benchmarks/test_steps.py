@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks import steps
+from isiw.design import VALVE_SPACE
 from isiw.studies.sessions import SimulatedSession
 from isiw.subjects.changes import Change
 
@@ -20,8 +21,10 @@ def test_the_detector_adds_up_what_speaks_for_a_step_and_forgets_what_speaks_aga
 def test_the_detector_is_for_the_step_after_it_and_against_it_before() -> None:
     usual = SimulatedSession("default", "step", 0, 1, 60, (60,)).subject()
     person = replace(usual, change=Change(21, 21, log_gain=np.log(6.0)))
-    start_ms = usual.hit_delay_ms + usual.profile.start_ms
-    isis_ms, responder = np.linspace(start_ms + 20.0, start_ms + 60.0, 40), person.begin(3)
+    window = usual.window(VALVE_SPACE)
+    assert window is not None
+    middle_ms = 0.5 * (window.start_ms + window.end_ms)
+    isis_ms, responder = np.linspace(middle_ms - 10.0, middle_ms + 10.0, 40), person.begin(3)
     meps_mv = np.array([[responder.respond(float(isi), "valve").mep_mv for isi in isis_ms]])
     ratios = steps.log_ratios(person, isis_ms, meps_mv, np.random.default_rng(1))[0]
     assert ratios[:20].mean() < 0 < ratios[20:].mean()

@@ -44,4 +44,3 @@ class Place(Checked):
         if self.reference != "valve" or self.hit_delay_ms is None or hit_delay_ms is None:
             return True
         return abs(self.hit_delay_ms[0] - hit_delay_ms[0]) <= MOST_APART_MS
-
