@@ -2,24 +2,32 @@
 
 from __future__ import annotations
 
+import math
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from isiw.design import DesignSpace
+from isiw.devices.callback import CallbackDevice
+from isiw.devices.protocol import DeviceInfo
+from isiw.session.loop import Session
 from isiw.signals import judge
+from isiw.strategy.catalogue import make_strategy
 from isiw.trials import Channel, Status, Stimulus, Sweep, Trial
+from known import known
 
 SPACE = DesignSpace(0, 320, reference="impact")
 
 
-def emg_of(rate_hz: float, before_ms: float, after_ms: float, seed: int = 0) -> Channel:
-    """EMG at rest with an MEP of 0.1 mV at 20 to 30 ms after the pulse, which is at 0 ms."""
+def emg_of(rate_hz: float, before_ms: float, after_ms: float, seed: int = 0, mep_mv: float = 0.1) -> Channel:
+    """EMG at rest with an MEP at 20 to 30 ms after the pulse, which is at 0 ms."""
     since_ms = np.arange(max(2, round((before_ms + after_ms) * rate_hz / 1000))) * 1000 / rate_hz - before_ms
-    mep_mv = 0.05 * np.where((since_ms > 20) & (since_ms < 30), np.sin((since_ms - 20) * np.pi / 5), 0)
+    evoked_mv = mep_mv / 2 * np.where((since_ms > 20) & (since_ms < 30), np.sin((since_ms - 20) * np.pi / 5), 0)
     noise_mv = 0.003 * np.random.default_rng(seed).standard_normal(since_ms.size)
-    return Channel(mep_mv + noise_mv, rate_hz, "mV", t0_ms=-before_ms)
+    return Channel(evoked_mv + noise_mv, rate_hz, "mV", t0_ms=-before_ms)
 
 
 def judged(sweep: Sweep, isi_ms: float | None) -> Trial:
@@ -57,3 +65,17 @@ def test_no_sweep_raises(
 
 def test_a_window_that_begins_a_part_of_a_sample_before_the_sweep_is_no_error() -> None:
     assert judged(Sweep({"emg": emg_of(600.0, -15.1, 100.0)}, t_tms_ms=0.0), None).status is Status.MISTRIAL
+
+
+@pytest.mark.parametrize("rate_hz", [1024.0, 3003.003, 4370.0])
+def test_a_session_with_just_enough_rest_at_some_isi_runs_to_its_end(rate_hz: float, tmp_path: Path) -> None:
+    def fired(stimulus: Stimulus, _: float) -> Sweep:
+        size = math.exp(0.6 * np.random.default_rng(stimulus.trial).standard_normal())
+        emg = emg_of(rate_hz, 100.0, 100.0, stimulus.trial, mep_mv=0.1 * size)
+        return Sweep({"emg": emg}, t_tms_ms=0.0, t_hit_ms=-known(stimulus.isi_ms))
+
+    rig = CallbackDevice(fired, DeviceInfo("own", "impact", channels={"emg": "mV"}, simulated=True))
+    strategy = make_strategy("even", space=DesignSpace(20, 90, step_ms=10, reference="impact"), max_trials=8)
+    result = Session(rig, strategy, log=tmp_path / "s.mcap").run(progress=False)
+    assert result.decision.stop
+    assert [trial.status for trial in result.trials] == [Status.ACCEPTED] * 8

@@ -1,0 +1,31 @@
+"""A hand muscle above its threshold: its MEPs vary much, and do not depend on the ISI."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from isiw.design import DesignSpace
+from isiw.strategy.catalogue import make_strategy
+from known import known
+
+SPACE = DesignSpace(0, 320, reference="impact")
+
+
+def mep_mv(drive_pct: float, rng: np.random.Generator) -> float:
+    """An MEP on a recruitment curve of 1 mV, at an intensity that is so far from the curve's middle."""
+    share = 1 / (1 + np.exp(-0.23 * (drive_pct + 7.2 * rng.standard_normal())))
+    return float(share * np.exp(0.4 * rng.standard_normal()) + 0.009 * np.exp(0.2 * rng.standard_normal()))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("drive_pct", [-7.0, -17.0])
+def test_hardly_anybody_with_a_flat_hand_muscle_gets_a_sure_window(drive_pct: float) -> None:
+    sure = 0
+    for seed in range(8):
+        rng, strategy = np.random.default_rng(seed), make_strategy(space=SPACE, seed=seed, max_trials=40)
+        while not strategy.decision().stop:
+            alone = seed % 2 and strategy.delivered % 10 == 9
+            strategy.tell(None if alone else strategy.ask(), mep_mv(drive_pct, rng))
+        sure += known(strategy.estimate().probability) >= 0.9
+    assert sure <= 1
