@@ -125,6 +125,13 @@ def test_the_isis_that_would_show_what_is_not_known_within_a_window_are_longer_t
     assert rig.taps.shown_from_ms(window, trials) is None
 
 
+def test_what_comes_after_all_responses_to_a_tap_is_known_to_have_none() -> None:
+    rig = TapRig(reflex(0.3))
+    trials = TrialTable(tuple(rig.trials([136.0, 150.0, 170.0])))
+    assert [trial.tap_mv for trial in trials] == [0.0] * 3
+    assert rig.taps.shown_from_ms(Window(100.0, 200.0), trials) is None
+
+
 @pytest.mark.parametrize("isi_ms", [0.0, 1.0, 3.0, 15.0])
 def test_an_electrical_pulse_is_known_by_its_own_times_and_nothing_is_blanked_for_a_tap(isi_ms: float) -> None:
     shock = TapResponse(-0.5, 12.0, 1.0, 0.1)  # its artefact and M-wave, over before any MEP

@@ -20,7 +20,7 @@ from isiw.visit import PAIRS_FIRST
 KNOWN: Final = "What the first stimulus alone does to the EMG is known now, and was subtracted."
 LONGER: Final = "A longer ISI shows what the first stimulus alone does to the EMG, which may be what is larger so far."
 
-LEAST_PROBABILITY: Final = 0.8
+LEAST_PROBABILITY: Final = 0.9
 """A window that is as probable as this should not be the first stimulus's own response."""
 
 

@@ -66,10 +66,11 @@ class _Shown(NamedTuple):
 
 
 class _MepWindow(NamedTuple):
-    """The EMG in a trial's MEP window, its times after the hit, and how many sweeps its amplitude rests on."""
+    """A trial's MEP window: its EMG, its times after the hit, when responses end, and how many sweeps it rests on."""
 
     emg_mv: FloatArray
     since_hit_ms: FloatArray
+    over_ms: float
     told_by: int = 0
 
 
@@ -109,7 +110,8 @@ class TapResponses:
         if trial.mep_mv is not None and trial.t_tms_ms is not None:
             first, last = (trial.t_tms_ms + edge for edge in self.mep_window_ms)
             within = (times_ms >= first - 1e-6) & (times_ms <= last + 1e-6)
-            windows[trial.index] = _MepWindow(values[within], times_ms[within] - hit_ms)
+            over_ms = float(GRID_MS[-1]) if trial.t_hit_ms is None else TAP_MS
+            windows[trial.index] = _MepWindow(values[within], times_ms[within] - hit_ms, over_ms)
         return replace(self, shown=shown, windows=windows)
 
     def _size_mv(self, resting_mv: FloatArray, rate_hz: float) -> float:
@@ -121,7 +123,7 @@ class TapResponses:
     def measured(self, trial: Trial) -> Trial:
         """The trial with its amplitude without the tap's response, as far as that is known; else as it is."""
         window = self.windows.get(trial.index)
-        left = None if window is None else self._left(window.since_hit_ms)
+        left = None if window is None else self._left(window)
         if window is None or left is None or trial.mep_mv is None:
             return trial
         mep_mv = float(np.ptp(window.emg_mv - self._mean(window.since_hit_ms))) if left.mean_mv else trial.mep_mv
@@ -130,8 +132,9 @@ class TapResponses:
     def without(self, emg_mv: FloatArray, since_hit_ms: FloatArray) -> FloatArray:
         """Some EMG without the mean course, as far as it is known [mV], shape (w,)."""
         courses = np.array([one.course_mv for one in self.shown]).reshape(-1, GRID_MS.size)
-        count = np.isfinite(courses).sum(axis=0)
-        mean_mv = np.where(count >= LEAST_SHOWN, np.nansum(courses, axis=0) / np.maximum(count, 1), 0.0)
+        are_shown = (self._spans_ms[:, :1] <= GRID_MS) & (self._spans_ms[:, 1:] >= GRID_MS)
+        count = are_shown.sum(axis=0)
+        mean_mv = np.where(count >= LEAST_SHOWN, (courses * are_shown).sum(axis=0) / np.maximum(count, 1), 0.0)
         return np.asarray(emg_mv - np.interp(since_hit_ms, GRID_MS, mean_mv, left=0.0, right=0.0))
 
     def corrected(self, trials: Iterable[Trial]) -> tuple[TapResponses, list[Trial]]:
@@ -141,7 +144,7 @@ class TapResponses:
             window = windows.get(trial.index)
             if window is None or self._count(window.since_hit_ms) < 2 * window.told_by:
                 continue
-            left = self._left(window.since_hit_ms)
+            left = self._left(window)
             if left is None or left.shown < 2 * window.told_by:
                 continue
             windows[trial.index] = window._replace(told_by=left.shown)
@@ -155,8 +158,8 @@ class TapResponses:
         if window is None or any(trial.tap_alone for trial in trials.trials[-TAP_EVERY + 1 :]):
             return False
         inside = (trial.index for trial in trials.told if trial.isi_ms is not None and _inside(window, trial.isi_ms))
-        times_ms = (self.windows[number].since_hit_ms for number in inside if number in self.windows)
-        lefts = (self._left(each_ms) for each_ms in times_ms if self._count(each_ms) < ENOUGH_SHOWN)
+        own = (self.windows[number] for number in inside if number in self.windows)
+        lefts = (self._left(each) for each in own if self._count(each.since_hit_ms) < ENOUGH_SHOWN)
         return any(left is None or left.mean_mv > 0 for left in lefts)
 
     def shown_from_ms(self, window: Window | None, trials: TrialTable) -> float | None:
@@ -168,7 +171,7 @@ class TapResponses:
             trial.isi_ms
             for trial in trials.told
             if window is not None and trial.isi_ms is not None and _inside(window, trial.isi_ms)
-            if (own := self.windows.get(trial.index)) is not None and not self._is_known(own.since_hit_ms)
+            if (own := self.windows.get(trial.index)) is not None and not self._is_known(own)
         ]
         if not unknown_ms:
             return None
@@ -193,11 +196,12 @@ class TapResponses:
         """How many sweeps show some times."""
         return int(self._which(since_hit_ms)[1].sum())
 
-    def _is_known(self, since_hit_ms: FloatArray) -> bool:
-        """Whether enough sweeps show what the tap does at some times, or these lie outside the response."""
-        if _is_outside(since_hit_ms):
+    def _is_known(self, window: _MepWindow) -> bool:
+        """Whether enough sweeps show what the tap does in a trial's MEP window, or that is outside the response."""
+        if _is_outside(window):
             return True
-        return self._count(since_hit_ms) >= LEAST_SHOWN and not all(math.isnan(one.rest_mv) for one in self.shown)
+        enough = self._count(window.since_hit_ms) >= LEAST_SHOWN
+        return enough and not all(math.isnan(one.rest_mv) for one in self.shown)
 
     def _covering(self, since_hit_ms: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The courses that show some times, as far as a response lasts, shape (k, t), and what they have at rest."""
@@ -212,13 +216,13 @@ class TapResponses:
         mean = self._covering(since_hit_ms)[0].mean(axis=0)
         return np.asarray(np.interp(since_hit_ms, GRID_MS[meets], mean))
 
-    def _left(self, since_hit_ms: FloatArray) -> Left | None:
-        """What subtracting the mean course leaves of the response at some times after the hit; None where unknown."""
-        if _is_outside(since_hit_ms):
+    def _left(self, window: _MepWindow) -> Left | None:
+        """What subtracting the mean course leaves of the response in a trial's MEP window; None where unknown."""
+        if _is_outside(window):
             return Left(0.0, 0.0, LEAST_SHOWN)
-        if not self._is_known(since_hit_ms):
+        if not self._is_known(window):
             return None
-        waves, rests = self._covering(since_hit_ms)
+        waves, rests = self._covering(window.since_hit_ms)
         count = len(waves)
         if np.isnan(rests).all():
             rests = np.array([one.rest_mv for one in self.shown])
@@ -232,9 +236,9 @@ class TapResponses:
         return Left(max(excess, whole * mean_share), max(float(apart.std()), whole * sd_share), count)
 
 
-def _is_outside(since_hit_ms: FloatArray) -> bool:
-    """Whether the tap does nothing at some times after the hit: they are before it, or long after it."""
-    return bool(since_hit_ms[-1] < 0 or since_hit_ms[0] > GRID_MS[-1])
+def _is_outside(window: _MepWindow) -> bool:
+    """Whether the tap does nothing in a trial's MEP window: it is before the hit, or long after it."""
+    return bool(window.since_hit_ms[-1] < 0 or window.since_hit_ms[0] > window.over_ms)
 
 
 def _left_of_varying_size(waves: FloatArray, mean: FloatArray) -> tuple[float, float]:
