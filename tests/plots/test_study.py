@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -113,6 +114,14 @@ def test_a_picture_as_vector_graphics_is_the_same_each_time(tmp_path: Path) -> N
     first, second = (save_study_plot(table("wide"), tmp_path / f"{k}.svg").read_bytes() for k in range(2))
     assert first == second
     assert b"<svg" in first
+
+
+def test_vector_graphics_are_dark_in_a_dark_viewer_and_so_are_those_of_the_first_page(tmp_path: Path) -> None:
+    made = save_study_plot(table("wide"), tmp_path / "study.svg").read_text("utf-8")
+    images = Path(__file__).parents[2] / "docs" / "images"
+    for drawn in (made, *((images / f"{name}.svg").read_text("utf-8") for name in ("session", "results"))):
+        (dark,) = re.findall(r"<style>@media \(prefers-color-scheme: dark\) (.*?)</style>", drawn)
+        assert '[style*="fill: #ffffff"] { fill: #15181b !important }' in dark
 
 
 def test_latency_has_the_times_of_ask_and_tell() -> None:

@@ -64,6 +64,15 @@ PAGE_COLOURS: Final[Mapping[str, str]] = MappingProxyType(
 )
 """By what is drawn, the name of the page's own colour (the CSS variable `--ink` and so on)."""
 
+_DARK = {"#ffffff": "#15181b", INK: "#e6e8ea", "#000000": "#e6e8ea", FAINT: "#9ba3aa", BLUE: "#2a8ad4"}
+_DARK_RULES = " ".join(
+    f'[style*="{part}: {light}"] {{ {part}: {dark} !important }}'
+    for light, dark in _DARK.items()
+    for part in ("fill", "stroke")
+)
+_DARK_STYLE = f"<style>@media (prefers-color-scheme: dark) {{ svg {{ fill: {_DARK['#000000']} }} {_DARK_RULES} }}</style>"
+"""Gives an SVG file a dark scheme, which viewers choose by themselves; a page has colours of its own."""
+
 
 def strategy_colours(names: Sequence[str]) -> dict[str, str]:
     """A colour for each strategy: its own where it has one, otherwise one that no other of them has."""
@@ -122,7 +131,10 @@ def save_figure(figure: Figure, path: str | Path, *, overwrite: bool = False) ->
     picture = io.BytesIO()
     with mpl.rc_context({"svg.hashsalt": "isiw"}):  # so that the same picture is the same file
         figure.savefig(picture, dpi=200, format=suffix, metadata={"Date": None} if suffix == "svg" else None)
-    return write_output(target, picture.getvalue(), overwrite=overwrite)
+    data = picture.getvalue()
+    if suffix == "svg":
+        data = data.replace(b"</metadata>", f"</metadata>{_DARK_STYLE}".encode(), 1)
+    return write_output(target, data, overwrite=overwrite)
 
 
 def inline_svg(figure: Figure, name: str) -> str:
