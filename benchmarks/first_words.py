@@ -75,7 +75,11 @@ COMMANDS = (
     "run mine/session.toml --log mine.mcap",
     "prior learn a.mcap robot.mcap -o lab.toml --again",
     "prior show lab.toml -o lab.png",
+    "analyse data.csv --reference impact -o data.mcap",
+    "replay data.csv --reference impact --seeds 1 --trials 6",
     "study run study.toml --workers 1",
+    "study summary study.study",
+    "study replay study.study 0",
     "serve served --port 0",
 )
 """In an order in which each has what it needs."""
@@ -135,6 +139,8 @@ def prepared(folder: Path, trials: int) -> None:
     robot = f'[device]\nkind = "tapper"\n[subject]\ncohort = "gaussian"\n{CONFIG.format(trials=trials // 3)}'
     (folder / "robot.toml").write_text(robot)
     (folder / "study.toml").write_text(STUDY)
+    rows = [f"{isi_ms},{0.3 if 80 <= isi_ms <= 160 else 0.02}" for isi_ms in range(0, 200, 10)]
+    (folder / "data.csv").write_text("\n".join(["isi_ms,mep_mv", *rows]))
 
 
 def row(command: str, found: Heard) -> str:

@@ -1,6 +1,6 @@
 // What themes and notebooks leave out for those who use a keyboard or a screen reader.
 function makeFocusable() {
-  for (const part of document.querySelectorAll(".table-wrapper, pre, .output, .sidebar-scroll, .toc-scroll")) {
+  for (const part of document.querySelectorAll(".table-wrapper, pre, .output, .cell_output, article p:has(> img), .sidebar-scroll, .toc-scroll")) {
     if (part.scrollWidth > part.clientWidth || part.scrollHeight > part.clientHeight) {
       part.tabIndex = 0;
     }

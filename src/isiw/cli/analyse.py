@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,8 +11,18 @@ from rich.console import Console
 from rich.progress import Progress
 
 import isiw
-from isiw.cli.console import LOGS, NO_DEFAULT, STUDIES, Overwrite, errors_reported, free_beside, show
-from isiw.text.sanitize import command
+from isiw.cli.console import (
+    LOGS,
+    NO_DEFAULT,
+    STUDIES,
+    Overwrite,
+    errors_reported,
+    free_beside,
+    show,
+    ticking,
+    working,
+)
+from isiw.text.sanitize import command, counted
 
 if TYPE_CHECKING:
     from isiw.existing.batch import Person, Way
@@ -76,7 +87,9 @@ def analyse(  # noqa: PLR0913, PLR0917 - an option each
         )
         settings = isiw.config.load_config(config).with_overrides(strategy=strategy, seed=seed)
         way = isiw.existing.way_of(settings, read, simulated=simulated)
-        _analyse_all(isiw.existing.read_files(files, way, output, only), way, files[0])
+        with working(f"Reading {counted(len(files), 'file')}"):
+            people = isiw.existing.read_files(files, way, output, only)
+        _analyse_all(people, way, files[0])
 
 
 @app.command(rich_help_panel=STUDIES)
@@ -103,13 +116,15 @@ def replay(  # noqa: PLR0913, PLR0917 - an option each
             units=tuple(unit or ()),
             sheet=sheet,
         )
-        found = isiw.existing.read_files([file], isiw.existing.Way(read), only=only)
+        with working(f"Reading {file.name}"):
+            found = isiw.existing.read_files([file], isiw.existing.Way(read), only=only)
         if len(found) > 1:
             people = isiw.existing.told_people([one.delivered for one in found])
             raise isiw.errors.ConfigError("a replay is of one person", got=people, remedy="Say whose: --only CODE.")
         names = strategy or ["default"]
-        with Progress(console=Console(stderr=True)) as progress:
-            task = progress.add_task("runs", total=seeds * len(names))
+        progress = Progress(console=Console(stderr=True))
+        task = progress.add_task("runs", total=seeds * len(names))
+        with progress, ticking(lambda: f"{progress.tasks[0].completed:.0f} of {counted(seeds * len(names), 'run')}"):
             replayed = isiw.existing.replay(
                 found[0].delivered, names, seeds=seeds, trials=trials, on_done=lambda: progress.advance(task)
             )
@@ -134,7 +149,8 @@ def _analyse_one(person: Person, way: Way, source: Path, *, several: bool) -> No
         if not person.log.with_suffix(".png").exists():  # interrupted between the two
             isiw.plots.save_session_plot(isiw.read_session(person.log), person.log.with_suffix(".png"))
         return
-    analysis = isiw.existing.analyse_person(person, way)
+    with nullcontext() if several else working(f"Analysing {counted(len(person.delivered.trials), 'trial')}"):
+        analysis = isiw.existing.analyse_person(person, way)
     show(f"{name}{analysis}", style=None if several else "bold")
     if person.log is not None:
         show(f"log:     {person.log}")

@@ -8,7 +8,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -63,21 +63,50 @@ def show_entry(heading: str, text: str) -> None:
 
 
 @contextmanager
+def ticking(said: Callable[[], str]) -> Iterator[None]:
+    """Within, a pipe gets a line after a second, and then ever less often: nobody takes a silent command for dead."""
+    begun_s, ended = time.monotonic(), threading.Event()
+
+    def tick() -> None:
+        with suppress(OSError):  # nobody reads any more
+            while not ended.wait(max(_SILENT_S, (time.monotonic() - begun_s) / 4)):
+                show(said(), stderr=True)
+
+    thread = threading.Thread(target=tick, daemon=True)
+    if not Console(stderr=True).is_terminal:
+        thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        if thread.ident is not None:
+            thread.join()
+
+
+@contextmanager
+def working(doing: str, *, stderr: bool = True) -> Iterator[Callable[[str], None]]:
+    """Print what is done; within, nothing else is printed, and a terminal or pipe shows how far it is."""
+    begun_s, far = time.monotonic(), ""
+    show(f"{doing} …", stderr=stderr)
+    with Console(stderr=True).status("") as status:
+
+        def note(said: str) -> None:
+            nonlocal far
+            far = said
+            status.update(said)
+
+        with ticking(lambda: far or f"{doing}: {time.monotonic() - begun_s:.0f} s"):
+            yield note
+
+
+@contextmanager
 def counting(doing: str, number: int, thing: str) -> Iterator[Callable[[int], None]]:
-    """Print what is done with how many things; within, a terminal counts them, and a pipe gets a line now and then."""
-    if number:
-        show(f"{doing} {counted(number, thing)} …")
-    console, said_s = Console(stderr=True), time.monotonic()
-    with console.status("") as status:
-
-        def count(done: int) -> None:
-            nonlocal said_s
-            status.update(f"{done} of {number}")
-            if not console.is_terminal and time.monotonic() - said_s > _SILENT_S:
-                said_s = time.monotonic()
-                show(f"{done} of {number}")
-
-        yield count
+    """Print what is done with how many things, and within how many are done; nothing of none."""
+    if not number:
+        yield lambda _done: None
+        return
+    with working(f"{doing} {counted(number, thing)}", stderr=False) as note:
+        yield lambda done: note(f"{done} of {number}")
 
 
 def exit_if_damaged(losses: Sequence[str]) -> None:

@@ -20,6 +20,7 @@ from isiw.cli.console import (
     say_unread,
     show,
     show_paragraph,
+    working,
 )
 from isiw.text.sanitize import command, counted
 
@@ -102,11 +103,12 @@ def _save(
 ) -> None:
     """Save what is made of a log, beside it where nobody gave a place, and say where it is."""
     record = isiw.read_session(log)
-    show(f"Drawing {record.path.name} …", stderr=True)
     say_unread(record)
-    truth = isiw.config.truth_of(record)
     target = output or free_beside(record.path, suffix)
-    show(f"{what}: {save(record, target, truth=truth.window, overwrite=overwrite)}")
+    with working(f"Drawing {record.path.name}"):
+        truth = isiw.config.truth_of(record)
+        saved = save(record, target, truth=truth.window, overwrite=overwrite)
+    show(f"{what}: {saved}")
     if truth.lacking:
         show(f"Drawn without it: {truth.lacking}", style="yellow")
     exit_if_damaged(record.losses)
@@ -188,11 +190,12 @@ def compare(
 ) -> None:
     """Compare the windows of sessions: of one person on several days, or of several people."""
     with errors_reported():
-        records = [isiw.read_session(log) for log in logs]
+        with working(f"Comparing {counted(len(logs), 'session')}"):
+            records = [isiw.read_session(log) for log in logs]
+            table, differences = isiw.report.comparison_table(records), isiw.priors.differences(records)
         for record in records:
             say_unread(record)
-        show(isiw.report.comparison_table(records))
-        differences = isiw.priors.differences(records)
+        show(table)
         for difference in differences:
             show(isiw.report.comparison_sentence(difference), style="bold")
         if output is not None and output.suffix.lower() == ".html":

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import isiw
-from isiw.cli.console import NO_DEFAULT, Overwrite, counting, errors_reported, exit_if_damaged, show
+from isiw.cli.console import NO_DEFAULT, Overwrite, counting, errors_reported, exit_if_damaged, show, working
 from isiw.text.sanitize import command, counted
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from isiw.log.reader import SessionRecord
     from isiw.priors import LabPrior
 
@@ -41,7 +43,7 @@ def learn(
 
             lab = isiw.priors.learn(logs, again=again, damaged=damaged, seed=seed, on_done=note)
         isiw.priors.write_lab_prior(lab, output, overwrite=overwrite)
-        _print(lab)
+        _print(lab, isiw.priors.compared(lab))
         if imported := [record.path.name for record in done if record.header.imported]:
             show(isiw.session.imported_sentence(imported))
         show(f"prior: {output}")
@@ -58,14 +60,16 @@ def show_prior(
     """Show what a lab's people are like, compared with the built-in prior."""
     with errors_reported():
         lab = isiw.priors.read_lab_prior(source)
-        show(f"Comparing {source.name} with the built-in prior …", stderr=True)
-        _print(lab)
+        with working(f"Comparing {source.name} with the built-in prior"):
+            table = isiw.priors.compared(lab)
+        _print(lab, table)
         if output is not None:
-            picture = isiw.plots.save_prior_plot(isiw.priors.densities(lab), output, overwrite=overwrite)
+            with working(f"Drawing {source.name}"):
+                picture = isiw.plots.save_prior_plot(isiw.priors.densities(lab), output, overwrite=overwrite)
             show(f"picture: {picture}")
 
 
-def _print(lab: LabPrior) -> None:
-    show(isiw.priors.compared(lab).to_string(float_format=lambda value: f"{value:.3g}", na_rep=""))
+def _print(lab: LabPrior, table: pd.DataFrame) -> None:
+    show(table.to_string(float_format=lambda value: f"{value:.3g}", na_rep=""))
     trials = counted(sum(session.trials for session in lab.sessions), "trial")
     show(f"Learnt from {counted(len(lab.sessions), 'session')} with {trials}.", style="bold")

@@ -13,9 +13,9 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 import isiw
-from isiw.cli.console import NO_DEFAULT, errors_reported, show
+from isiw.cli.console import NO_DEFAULT, errors_reported, show, ticking, working
 from isiw.text import plain
-from isiw.text.sanitize import command, read_whole
+from isiw.text.sanitize import command, counted, read_whole
 
 if TYPE_CHECKING:
     from isiw.studies import Store, Unit
@@ -45,13 +45,14 @@ def run(
 ) -> None:
     """Run a study, or what is left of it. The exit code is 1 if sessions failed."""
     with errors_reported():
-        show(f"Running the study of {source} …", stderr=True)
-        studies, store = isiw.studies, _store(source, out)
+        with working(f"Running the study of {source}"):
+            studies, store = isiw.studies, _store(source, out)
+            left = store.left(retry=retry)
         folder = store.folder
         processes = (os.cpu_count() or 1) if workers is None else workers
         executor = studies.DaskCluster(scheduler) if scheduler else studies.Processes(processes)
         kept = f"Interrupted. All that is finished is kept; continue with: {command('study', 'run', folder)}"
-        with errors_reported(kept), _bar(store.left(retry=retry)) as on_done:
+        with errors_reported(kept), _bar(left) as on_done:
             studies.conduct(store.study, folder, executor, retry=retry, on_done=on_done)
         _say_what_is_there(store)
         if len(store.errors()):
@@ -69,10 +70,12 @@ def replay(
 ) -> None:
     """Run one session of a study again, alone, and say whether the result is the same."""
     with errors_reported():
-        store = isiw.studies.open_store(folder) if study is None else _store(study, folder)
+        with working(f"Opening {folder}"):
+            store = isiw.studies.open_store(folder) if study is None else _store(study, folder)
         if (row := read_whole(key)) is not None:
             key, person = isiw.studies.unit_of_row(store, row)
-        result = isiw.studies.replay(store, key, person)
+        with working(f"Running {key} again"):
+            result = isiw.studies.replay(store, key, person)
         show(result.again.T.to_string(header=False))
         if result.differing:
             show(f"{key} is not what it was: {', '.join(result.differing)} differ.", style="red", stderr=True)
@@ -90,8 +93,10 @@ def summary(
 ) -> None:
     """Print the mean F1 and the paired differences of a study, and write its tables and pictures into the folder."""
     with errors_reported():
-        store = isiw.studies.open_store(folder)
-        if not len(rows := store.rows()):
+        with working(f"Summarising {folder}"):
+            store = isiw.studies.open_store(folder)
+            rows = store.rows()
+        if not len(rows):
             _say_what_is_there(store)
             raise typer.Exit(1)
         table, compared = isiw.studies.summarise(rows, store.errors()), None
@@ -105,7 +110,9 @@ def summary(
             show(f"table:   {folder / f'{name}.csv'}")
         for name in isiw.plots.STUDY_PICTURES:
             target = folder / f"summary_{name}.svg"
-            show(f"picture: {isiw.plots.save_study_plot(table, target, picture=name, overwrite=True)}")
+            with working(f"Drawing {target.name}"):
+                isiw.plots.save_study_plot(table, target, picture=name, overwrite=True)
+            show(f"picture: {target}")
 
 
 def _store(source: Path, out: Path | None) -> Store:
@@ -127,7 +134,8 @@ def _bar(left: list[Unit]) -> Iterator[Callable[[Unit, Any], None]]:
         return
     rate, people = TextColumn("{task.fields[rate]}"), sum(len(unit.sessions) for unit in left)
     columns = (TextColumn("sessions"), BarColumn(), MofNCompleteColumn(), rate, TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True)) as progress:
+    progress = Progress(*columns, console=Console(stderr=True))
+    with progress, ticking(lambda: f"{progress.tasks[0].completed:.0f} of {counted(people, 'session')}"):
         task = progress.add_task("sessions", total=people, rate="")
 
         def on_done(unit: Unit, result: Any) -> None:
