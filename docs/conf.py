@@ -44,6 +44,7 @@ myst_heading_anchors = 6
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
 autodoc_preserve_defaults = True
+autodoc_type_aliases = {name: name for name in ("ArrayLike", "FloatArray", "IntArray", "BoolArray")}
 python_use_unqualified_type_names = True
 napoleon_google_docstring = True
 napoleon_use_rtype = False

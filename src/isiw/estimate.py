@@ -198,7 +198,7 @@ class WindowEstimate(Checked):
 
     @property
     def too_little(self) -> str | None:
-        """What is said where too little was measured to speak of a window; None where enough was."""
+        """A sentence if too little was measured to report a window; None if enough was."""
         found = lacking(self.pairs, silent=self.silent)
         return None if found is None else f"{found}"
 

@@ -152,7 +152,7 @@ class Sweep(Checked):
 
 @dataclass(frozen=True)
 class Measurement(Checked):
-    """What a device reports that measures the MEP itself.
+    """The outcome reported by a device that measures the MEP itself.
 
     Args:
         mep_mv: peak-to-peak amplitude of the MEP [mV]; 0 means below the detection limit.
@@ -309,7 +309,7 @@ class TrialTable:
         return self.counted(TAP)
 
     def counted(self, first: StimulusWords) -> str:
-        """How many trials there are, and of which kinds.
+        """Number of trials, and of each kind.
 
         Args:
             first: what the conditioning stimulus is called.

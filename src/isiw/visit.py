@@ -42,7 +42,7 @@ class Control(StrEnum):
 
 @dataclass(frozen=True)
 class Visit(Checked):
-    """What is noted about a visit, for whoever reads its log.
+    """Notes about a visit, for readers of its log.
 
     Args:
         day: the number of the person's visit, from 1; None if it is not noted.
@@ -86,7 +86,7 @@ PAIRS_FIRST: Final = 4
 
 @dataclass(frozen=True)
 class VisitProtocol(Checked):
-    """How the stimuli of a session follow each other, within its limits.
+    """The schedule of a session's stimuli, within its limits.
 
     What is random depends on the seed and the trial's number alone, so that a resumed session goes on as planned.
 
@@ -153,7 +153,7 @@ class VisitProtocol(Checked):
         return self.block_trials is not None and trial > 0 and trial % self.block_trials == 0
 
     def interval_s(self, trial: int, seed: int) -> float:
-        """How long after the trial before this one comes at the earliest [s].
+        """Shortest interval between the trial before and this one [s].
 
         Args:
             trial: its number.
@@ -165,7 +165,7 @@ class VisitProtocol(Checked):
         return max(rest_s, float(_draws(seed, trial, _ITI_DRAWS).uniform(*self.iti_s)))
 
     def stimuli_for(self, pairs: int) -> int:
-        """How many stimuli so many pairs take at most, their control trials among them.
+        """Largest number of stimuli for a number of pairs, control trials included.
 
         Args:
             pairs: how many pairs.

@@ -75,7 +75,7 @@ def run_of_log(record: SessionRecord) -> _LoggedRun:
 
 
 def truth_of(record: SessionRecord) -> Truth:
-    """What a log says of the true window of a simulated person."""
+    """The true window of a simulated person, from a log."""
     if RUN_KEY not in record.header.config:
         return Truth()
     try:
@@ -164,7 +164,7 @@ def changes_on_resume(config: RunConfig, record: SessionRecord) -> dict[str, Any
 
 
 def differences_on_resume(config: RunConfig, record: SessionRecord) -> tuple[str, ...]:
-    """What the file says otherwise than the log, in words: what changes, and what a session does not change on its way.
+    """The differences between the file and the log, in words: what changes, and what a session keeps.
 
     Of limits, signals and time-out, which change, and of strategy, protocol and visit, which do not.
 
@@ -289,7 +289,7 @@ def _is_over(log: Path) -> bool:
 
 
 def after_end(session: Session, config: Path | None, *, delivered: bool) -> str | None:
-    """How more can be delivered to the same person after a session is over; None where nobody has asked for that.
+    """The way to deliver more to the same person after a session is over; None if nobody has asked for that.
 
     Args:
         session: the session, after a decision that stops.

@@ -111,7 +111,7 @@ class RunConfig(Section):
 
     @property
     def timeout_s(self) -> float:
-        """How long the device may take for one delivery [s]."""
+        """Longest time that the device may take for one delivery [s]."""
         return self.device.timeout_s if self.device else TIMEOUT_S
 
     def with_overrides(  # noqa: PLR0913 - an option of the command line each, all keyword-only
@@ -219,5 +219,5 @@ def _validated(values: Mapping[str, Any], source: str) -> RunConfig:
 
 
 def limits_for(config: RunConfig) -> Limits:
-    """What may be delivered: the ISIs of the space, within the section on limits."""
+    """The limits of a session: the ISIs of the space, within the section on limits."""
     return dataclasses.replace(Limits.of_space(config.space.design()), **config.limits.model_dump())

@@ -198,7 +198,7 @@ class DeviceConfig(Section):
 
     Args:
         factory: the function that makes the device, as `module:function`.
-        kind: the simulated robot.
+        kind: a simulated robot, `tapper` or `rotating-tapper`.
         settings: keyword arguments of the factory, or settings of the robot.
         folder: where the factory's module is; by default beside the configuration.
         timeout_s: the longest time that one delivery may take [s].

@@ -199,7 +199,7 @@ def fresh_log_path(config: RunConfig) -> Path:
 
 
 def assumed_space(config: RunConfig) -> str | None:
-    """What to say where a new session has the design space that nobody has named; None where it has another."""
+    """A sentence if a new session has the default design space; None if it has another."""
     if config.space_named or config.own_rig:
         return None
     return f"No [space] is given, so ISIs are {config.space.design()}."

@@ -34,7 +34,7 @@ class CallbackDevice:
         self._staged = False
 
     def describe(self) -> DeviceInfo:
-        """What the device is."""
+        """The device's description."""
         return self._info
 
     def stage(self) -> None:

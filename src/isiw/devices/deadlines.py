@@ -23,7 +23,7 @@ _GLANCE_S = 0.05  # Windows lets no signal interrupt a wait, so none is longer
 
 @dataclass(frozen=True)
 class Deadlines(Checked):
-    """How long each verb of a device may take; how long a delivery may is the session's `timeout_s`.
+    """Time limits of a device's verbs; that of a delivery is the session's `timeout_s`.
 
     Args:
         describe_s: `describe` [s].

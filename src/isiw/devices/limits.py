@@ -22,7 +22,7 @@ USUAL_ITI_S = 5.0
 
 @dataclass(frozen=True)
 class Limits(Checked):
-    """What may be delivered at most.
+    """Limits on what may be delivered.
 
     Args:
         low_ms: shortest ISI on the device's reference [ms].

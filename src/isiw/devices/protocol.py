@@ -26,7 +26,7 @@ Answer: TypeAlias = Sweep | Measurement
 
 @dataclass(frozen=True)
 class DeviceInfo(Checked):
-    """What a device says about itself; the log keeps it.
+    """A device's description of itself; the log keeps it.
 
     Args:
         name: what it is, in a few words.
@@ -73,7 +73,7 @@ class DeviceInfo(Checked):
 
 @dataclass(frozen=True)
 class Readiness(Checked):
-    """What a device says about its state before a stimulus.
+    """A device's state before a stimulus, as it reports it.
 
     Args:
         ready: whether it could fire now.
@@ -97,7 +97,7 @@ class Device(Protocol):
     """
 
     def describe(self) -> DeviceInfo:
-        """What the device is; may be called at any time and delivers nothing."""
+        """The device's description; may be called at any time and delivers nothing."""
 
     def stage(self) -> None:
         """Get ready and arm. Delivers nothing."""

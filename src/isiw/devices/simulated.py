@@ -27,7 +27,7 @@ class Outcome(Protocol):
 
     @property
     def isi_sd_ms(self) -> float:
-        """SD of the realised ISI about the told one [ms]."""
+        """SD of the realised ISI about the reported one [ms]."""
 
 
 Respond: TypeAlias = Callable[[float | None], Outcome]
@@ -57,7 +57,7 @@ class SimulatedDevice:
         self._asked, self._staged = 0, False
 
     def describe(self) -> DeviceInfo:
-        """What the device is."""
+        """The device's description."""
         return self.simulation.info
 
     def stage(self) -> None:
@@ -138,11 +138,11 @@ class DryRun:
         self._info = dataclasses.replace(info, name=f"dry run of {info.name}", simulated=True, channels={})
 
     def describe(self) -> DeviceInfo:
-        """What the device is, as a simulated one that measures MEPs."""
+        """The device's description, as of a simulated one that measures MEPs."""
         return self._info
 
     def readiness(self) -> Readiness:
-        """What the real device says about its state."""
+        """The state that the real device reports."""
         return readiness_of(self._device)
 
     def stage(self) -> None:

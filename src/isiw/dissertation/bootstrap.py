@@ -181,7 +181,7 @@ class BootstrapPosterior:
 
     @property
     def trials(self) -> int:
-        """How many trials of each person it has been told."""
+        """Number of trials of each person that it has learnt."""
         return self.told.trials
 
     @property

@@ -89,7 +89,7 @@ class SweepPosterior:
 
     @property
     def trials(self) -> int:
-        """How many trials of each person it has been told."""
+        """Number of trials of each person that it has learnt."""
         return self.told.trials
 
     @cached_property

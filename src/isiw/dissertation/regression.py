@@ -126,7 +126,7 @@ class RegressionModel(Checked):
 
 @dataclass(frozen=True, eq=False)
 class RegressionPosterior:
-    """What is believed about b people.
+    """The posterior of b people.
 
     Args:
         model: the model's settings.
@@ -146,7 +146,7 @@ class RegressionPosterior:
 
     @property
     def trials(self) -> int:
-        """How many trials of each person it has been told."""
+        """Number of trials of each person that it has learnt."""
         return self.told.trials
 
     @property

@@ -48,7 +48,7 @@ _NEVER: Final = 10**9
 
 @dataclass(frozen=True, eq=False)
 class Analysis:
-    """What trials that were delivered without isiw say of one person's window.
+    """The estimate of one person's window from trials that were delivered without isiw.
 
     Args:
         record: the trials and the estimates after them, as in a log.
@@ -141,19 +141,19 @@ def analyse(
     simulated: bool = False,
     **settings: Any,
 ) -> Analysis:
-    """What trials that exist already say of a person's window.
+    """Estimate a person's window from trials that exist already.
 
     Args:
         isi_ms: the ISI of each trial [ms], in the order of delivery, shape (n,); NaN is TMS alone.
         mep_mv: peak-to-peak amplitude of its MEP [mV], shape (n,); 0 is below the detection limit, NaN a trial that was
             lost.
         space: the ISIs at which a window is sought; trials at others teach, too.
-        strategy: whose belief it is, one of `isiw.list_strategies()`.
+        strategy: the strategy that estimates, one of `isiw.list_strategies()`.
         seed: seed of all randomness.
         subject: the person's code.
         visit: what is noted about the visit.
         simulated: whether nobody was stimulated.
-        **settings: settings of the strategy, such as `detection_limit_mv=0.05` or `conditioning="pulse"`.
+        **settings: settings of the strategy, such as `detection_limit_mv=0.05` or `conditioning="electrical"`.
 
     Raises:
         InvalidValueError: no design space, shapes that differ, no pair of stimuli, or numbers that are probably in
@@ -186,7 +186,7 @@ def _trials(isis_ms: FloatArray, meps_mv: FloatArray) -> TrialTable:
 
 
 def analysed(delivered: Delivered, strategy: Strategy, config: Mapping[str, Any] | None = None) -> Analysis:
-    """What the belief of a strategy that has learnt nothing yet makes of trials that were delivered without isiw.
+    """Estimate the window from trials that were delivered without isiw, by a strategy that has learnt nothing yet.
 
     Args:
         delivered: the trials.

@@ -36,12 +36,12 @@ class Person(NamedTuple):
 
 @dataclass(frozen=True)
 class Way:
-    """How trials are read and analysed.
+    """Settings by which trials are read and analysed.
 
     Args:
         layout: how the files are laid out.
         space: the ISIs at which a window is sought; by default the range of those that were delivered.
-        strategy: whose belief it is.
+        strategy: the strategy that estimates.
         seed: seed of all randomness.
         settings: settings of the strategy.
         subject: the code of a person who has none in the file.
@@ -60,7 +60,7 @@ class Way:
 
 
 def way_of(config: RunConfig, layout: Layout, *, simulated: bool = False) -> Way:
-    """How a configuration says that trials are analysed: its space, strategy, seed and visit.
+    """The settings of a configuration by which trials are analysed: space, strategy, seed and visit.
 
     Args:
         config: the configuration.
@@ -181,7 +181,7 @@ def _stem(one: Delivered) -> str:
 
 
 def is_there(person: Person) -> bool:
-    """Whether the log of a person is there already, of the same file, read and analysed in the same way."""
+    """True if the log of a person is there already, of the same file, read and analysed in the same way."""
     if person.log is None or not log_exists(person.log):
         return False
     return read_session(person.log).header.config.get(ANALYSED_KEY) == dict(person.made_of)

@@ -61,7 +61,7 @@ def letters(name: str) -> str:
 
 @dataclass(frozen=True)
 class Layout(Checked):
-    """How a file is laid out; what is not said is found, or asked for.
+    """The layout of a file; what is not stated is found, or asked for.
 
     Args:
         reference: the event that ISIs count from, `"impact"` (of the hammer, or an electrical pulse) or `"valve"`.
@@ -131,7 +131,7 @@ def read_layout(path: str | Path) -> Layout:
 
 
 def pairs_of(option: str, texts: Sequence[str]) -> dict[str, str]:
-    """What an option says by KEY=NAME, each time that it is given.
+    """The values of an option KEY=NAME, of each time that it is given.
 
     Args:
         option: what it is called.

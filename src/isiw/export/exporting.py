@@ -56,7 +56,7 @@ FORMATS: Mapping[str, Callable[[Sequence[Part], Path], Sequence[str] | None]] = 
 
 @dataclass(frozen=True)
 class Exported:
-    """What was exported.
+    """The result of an export.
 
     Args:
         folder: where to.

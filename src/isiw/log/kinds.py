@@ -17,7 +17,7 @@ OWN_LOOP: Final = "a loop of the lab's own"
 
 
 class LogKind(StrEnum):
-    """What a log is of, as it is called in a sentence."""
+    """The kind of a log, as a sentence names it."""
 
     SEARCH = "a search for a window"
     THRESHOLD = "a search for a motor threshold"

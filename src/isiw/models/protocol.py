@@ -85,11 +85,11 @@ def _column(values: Values) -> Tensor:
 
 @runtime_checkable
 class Posterior(Protocol):
-    """What is believed about b people after the trials so far."""
+    """The posterior of b people after the trials so far."""
 
     @property
     def trials(self) -> int:
-        """How many trials of each person it has been told."""
+        """Number of trials of each person that it has learnt."""
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person."""
@@ -167,7 +167,7 @@ class Conditions(Protocol):
     """Capability: fantasies, for batches and look-ahead."""
 
     def condition(self, isi_ms: Tensor, mep_mv: Tensor) -> Posterior:
-        """What would be believed after one more trial of each person at these ISIs [ms] with these MEPs [mV].
+        """The posterior after one more trial of each person at these ISIs [ms] with these MEPs [mV].
 
         It may be rougher than `ResponseModel.update`. Shapes (b,).
 
@@ -191,7 +191,7 @@ class HasBotorchModel(Protocol):
 
     @property
     def people(self) -> int:
-        """How many people there are."""
+        """Number of people."""
 
     def botorch_model(self, person: int = 0) -> Any:
         """The BoTorch model of one person: from ISIs [ms] to MEPs on a scale of its own, in double precision."""
@@ -228,7 +228,7 @@ class ReportsTrouble(Protocol):
 
     @property
     def trouble(self) -> str | None:
-        """What went wrong with the last fit and what stands in for it, as full sentences; None where nothing did."""
+        """The fault of the last fit and what replaces it, as full sentences; None if there was none."""
 
 
 @runtime_checkable

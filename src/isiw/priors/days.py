@@ -40,7 +40,7 @@ def recalled(record: SessionRecord, prior: Prior, *, particles: int = 1000) -> P
 
     Args:
         record: the session.
-        prior: what is believed of people before it.
+        prior: the prior before it.
         particles: how many particles.
 
     Raises:
@@ -128,7 +128,7 @@ LEAST_PARTICLES: Final = 50
 
 @dataclass(frozen=True)
 class DayToDay(Checked):
-    """How the same person differs from day to day.
+    """Differences of the same person from day to day.
 
     Args:
         p_stays: probability, below 1, that the window is that of the day before, moved as a whole; else it is anyone's.
@@ -150,7 +150,7 @@ class DayToDay(Checked):
     p_other: Share = 0.1
 
     def added_sd(self) -> dict[str, float]:
-        """What the SDs of latents grow by, in squares."""
+        """Squares by which the variances of latents grow."""
         return {
             "start_ms": self.shift_sd_ms,
             "log_floor_mv": self.floor_log_sd,
@@ -163,11 +163,11 @@ class DayToDay(Checked):
 def after(
     *records: SessionRecord, prior: Prior | None = None, law: DayToDay | None = None, damaged: bool = False
 ) -> Prior:
-    """What is believed of a person after earlier sessions, for `isiw.make_strategy(prior=...)`.
+    """The prior of a person after earlier sessions, for `isiw.make_strategy(prior=...)`.
 
     Args:
         *records: the person's sessions, the first one first.
-        prior: what is believed of people before them; by default the built-in prior.
+        prior: the prior before them; by default the built-in one.
         law: how people differ from day to day.
         damaged: whether to learn what is left of damaged logs.
 
@@ -190,7 +190,7 @@ def after(
 
 
 def moved(first: SessionRecord, second: SessionRecord, law: DayToDay | None = None) -> float:
-    """How probable it is that a person's window moved between two sessions, beyond the usual shift as a whole.
+    """Probability that a person's window moved between two sessions by more than the usual shift.
 
     Args:
         first: the earlier session.

@@ -31,7 +31,7 @@ _Session: TypeAlias = tuple[SessionRecord, FloatArray | None]
 
 @dataclass(frozen=True, eq=False)
 class Difference:
-    """How the window of a session differs from that of another one.
+    """Difference of a session's window from that of another one.
 
     Args:
         first: the session that it is compared to.
@@ -55,7 +55,7 @@ class Difference:
 
 
 def differences(records: Sequence[SessionRecord]) -> list[Difference]:
-    """How each session's window differs from the first one's, by the trials that count.
+    """Differences of each session's window from the first one's, by the trials that count.
 
     Each session's trials are told to the particle model with the built-in prior, whatever strategy had asked for them,
     so that all are judged alike. Whether one person's window moved is judged in the order of the sessions' dates.

@@ -81,7 +81,7 @@ class LearntSession(Checked):
 
 @dataclass(frozen=True)
 class LabPrior(Checked):
-    """What a lab's people are like: numbers only. There is no law of what nobody was learnt from.
+    """A lab's people as a prior, in numbers only. There is no law of what no session has shown.
 
     Args:
         sessions: the sessions that it was learnt from.
@@ -132,7 +132,7 @@ class LabPrior(Checked):
         """A prior in which the lab's laws stand beside those of people in general.
 
         Args:
-            usual: what is believed of people in general; by default the built-in prior.
+            usual: the prior of people in general; by default the built-in one.
         """
         usual = usual or Prior()
         own = usual.profile if self.place is None else usual.profile.after(self.place.conditioning)

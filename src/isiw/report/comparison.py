@@ -74,7 +74,7 @@ def _cell(estimate: Estimate, edge: Edge) -> str:
 
 
 def comparison_sentence(difference: Difference) -> str:
-    """What is known of how two windows differ.
+    """A sentence on the difference of two windows.
 
     Args:
         difference: between the sessions.

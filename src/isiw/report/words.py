@@ -23,7 +23,7 @@ TRIAL_HEADINGS = ("trial", "commanded", "outcome", "realised")
 
 
 def final_statement(record: SessionRecord, config: Path | None = None) -> str:
-    """What a session found, in a few sentences.
+    """The result of a session, in a few sentences.
 
     Args:
         record: the session.
@@ -153,7 +153,7 @@ def _expects_a_tap(record: SessionRecord) -> str:
 
 
 def truth_sentence(record: SessionRecord, truth: Window | None) -> str:
-    """How close the reported window is to a simulated person's true one.
+    """A sentence that compares the reported window with a simulated person's true one.
 
     Args:
         record: the session.

@@ -229,7 +229,7 @@ class ServerSettings(Checked):
             ) from error
 
     def tls(self) -> ssl.SSLContext | None:
-        """What connections are encrypted by; None without a certificate."""
+        """The context by which connections are encrypted; None without a certificate."""
         if self.certificate is None:
             return None
         context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
@@ -237,7 +237,7 @@ class ServerSettings(Checked):
         return context
 
     def rules(self) -> Rules:
-        """What is let through: under this computer's own names, and the address and names by which others ask."""
+        """The rules of requests: this computer's own names, and the address and names that others use."""
         others = {self.host, socket.gethostname().lower(), socket.getfqdn().lower()}
         return Rules(self.token, hosts=LOOPBACK if self.address.is_loopback else LOOPBACK | others)
 

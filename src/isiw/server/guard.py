@@ -24,7 +24,7 @@ SHORTEST_TOKEN: Final = 16
 
 @dataclass(frozen=True)
 class Rules(Checked):
-    """What is let through.
+    """Rules by which requests are let through.
 
     Args:
         token: what every request must carry.
@@ -64,7 +64,7 @@ class Rules(Checked):
             )
 
     def shows_token(self, headers: Headers) -> bool:
-        """Whether a request carries the token."""
+        """True if a request carries the token."""
         kind, _, given = headers.get("authorization", "").partition(" ")
         same = hmac.compare_digest(given.strip().encode("latin-1", "replace"), self.token.encode())
         return same and kind.lower() == "bearer"

@@ -77,7 +77,7 @@ class Session(Judging):
 
     @property
     def header(self) -> Header:
-        """What the session is, as its log says it."""
+        """The header of the session's log."""
         return self._header
 
     @property

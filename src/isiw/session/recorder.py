@@ -67,11 +67,11 @@ class Recorder(Judging):
 
     @property
     def asked(self) -> Stimulus | None:
-        """What was asked and has no outcome yet; None where nothing is open."""
+        """The ISI that was asked and has no outcome yet; None if no trial is open."""
         return self._asked if self._asked is not None and self._asked.trial == len(self.trials) else None
 
     def wait_s(self) -> float:
-        """How long `ask` would wait now until limits and protocol allow the next stimulus [s]."""
+        """Time that `ask` would wait now until limits and protocol allow the next stimulus [s]."""
         if self.asked is not None:
             return 0.0
         return self._pacing.wait_s(self._protocol.interval_s(len(self.trials), self._seed))
@@ -125,7 +125,7 @@ class Recorder(Judging):
         mep_interval_mv: tuple[float, float] | None = None,
         pulse: bool = True,
     ) -> None:
-        """What came of the ISI that was asked; it is on disk before the strategy learns it.
+        """Report the outcome of the ISI that was asked; it is on disk before the strategy learns it.
 
         Args:
             isi_ms: the realised ISI on the space's reference [ms]; None is TMS alone, which was given without being

@@ -206,7 +206,7 @@ def resume(
     replayed: Callable[[int], None] = lambda _: None,
     **options: Unpack[ResumeOptions],
 ) -> Session | Recorder | ThresholdRecorder:
-    """What goes on where a log ends. With a device it is a session; nothing is delivered or written before its `run`.
+    """Continue where a log ends. With a device it is a session; nothing is delivered or written before its `run`.
 
     Without one it is what asks and is told: of a session the `Recorder` that `open_session` opens, and of a search for
     a motor threshold the one that `open_threshold` opens. An interval production task goes on at the command line.

@@ -87,7 +87,7 @@ def _taken(which: str) -> DeviceError:
 
 @dataclass(frozen=True)
 class Safeguards(Checked):
-    """How a session keeps a person safe besides its limits.
+    """The means by which a session keeps a person safe besides its limits.
 
     Args:
         deadlines: how long each verb of the device may take.
@@ -109,7 +109,7 @@ class Safeguards(Checked):
 
     @property
     def backoffs_s(self) -> tuple[float, ...]:
-        """How long to wait before each retry [s]."""
+        """Waiting times before each retry [s]."""
         return tuple(self.backoff_s * 2**retry for retry in range(self.retries))
 
 
@@ -155,7 +155,7 @@ class Rig:
 
     @property
     def info(self) -> DeviceInfo:
-        """What the device is."""
+        """The device's description."""
         return self._punctual.describe()
 
     @property

@@ -19,7 +19,7 @@ from isiw.trials import Trial, TrialTable
 
 @dataclass(frozen=True)
 class SessionUpdate:
-    """What is known after one trial.
+    """The state of a session after one trial.
 
     Args:
         trial: the trial.
@@ -41,7 +41,7 @@ class SessionUpdate:
 
 @dataclass(frozen=True)
 class SessionResult:
-    """How a session ended.
+    """The result of a session.
 
     Args:
         estimate: the window's estimate.

@@ -247,17 +247,17 @@ class ThresholdRecorder:
 
     @property
     def search(self) -> ThresholdSearch:
-        """What proposes intensities and learns."""
+        """The search, which proposes intensities and learns."""
         return self._examination.learner.search
 
     @property
     def outcomes(self) -> tuple[PulseOutcome, ...]:
-        """What came of each pulse so far, as it counts now, in order."""
+        """The outcome of each pulse so far, as it counts now, in order."""
         return self._examination.trials.outcomes
 
     @property
     def given(self) -> int:
-        """How many pulses were given, or may have been; also the number of the next one."""
+        """Number of pulses that were given, or may have been; also the number of the next one."""
         return len(self._examination.trials)
 
     def conclude_open(self, intents: Sequence[Intent]) -> None:
@@ -280,7 +280,7 @@ class ThresholdRecorder:
         return self._asked
 
     def tell(self, mep_mv: float | None = None, *, response: bool | None = None) -> None:
-        """What came of the intensity that was asked; it is on disk before the search learns it.
+        """Report the outcome of the intensity that was asked; it is on disk before the search learns it.
 
         Args:
             mep_mv: peak-to-peak amplitude of the MEP [mV]; 0 is below the detection limit.

@@ -192,7 +192,7 @@ def _require_no_tap(sweep: Sweep) -> None:
 def wrong_isi(
     isi_ms: float, commanded_isi_ms: float, space: DesignSpace, limits: SignalLimits | None = None
 ) -> Kind | None:
-    """What is wrong with a realised ISI; None where the trial may be told.
+    """The fault of a realised ISI; None if the trial can be learnt.
 
     Args:
         isi_ms: when the pulse came after the event that the space counts from [ms].

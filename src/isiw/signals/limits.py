@@ -25,7 +25,7 @@ ARTEFACT_MS: Final = 3.0
 
 @dataclass(frozen=True)
 class SignalLimits(Checked):
-    """What a sweep must satisfy to be accepted.
+    """Conditions that a sweep must satisfy to be accepted.
 
     Args:
         mep_window_ms: where the MEP is sought [ms after the pulse]; `MEP_WINDOWS_MS` has one for each muscle group.
@@ -79,7 +79,7 @@ class SignalLimits(Checked):
         return math.inf if self.contracted else self.background_uv
 
     def tolerance_ms(self, space: DesignSpace) -> float:
-        """How far a realised ISI may be from the commanded one [ms]."""
+        """Largest difference between a realised ISI and the commanded one [ms]."""
         return min(space.tolerance_ms, self.isi_tolerance_ms or math.inf)
 
 

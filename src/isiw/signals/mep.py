@@ -156,7 +156,7 @@ def mep_present(
     *,
     least_mv: float = PRESENT_MV,
 ) -> BoolArray:
-    """Whether each of n sweeps holds an MEP: large enough, and standing out of its own noise, shape (n,).
+    """True for each of n sweeps that holds an MEP: large enough, and clear of its own noise, shape (n,).
 
     Args:
         emg_mv: EMG [mV], shape (n, w).

@@ -160,7 +160,7 @@ def is_saturated(
     *,
     span_ms: tuple[float, float] = (0.0, math.inf),
 ) -> bool:
-    """Whether the EMG of one sweep ran into a limit of its amplifier.
+    """True if the EMG of one sweep ran into a limit of its amplifier.
 
     Args:
         emg_mv: EMG [mV], shape (w,).

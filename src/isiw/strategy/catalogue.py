@@ -107,7 +107,7 @@ def list_strategies() -> dict[str, str]:
 
 
 def list_settings(name: str = "default") -> tuple[DescribedSetting, ...]:
-    """What can be set about a named strategy: key, value, unit and meaning.
+    """The settings of a named strategy: key, value, unit and meaning.
 
     Args:
         name: one of `list_strategies()`.

@@ -45,7 +45,7 @@ def _nearest(asked_ms: Sequence[float], value: float) -> float:
 
 @dataclass(frozen=True)
 class Recipe:
-    """How a named strategy was made, so that a log can make it again.
+    """Name and settings of a strategy, so that a log can make it again.
 
     Args:
         name: its name in the catalogue; empty for a strategy built from a user's own objects.
@@ -143,28 +143,28 @@ class Strategy:
 
     @property
     def posterior(self) -> Posterior:
-        """What is believed after the trials told so far."""
+        """The posterior after the trials so far."""
         return self._course.posterior
 
     @property
     def delivered(self) -> int:
-        """How many stimuli it knows of, mistrials and control trials among them."""
+        """Number of stimuli so far, mistrials and control trials included."""
         return self._course.told + self._mistrials + self._controls
 
     @property
     def spent(self) -> int:
-        """How many stimuli its budget counts: pairs, mistrials among them, but no control trials."""
+        """Number of stimuli that count towards the budget: pairs, mistrials included, but no control trials."""
         return self._course.paired_trials + self._mistrials
 
     @property
     def stimuli_planned(self) -> int | None:
-        """How many stimuli its plan takes at most; None for a method that chooses as it learns."""
+        """Largest number of stimuli that its plan takes; None for a method that chooses as it learns."""
         ahead = self._course.plans_ahead and len(self._course.ahead_ms(2)) > 1
         return stimuli_left(self.stopping, 0) if ahead else None
 
     @property
     def detection_limit_mv(self) -> float | None:
-        """What it takes an amplitude of 0 to be below [mV]; None where neither setting nor model says."""
+        """Detection limit below which an amplitude of 0 lies [mV]; None if neither setting nor model states it."""
         return self._stated("detection_limit_mv")
 
     @property
@@ -256,7 +256,7 @@ class Strategy:
 
     @property
     def trouble(self) -> str | None:
-        """What went wrong with the last fit and what stands in for it; None where nothing did."""
+        """The fault of the last fit and what replaces it; None if there was none."""
         return self.posterior.trouble if isinstance(self.posterior, ReportsTrouble) else None
 
     def tell(
@@ -446,7 +446,7 @@ class Strategy:
         self._controls += 1
 
     def estimate(self) -> WindowEstimate:
-        """What is believed about the window now."""
+        """The present estimate of the window."""
         estimate = self._course.estimate()
         if self._outcomes.tap_may_explain(estimate.window):
             estimate = estimate.noting(tap_may_explain=True)

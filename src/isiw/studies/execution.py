@@ -76,7 +76,7 @@ _ONE_THREAD = dict.fromkeys(
 
 @dataclass(frozen=True)
 class Failure:
-    """What became of an item without a result.
+    """The failure of an item without a result.
 
     Args:
         error: what was raised, in a line.

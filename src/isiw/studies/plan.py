@@ -110,7 +110,7 @@ class StudyStrategy:
 
 @dataclass(frozen=True)
 class Unit:
-    """What is run, and kept, as a whole: one session, or one batch of people.
+    """A unit of work that is run and kept as a whole: one session, or one batch of people.
 
     Args:
         key: its name in the study; the same whenever and wherever it runs.

@@ -17,7 +17,7 @@ Reported: TypeAlias = WindowEstimate | Window | None
 
 
 class Player(Protocol):
-    """What proposes ISIs in a simulated session: a strategy, or what a benchmark compares it with."""
+    """Protocol of what proposes ISIs in a simulated session: a strategy, or what a benchmark compares it with."""
 
     def ask(self) -> float:
         """The next ISI [ms]."""

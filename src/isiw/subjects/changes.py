@@ -19,7 +19,7 @@ from isiw.types import FloatArray
 
 @dataclass(frozen=True)
 class Plasticity(Checked):
-    """How a person's gain depends on the pairs that they have had.
+    """Dependence of a person's gain on the pairs that they have had.
 
     Args:
         limit: change of the log gain after very many pairs, natural log; above 0 the MEPs grow, below 0 they shrink.
@@ -30,7 +30,7 @@ class Plasticity(Checked):
     pairs: Positive = 100.0
 
     def log_gain(self, dose: float) -> float:
-        """What is added to the log gain.
+        """The term that is added to the log gain.
 
         Args:
             dose: the facilitation, in 0–1, of all pairs so far, summed.
@@ -80,7 +80,7 @@ class Change(Checked):
             raise InvalidValueError("a change ends before it begins", got=(self.first, self.last))
 
     def share(self, trial: int) -> float:
-        """How much of the change there is at a trial, in 0–1.
+        """Share of the change that is reached at a trial, in 0–1.
 
         Args:
             trial: its number, from 1 on.
@@ -98,7 +98,7 @@ class Change(Checked):
 
 @dataclass(frozen=True)
 class TapResponse(Checked):
-    """What the tap alone evokes in the muscle that is recorded: a burst of fixed course and varying size.
+    """The tap's own response in the recorded muscle: a burst of fixed course and varying size.
 
     Args:
         start_ms: when it begins [ms after the hit].

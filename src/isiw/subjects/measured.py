@@ -52,7 +52,7 @@ MAX_BOOST_PCT_RMT: Final = 60.0
 
 @dataclass(frozen=True)
 class MeasuredPerson(Checked):
-    """What the text has about one of its subjects.
+    """Figures of the text about one of its subjects.
 
     Args:
         width_ms: width of the measured window (Table 4.1) [ms].

@@ -44,7 +44,7 @@ class EmgFloor(Checked):
 
 @dataclass(frozen=True)
 class TrialNoise:
-    """What differs from trial to trial and has a memory: kept by the responder, not by the response.
+    """Noise that has a memory from trial to trial: kept by the responder, not by the response.
 
     Args:
         input_z: standard normal noise on the input of the recruitment curve.

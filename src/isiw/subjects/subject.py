@@ -38,7 +38,7 @@ OUTLIERS_MV: Final = (0.1, 0.5)
 
 @dataclass(frozen=True)
 class Drift(Checked):
-    """How a person's log gain wanders: an AR(1) walk from zero, and the start-up of the first trials.
+    """Drift of a person's log gain: an AR(1) walk from zero, and the start-up of the first trials.
 
     Args:
         persistence: AR(1) coefficient from trial to trial.
@@ -60,7 +60,7 @@ class Drift(Checked):
 
 @dataclass(frozen=True)
 class Response:
-    """What a stimulus came to.
+    """The response to a stimulus.
 
     Args:
         isi_ms: the ISI as told [ms]: the realised one where it is known, else the commanded; None for TMS alone.
@@ -210,7 +210,7 @@ class Responder:
 
     @property
     def trials(self) -> int:
-        """How many stimuli were answered."""
+        """Number of stimuli that were answered."""
         return self._trials
 
     def respond(self, isi_ms: float | None, reference: Reference, *, pulse: bool = True) -> Response:

@@ -101,7 +101,7 @@ class StimulatedPerson(Checked):
         return _exceeding(drive, self._needed_drive_pct, self.response.sigma_x_pct_rmt)
 
     def begin(self, seed: int) -> StimulatedResponder:
-        """What answers stimuli.
+        """A responder, which answers stimuli.
 
         Args:
             seed: of the noise of the trials.

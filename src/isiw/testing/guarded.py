@@ -48,7 +48,7 @@ class Guarded:
 
     @property
     def info(self) -> DeviceInfo:
-        """What the device is."""
+        """The device's description."""
         return self._rig.info
 
     @contextmanager

@@ -75,7 +75,7 @@ class Evoked(Protocol):
 
 @dataclass(frozen=True)
 class TapperSettings(Checked):
-    """How the robot is run.
+    """Settings of the robot.
 
     Args:
         reference: the event that commanded ISIs count from.
@@ -158,7 +158,7 @@ class Tapper:
 
     @property
     def info(self) -> DeviceInfo:
-        """What the robot says about itself."""
+        """The robot's description of itself."""
         absent = {name for name, there in self._has.items() if not there}
         channels = {name: unit for name, unit in UNITS.items() if name not in absent}
         known = self.settings.expected_hit_ms, self.settings.expected_hit_sd_ms

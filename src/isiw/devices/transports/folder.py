@@ -74,7 +74,7 @@ class FolderDevice:
         self._exchange = Exchange(self._info.name, self._folder, keys, stop_timeout_s)
 
     def describe(self) -> DeviceInfo:
-        """What the device is."""
+        """The device's description."""
         return self._info
 
     def stage(self) -> None:

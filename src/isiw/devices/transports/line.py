@@ -77,11 +77,11 @@ class LineDevice:
             )
 
     def describe(self) -> DeviceInfo:
-        """What the instrument is."""
+        """The instrument's description."""
         return self._info
 
     def readiness(self) -> Readiness:
-        """What the instrument says about its state; ready, where the table has no status."""
+        """The state that the instrument reports; ready, if the table has no status."""
         if self._commands.status is None:
             return Readiness()
         with _nothing_given():

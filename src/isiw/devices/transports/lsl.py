@@ -192,7 +192,7 @@ class LslDevice:
         self._streams: dict[str, SampleStream] = {}
 
     def describe(self) -> DeviceInfo:
-        """What the device is."""
+        """The device's description."""
         return self._info
 
     def stage(self) -> None:

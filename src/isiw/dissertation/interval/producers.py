@@ -53,7 +53,7 @@ TAIL: Final = 3
 
 @dataclass(frozen=True)
 class Producer(Checked):
-    """What people have in common who produce intervals.
+    """Protocol of people who produce intervals.
 
     The defaults are fitted to session 1 of [Kim2020, Table 6.2], target 300 ms, and the share of mode 2 within 20 ms
     of the target [Kim2020, 6.3.2], by `python -m benchmarks.interval --fit`; but for `motor_ms`, which one target does
@@ -152,7 +152,7 @@ LIGHT_VARIANCE: Final = 0.1
 
 @dataclass(frozen=True)
 class LightSearch(Checked):
-    """How the computer searches.
+    """Settings of the computer's search.
 
     Args:
         low_ms: the shortest interval [ms].

@@ -115,7 +115,7 @@ class GaussianProcess(Checked):
 
 @dataclass(frozen=True, eq=False)
 class GaussianProcessPosterior:
-    """What is believed about b people.
+    """The posterior of b people.
 
     Args:
         model: the model's settings.
@@ -133,17 +133,17 @@ class GaussianProcessPosterior:
 
     @property
     def trials(self) -> int:
-        """How many trials of each person it has been told."""
+        """Number of trials of each person that it has learnt."""
         return self.told.trials
 
     @property
     def pairs(self) -> int:
-        """How many of them were pairs of stimuli; see `CountsPairs`."""
+        """Number of them that were pairs of stimuli; see `CountsPairs`."""
         return int((~np.isnan(self.told.isi_ms[0])).sum())
 
     @property
     def people(self) -> int:
-        """How many people there are."""
+        """Number of people."""
         return self.told.people
 
     @cached_property
@@ -184,7 +184,7 @@ class GaussianProcessPosterior:
         return self._sample.floor_mv
 
     def condition(self, isi_ms: Tensor, mep_mv: Tensor) -> GaussianProcessPosterior:
-        """What would be believed after one more trial, the hyperparameters staying what they are; see `Conditions`."""
+        """The posterior after one more trial, with the same hyperparameters; see `Conditions`."""
         return replace(self, told=self.told.appended(Observation.of(isi_ms, mep_mv)), held=self.fits)
 
     def log_evidence(self) -> Tensor:
@@ -197,7 +197,7 @@ class GaussianProcessPosterior:
 
     @property
     def trouble(self) -> str | None:
-        """What went wrong with the last fit, of all people; see `ReportsTrouble`."""
+        """The fault of the last fit, of all people; see `ReportsTrouble`."""
         return " ".join(dict.fromkeys(f.trouble for f in self.fits if f.trouble)) or None
 
     def botorch_model(self, person: int = 0) -> botorch.models.SingleTaskGP:

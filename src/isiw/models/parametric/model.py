@@ -200,7 +200,7 @@ class WindowSample:
 
 @dataclass(frozen=True, eq=False)
 class ParametricPosterior:
-    """What is believed about b people.
+    """The posterior of b people.
 
     Args:
         model: the model's settings.
@@ -224,12 +224,12 @@ class ParametricPosterior:
 
     @property
     def trials(self) -> int:
-        """How many trials of each person it has been told."""
+        """Number of trials of each person that it has learnt."""
         return self.history.isi_ms.shape[-1]
 
     @property
     def pairs(self) -> int:
-        """How many of them were pairs of stimuli; see `CountsPairs`."""
+        """Number of them that were pairs of stimuli; see `CountsPairs`."""
         return int((~self.history.isi_ms[0].isnan()).sum())
 
     @cached_property

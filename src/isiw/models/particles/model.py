@@ -111,7 +111,7 @@ class ParticleModel(Checked):
 
 @dataclass(frozen=True, eq=False)
 class ParticlePosterior(SwarmPosterior[ParticleModel, Latents]):
-    """What is believed about b people.
+    """The posterior of b people.
 
     Args:
         model: the model's settings.

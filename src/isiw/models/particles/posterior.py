@@ -40,7 +40,7 @@ M = TypeVar("M", bound=_Model)
 
 @dataclass(frozen=True, eq=False)
 class SwarmPosterior(ABC, Generic[M, L]):
-    """What is believed about b people.
+    """The posterior of b people.
 
     Args:
         model: the model's settings.
@@ -73,12 +73,12 @@ class SwarmPosterior(ABC, Generic[M, L]):
 
     @property
     def trials(self) -> int:
-        """How many trials of each person it has been told."""
+        """Number of trials of each person that it has learnt."""
         return self.swarm.trials
 
     @property
     def pairs(self) -> int:
-        """How many of them were pairs of stimuli; see `CountsPairs`."""
+        """Number of them that were pairs of stimuli; see `CountsPairs`."""
         return int((~self.swarm.history.isi_ms[0].isnan()).sum())
 
     @property

@@ -123,7 +123,7 @@ class Swarm(Generic[L]):
 
     @property
     def trials(self) -> int:
-        """How many trials of each person it has been told."""
+        """Number of trials of each person that it has learnt."""
         return self.history.isi_ms.shape[-1]
 
     @property

@@ -38,7 +38,7 @@ class MaximumLikelihood(Checked):
 
     @property
     def budget(self) -> int:
-        """How many pulses; see `HasPulseBudget`."""
+        """Number of pulses; see `HasPulseBudget`."""
         return self.pulses
 
     def ask(self, pulses: Sequence[Pulse], space: IntensityRange) -> float:
@@ -185,7 +185,7 @@ class BayesThreshold(Checked):
 
     @property
     def budget(self) -> int:
-        """How many pulses at most; see `HasPulseBudget`."""
+        """Largest number of pulses; see `HasPulseBudget`."""
         return self.max_pulses
 
     def posterior(self, pulses: Sequence[Pulse]) -> FloatArray:

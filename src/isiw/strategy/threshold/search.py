@@ -106,7 +106,7 @@ class ThresholdSearch:
         self.pulses = (*self.pulses, self.checked(intensity_pct_mso, mep_mv, response=response))
 
     def checked(self, intensity_pct_mso: float, mep_mv: float | None = None, *, response: bool | None = None) -> Pulse:
-        """What `tell` would learn from, without learning it.
+        """The pulse that `tell` would learn from, without learning it.
 
         Args:
             intensity_pct_mso: as for `tell` [% MSO].

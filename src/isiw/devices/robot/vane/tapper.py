@@ -112,7 +112,7 @@ class RotatingTapper:
 
     @property
     def info(self) -> DeviceInfo:
-        """What the robot says about itself."""
+        """The robot's description of itself."""
         robot = self.tapper.info
         return replace(robot, name=f"{robot.name} with vane actuator", channels={**robot.channels, **UNITS})
 

@@ -62,7 +62,7 @@ class SupraModel(Checked):
 
 @dataclass(frozen=True, eq=False)
 class SupraPosterior(SwarmPosterior[SupraModel, SupraLatents]):
-    """What is believed about b people.
+    """The posterior of b people.
 
     Args:
         model: the model's settings.
