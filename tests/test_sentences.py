@@ -163,7 +163,7 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
         (
             sentences.not_clearly_larger((21.0, 20.0), 0.2),
             (
-                "The data hardly bear this out: the MEPs inside are not clearly larger than those "
+                "The data support this only weakly: the MEPs inside are not clearly larger than those "
                 "outside (medians 21 and 20 "
                 "µV, p = 0.20)."
             ),
@@ -196,7 +196,7 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
         ),
         (
             sentences.counts(5, 3, {"TMS alone": 1}, {"no impact": 1}, 1),
-            "5 stimuli were delivered, 1 of TMS alone among them; 3 count; mistrials: 1 no impact; 1 excluded.",
+            "5 stimuli were delivered, including 1 of TMS alone; 3 count; mistrials: 1 no impact; 1 excluded.",
         ),
         (sentences.counts(1, 1, {}, {}, 0), "1 pair of stimuli was delivered; 1 counts."),
         (sentences.fit(2, 9), "The fit had trouble in 2 of 9 trials; isiw show lists them."),
@@ -216,7 +216,7 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
         ),
         (
             sentences.later(0.4, 0.6),
-            "the window probably starts earlier (60 %) and ends later (60 %); 50 % is no knowledge.",
+            "the window probably starts earlier (60 %) and ends later (60 %); 50 % means unknown.",
         ),
         (sentences.later(None, 0.6), ""),
     ],

@@ -134,7 +134,7 @@ def tap_unknown(estimate: Estimate) -> str:
         return ""
     return (
         "The first stimulus alone was not measured within this window: its own response, and not the MEP, may be what "
-        "is larger there. In the next session give it alone some times (in a configuration: [protocol] tap_alone)."
+        "is larger there. In the next session deliver it alone a few times (in a configuration: [protocol] tap_alone)."
     )
 
 
@@ -163,7 +163,7 @@ def finding(estimate: Estimate, first: StimulusWords, space: DesignSpace) -> str
     if window is None:
         return f"No window was found{chance}." if rules_out(probability) else f"{undecided}."
     if _is_guess(estimate):
-        return f"{undecided}: the trials hardly speak for one. If there is one, the best guess is {window} {after}."
+        return f"{undecided}: the trials are weak evidence for one. If there is one, the best guess is {window} {after}."
     enhances = f"The {first.name} {'' if probability >= SURE else 'probably '}enhances the MEP"
     isis = f"{window} {after}{chance}"
     if estimate.expected_f1 is not None and estimate.expected_f1 < A_GUESS:
@@ -316,7 +316,7 @@ def not_larger(medians_uv: tuple[float, float]) -> str:
 def not_clearly_larger(medians_uv: tuple[float, float], p: float) -> str:
     """The same, if it is possible that they are."""
     return (
-        "The data hardly bear this out: the MEPs inside are not clearly larger than those outside "
+        "The data support this only weakly: the MEPs inside are not clearly larger than those outside "
         f"(medians {medians_uv[0]:.0f} and {medians_uv[1]:.0f} µV, p = {p:.2f})."
     )
 
@@ -354,7 +354,7 @@ def counts(given: int, told: int, controls: Mapping[str, int], mistrials: Mappin
     pairs = counted(given, "pair of stimuli was delivered", "pairs of stimuli were delivered")
     if controls:
         kinds = " and ".join(f"{count} of {kind}" for kind, count in sorted(controls.items(), reverse=True))
-        pairs = f"{given} stimuli were delivered, {kinds} among them"
+        pairs = f"{given} stimuli were delivered, including {kinds}"
     parts = [f"{pairs}; {counted(told, 'counts', 'count')}"]
     if mistrials:
         parts.append("mistrials: " + ", ".join(f"{count} {reason}" for reason, count in mistrials.items()))
@@ -395,7 +395,7 @@ def later(starts_later: float | None, ends_later: float | None) -> str:
     if starts_later is None or ends_later is None:
         return ""
     start, end = _direction(starts_later), _direction(ends_later)
-    return f"the window probably starts {start} and ends {end}; 50 % is no knowledge."
+    return f"the window probably starts {start} and ends {end}; 50 % means unknown."
 
 
 def _direction(later: float) -> str:

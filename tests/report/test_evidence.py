@@ -44,7 +44,7 @@ def test_without_a_probability_it_is_said_too_that_meps_are_not_clearly_larger()
     assert contradiction(WINDOW, told) is None
     said = contradiction(WINDOW, told, without_probability=True)
     assert said is not None
-    assert said.startswith("The data hardly bear this out: the MEPs inside are not clearly larger")
+    assert said.startswith("The data support this only weakly: the MEPs inside are not clearly larger")
     clear = trials([0.08, 0.05, 0.04, 0.06], [0.02, 0.022, 0.021, 0.02])
     assert contradiction(WINDOW, clear, without_probability=True) is None
 

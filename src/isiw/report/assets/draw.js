@@ -43,7 +43,8 @@ const draw = (() => {
     ];
   }
 
-  // A mistrial is drawn where it happened: at the lower edge where no MEP was measured, at what was asked where nothing came.
+  // A mistrial is drawn at its ISI, or at the commanded one if nothing came, at most at an end of the picture; and at the lower
+  // edge if no MEP was measured.
   // Beside the range is room for whole points at its ends, and at its left a strip for TMS alone.
   const [roomShare, aloneShare] = [0.02, 0.06];
   function placesMs(session) {
@@ -55,8 +56,9 @@ const draw = (() => {
     const aloneMs = least - aloneShare * (high - low);
     return { aloneMs, partMs: (least + aloneMs) / 2, range: [2 * aloneMs - least + room, most + room] };
   }
+  const inside = (x, [low, high]) => (x === null ? null : Math.min(Math.max(x, low), high));
   const placeMs = (trial, places) => (trial.isAlone ? places.aloneMs
-    : trial.kind === "mistrial" ? trial.isiMs ?? trial.askedMs : trial.isiMs);
+    : trial.kind === "mistrial" ? inside(trial.isiMs ?? trial.askedMs, places.range) : trial.isiMs);
   const measuredUv = (trial, lowestUv) => (trial.mepUv === null ? null : Math.max(trial.mepUv, lowestUv));
   const heightUv = (trial, lowestUv) => measuredUv(trial, lowestUv) ?? (trial.kind === "mistrial" ? lowestUv : null);
 
@@ -66,7 +68,7 @@ const draw = (() => {
     return {
       x: shown.map((trial) => placeMs(trial, places)), y: shown.map((trial) => heightUv(trial, lowestUv)),
       text: shown.map((trial) => `${trial.realised === "–" ? trial.asked : trial.realised}, ${trial.outcome}`),
-      customdata: shown.map((trial) => trial.number), name: names[kind], mode: "markers", type: "scatter",
+      customdata: shown.map((trial) => trial.number), name: names[kind], mode: "markers", type: "scatter", cliponaxis: false,
       marker: {
         symbol, size: shown.map((trial) => (trial.number === number ? 14 : 8)),
         color: colour(kind === "mistrial" ? "red" : "ink"),
@@ -180,6 +182,7 @@ const draw = (() => {
     const traces = [];
     const axes = {};
     const shapes = [];
+    const annotations = [];
     const share = 1 / (waves.length + 1); // the first, the EMG near the pulse, is twice as high
     waves.forEach((wave, k) => {
       const index = k ? k + 1 : "";
@@ -191,11 +194,14 @@ const draw = (() => {
       });
       axes[`xaxis${index}`] = axis(k === waves.length - 1 ? "time of the sweep [ms]" : "",
         { range: [x[0], x[x.length - 1]], anchor: `y${index}` });
-      axes[`yaxis${index}`] = axis(`${markup(wave.name)}<br>[${markup(wave.unit)}]`,
-        { domain: [top - height + 0.3 * share, top], anchor: `x${index}`, ...(wave.axis && { range: wave.axis }) });
+      axes[`yaxis${index}`] = axis("", { domain: [top - height + 0.3 * share, top], anchor: `x${index}`, ...(wave.axis && { range: wave.axis }) });
+      annotations.push({
+        text: `${markup(wave.name)} [${markup(wave.unit)}]`, showarrow: false, bgcolor: colour("paper"), opacity: 0.85,
+        x: 0, xref: "paper", xanchor: "left", xshift: 4, y: 1, yref: `y${index} domain`, yanchor: "top",
+      });
       shapes.push(...sweepMarks(trial, index, session.mepWindow));
     });
-    Plotly.react(figure, traces, layout({ ...axes, shapes, margin: { l: 90, r: 12, t: 8, b: 44 } }), options);
+    Plotly.react(figure, traces, layout({ ...axes, shapes, annotations, margin: { l: 60, r: 12, t: 8, b: 44 } }), options);
   }
 
   return { belief, sweep };
