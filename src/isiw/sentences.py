@@ -163,7 +163,7 @@ def finding(estimate: Estimate, first: StimulusWords, space: DesignSpace) -> str
     if window is None:
         return f"No window was found{chance}." if rules_out(probability) else f"{undecided}."
     if _is_guess(estimate):
-        return f"{undecided}: the trials are weak evidence for one. If there is one, the best guess is {window} {after}."
+        return f"{undecided}: the trials are weak evidence for one. If there is, the best guess is {window} {after}."
     enhances = f"The {first.name} {'' if probability >= SURE else 'probably '}enhances the MEP"
     isis = f"{window} {after}{chance}"
     if estimate.expected_f1 is not None and estimate.expected_f1 < A_GUESS:

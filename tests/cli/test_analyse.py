@@ -84,7 +84,7 @@ def test_a_session_after_an_imported_log_knows_it_and_says_what_it_is(isiw: Comm
     [
         ((), "--reference"),
         (("--reference", "impact", "-o", "both.mcap"), "--only CODE"),
-        (("--reference", "impact", "--only", "C"), "nobody has this code"),
+        (("--reference", "impact", "--only", "C"), "no person has this code"),
         (("--reference", "impact", "--column", "isi"), "KEY=NAME"),
         (("--reference", "impact", "--column", "width=isi_ms"), "what a column holds"),
         (("--reference", "valve", "--config", "impact.toml"), "is not that of the design space"),

@@ -42,7 +42,7 @@ from isiw.visit import Visit
 MOST_ESTIMATES: Final = 50
 """Of a long series of trials the belief is logged after so many of them, evenly spread, and after the last."""
 
-_END: Final = StopKind.OWN.stop("All trials are analysed. They were delivered without isiw, so none can follow.")
+_END: Final = StopKind.OWN.stop("All trials are analysed. They were delivered without isiw, so no more can follow.")
 _NEVER: Final = 10**9
 
 

@@ -147,7 +147,7 @@ def _chosen(people: list[tuple[Delivered, Mapping[str, Any]]], only: str) -> lis
     chosen = [person for person in people if person[0].subject == only]
     if not chosen:
         raise InvalidValueError(
-            "nobody has this code", got=only, expected=told_people([delivered for delivered, _ in people])
+            "no person has this code", got=only, expected=told_people([delivered for delivered, _ in people])
         )
     return chosen
 

@@ -65,7 +65,7 @@ def required_reference(layout: Layout, source: str) -> Reference:
     """The event that the ISIs of a file count from, which nobody but the lab knows."""
     if layout.reference is None:
         raise InvalidValueError(
-            f"nobody says from which event the ISIs of {source} count",
+            f"the event from which the ISIs of {source} count is not stated",
             expected=missing_reference().expected,
             remedy="Say --reference impact or --reference valve.",
         )

@@ -182,7 +182,7 @@ def _factor_mv(raw: Any, name: str, layout: Layout, source: str) -> float:
     unit = layout.unit_of(EMG_UNITS_MV)
     if unit is None:
         raise InvalidValueError(
-            f"nobody says in which unit the channel {name!r} of {source} is", remedy="Say --unit with mV, uV or V."
+            f"the unit of the channel {name!r} of {source} is not stated", remedy="Say --unit with mV, uV or V."
         )
     return EMG_UNITS_MV[unit]
 

@@ -138,7 +138,7 @@ def required_unit(what: str, column: Column, layout: Layout, known: Mapping[str,
         numbers = [value for row in range(len(column.cells)) if isinstance(value := _tried(column, row), float)]
         span = f"{min(numbers):g} to {max(numbers):g}" if numbers else None
         raise InvalidValueError(
-            f"nobody says in which unit the {what} of {column.of} are, in the column {column.name!r}",
+            f"the unit of the {what} of {column.of} is not stated, in the column {column.name!r}",
             got=span,
             remedy=f"Say --unit with {units}.",
         )

@@ -33,14 +33,14 @@ def read_waves(path: Path, layout: Layout, subject: str) -> Delivered:
 def _required(layout: Layout, key: Literal["rate_hz", "pulse_at_ms"], what: str) -> float:
     value: float | None = getattr(layout, key)
     if value is None:
-        raise InvalidValueError(f"nobody says {what}", remedy=f"Write {key} = NUMBER into a layout: --layout FILE.")
+        raise InvalidValueError(f"{what} is not stated", remedy=f"Write {key} = NUMBER into a layout: --layout FILE.")
     return value
 
 
 def _of_matrix(arrays: dict[str, FloatArray], layout: Layout, subject: str, source: str) -> Delivered:
     """Sweeps that are the rows or the columns of a matrix, beside a vector of their ISIs."""
-    rate_hz = _required(layout, "rate_hz", f"at which rate {source} was sampled")
-    pulse_at_ms = _required(layout, "pulse_at_ms", f"how long after its first sample a sweep of {source} has the pulse")
+    rate_hz = _required(layout, "rate_hz", f"the sampling rate of {source}")
+    pulse_at_ms = _required(layout, "pulse_at_ms", f"the time of the pulse in a sweep of {source}")
     vectors = {
         name: array.ravel().tolist() for name, array in arrays.items() if max(array.shape, default=0) == array.size
     }
@@ -62,7 +62,7 @@ def _of_matrix(arrays: dict[str, FloatArray], layout: Layout, subject: str, sour
 def _of_columns(frame: pd.DataFrame, layout: Layout, subject: str, source: str) -> Delivered:
     """A continuous recording, a row for each sample; blocks, each with lines of its own before it, are sweeps."""
     reference = required_reference(layout, source)
-    rate_hz = _required(layout, "rate_hz", f"at which rate {source} was sampled")
+    rate_hz = _required(layout, "rate_hz", f"the sampling rate of {source}")
     for name in layout.channels.values():
         if name not in frame:
             remedy = (

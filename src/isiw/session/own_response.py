@@ -18,7 +18,7 @@ from isiw.trials import Sweep, Trial
 from isiw.visit import PAIRS_FIRST
 
 KNOWN: Final = "What the first stimulus alone does to the EMG is known now, and was subtracted."
-LONGER: Final = "A longer ISI was chosen: it shows the first stimulus's own response, which may explain the enhancement so far."
+LONGER: Final = "A longer ISI shows the first stimulus's own response, which may explain the enhancement so far."
 
 LEAST_PROBABILITY: Final = 0.9
 """A window that is as probable as this should not be the first stimulus's own response."""
