@@ -37,7 +37,7 @@ METHODS = {
 }
 PICTURED = {
     "default": "isiw's default",
-    "second": "oracle, not told that there is a window",
+    "second": "second oracle",
     "oracle": "oracle",
     "gpr": "dissertation: Gaussian process (gpr)",
     "nr": "dissertation: nonlinear regression (nr)",

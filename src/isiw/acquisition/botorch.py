@@ -12,7 +12,7 @@ from isiw.models.protocol import HasBotorchModel, Tensor
 
 @dataclass(frozen=True)
 class BotorchAcquisition:
-    """An acquisition function of BoTorch's, made anew for each posterior.
+    """An acquisition function of BoTorch's, made again for each posterior.
 
         BotorchAcquisition(lambda model: qNegIntegratedPosteriorVariance(model, mc_points=grid_ms))
 

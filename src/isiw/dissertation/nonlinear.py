@@ -80,7 +80,7 @@ class NonlinearRegression(Checked):
         samples: how many curves are drawn from the parameters' asymptotic distribution.
         start: where the search starts: `"even"` as above; `"unequal"`: the second Gaussian with a tenth of the first's
             amplitude, which stays at mid-range; `"random"`: anywhere in the range and with any share of the amplitude,
-            drawn anew for each fit.
+            drawn again for each fit.
     """
 
     peaks: Annotated[int, partial(choice, known=(1, 2))] = 1

@@ -1,4 +1,4 @@
-"""Regression of the MEP on the ISI, anew after each trial: the part that NR, SVMR and GPR share [Kim2020, 4.3].
+"""Regression of the MEP on the ISI, again after each trial: the part that NR, SVMR and GPR share [Kim2020, 4.3].
 
 A method fits a curve to what the MEPs of one person have above the floor; its window is where the curve has at least
 0.135 of its maximum.
@@ -92,7 +92,7 @@ class RegressionMethod(Protocol):
 
 @dataclass(frozen=True)
 class RegressionModel(Checked):
-    """A regression as a model: fits all trials anew after each.
+    """A regression as a model: fits all trials again after each.
 
     Args:
         method: what fits the curve.

@@ -64,14 +64,22 @@ PAGE_COLOURS: Final[Mapping[str, str]] = MappingProxyType(
 )
 """By what is drawn, the name of the page's own colour (the CSS variable `--ink` and so on)."""
 
-_DARK = {"#ffffff": "#15181b", INK: "#e6e8ea", "#000000": "#e6e8ea", FAINT: "#9ba3aa", BLUE: "#2a8ad4"}
+_DARK_PAPER, _DARK_INK = "#15181b", "#e6e8ea"
+_DARK = {
+    "#ffffff": _DARK_PAPER,
+    INK: _DARK_INK,
+    "#000000": _DARK_INK,
+    FAINT: "#9ba3aa",
+    BLUE: "#2a8ad4",
+    _BROWN: "#b98352",
+}
 _DARK_RULES = [
     f'[style*="{part}: {light}"] {{ {part}: {dark} !important }}'
     for light, dark in _DARK.items()
     for part in ("fill", "stroke")
 ]
 _DARK_STYLE = (
-    f"<style>@media (prefers-color-scheme: dark) {{ svg {{ fill: {_DARK[INK]} }} {' '.join(_DARK_RULES)} }}</style>"
+    f"<style>@media (prefers-color-scheme: dark) {{ svg {{ fill: {_DARK_INK} }} {' '.join(_DARK_RULES)} }}</style>"
 )
 """Gives an SVG file a dark scheme, which viewers choose by themselves; a page has colours of its own."""
 

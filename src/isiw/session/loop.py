@@ -180,7 +180,7 @@ class Session(Judging):
             number: the pause that is meant, as `pause_waiting` has it; by default whichever there is.
 
         Raises:
-            InvalidValueError: it is not paused, or pauses anew, or is to end, or `Safeguards.on_pause` decides.
+            InvalidValueError: it is not paused, or pauses again, or is to end, or `Safeguards.on_pause` decides.
         """
         self._asking.answer(goes_on=True, number=number)
 

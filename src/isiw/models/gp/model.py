@@ -1,4 +1,4 @@
-"""A Gaussian process on the transformed MEP, fitted anew after each trial, and windows from its sample paths.
+"""A Gaussian process on the transformed MEP, fitted again after each trial, and windows from its sample paths.
 
 Whatever the profile's form, it needs to be smooth only. The price is trials: the process does not know that there is
 one window with flat ends.
@@ -122,7 +122,7 @@ class GaussianProcessPosterior:
         space: the design space.
         seed: seed of all randomness.
         told: the trials so far.
-        held: fits whose hyperparameters stay, one a person; None to fit anew.
+        held: fits whose hyperparameters stay, one a person; None to fit again.
     """
 
     model: GaussianProcess

@@ -2,7 +2,7 @@
 
 The prior is a standard normal of the latents. A mixture begins with a Student t at each mode, of the curvature there,
 and with the prior, which stays in it [Hesterberg1995]. Where its draws are worth too little, it is
-fitted to them by their weights (population Monte Carlo [Cappe2008]), and draws anew. So the
+fitted to them by their weights (population Monte Carlo [Cappe2008]), and draws again. So the
 modes need only be near: what they miss, the weights correct.
 """
 

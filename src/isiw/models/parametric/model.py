@@ -1,6 +1,6 @@
 """The parametric window model: a Gaussian window on a floor, with noise that depends on the level, as a Pyro program.
 
-Its posterior is sampled anew after every trial, and depends on the seed and on which trials there were, not on their
+Its posterior is sampled again after every trial, and depends on the seed and on which trials there were, not on their
 order. Whether there is a window is one more unknown: with and without are two models, weighed by their evidence. The
 floor is an unknown too, so the least-excess rule is always applied to what is above the baseline.
 """

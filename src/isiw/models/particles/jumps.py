@@ -1,4 +1,4 @@
-"""What moves may do to particles of the default model: which latents a shift moves, and which kinds a jump draws anew.
+"""What moves may do to particles of the default model: which latents a shift moves, and which kinds a jump draws again.
 
 A jump leads to another kind of profile, of noise, or to and from "no window".
 """
@@ -41,7 +41,7 @@ JUMPS: Final = {
     "change": 0.12,
     "time or window": 0.12,
 }
-"""Shares of the jumps. They draw anew: the profile's kind and form; the noise's kind and all that belongs to it;
+"""Shares of the jumps. They draw again: the profile's kind and form; the noise's kind and all that belongs to it;
 whether there is a window, and all of it; where and how wide it is; what belongs to the noise's kind; what changes in
 the session, and when; that and the window at once."""
 
@@ -151,7 +151,7 @@ class WindowTarget:
         return _shifted(part.device)[part] & used_by(latents.noise, latents.present, latents.change)
 
     def jumped(self, latents: Latents, generator: torch.Generator, steps: Tensor) -> tuple[Latents, Tensor]:
-        """Particles (n,) with some kinds and latents drawn anew, and the log ratio of what that favours, (n,)."""
+        """Particles (n,) with some kinds and latents drawn again, and the log ratio of what that favours, (n,)."""
         fresh = self.prior.sample(1, len(latents.present), generator, self.space)
         uniform = torch.rand(latents.present.shape, generator=generator, dtype=torch.float32, device=generator.device)
         jump = drawn(tuple(JUMPS.values()), uniform)
@@ -240,5 +240,5 @@ def _shifted(device: torch.device) -> Tensor:
 
 @cache
 def _redrawn(device: torch.device) -> Tensor:
-    """Which latents each of `JUMPS` draws anew, shape (jumps, d)."""
+    """Which latents each of `JUMPS` draws again, shape (jumps, d)."""
     return torch.stack([latents_of(*REDRAWN[jump], device=device) for jump in JUMPS])

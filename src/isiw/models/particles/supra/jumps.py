@@ -1,4 +1,4 @@
-"""What moves may do to particles with both kinds of segment: what a shift moves, and what a jump draws anew."""
+"""What moves may do to particles with both kinds of segment: what a shift moves, and what a jump draws again."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ JUMPS: Final = {
     "both places": 0.15,
     "curve": 0.1,
 }
-"""Shares of the jumps. They draw anew: whether there is a segment, and all of it; where and how wide one is, or both
+"""Shares of the jumps. They draw again: whether there is a segment, and all of it; where and how wide one is, or both
 are; the curve."""
 
 REDRAWN: Final = {
@@ -39,7 +39,7 @@ REDRAWN: Final = {
     "both places": (*BLOCKS["enhanced"][:2], *BLOCKS["depressed"][:2]),
     "curve": BLOCKS["curve"],
 }
-"""The latents that each jump draws anew."""
+"""The latents that each jump draws again."""
 
 _PLACES_AND_SIZES: Final = (*REDRAWN["both places"], "log_floor_mv", "log_ceiling")
 
@@ -125,7 +125,7 @@ class SupraTarget:
         generator: torch.Generator,
         steps: Tensor,  # noqa: ARG002 - nothing changes with time
     ) -> tuple[SupraLatents, Tensor]:
-        """Particles (n,) with some latents, and whether their segment is there, drawn anew from the prior."""
+        """Particles (n,) with some latents, and whether their segment is there, drawn again from the prior."""
         fresh = self.prior.draw(1, len(latents.enhanced), generator, self.space)
         uniform = torch.rand(latents.enhanced.shape, generator=generator, dtype=torch.float32, device=generator.device)
         jump = drawn(tuple(JUMPS.values()), uniform)
@@ -154,5 +154,5 @@ def _shifted(device: torch.device) -> Tensor:
 
 @cache
 def _redrawn(device: torch.device) -> Tensor:
-    """Which latents each of `JUMPS` draws anew, shape (jumps, d)."""
+    """Which latents each of `JUMPS` draws again, shape (jumps, d)."""
     return torch.stack([_latents(*names, device=device) for names in REDRAWN.values()])
