@@ -30,12 +30,13 @@ def test_the_python_examples_run_one_page_after_the_other(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     for page in ("device.md", "log.md", "strategies.md"):
-        (block,) = blocks(page, "python")
         names: dict[str, Any] = {"__name__": "guide"}
-        exec(compile(block, page, "exec"), names)  # noqa: S102 - the point of the test
+        for block in blocks(page, "python"):
+            exec(compile(block, page, "exec"), names)  # noqa: S102 - the point of the test
     printed = capsys.readouterr().out
     assert "The budget of 4 stimuli is used up." in printed
     assert "nothing is missing" in printed
+    assert "60 pairs are left." in printed
 
 
 @pytest.mark.parametrize("page", ["device.md", "log.md"])

@@ -44,12 +44,14 @@ What may be imported, by package. ``import isiw`` loads a part when it is first 
 
 @cache
 def packages() -> tuple[ModuleType, ...]:
-    """The packages that export names, `isiw` first, and the module of errors."""
+    """The packages that export names, `isiw` first, and the plain modules that it exports."""
     found = [
         isiw,
         *(importlib.import_module(room.name) for room in pkgutil.walk_packages(isiw.__path__, "isiw.") if room.ispkg),
     ]
-    return (*(room for room in found if exported(room) and room.__name__ not in _HIDDEN), isiw.errors, isiw.metrics)
+    modules = [thing for name in isiw.__all__ if inspect.ismodule(thing := getattr(isiw, name))]
+    plain = [module for module in modules if not hasattr(module, "__path__")]
+    return (*(room for room in found if exported(room) and room.__name__ not in _HIDDEN), *plain)
 
 
 def exported(room: ModuleType) -> list[str]:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 import itertools
 import os
 
-_SILENT_S = 1.0
+_SILENT_S = 1.5
 _AGAIN_S = 0.05
 
 DAMAGED = 3
