@@ -24,7 +24,7 @@ OWN = {"isiw.cli", "isiw.text"}
 def public() -> set[str]:
     """Full names of what packages export, and of what the plain modules that `isiw` exports define."""
     rooms = [isiw, *(importlib.import_module(room.name) for room in pkgutil.walk_packages(isiw.__path__, "isiw."))]
-    modules = [thing for name in isiw.__all__ if inspect.ismodule(thing := getattr(isiw, name))]
+    modules = [thing for name in dir(isiw) if inspect.ismodule(thing := getattr(isiw, name))]
     plain = [module for module in modules if not hasattr(module, "__path__")]
     return {f"{module.__name__}.{name}" for module in plain for name in api.exported(module)} | {
         f"{room.__name__}.{name}"

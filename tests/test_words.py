@@ -20,7 +20,7 @@ PHRASES = re.compile(
 CONTINUING = re.compile(r"\b(?:go|goes|went|going) on with\b", re.IGNORECASE)
 PAGES = [
     path
-    for path in [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "docs").glob("[lt]*/*.md")]
+    for path in [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "docs").glob("[dlt]*/*.md")]
     if path.name != "words.md"
 ]
 SOURCES = sorted((ROOT / "src").rglob("*.py"))

@@ -49,7 +49,7 @@ def packages() -> tuple[ModuleType, ...]:
         isiw,
         *(importlib.import_module(room.name) for room in pkgutil.walk_packages(isiw.__path__, "isiw.") if room.ispkg),
     ]
-    modules = [thing for name in isiw.__all__ if inspect.ismodule(thing := getattr(isiw, name))]
+    modules = [thing for name in dir(isiw) if inspect.ismodule(thing := getattr(isiw, name))]
     plain = [module for module in modules if not hasattr(module, "__path__")]
     return (*(room for room in found if exported(room) and room.__name__ not in _HIDDEN), *plain)
 
