@@ -100,9 +100,9 @@ class WindowEstimate(Checked):
         silent: whether no trial that it rests on showed an MEP, so that nothing is known about a window.
         depressed: the ISIs that depress the MEP, as far as they are reported; None where there are none, or where
             nobody looked for them.
-        depressed_probability: probability that there are any; None where nobody looked for them.
-        change: what probably changed during the session, whatever the ISI; None where nothing did, or nobody looked.
-        time_alone: probability that there is no window, but amplitudes changed with time; None where nobody looked.
+        depressed_probability: probability that there are any; None if the model does not look for them.
+        change: what probably changed during the session, whatever the ISI; None if nothing did, or it is not sought.
+        time_alone: probability that there is no window, but amplitudes changed with time; None if the model lacks it.
         beforehand: probability of a window before the first trial; None where it is not known.
         tap_may_explain: whether the tap's own response may be what is larger within the window, as nobody knows what
             the tap alone does there.

@@ -180,7 +180,7 @@ class Trial(Checked):
     Args:
         index: number of the trial, from 0.
         status: the strategy learns from accepted trials and not from mistrials; both count as stimuli.
-        commanded_isi_ms: the ISI that was asked for [ms]; None for a control trial.
+        commanded_isi_ms: the ISI that was commanded [ms]; None for a control trial.
         reason: why it is a mistrial; None where accepted.
         isi_ms: the realised ISI [ms]; None for a control trial or where unknown. Of a tap alone it is the ISI at which
             the MEP window would lie that its amplitude was taken in.
@@ -196,7 +196,7 @@ class Trial(Checked):
         overruled: why it had been a mistrial before an operator accepted it; None otherwise.
         mep_sd_mv: SD of the amplitude [mV]: of the mean of several, or from what is left of the tap's own response.
         mep_interval_mv: the interval that the amplitude lies in, if no more is known [mV]; its end may be infinite.
-        tap_mv: what is left of the tap's own response in the amplitude, in the mean [mV]; None where nobody knows.
+        tap_mv: what is left of the tap's own response in the amplitude, in the mean [mV]; None if it is unknown.
 
     Raises:
         InvalidValueError: a mistrial without a reason, an accepted trial with one or without an amplitude, a tap alone

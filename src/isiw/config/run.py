@@ -98,7 +98,7 @@ class RunConfig(Section):
         """The design space of a new session.
 
         Raises:
-            ConfigError: a device of the lab's own, and nobody says from which event it counts.
+            ConfigError: a device of the lab's own, and the event from which its ISIs count is not stated.
         """
         if self.own_rig and not self.space_named:
             missing = missing_reference()

@@ -107,7 +107,7 @@ class Device(Protocol):
 
         Args:
             stimulus: what to deliver; an ISI of None is TMS alone, or a tap alone where `stimulus.tap_alone` says so,
-                which only a device is asked for whose `DeviceInfo` says that it can.
+                which only a device gets whose `DeviceInfo` says that it can.
             timeout_s: the longest the call may take [s].
 
         Raises:

@@ -71,7 +71,7 @@ class SimulatedDevice:
         return self.simulation.answer(stimulus)
 
     def resume_after(self, stimuli: Sequence[Stimulus]) -> None:
-        """Answer those of the session's stimuli that have not been asked for yet, and forget the answers.
+        """Answer those of the session's stimuli that have not been delivered yet, and forget the answers.
 
         Args:
             stimuli: all of them since the session's beginning.

@@ -142,7 +142,7 @@ class TimingStudy:
 
 
 def hit_delay_ms(study: TimingStudy) -> tuple[float, float] | None:
-    """From the valve command to the impact, as a strategy can be told [ms]; None where no impact was found."""
+    """From the valve command to the impact, as a setting of a strategy [ms]; None if no impact was found."""
     if not isinstance(study.events, TapEvents):
         return None
     hits_ms = study.events.hit_ms[~np.isnan(study.events.hit_ms)] - VALVE_MS

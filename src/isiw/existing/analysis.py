@@ -152,7 +152,7 @@ def analyse(
         seed: seed of all randomness.
         subject: the person's code.
         visit: what is noted about the visit.
-        simulated: whether nobody was stimulated.
+        simulated: true if nobody was stimulated: the person is simulated.
         **settings: settings of the strategy, such as `detection_limit_mv=0.05` or `conditioning="electrical"`.
 
     Raises:

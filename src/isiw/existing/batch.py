@@ -46,7 +46,7 @@ class Way:
         settings: settings of the strategy.
         subject: the code of a person who has none in the file.
         visit: what is noted about the visits.
-        simulated: whether nobody was stimulated.
+        simulated: true if nobody was stimulated: the person is simulated.
     """
 
     layout: Layout = field(default_factory=Layout)
@@ -65,7 +65,7 @@ def way_of(config: RunConfig, layout: Layout, *, simulated: bool = False) -> Way
     Args:
         config: the configuration.
         layout: how the files are laid out.
-        simulated: whether nobody was stimulated.
+        simulated: true if nobody was stimulated: the person is simulated.
 
     Raises:
         ConfigError: a prior, or earlier logs, which an analysis does not learn from.

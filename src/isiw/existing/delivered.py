@@ -34,12 +34,12 @@ class Delivered:
         subject: the person's code.
         visit: what is known of the visit.
         source: where they are from, in words.
-        created: when the first one was delivered, as ISO 8601 in UTC; empty if nobody knows.
+        created: when the first one was delivered, as ISO 8601 in UTC; empty if unknown.
         signals: what sweeps were judged by.
         sweeps: the waveforms, by trial and channel; empty if amplitudes alone are known.
         blocks: the first trial of each block, and what the block is called.
         conditioning: the conditioning stimulus.
-        simulated: whether nobody was stimulated.
+        simulated: true if nobody was stimulated: the person is simulated.
         units: the units in which ISIs and amplitudes are stated where they are from.
 
     Raises:

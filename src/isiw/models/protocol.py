@@ -29,14 +29,14 @@ Values: TypeAlias = "Tensor | Sequence[float | None] | Sequence[bool | None]"
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """One trial of each of b people, as told to a model.
+    """One trial of each of b people, as a model learns it.
 
     Args:
         isi_ms: the realised ISI [ms], shape (b,); NaN means TMS alone.
         mep_mv: amplitude of the MEP [mV], shape (b,); 0 is left-censored at the detection limit; NaN where only
             `response` is known.
         isi_sd_ms: SD of the realised ISI [ms], shape (b,).
-        response: 1 seen, 0 not seen, NaN where the amplitude is told instead, shape (b,).
+        response: 1 seen, 0 not seen, NaN if the amplitude is given instead, shape (b,).
         mep_high_mv: upper end of the interval that begins at `mep_mv` and holds the amplitude [mV], shape (b,); None
             where all amplitudes are points.
         known_mv: mean and SD of a part of the amplitude that is not the pulse's [mV], shape (b, 2); None for none.
@@ -182,7 +182,7 @@ class HasEvidence(Protocol):
     """Capability: how well the model as a whole predicted the trials."""
 
     def log_evidence(self) -> Tensor:
-        """Log marginal likelihood of the trials told so far [nat], shape (b,)."""
+        """Log marginal likelihood of the trials so far [nat], shape (b,)."""
 
 
 @runtime_checkable
@@ -207,7 +207,7 @@ class ProposesIsi(Protocol):
 
 @runtime_checkable
 class ExpectsTheUsual(Protocol):
-    """Capability: a belief that allows for more than is worth a trial, so that ISIs are chosen with another."""
+    """Capability: a posterior that allows for more than is worth a trial, so that ISIs are chosen with another."""
 
     @property
     def as_usual(self) -> Posterior:
@@ -216,7 +216,7 @@ class ExpectsTheUsual(Protocol):
 
 @runtime_checkable
 class NotesChanges(Protocol):
-    """Capability: a belief that reckons with changes in the course of a session, and can be told of one."""
+    """Capability: a posterior that allows for changes during a session, and can learn that there was one."""
 
     def noting_change(self) -> Posterior:
         """The same trials where somebody has seen that something changes now, such as the place of the coil."""
@@ -248,7 +248,7 @@ class ResponseModel(Protocol):
         """The posterior after one more trial.
 
         Args:
-            posterior: what is believed before it.
+            posterior: the posterior before it.
             observation: the trial.
 
         Raises:

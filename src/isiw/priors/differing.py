@@ -57,7 +57,7 @@ class Difference:
 def differences(records: Sequence[SessionRecord]) -> list[Difference]:
     """Differences of each session's window from the first one's, by the trials that count.
 
-    Each session's trials are told to the particle model with the built-in prior, whatever strategy had asked for them,
+    The particle model with the built-in prior learns each session's trials, whatever strategy chose them,
     so that all are judged alike. Whether one person's window moved is judged in the order of the sessions' dates.
     Nothing is said of windows after different conditioning stimuli, or from the valve command on rigs that state hit
     delays further apart than one rig's. Edges are compared within the range of ISIs that the sessions have in common.

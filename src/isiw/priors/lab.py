@@ -161,7 +161,7 @@ def learn(
 ) -> LabPrior:
     """Learn a lab's prior from the logs of its sessions, one a person.
 
-    The trials are told to the built-in model whatever the sessions were run with, so that no person counts twice where
+    The built-in model learns the trials whatever the sessions were run with, so that no person counts twice where
     a session was run with an earlier prior of the lab.
 
     Args:

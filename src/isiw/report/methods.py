@@ -30,7 +30,7 @@ class MethodAnswer(NamedTuple):
 
 
 def method_answers(record: SessionRecord) -> list[MethodAnswer]:
-    """The belief, the dissertation's rule on mean MEPs, response counts, and the form of the profile.
+    """The estimate of isiw, the dissertation's rule on mean MEPs, response counts, and the form of the profile.
 
     Args:
         record: the trials and their estimate.

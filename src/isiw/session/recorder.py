@@ -135,11 +135,11 @@ class Recorder(Judging):
             background_rms_uv: EMG before the pulse [µV RMS], where known.
             mep_sd_mv: as for `Strategy.tell` [mV].
             mep_interval_mv: as for `Strategy.tell` [mV].
-            pulse: False is a tap alone, as for `Strategy.tell`, which was given without being asked for.
+            pulse: False is a tap alone, as for `Strategy.tell`, which was given without a request.
 
         Raises:
             InvalidValueError: nothing was asked, a value that cannot be, a slip of unit or order, a pulse before the
-                impact, or an ISI that is too uncertain; the outcome is not logged, and the right value can be told.
+                impact, or an ISI that is too uncertain; the outcome is not logged, and the right value can be given.
                 TMS alone counts as given from the first try on.
             OutOfSpaceError: an ISI beyond the space and its tolerance.
             LogError: the log cannot be written.
@@ -186,7 +186,7 @@ class Recorder(Judging):
             self._warn(self._doubts.new)
 
     def mistrial(self, reason: Kind | str) -> None:
-        """That the trial of the ISI that was asked is lost: it counts as a stimulus, and is not told.
+        """That the trial of the ISI that was asked is lost: it counts as a stimulus, and is not learnt.
 
         Args:
             reason: a `Kind` or its value; any other text is logged as a note, under "rejected".

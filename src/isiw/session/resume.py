@@ -57,9 +57,9 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
             the strategy learns them before its first ask, as `Strategy.learn_all` does, and nothing counts them.
         limits: what may be asked; the strategy's space and 200 pulses by default. Nothing waits between stimuli unless
             their `min_iti_s` is stated. Of a session that goes on, the logged ones by default. Limits of the coil and
-            of the intensity allow nothing, as nobody reports these here.
+            of the intensity allow nothing, as these are not reported here.
         clock: tells the time, and waits in `ask` until the interval, the rest and the period of the limits have passed,
-            before the first stimulus, too, as nobody knows what came before.
+            before the first stimulus, too, as what came before is unknown.
         subject: the person's code, for the log; of a session that goes on, the logged one by default.
         visit: what is noted about the visit, for the log; of a session that goes on, the logged one by default.
         protocol: intervals, blocks and rests, which `ask` waits for; of a session that goes on, the logged one by
@@ -75,7 +75,7 @@ def open_session(  # noqa: PLR0913 - all but two are keyword-only
         DeviceError: the log is of a simulated device.
         InvalidValueError: `lost_pulses` is no number of stimuli, or the log's end is there; a subject that is no text,
             or another than the log's; a protocol with control trials; a rest or a period that limits nothing, a limit
-            on intensity or coil temperature, which nobody reports here, or limits that do not hold the strategy's plan.
+            on intensity or coil temperature, which are unknown here, or limits that do not hold the strategy's plan.
         LogError: there is a log already, or it cannot be written or read.
         StrategyError: the strategy knows of trials already, or asks something else than the log says it asked.
 

@@ -96,7 +96,7 @@ def resume_threshold(
         clock: as for `open_threshold`.
 
     Raises:
-        DamagedLogError: the end of the log is missing, so that nobody knows how many pulses were given.
+        DamagedLogError: the end of the log is missing, so that the number of pulses is unknown.
         DeviceError: a virtual clock for a device that is not simulated.
         InvalidValueError: a search with another range than the log's, or none for a method of one's own.
         LogError: no such log, or one of something else.

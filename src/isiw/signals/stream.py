@@ -27,7 +27,7 @@ class Impact:
 
     Args:
         hit_ms: when the hammer hit [ms].
-        known_ms: when the sample was taken that told so [ms].
+        known_ms: when the sample was taken that showed it [ms].
     """
 
     hit_ms: float

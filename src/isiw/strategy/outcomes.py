@@ -154,7 +154,7 @@ class Outcomes:
         )
 
     def _tap_mv(self, outcome: Outcome) -> tuple[float, float] | None:
-        """Mean and SD of the tap's own part of an amplitude [mV]; None where nobody knows."""
+        """Mean and SD of the tap's own part of an amplitude [mV]; None if it is unknown."""
         if outcome.isi_ms is None or outcome.tap_mv is not None:
             return outcome.tap_mv or 0.0, 0.0
         if not self.taps:

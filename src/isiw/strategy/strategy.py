@@ -169,7 +169,7 @@ class Strategy:
 
     @property
     def amplitude_step_mv(self) -> float | None:
-        """The step of the amplitudes that it is told [mV]; None where it is to be found, 0 where there is none."""
+        """The step of the amplitudes [mV]; None if it is to be found, 0 if there is none."""
         return self._stated("amplitude_step_mv")
 
     def _stated(self, setting: str) -> float | None:
@@ -224,7 +224,7 @@ class Strategy:
             return Choice(evenly_spaced(self.space, course.told), reason, by="fallback")
 
     def ask_batch(self, n: int) -> list[float]:
-        """The next n ISIs [ms], to be delivered before anything is told, and told in any order; the first is `ask`'s.
+        """The next n ISIs [ms], to be delivered before any outcome, which may come in any order; the first is `ask`'s.
 
         Args:
             n: how many, at most 1,000.
@@ -318,7 +318,7 @@ class Strategy:
             isi_ms: as for `tell` [ms].
             mep_mv: as for `tell` [mV].
             **more: as for `tell`, and `tap_mv`: what is left of the tap's own response in the amplitude, in the mean
-                [mV]; None where nobody knows.
+                [mV]; None if it is unknown.
 
         Raises:
             InvalidValueError: an amplitude that no amplifier gives, or other values that `tell` refuses.
@@ -338,7 +338,7 @@ class Strategy:
 
         Raises:
             InvalidValueError: an amplitude that no amplifier gives.
-            StrategyError: an ISI was asked for or told before, trials of another level were learnt before, or the model
+            StrategyError: an ISI was asked or learnt before, trials of another level were learnt before, or the model
                 cannot learn from such a trial.
         """
         if self.delivered or self._choice is not None or (self._earlier and not (same_level and self.same_level)):
@@ -376,7 +376,7 @@ class Strategy:
         self._lost = 0 if isi_ms is not None else self._lost
 
     def learn_tap(self, isi_ms: float | None, mep_mv: float | None) -> None:
-        """Learn from a tap alone, whatever was told before it.
+        """Learn from a tap alone, whatever was learnt before it.
 
         Args:
             isi_ms: as for `tell` [ms].
@@ -428,7 +428,7 @@ class Strategy:
         self._choice = self._fallback_reason = None
 
     def count_mistrial(self) -> None:
-        """Count a delivered stimulus whose outcome is not told: it uses up budget, and is asked again at most twice."""
+        """Count a delivered stimulus without an outcome: it uses up budget, and its ISI is repeated at most twice."""
         self._mistrials += 1
         self._lost += 1
         self._choice = None if self._choice is None else replace(self._choice, by="again")

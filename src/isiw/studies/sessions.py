@@ -62,7 +62,7 @@ class SimulatedSession(Checked):
         person: which person of it, from 0.
         seed: seed of the cohort; trial noise and strategy use `seed + person`.
         trials: how many trials to run at most.
-        marks: after which trials the estimate is recorded; 0 is before any. Trials that were told count, no mistrials.
+        marks: after which trials the estimate is recorded; 0 is before any. Trials with an outcome count, no mistrials.
         space: the design space.
         settings: settings of the strategy, as (name, value) pairs.
         label: what the strategy is called in the table; by default its name.
@@ -111,7 +111,7 @@ class SimulatedSession(Checked):
         return replace(usual, scale=self.amplitude * usual.scale)
 
     def as_the_rig_states(self) -> SimulatedSession:
-        """The same with what the person's rig states told to the strategy, where it can use it.
+        """The same with what the person's rig states as a setting of the strategy, if it can use it.
 
         It states its hit delay, where ISIs count from the valve command, and its conditioning stimulus.
         """
@@ -124,7 +124,7 @@ class SimulatedSession(Checked):
         return replace(self, settings=tuple((known | dict(self.settings)).items()))
 
     def as_the_visit_states(self) -> SimulatedSession:
-        """The same with the intensity told to the strategy, where the visit states it and the strategy can use it."""
+        """The same with the intensity as a setting of the strategy, if it is stated and the strategy can use it."""
         if self.own is not None:
             return self
         known = known_settings(self.strategy, {"intensity_pct_rmt": self.subject().stated_intensity_pct_rmt})

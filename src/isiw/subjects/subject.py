@@ -63,9 +63,9 @@ class Response:
     """The response to a stimulus.
 
     Args:
-        isi_ms: the ISI as told [ms]: the realised one where it is known, else the commanded; None for TMS alone.
+        isi_ms: the ISI as reported [ms]: the realised one if it is known, else the commanded; None for TMS alone.
         mep_mv: peak-to-peak amplitude of the MEP [mV].
-        isi_sd_ms: SD of the realised ISI about the told one [ms].
+        isi_sd_ms: SD of the realised ISI about the reported one [ms].
     """
 
     isi_ms: float | None

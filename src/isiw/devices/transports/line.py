@@ -46,7 +46,7 @@ class LineDevice:
             time that is left [s].
 
     Raises:
-        InvalidValueError: an incomplete address, a table that lacks something, or nobody or both measure the MEP.
+        InvalidValueError: an incomplete address, a table that lacks something, or no command or two measure the MEP.
     """
 
     def __init__(

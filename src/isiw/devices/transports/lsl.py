@@ -215,7 +215,7 @@ class LslDevice:
         return self._exchange.deliver(stimulus, _left_s(end_s), partial(self._sweep, asked_s, end_s))
 
     def stop(self) -> None:
-        """Have it disarm, and wait for its word; without a connection there is nobody to ask."""
+        """Have it disarm, and wait for its answer; without a connection nothing is sent."""
         if self._markers.connected:
             self._exchange.disarm()
 

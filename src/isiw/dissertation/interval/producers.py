@@ -62,7 +62,7 @@ class Producer(Checked):
     Args:
         timing_cv: w, SD of the timing noise as a fraction of the time aimed at.
         motor_ms: b, SD of the noise of the two presses [ms].
-        offset_ms: by how much people take another time for a told target, mean [ms].
+        offset_ms: by how much people take another time for a stated target, mean [ms].
         offset_sd_ms: the same, SD over people [ms].
         start_sd_ms: SD over people of the first aim about a hidden target [ms].
         search_ms: S, SD of the search without rewards [ms].

@@ -74,7 +74,7 @@ class GaussianProcess(Checked):
         floor: what the least-excess rule is applied above. Where the floor is subtracted and TMS alone was not told,
             it is the median of what lies low on each path.
         samples: how many paths represent the posterior.
-        detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
+        detection_limit_mv: an amplitude of 0 lies below this [mV].
     """
 
     process: ProcessSettings = field(default_factory=ProcessSettings, metadata={"spread": True})

@@ -42,8 +42,8 @@ class ParametricModel(Checked):
         samples: equally weighted samples that represent a posterior.
         effort: how much work a sample with a window is worth.
         chains: how long the no-U-turn sampler runs.
-        detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
-        response_threshold_mv: what a told response is known to be above [mV].
+        detection_limit_mv: an amplitude of 0 lies below this [mV].
+        response_threshold_mv: a response that was seen lies above this [mV].
 
     Raises:
         InvalidValueError: an unknown likelihood or method, or an invalid number.
@@ -77,7 +77,7 @@ class ParametricModel(Checked):
         """The posterior after several more trials: the same as after one by one, at the cost of one.
 
         Args:
-            posterior: what is believed before them.
+            posterior: the posterior before them.
             observations: the trials, in order.
         """
         history = posterior.history

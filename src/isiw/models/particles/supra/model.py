@@ -34,8 +34,8 @@ class SupraModel(Checked):
         particles: how many particles a person has.
         thinned: how many of them represent the posterior where every candidate ISI is scored.
         moves: how often particles move, and when they are resampled.
-        detection_limit_mv: what a told amplitude of 0 is known to be below [mV].
-        response_threshold_mv: what a told response is known to be above [mV].
+        detection_limit_mv: an amplitude of 0 lies below this [mV].
+        response_threshold_mv: a response that was seen lies above this [mV].
         engine: `"compiled"` loops, or `"torch"`, which stands in where there are none.
     """
 
