@@ -63,7 +63,7 @@ classdef isiw < handle
     function [trial, isi_ms] = ask(this)
       % The next trial's number and its ISI [ms], which is on disk as about to be delivered.
       if ~isempty(this.asked)
-        error('isiw:TrialOpen', ['trial %d was asked for and has no outcome; it may have been delivered. ' ...
+        error('isiw:TrialOpen', ['trial %d was requested and has no outcome; it may have been delivered. ' ...
               'Tell it, or call mistrial(%d, ''outcome unknown'').'], this.asked, this.asked);
       end
       answer = this.post(this.path('ask'), {'trial', number(this.trials)});

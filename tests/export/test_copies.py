@@ -119,7 +119,7 @@ def test_of_two_damaged_copies_that_which_tells_of_more_is_exported_and_the_othe
     told, sessions = exported(log, tmp_path)
     assert sessions[["log", "delivered"]].to_numpy().tolist() == [["b.mcap", 6]]
     assert told.lacking[0] == (
-        "s.mcap is left out: it is of the same session as b.mcap, which tells of more; 1 record is in s.mcap alone."
+        "s.mcap is left out: it is of the same session as b.mcap, which holds more; 1 record is in s.mcap alone."
     )
     assert any("fails its checksum" in loss for loss in told.lacking[1:])
 
@@ -136,7 +136,7 @@ def test_a_whole_copy_of_an_earlier_day_stands_behind_the_damaged_log_that_went_
     told, sessions = exported(path, tmp_path)
     assert sessions.log.tolist() == ["s.mcap"]
     assert told.lacking[0] == (
-        "after 3.mcap is left out: it is of the same session as s.mcap, which tells of more; "
+        "after 3.mcap is left out: it is of the same session as s.mcap, which holds more; "
         "1 record is in after 3.mcap alone."
     )
 

@@ -158,7 +158,7 @@ def replay(
     seeds, trials = whole("seeds", seeds, least=1), whole("trials", trials, least=1)
     pairs = [trial for trial in delivered.trials.told if trial.isi_ms is not None and space.admits(trial.isi_ms)]
     if len(pairs) < 2:
-        raise InvalidValueError("too few trials to be asked for", got=len(pairs), expected="two and more")
+        raise InvalidValueError("too few trials to answer a strategy", got=len(pairs), expected="two and more")
     runs = []
     for name in strategies:
         for seed in range(first_seed, first_seed + seeds):

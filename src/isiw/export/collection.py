@@ -158,7 +158,7 @@ class _Copy:
         name, fuller = _names(self.record, self.fuller)
         if self.alone:
             more = f"{counted(self.alone, 'record is', 'records are')} in {name} alone"
-            return f"{name} is left out: it is of the same session as {fuller}, which tells of more; {more}."
+            return f"{name} is left out: it is of the same session as {fuller}, which holds more; {more}."
         if _is_damaged(self.record):
             return f"{name} is left out: it is a damaged copy of {fuller}, which has all that can be read of it."
         return f"{name} is left out: it is a part of {fuller}."

@@ -126,7 +126,7 @@ def _of_subject(log: Path, subject: str) -> list[tuple[int, int]]:
         return []
     if salvaged.end_lost and not _went_on(salvaged):
         raise DamagedLogError(
-            "the end of an earlier log of this subject is missing, so nobody knows how many stimuli were given",
+            "the end of an earlier log of this subject is missing, so the number of stimuli given is unknown",
             got=str(log),
             remedy="Resume that session with the number of pulses that were lost, or wait until the period is over.",
         )

@@ -113,7 +113,7 @@ class SessionRecord:
         """Raise where nobody knows how many stimuli were given."""
         if self.end_lost:
             raise DamagedLogError(
-                "the log's end is missing, so nobody knows how many stimuli were given",
+                "the log's end is missing, so the number of stimuli given is unknown",
                 got=str(self.path),
                 remedy="Look at the stimulator's counter, and resume with the number N of pulses that isiw show does "
                 f"not list: {continued_by(self.path, self.header, end_lost=True)}",

@@ -103,7 +103,7 @@ def _by_form(trials: TrialsByIsi) -> MethodAnswer:
     return MethodAnswer(
         "Form of the profile [Kim2020, Tables 4.1 and 8.1, Fig. 8.2]",
         " ".join(said),
-        "Means at five ISIs and more; a few hundred trials to tell two Gaussians from one.",
+        "Means at five ISIs and more; a few hundred trials to distinguish two Gaussians from one.",
         f"Where the window is. {counted(len(at_ms), 'ISI')} were used.",
     )
 

@@ -126,7 +126,7 @@ class DrivenSession:
             raise Refusal(
                 409,
                 "TrialOpen",
-                f"trial {asked.trial} was asked for and has no outcome; it may have been delivered",
+                f"trial {asked.trial} was requested and has no outcome; it may have been delivered",
                 got=asked.isi_ms,
                 remedy="Tell its outcome, or make it a mistrial. Only where the answer of ask was lost, ask again with "
                 f"trial={asked.trial}.",
@@ -193,9 +193,9 @@ class DrivenSession:
         raise Refusal(
             409,
             "NotAsked",
-            f"trial {trial} was not asked for",
+            f"trial {trial} was not requested",
             got=trial,
-            expected=f"trial {comes_next}{'' if stimulus else ', once it was asked for'}",
+            expected=f"trial {comes_next}{'' if stimulus else ', once it was requested'}",
             remedy="Call ask, deliver, and then tell.",
             field="trial",
         )

@@ -107,7 +107,7 @@ def resume_threshold(
     clock = _clock_for(record.header.device, clock)
     if record.end_lost:
         raise DamagedLogError(
-            "the log's end is missing, so nobody knows how many pulses were given",
+            "the log's end is missing, so the number of pulses given is unknown",
             got=str(record.path),
             remedy="Begin a new log, with the pulses that the stimulator has counted taken off max_pulses.",
         )

@@ -251,7 +251,7 @@ def _unit_question(rest_uv: float, evidence: Evidence) -> str | None:
     """Which unit the EMG is likely in, and what to do about it; None where no unit makes its level plausible."""
     emg = evidence.answer.channels.get("emg") if isinstance(evidence.answer, Sweep) else None
     if emg is None:  # the device itself measures
-        return "Is background_rms_uv, as the device tells it, in µV? Convert it"
+        return "Is background_rms_uv, as the device reports it, in µV? Convert it"
     levels_uv = {unit: rest_uv * EMG_UNITS_MV[unit] / EMG_UNITS_MV[emg.unit] for unit in ("V", "mV", "µV")}
     likely = REST_UV.likely_unit(levels_uv)
     return likely and f"Is it in {likely}, and described as {emg.unit}? Give the channel its unit"

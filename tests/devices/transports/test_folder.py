@@ -119,8 +119,8 @@ def test_a_session_runs_from_a_configuration_file_and_leaves_no_answers_behind(t
 
 
 LIES: dict[str, tuple[type[Exception], str]] = {
-    "silence": (DeviceTimeoutError, "nobody answered to deliver"),
-    "late": (DeviceTimeoutError, "nobody answered to deliver"),
+    "silence": (DeviceTimeoutError, "no answer to deliver"),
+    "late": (DeviceTimeoutError, "no answer to deliver"),
     "refuses": (NotDelivered, "refused to deliver: no air$"),
     "fails": (DeviceError, "failed to deliver: trigger lost"),
     "says another thing": (DeviceError, "expected delivered"),
@@ -226,7 +226,7 @@ def test_a_sweep_has_its_channels_and_times(tmp_path: Path) -> None:
 
 def test_without_anybody_there_staging_fails_in_time_and_stopping_is_harmless(tmp_path: Path) -> None:
     made = device(tmp_path, stage_timeout_s=0.2, stop_timeout_s=0.2)
-    with pytest.raises(DeviceTimeoutError, match=r"nobody answered to disarm"):
+    with pytest.raises(DeviceTimeoutError, match=r"no answer to disarm"):
         made.stage()
     made.stop()
     made.unstage()
@@ -250,7 +250,7 @@ def test_what_does_not_arm_is_not_staged(tmp_path: Path) -> None:
 def test_what_is_deaf_to_arming_is_disarmed(tmp_path: Path) -> None:
     with rig(tmp_path, {"arm": "silence"}):
         made = device(tmp_path, stage_timeout_s=0.3)
-        with pytest.raises(DeviceTimeoutError, match="nobody answered to arm"):
+        with pytest.raises(DeviceTimeoutError, match="no answer to arm"):
             made.stage()
         assert request_in(tmp_path)["verb"] == "disarm"
         made.stop()
@@ -261,7 +261,7 @@ def test_stopping_fails_where_what_may_be_armed_does_not_answer(tmp_path: Path) 
         made = device(tmp_path, stop_timeout_s=0.2)
         made.stage()
     for verb in (made.stop, made.unstage):
-        with pytest.raises(DeviceTimeoutError, match="nobody answered to disarm"):
+        with pytest.raises(DeviceTimeoutError, match="no answer to disarm"):
             verb()
 
 

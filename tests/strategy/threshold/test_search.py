@@ -84,7 +84,7 @@ def test_answered_pulses_must_be_larger_than_the_others() -> None:
         search.tell(44, 0.04)
         search.tell(45, 0.059)
     assert search.estimate().threshold_pct_mso is None
-    assert "(median 59 µV) are hardly larger than the others (median 40 µV)" in search.decision().reason
+    assert "(median 59 µV) are only a little larger than the others (median 40 µV)" in search.decision().reason
     assert "hum or an artefact" in search.decision().reason
     for _ in range(7):
         search.tell(45, 0.07)

@@ -298,7 +298,7 @@ def _require_answer_to(stimulus: Stimulus, reply: Reply) -> None:
         raise reply.broken("the answer is about another trial", got=trial, expected=f"trial {stimulus.trial}")
     if stimulus.isi_ms is None:
         if reply.has("set_isi_ms"):
-            raise reply.broken("an ISI was set where TMS alone was asked for", got=reply.number("set_isi_ms"))
+            raise reply.broken("an ISI was set for a request of TMS alone", got=reply.number("set_isi_ms"))
         return
     set_ms = reply.number("set_isi_ms")
     if abs(set_ms - stimulus.isi_ms) > SET_TOLERANCE_MS:

@@ -120,7 +120,7 @@ class FolderDevice:
 
 def _measurement(stimulus: Stimulus, reply: Reply) -> Measurement:
     if stimulus.isi_ms is None and reply.has("isi_ms"):
-        raise reply.broken("a realised ISI where TMS alone was asked for", got=reply.number("isi_ms"))
+        raise reply.broken("a realised ISI for a request of TMS alone", got=reply.number("isi_ms"))
     isi_ms = None if stimulus.isi_ms is None else reply.number("isi_ms")
     others = [key for key in _OF_MEASUREMENT if key not in {"mep_mv", "isi_ms"} and reply.has(key)]
     return Measurement(reply.number("mep_mv"), isi_ms, **{key: reply.number(key) for key in others})
@@ -235,7 +235,7 @@ class _Folder:
                 remedy="Write it under another name and rename it, or write it in one go.",
             )
         return DeviceTimeoutError(
-            f"nobody answered to {request.verb} in the folder",
+            f"no answer to {request.verb} came in the folder",
             got=str(self._place),
             expected=f"{path.name} within {request.timeout_s:.3g} s",
             remedy=f"Does the software run that reads {REQUEST} there?",

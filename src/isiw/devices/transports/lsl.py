@@ -61,7 +61,7 @@ class Markers:
         """Wait until somebody listens, since markers are lost that nobody listens to."""
         if not self._outlet.wait_for_consumers(timeout_s):
             raise DeviceTimeoutError(
-                "nobody listens to the markers",
+                "no program listens to the markers",
                 got=f"the stream {self._name}",
                 remedy="Let the software that drives the hardware open an inlet to it.",
             )
@@ -77,7 +77,7 @@ class Markers:
         """Push a marker."""
         if not self._outlet.have_consumers():
             kind = NotDelivered if request.verb is Verb.DELIVER else DeviceError
-            raise kind("nobody listens to the markers any more", got=f"the stream {self._name}")
+            raise kind("no program listens to the markers any more", got=f"the stream {self._name}")
         self._newest = request
         self._outlet.push_sample([json.dumps(request.values())])
 

@@ -63,7 +63,7 @@ class HotSpotEstimate(NamedTuple):
 def _require_a_response(pulses: Sequence[CoilPulse]) -> None:
     if not any(pulse.mep_mv > RESPONSE_MV for pulse in pulses):
         raise InvalidValueError(
-            "no pulse evoked an MEP, so nobody can say where the hot spot is",
+            "no pulse evoked an MEP, so the hot spot is unknown",
             got=len(pulses),
             expected=f"at least one MEP above {1000 * RESPONSE_MV:g} µV",
             remedy="Search with a higher intensity, or in another area.",

@@ -279,6 +279,6 @@ def hardly_larger(pulses: Sequence[Pulse]) -> str | None:
     if answered > LEAST_RATIO * missed:
         return None
     return (
-        f"The amplitudes that count as MEPs (median {1e3 * answered:.0f} µV) are hardly larger than the others "
+        f"The amplitudes that count as MEPs (median {1e3 * answered:.0f} µV) are only a little larger than the others "
         f"(median {1e3 * missed:.0f} µV)."
     )
