@@ -5,6 +5,7 @@ import os
 import re
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -13,7 +14,26 @@ import typer
 
 from cli.conftest import COMMAND, Command
 from isiw import __version__
-from isiw.cli.console import INTERRUPTED, errors_reported, show_paragraph
+from isiw.cli import console
+from isiw.cli.console import INTERRUPTED, errors_reported, show_paragraph, working
+
+
+def test_a_pipe_gets_lines_while_a_command_is_at_work(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(console, "_SILENT_S", 0.001)
+    said, show = threading.Event(), console.show
+
+    def heard(text: str, *, stderr: bool = False) -> None:
+        show(text, stderr=stderr)
+        if text == "7 of 36":
+            said.set()
+
+    monkeypatch.setattr(console, "show", heard)
+    with working("Drawing a.mcap") as note:
+        note("7 of 36")
+        assert said.wait(60)
+    assert capsys.readouterr().err.startswith("Drawing a.mcap …\n")
 
 
 def test_the_version_is_shown(isiw: Command) -> None:

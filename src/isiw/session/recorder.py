@@ -170,7 +170,7 @@ class Recorder(Judging):
         if (isi_ms is None or not pulse) != (asked.isi_ms is None) or asked.tap_alone is pulse:
             alone = "a tap alone" if asked.tap_alone else "TMS alone"
             raise InvalidValueError(
-                "the outcome is not of the kind of the requested trial",
+                "the outcome is not of the kind of trial that was requested",
                 got=isi_ms,
                 expected=f"the outcome of {alone if asked.isi_ms is None else f'{asked.isi_ms:g} ms'}",
                 remedy="Tell that first, or call mistrial().",
