@@ -67,7 +67,7 @@ def analyse(  # noqa: PLR0913, PLR0917 - an option each
     strategy: Annotated[str | None, typer.Option(help="The strategy; see isiw strategies.", **NO_DEFAULT)] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the analysis.", **NO_DEFAULT)] = None,
     only: Annotated[str | None, typer.Option(help="The code of the one person who is wanted.", **NO_DEFAULT)] = None,
-    simulated: Annotated[bool, typer.Option("--simulated", help="Nobody was stimulated.")] = False,  # noqa: FBT002 - a flag
+    simulated: Annotated[bool, typer.Option("--simulated", help="The trials are simulated.")] = False,  # noqa: FBT002 - a flag
 ) -> None:
     """Estimate the window from trials that were delivered without isiw; with -o, make a log of them.
 

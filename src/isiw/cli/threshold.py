@@ -35,7 +35,8 @@ def threshold(  # noqa: PLR0913, PLR0917 - an option each
     method: Annotated[
         str | None,
         typer.Option(
-            help="bayes (default), maximum-likelihood, five-of-ten; or hot-spot, which moves the coil.", **NO_DEFAULT
+            help="bayes (default), maximum-likelihood, five-of-ten; or hot-spot, which says where to hold the coil.",
+            **NO_DEFAULT,
         ),
     ] = None,
     enough: Annotated[
