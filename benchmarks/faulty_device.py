@@ -18,7 +18,7 @@ from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, require
 from isiw.errors import DeviceError, NotDelivered
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Event, Intent
-from isiw.testing.requirements import require
+from isiw.testing.suites import require
 from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep
 
 _HOT_C = 90.0

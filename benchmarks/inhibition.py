@@ -31,7 +31,7 @@ from benchmarks.tables import write_tables
 from isiw import DesignSpace, VisitProtocol, make_strategy
 from isiw.metrics import f1
 from isiw.subjects import RecruitmentResponse, SimulatedSubject, cohort
-from isiw.subjects.profiles import OpposedProfile
+from isiw.subjects.responses import OpposedProfile
 
 SPACE: Final = DesignSpace(0, 120, reference="impact")
 MARKS: Final = (20, 40, 60)

@@ -22,8 +22,7 @@ from scipy.stats import gamma, norm
 from isiw.design import DesignSpace
 from isiw.studies import SimulatedSession, play
 from isiw.subjects.measured import LABS, MEASURED_KIM, WIDTHS_KIM_MS, MeasuredPerson, lab
-from isiw.subjects.profiles import PeakProfile
-from isiw.subjects.responses import GainResponse, RecruitmentResponse, ResponseCurve
+from isiw.subjects.responses import GainResponse, PeakProfile, RecruitmentResponse, ResponseCurve
 from isiw.subjects.subject import OUTLIERS_MV, SimulatedSubject
 from isiw.types import BoolArray, FloatArray
 from isiw.window import Window, least_excess_mv

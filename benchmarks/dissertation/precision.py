@@ -15,7 +15,7 @@ from benchmarks.dissertation.claims import Claim, put_to_test
 from benchmarks.dissertation.parts import Told, verdict
 from benchmarks.dissertation.size import Size
 from benchmarks.reduction.look import OURS, panels
-from isiw.devices.robot.mechanism import Event
+from isiw.devices.robot.mechanism import EventTime
 from isiw.devices.robot.tapper import preset
 from isiw.dissertation.repeatability import STUDY_ISI_MS, TimingStudy, study_preset, study_sweeps
 
@@ -146,7 +146,7 @@ def _followed(taps: int, seed: int) -> TimingStudy:
 def _triggered(isi_ms: float, taps: int, seed: int) -> list[isiw.Sweep]:
     cushion = preset("cushion")
     hit_sd_ms = float(np.sqrt(JITTER_MS[1] ** 2 - POOLED_MS**2)) if isi_ms == 52.0 else cushion.hit.sd_ms
-    geometry = replace(cushion, hit=Event(cushion.hit.mean_ms, hit_sd_ms))
+    geometry = replace(cushion, hit=EventTime(cushion.hit.mean_ms, hit_sd_ms))
     settings = isiw.TapperSettings(trigger="impact", rate_hz=2000.0, pulse_jitter_ms=POOLED_MS)
     robot = isiw.Tapper(lambda _: _Evoked(), geometry, settings, seed=seed + round(isi_ms))
     return [robot.answer(isiw.Stimulus(trial, isi_ms)) for trial in range(taps)]

@@ -14,7 +14,7 @@ from benchmarks.dissertation.parts import Told, verdict
 from benchmarks.dissertation.size import Size
 from benchmarks.reduction.look import OURS, panels
 from isiw.design import IMPACT_SPACE
-from isiw.devices.robot.mechanism import Event
+from isiw.devices.robot.mechanism import EventTime
 from isiw.devices.robot.tapper import preset
 from isiw.subjects import SimulatedSubject, cohort
 from isiw.types import FloatArray
@@ -48,7 +48,7 @@ def _traced(person: SimulatedSubject, seed: int) -> dict[str, tuple[float, isiw.
     profile = replace(person.profile, start_ms=centre_ms - 0.5 * person.profile.width_ms)
     responder = replace(person, profile=profile, hit_delay_sd_ms=0.0).begin(seed)
     settings = isiw.TapperSettings(reference="valve", expected_hit_ms=183.0)
-    geometry = replace(preset("subject1"), descent=Event(131, 2), hit=Event(183, 1.0))
+    geometry = replace(preset("subject1"), descent=EventTime(131, 2), hit=EventTime(183, 1.0))
     robot = isiw.Tapper(lambda isi_ms: responder.respond(isi_ms, "impact"), geometry, settings, seed=seed)
     stimuli = {f"{isi_ms:g} ms": isiw.Stimulus(k, isi_ms) for k, isi_ms in enumerate(np.arange(310.0, 235.0, -5.0))}
     stimuli |= {"TMS alone": isiw.Stimulus(20, None), "tap alone": isiw.Stimulus(21, None, tap_alone=True)}

@@ -20,11 +20,11 @@ from . import testing as testing
 from .design import IMPACT_SPACE as IMPACT_SPACE
 from .design import VALVE_SPACE as VALVE_SPACE
 from .design import DesignSpace as DesignSpace
-from .devices.callback import CallbackDevice as CallbackDevice
 from .devices.clock import MonotonicClock as MonotonicClock
 from .devices.clock import VirtualClock as VirtualClock
 from .devices.deadlines import Deadlines as Deadlines
 from .devices.limits import Limits as Limits
+from .devices.protocol import CallbackDevice as CallbackDevice
 from .devices.protocol import Device as Device
 from .devices.protocol import DeviceInfo as DeviceInfo
 from .devices.protocol import Readiness as Readiness
@@ -40,8 +40,8 @@ from .devices.simulated import SimulatedDevice as SimulatedDevice
 from .devices.simulated import SimulatedPerson as SimulatedPerson
 from .devices.transports.folder import FolderDevice as FolderDevice
 from .devices.transports.line import LineDevice as LineDevice
-from .devices.transports.lsl import LslChannel as LslChannel
 from .devices.transports.lsl import LslDevice as LslDevice
+from .devices.transports.lsl_samples import LslChannel as LslChannel
 from .dissertation import interval as interval
 from .dissertation import repeatability as repeatability
 from .dissertation import response_counts as response_counts

@@ -10,6 +10,7 @@ import inspect
 import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from functools import cache, partial
 from numbers import Integral, Real
 from types import UnionType
@@ -55,7 +56,10 @@ class Bounds(TypedDict, total=False):
 
 def number(what: str, value: object, *, remedy: str | None = None, **bounds: Unpack[Bounds]) -> float:
     """A finite number within some bounds."""
-    plain = _as_float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
+    plain = math.nan
+    if isinstance(value, Real) and not isinstance(value, bool):
+        with suppress(OverflowError):  # a whole number that no float can hold
+            plain = float(value)
     if not (math.isfinite(plain) and _within(plain, bounds)):
         raise InvalidValueError(f"{what} must be {_described('a finite number', bounds)}", got=value, remedy=remedy)
     return plain
@@ -74,14 +78,16 @@ def amplitude(what: str, value: object) -> float:
     return plain
 
 
-def amplitude_interval(ends_mv: object) -> tuple[float, float]:
+def amplitude_interval(what: str, ends_mv: object) -> tuple[float, float]:
     """An interval of amplitudes, whose upper end may be infinite [mV]."""
     if isinstance(ends_mv, tuple | list) and len(ends_mv) == 2:
         low_mv, high_mv = ends_mv
         if 0 <= number("an amplitude's lower end [mV]", low_mv) < high_mv:
             return float(low_mv), float(high_mv)
     raise InvalidValueError(
-        "this is no interval of amplitudes", got=ends_mv, expected="two amplitudes in mV that ascend, such as (0, 0.05)"
+        f"{what} is no interval of amplitudes",
+        got=ends_mv,
+        expected="two amplitudes in mV that ascend, such as (0, 0.05)",
     )
 
 
@@ -117,7 +123,7 @@ def mean_and_sd(what: str, value: object) -> tuple[float, float]:
 
 
 def require_sum_of_one(what: str, shares: Iterable[float]) -> None:
-    """Raise where probabilities that exclude each other do not sum to 1."""
+    """Raise if probabilities that exclude each other do not sum to 1."""
     if not math.isclose(total := math.fsum(shares), 1.0, abs_tol=1e-6):
         raise InvalidValueError(f"{what} must sum to 1", got=total)
 
@@ -163,7 +169,7 @@ def ascending(what: str, values: Iterable[object], **bounds: Unpack[Bounds]) -> 
 
 
 def share(what: str, value: object, **bounds: Unpack[Bounds]) -> float:
-    """A probability or a share; what is in % is told so."""
+    """A probability or a share; a value in % is refused with that remedy."""
     remedy = SHARE.slip(value) if isinstance(value, int | float) and value <= 100 else None
     return number(what, value, remedy=remedy, **(bounds or {"least": 0.0, "most": 1.0}))
 
@@ -181,6 +187,8 @@ Positive: TypeAlias = Annotated[float, partial(number, above=0)]
 NonNegative: TypeAlias = Annotated[float, partial(number, least=0)]
 Share: TypeAlias = Annotated[float, share]
 Amplitude: TypeAlias = Annotated[float, amplitude]
+AmplitudeInterval: TypeAlias = Annotated[tuple[float, float], amplitude_interval]
+MeanAndSd: TypeAlias = Annotated[tuple[float, float], mean_and_sd]
 Count: TypeAlias = Annotated[int, partial(whole, least=1)]
 Natural: TypeAlias = Annotated[int, partial(whole, least=0)]
 Text: TypeAlias = Annotated[str, text]
@@ -212,13 +220,6 @@ def _declared(owner: type) -> tuple[tuple[str, str, bool, Callable[[str, object]
         if plain is not None:
             declared.append((name, f"{owner.__name__}.{name}", type(None) in kinds, plain))
     return tuple(declared)
-
-
-def _as_float(value: Real) -> float:
-    try:
-        return float(value)
-    except OverflowError:  # a whole number that no float can hold
-        return math.inf
 
 
 def _within(plain: float, bounds: Bounds) -> bool:

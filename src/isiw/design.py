@@ -20,7 +20,7 @@ MOST_ISIS = 10_001
 """Of a design space: a second in steps of 0.1 ms."""
 
 _MOST_TOLD: Final = 12
-"""ISIs of a list that are told one by one."""
+"""ISIs of a list that are written one by one."""
 
 _UNSAID: Final = cast("Reference", "")
 """No reference; it is the default so that its absence is refused in words, and not as a missing argument."""
@@ -121,11 +121,7 @@ class DesignSpace(Checked):
         return self.told(TAP)
 
     def told(self, first: StimulusWords) -> str:
-        """The ISIs in words.
-
-        Args:
-            first: what the conditioning stimulus is called.
-        """
+        """The ISIs in words, with those for the conditioning stimulus."""
         counted = first.origin(self.reference)
         if self.isis_ms:
             *before, last = (f"{isi_ms:g}" for isi_ms in self.isis_ms)
@@ -137,12 +133,10 @@ class DesignSpace(Checked):
     def grid_ms(self) -> FloatArray:
         """All ISIs that may be asked [ms], shape (t,)."""
         if self.isis_ms:
-            listed: FloatArray = np.array(self.isis_ms)
-            listed.setflags(write=False)
-            return listed
-        steps = np.arange(round((self.high_ms - self.low_ms) / self.step_ms) + 1, dtype=np.float64)
-        grid: FloatArray = self.low_ms + self.step_ms * steps
-        grid[-1] = self.high_ms  # rounding may have put it a little beyond, where limits refuse it
+            grid: FloatArray = np.array(self.isis_ms)
+        else:
+            grid = self.low_ms + self.step_ms * np.arange(round((self.high_ms - self.low_ms) / self.step_ms) + 1.0)
+            grid[-1] = self.high_ms  # rounding may have put it a little beyond, where limits refuse it
         grid.setflags(write=False)
         return grid
 
@@ -158,21 +152,17 @@ class DesignSpace(Checked):
         steps = round((inside - self.low_ms) / self.step_ms)
         return float(self.grid_ms[steps])
 
-    def whole_steps_ms(self, step_ms: float) -> float:
-        """The smallest multiple of the grid's step that is no smaller than this step [ms]."""
-        return self.step_ms * math.ceil(step_ms / self.step_ms - 1e-9)
-
     def stops_ms(self, step_ms: float) -> FloatArray:
         """The ISIs of a sweep from the first one on [ms], shape (t,).
 
         Args:
-            step_ms: from one to the next [ms]; where that is none of the grid's, the next multiple of its step.
+            step_ms: from one to the next [ms]; if that is none of the grid's, the next multiple of its step.
         """
         if self.isis_ms:
             stops_ms = [self.isis_ms[0]]
             stops_ms += [i for i in self.isis_ms if i - stops_ms[-1] >= step_ms - 1e-9]
             return np.array(stops_ms)
-        whole_ms = self.whole_steps_ms(step_ms)
+        whole_ms = self.step_ms * math.ceil(step_ms / self.step_ms - 1e-9)
         stops = math.floor((self.high_ms - self.low_ms) / whole_ms + 1e-9) + 1
         isis_ms: FloatArray = self.low_ms + whole_ms * np.arange(stops, dtype=np.float64)
         return isis_ms
@@ -205,7 +195,7 @@ def _widest_ms(listed_ms: tuple[float, ...]) -> float:
 
 
 def missing_reference() -> InvalidValueError:
-    """The error to raise where nobody says which event the ISIs of a design space count from."""
+    """The error to raise if nobody says which event the ISIs of a design space count from."""
     return InvalidValueError(
         "a design space needs its reference, the event that its ISIs count from",
         expected='reference="impact", the impact of the hammer or the electrical pulse, or reference="valve", the '
@@ -215,7 +205,7 @@ def missing_reference() -> InvalidValueError:
 
 
 def require_space(space: object) -> None:
-    """Raise where something else is given for a design space."""
+    """Raise if something else is given for a design space."""
     if not isinstance(space, DesignSpace):
         raise InvalidValueError("a design space is needed", got=space, expected="an isiw.DesignSpace")
 

@@ -119,7 +119,7 @@ _LONGEST_GOT = 200
 
 
 def _shortened(value: object) -> str:
-    """What a value prints as, of a long one its beginning and its end."""
+    """A value as it prints, of a long one the beginning and the end."""
     try:
         return _cut(repr(value), _LONGEST_GOT)
     except Exception:  # noqa: BLE001 - a whole number of thousands of digits, or an object that fails in any way
@@ -127,7 +127,7 @@ def _shortened(value: object) -> str:
 
 
 def _cut(text: str, most: int) -> str:
-    """A text without its middle, where it is longer than it may be; a path keeps its name at the end."""
+    """A text without its middle, if it is longer than it may be; a path keeps its name at the end."""
     half = (most - 3) // 2
     return text if len(text) <= most else f"{text[:half]} … {text[-half:]}"
 
@@ -151,7 +151,7 @@ def warn(text: str, category: type[Warning]) -> None:
 
 
 def did_you_mean(given: object, known: Iterable[object]) -> str:
-    """The known word that was probably meant, as a question; empty where none is near. Capitals make no difference."""
+    """The known word that was probably meant, as a question; empty if none is near. Capitals make no difference."""
     words = {word.casefold(): word for word in map(str, known)}
     near = (
         difflib.get_close_matches(given.casefold(), words, n=1)

@@ -43,7 +43,7 @@ def is_reserved(name: str) -> bool:
 
 
 def in_the_way(path: Path) -> str | None:
-    """What has a file's name and is no file, in words; None where there is a file, or nothing."""
+    """The thing of a file's name that is no file, in words; None if there is a file, or nothing."""
     try:
         mode = path.stat().st_mode
     except OSError as error:
@@ -106,7 +106,7 @@ def _removed(file: Path) -> None:
 def take_free_place(file: Path, place: Path) -> None:
     """Rename a file to a name that nothing has, in one step that replaces nothing."""
     if sys.platform == "win32":
-        file.rename(place)  # which Windows itself refuses where the name is taken
+        file.rename(place)  # which Windows itself refuses if the name is taken
         return
     try:
         place.hardlink_to(file)
@@ -146,7 +146,7 @@ _LOG: Final = b"\x89MCAP"
 
 
 def write_output(path: str | Path, content: bytes, *, overwrite: bool = False) -> Path:
-    """Write a file that is no log, as a whole or not at all; its folder is made where it is missing."""
+    """Write a file that is no log, as a whole or not at all; its folder is made if it is missing."""
     target = Path(path)
     check_output(target, overwrite=overwrite)
     made_folder(target.parent)
@@ -175,7 +175,7 @@ def check_output(path: str | Path, *, overwrite: bool = False) -> None:
 
 
 def made_folder(path: str | Path) -> Path:
-    """A folder, made where it is missing."""
+    """A folder, made if it is missing."""
     folder = Path(path)
     try:
         folder.mkdir(parents=True, exist_ok=True)

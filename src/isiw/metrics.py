@@ -1,4 +1,4 @@
-"""How good an estimate is: F1, edge errors, coverage, and the trial from which a criterion is met."""
+"""Measures of an estimate: F1, edge errors, coverage, and the trial from which a criterion is met."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def f1(estimate: WindowEstimate | Window | None, truth: Window | None, space: De
 
 
 def _require(given: object, what: str, *kinds: type) -> None:
-    """Raise where something else is given, such as an estimate in the place of the truth."""
+    """Raise if something else is given, such as an estimate in the place of the truth."""
     if not isinstance(given, kinds):
         raise InvalidValueError(
             f"{what} is of another kind",
@@ -44,7 +44,7 @@ def _require(given: object, what: str, *kinds: type) -> None:
 
 
 def _on_grid(window: Window | None, space: DesignSpace) -> BoolArray:
-    """Which ISIs of the space are a window's; at least one where it lies in the space."""
+    """Which ISIs of the space are a window's; at least one if it lies in the space."""
     grid_ms = space.grid_ms
     if window is None:
         return np.zeros(len(grid_ms), dtype=bool)
@@ -56,7 +56,7 @@ def _on_grid(window: Window | None, space: DesignSpace) -> BoolArray:
 
 
 def true_edges_ms(truth: Window, space: DesignSpace) -> Interval:
-    """Start and end of a true window [ms], ±inf where it runs out of the range."""
+    """Start and end of a true window [ms], ±inf if it runs out of the range."""
     _require(truth, "the true window", Window)
     require_space(space)
     start = -math.inf if truth.start_ms <= space.low_ms else truth.start_ms
@@ -67,7 +67,7 @@ def true_edges_ms(truth: Window, space: DesignSpace) -> Interval:
 def covers(
     estimate: WindowEstimate, truth: Window | None, space: DesignSpace, level: float = 0.9
 ) -> tuple[bool, bool] | None:
-    """True if the credible intervals of start and end hold the true edges; None where there are none of either."""
+    """True if the credible intervals of start and end hold the true edges; None if there are none of either."""
     _require(estimate, "the estimate", WindowEstimate)
     intervals = estimate.interval(level)
     if intervals is None or truth is None:
@@ -97,7 +97,7 @@ def edge_ranks(
 
 
 def edge_error_ms(estimate: WindowEstimate | Window | None, truth: Window | None) -> tuple[float, float] | None:
-    """Estimated minus true start and end [ms]; None where either has no window."""
+    """Estimated minus true start and end [ms]; None if either has no window."""
     _require(estimate, "the estimate", WindowEstimate, Window, NoneType)
     _require(truth, "the true window", Window, NoneType)
     window = estimate.window if isinstance(estimate, WindowEstimate) else estimate
@@ -107,7 +107,7 @@ def edge_error_ms(estimate: WindowEstimate | Window | None, truth: Window | None
 
 
 def trials_to_criterion(mean_f1: ArrayLike, criterion: float) -> int | None:
-    """The first trial from which a cohort's mean F1 stays at or above a criterion; None where it never does."""
+    """The first trial from which a cohort's mean F1 stays at or above a criterion; None if it never does."""
     reached = np.asarray(mean_f1, dtype=float) >= criterion  # a NaN has not
     missed = np.flatnonzero(~reached)
     first = 1 if len(missed) == 0 else int(missed[-1]) + 2

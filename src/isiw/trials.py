@@ -14,13 +14,13 @@ import numpy as np
 
 from isiw.checks import (
     Amplitude,
+    AmplitudeInterval,
     Checked,
     Natural,
     NonNegative,
     Number,
     Positive,
     Text,
-    amplitude_interval,
     choice,
     number,
     text,
@@ -35,11 +35,11 @@ MOST_ISI_SD_MS: Final = 50.0
 """The largest SD of a realised ISI that can be learnt from [ms]: a window is hardly wider than two of them."""
 
 RESPONSE_MV: Final = 0.05
-"""A larger MEP is a response where a motor threshold is sought [mV] [Rossini2015]."""
+"""A larger MEP is a response if a motor threshold is sought [mV] [Rossini2015]."""
 
 
 class Status(StrEnum):
-    """True if the strategy learns from a trial."""
+    """The strategy learns from accepted trials, and not from mistrials."""
 
     ACCEPTED = "accepted"
     MISTRIAL = "mistrial"
@@ -115,11 +115,11 @@ class Sweep(Checked):
 
     Args:
         channels: waveforms by name; isiw knows `emg`, `acceleration`, `pressure`, `force` and `valve`.
-        t_valve_ms: the valve command [ms]; None where unknown.
-        t_tms_ms: the magnetic pulse [ms]; None where unknown.
-        t_hit_ms: the impact, where the device measures it [ms]; None to have it found in the waveforms.
-        isi_sd_ms: SD of the realised ISI where the impact is not measured [ms]: of what varies from trial to trial. An
-            error that all trials share is none of it; count from the valve command where the impact is not known.
+        t_valve_ms: the valve command [ms]; None if unknown.
+        t_tms_ms: the magnetic pulse [ms]; None if unknown.
+        t_hit_ms: the impact, if the device measures it [ms]; None to have it found in the waveforms.
+        isi_sd_ms: SD of the realised ISI if the impact is not measured [ms]: of what varies from trial to trial. An
+            error that all trials share is none of it; count from the valve command if the impact is not known.
 
     Raises:
         InvalidValueError: channels that are none, a time that is not finite, or an SD that is negative or larger than
@@ -157,11 +157,11 @@ class Measurement(Checked):
     Args:
         mep_mv: peak-to-peak amplitude of the MEP [mV]; 0 means below the detection limit.
         isi_ms: the realised ISI on the space's reference [ms]; None for TMS alone.
-        isi_sd_ms: SD of the realised ISI, of what varies from trial to trial [ms]; 0 where it was measured.
-        background_rms_uv: EMG before the pulse [µV RMS], where known.
-        t_valve_ms: time of the valve command [ms], where known.
-        t_hit_ms: time of the impact [ms], where known.
-        t_tms_ms: time of the magnetic pulse [ms], where known.
+        isi_sd_ms: SD of the realised ISI, of what varies from trial to trial [ms]; 0 if it was measured.
+        background_rms_uv: EMG before the pulse [µV RMS], if known.
+        t_valve_ms: time of the valve command [ms], if known.
+        t_hit_ms: time of the impact [ms], if known.
+        t_tms_ms: time of the magnetic pulse [ms], if known.
     """
 
     mep_mv: Amplitude
@@ -181,11 +181,11 @@ class Trial(Checked):
         index: number of the trial, from 0.
         status: the strategy learns from accepted trials and not from mistrials; both count as stimuli.
         commanded_isi_ms: the ISI that was commanded [ms]; None for a control trial.
-        reason: why it is a mistrial; None where accepted.
-        isi_ms: the realised ISI [ms]; None for a control trial or where unknown. Of a tap alone it is the ISI at which
+        reason: why it is a mistrial; None if accepted.
+        isi_ms: the realised ISI [ms]; None for a control trial or if unknown. Of a tap alone it is the ISI at which
             the MEP window would lie that its amplitude was taken in.
         isi_sd_ms: SD of the realised ISI [ms].
-        mep_mv: peak-to-peak amplitude of the MEP [mV], also of some mistrials, for whoever looks at them; None where
+        mep_mv: peak-to-peak amplitude of the MEP [mV], also of some mistrials, for whoever looks at them; None if
             none was measured.
         background_rms_uv: EMG before the pulse [µV RMS].
         t_valve_ms: time of the valve command [ms].
@@ -218,7 +218,7 @@ class Trial(Checked):
     tap_alone: bool = False
     overruled: Kind | None = None
     mep_sd_mv: NonNegative = 0.0
-    mep_interval_mv: tuple[float, float] | None = None
+    mep_interval_mv: AmplitudeInterval | None = None
     tap_mv: NonNegative | None = None
     __pydantic_config__: ClassVar = {"ser_json_inf_nan": "strings"}  # as JSON knows no infinity
 
@@ -232,8 +232,6 @@ class Trial(Checked):
             raise InvalidValueError("a mistrial needs a reason and an accepted trial has none", got=self.reason)
         if self.tap_alone and self.commanded_isi_ms is not None:
             raise InvalidValueError("a tap alone has no ISI", got=self.commanded_isi_ms, expected="None")
-        if self.mep_interval_mv is not None:
-            object.__setattr__(self, "mep_interval_mv", amplitude_interval(self.mep_interval_mv))
         measured = self.mep_mv is not None or self.mep_interval_mv is not None
         if self.status is Status.ACCEPTED and not measured and not self.tap_alone:
             raise InvalidValueError("an accepted trial needs its MEP", got=self.index)
@@ -266,10 +264,15 @@ class Trial(Checked):
 
     @property
     def isi_error_ms(self) -> float | None:
-        """Realised minus commanded ISI [ms]; None where one of them is not known."""
+        """Realised minus commanded ISI [ms]; None if one of them is not known."""
         if self.isi_ms is None or self.commanded_isi_ms is None:
             return None
         return self.isi_ms - self.commanded_isi_ms
+
+    @property
+    def wanted_isi_ms(self) -> float | None:
+        """The commanded ISI [ms], or else the realised one; None for TMS alone."""
+        return self.isi_ms if self.commanded_isi_ms is None else self.commanded_isi_ms
 
     def accepted_anyway(self) -> Trial:
         """The same trial, accepted by an operator after looking at it."""
@@ -309,11 +312,7 @@ class TrialTable:
         return self.counted(TAP)
 
     def counted(self, first: StimulusWords) -> str:
-        """Number of trials, and of each kind.
-
-        Args:
-            first: what the conditioning stimulus is called.
-        """
+        """The number of trials of each kind, in words, with those for the conditioning stimulus."""
         mistrials = Counter(str(trial.reason) for trial in self.trials if trial.reason is not None)
         reasons = ", ".join(f"{count} {reason}" for reason, count in mistrials.items())
         excluded = sum(trial.excluded for trial in self.trials)

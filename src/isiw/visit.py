@@ -61,11 +61,7 @@ class Visit(Checked):
     electrodes: Text = ""
 
     def unlike(self, other: Visit) -> str | None:
-        """Why the window of this visit is not that of another one, in words; None where nothing that is noted says so.
-
-        Args:
-            other: the other visit of the same person.
-        """
+        """Why the window of the person's other visit is not this one's, in words; None if nothing noted says so."""
         if muscles := different_muscles((self.muscle, other.muscle)):
             return f"different muscles, {' and '.join(muscles)}"
         own, others = self.intensity_pct_rmt, other.intensity_pct_rmt
@@ -75,13 +71,35 @@ class Visit(Checked):
 
 
 def different_muscles(noted: Iterable[str]) -> list[str]:
-    """The muscles that visits note, where these are more than one; else none. Capitals make no difference."""
+    """The muscles that visits note, if these are more than one; else none. Capitals make no difference."""
     muscles = {muscle.strip().casefold(): muscle.strip() for muscle in noted if muscle.strip()}
     return list(muscles.values()) if len(muscles) > 1 else []
 
 
 PAIRS_FIRST: Final = 4
 """So many trials show whether a rig works, before taps alone are given."""
+
+
+def interval_s(what: str, value: object) -> float:
+    """An interval between two stimuli, no longer than anybody waits [s]."""
+    plain_s = number(what, value, least=0)
+    if (slip := INTERVAL_S.slip(plain_s)) is not None:
+        raise InvalidValueError(
+            f"{what} is longer than anybody waits between two stimuli",
+            got=value,
+            expected=f"at most {INTERVAL_S.most:g} s",
+            remedy=slip,
+        )
+    return plain_s
+
+
+def _interval_ends(what: str, iti_s: object) -> tuple[float, float]:
+    if not isinstance(iti_s, tuple | list) or len(iti_s) != 2:
+        raise InvalidValueError(f"{what} must be the shortest and the longest interval [s]", got=iti_s)
+    low_s, high_s = (interval_s(what, value) for value in iti_s)
+    if low_s > high_s:
+        raise InvalidValueError(f"{what} must ascend", got=(low_s, high_s))
+    return low_s, high_s
 
 
 @dataclass(frozen=True)
@@ -105,7 +123,7 @@ class VisitProtocol(Checked):
             leave no pairs, or a number that is not positive.
     """
 
-    iti_s: tuple[float, float] | None = None
+    iti_s: Annotated[tuple[float, float], _interval_ends] | None = None
     tms_alone: Annotated[float, partial(share, least=0, below=1)] = 0.0
     tap_alone: Annotated[float, partial(share, least=0, below=1)] = 0.0
     taps_first: Natural = 3
@@ -114,8 +132,6 @@ class VisitProtocol(Checked):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.iti_s is not None:
-            object.__setattr__(self, "iti_s", _interval(self.iti_s))
         if self._share >= 1:
             raise InvalidValueError(
                 "the control trials leave no pairs of stimuli",
@@ -128,12 +144,12 @@ class VisitProtocol(Checked):
         return _exact(self.tms_alone) + _exact(self.tap_alone)
 
     def require_effect(self, min_iti_s: float) -> None:
-        """Raise where the intervals are as long as the rests, so that these are none.
+        """Raise if the intervals are as long as the rests, so that these are none.
 
         It is for a protocol that somebody states: those of earlier logs stay readable.
 
         Args:
-            min_iti_s: the interval of the limits, which holds where the protocol has none [s].
+            min_iti_s: the interval of the limits, which holds if the protocol has none [s].
 
         Raises:
             InvalidValueError: a rest that is no longer than the longest interval.
@@ -165,11 +181,7 @@ class VisitProtocol(Checked):
         return max(rest_s, float(_draws(seed, trial, _ITI_DRAWS).uniform(*self.iti_s)))
 
     def stimuli_for(self, pairs: int) -> int:
-        """Largest number of stimuli for a number of pairs, control trials included.
-
-        Args:
-            pairs: how many pairs.
-        """
+        """The number of stimuli that so many pairs take at most, their control trials among them."""
         return math.ceil((pairs + 1) / (1 - self._share)) if self._share else pairs
 
     def control(self, trial: int, seed: int) -> Control | None:
@@ -202,25 +214,3 @@ def _draws(seed: int, number: int, kind: int) -> np.random.Generator:
 def _exact(share: float) -> Fraction:
     """A share as a fraction, so that no stretch gains or loses a trial by rounding."""
     return Fraction(share).limit_denominator(_FINEST_SHARE)
-
-
-def interval_s(what: str, value: object) -> float:
-    """An interval between two stimuli, no longer than anybody waits [s]."""
-    plain_s = number(what, value, least=0)
-    if (slip := INTERVAL_S.slip(plain_s)) is not None:
-        raise InvalidValueError(
-            f"{what} is longer than anybody waits between two stimuli",
-            got=value,
-            expected=f"at most {INTERVAL_S.most:g} s",
-            remedy=slip,
-        )
-    return plain_s
-
-
-def _interval(iti_s: object) -> tuple[float, float]:
-    if not isinstance(iti_s, tuple | list) or len(iti_s) != 2:
-        raise InvalidValueError("VisitProtocol.iti_s must be the shortest and the longest interval [s]", got=iti_s)
-    low_s, high_s = (interval_s("VisitProtocol.iti_s", value) for value in iti_s)
-    if low_s > high_s:
-        raise InvalidValueError("VisitProtocol.iti_s must ascend", got=(low_s, high_s))
-    return low_s, high_s

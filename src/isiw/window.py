@@ -37,7 +37,7 @@ def rules_out(probability: float | None) -> bool:
 
 
 def bayes_factor(probability: float | None, beforehand: float | None) -> float | None:
-    """By what the trials multiplied the odds of a window; None where one of the probabilities is not known."""
+    """By what the trials multiplied the odds of a window; None if one of the probabilities is not known."""
     if probability is None or beforehand is None or not 0 < beforehand < 1:
         return None
     odds = math.inf if probability == 1 else probability / (1 - probability)
@@ -80,7 +80,7 @@ class Window:
 
     @classmethod
     def from_mask(cls, grid_ms: ArrayLike, mask: ArrayLike) -> Window | None:
-        """The window of the marked grid points, or None where none is marked.
+        """The window of the marked grid points, or None if none is marked.
 
         Args:
             grid_ms: ascending ISIs [ms], shape (t,).
@@ -104,11 +104,7 @@ class Window:
 
     @classmethod
     def of_edges(cls, edges_ms: Sequence[float]) -> Window | None:
-        """The window whose segments start and end at these ISIs [ms] in turn, or None where there are none.
-
-        Args:
-            edges_ms: as `edges_ms` of a window are.
-        """
+        """The window whose segments start and end at these ISIs [ms] in turn, or None if there are none."""
         segments = tuple(zip(edges_ms[::2], edges_ms[1::2], strict=True))
         return cls(edges_ms[0], edges_ms[-1], segments) if segments else None
 
@@ -146,7 +142,7 @@ def least_excess_mv(peak_mv: ArrayLike, baseline_mv: ArrayLike, share: float = E
 
 
 def window_from_excess(grid_ms: ArrayLike, excess_mv: ArrayLike, baseline_mv: float) -> Window | None:
-    """The window by the least-excess rule, or None where nothing is enhanced."""
+    """The window by the least-excess rule, or None if nothing is enhanced."""
     excess = np.asarray(excess_mv, dtype=float)
     if not (np.isfinite(excess).all() and math.isfinite(baseline_mv)):
         raise InvalidValueError("the expected MEP must be finite at every ISI", got=(float(excess.max()), baseline_mv))

@@ -10,7 +10,7 @@ from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.metrics import f1
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.measured import LABS
-from isiw.subjects.profiles import PeakProfile
+from isiw.subjects.responses import PeakProfile
 from isiw.subjects.subject import SimulatedSubject
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from isiw.devices.callback import CallbackDevice
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.protocol import CallbackDevice, DeviceInfo
 from isiw.errors import DeviceError
 from isiw.trials import Measurement, Stimulus
 

@@ -17,11 +17,10 @@ import numpy as np
 import pytest
 
 from isiw.design import VALVE_SPACE, DesignSpace
-from isiw.devices.callback import CallbackDevice
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.limited import LimitedDevice
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import DeviceInfo, Readiness
+from isiw.devices.protocol import CallbackDevice, DeviceInfo, Readiness
 from isiw.devices.recorded import RecordedPerson, Recordings
 from isiw.devices.robot.tapper import Tapper, TapperSettings
 from isiw.devices.simulated import RecordedTrials, SimulatedDevice, SimulatedPerson

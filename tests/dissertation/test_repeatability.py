@@ -16,8 +16,6 @@ from isiw.dissertation.repeatability import (
     RotationEvents,
     TimingStudy,
     error_probabilities,
-    error_table,
-    event_table,
     study_preset,
     study_session,
     study_sweeps,
@@ -128,7 +126,9 @@ def test_the_text_has_errors_beyond_4_ms_as_often_as_its_sd_gives() -> None:
 
 def test_a_mistrial_counts_and_is_left_out_of_the_statistics() -> None:
     commanded = np.array([10.0, 10.0, 10.0, 10.0, np.nan])
-    table = error_table(commanded, np.array([11.0, 9.5, -3.0, np.nan, 5.0]))
+    nothing = np.full(5, np.nan)
+    events = TapEvents(nothing, nothing, nothing, nothing, nothing)
+    table = TimingStudy("five taps", events, commanded, np.array([11.0, 9.5, -3.0, np.nan, 5.0])).error_table
     assert table.loc[10.0].to_dict() == pytest.approx(
         {"n": 2, "mean_ms": 0.25, "sd_ms": np.std([1.0, -0.5], ddof=1), "mistrials": 2}
     )
@@ -137,7 +137,7 @@ def test_a_mistrial_counts_and_is_left_out_of_the_statistics() -> None:
 def test_an_event_that_was_never_found_is_not_in_the_table() -> None:
     nowhere = np.full(3, np.nan)
     events = TapEvents(nowhere, nowhere, np.array([680.0, 682.0, np.nan]), nowhere, nowhere)
-    table = event_table(events)
+    table = TimingStudy("three taps", events, nowhere, nowhere).event_table
     assert table.index.tolist() == ["hit"]
     assert table[["mean_ms", "low_ms", "high_ms", "n"]].to_numpy().tolist() == [[681.0, 680.0, 682.0, 2.0]]
 

@@ -68,12 +68,6 @@ def test_there_is_a_light_in_mode_2_only() -> None:
     assert [answer(Block(mode, 300.0), 0, 0, 300.0, seed=0).light for mode in (1, 2, 3, 4)] == [None, True, None, None]
 
 
-@pytest.mark.parametrize("produced_ms", [0.0, -5.0, math.nan, math.inf])
-def test_what_is_no_time_is_not_answered(produced_ms: float) -> None:
-    with pytest.raises(InvalidValueError, match="positive time"):
-        answer(Block(1, 300.0), 0, 0, produced_ms, seed=0)
-
-
 @pytest.mark.parametrize(
     ("mode", "shown"),
     [

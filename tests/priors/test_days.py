@@ -17,8 +17,7 @@ from isiw.models.particles.prior import Prior
 from isiw.priors.days import recalled
 from isiw.session.again import exclude
 from isiw.strategy.catalogue import make_strategy
-from isiw.subjects.profiles import PeakProfile
-from isiw.subjects.responses import GainResponse
+from isiw.subjects.responses import GainResponse, PeakProfile
 from isiw.subjects.subject import SimulatedSubject
 from isiw.visit import Visit
 from known import instance, known

@@ -13,8 +13,7 @@ from isiw.design import IMPACT_SPACE
 from isiw.errors import InvalidValueError
 from isiw.log.reader import SessionRecord, read_session
 from isiw.priors import Difference, differences
-from isiw.subjects.profiles import PeakProfile
-from isiw.subjects.responses import GainResponse
+from isiw.subjects.responses import GainResponse, PeakProfile
 from isiw.subjects.subject import SimulatedSubject
 from isiw.types import Conditioning, Reference
 from isiw.visit import Visit

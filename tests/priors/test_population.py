@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from isiw.priors.population import Block, HyperPrior, Law, People, Population, learnt
+from isiw.priors.population import HyperPrior, LatentBlock, Law, People, Population, learnt
 from isiw.types import FloatArray
 
 USUAL_SD, ERROR_SD = 8.0, 0.7
@@ -22,7 +22,7 @@ def population_of(values: Any, *, kinds: Any = None, used: Any = True) -> Popula
     measured = np.asarray(values) + ERROR_SD * rng.standard_normal(len(values))
     shrunk = USUAL_SD**2 / (USUAL_SD**2 + ERROR_SD**2)
     particles = shrunk * measured[:, None] + np.sqrt(shrunk) * ERROR_SD * rng.standard_normal((len(values), 300))
-    block = Block(
+    block = LatentBlock(
         particles[..., None], stats.norm.logpdf(particles, scale=USUAL_SD), np.full(particles.shape, fill_value=used)
     )
     kind = np.zeros(particles.shape, dtype=np.int64) if kinds is None else kinds
@@ -80,7 +80,9 @@ def shares_after_nothing(seed: int) -> FloatArray:
     rng = np.random.default_rng(seed)
     values, kinds = USUAL_SD * rng.standard_normal((12, 500)), rng.choice(3, size=(12, 500), p=KINDS)
     used = kinds != 2  # the third kind has no such latent, as who has no window has no start
-    people = People({"x": Block(values[..., None], stats.norm.logpdf(values, scale=USUAL_SD), used)}, {"kind": kinds})
+    people = People(
+        {"x": LatentBlock(values[..., None], stats.norm.logpdf(values, scale=USUAL_SD), used)}, {"kind": kinds}
+    )
     return learnt(people, {"x": HYPER}, {"kind": KINDS}, rng).shares["kind"]
 
 

@@ -14,6 +14,7 @@ from isiw.log.schema import EstimateRecord, decode, encode
 from isiw.session.examination import estimate_record
 from isiw.session.loop import Session
 from isiw.session.resume import open_session
+from isiw.strategy.asked import Asked
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.course import candidate_isis
 from isiw.strategy.strategy import Strategy
@@ -99,6 +100,7 @@ def test_a_score_that_is_not_finite_is_kept_as_such() -> None:
     asked.ask()
     choice = known(asked.choice)
     scores = candidate_isis(SPACE) * float("nan")
-    asked._choice = replace(choice, by="acquisition", scores=scores)  # noqa: SLF001 - no acquisition function gives one here
+    scored = replace(choice, by="acquisition", scores=scores)
+    asked._asked = Asked(scored)  # noqa: SLF001 - no acquisition function gives one here
     written = encode("/estimate", estimate_record(asked, 0, asked.decision(), choice.isi_ms))
     assert np.isnan(instance(EstimateRecord, decode("/estimate", written)).scores).all()

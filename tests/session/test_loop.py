@@ -25,7 +25,8 @@ from isiw.session.loop import Session
 from isiw.session.sink import SessionUpdate
 from isiw.signals import SignalLimits
 from isiw.strategy.catalogue import make_strategy
-from isiw.strategy.strategy import Recipe, Strategy
+from isiw.strategy.settings.common import Recipe
+from isiw.strategy.strategy import Strategy
 from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial
 from known import instance, known
 from scripted import FakeRealClock, ScriptedDevice, scripted_strategy, told_to

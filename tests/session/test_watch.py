@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 from isiw.design import DesignSpace
-from isiw.devices.callback import CallbackDevice
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.protocol import CallbackDevice, DeviceInfo
 from isiw.findings import Kind, Severity
 from isiw.log.reader import read_session
 from isiw.plots.session import session_figure

@@ -11,8 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from isiw.design import DesignSpace
-from isiw.devices.callback import CallbackDevice
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.protocol import CallbackDevice, DeviceInfo
 from isiw.session.loop import Session
 from isiw.signals import judge
 from isiw.strategy.catalogue import make_strategy

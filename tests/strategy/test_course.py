@@ -10,7 +10,7 @@ import torch
 from isiw.acquisition.fixed import EvenSpacing, IncrementalSweep
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
 from isiw.dissertation.bootstrap import BootstrapPosterior
-from isiw.dissertation.strategies import EdgeVariance
+from isiw.dissertation.strategies import Settling
 from isiw.models.particles import ParticlePosterior
 from isiw.models.protocol import Observation, Posterior, Tensor
 from isiw.strategy.catalogue import make_strategy
@@ -78,7 +78,7 @@ def test_isis_are_chosen_as_usual_and_windows_estimated_as_believed() -> None:
 
 
 def test_a_rule_remembers_as_much_as_it_looks_back_on() -> None:
-    going = course("nr", people=2, initial_ms=(7.0, 9.0), stopping=EdgeVariance(last=2))
+    going = course("nr", people=2, initial_ms=(7.0, 9.0), stopping=Settling(stop_last=2))
     remembered = []
     for _ in range(5):
         going = told(going)
@@ -92,16 +92,16 @@ def test_a_rule_that_does_not_look_back_remembers_nothing() -> None:
 
 
 def test_trials_that_nobody_decides_upon_are_told_without_an_estimate() -> None:
-    going = course("nr", people=2, stopping=EdgeVariance(last=2))
+    going = course("nr", people=2, stopping=Settling(stop_last=2))
     for _ in range(5):
         going = told(going)
-    assert [belief.estimates for belief in going.past] == [{}, {}]
+    assert [each.made for each in going.past] == [{}, {}]
     going.decision(0)
-    assert [list(belief.estimates) for belief in going.past] == [[0], [0]]
+    assert [list(each.made) for each in going.past] == [[0], [0]]
 
 
 def test_of_trials_that_were_decided_upon_only_the_estimates_are_kept() -> None:
-    going = course("nr", people=2, stopping=EdgeVariance(last=3))
+    going = course("nr", people=2, stopping=Settling(stop_last=3))
     looked_at = []
     for _ in range(3):
         going = told(going)

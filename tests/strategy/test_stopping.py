@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from isiw.dissertation.strategies import EdgeVariance, ParticleSpread, SweptPast
+from isiw.dissertation.strategies import Converging, Passing, Settling
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
 from isiw.findings import NO_MEP
@@ -208,9 +208,9 @@ def test_any_of_no_rules_would_never_stop_and_is_refused() -> None:
         CredibleWidth(1),
         NoWindow(0.01),
         NoWindow(),
-        EdgeVariance(),
-        ParticleSpread(),
-        SweptPast(),
+        Settling(),
+        Converging(),
+        Passing(),
         AnyOf((Budget(9),)),
     ],
 )
@@ -272,7 +272,7 @@ class OneInTwo:
 
 
 def test_a_rule_of_ones_own_says_what_it_needs() -> None:
-    for rule in (OneInTwo(), AnyOf((Budget(40), OneInTwo(), EdgeVariance(last=3)))):
+    for rule in (OneInTwo(), AnyOf((Budget(40), OneInTwo(), Settling(stop_last=3)))):
         assert looks_back(rule) == 4
         assert stimuli_left(rule, 2) == 7
     strategy = make_strategy("nr")

@@ -15,12 +15,13 @@ import torch
 from isiw.acquisition.fixed import IncrementalSweep
 from isiw.acquisition.information import MutualInformation, WindowGain
 from isiw.design import VALVE_SPACE, DesignSpace
-from isiw.dissertation.strategies import EdgeVariance
+from isiw.dissertation.strategies import Settling
 from isiw.errors import InvalidValueError, OutOfSpaceError, StrategyError
 from isiw.models.protocol import Posterior, Tensor
 from isiw.strategy.catalogue import make_strategy
+from isiw.strategy.settings.common import Recipe
 from isiw.strategy.stopping import Budget, Progress, StopDecision
-from isiw.strategy.strategy import Recipe, Strategy
+from isiw.strategy.strategy import Strategy
 from known import known
 from scripted import scripted_strategy
 
@@ -307,7 +308,7 @@ def settled_after(strategy: Strategy, trials: int) -> bool:
 def test_only_windows_after_the_initial_isis_tell_whether_the_edges_have_settled() -> None:
     usual = scripted_strategy()
     for initial_ms in ((), (0.0,), (0.0, 100.0, 200.0)):
-        strategy = Strategy(usual.space, usual.model, usual.acquisition, EdgeVariance(), initial_ms=initial_ms)
+        strategy = Strategy(usual.space, usual.model, usual.acquisition, Settling(), initial_ms=initial_ms)
         # The value after the last initial trial is the first.
         assert not settled_after(strategy, max(1, len(initial_ms)) + 3)
         assert settled_after(strategy, 1)
@@ -315,7 +316,7 @@ def test_only_windows_after_the_initial_isis_tell_whether_the_edges_have_settled
 
 def test_tms_alone_does_not_settle_the_edges() -> None:
     usual = scripted_strategy()
-    strategy = Strategy(usual.space, usual.model, usual.acquisition, EdgeVariance())
+    strategy = Strategy(usual.space, usual.model, usual.acquisition, Settling())
     settled_after(strategy, 4)
     for _ in range(5):
         strategy.learn(None, 0.02)

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 import torch
 
-from isiw.dissertation.strategies import EdgeVariance
+from isiw.dissertation.strategies import Settling
 from isiw.errors import InvalidValueError
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy
@@ -126,7 +126,7 @@ class NaNForOne:
 def test_a_person_without_a_finite_score_falls_back_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     def player(session: SimulatedSession) -> Strategy:
         usual = make_strategy("nr", session.space, session.seed)
-        return Strategy(session.space, usual.model, NaNForOne(), EdgeVariance(), seed=session.seed)
+        return Strategy(session.space, usual.model, NaNForOne(), Settling(), seed=session.seed)
 
     monkeypatch.setattr(SimulatedSession, "player", player)
     rows = simulate_batch(sessions("nr", 3, trials=5))

@@ -17,11 +17,16 @@ from scipy import stats
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.subjects.cohorts import COHORTS, another_day, cohort, person_of
+from isiw.subjects.cohorts import CHANGED, COHORTS, another_day, cohort, person_of
 from isiw.subjects.measured import LABS, lab
-from isiw.subjects.profiles import OpposedProfile, PeakProfile, TwoPeakProfile
-from isiw.subjects.realities import CHANGED
-from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse
+from isiw.subjects.responses import (
+    EmgFloor,
+    GainResponse,
+    OpposedProfile,
+    PeakProfile,
+    RecruitmentResponse,
+    TwoPeakProfile,
+)
 from isiw.subjects.subject import Drift, SimulatedSubject
 from isiw.types import ArrayLike, FloatArray
 from known import instance, known

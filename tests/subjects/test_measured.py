@@ -12,7 +12,7 @@ from isiw.design import VALVE_SPACE
 from isiw.errors import InvalidValueError
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.measured import MEASURED_KIM, STEP_MS, WIDTHS_KIM_MS, MeasuredPerson
-from isiw.subjects.profiles import PeakProfile
+from isiw.subjects.responses import PeakProfile
 from known import instance
 
 PEOPLE = cohort("kim11-measured", 11, 0)

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from isiw.errors import InvalidValueError
-from isiw.subjects.profiles import PeakProfile, TwoPeakProfile
+from isiw.subjects.responses import PeakProfile, TwoPeakProfile
 
 peaks = st.builds(
     PeakProfile, st.floats(-50, 400), st.floats(20, 300), peak_at=st.floats(0.1, 0.9), exponent=st.floats(1, 8)

@@ -11,8 +11,7 @@ from isiw.design import IMPACT_SPACE
 from isiw.errors import InvalidValueError
 from isiw.studies.sessions import SimulatedSession, simulate
 from isiw.subjects import Change, EmgFloor, GainResponse, PeakProfile, SimulatedSubject, TapResponse
-from isiw.subjects.cohorts import cohort
-from isiw.subjects.realities import CHANGED
+from isiw.subjects.cohorts import CHANGED, cohort
 from known import known
 
 PERSON = SimulatedSubject(

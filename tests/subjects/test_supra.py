@@ -13,8 +13,7 @@ from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.subjects.changes import Plasticity
 from isiw.subjects.cohorts import cohort
-from isiw.subjects.profiles import OpposedProfile, PeakProfile
-from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse
+from isiw.subjects.responses import EmgFloor, GainResponse, OpposedProfile, PeakProfile, RecruitmentResponse
 from isiw.subjects.subject import SimulatedSubject
 from known import instance, known
 

@@ -23,7 +23,7 @@ from isiw.strategy.catalogue import list_strategies, make_strategy
 from isiw.strategy.strategy import Strategy
 from isiw.subjects.cohorts import cohort
 from isiw.testing import check_acquisition, check_model, check_strategy
-from isiw.testing.requirements import Trials, trials_that_break_things, usual_trials
+from isiw.testing.suites import Trials, trials_that_break_things, usual_trials
 from isiw.types import FloatArray
 from isiw.window import Window
 

@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validat
 from isiw.checks import choice
 from isiw.design import DesignSpace, missing_reference
 from isiw.devices.limits import USUAL_ITI_S
-from isiw.devices.robot.mechanism import LINE_DELAY_MS, Event, Geometry, SensorNoise
+from isiw.devices.robot.mechanism import LINE_DELAY_MS, EventTime, Geometry, SensorNoise
 from isiw.devices.robot.tapper import Tapper, TapperSettings, preset
 from isiw.devices.robot.vane.actuator import Vane
 from isiw.devices.robot.vane.tapper import WAIT_MS, RotatingTapper
@@ -330,5 +330,6 @@ def own_wrist(person: SimulatedSubject) -> Geometry:
             got=f"a person with a hit delay of {hit_ms:.0f} ms",
             remedy='Name a wrist, such as geometry = "subject1" under [device.settings], or choose another cohort.',
         )
-    events = Event(hit_ms - _DESCENT_MS, sd_ms), Event(hit_ms, sd_ms), Event(15.0, 0.5), Event(20.0, 1.0)
-    return Geometry(*events, noise=SensorNoise(emg_uv=_REST_UV_PER_FLOOR_MV * person.response.floor.median_mv))
+    descent, hit = EventTime(hit_ms - _DESCENT_MS, sd_ms), EventTime(hit_ms, sd_ms)
+    noise = SensorNoise(emg_uv=_REST_UV_PER_FLOOR_MV * person.response.floor.median_mv)
+    return Geometry(descent, hit, EventTime(15.0, 0.5), EventTime(20.0, 1.0), noise=noise)

@@ -22,7 +22,7 @@ class Clock(Protocol):
         """The time [s]; never runs backwards."""
 
     def sleep_s(self, duration_s: float) -> None:
-        """Wait [s]; not at all where the duration is not positive."""
+        """Wait [s]; not at all if the duration is not positive."""
 
 
 class MonotonicClock:
@@ -70,13 +70,11 @@ class Pacing:
         self._times_s = [self._since_s - age_s for age_s in sorted(earlier_s, reverse=True)]
 
     def wait_s(self, interval_s: float = 0.0) -> float:
-        """How long until the next stimulus may come [s]."""
-        last_s = self._times_s[-1] if self._times_s else self._since_s
-        due_s = max(self._limits.earliest_s(self._times_s, self._since_s), last_s + interval_s)
-        return max(0.0, due_s - self._clock.now_s())
+        """The time until the next stimulus may come [s]."""
+        return self.ahead_s((interval_s,))
 
     def ahead_s(self, intervals_s: Sequence[float]) -> float:
-        """How long the next stimuli take that follow each other at these intervals, or as the limits allow [s]."""
+        """The time that the next stimuli take at these intervals, or as the limits allow [s]."""
         now_s, times_s = self._clock.now_s(), list(self._times_s)
         for interval_s in intervals_s:
             last_s = times_s[-1] if times_s else self._since_s
@@ -93,7 +91,7 @@ class Pacing:
 
     @contextmanager
     def delivering(self) -> Iterator[None]:
-        """Within, a stimulus is delivered. It counts from its end, even where it fails, unless it was refused."""
+        """Within, a stimulus is delivered. It counts from its end, even if it fails, unless it was refused."""
         self.came()
         try:
             yield

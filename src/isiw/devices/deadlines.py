@@ -69,7 +69,6 @@ class _Call(Generic[_T]):
         return time.monotonic() - self._began_s
 
     def kept(self, deadline_s: float) -> bool:
-        """True if it ended in time."""
         return self.ended and self._ended_s - self._began_s <= deadline_s
 
     def wait(self, deadline_s: float, given_up: Callable[[], bool] = lambda: False) -> None:
@@ -78,7 +77,6 @@ class _Call(Generic[_T]):
             self._ended.wait(min(left_s, _GLANCE_S))
 
     def result(self) -> _T:
-        """What it returned; what it raised is raised."""
         if self._error is not None:
             raise self._error
         return self._result
@@ -137,7 +135,7 @@ class PunctualDevice:
 
     All verbs run in one thread of their own, one after the other. A verb that is given up may still be busy; when it
     ends, the device is disarmed once more, in case it armed it, and until then nobody arms the device. `stop` is tried
-    several times, from another thread where the device's own is busy.
+    several times, from another thread if the device's own is busy.
     """
 
     def __init__(
@@ -162,7 +160,7 @@ class PunctualDevice:
         self._name = self._info.name
 
     def describe(self) -> DeviceInfo:
-        """What the device is, as it said at first."""
+        """The description of the device, as it was at first."""
         return self._info
 
     def stage(self) -> None:
@@ -182,7 +180,7 @@ class PunctualDevice:
         self._awaited("stage", call, self._deadlines.stage_s)
 
     def readiness(self) -> Readiness:
-        """What the device says about its state; ready, where it cannot say."""
+        """The state that the device reports; ready, if it cannot report one."""
         if not isinstance(self._device, ReportsReadiness):
             return Readiness()
         return self._within("readiness", partial(readiness_of, self._device), self._deadlines.readiness_s)
@@ -196,14 +194,14 @@ class PunctualDevice:
         return self._awaited("deliver", call, timeout_s, self._given_up)
 
     def late_answer(self, wait_s: float) -> Answer | None:
-        """What came of the last delivery after its deadline; None where nothing did."""
+        """The answer to the last delivery that came after its deadline; None if none did."""
         late = self._late
         if late is None:
             return None
         late.wait(late.age_s + wait_s)
         try:
             return late.result() if late.ended else None
-        except Exception as error:  # noqa: BLE001 - whatever a device fails with too late is told
+        except Exception as error:  # noqa: BLE001 - whatever a device fails with too late is reported
             self._report(f"After its deadline the delivery failed: {error_text(error)}")
             return None
 
@@ -293,7 +291,7 @@ class PunctualDevice:
                 self._still_armed(error)
 
     def _failure_to_stop(self) -> str | None:
-        """Why an attempt to disarm failed; None where it did not."""
+        """Why an attempt to disarm failed; None if it did not."""
         own = self._idle and self._owner == threading.get_ident()
         call = self._begun(self._device.stop) if own else _outside(self._device.stop)
         call.wait(self._deadlines.stop_s)

@@ -14,7 +14,7 @@ from isiw.trials import Stimulus
 
 
 def require_real_time(info: DeviceInfo, clock: Clock) -> None:
-    """Raise where a device that may stimulate somebody would not wait between its stimuli."""
+    """Raise if a device that may stimulate somebody would not wait between its stimuli."""
     if isinstance(clock, VirtualClock) and not info.simulated:
         raise DeviceError(
             "a virtual clock does not wait between stimuli, so it is for simulated devices only",
@@ -55,24 +55,24 @@ class LimitedDevice:
 
     @property
     def limits(self) -> Limits:
-        """What it may deliver."""
+        """The limits that hold now."""
         return self._limits
 
     @property
     def pulses_left(self) -> int:
-        """How many deliveries are still allowed."""
+        """The number of deliveries that are still allowed."""
         return max(0, self._limits.max_pulses - self._delivered)
 
     def wait_s(self, interval_s: float = 0.0) -> float:
-        """How long until the interval, the rest and the period allow the next delivery [s]."""
+        """The time until the interval, the rest and the period allow the next delivery [s]."""
         return self._pacing.wait_s(interval_s)
 
     def ahead_s(self, intervals_s: Sequence[float]) -> float:
-        """How long the next stimuli take that follow each other at these intervals, or as the limits allow [s]."""
+        """The time that the next stimuli take at these intervals, or as the limits allow [s]."""
         return self._pacing.ahead_s(intervals_s)
 
     def check(self, stimulus: Stimulus) -> None:
-        """Raise where this stimulus must not be delivered now."""
+        """Raise if this stimulus must not be delivered now."""
         self._limits.require_left(self._delivered)
         if stimulus.isi_ms is not None:
             self._limits.require_isi(stimulus.isi_ms)
@@ -100,7 +100,7 @@ class LimitedDevice:
         self._limits.require_state(state)
 
     def describe(self) -> DeviceInfo:
-        """What the guarded device is."""
+        """The description of the guarded device."""
         return self._info
 
     def stage(self) -> None:

@@ -17,7 +17,7 @@ _GRID_TOLERANCE_MS = 1e-6
 _SAME_PCT_MSO = 0.01
 
 USUAL_ITI_S = 5.0
-"""Between two stimuli that isiw delivers, where nobody states another interval [s]."""
+"""Between two stimuli that isiw delivers, if nobody states another interval [s]."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Limits(Checked):
     Args:
         low_ms: shortest ISI on the device's reference [ms].
         high_ms: longest ISI [ms].
-        min_iti_s: shortest time between two deliveries [s]; where it is not stated, 5 s if isiw delivers, and none in a
+        min_iti_s: shortest time between two deliveries [s]; if it is not stated, 5 s if isiw delivers, and none in a
             loop of your own, as of `isiw.open_session`.
         max_pulses: largest number of deliveries in a session, failed ones included.
         step_ms: ISIs are whole multiples of it above the shortest [ms]; None if any ISI of the range is allowed.
@@ -99,19 +99,15 @@ class Limits(Checked):
 
     @property
     def iti_s(self) -> float:
-        """The interval that holds where isiw delivers [s]."""
+        """The interval that holds if isiw delivers [s]."""
         return USUAL_ITI_S if self.min_iti_s is None else self.min_iti_s
 
     def stated(self, iti_s: float) -> Limits:
-        """The same with this interval [s], unless another one is stated.
-
-        Args:
-            iti_s: what holds otherwise.
-        """
+        """The same with this interval [s], unless another one is stated."""
         return replace(self, min_iti_s=iti_s) if self.min_iti_s is None else self
 
     def require_effect(self) -> None:
-        """Raise where the interval alone keeps what a rest or a period asks for, so that these limit nothing.
+        """Raise if the interval alone keeps what a rest or a period asks for, so that these limit nothing.
 
         It is for limits that somebody states: those of earlier logs stay readable.
 
@@ -137,10 +133,7 @@ class Limits(Checked):
             )
 
     def require_left(self, delivered: int) -> None:
-        """Raise where no delivery is left.
-
-        Args:
-            delivered: deliveries of the session so far.
+        """Raise if so many deliveries leave none.
 
         Raises:
             LimitExceededError: as many as are allowed.
@@ -152,7 +145,7 @@ class Limits(Checked):
             )
 
     def require_isi(self, isi_ms: float) -> None:
-        """Raise where an ISI must not be delivered.
+        """Raise if an ISI must not be delivered.
 
         Raises:
             LimitExceededError: it is beyond the range, or off the grid.
@@ -172,7 +165,7 @@ class Limits(Checked):
                 expected=f"one of {', '.join(f'{one:g}' for one in self.isis_ms)} ms",
                 remedy="This stimulus was not delivered. Use the same list in the design space and in the limits.",
             )
-        if self.step_ms is not None and self._off_grid_ms(isi_ms) > _GRID_TOLERANCE_MS:
+        if self.step_ms and math.fabs(math.remainder(isi_ms - self.low_ms, self.step_ms)) > _GRID_TOLERANCE_MS:
             raise LimitExceededError(
                 "the ISI is not on the grid of the limits",
                 got=isi_ms,
@@ -181,11 +174,8 @@ class Limits(Checked):
                 "the limits.",
             )
 
-    def _off_grid_ms(self, isi_ms: float) -> float:
-        return math.fabs(math.remainder(isi_ms - self.low_ms, self.step_ms or math.inf))
-
     def require_state(self, state: Readiness) -> None:
-        """Raise where what the device reports does not allow a stimulus.
+        """Raise if what the device reports does not allow a stimulus.
 
         Raises:
             LimitExceededError: the coil is too hot, the intensity is another one, or a limited value is not reported.
@@ -231,7 +221,7 @@ class Limits(Checked):
         return max(earliest)
 
     def _block_pulses(self, times_s: Sequence[float]) -> int:
-        """How many stimuli came since the last rest, counted no further than matters."""
+        """The number of stimuli since the last rest, counted no further than matters."""
         last = times_s[-(self.max_block_pulses or 0) :]
         rests = [
             number for number, (before, after) in enumerate(pairwise(last), start=1) if after - before >= self.rest_s

@@ -1,19 +1,19 @@
-"""What a device must do, in terms familiar from instrument control, and what it says about itself."""
+"""The protocol of a device in terms familiar from instrument control, its description, and a device of functions."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias, runtime_checkable
 
 from isiw.checks import (
     Checked,
     Flag,
+    MeanAndSd,
     NonNegative,
     Number,
     Positive,
     Text,
-    mean_and_sd,
     text,
 )
 from isiw.errors import DeviceError, InvalidValueError, NotDelivered
@@ -31,12 +31,12 @@ class DeviceInfo(Checked):
     Args:
         name: what it is, in a few words.
         reference: the event that its ISIs count from.
-        simulated: True where nothing is delivered to anybody; such a session does not wait between trials.
+        simulated: True if nothing is delivered to anybody; such a session does not wait between trials.
         channels: the unit of each waveform by the channel's name; empty for a device that measures the MEP itself.
         version: firmware or software version, as text.
-        detection_limit_mv: amplitudes below it are reported as 0 [mV]; None where there is no such limit.
+        detection_limit_mv: amplitudes below it are reported as 0 [mV]; None if there is no such limit.
         hit_delay_ms: from the valve command to the impact, mean and SD over people [ms]; `isiw timing LOG` measures it.
-            None where it is not known, or where ISIs count from the impact.
+            None if it is not known, or if ISIs count from the impact.
         conditioning: what it delivers first: a tap on the tendon, or an electrical pulse to the nerve, from which ISIs
             count as from an impact.
         address: what it is connected to, such as "COM3"; no two sessions of a computer drive a device of one address.
@@ -53,7 +53,7 @@ class DeviceInfo(Checked):
     channels: Mapping[str, str] = field(default_factory=dict)
     version: Text = ""
     detection_limit_mv: Positive | None = None
-    hit_delay_ms: tuple[float, float] | None = None
+    hit_delay_ms: MeanAndSd | None = None
     address: Text = ""
     tap_alone: Flag = False
     conditioning: Conditioning = "tap"
@@ -67,8 +67,6 @@ class DeviceInfo(Checked):
         for channel, unit in self.channels.items():
             text("the name of a channel in DeviceInfo.channels", channel)
             text(f"the unit of {channel!r} in DeviceInfo.channels", unit)
-        if self.hit_delay_ms is not None:
-            object.__setattr__(self, "hit_delay_ms", mean_and_sd("DeviceInfo.hit_delay_ms", self.hit_delay_ms))
 
 
 @dataclass(frozen=True)
@@ -78,8 +76,8 @@ class Readiness(Checked):
     Args:
         ready: whether it could fire now.
         reason: why it is not ready.
-        coil_c: temperature of the coil [°C]; None where it is not measured.
-        intensity_pct_mso: intensity that is set [% of the maximum stimulator output]; None where it is not known.
+        coil_c: temperature of the coil [°C]; None if it is not measured.
+        intensity_pct_mso: intensity that is set [% of the maximum stimulator output]; None if it is not known.
     """
 
     ready: Flag = True
@@ -106,7 +104,7 @@ class Device(Protocol):
         """Deliver one pair of stimuli and report what came of it.
 
         Args:
-            stimulus: what to deliver; an ISI of None is TMS alone, or a tap alone where `stimulus.tap_alone` says so,
+            stimulus: what to deliver; an ISI of None is TMS alone, or a tap alone if `stimulus.tap_alone` says so,
                 which only a device gets whose `DeviceInfo` says that it can.
             timeout_s: the longest the call may take [s].
 
@@ -140,7 +138,7 @@ class HasMemory(Protocol):
 
 
 def readiness_of(device: Device) -> Readiness:
-    """What a device says about its state; ready, where it cannot say."""
+    """The state that a device reports; ready, if it cannot report one."""
     state: object = device.readiness() if isinstance(device, ReportsReadiness) else Readiness()
     if not isinstance(state, Readiness):
         raise DeviceError(
@@ -155,3 +153,52 @@ def require_staged(name: str, *, staged: bool) -> None:
     """Raise NotDelivered if a device is to deliver without being armed."""
     if not staged:
         raise NotDelivered(f"{name} is not staged, so it delivers nothing", remedy="Call stage() first.")
+
+
+def _nothing() -> None:
+    """Arm or disarm hardware that needs neither."""
+
+
+class CallbackDevice:
+    """Calls your functions.
+
+    Args:
+        fire: delivers one pair of stimuli and returns a `Measurement` or a `Sweep`; takes the stimulus and the time
+            allowed [s]. The ISI must be timed by hardware, never by Python.
+        info: what the device is.
+        arm: called by `stage`.
+        disarm: called by `stop` and `unstage`; must work in any state.
+    """
+
+    def __init__(
+        self,
+        fire: Callable[[Stimulus, float], Answer],
+        info: DeviceInfo,
+        arm: Callable[[], None] = _nothing,
+        disarm: Callable[[], None] = _nothing,
+    ) -> None:
+        self._fire, self._info, self._arm, self._disarm = fire, info, arm, disarm
+        self._staged = False
+
+    def describe(self) -> DeviceInfo:
+        """The description of the device."""
+        return self._info
+
+    def stage(self) -> None:
+        """Arm."""
+        self._arm()
+        self._staged = True
+
+    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Answer:
+        """Fire."""
+        require_staged(self._info.name, staged=self._staged)
+        return self._fire(stimulus, timeout_s)
+
+    def stop(self) -> None:
+        """Disarm."""
+        self._staged = False
+        self._disarm()
+
+    def unstage(self) -> None:
+        """Disarm."""
+        self.stop()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Protocol, TypeAlias
@@ -14,12 +13,12 @@ from isiw.trials import MOST_ISI_SD_MS, Measurement, Stimulus, Trial, TrialTable
 from isiw.types import Conditioning, Reference
 
 
-class Outcome(Protocol):
+class SimulatedOutcome(Protocol):
     """The outcome of a simulated stimulus."""
 
     @property
     def isi_ms(self) -> float | None:
-        """The realised ISI as told [ms]; None for TMS alone."""
+        """The ISI as reported [ms]; None for TMS alone."""
 
     @property
     def mep_mv(self) -> float:
@@ -30,16 +29,16 @@ class Outcome(Protocol):
         """SD of the realised ISI about the reported one [ms]."""
 
 
-Respond: TypeAlias = Callable[[float | None], Outcome]
+Respond: TypeAlias = Callable[[float | None], SimulatedOutcome]
 """Answers a commanded ISI [ms]; None is TMS alone."""
 
 
 class Simulation(Protocol):
-    """What a simulated device stands for: it answers one stimulus after the other, and may remember them."""
+    """The source of the answers of a simulated device: one stimulus after the other, which it may remember."""
 
     @property
     def info(self) -> DeviceInfo:
-        """What the device says about itself; it is simulated."""
+        """The description of the device; it is simulated."""
 
     def answer(self, stimulus: Stimulus) -> Answer:
         """The outcome of the next stimulus."""
@@ -71,11 +70,7 @@ class SimulatedDevice:
         return self.simulation.answer(stimulus)
 
     def resume_after(self, stimuli: Sequence[Stimulus]) -> None:
-        """Answer those of the session's stimuli that have not been delivered yet, and forget the answers.
-
-        Args:
-            stimuli: all of them since the session's beginning.
-        """
+        """Answer those of the session's stimuli that have not been delivered yet, and forget the answers."""
         for stimulus in stimuli[self._asked :]:
             self._asked += 1
             with suppress(DeviceError):  # it refused then, too
@@ -122,43 +117,34 @@ class SimulatedPerson:
         return Measurement(outcome.mep_mv, outcome.isi_ms, outcome.isi_sd_ms)
 
 
-class DryRun:
+class _NoResponse:
+    """A simulation of somebody in whom no stimulus evokes anything."""
+
+    def __init__(self, info: DeviceInfo) -> None:
+        self.info = info
+
+    def answer(self, stimulus: Stimulus) -> Measurement:
+        return Measurement(0.0, stimulus.isi_ms)
+
+
+class DryRun(SimulatedDevice):
     """A device that is never armed and never fires: every stimulus is answered with an MEP of 0.
 
     Strategy, limits, readiness, pauses and log can be tried with the rig connected. It counts as simulated; give the
     session a `MonotonicClock` to rehearse its pace, too.
 
     Args:
-        device: the real one; only `describe` and, where it has it, `readiness` are called.
+        device: the real one; only `describe` and, if it has it, `readiness` are called.
     """
 
     def __init__(self, device: Device) -> None:
-        info = device.describe()
-        self._device, self._staged = device, False
-        self._info = dataclasses.replace(info, name=f"dry run of {info.name}", simulated=True, channels={})
-
-    def describe(self) -> DeviceInfo:
-        """The device's description, as of a simulated one that measures MEPs."""
-        return self._info
+        self._device, info = device, device.describe()
+        called = f"dry run of {info.name}"
+        super().__init__(_NoResponse(dataclasses.replace(info, name=called, simulated=True, channels={})))
 
     def readiness(self) -> Readiness:
-        """The state that the real device reports."""
+        """The state of the real device."""
         return readiness_of(self._device)
-
-    def stage(self) -> None:
-        """Arm nothing."""
-        self._staged = True
-
-    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Measurement:  # noqa: ARG002 - answers at once
-        """Fire nothing."""
-        require_staged(self._info.name, staged=self._staged)
-        return Measurement(0.0, stimulus.isi_ms)
-
-    def stop(self) -> None:
-        """Refuse what comes until the next `stage`."""
-        self._staged = False
-
-    unstage = stop
 
 
 class RecordedTrials:
@@ -199,7 +185,7 @@ class RecordedTrials:
                 remedy="Give the limits as many max_pulses as there are recorded pairs, or replay a longer recording. "
                 "Where trials were mistrials for their ISI, give the space a tolerance_ms wider than its range.",
             )
-        trial = min(fitting, key=lambda candidate: _distance_ms(candidate, asked_ms))
+        trial = min(fitting, key=lambda candidate: abs((candidate.wanted_isi_ms or 0.0) - (asked_ms or 0.0)))
         self._left.remove(trial)
         return Measurement(
             trial.mep_mv or 0.0,
@@ -210,9 +196,3 @@ class RecordedTrials:
             trial.t_hit_ms,
             trial.t_tms_ms,
         )
-
-
-def _distance_ms(trial: Trial, asked_ms: float | None) -> float:
-    """How far a trial lies from the ISI asked for, by what was commanded where that is known."""
-    at_ms = trial.isi_ms if trial.commanded_isi_ms is None else trial.commanded_isi_ms
-    return 0.0 if asked_ms is None or at_ms is None else math.fabs(at_ms - asked_ms)

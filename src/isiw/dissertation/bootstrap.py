@@ -21,7 +21,7 @@ from isiw.dissertation.regression import FittedCurve, curve_masks
 from isiw.estimate import WindowEstimate
 from isiw.lazy import torch
 from isiw.models.protocol import Observation, Tensor
-from isiw.models.shared.history import AmplitudeHistory, FloorTreatment
+from isiw.models.shared.history import AmplitudeHistory, FloorTreatment, OfAmplitudes
 from isiw.types import BoolArray, FloatArray, IntArray
 from isiw.window import Window
 
@@ -29,7 +29,7 @@ WindowKind = Literal["expectation", "fit", "particles"]
 
 
 def normalised(weights: FloatArray) -> FloatArray:
-    """Weights that sum to 1; equal ones where all are 0."""
+    """Weights that sum to 1; equal ones if all are 0."""
     total = weights.sum(axis=-1, keepdims=True)
     return np.asarray(np.where(total > 0, weights, 1.0) / np.where(total > 0, total, weights.shape[-1]))
 
@@ -88,7 +88,7 @@ class BootstrapFilter(Checked):
         )
 
     def update(self, posterior: BootstrapPosterior, observation: Observation) -> BootstrapPosterior:
-        """One more particle measured; the next generation where it was the last one of its own."""
+        """One more particle measured; the next generation if it was the last one of its own."""
         told = posterior.told.appended(observation)
         paired = np.flatnonzero(~np.isnan(told.isi_ms[:, -1]))
         measured_ms, mep_mv = posterior.measured_ms.copy(), posterior.mep_mv.copy()
@@ -144,17 +144,13 @@ class BootstrapFilter(Checked):
 
 
 @dataclass(frozen=True, eq=False)
-class BootstrapPosterior:
+class BootstrapPosterior(OfAmplitudes):
     """Where b people's particles are.
 
     Args:
-        model: the filter's settings.
-        space: the design space.
-        seed: seed of all randomness.
-        told: the trials so far.
         plan_ms: the present generation [ms], shape (b, p).
         count: how many of it have been measured, shape (b,).
-        measured_ms: where they were measured, NaN where they were not yet, shape (b, p).
+        measured_ms: where they were measured, NaN if they were not yet, shape (b, p).
         mep_mv: their MEPs [mV], shape (b, p).
         expectation_ms: the posterior expectation after the last generation [ms], NaN before, shape (b,).
         spread_ms: SD of the particles after it [ms], shape (b,).
@@ -180,13 +176,8 @@ class BootstrapPosterior:
     floors_mv: FloatArray
 
     @property
-    def trials(self) -> int:
-        """Number of trials of each person that it has learnt."""
-        return self.told.trials
-
-    @property
     def trouble(self) -> str | None:
-        """True if the last generation taught nothing; see `ReportsTrouble`."""
+        """That the last generation taught nothing; see `ReportsTrouble`."""
         if not self.weightless.any():
             return None
         return "No MEP of the last generation was above the floor: all of its particles were given the same weight."

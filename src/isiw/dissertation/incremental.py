@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from statistics import NormalDist
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
@@ -16,19 +16,11 @@ from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
 from isiw.lazy import torch
 from isiw.models.protocol import Observation, Tensor
-from isiw.models.shared.history import AmplitudeHistory, FloorTreatment, PersonTrials
+from isiw.models.shared.history import AmplitudeHistory, FloorTreatment, OfAmplitudes, PersonTrials
 from isiw.types import FloatArray
 from isiw.window import EDGE_LEVEL, Window
 
 SweepRule = Literal["baseline", "share"]
-
-
-class _Means(NamedTuple):
-    """What was measured at the ISIs swept so far, in ascending order, each field of shape (t,)."""
-
-    isi_ms: FloatArray
-    mep_mv: FloatArray
-    sem_mv: FloatArray
 
 
 @dataclass(frozen=True)
@@ -36,14 +28,14 @@ class SweepModel(Checked):
     """The mean MEP of each ISI in turn.
 
     Args:
-        step_ms: from one ISI to the next [ms]; where that is none of the space's, the next multiple of its step.
+        step_ms: from one ISI to the next [ms]; if that is none of the space's, the next multiple of its step.
         trials_per_isi: trials at each.
         discarded: the first trials at each ISI, which a startle may have enlarged, are left out.
         rule: the window is the run of ISIs about the largest mean whose means exceed the `"baseline"` or the 0.135
             `"share"` of the largest excess (the other methods'). The text's baseline is TMS alone at 100 % of the
             resting motor threshold (4.2.1); here it is the TMS alone that was told, whatever its intensity.
         neighbours: means are averaged over so many ISIs (an odd number) before the rule judges them,
-        evidence_se: and a window is reported where the largest exceeds the baseline by so many of its standard errors:
+        evidence_se: and a window is reported if the largest exceeds the baseline by so many of its standard errors:
             both stand for the eye of the experimenter, who expected one distribution.
         floor: what the baseline is; without TMS alone, the median of the means.
     """
@@ -58,9 +50,8 @@ class SweepModel(Checked):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        whole(
-            "SweepModel.trials_per_isi", self.trials_per_isi, least=self.discarded + 2
-        )  # a mean and its error need two that are kept
+        kept = 2  # trials that a mean and its error need
+        whole("SweepModel.trials_per_isi", self.trials_per_isi, least=self.discarded + kept)
         if self.neighbours % 2 == 0:
             raise InvalidValueError("SweepModel.neighbours must be odd", got=self.neighbours)
 
@@ -74,27 +65,15 @@ class SweepModel(Checked):
 
 
 @dataclass(frozen=True, eq=False)
-class SweepPosterior:
-    """What was measured of b people.
-
-    Args:
-        model: the sweep's settings.
-        space: the design space.
-        told: the trials so far.
-    """
+class SweepPosterior(OfAmplitudes):
+    """The trials of b people, from which means are worked out when they are looked at."""
 
     model: SweepModel
     space: DesignSpace
     told: AmplitudeHistory
 
-    @property
-    def trials(self) -> int:
-        """Number of trials of each person that it has learnt."""
-        return self.told.trials
-
     @cached_property
     def _stops_ms(self) -> FloatArray:
-        """The ISIs of one sweep [ms]."""
         return self.space.stops_ms(self.model.step_ms)
 
     def proposed_isis_ms(self) -> Tensor:
@@ -103,8 +82,11 @@ class SweepPosterior:
         done = (~np.isnan(self.told.isi_ms)).sum(axis=-1, keepdims=True)
         return torch.as_tensor(sweep[(done + np.arange(len(sweep))) % len(sweep)], dtype=torch.float32)
 
-    def _means(self, trials: PersonTrials) -> _Means:
-        """Means by the nearest stop of the realised ISI; the first trials of each block of the sweep are left out."""
+    def _means(self, trials: PersonTrials) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The ISIs swept so far, ascending, and the means and their standard errors there, each of shape (t,).
+
+        A trial belongs to the stop that is nearest to its realised ISI; the first ones of each block are left out.
+        """
         per_isi, discarded = self.model.trials_per_isi, self.model.discarded
         kept = np.arange(len(trials.isi_ms)) % per_isi >= discarded
         mep_mv, last = self.model.floor.excess_mv(trials.mep_mv[kept], 0.0), len(self._stops_ms) - 1
@@ -116,7 +98,7 @@ class SweepPosterior:
         n = count[done]
         mean = total / n
         sem = np.sqrt((squares / n - mean**2).clip(0.0) / (n - 1))
-        return _Means(self._stops_ms[done], mean, sem)
+        return self._stops_ms[done], mean, sem
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person, as far as the sweep has come."""

@@ -20,7 +20,7 @@ from isiw.lazy import scipy, sklearn
 from isiw.types import FloatArray
 
 LEAST_SCALE_MV = 1e-3
-"""Amplitudes are fitted in units of the largest excess, or of this where that is smaller [mV]."""
+"""Amplitudes are fitted in units of the largest excess, or of this if that is smaller [mV]."""
 
 SUPPORT_MS = 5.0
 """Distance of the ISIs at which curves are drawn; the kernel is smooth in between."""
@@ -58,21 +58,16 @@ class GaussianProcessRegression(Checked):
         self, isi_ms: FloatArray, excess_mv: FloatArray, space: DesignSpace, rng: np.random.Generator
     ) -> FittedCurve:
         """Fit the Gaussian process; see `RegressionMethod`."""
-        # Matrices this small gain nothing from several threads, and lose a lot where the machine is busy.
-        with _blas().limit(limits=1, user_api="blas"):
-            return self._fit(isi_ms, excess_mv, space, rng)
-
-    def _fit(
-        self, isi_ms: FloatArray, excess_mv: FloatArray, space: DesignSpace, rng: np.random.Generator
-    ) -> FittedCurve:
         scale_mv = max(float(np.abs(excess_mv).max(initial=0.0)), LEAST_SCALE_MV)
-        process, noise, trouble = self._process(isi_ms[:, None], excess_mv / scale_mv)
         grid = space.grid_ms
         support = np.linspace(space.low_ms, space.high_ms, round((space.high_ms - space.low_ms) / SUPPORT_MS) + 1)
-        mean, covariance = process.predict(support[:, None], return_cov=True)
-        values, vectors = np.linalg.eigh(covariance - noise**2 * np.eye(len(support)))
-        drawn = mean + rng.standard_normal((self.samples, len(support))) @ (vectors * np.sqrt(values.clip(0.0))).T
-        mean, sd = process.predict(grid[:, None], return_std=True)
+        # Matrices this small gain nothing from several threads, and lose a lot if the machine is busy.
+        with _blas().limit(limits=1, user_api="blas"):
+            process, noise, trouble = self._process(isi_ms[:, None], excess_mv / scale_mv)
+            mean, covariance = process.predict(support[:, None], return_cov=True)
+            values, vectors = np.linalg.eigh(covariance - noise**2 * np.eye(len(support)))
+            drawn = mean + rng.standard_normal((self.samples, len(support))) @ (vectors * np.sqrt(values.clip(0.0))).T
+            mean, sd = process.predict(grid[:, None], return_std=True)
         return FittedCurve(
             grid_ms=grid,
             mean_mv=mean * scale_mv,

@@ -18,7 +18,7 @@ from isiw.types import FloatArray
 Start = Literal["even", "unequal", "random"]
 
 LEAST_AMPLITUDE_MV = 1e-3
-"""The amplitude to start from where it is not known and all MEPs are at the floor."""
+"""The amplitude to start from if it is not known and all MEPs are at the floor."""
 
 LEAST_NOISE_MV = 1e-6
 """The noise that a fit without residuals is taken to have."""
@@ -41,8 +41,8 @@ def gradient_mv(isi_ms: FloatArray, parameters: FloatArray) -> FloatArray:
     return np.stack((bell, amplitude * bell * z / sd, amplitude * bell * z**2 / sd), axis=-1).reshape(len(isi_ms), -1)
 
 
-class _Beliefs(NamedTuple):
-    """What is known of the parameters before any trial, each field of shape (3 k,)."""
+class _Known(NamedTuple):
+    """Start values, SDs and bounds of the parameters, each of shape (3 k,)."""
 
     start: FloatArray
     sd: FloatArray
@@ -51,7 +51,7 @@ class _Beliefs(NamedTuple):
 
 
 class _Estimate(NamedTuple):
-    """What least squares make of the trials: parameters (3 k,), their covariance, and the noise."""
+    """The result of least squares: parameters (3 k,), their covariance, and the noise."""
 
     parameters: FloatArray
     covariance: FloatArray
@@ -75,7 +75,7 @@ class NonlinearRegression(Checked):
         min_width_ms: the narrowest window that is fitted [ms]; Table 4.1 has 60–220, and no bounds.
         max_width_ms: the widest [ms].
         amplitude_mv: amplitude before anything is known [mV]; the text's figures have 0.03–0.3 mV. 0: as much as the
-            largest MEP so far, where nothing is known.
+            largest MEP so far, if nothing is known.
         max_evaluations: evaluations after which the search gives up.
         samples: how many curves are drawn from the parameters' asymptotic distribution.
         start: where the search starts: `"even"` as above; `"unequal"`: the second Gaussian with a tenth of the first's
@@ -102,8 +102,8 @@ class NonlinearRegression(Checked):
     ) -> FittedCurve:
         """Fit the Gaussians; see `RegressionMethod`."""
         amplitude_mv = self.amplitude_mv or max(float(excess_mv.max(initial=0.0)), LEAST_AMPLITUDE_MV)
-        beliefs = self._beliefs(space, amplitude_mv, rng)
-        estimate = self._least_squares(isi_ms, excess_mv, beliefs)
+        known = self._known(space, amplitude_mv, rng)
+        estimate = self._least_squares(isi_ms, excess_mv, known)
         values, vectors = np.linalg.eigh(estimate.covariance)
         root = vectors * np.sqrt(values.clip(0.0))
         drawn = estimate.parameters + rng.standard_normal((self.samples, len(root))) @ root.T
@@ -112,7 +112,7 @@ class NonlinearRegression(Checked):
             grid_ms=grid,
             mean_mv=gaussians_mv(grid, estimate.parameters),
             sd_mv=np.linalg.norm(gradient_mv(grid, estimate.parameters) @ root, axis=-1),
-            samples_mv=gaussians_mv(grid, np.clip(drawn, beliefs.low, beliefs.high)),
+            samples_mv=gaussians_mv(grid, np.clip(drawn, known.low, known.high)),
             noise_sd_mv=estimate.noise_sd_mv,
             dof=estimate.dof,
             trouble=estimate.trouble,
@@ -120,13 +120,12 @@ class NonlinearRegression(Checked):
             fitted=estimate.fitted,
         )
 
-    def _beliefs(self, space: DesignSpace, amplitude_mv: float, rng: np.random.Generator) -> _Beliefs:
-        """Start values, SDs and bounds of the parameters."""
+    def _known(self, space: DesignSpace, amplitude_mv: float, rng: np.random.Generator) -> _Known:
         sd = [amplitude_mv, (space.high_ms - space.low_ms) / math.sqrt(12.0), self.width_ms / 8.0]
         low = [0.0, space.low_ms, 0.25 * self.min_width_ms]
         high = [math.inf, space.high_ms, 0.25 * self.max_width_ms]
         start = np.ravel(self.starts(space, amplitude_mv, rng))
-        return _Beliefs(start, *(np.tile(values, self.peaks) for values in (sd, low, high)))
+        return _Known(start, *(np.tile(values, self.peaks) for values in (sd, low, high)))
 
     def starts(self, space: DesignSpace, amplitude_mv: float, rng: np.random.Generator) -> list[list[float]]:
         """Amplitude [mV], mean and SD [ms] from which the search for each Gaussian starts."""
@@ -141,36 +140,36 @@ class NonlinearRegression(Checked):
             return [[amplitude_mv, middle_ms, sd_ms], [0.1 * amplitude_mv, middle_ms + apart_ms, sd_ms]]
         return [[amplitude_mv, middle_ms + side * apart_ms, sd_ms] for side in (-1, 1)]
 
-    def _least_squares(self, isi_ms: FloatArray, excess_mv: FloatArray, beliefs: _Beliefs) -> _Estimate:
-        """The best parameters and their asymptotic covariance; prior knowledge where the trials do not give them."""
-        free = len(isi_ms) - len(beliefs.start)
+    def _least_squares(self, isi_ms: FloatArray, excess_mv: FloatArray, known: _Known) -> _Estimate:
+        """The best parameters and their asymptotic covariance; prior knowledge if the trials do not give them."""
+        free = len(isi_ms) - len(known.start)
         if free < 1:
-            flat = beliefs.start * np.tile([0.0, 1.0, 1.0], self.peaks)
+            flat = known.start * np.tile([0.0, 1.0, 1.0], self.peaks)
             trouble = f"{len(isi_ms)} trials do not determine {len(flat)} parameters: a flat curve stands in."
-            return _Estimate(flat, np.diag(beliefs.sd**2), float(beliefs.sd[0]), trouble=trouble, fitted=False)
+            return _Estimate(flat, np.diag(known.sd**2), float(known.sd[0]), trouble=trouble, fitted=False)
+
+        def residuals_mv(parameters: FloatArray) -> FloatArray:
+            return gaussians_mv(isi_ms, parameters) - excess_mv
+
         found = scipy.optimize.least_squares(
-            partial(_residuals_mv, isi_ms, excess_mv),
-            beliefs.start,
+            residuals_mv,
+            known.start,
             jac=partial(gradient_mv, isi_ms),
-            bounds=(beliefs.low, beliefs.high),
-            x_scale=beliefs.sd,
+            bounds=(known.low, known.high),
+            x_scale=known.sd,
             ftol=1e-6,
             xtol=1e-6,
             max_nfev=self.max_evaluations,
         )
         noise_mv = max(math.sqrt(2.0 * found.cost / free), LEAST_NOISE_MV)
-        covariance, doubt = _covariance(gradient_mv(isi_ms, found.x) / noise_mv, beliefs.sd)
+        covariance, doubt = _covariance(gradient_mv(isi_ms, found.x) / noise_mv, known.sd)
         gave_up = f"The fit did not converge in {self.max_evaluations} evaluations: its best curve stands in."
         trouble = " ".join(filter(None, ("" if found.success else gave_up, doubt)))
         return _Estimate(found.x, covariance, noise_mv, free, trouble or None)
 
 
-def _residuals_mv(isi_ms: FloatArray, excess_mv: FloatArray, parameters: FloatArray) -> FloatArray:
-    return gaussians_mv(isi_ms, parameters) - excess_mv
-
-
 def _covariance(gradient: FloatArray, prior_sd: FloatArray) -> tuple[FloatArray, str | None]:
-    """Covariance of the parameters from the gradient in noise SDs; what stands in where that is singular."""
+    """Covariance of the parameters from the gradient in noise SDs; what stands in if that is singular."""
     scaled = gradient * prior_sd
     information = scaled.T @ scaled
     trouble = None

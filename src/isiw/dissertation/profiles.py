@@ -42,7 +42,7 @@ class ProfileFit:
         aicc: the corrected information criterion of Akaike; the smallest is best. Infinite with too few ISIs.
         bic: the Bayesian information criterion.
         rms_mv: root mean square of the residuals [mV].
-        gaussians: amplitude [mV], mean [ms] and SD [ms] of each Gaussian, shape (k, 3); negative where it is depressed.
+        gaussians: amplitude [mV], mean [ms] and SD [ms] of each Gaussian, shape (k, 3); negative if it is depressed.
     """
 
     name: str
@@ -63,7 +63,7 @@ class Normality(NamedTuple):
 
     Args:
         statistic: W, at most 1.
-        p_value: of values as far from normal, where they are drawn from a normal law.
+        p_value: of values as far from normal, if they are drawn from a normal law.
         normal: whether the test passes.
     """
 
@@ -86,14 +86,20 @@ def normality(values: ArrayLike, level: float = 0.05) -> Normality:
     return Normality(float(found.statistic), float(found.pvalue), bool(found.pvalue >= level))
 
 
-def profile_fits(isi_ms: ArrayLike, mep_mv: ArrayLike, most: int = MOST_GAUSSIANS) -> tuple[ProfileFit, ...]:
-    """Sums of one and more Gaussians on a baseline, and a smoothing spline, through the mean MEP at each ISI."""
-    most = whole("the number of Gaussians", most, least=1, most=20)
+def paired(isi_ms: ArrayLike, mep_mv: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """The ISI [ms] and the MEP [mV] of each trial, both finite, shape (n,) each."""
     isi, mep = np.asarray(isi_ms, dtype=np.float64), np.asarray(mep_mv, dtype=np.float64)
     if isi.shape != mep.shape or isi.ndim != 1:
         raise InvalidValueError("each trial has one ISI and one MEP", got=(isi.shape, mep.shape))
     if not (np.isfinite(isi).all() and np.isfinite(mep).all()):
         raise InvalidValueError("ISIs and MEPs must be finite", remedy="Leave mistrials out.")
+    return isi, mep
+
+
+def profile_fits(isi_ms: ArrayLike, mep_mv: ArrayLike, most: int = MOST_GAUSSIANS) -> tuple[ProfileFit, ...]:
+    """Sums of one and more Gaussians on a baseline, and a smoothing spline, through the mean MEP at each ISI."""
+    most = whole("the number of Gaussians", most, least=1, most=20)
+    isi, mep = paired(isi_ms, mep_mv)
     at_ms, which, trials = np.unique(isi, return_inverse=True, return_counts=True)
     if len(at_ms) < LEAST_ISIS:
         raise InvalidValueError("too few ISIs for a profile", got=len(at_ms), expected=f"at least {LEAST_ISIS}")
@@ -101,7 +107,8 @@ def profile_fits(isi_ms: ArrayLike, mep_mv: ArrayLike, most: int = MOST_GAUSSIAN
     fits, parameters = [], np.array([np.average(profile.mep_mv, weights=profile.weights)])
     for _ in range(most):
         parameters = _with_one_more(profile, parameters)
-        fits.append(_sum_of_gaussians(profile, parameters))
+        gaussians, curve = parameters[1:].reshape(-1, 3), partial(_mean_mv, parameters)
+        fits.append(_scored(counted(len(gaussians), "Gaussian"), profile, curve, len(parameters) + 1.0, gaussians))
     return (*fits, _spline(profile))
 
 
@@ -156,13 +163,6 @@ def _least_squares(profile: _Profile, start: FloatArray) -> FloatArray:
         _residuals, inside, jac=_jacobian, bounds=(low, high), x_scale="jac", max_nfev=200, args=(profile,)
     )
     return np.asarray(found.x)
-
-
-def _sum_of_gaussians(profile: _Profile, parameters: FloatArray) -> ProfileFit:
-    gaussians = parameters[1:].reshape(-1, 3)
-    name = counted(len(gaussians), "Gaussian")
-    curve = partial(_mean_mv, parameters)
-    return _scored(name, profile, curve, len(parameters) + 1.0, gaussians)
 
 
 def _spline(profile: _Profile) -> ProfileFit:

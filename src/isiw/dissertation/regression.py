@@ -18,7 +18,7 @@ from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
 from isiw.lazy import scipy, torch
 from isiw.models.protocol import Observation, Tensor
-from isiw.models.shared.history import AmplitudeHistory, FloorTreatment
+from isiw.models.shared.history import AmplitudeHistory, FloorTreatment, OfAmplitudes
 from isiw.types import BoolArray, FloatArray
 from isiw.window import EDGE_LEVEL, Window, least_excess_mv
 
@@ -36,9 +36,9 @@ class FittedCurve:
         samples_mv: curves that would fit as well, shape (s, t).
         noise_sd_mv: SD of one MEP about the curve.
         dof: degrees of freedom of that SD.
-        trouble: what went wrong, and what stands in for it, as full sentences; None where nothing did.
-        amplitudes_mv: of the Gaussians that the curve is made of, largest first; empty where it is not made of any.
-        fitted: whether trials determine it; where they do not, a curve stands in that says nothing of a window.
+        trouble: what went wrong, and what stands in for it, as full sentences; None if nothing did.
+        amplitudes_mv: of the Gaussians that the curve is made of, largest first; empty if it is not made of any.
+        fitted: whether trials determine it; if they do not, a curve stands in that says nothing of a window.
     """
 
     grid_ms: FloatArray
@@ -97,7 +97,7 @@ class RegressionModel(Checked):
     Args:
         method: what fits the curve.
         floor: what is subtracted before.
-        segments: where the curve crosses its edges' level more than twice: the window is `"all"` that lies above it,
+        segments: if the curve crosses its edges' level more than twice: the window is `"all"` that lies above it,
             or the segment that holds the `"peak"`, since a single distribution is expected (4.2.1, 5.4.1).
     """
 
@@ -125,17 +125,8 @@ class RegressionModel(Checked):
 
 
 @dataclass(frozen=True, eq=False)
-class RegressionPosterior:
-    """The posterior of b people.
-
-    Args:
-        model: the model's settings.
-        space: the design space.
-        seed: seed of all randomness.
-        told: the trials so far.
-        curves: what was fitted to them, one a person.
-        floors_mv: the floor of each person [mV], shape (b,).
-    """
+class RegressionPosterior(OfAmplitudes):
+    """The curve that was fitted to the trials of each of b people, and the floor that it is above [mV], shape (b,)."""
 
     model: RegressionModel
     space: DesignSpace
@@ -145,13 +136,8 @@ class RegressionPosterior:
     floors_mv: FloatArray
 
     @property
-    def trials(self) -> int:
-        """Number of trials of each person that it has learnt."""
-        return self.told.trials
-
-    @property
     def trouble(self) -> str | None:
-        """What went wrong with the last fit; see `ReportsTrouble`."""
+        """The trouble of the last fits; see `ReportsTrouble`."""
         return " ".join(dict.fromkeys(curve.trouble for curve in self.curves if curve.trouble)) or None
 
     @cached_property
@@ -205,7 +191,7 @@ class RegressionPosterior:
         return low + self.floors_mv[person], high + self.floors_mv[person]
 
     def estimate(self, person: int = 0) -> WindowEstimate:
-        """The window of one person; there is no answer yet where no curve is fitted."""
+        """The window of one person; there is no answer yet if no curve is fitted."""
         if not self.curves[person].fitted:
             return WindowEstimate(probability=None, window=None)
         curve, floor_mv = self.curves[person], float(self.floors_mv[person])

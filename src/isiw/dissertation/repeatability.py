@@ -10,9 +10,8 @@ of those SDs away. So there are two presets of the cushion. `cushion` has Gaussi
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -86,10 +85,9 @@ HIT_DELAY_SD_MS = 6.0
 
 @dataclass(frozen=True, eq=False)
 class TimingStudy:
-    """What a repeatability study found.
+    """The findings of a repeatability study.
 
     Args:
-        name: the preset, or what else was studied.
         events: the events of all taps, or of all rotations [ms from the trial's start, 500 ms before its valve
             command].
         commanded_ms: commanded ISIs from the impact [ms], NaN for a tap without a pulse, shape (n,).
@@ -103,18 +101,37 @@ class TimingStudy:
 
     @property
     def kind(self) -> str:
-        """What was repeated."""
+        """The repeated event: "taps" or "rotations"."""
         return "taps" if isinstance(self.events, TapEvents) else "rotations"
 
     @property
     def event_table(self) -> pd.DataFrame:
-        """Mean, SD and range of each event, as `event_table`."""
-        return event_table(self.events)
+        """Mean, SD and range of each event that was found at least once."""
+        rows = {}
+        for name, times in self.events.columns().items():
+            found = times[~np.isnan(times)]
+            if found.size:
+                sd_ms = found.std(ddof=1) if found.size > 1 else 0.0
+                rows[name] = (found.mean(), sd_ms, found.min(), found.max(), found.size)
+        table = pd.DataFrame.from_dict(rows, orient="index", columns=["mean_ms", "sd_ms", "low_ms", "high_ms", "n"])
+        return table.rename_axis("event")
 
     @property
     def error_table(self) -> pd.DataFrame:
-        """The ISI error by commanded ISI, as `error_table`."""
-        return error_table(self.commanded_ms, self.realised_ms)
+        """The ISI error, realised minus commanded, by commanded ISI.
+
+        Mistrials, with a realised ISI below 0 or none at all, are counted and left out of the statistics (5.3.1).
+        """
+        trials = pd.DataFrame({"isi_ms": self.commanded_ms, "error_ms": self.realised_ms - self.commanded_ms})
+        trials["mistrial"] = ~(self.realised_ms >= 0)
+        trials = trials.dropna(subset="isi_ms")
+        trials["accepted_ms"] = trials["error_ms"].mask(trials["mistrial"])
+        return trials.groupby("isi_ms").agg(
+            n=("accepted_ms", "count"),
+            mean_ms=("accepted_ms", "mean"),
+            sd_ms=("accepted_ms", "std"),
+            mistrials=("mistrial", "sum"),
+        )
 
     @property
     def mistrials(self) -> int:
@@ -123,19 +140,19 @@ class TimingStudy:
 
     @property
     def pulse_table(self) -> pd.DataFrame:
-        """How the pulse varies against the valve command, by commanded ISI (Fig. 5.9): columns n and sd_ms."""
+        """Variation of the pulse against the valve command, by commanded ISI (Fig. 5.9): columns n and sd_ms."""
         hit_ms = self.events.hit_ms if isinstance(self.events, TapEvents) else np.nan
         pulses = pd.DataFrame({"isi_ms": self.commanded_ms, "pulse_ms": self.realised_ms + hit_ms})
         return pulses.dropna().groupby("isi_ms").agg(n=("pulse_ms", "count"), sd_ms=("pulse_ms", "std"))
 
     @property
     def error_probabilities(self) -> pd.DataFrame:
-        """How probable an ISI error of some size is, as `error_probabilities`."""
+        """Probability of an ISI error by its size, as `error_probabilities`."""
         return error_probabilities(self.commanded_ms, self.realised_ms, self.pooled_sd_ms)
 
     @property
     def pooled_sd_ms(self) -> float:
-        """SD of the ISI error, each set's mean removed (5.2.1) [ms]; NaN where no ISI has two accepted trials."""
+        """SD of the ISI error, each set's mean removed (5.2.1) [ms]; NaN if no ISI has two accepted trials."""
         table = self.error_table[self.error_table["n"] > 1]
         left = (table["n"] - 1).sum()
         return float(np.sqrt((table["sd_ms"] ** 2 * (table["n"] - 1)).sum() / left)) if left > 0 else float("nan")
@@ -152,37 +169,8 @@ def hit_delay_ms(study: TimingStudy) -> tuple[float, float] | None:
     return float(hits_ms.mean()), float(np.hypot(math.sqrt(2.0) * HIT_DELAY_SD_MS, error_ms))
 
 
-def event_table(events: TapEvents | RotationEvents) -> pd.DataFrame:
-    """Mean, SD and range of each event that was found at least once."""
-    rows = {}
-    for name, times in events.columns().items():
-        found = times[~np.isnan(times)]
-        if found.size:
-            sd_ms = found.std(ddof=1) if found.size > 1 else 0.0
-            rows[name] = (found.mean(), sd_ms, found.min(), found.max(), found.size)
-    table = pd.DataFrame.from_dict(rows, orient="index", columns=["mean_ms", "sd_ms", "low_ms", "high_ms", "n"])
-    return table.rename_axis("event")
-
-
-def error_table(commanded_ms: FloatArray, realised_ms: FloatArray) -> pd.DataFrame:
-    """The ISI error, realised minus commanded, by commanded ISI.
-
-    Mistrials, with a realised ISI below 0 or none at all, are counted and left out of the statistics (5.3.1).
-    """
-    trials = pd.DataFrame({"isi_ms": commanded_ms, "error_ms": realised_ms - commanded_ms})
-    trials["mistrial"] = ~(realised_ms >= 0)
-    trials = trials.dropna(subset="isi_ms")
-    trials["accepted_ms"] = trials["error_ms"].mask(trials["mistrial"])
-    return trials.groupby("isi_ms").agg(
-        n=("accepted_ms", "count"),
-        mean_ms=("accepted_ms", "mean"),
-        sd_ms=("accepted_ms", "std"),
-        mistrials=("mistrial", "sum"),
-    )
-
-
 def error_probabilities(commanded_ms: FloatArray, realised_ms: FloatArray, sd_ms: float) -> pd.DataFrame:
-    """How probable an ISI error of some magnitude is: by a Gaussian, as in Table 5.1, and as counted."""
+    """Probability of an ISI error by its magnitude: by a Gaussian, as in Table 5.1, and as counted."""
     low, high = np.array(ERROR_BANDS_MS[:-1]), np.array(ERROR_BANDS_MS[1:])
     trials = pd.DataFrame({"isi_ms": commanded_ms, "error_ms": realised_ms - commanded_ms})[realised_ms >= 0].dropna()
     size_ms = (trials["error_ms"] - trials.groupby("isi_ms")["error_ms"].transform("mean")).abs().to_numpy()
@@ -236,7 +224,7 @@ def study_sweeps(name: str, sweeps: Iterable[Sweep], commanded_isi_ms: Iterable[
     """Run the repeatability study on recorded sweeps."""
     parts, realised = [], []
     for sweep in sweeps:
-        events = sweep_events(sweep)  # raises where the valve's time is unknown
+        events = sweep_events(sweep)  # raises if the valve's time is unknown
         realised.append(np.nan if sweep.t_tms_ms is None else sweep.t_tms_ms - events.hit_ms[0])
         parts.append(_later(events, VALVE_MS - (sweep.t_valve_ms or 0.0)))
     if not parts:
@@ -321,6 +309,4 @@ def _later(events: TapEvents, shift_ms: float) -> TapEvents:
 
 
 def _joined(parts: Iterable[TapEvents]) -> TapEvents:
-    columns: Iterator[tuple[FloatArray, ...]] = zip(*(part.columns().values() for part in parts), strict=True)
-    names = [field.name for field in dataclasses.fields(TapEvents)]
-    return TapEvents(**{name: np.concatenate(column) for name, column in zip(names, columns, strict=True)})
+    return TapEvents(*map(np.concatenate, zip(*(part.columns().values() for part in parts), strict=True)))

@@ -16,12 +16,12 @@ from typing import Final, Literal, NamedTuple, TypeAlias, get_args
 import numpy as np
 
 from isiw.checks import choice, number, whole
+from isiw.dissertation.profiles import paired
 from isiw.errors import InvalidValueError
 from isiw.findings import AMPLITUDE_MV
 from isiw.lazy import pd
 from isiw.signals.limits import require_amplitude
-from isiw.subjects.profiles import PeakProfile
-from isiw.subjects.responses import EmgFloor, RecruitmentResponse
+from isiw.subjects.responses import EmgFloor, PeakProfile, RecruitmentResponse
 from isiw.subjects.subject import SimulatedSubject
 from isiw.trials import RESPONSE_MV, Trial
 from isiw.types import ArrayLike, FloatArray
@@ -64,7 +64,7 @@ class CountStudy:
 
     Args:
         counts: as `response_counts` returns it.
-        window: the effective ISIs about the largest share; None where there are none.
+        window: the effective ISIs about the largest share; None if there are none.
         threshold_mv: what an MEP had to exceed [mV].
         alone_share: share of the trials of TMS alone that exceeded it; NaN without such trials.
     """
@@ -104,25 +104,16 @@ def count_trials(trials: TrialsByIsi) -> CountStudy:
 
 
 def response_counts(isi_ms: ArrayLike, mep_mv: ArrayLike, threshold_mv: float) -> pd.DataFrame:
-    """How many trials respond at each ISI."""
-    isi, mep = np.asarray(isi_ms, dtype=np.float64), np.asarray(mep_mv, dtype=np.float64)
-    if isi.shape != mep.shape or isi.ndim != 1:
-        raise InvalidValueError("each trial has one ISI and one MEP", got=(isi.shape, mep.shape))
-    if not (np.isfinite(isi).all() and np.isfinite(mep).all()):
-        raise InvalidValueError("ISIs and MEPs must be finite", remedy="Leave mistrials out.")
-    _require_amplitudes(mep)
+    """The number of trials that respond at each ISI."""
+    isi, mep = paired(isi_ms, mep_mv)
+    if mep.min(initial=0.0) < 0:
+        raise InvalidValueError("an amplitude is negative", got=float(mep.min()), expected="peak-to-peak amplitudes")
+    require_amplitude(float(mep.max(initial=0.0)))
     threshold_mv = number("threshold_mv", threshold_mv, above=0, most=AMPLITUDE_MV.most)
     trials = pd.DataFrame({"isi_ms": isi, "response": mep > threshold_mv})
     table = trials.groupby("isi_ms").agg(trials=("response", "count"), responses=("response", "sum"))
     table["share"] = table["responses"] / table["trials"]
     return table
-
-
-def _require_amplitudes(mep_mv: FloatArray) -> None:
-    """Raise where these are no peak-to-peak amplitudes in mV."""
-    if mep_mv.min(initial=0.0) < 0:
-        raise InvalidValueError("an amplitude is negative", got=float(mep_mv.min()), expected="peak-to-peak amplitudes")
-    require_amplitude(float(mep_mv.max(initial=0.0)))
 
 
 def response_threshold_mv(alone_mv: ArrayLike, false_share: float = 0.05) -> float:
@@ -142,7 +133,7 @@ def response_threshold_mv(alone_mv: ArrayLike, false_share: float = 0.05) -> flo
 def effective_window(
     counts: pd.DataFrame, share: float = EFFECTIVE_SHARE, *, segments: Segments = "all"
 ) -> Window | None:
-    """The ISIs at which more than a share of the trials respond; None where there are none."""
+    """The ISIs at which more than a share of the trials respond; None if there are none."""
     choice("segments", segments, get_args(Segments))
     share = number("the share of responses", share, least=0, below=1)
     isi_ms, shares = counts.index.to_numpy(), counts["share"].to_numpy()

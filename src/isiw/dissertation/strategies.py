@@ -20,90 +20,13 @@ from isiw.dissertation.kernel_regressions import GaussianProcessRegression, Supp
 from isiw.dissertation.nonlinear import NonlinearRegression
 from isiw.dissertation.regression import RegressionModel
 from isiw.models.shared.history import FloorTreatment
-from isiw.strategy.settings.common import Settings
+from isiw.strategy.settings.common import AcquisitionName, Settings
 from isiw.strategy.stopping import AnyOf, Budget, Progress, StopDecision, StopKind, StoppingRule
 
 
 @dataclass(frozen=True)
-class EdgeVariance(Checked):
-    """Stop when the reported edges have settled: the dissertation's rule (4.3).
-
-    Args:
-        variance_ms2: the variance [ms²] of an edge's last values below which it has settled.
-        last: how many values.
-        edges: whether both edges must have settled, as the text says, or either, as its pseudo-code does.
-    """
-
-    variance_ms2: Positive = 50.0
-    last: Annotated[int, partial(whole, least=2)] = 5
-    edges: Literal["both", "either"] = "both"
-
-    @property
-    def looks_back(self) -> int:
-        """How many past estimates it needs."""
-        return self.last
-
-    def __call__(self, progress: Progress) -> StopDecision:
-        """Decide whether to stop."""
-        windows = [estimate.window for estimate in progress.past[-self.last :]]
-        edges = [(window.start_ms, window.end_ms) for window in windows if window is not None]
-        if len(edges) < self.last:
-            return StopKind.SETTLED.go_on(f"There are not {self.last} windows in a row yet.")
-        start, end = (statistics.variance(values) for values in zip(*edges, strict=True))
-        settled = (max if self.edges == "both" else min)(start, end) < self.variance_ms2
-        spread = f"the last {self.last} values of start and end have variances of {start:.0f} and {end:.0f} ms²"
-        if settled:
-            return StopKind.SETTLED.stop(f"The window has settled: {spread}.")
-        return StopKind.SETTLED.go_on(f"The window has not settled: {spread}.")
-
-
-@dataclass(frozen=True)
-class ParticleSpread(Checked):
-    """Stop when a particle search has narrowed itself down: the dissertation's rule for its PF (4.6).
-
-    Args:
-        sd_ms: the largest acceptable SD of the particles [ms].
-    """
-
-    sd_ms: Positive = 25.0
-
-    def __call__(self, progress: Progress) -> StopDecision:
-        """Decide whether to stop."""
-        spread_ms = progress.estimate.spread_ms
-        if spread_ms is None or progress.estimate.window is None:
-            return StopKind.SETTLED.go_on("No generation of particles has been measured yet.")
-        spread = f"they have an SD of {spread_ms:.0f} ms"
-        if spread_ms <= self.sd_ms:
-            return StopKind.SETTLED.stop(f"The particles have converged: {spread}.")
-        return StopKind.SETTLED.go_on(f"The particles have not converged: {spread}.")
-
-
-@dataclass(frozen=True)
-class SweptPast(Checked):
-    """Stop a sweep that has left the window behind: the dissertation's manual termination (4.2.1).
-
-    Only an estimate whose `grid_ms` is what was swept so far can be judged by it.
-
-    Args:
-        quiet_ms: how far behind the window's end nothing was enhanced [ms].
-    """
-
-    quiet_ms: Positive = 25.0
-
-    def __call__(self, progress: Progress) -> StopDecision:
-        """Decide whether to stop."""
-        window, swept_ms = progress.estimate.window, progress.estimate.grid_ms
-        if window is None or swept_ms is None:
-            return StopKind.SETTLED.go_on("The scan of ISIs has found no window yet.")
-        behind = f"it is {swept_ms[-1] - window.end_ms:.0f} ms past the window's end"
-        if swept_ms[-1] - window.end_ms >= self.quiet_ms:
-            return StopKind.SETTLED.stop(f"The scan of ISIs has passed the window: {behind}.")
-        return StopKind.SETTLED.go_on(f"The scan of ISIs has not passed the window: {behind}.")
-
-
-@dataclass(frozen=True)
 class EvenStart(Checked):
-    """What the dissertation's regressions ask (4.3).
+    """The ISIs that the dissertation's regressions ask for (4.3).
 
     Args:
         initial: how many evenly spaced ISIs to begin with, both ends of the range among them.
@@ -115,11 +38,7 @@ class EvenStart(Checked):
     """
 
     initial: Annotated[int, partial(whole, least=2)] = 7
-    acquisition: str = "variance"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.function(0)
+    acquisition: AcquisitionName = "variance"
 
     def function(self, seed: int) -> AcquisitionFunction:
         """The acquisition function."""
@@ -150,7 +69,7 @@ ones alone (4.3)."""
 
 @dataclass(frozen=True)
 class Settling(Checked):
-    """When the dissertation's regressions stop (4.3).
+    """Stops when the reported edges have settled, as the dissertation's regressions do (4.3).
 
     Args:
         stop_variance_ms2: stop when the variance [ms²] of the last values of the edges is below this,
@@ -168,15 +87,32 @@ class Settling(Checked):
     stop_edges: Literal["both", "either"] = "both"
     max_trials: Count | None = None
 
+    @property
+    def looks_back(self) -> int:
+        """Number of past estimates that it needs."""
+        return self.stop_last
+
+    def __call__(self, progress: Progress) -> StopDecision:
+        """Decide whether the edges have settled."""
+        windows = [estimate.window for estimate in progress.past[-self.stop_last :]]
+        edges = [(window.start_ms, window.end_ms) for window in windows if window is not None]
+        if len(edges) < self.stop_last:
+            return StopKind.SETTLED.go_on(f"There are not {self.stop_last} windows in a row yet.")
+        start, end = (statistics.variance(values) for values in zip(*edges, strict=True))
+        settled = (max if self.stop_edges == "both" else min)(start, end) < self.stop_variance_ms2
+        spread = f"the last {self.stop_last} values of start and end have variances of {start:.0f} and {end:.0f} ms²"
+        if settled:
+            return StopKind.SETTLED.stop(f"The window has settled: {spread}.")
+        return StopKind.SETTLED.go_on(f"The window has not settled: {spread}.")
+
     def rule(self, initial: int) -> StoppingRule:
         """The edges have settled, or the budget is used up."""
-        settled = EdgeVariance(self.stop_variance_ms2, self.stop_last, self.stop_edges)
-        return AnyOf((settled, Budget(initial + ITERATIONS if self.max_trials is None else self.max_trials)))
+        return AnyOf((self, Budget(initial + ITERATIONS if self.max_trials is None else self.max_trials)))
 
 
 @dataclass(frozen=True)
 class Converging(Checked):
-    """When the particle filter stops.
+    """Stops when a particle search has narrowed itself down: the dissertation's rule for its PF (4.6).
 
     Args:
         stop_sd_ms: stop when the SD of the particles is at most this [ms] (4.6).
@@ -187,14 +123,26 @@ class Converging(Checked):
     stop_sd_ms: Positive = 25.0
     max_trials: Count = 600
 
+    def __call__(self, progress: Progress) -> StopDecision:
+        """Decide whether the particles have converged."""
+        spread_ms = progress.estimate.spread_ms
+        if spread_ms is None or progress.estimate.window is None:
+            return StopKind.SETTLED.go_on("No generation of particles has been measured yet.")
+        spread = f"they have an SD of {spread_ms:.0f} ms"
+        if spread_ms <= self.stop_sd_ms:
+            return StopKind.SETTLED.stop(f"The particles have converged: {spread}.")
+        return StopKind.SETTLED.go_on(f"The particles have not converged: {spread}.")
+
     def rule(self, initial: int) -> StoppingRule:  # noqa: ARG002 - there are no initial ISIs
         """The particles have converged, or the budget is used up."""
-        return AnyOf((ParticleSpread(self.stop_sd_ms), Budget(self.max_trials)))
+        return AnyOf((self, Budget(self.max_trials)))
 
 
 @dataclass(frozen=True)
 class Passing(Checked):
-    """When the incremental sweep stops (4.2.1).
+    """Stops a sweep that has left the window behind: the dissertation's manual termination (4.2.1).
+
+    Only an estimate whose `grid_ms` is what was swept so far can be judged by it.
 
     Args:
         quiet_ms: stop when nothing was enhanced for so long behind a window [ms]; 0 sweeps the whole budget.
@@ -205,10 +153,20 @@ class Passing(Checked):
     quiet_ms: NonNegative = 25.0
     max_trials: Count = 1212
 
+    def __call__(self, progress: Progress) -> StopDecision:
+        """Decide whether the window was passed."""
+        window, swept_ms = progress.estimate.window, progress.estimate.grid_ms
+        if window is None or swept_ms is None:
+            return StopKind.SETTLED.go_on("The scan of ISIs has found no window yet.")
+        behind = f"it is {swept_ms[-1] - window.end_ms:.0f} ms past the window's end"
+        if swept_ms[-1] - window.end_ms >= self.quiet_ms:
+            return StopKind.SETTLED.stop(f"The scan of ISIs has passed the window: {behind}.")
+        return StopKind.SETTLED.go_on(f"The scan of ISIs has not passed the window: {behind}.")
+
     def rule(self, initial: int) -> StoppingRule:  # noqa: ARG002 - there are no initial ISIs
         """The window was passed, or the budget is used up."""
         budget = Budget(self.max_trials)
-        return AnyOf((SweptPast(self.quiet_ms), budget)) if self.quiet_ms else budget
+        return AnyOf((self, budget)) if self.quiet_ms else budget
 
 
 NR: Final = Settings(RegressionModel(NonlinearRegression(), FloorTreatment("lowest")), EvenStart(initial=6), Settling())

@@ -1,4 +1,4 @@
-"""What trials that were delivered without isiw say of a person's window, and a log of them that was never a session."""
+"""The analysis of trials that were delivered without isiw, and a log of them that was never a session."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from isiw.types import ArrayLike, FloatArray
 from isiw.visit import Visit
 
 MOST_ESTIMATES: Final = 50
-"""Of a long series of trials the belief is logged after so many of them, evenly spread, and after the last."""
+"""Of a long series of trials the estimate is logged after so many of them, evenly spread, and after the last."""
 
 _END: Final = StopKind.OWN.stop("All trials are analysed. They were delivered without isiw, so no more can follow.")
 _NEVER: Final = 10**9
@@ -62,7 +62,6 @@ class Analysis:
         return final_statement(self.record)
 
     def _repr_html_(self) -> str:
-        """In a notebook: the statement and the picture."""
         style = "--ink:#222;--faint:#888;--blue:#0072b2;--orange:#d55e00;--green:#009e73;--red:#c1272d;--paper:#fff"
         picture = inline_svg(self.plot(), "analysis")
         return f'<div style="{style}"><p>{html.escape(str(self))}</p>{picture}</div>'
@@ -113,20 +112,12 @@ class Analysis:
         with tempfile.TemporaryDirectory() as folder:  # a log that is not whole never gets a name
             whole = Path(folder) / "log.mcap"
             with LogWriter.create(whole, self.record.header) as log:
-                for number, channels in self._sweeps.items():
-                    for name, channel in channels.items():
-                        log.append(Waveform.of(number, channel), name)
+                for (number, name), channel in self.record.waveforms.items():
+                    log.append(Waveform.of(number, channel), name)
                 for record in self.record.history:
                     log.append(record)
             put(target, whole.read_bytes(), replacing=False)
         return target
-
-    @property
-    def _sweeps(self) -> dict[int, dict[str, Any]]:
-        sweeps: dict[int, dict[str, Any]] = {}
-        for (number, name), channel in self.record.waveforms.items():
-            sweeps.setdefault(number, {})[name] = channel
-        return sweeps
 
 
 def analyse(
@@ -257,7 +248,7 @@ def _history(delivered: Delivered, strategy: Strategy, header: Header) -> Iterat
 
 
 def _answer(delivered: Delivered, trial: Trial) -> Answer:
-    """What a device would have answered."""
+    """The answer that a device would have given."""
     if trial.index in delivered.sweeps:
         return Sweep(delivered.sweeps[trial.index], trial.t_valve_ms, trial.t_tms_ms, trial.t_hit_ms)
     return Measurement(trial.mep_mv or 0.0, trial.isi_ms)

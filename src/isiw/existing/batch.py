@@ -101,11 +101,13 @@ def read_files(
 
     Raises:
         InvalidValueError: as for `read_people`, or not one person for one log.
-        LogError: a log of something else where one would be written.
+        LogError: a log of something else in the place of one that would be written.
     """
     people = [person for source in sources for person in _read(Path(source), way)]
     if only is not None:
-        people = _chosen(people, only)
+        everybody, people = [delivered for delivered, _ in people], [one for one in people if one[0].subject == only]
+        if not people:
+            raise InvalidValueError("no person has this code", got=only, expected=told_people(everybody))
     paths = _paths([delivered for delivered, _ in people], output)
     found = [Person(delivered, path, made_of) for (delivered, made_of), path in zip(people, paths, strict=True)]
     for person in found:
@@ -141,15 +143,6 @@ def _read(source: Path, way: Way) -> Iterator[tuple[Delivered, Mapping[str, Any]
         }
         as_logged = json.loads(json.dumps(made_of))  # a log knows no tuples
         yield replace(delivered, visit=visit, simulated=simulated), as_logged
-
-
-def _chosen(people: list[tuple[Delivered, Mapping[str, Any]]], only: str) -> list[tuple[Delivered, Mapping[str, Any]]]:
-    chosen = [person for person in people if person[0].subject == only]
-    if not chosen:
-        raise InvalidValueError(
-            "no person has this code", got=only, expected=told_people([delivered for delivered, _ in people])
-        )
-    return chosen
 
 
 def _paths(people: Sequence[Delivered], output: str | Path | None) -> list[Path | None]:

@@ -5,17 +5,17 @@ from __future__ import annotations
 import csv
 import importlib
 import io
-import re
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, cast
 
 import numpy as np
 
 from isiw.errors import ConfigError, InvalidValueError
-from isiw.existing.cells import is_missing
 from isiw.existing.layout import COLUMNS, UNIT_WORDS, Layout, letters
+from isiw.existing.tables import is_missing
 from isiw.files import opened
 from isiw.lazy import pd, scipy
 
@@ -29,8 +29,6 @@ _LINES: Final = 100
 
 _HEAD: Final = 40
 """So many bytes show how a text is encoded."""
-
-_NUMBER_BEFORE: Final = re.compile(r"^[-+\d.,\s]*(e[-+]?\d+)?\s*")
 
 Rows = Sequence[Sequence[Any]]
 
@@ -58,19 +56,23 @@ def read_arrays(path: Path) -> dict[str, Any]:
 def _read(path: Path, read: Callable[[bytes], Any]) -> Any:
     with opened(path) as file:
         content = file.read()
+    remedy = "Save it as CSV, with the columns' names in the first line."
+    with reading(path, "the file is no table that can be read", remedy):
+        return read(content)
+
+
+@contextmanager
+def reading(path: Path, what: str, remedy: str) -> Generator[None, None, None]:
+    """Within, whatever a reader of another library fails with is an `InvalidValueError`; its warnings are not shown."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of a workbook's styles; what is in its cells is checked
-            return read(content)
+            warnings.simplefilter("ignore")  # of styles, names and dates; what is read is checked
+            yield
     except (ConfigError, InvalidValueError):
         raise
     except Exception as error:  # each reader has errors of its own
         why, *_ = str(error).splitlines() or [type(error).__name__]
-        raise InvalidValueError(
-            f"the file is no table that can be read: {why}",
-            got=str(path),
-            remedy="Save it as CSV, with the columns' names in the first line.",
-        ) from error
+        raise InvalidValueError(f"{what}: {why}", got=str(path), remedy=remedy) from error
 
 
 def named(frame: pd.DataFrame) -> pd.DataFrame:
@@ -96,7 +98,7 @@ def _texts(content: bytes, layout: Layout) -> pd.DataFrame:
 
 
 def _begins(lines: Sequence[str], number: int, layout: Layout) -> bool:
-    """Whether a line holds the columns' names, and those below it as many cells."""
+    """True if a line holds the columns' names, and those below it as many cells."""
     line = lines[number].lstrip("# ")
     separator = layout.separator or _separator(line)
     names, *below = _split([line, *lines[number + 1 : number + 3]], separator)
@@ -104,7 +106,7 @@ def _begins(lines: Sequence[str], number: int, layout: Layout) -> bool:
 
 
 def _is_header(cells: Sequence[Any], layout: Layout) -> bool:
-    """Whether cells are the names of columns, those of ISIs and amplitudes among them."""
+    """True if cells are the names of columns, those of ISIs and amplitudes among them."""
     texts = [cell.strip() for cell in cells if isinstance(cell, str)]
     known = {letters(text) for text in texts}
     stated = [*layout.columns.values(), *layout.channels.values()]
@@ -135,7 +137,6 @@ def _names(cells: Sequence[Any]) -> list[str]:
 
 
 def _unit_of(cell: Any) -> str | None:
-    """The unit that a cell is, if it is one."""
     return UNIT_WORDS.get(cell.strip().strip("[]()").casefold()) if isinstance(cell, str) else None
 
 
@@ -169,14 +170,13 @@ def _decoded(content: bytes) -> str:
 
 
 def _separator(line: str) -> str:
-    """What separates the columns' names; blanks, if nothing else does."""
+    """The separator of the columns' names; blanks, if there is no other."""
     counts = {sign: line.count(sign) for sign in ("\t", ";", ",", "|")}
     best = max(counts, key=lambda sign: counts[sign])
     return best if counts[best] else r"\s+"
 
 
 def _split(lines: Sequence[str], separator: str) -> Iterator[list[str]]:
-    """The cells of lines."""
     if separator == r"\s+":
         lines, separator = [" ".join(line.split()) for line in lines], " "
     return csv.reader(lines, delimiter=separator, skipinitialspace=True)
@@ -254,16 +254,3 @@ def extra(name: str) -> Any:
         return importlib.import_module(name)
     except ModuleNotFoundError as error:
         raise ConfigError(f"{name} is not installed", remedy='Install it with: pip install "isiw[import]"') from error
-
-
-def without_unit_in_cells(name: str, cells: list[Any]) -> tuple[str, list[Any]]:
-    """A column whose cells all say the same unit, such as "12.5 ms", as one whose name says it."""
-    texts = [cell for cell in cells if not is_missing(cell)]
-    ends = {
-        re.sub(r"^[-+\d.,\s]*(e[-+]?\d+)?\s*", "", cell.casefold()) if isinstance(cell, str) else "" for cell in texts
-    }
-    (unit,) = ends if len(ends) == 1 else ("",)
-    if unit not in UNIT_WORDS:
-        return name, cells
-    bare = [cell if is_missing(cell) else cell.strip()[: -len(unit)].strip() for cell in cells]
-    return f"{name} ({UNIT_WORDS[unit]})", bare

@@ -1,4 +1,4 @@
-"""How a file of another program is laid out: which column, marker or channel is what, and in which unit."""
+"""The layout of files of other programs: which column, marker or channel is what, and in which unit."""
 
 from __future__ import annotations
 

@@ -10,10 +10,9 @@ from typing import Any, Final
 from isiw.checks import MOST_MEP_MV
 from isiw.design import DesignSpace, missing_reference
 from isiw.errors import InvalidValueError
-from isiw.existing.cells import says_alone
 from isiw.existing.delivered import Delivered, renumbered
 from isiw.existing.layout import Layout
-from isiw.existing.tables import Columns
+from isiw.existing.tables import Columns, says_alone
 from isiw.findings import Kind
 from isiw.lazy import pd
 from isiw.signals.judgement import judge_measurement
@@ -61,6 +60,11 @@ def _days(columns: Columns, rows: Sequence[int]) -> dict[int | None, list[int]]:
     return dict(zip(numbers, days.values(), strict=True))
 
 
+def anywhere(reference: Reference) -> DesignSpace:
+    """A space that any ISI can have come from."""
+    return DesignSpace(-_ANYWHERE_MS, _ANYWHERE_MS, 10.0, reference=reference)
+
+
 def required_reference(layout: Layout, source: str) -> Reference:
     """The event that the ISIs of a file count from, which nobody but the lab knows."""
     if layout.reference is None:
@@ -84,8 +88,7 @@ def _person(
     subject, day = key
     _require_ascending(columns, rows, source)
     _require_said(columns, rows, layout, source)
-    anywhere = DesignSpace(-_ANYWHERE_MS, _ANYWHERE_MS, 10.0, reference=reference)
-    trials = [_trial(columns, row, number, layout, anywhere) for number, row in enumerate(rows)]
+    trials = [_trial(columns, row, number, layout, anywhere(reference)) for number, row in enumerate(rows)]
     blocks = [columns.text("block", row) for row in rows]
     return Delivered(
         renumbered(trials),
@@ -99,7 +102,7 @@ def _person(
     )
 
 
-def _trial(columns: Columns, row: int, number: int, layout: Layout, anywhere: DesignSpace) -> Trial:
+def _trial(columns: Columns, row: int, number: int, layout: Layout, space: DesignSpace) -> Trial:
     """One row as a trial: as the file judges it, or else as a session would."""
     alone = says_alone(columns.of["isi"].cells[row], layout.alone)
     isi_ms = None if alone else columns.number("isi", row)
@@ -123,7 +126,7 @@ def _trial(columns: Columns, row: int, number: int, layout: Layout, anywhere: De
     if lost is None and not {"status", "exclude"} & columns.of.keys() and mep_mv is not None:
         measured = Measurement(mep_mv, isi_ms, facts["isi_sd_ms"] or 0.0, None)
         meant_ms = asked_ms if "asked" in columns.of or isi_ms is None else max(isi_ms, 0.0)
-        judged = judge_measurement(measured, Stimulus(number, meant_ms), anywhere)
+        judged = judge_measurement(measured, Stimulus(number, meant_ms), space)
         lost = judged.reason
     return Trial(number, Status.ACCEPTED if lost is None else Status.MISTRIAL, reason=lost, **facts)
 
@@ -164,7 +167,7 @@ def _require_ascending(columns: Columns, rows: Sequence[int], source: str) -> No
         return
     known = [row for row in rows if order.text(row)]
     texts = [order.text(row) for row in known]
-    are_numbers = [_is_number(text) for text in texts]
+    are_numbers = [re.sub("[.,]", "", text).lstrip("-").isdigit() for text in texts]
     if any(are_numbers):
         if not all(are_numbers):
             odd = known[are_numbers.index(False)]
@@ -186,10 +189,6 @@ def _require_ascending(columns: Columns, rows: Sequence[int], source: str) -> No
             remedy="Leave one row for each trial, such as that of one muscle; or name a column of people or blocks: "
             "--column subject=NAME, --column block=NAME.",
         )
-
-
-def _is_number(text: str) -> bool:
-    return text.replace(",", "").replace(".", "").lstrip("-").isdigit()
 
 
 def _created(columns: Columns, row: int) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -13,12 +12,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.existing.delivered import Delivered, renumbered
-from isiw.existing.frames import extra
+from isiw.existing.frames import extra, reading
 from isiw.existing.layout import Layout
-from isiw.existing.people import required_reference
+from isiw.existing.people import anywhere, required_reference
 from isiw.existing.tables import isis_of
 from isiw.lazy import pd
 from isiw.signals.judgement import judge
@@ -39,8 +37,6 @@ _BEFORE_MS: Final = 150.0
 _AFTER_MS: Final = 100.0
 """What is cut out of a continuous recording: from so long before the longest ISI to so long after the pulse."""
 
-_ANYWHERE_MS: Final = 10_000.0
-
 
 @dataclass(frozen=True, eq=False)
 class Recording:
@@ -60,17 +56,9 @@ def read_recording(path: Path, layout: Layout, subject: str) -> Delivered:
     """The trials of a recording of one person."""
     mne, is_epochs = extra("mne"), re.search(r"epo\.fif(\.gz)?$", path.name)
     read = mne.read_epochs if is_epochs else partial(mne.io.read_raw, preload=True)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of names and dates; what is read of the recording is judged
-            found = read(path, verbose="ERROR")
-    except Exception as error:  # each format has errors of its own
-        why, *_ = str(error).splitlines() or [type(error).__name__]
-        raise InvalidValueError(
-            f"the recording cannot be read: {why}",
-            got=str(path),
-            remedy="Are all of its files in one folder, and is it continuous?",
-        ) from error
+    remedy = "Are all of its files in one folder, and is it continuous?"
+    with reading(path, "the recording cannot be read", remedy):
+        found = read(path, verbose="ERROR")
     if is_epochs:
         return of_epochs(found, layout, subject, path.name)
     return of_raw(found, layout, subject, path.name, _bids_events(path))
@@ -119,11 +107,10 @@ def delivered_of(
     recording: Recording, sweeps: Sequence[Found], layout: Layout, reference: Reference, subject: str
 ) -> Delivered:
     """The sweeps as trials, judged as in a session."""
-    anywhere = DesignSpace(-_ANYWHERE_MS, _ANYWHERE_MS, 10.0, reference=reference)
     signals = SignalLimits() if layout.mep_window_ms is None else SignalLimits(mep_window_ms=layout.mep_window_ms)
     trials: list[Trial] = []
     for stimulus, sweep, said in sweeps:
-        judged = judge(sweep, stimulus, anywhere, signals)
+        judged = judge(sweep, stimulus, anywhere(reference), signals)
         trials.append(replace(judged, excluded=said.get("excluded") in {True, "true", "True"}))
     if trials and not any(trial.told for trial in trials):
         reasons = sorted({str(trial.reason) for trial in trials if trial.reason})
@@ -188,7 +175,7 @@ def _factor_mv(raw: Any, name: str, layout: Layout, source: str) -> float:
 
 
 def _annotated(raw: Any) -> pd.DataFrame:
-    """What is annotated in a recording, or on its trigger channel."""
+    """The annotations of a recording, or the events on its trigger channel."""
     mne = extra("mne")
     rows = [
         {
@@ -217,7 +204,7 @@ def _bids_events(path: Path) -> pd.DataFrame | None:
 
 
 def _marker(recording: Recording, key: str, layout: Layout) -> str | None:
-    """What the events are called that mark something; None if none of them does."""
+    """The name of the events that mark something; None if none of them does."""
     names = [str(name) for name in dict.fromkeys(recording.events["name"])]
     if (stated := layout.markers.get(key)) is None:
         return next((name for name in names if _plain(name) in _KNOWN[key]), None)
@@ -235,7 +222,7 @@ def _plain(name: str) -> str:
 
 
 def _required_markers(recording: Recording, marked: Mapping[str, str], layout: Layout) -> list[str]:
-    """What the events are called that mark each of several things."""
+    """The names of the events that mark several things."""
     found = {key: _marker(recording, key, layout) for key in marked}
     missing = [key for key, name in found.items() if name is None]
     if missing:
@@ -285,7 +272,7 @@ def sweeps_of(recording: Recording, layout: Layout, reference: Reference) -> lis
 
 
 def _after_s(origins_s: FloatArray, pulse_s: float, layout: Layout) -> float | None:
-    """How long after the last tap a pulse came [s]; None if that is longer than an ISI."""
+    """The time from the last tap to a pulse [s]; None if that is longer than an ISI."""
     before = origins_s[(origins_s <= pulse_s) & (origins_s >= pulse_s - layout.longest_isi_ms / 1e3)]
     return float(pulse_s - before[-1]) if len(before) else None
 

@@ -1,4 +1,4 @@
-"""How many stimuli would it have taken? Strategies ask, and a person's recorded trials answer, each trial once."""
+"""Replay of a person's recorded trials: strategies ask, the trials answer, each once; how many would it have taken?"""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ SHARED: Final = (
 
 
 @dataclass(frozen=True, eq=False)
-class Replayed:
+class StrategyRun:
     """A strategy that was answered by recorded trials.
 
     Args:
@@ -66,11 +66,11 @@ class Replay:
     delivered: Delivered
     space: DesignSpace
     pairs: int
-    runs: tuple[Replayed, ...]
+    runs: tuple[StrategyRun, ...]
 
     @cached_property
     def window(self) -> Window | None:
-        """What the default's belief reports after all trials."""
+        """The window that the default reports after all trials."""
         strategy = make_strategy("default", self.space, self.runs[0].seed)
         return analysed(self.delivered, strategy).estimate.window
 
@@ -169,14 +169,14 @@ def replay(
 
 def _run(
     name: str, space: DesignSpace, seed: int, pairs: Sequence[Trial], trials: int, settings: dict[str, Any]
-) -> Replayed:
+) -> StrategyRun:
     strategy, rng, left = make_strategy(name, space, seed, **settings), np.random.default_rng([seed, 1]), list(pairs)
     windows: list[Window | None] = []
     far_ms: list[float] = []
     stopped = None
     for _ in range(trials):
         asked_ms = strategy.ask()
-        gaps_ms = np.abs([_asked_ms(trial) - asked_ms for trial in left])
+        gaps_ms = np.abs([(trial.wanted_isi_ms or 0.0) - asked_ms for trial in left])
         nearest = np.flatnonzero(gaps_ms <= gaps_ms.min() + 1e-9)
         trial = left.pop(int(rng.choice(nearest)))
         far_ms.append(float(gaps_ms.min()))
@@ -184,10 +184,4 @@ def _run(
         windows.append(strategy.estimate().window)
         if stopped is None and strategy.decision().stop:
             stopped = len(windows)
-    return Replayed(name, seed, tuple(windows), tuple(far_ms), stopped)
-
-
-def _asked_ms(trial: Trial) -> float:
-    """Which ISI a trial is of: the one that was commanded, or else the realised one [ms]."""
-    at_ms = trial.isi_ms if trial.commanded_isi_ms is None else trial.commanded_isi_ms
-    return float(at_ms or 0.0)
+    return StrategyRun(name, seed, tuple(windows), tuple(far_ms), stopped)

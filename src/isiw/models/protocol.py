@@ -1,4 +1,4 @@
-"""What a model of one person's responses, and its posterior, must answer.
+"""The protocols of a model of one person's responses and of its posterior.
 
 A model is a frozen settings object with two methods: `begin` gives the posterior before any trial, `update` gives the
 posterior after one more. A posterior never changes; it holds `b` people at once, and one person is b = 1. Acquisition
@@ -33,12 +33,12 @@ class Observation:
 
     Args:
         isi_ms: the realised ISI [ms], shape (b,); NaN means TMS alone.
-        mep_mv: amplitude of the MEP [mV], shape (b,); 0 is left-censored at the detection limit; NaN where only
+        mep_mv: amplitude of the MEP [mV], shape (b,); 0 is left-censored at the detection limit; NaN if only
             `response` is known.
         isi_sd_ms: SD of the realised ISI [ms], shape (b,).
         response: 1 seen, 0 not seen, NaN if the amplitude is given instead, shape (b,).
         mep_high_mv: upper end of the interval that begins at `mep_mv` and holds the amplitude [mV], shape (b,); None
-            where all amplitudes are points.
+            if all amplitudes are points.
         known_mv: mean and SD of a part of the amplitude that is not the pulse's [mV], shape (b, 2); None for none.
     """
 
@@ -63,10 +63,10 @@ class Observation:
 
         Args:
             isi_ms: the realised ISI [ms], one a person; None or NaN means TMS alone.
-            mep_mv: amplitude of the MEP [mV], one a person; None or NaN where only the response is told.
+            mep_mv: amplitude of the MEP [mV], one a person; None or NaN if only the response is known.
             isi_sd_ms: SD of the realised ISI [ms], one a person; by default all were measured.
-            response: whether a response was seen, one a person; by default amplitudes are told.
-            mep_high_mv: where amplitudes are intervals, their upper ends [mV], one a person.
+            response: whether a response was seen, one a person; by default amplitudes are.
+            mep_high_mv: if amplitudes are intervals, their upper ends [mV], one a person.
             known_mv: mean and SD of a part of the amplitude that is not the pulse's [mV], one a person.
         """
         isi, mep = _column(isi_ms), _column(mep_mv)
@@ -101,7 +101,7 @@ class CountsPairs(Protocol):
 
     @property
     def pairs(self) -> int:
-        """How many pairs of stimuli of each person; TMS alone comes to all of them together."""
+        """Number of pairs of stimuli of each person; TMS alone comes to all of them together."""
 
 
 @runtime_checkable
@@ -219,7 +219,7 @@ class NotesChanges(Protocol):
     """Capability: a posterior that allows for changes during a session, and can learn that there was one."""
 
     def noting_change(self) -> Posterior:
-        """The same trials where somebody has seen that something changes now, such as the place of the coil."""
+        """The same trials after somebody has seen that something changes now, such as the place of the coil."""
 
 
 @runtime_checkable
@@ -260,7 +260,7 @@ class PriorPerson(NamedTuple):
     """A person drawn from a model's prior.
 
     Args:
-        window: the true window; None where there is none.
+        window: the true window; None if there is none.
         mep_mv: MEPs at the ISIs asked for [mV], shape (n,).
     """
 

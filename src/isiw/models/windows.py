@@ -20,7 +20,7 @@ PROFILE_POINTS = 101
 """ISIs at which the expected MEP and its band are reported, at least."""
 
 PROFILE_STEP_MS = 4.0
-"""They are no further apart than this, where the space has ISIs between them: narrow peaks are 20 ms wide."""
+"""They are no further apart than this, if the space has ISIs between them: narrow peaks are 20 ms wide."""
 
 
 def least_excess_mv(peak_mv: Tensor, baseline_mv: Tensor) -> Tensor:
@@ -93,7 +93,7 @@ class Runs:
 
     @cached_property
     def sizes(self) -> FloatArray:
-        """How many ISIs each window has, shape (w,)."""
+        """Number of ISIs of each window, shape (w,)."""
         return self.summed((self.behind - self.first).astype(float))
 
     @property
@@ -117,7 +117,7 @@ def best_window(windows: Runs, grid_ms: FloatArray) -> tuple[Window | None, floa
 
 
 def edge_samples(windows: Runs, space: DesignSpace) -> FloatArray:
-    """Start and end of sampled windows [ms], ±inf where a window runs out of the range, shape (w, 2)."""
+    """Start and end of sampled windows [ms], ±inf if a window runs out of the range, shape (w, 2)."""
     first, last = windows.hulls
     start = np.where(first == 0, -np.inf, space.grid_ms[first])
     end = np.where(last == windows.points - 1, np.inf, space.grid_ms[last])
@@ -149,12 +149,7 @@ class SampledProfiles(NamedTuple):
 
 
 class SampledHypotheses(NamedTuple):
-    """Which of a model's hypotheses sampled windows belong to.
-
-    Args:
-        kinds: an index of the names for each sample, shape (s,).
-        names: what the hypotheses are called.
-    """
+    """The hypotheses that sampled windows belong to: an index of the names for each sample, shape (s,)."""
 
     kinds: Tensor
     names: tuple[str, ...]
@@ -167,7 +162,7 @@ def sampled_estimate(
     hypotheses: SampledHypotheses | None = None,
     shift_pct_rmt: Callable[[], float | None] = lambda: None,
 ) -> WindowEstimate:
-    """What equally weighted samples say about the window of one person."""
+    """The estimate of the window of one person by equally weighted samples."""
     probability = len(windows.found) / windows.samples
     first, last = windows.hulls
     edges = edge_samples(windows, space)
@@ -187,7 +182,9 @@ def sampled_estimate(
         hypothesis_names=() if hypotheses is None else hypotheses.names,
         expected_f1=f1 * (1.0 - probability if reported is None else probability),
         best_isi=Later(lambda: _best_isi(profiles(), space)),
-        largest_excluded=Later(lambda: Enhancement(_excluded_mv(profiles()), shift_pct_rmt())),
+        largest_excluded=Later(
+            lambda: Enhancement(float(torch.quantile(profiles().excess_mv, EXCLUDED_AT)), shift_pct_rmt())
+        ),
     )
 
 
@@ -195,10 +192,6 @@ def _band_mv(profiles: SampledProfiles) -> FloatArray:
     levels = torch.tensor([0.05, 0.5, 0.95], dtype=profiles.mep_mv.dtype, device=profiles.mep_mv.device)
     band_mv: FloatArray = torch.quantile(profiles.mep_mv, levels, dim=0).double().cpu().numpy()
     return band_mv
-
-
-def _excluded_mv(profiles: SampledProfiles) -> float:
-    return float(torch.quantile(profiles.excess_mv, EXCLUDED_AT))
 
 
 def _best_isi(profiles: SampledProfiles, space: DesignSpace) -> BestISI | None:

@@ -94,7 +94,7 @@ def stated_hit_delay_ms(record: SessionRecord) -> tuple[float, float] | None:
 
 
 def too_far_apart_ms(records: Sequence[SessionRecord]) -> tuple[float, float] | None:
-    """The least and the largest stated hit delay [ms] where they are further apart than one rig's; else None.
+    """The least and the largest stated hit delay [ms] if they are further apart than one rig's; else None.
 
     From the valve command, the same window is as much later as a rig's taps are. Of ISIs from the impact it is None.
     """
@@ -106,7 +106,7 @@ def too_far_apart_ms(records: Sequence[SessionRecord]) -> tuple[float, float] | 
 
 
 def _of_rig(prior: Prior, record: SessionRecord) -> Prior:
-    """The prior, told what came when and whose MEPs these are, as far as prior, strategy or device say."""
+    """The prior with the hit delay, the muscle and the intensity that session, strategy or device state."""
     start = prior.profile.start
     delay_ms = stated_hit_delay_ms(record) or start.hit_delay_ms
     profile = replace(prior.profile, start=replace(start, hit_delay_ms=delay_ms)).after(record.header.conditioning)
@@ -215,7 +215,7 @@ def moved(first: SessionRecord, second: SessionRecord, law: DayToDay | None = No
 
 
 def _require_days_of_one_person(records: Sequence[SessionRecord]) -> None:
-    """Raise where sessions are of different people or muscles, one counts twice, or a later one comes first."""
+    """Raise if sessions are of different people or muscles, one counts twice, or a later one comes first."""
     require_records(records)
     subjects = sorted({record.header.subject for record in records} - {""})
     if len(subjects) > 1:
@@ -259,7 +259,7 @@ def _require_window(record: SessionRecord, posterior: ParticlePosterior) -> None
 
 
 def _another_day(posterior: ParticlePosterior, law: DayToDay) -> Prior:
-    """What a posterior says of the next day."""
+    """The prior of the next day, from a posterior."""
     usual = posterior.model.prior
     latents = posterior.swarm.picked(posterior.model.particles)
     p_window = float(latents.present.double().mean())
@@ -281,7 +281,7 @@ def _another_day(posterior: ParticlePosterior, law: DayToDay) -> Prior:
 
 
 def _shares(kinds: Tensor, of: int) -> list[float]:
-    """How often kinds come, counting one more particle that is of all kinds."""
+    """Shares of the kinds, counting one more particle that is of all kinds."""
     counts = torch.bincount(kinds.flatten(), minlength=of).double() + 1.0 / of
     shares: list[float] = (counts / counts.sum()).tolist()
     return shares
@@ -301,7 +301,7 @@ def _laws(
 
 
 def _normals(latents: Latents, name: str, law: DayToDay) -> list[_Normal]:
-    """Normal laws of some latents on the next day; none where hardly a particle uses them."""
+    """Normal laws of some latents on the next day; none if hardly a particle uses them."""
     own = columns(name)
     used = used_by(latents.noise, latents.present)[0][:, own].all(-1)
     values = latents.values[0][used][:, own].double().numpy()

@@ -37,11 +37,11 @@ class Difference:
         first: the session that it is compared to.
         second: the other one.
         same_person: whether both have the same person's code.
-        starts_later: probability that the second window starts later, given a window in each; .5 where nothing is
-            known, None where nothing can be said.
+        starts_later: probability that the second window starts later, given a window in each; .5 if nothing is
+            known, None if nothing can be said.
         ends_later: the same of its end.
         moved: of the same person, how probable it is that the window moved, beyond the usual shift from day to day;
-            None where it cannot be said.
+            None if it cannot be said.
         obstacle: why something cannot be said, or says less than it seems to.
     """
 
@@ -80,7 +80,7 @@ def differences(records: Sequence[SessionRecord]) -> list[Difference]:
 
 
 def _edges(record: SessionRecord) -> FloatArray | None:
-    """Samples of start and end, given a window [ms]; None where too few trials count, or there is probably none."""
+    """Samples of start and end, given a window [ms]; None if too few trials count, or there is probably none."""
     if not record.rests_on_data:
         return None
     estimate = recalled(record, Prior()).estimate()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +13,12 @@ from isiw.files import check_output, write_output
 from isiw.models.particles.laws import NoiseShares
 from isiw.models.particles.prior import Prior
 from isiw.priors.lab import SCHEMA_VERSION, LabPrior
+from isiw.strategy.settings.common import as_toml
 from isiw.text.toml_files import checked, read_toml
 
 
 def write_lab_prior(lab: LabPrior, path: str | Path, *, overwrite: bool = False) -> Path:
-    """Write a lab's prior as TOML, into a folder that is made where it is missing.
+    """Write a lab's prior as TOML, into a folder that is made if it is missing.
 
     Args:
         lab: the lab's prior.
@@ -28,7 +29,7 @@ def write_lab_prior(lab: LabPrior, path: str | Path, *, overwrite: bool = False)
         InvalidValueError: there is a file that is not to be replaced, or is something else than a lab's prior.
     """
     check_lab_output(path, overwrite=overwrite)
-    return write_output(path, tomli_w.dumps(_plain(asdict(lab))).encode(), overwrite=overwrite)
+    return write_output(path, tomli_w.dumps(as_toml(lab)).encode(), overwrite=overwrite)
 
 
 def check_lab_output(path: str | Path, *, overwrite: bool = False) -> None:
@@ -42,19 +43,15 @@ def check_lab_output(path: str | Path, *, overwrite: bool = False) -> None:
         InvalidValueError: there is a file that is not to be replaced, or is something else than a lab's prior.
     """
     check_output(path, overwrite=overwrite)
-    if Path(path).exists() and "schema_version" not in _values_or_none(path):
+    kept: dict[str, Any] = {}
+    with suppress(ConfigError):
+        kept = read_toml(path)
+    if Path(path).exists() and "schema_version" not in kept:
         raise InvalidValueError(
             "the file that is there is not a lab's prior, so it is not replaced",
             got=str(path),
             remedy="Choose another path.",
         )
-
-
-def _values_or_none(path: str | Path) -> dict[str, Any]:
-    try:
-        return read_toml(path)
-    except ConfigError:
-        return {}
 
 
 def read_lab_prior(path: str | Path) -> LabPrior:
@@ -102,10 +99,3 @@ def _upgraded(values: dict[str, Any]) -> dict[str, Any]:
     share = NoiseShares().rectified
     learnt = {name: (1.0 - share) * value for name, value in noise.items() if isinstance(value, int | float)}
     return values | {"schema_version": SCHEMA_VERSION, "noise": noise | learnt | {"rectified": share}}
-
-
-def _plain(value: Any) -> Any:
-    """As TOML has it: what is not known is left out."""
-    if isinstance(value, dict):
-        return {key: _plain(inner) for key, inner in value.items() if inner is not None}
-    return [_plain(inner) for inner in value] if isinstance(value, list | tuple) else value

@@ -1,4 +1,4 @@
-"""A lab's prior: what the sessions of its own people say, beside what is believed of people in general."""
+"""A lab's prior, learnt from the sessions of its own people, and how it compares with that of people in general."""
 
 from __future__ import annotations
 
@@ -7,14 +7,17 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Final, TypeVar
+from typing import Annotated, Any, Final, NamedTuple, TypeVar
 
 import numpy as np
 
 import isiw
 from isiw.checks import MOST_OF_A_KIND, Checked, share, whole
+from isiw.design import IMPACT_SPACE, VALVE_SPACE
 from isiw.errors import InvalidValueError, LogError
+from isiw.lazy import pd, torch
 from isiw.log.reader import SessionRecord, read_session
+from isiw.models.particles.latents import LATENTS
 from isiw.models.particles.laws import Floor, Gain, Muscle, NoiseShares
 from isiw.models.particles.places import MOST_APART_MS, Place
 from isiw.models.particles.prior import Prior
@@ -41,7 +44,7 @@ from isiw.priors.population import (
     place,
     usual_shares,
 )
-from isiw.types import Conditioning, Reference
+from isiw.types import Conditioning, FloatArray, Reference
 from isiw.visit import MOST_APART_PCT_RMT, different_muscles
 
 _T = TypeVar("_T")
@@ -125,7 +128,7 @@ class LabPrior(Checked):
 
     @property
     def noted_muscle(self) -> str:
-        """Whose EMG was recorded, as the sessions note it; empty where none does."""
+        """Whose EMG was recorded, as the sessions note it; empty if none does."""
         return next((session.muscle for session in self.sessions if session.muscle), "")
 
     def joined(self, usual: Prior | None = None) -> Prior:
@@ -161,7 +164,7 @@ def learn(
 ) -> LabPrior:
     """Learn a lab's prior from the logs of its sessions, one a person.
 
-    The built-in model learns the trials whatever the sessions were run with, so that no person counts twice where
+    The built-in model learns the trials whatever the sessions were run with, so that no person counts twice if
     a session was run with an earlier prior of the lab.
 
     Args:
@@ -207,7 +210,7 @@ def _learnt_session(record: SessionRecord) -> LearntSession:
 
 
 def _require_different(records: Sequence[SessionRecord], sessions: Sequence[LearntSession], *, again: bool) -> None:
-    """Raise where one log or person would count twice, or where sessions do not belong together."""
+    """Raise if one log or person would count twice, or if sessions do not belong together."""
     if not records:
         raise LogError("there is no session to learn from", remedy="Name at least one log.")
     hashes = [session.sha256 for session in sessions]
@@ -272,12 +275,89 @@ def _lab_prior(
 
 
 def share_of(members: float) -> float:
-    """The share of a lab's own law beside what is believed of people in general."""
+    """The share of a lab's own law beside that of people in general."""
     return 1.0 - max(LEAST_USUAL, PEOPLE_FOR_HALF / (PEOPLE_FOR_HALF + members))
 
 
 def _where_known(law: Law, component: Callable[..., _T]) -> _T | None:
-    """The law as a component of the prior; None where fewer than one person was learnt from."""
+    """The law as a component of the prior; None if fewer than one person was learnt from."""
     if law.members < 1.0:
         return None
     return component(share_of(law.members), law.mean, law.sd)
+
+
+DRAWN: Final = 20_000
+POINTS: Final = 120
+
+
+class _Quantity(NamedTuple):
+    latent: str
+    logarithmic: bool = True
+
+
+QUANTITIES: Final = {
+    "start [ms]": _Quantity("start_ms", logarithmic=False),
+    "width [ms]": _Quantity("log_width_ms"),
+    "EMG floor [mV]": _Quantity("log_floor_mv"),
+    "SD of the log floor": _Quantity("log_floor_sd"),
+    "largest MEP / floor": _Quantity("log_ceiling"),
+    "slope [1 / % RMT]": _Quantity("log_slope"),
+    "noise on the input": _Quantity("log_input_sd"),
+    "noise on the output": _Quantity("log_sigma_y"),
+    "boost [% RMT]": _Quantity("log_boost"),
+    "input at rest [% RMT]": _Quantity("rest", logarithmic=False),
+    "gain / floor": _Quantity("log_gain"),
+    "CV": _Quantity("log_cv"),
+}
+
+
+def compared(lab: LabPrior) -> pd.DataFrame:
+    """Median and 90 % range of each quantity in people in general and in the next person of the lab."""
+    usual, own = _drawn(lab)
+    rows = {
+        name: [*_range(usual[latent], log=logarithmic), *_range(own[latent], log=logarithmic)]
+        for name, (latent, logarithmic) in QUANTITIES.items()
+    }
+    columns = [f"{whose} {what}" for whose in ("built-in", "lab") for what in ("median", "5 %", "95 %")]
+    return pd.DataFrame.from_dict(rows, orient="index", columns=columns)
+
+
+def densities(lab: LabPrior) -> pd.DataFrame:
+    """Densities of each quantity in people in general and in the next person of the lab.
+
+    Returns:
+        One row a value: quantity, value, whether the axis is logarithmic, and the densities `built_in` and `lab`,
+        of the logarithm if it is.
+    """
+    usual, own = _drawn(lab)
+    return pd.concat([_density(name, quantity, usual, own) for name, quantity in QUANTITIES.items()], ignore_index=True)
+
+
+def _drawn(lab: LabPrior) -> list[dict[str, FloatArray]]:
+    """Latents of people in general and of the lab's, by name."""
+    space = VALVE_SPACE if lab.place is None or lab.place.reference == "valve" else IMPACT_SPACE
+    drawn, own = [], lab.joined()
+    for prior in (Prior(ProfilePrior(conditioning=own.profile.conditioning)), own):
+        latents = prior.sample(1, DRAWN, torch.Generator().manual_seed(0), space)
+        columns = latents.values[0].double().numpy().T
+        drawn.append(dict(zip(LATENTS, columns, strict=True)))
+    return drawn
+
+
+def _range(values: FloatArray, *, log: bool) -> list[float]:
+    quantiles = np.quantile(values, [0.5, 0.05, 0.95])
+    shown: list[float] = (np.exp(quantiles) if log else quantiles).tolist()
+    return shown
+
+
+def _density(name: str, quantity: _Quantity, usual: dict[str, FloatArray], own: dict[str, FloatArray]) -> pd.DataFrame:
+    both = [usual[quantity.latent], own[quantity.latent]]
+    low, high = np.quantile(np.concatenate(both), [0.002, 0.998])
+    edges = np.linspace(low, high, POINTS + 1)
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    columns = {
+        whose: np.histogram(values, edges)[0] / (len(values) * np.diff(edges))
+        for whose, values in zip(("built_in", "lab"), both, strict=True)
+    }
+    shown = np.exp(middle) if quantity.logarithmic else middle
+    return pd.DataFrame({"quantity": name, "value": shown, "logarithmic": quantity.logarithmic, **columns})

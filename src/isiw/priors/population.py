@@ -104,7 +104,7 @@ KINDS_WEIGHT: Final = 1.0
 """As how many people the usual shares of kinds count: of one muscle and one rig, most people are of one kind."""
 
 
-class Block(NamedTuple):
+class LatentBlock(NamedTuple):
     """One block of latents of the people's particles.
 
     Args:
@@ -119,7 +119,7 @@ class Block(NamedTuple):
 
 
 class HyperPrior(NamedTuple):
-    """What is believed of a block's law before any person, fields of shape (d,).
+    """The prior of a block's law, fields of shape (d,).
 
     Args:
         mean: where the law's mean is expected.
@@ -134,26 +134,15 @@ class HyperPrior(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class People:
-    """Equally weighted particles of n people, i of each.
+    """Equally weighted particles of n people, i of each: latents that have a law, and discrete ones, (n, i)."""
 
-    Args:
-        blocks: the latents that have a law, by name.
-        kinds: discrete latents by name: the kind, shape (n, i).
-    """
-
-    blocks: Mapping[str, Block]
+    blocks: Mapping[str, LatentBlock]
     kinds: Mapping[str, IntArray]
 
 
 @dataclass(frozen=True, eq=False)
 class Law:
-    """The posterior predictive of one block.
-
-    Args:
-        mean: shape (d,).
-        sd: shape (d,).
-        members: how many people it was learnt from, expected.
-    """
+    """The posterior predictive of one block, shape (d,), and the expected number of people that it was learnt from."""
 
     mean: FloatArray
     sd: FloatArray
@@ -162,12 +151,7 @@ class Law:
 
 @dataclass(frozen=True, eq=False)
 class Population:
-    """What was learnt of a lab's people.
-
-    Args:
-        laws: by block.
-        shares: of the kinds, by discrete latent.
-    """
+    """The laws of a lab's people by block, and the shares of the kinds by discrete latent."""
 
     laws: Mapping[str, Law]
     shares: Mapping[str, FloatArray]
@@ -201,7 +185,7 @@ def learnt(
     return Population(predictive, {name: np.mean(kept, axis=0) for name, kept in kept_shares.items()})
 
 
-def _log_ratio(block: Block, law: _Normal) -> FloatArray:
+def _log_ratio(block: LatentBlock, law: _Normal) -> FloatArray:
     """Log density under the law over that under the prior, times the share of the lab's people, shape (n, i)."""
     mean, sd = law
     z = (block.values - mean) / sd
@@ -230,7 +214,7 @@ def _picked(
     return picks
 
 
-def _members(block: Block, law: _Normal, picks: IntArray, rng: np.random.Generator) -> FloatArray:
+def _members(block: LatentBlock, law: _Normal, picks: IntArray, rng: np.random.Generator) -> FloatArray:
     """The picked particles of those who are of the lab's law in this block, shape (m, d)."""
     rows = np.arange(len(picks))
     log_odds = _log_ratio(block, law)[rows, picks] - np.log(P_OUTSIDER)
@@ -262,24 +246,22 @@ WITHIN_A_LAB: Final = 0.5
 """The share of the variance between usual people that is between people of one lab."""
 
 
-class _Person(NamedTuple):
-    blocks: dict[str, Block]
-    kinds: dict[str, IntArray]
-
-
 def people_of(posteriors: Sequence[ParticlePosterior]) -> People:
     """Equally weighted particles of some people."""
-    each = [_person(posterior) for posterior in posteriors]
-    blocks = {name: Block(*map(np.stack, zip(*(p.blocks[name] for p in each), strict=True))) for name in each[0].blocks}
-    return People(blocks, {name: np.stack([person.kinds[name] for person in each]) for name in each[0].kinds})
+    blocks, kinds = zip(*map(_person, posteriors), strict=True)
+    stacked = {
+        name: LatentBlock(*map(np.stack, zip(*(own[name] for own in blocks), strict=True))) for name in LATENT_BLOCKS
+    }
+    return People(stacked, {name: np.stack([own[name] for own in kinds]) for name in kinds[0]})
 
 
-def _person(posterior: ParticlePosterior) -> _Person:
+def _person(posterior: ParticlePosterior) -> tuple[dict[str, LatentBlock], dict[str, IntArray]]:
+    """The blocks of one person's particles by name, and the discrete latents."""
     latents = posterior.swarm.picked(PARTICLES)
     densities = posterior.model.prior.log_densities(latents.values, posterior.space)
     values, used = latents.values[0].double().numpy(), used_by(latents.noise, latents.present)[0].numpy()
     blocks = {
-        name: Block(
+        name: LatentBlock(
             values[:, columns(name)],
             densities["place" if name == "place" else LATENT_BLOCKS[name][0]][0].double().numpy(),
             np.all(used[:, columns(name)], axis=-1),
@@ -288,7 +270,7 @@ def _person(posterior: ParticlePosterior) -> _Person:
     }
     shape = torch.where(latents.present, latents.shape, -1)
     kinds = {"window": latents.present.long(), "shape": shape, "noise": latents.noise}
-    return _Person(blocks, {name: kind[0].numpy() for name, kind in kinds.items()})
+    return blocks, {name: kind[0].numpy() for name, kind in kinds.items()}
 
 
 def hyper_prior(prior: Prior, space: DesignSpace) -> dict[str, HyperPrior]:
@@ -303,7 +285,7 @@ def hyper_prior(prior: Prior, space: DesignSpace) -> dict[str, HyperPrior]:
 
 
 def usual_shares(prior: Prior) -> dict[str, FloatArray]:
-    """How often the kinds of people come in general."""
+    """Shares of the kinds of people in general."""
     p_window = prior.profile.p_window
     kinds = {
         "window": (1.0 - p_window, p_window),

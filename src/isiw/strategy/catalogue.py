@@ -13,23 +13,21 @@ from isiw.errors import StrategyError, did_you_mean
 from isiw.models.particles.profile import ProfilePrior
 from isiw.strategy.settings.common import (
     DescribedSetting,
+    Recipe,
     Settings,
     described,
     settings_from,
     settings_keys,
     settings_values,
 )
-from isiw.strategy.strategy import Recipe, Strategy
+from isiw.strategy.strategy import Strategy
 
 
 @dataclass(frozen=True)
 class _Entry:
-    """A named strategy.
+    """A named strategy, and the settings that it stands for.
 
-    Args:
-        summary: what it does, in a sentence.
-        family: where its usual settings are; loaded, with its model, only when the strategy is made.
-        meant: the settings that the name stands for.
+    The family is where its usual settings are: they are loaded, with its model, only when the strategy is made.
     """
 
     summary: str
@@ -133,7 +131,7 @@ def settings_for(name: str, **settings: Any) -> Settings:
 
 
 def known_settings(name: str, known: Mapping[str, Any]) -> dict[str, Any]:
-    """What is known of a rig or a person, as settings of a strategy: those that it has."""
+    """Settings of a strategy that are known of a rig or a person: those that it has."""
     keys = settings_keys(settings_for(name))
     return {key: value for key, value in known.items() if value is not None and key in keys}
 
@@ -144,7 +142,7 @@ def make_strategy(name: str = "default", space: DesignSpace = VALVE_SPACE, seed:
     Args:
         name: one of `list_strategies()`.
         space: the ISIs that may be asked; by default what can be searched without an accelerometer, 0 to 500 ms *after
-            the valve command*, as the strategy says when it is printed. Give `IMPACT_SPACE` where you count from the
+            the valve command*, as the strategy says when it is printed. Give `IMPACT_SPACE` if you count from the
             impact.
         seed: seed of all randomness, not negative.
         **settings: what differs from what the name stands for, by key; `isiw strategies NAME` lists the keys.

@@ -1,13 +1,15 @@
-"""How the examination of b people goes on: what is asked of each next, and what a stopping rule looks back on.
+"""The course of the examination of b people: what is asked of each next, and what a stopping rule looks back on.
 
-A `Course` never changes: telling it a trial gives the next one. One person's `Strategy` and a batch of people wrap the
+A `Course` never changes: a trial more gives the next one. One person's `Strategy` and a batch of people wrap the
 same course, so that both follow the same rules.
 """
 
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Callable, Iterable
+from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from typing import Literal, TypeAlias
@@ -45,13 +47,13 @@ that one, or is asked again because its trial was lost."""
 
 @dataclass(frozen=True)
 class Choice:
-    """What is asked of one person next.
+    """The next ISI of one person.
 
     Args:
         isi_ms: the ISI [ms], on the grid.
-        fallback: why it is not the acquisition function's choice; None where it is.
+        fallback: why it is not the acquisition function's choice; None if it is.
         by: what it was chosen by.
-        scores: of `candidate_isis`, less their cost, shape (t,); None where none were worked out.
+        scores: of `candidate_isis`, less their cost, shape (t,); None if none were worked out.
     """
 
     isi_ms: float
@@ -81,7 +83,7 @@ def best_choices(
     people: int = 1,
     cost: Cost | None = None,
 ) -> tuple[Choice, ...]:
-    """The ISI of each person that the acquisition function scores best; an evenly spaced one where it scores none."""
+    """The ISI of each person that the acquisition function scores best; an evenly spaced one if it scores none."""
     candidates = candidate_isis(space)
     given = require_scores(acquisition, acquisition(posterior, candidates), len(candidates), people)
     scores = given.cpu().expand(people, -1)
@@ -96,13 +98,13 @@ def best_choices(
 
 
 def evenly_spaced(space: DesignSpace, told: int) -> float:
-    """The ISI [ms] of this trial in an order that fills the range, whatever is believed."""
+    """The ISI [ms] of this trial in an order that fills the range, whatever the responses."""
     candidates = candidate_isis(space)
     return space.snap(float(candidates[golden_index(told, len(candidates))]))
 
 
 def instead_of_lost(space: DesignSpace, lost: int, delivered: int) -> Choice | None:
-    """What is asked instead of an ISI that was lost again and again; None where it is asked once more."""
+    """The ISI instead of one that was lost again and again; None if it is asked once more."""
     if lost <= ASKED_AGAIN:
         return None
     reason = f"The trial was lost {lost} times in a row: an evenly spaced ISI instead."
@@ -111,16 +113,7 @@ def instead_of_lost(space: DesignSpace, lost: int, delivered: int) -> Choice | N
 
 @dataclass(frozen=True)
 class Method:
-    """How people are examined.
-
-    Args:
-        space: the ISIs that may be asked.
-        model: the model of a person's responses.
-        acquisition: what scores candidate ISIs.
-        stopping: the rule that says when to stop.
-        initial_ms: ISIs to ask for first [ms], on the grid, whatever the responses.
-        cost: is taken off the scores.
-    """
+    """The method by which people are examined: the parts of a `Strategy`."""
 
     space: DesignSpace
     model: ResponseModel
@@ -132,52 +125,49 @@ class Method:
     def begin(self, seed: int, people: int = 1) -> Course:
         """The course before the first trial."""
         posterior = self.model.begin(self.space, seed, people)
-        return Course(self, posterior, people, Belief(posterior, 0))
+        return Course(self, posterior, people, Estimates(posterior, 0))
 
 
 @dataclass(frozen=True, eq=False)
-class Belief:
-    """What is believed of b people after some trials; a window is estimated once, and only where somebody asks.
+class Estimates:
+    """The estimates of b people after some trials, each made once, and only if somebody asks.
 
     Args:
-        posterior: what is believed; None where all estimates are made.
-        pairs: how many pairs of stimuli each person was told of.
-        estimates: those made so far, by person.
-        first: what was believed before the first trial; None where it is that.
+        posterior: None once all estimates are made.
+        pairs: how many pairs of stimuli of each person it has learnt.
+        made: those made so far, by person.
+        first: that before the first trial; None if it is this.
     """
 
     posterior: Posterior | None
     pairs: int
-    estimates: dict[int, WindowEstimate] = field(default_factory=dict)
-    first: Belief | None = None
+    made: dict[int, WindowEstimate] = field(default_factory=dict)
+    first: Estimates | None = None
 
     def estimate(self, person: int) -> WindowEstimate:
-        """What is believed about the window of one person."""
-        if person not in self.estimates and self.posterior is not None:
+        """The estimate of the window of one person."""
+        if person not in self.made and self.posterior is not None:
             estimate = self.posterior.estimate(person)
             knows = self.first is not None and estimate.probability is not None
             before = self.first.estimate(person).probability if self.first is not None and knows else None
-            self.estimates[person] = estimate.noting(pairs=self.pairs, beforehand=before)
-        return self.estimates[person]
+            self.made[person] = estimate.noting(pairs=self.pairs, beforehand=before)
+        return self.made[person]
 
-    def looked_back_on(self, people: int) -> Belief:
-        """The same, without a posterior where the estimates of all people are made."""
-        done = self.posterior is None or len(self.estimates) < people
+    def looked_back_on(self, people: int) -> Estimates:
+        """The same, without a posterior once the estimates of all people are made."""
+        done = self.posterior is None or len(self.made) < people
         return self if done else replace(self, posterior=None)
 
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """What was told of b people, what is believed of them, and what is asked of each next.
+    """The trials of b people so far, the posterior, and what is asked of each next.
 
     Args:
-        method: how they are examined.
-        posterior: what is believed.
-        people: how many there are.
-        first: what was believed before the first trial.
-        told: trials told of each.
+        first: the state before the first trial.
+        told: trials of each.
         alone: how many of those were TMS alone.
-        earlier: what was believed before the last trial, as far as the stopping rule looks back on it.
+        earlier: the states before the last trial, as far as the stopping rule looks back on them.
         paired: whether the last trial was a pair of stimuli.
         known: pairs that were learnt of each before the first ask; no plan and no budget counts them.
         known_told: trials that were, those with TMS alone among them.
@@ -186,10 +176,10 @@ class Course:
     method: Method
     posterior: Posterior
     people: int
-    first: Belief
+    first: Estimates
     told: int = 0
     alone: int = 0
-    earlier: tuple[Belief, ...] = ()
+    earlier: tuple[Estimates, ...] = ()
     paired: bool = False
     known: int = 0
     known_told: int = 0
@@ -215,40 +205,40 @@ class Course:
             posterior=self.method.model.update(self.posterior, observation),
             told=self.told + 1,
             alone=self.alone + alone,
-            earlier=tuple(belief.looked_back_on(self.people) for belief in self.past),
+            earlier=tuple(each.looked_back_on(self.people) for each in self.past),
             paired=not alone,
         )
 
     def noting_change(self) -> Course:
-        """The course where something changes now that bears on all MEPs; the same where the model knows no changes."""
+        """The course if something changes now that bears on all MEPs; the same if the model knows no changes."""
         posterior = self.posterior
         return replace(self, posterior=posterior.noting_change()) if isinstance(posterior, NotesChanges) else self
 
     @property
     def paired_trials(self) -> int:
-        """How many pairs of stimuli were told of each person."""
+        """Number of pairs of stimuli that were learnt of each person."""
         return self.told - self.alone
 
     @cached_property
-    def belief(self) -> Belief:
-        """What is believed now."""
-        return Belief(self.posterior, self.known + self.paired_trials, first=self.first)
+    def estimates(self) -> Estimates:
+        """The posterior now, with its estimates."""
+        return Estimates(self.posterior, self.known + self.paired_trials, first=self.first)
 
     @cached_property
-    def past(self) -> tuple[Belief, ...]:
-        """What the stopping rule looks back on, the first after the last initial ISI."""
+    def past(self) -> tuple[Estimates, ...]:
+        """The posteriors that the stopping rule looks back on, the first after the last initial ISI."""
         kept = looks_back(self.method.stopping)
         if not kept or not self.paired or self.paired_trials < len(self.method.initial_ms):
             return self.earlier
-        return (*self.earlier, self.belief)[-kept:]
+        return (*self.earlier, self.estimates)[-kept:]
 
     @property
     def initial_left(self) -> tuple[float, ...]:
-        """What is left of the initial ISIs [ms]."""
+        """The initial ISIs that are left [ms]."""
         return self.method.initial_ms[self.paired_trials :]
 
     def ahead_ms(self, n: int) -> list[float]:
-        """The next ISIs [ms] of one person that stand already, whatever will be told; at most n of a design's."""
+        """The next ISIs [ms] of one person that stand already, whatever comes of them; at most n of a design's."""
         acquisition, space, left = self.method.acquisition, self.method.space, self.initial_left
         if isinstance(acquisition, FollowsPlan):
             pairs = range(self.paired_trials + len(left), self.paired_trials + n)
@@ -264,7 +254,7 @@ class Course:
 
     @cached_property
     def planned(self) -> tuple[Choice, ...] | None:
-        """What is asked of each person where that stands already; None where the acquisition function chooses."""
+        """Each person's next ISI, if that stands already; None if the acquisition function chooses."""
         if self.initial_left:
             return (Choice(self.initial_left[0], by="initial"),) * self.people
         if isinstance(acquisition := self.method.acquisition, FollowsPlan):
@@ -277,11 +267,31 @@ class Course:
 
     @cached_property
     def choices(self) -> tuple[Choice, ...]:
-        """What is asked of each person next."""
+        """Each person's next ISI."""
         return self.planned or self.chosen(self.posterior)
 
+    def choices_within(self, deadline_s: float) -> tuple[Choice, ...]:
+        """Each person's next ISI; an evenly spaced one if that is not chosen within a time [s]."""
+        if self.planned:
+            return self.planned
+        answer: Future[tuple[Choice, ...]] = Future()
+
+        def choose() -> None:
+            try:
+                answer.set_result(self.chosen(self.posterior))
+            except Exception as error:  # noqa: BLE001 - handed over to whoever waits for the answer
+                answer.set_exception(error)
+
+        # A course never changes, so a late thread can go on with it and be forgotten.
+        threading.Thread(target=choose, daemon=True).start()
+        try:
+            return answer.result(min(deadline_s, threading.TIMEOUT_MAX))
+        except TimeoutError:
+            reason = f"No choice within {deadline_s:g} s: an evenly spaced ISI instead."
+            return (Choice(evenly_spaced(self.method.space, self.told), reason, by="fallback"),) * self.people
+
     def chosen(self, posterior: Posterior) -> tuple[Choice, ...]:
-        """What the acquisition function chooses for each person, whatever is planned."""
+        """The ISI that the acquisition function chooses for each person, whatever is planned."""
         if isinstance(posterior, ExpectsTheUsual):
             posterior = posterior.as_usual
         method = self.method
@@ -290,12 +300,12 @@ class Course:
         )
 
     def estimate(self, person: int = 0) -> WindowEstimate:
-        """What is believed about the window of one person."""
-        return self.belief.estimate(person)
+        """The estimate of the window of one person."""
+        return self.estimates.estimate(person)
 
     def decision(self, person: int = 0, mistrials: int = 0, *, silent: bool = False) -> StopDecision:
         """The decision to stop with one person or not, with its reason."""
-        past = tuple(belief.estimate(person) for belief in self.past)
+        past = tuple(each.estimate(person) for each in self.past)
         estimate = self.estimate(person).noting(silent=silent)
         progress = Progress(self.paired_trials + mistrials, self.paired_trials, estimate, past=past)
         return self.method.stopping(progress)

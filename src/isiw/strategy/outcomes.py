@@ -10,7 +10,7 @@ from typing import Final, TypedDict
 
 import numpy as np
 
-from isiw.checks import Amplitude, Checked, NonNegative, amplitude_interval
+from isiw.checks import Amplitude, AmplitudeInterval, Checked, Flag, NonNegative
 from isiw.errors import InvalidValueError
 from isiw.models.protocol import Observation
 from isiw.signals.tap import may_be_the_taps, meets_response
@@ -36,7 +36,7 @@ USUAL_SHARE, USUAL_COUNTS = 0.7, 2.0
 
 
 class Details(TypedDict, total=False):
-    """What may be said of an outcome besides its amplitude; see `Strategy.tell`."""
+    """Details of an outcome besides its amplitude; see `Strategy.tell`."""
 
     response: bool | None
     isi_sd_ms: float
@@ -57,14 +57,14 @@ def details_of(trial: Trial) -> Details:
 
 @dataclass(frozen=True)
 class Outcome(Checked):
-    """What came of one pulse; see `Strategy.tell`."""
+    """The outcome of one pulse; see `Strategy.tell`."""
 
     isi_ms: float | None
     mep_mv: Amplitude | None = None
-    response: bool | None = None
+    response: Flag | None = None
     isi_sd_ms: NonNegative = 0.0
     mep_sd_mv: NonNegative = 0.0
-    mep_interval_mv: tuple[float, float] | None = None
+    mep_interval_mv: AmplitudeInterval | None = None
     tap_mv: NonNegative | None = None
 
     def __post_init__(self) -> None:
@@ -72,10 +72,11 @@ class Outcome(Checked):
         told = self.mep_mv, self.mep_interval_mv, self.response
         if sum(value is not None for value in told) != 1:
             raise InvalidValueError("tell needs one of mep_mv, mep_interval_mv and response", got=told)
-        if not (self.response is None or isinstance(self.response, bool | np.bool_)):
-            raise InvalidValueError("response must be True or False", got=self.response)
-        if self.mep_interval_mv is not None:
-            object.__setattr__(self, "mep_interval_mv", amplitude_interval(self.mep_interval_mv))
+
+    @classmethod
+    def of(cls, trial: Trial) -> Outcome:
+        """The outcome of a trial that was judged before."""
+        return cls(trial.isi_ms, None if trial.mep_interval_mv else trial.mep_mv, **details_of(trial))
 
 
 @dataclass(frozen=True)
@@ -101,8 +102,7 @@ class Outcomes:
         outcomes = self
         for trial in trials:
             if trial.told:
-                mep_mv = None if trial.mep_interval_mv else trial.mep_mv
-                outcomes = outcomes.after(Outcome(trial.isi_ms, mep_mv, **details_of(trial)))
+                outcomes = outcomes.after(Outcome.of(trial))
             elif trial.counts and trial.isi_ms is not None and trial.mep_mv is not None:
                 outcomes = outcomes.after_tap(trial.isi_ms, trial.mep_mv)
         return outcomes
@@ -121,14 +121,14 @@ class Outcomes:
 
     @cached_property
     def step_mv(self) -> float:
-        """The step that amplitudes are multiples of [mV]; 0 where there is none."""
+        """The step that amplitudes are multiples of [mV]; 0 if there is none."""
         if self.stated_step_mv is not None:
             return self.stated_step_mv
         return found_step_mv([one.mep_mv for one in self.pulses if one.mep_mv is not None])
 
     @property
     def observations(self) -> tuple[Observation | None, ...]:
-        """What all pulses say to a model, as they are understood now; None where something changed."""
+        """The observations of all pulses, as they are understood now; None if something changed there."""
         told: list[Observation | None] = []
         for number, one in enumerate((*self.pulses, None)):
             told += [None] * self.changes.count(number)
@@ -136,7 +136,7 @@ class Outcomes:
         return tuple(told)
 
     def observation(self, outcome: Outcome) -> Observation:
-        """What an outcome says to a model."""
+        """The observation that a model learns from an outcome."""
         low_mv, high_mv = outcome.mep_mv, math.nan
         if outcome.mep_interval_mv is not None:
             low_mv, high_mv = outcome.mep_interval_mv
@@ -178,7 +178,7 @@ class Outcomes:
 
 
 def found_step_mv(amplitudes_mv: Sequence[float]) -> float:
-    """The largest step that all of some amplitudes are multiples of, unless by chance [mV]; 0 where there is none."""
+    """The largest step that all of some amplitudes are multiples of, unless by chance [mV]; 0 if there is none."""
     sizes = np.asarray(amplitudes_mv)
     if len(set(amplitudes_mv)) < LEAST_DIFFERENT:
         return 0.0

@@ -19,7 +19,7 @@ from isiw.window import SURE
 
 
 class StopKind(StrEnum):
-    """What a decision rests on."""
+    """The grounds of a decision."""
 
     BUDGET = "budget"
     LIMIT = "limit"
@@ -44,7 +44,7 @@ class StopKind(StrEnum):
 OF_THE_WINDOW: Final = frozenset(
     {StopKind.KNOWN, StopKind.ABSENT, StopKind.SMALL_GAIN, StopKind.SETTLED, StopKind.TOO_LITTLE}
 )
-"""Decisions that say something about the window; they mean nothing where too little was measured."""
+"""Decisions that say something about the window; they mean nothing if too little was measured."""
 
 
 @dataclass(frozen=True)
@@ -64,12 +64,12 @@ class StopDecision:
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a session has come.
+    """The progress of a session.
 
     Args:
         delivered: pairs of stimuli delivered so far; mistrials count.
-        told: pairs told so far.
-        estimate: what is believed about the window now.
+        told: pairs learnt so far.
+        estimate: of the window now.
         past: the estimates after each of the last few pairs told, as many as `looks_back(rule)`; the first is the one
             after the last of the initial ISIs.
     """
@@ -84,30 +84,24 @@ MOST_BY_TIME: Final = 0.05
 """No session stops on a window while changes with time explain it all with more probability than this."""
 
 
-def _by_time(estimate: WindowEstimate) -> str | None:
-    """That time alone may explain a window; None where it hardly can, or nobody looked."""
+def _stop_unless_by_time(kind: StopKind, estimate: WindowEstimate, reason: str) -> StopDecision:
+    """The decision to stop, unless time alone may explain a window."""
     if estimate.time_alone is None or estimate.time_alone <= MOST_BY_TIME:
-        return None
-    return (
+        return kind.stop(reason)
+    return kind.go_on(
         "It is too early to stop: that amplitudes have changed with time, and there is no window, has probability "
         f"{estimate.time_alone:.2f}."
     )
 
 
 class StoppingRule(Protocol):
-    """A rule: from progress to a decision. `LooksBack` and `HasBudget` are what it may say of itself besides."""
+    """A rule: from progress to a decision.
+
+    One that needs past estimates says how many by an attribute `looks_back`; `HasBudget` is what it may say besides.
+    """
 
     def __call__(self, progress: Progress) -> StopDecision:
         """Decide whether to stop."""
-
-
-@runtime_checkable
-class LooksBack(Protocol):
-    """Capability: a rule that needs past estimates."""
-
-    @property
-    def looks_back(self) -> int:
-        """How many."""
 
 
 @runtime_checkable
@@ -115,7 +109,7 @@ class HasBudget(Protocol):
     """Capability: a rule that stops after so many stimuli at the latest."""
 
     def stimuli_left(self, delivered: int) -> int | None:
-        """How many it still allows after so many; None where it sets no budget after all."""
+        """Number that it still allows after so many; None if it sets no budget after all."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +123,7 @@ class Budget(Checked):
     max_trials: Count
 
     def stimuli_left(self, delivered: int) -> int:
-        """How many stimuli are left after so many; see `HasBudget`."""
+        """Number of stimuli that are left after so many; see `HasBudget`."""
         return max(0, self.max_trials - delivered)
 
     def __call__(self, progress: Progress) -> StopDecision:
@@ -169,7 +163,7 @@ class CredibleWidth(Checked):
         # An edge that lies beyond the range for certain is an answer: its interval has no width.
         widths = [0.0 if low == high else high - low for low, high in intervals]
         probability = progress.estimate.probability or 0.0
-        start, end = map(_known_to, widths)
+        start, end = (f"is known to {x:.0f} ms" if math.isfinite(x) else "is still unknown" for x in widths)
         whatever = "" if progress.estimate.hypotheses is None else ", whichever plausible noise model holds"
         edges = f"its start {start} and its end {end} ({100 * self.level:.0f} % intervals{whatever})"
         if max(widths) > self.width_ms:
@@ -177,12 +171,7 @@ class CredibleWidth(Checked):
         if probability < self.min_probability:
             needed = f"{probability:.2f}, and {self.min_probability:g} is needed"
             return StopKind.KNOWN.go_on(f"The window is not probable enough yet ({needed}): {edges}.")
-        by_time = _by_time(progress.estimate)
-        return StopKind.KNOWN.go_on(by_time) if by_time else StopKind.KNOWN.stop(f"The window is known: {edges}.")
-
-
-def _known_to(width_ms: float) -> str:
-    return f"is known to {width_ms:.0f} ms" if math.isfinite(width_ms) else "is still unknown"
+        return _stop_unless_by_time(StopKind.KNOWN, progress.estimate, f"The window is known: {edges}.")
 
 
 @dataclass(frozen=True)
@@ -231,8 +220,7 @@ class ExpectedF1(Checked):
             f"an expected F1 of {math.floor(100 * estimate.expected_f1 + 1e-9) / 100:.2f}"  # never what is not reached
         )
         if self.f1 < 1.0 and estimate.expected_f1 >= self.f1 and estimate.probability >= self.min_probability:
-            by_time, known = _by_time(estimate), f"The window is known, with {expected}."
-            return StopKind.KNOWN.go_on(by_time) if by_time else StopKind.KNOWN.stop(known)
+            return _stop_unless_by_time(StopKind.KNOWN, estimate, f"The window is known, with {expected}.")
         ends = f"; {self.f1:g} ends the session" if self.f1 < 1.0 else ""
         return StopKind.KNOWN.go_on(f"The window as it is known so far has {expected}{ends}.")
 
@@ -255,7 +243,7 @@ class SmallGain(Checked):
 
     @property
     def looks_back(self) -> int:
-        """How many past estimates it needs."""
+        """Number of past estimates that it needs."""
         return self.last + 1
 
     def __call__(self, progress: Progress) -> StopDecision:
@@ -268,8 +256,7 @@ class SmallGain(Checked):
         small = self.gain > 0 and now.expected_f1 - before < self.gain and now.probability >= self.min_probability
         if small and progress.told >= self.min_told:
             reason = f"Another {self.last} stimuli would add little: {added}, now {now.expected_f1:.2f}."
-            by_time = _by_time(now)
-            return StopKind.SMALL_GAIN.go_on(by_time) if by_time else StopKind.SMALL_GAIN.stop(reason)
+            return _stop_unless_by_time(StopKind.SMALL_GAIN, now, reason)
         reason = f"Too early to stop: {added}, and a window has probability {now.probability:.2f}."
         return StopKind.SMALL_GAIN.go_on(reason)
 
@@ -290,11 +277,11 @@ class AnyOf:
 
     @property
     def looks_back(self) -> int:
-        """How many past estimates its rules need."""
+        """Number of past estimates that its rules need."""
         return max(looks_back(rule) for rule in self.rules)
 
     def stimuli_left(self, delivered: int) -> int | None:
-        """How many stimuli the least budget of its rules leaves; see `HasBudget`."""
+        """Number of stimuli that the least budget of its rules leaves; see `HasBudget`."""
         return min((left for r in self.rules if (left := stimuli_left(r, delivered)) is not None), default=None)
 
     def __call__(self, progress: Progress) -> StopDecision:
@@ -310,11 +297,11 @@ class AnyOf:
 
 
 def stimuli_left(rule: StoppingRule, delivered: int) -> int | None:
-    """How many stimuli a rule's budget still allows; None where it sets none."""
+    """Number of stimuli that a rule's budget still allows; None if it sets none."""
     return rule.stimuli_left(delivered) if isinstance(rule, HasBudget) else None
 
 
 def looks_back(rule: StoppingRule) -> int:
-    """How many past estimates a rule needs."""
-    past: int = getattr(rule, "looks_back", 0)  # asked for after each trial, and a check of `LooksBack` is slow
+    """Number of past estimates that a rule needs."""
+    past: int = getattr(rule, "looks_back", 0)
     return past

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import Future
-from dataclasses import dataclass, field, replace
-from functools import partial
-from typing import Any, TypeVar, Unpack
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Unpack
 
 from isiw.acquisition.batch import greedy_batch
 from isiw.acquisition.protocol import AcquisitionFunction, require_acquisition
@@ -15,47 +12,21 @@ from isiw.checks import amplitude, deadline, number, whole
 from isiw.design import DesignSpace, require_space
 from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError, warn
 from isiw.estimate import WindowEstimate
-from isiw.findings import NO_MEP
+from isiw.findings import NO_MEP, Finding
 from isiw.models.protocol import Posterior, PredictsMeps, ReportsTrouble, ResponseModel
 from isiw.signals.evidence import Evidence, Told, is_silent
-from isiw.signals.limits import isi_far, off_by, require_plausible
+from isiw.signals.limits import isi_far, require_plausible
 from isiw.signals.watch import Doubts, findings
-from isiw.strategy.course import Choice, Cost, Method, evenly_spaced, instead_of_lost
-from isiw.strategy.outcomes import Details, Outcome, Outcomes, details_of
+from isiw.strategy.asked import Asked
+from isiw.strategy.course import Choice, Cost, Method, instead_of_lost
+from isiw.strategy.outcomes import Details, Outcome, Outcomes
+from isiw.strategy.settings.common import Recipe
 from isiw.strategy.stopping import StopDecision, StopKind, StoppingRule, stimuli_left
 from isiw.trials import Trial
 from isiw.types import FloatArray
 
-_T = TypeVar("_T")
-
 MOST_OF_A_BATCH = 1000
-"""ISIs to be delivered before anything is told; more than any session has."""
-
-
-def _fulfil(answer: Future[_T], choose: Callable[[], _T]) -> None:
-    try:
-        answer.set_result(choose())
-    except Exception as error:  # noqa: BLE001 - handed over to whoever waits for the answer
-        answer.set_exception(error)
-
-
-def _nearest(asked_ms: Sequence[float], value: float) -> float:
-    return min(asked_ms, key=lambda isi_ms: abs(isi_ms - value))
-
-
-@dataclass(frozen=True)
-class Recipe:
-    """Name and settings of a strategy, so that a log can make it again.
-
-    Args:
-        name: its name in the catalogue; empty for a strategy built from a user's own objects.
-        seed: the seed of all its randomness.
-        settings: the settings it was made with, as TOML values.
-    """
-
-    name: str
-    seed: int
-    settings: Mapping[str, Any] = field(default_factory=dict)
+"""ISIs to be delivered before anything is learnt; more than any session has."""
 
 
 class Strategy:
@@ -69,7 +40,7 @@ class Strategy:
         initial_ms: ISIs to ask for first [ms], whatever the responses; each becomes the nearest on the grid.
         cost: what each of some ISIs [ms] (shape (t,)) costs, in the unit of the scores, shape (t,).
         seed: seed of all randomness; the same seed and tells give the same asks.
-        recipe: how the catalogue made this strategy; None where it was built by hand.
+        recipe: how the catalogue made this strategy; None if it was built by hand.
 
     Raises:
         StrategyError: no acquisition function, or one that needs a capability that the model's posterior lacks.
@@ -106,12 +77,10 @@ class Strategy:
         self._mistrials = self._controls = self._lost = 0
         self._told: list[Told] = []
         self._outcomes = Outcomes(space.reference, self.amplitude_step_mv)
-        self._earlier: tuple[Trial, ...] = ()
+        self.earlier: tuple[Trial, ...] = ()  # learnt before the first ask
         self.same_level = True
         self._doubts = Doubts()
-        self._choice: Choice | None = None
-        self._batch_ms: list[float] = []  # what was not told yet of the last batch
-        self._fallback_reason: str | None = None
+        self._asked = Asked()
 
     def __str__(self) -> str:
         name = f"Strategy {self.recipe.name!r}" if self.recipe.name else "Strategy"
@@ -138,7 +107,7 @@ class Strategy:
             seed=self.seed,
             recipe=self.recipe,
         )
-        again.learn_all(self._earlier, same_level=self.same_level)
+        again.learn_all(self.earlier, same_level=self.same_level)
         return again
 
     @property
@@ -189,10 +158,12 @@ class Strategy:
             InvalidValueError: a deadline that is negative or not a number.
         """
         deadline_s = deadline("deadline_s", deadline_s)
-        if self._choice is None:
-            self._choice = self._next_choice(deadline_s)
-            self._fallback_reason = self._fallback_reason or self._choice.fallback
-        return self._choice.isi_ms
+        choice = self._asked.choice
+        if choice is None:
+            course = self._course
+            choice = (course.choices if deadline_s is None else course.choices_within(deadline_s))[0]
+            self._asked = replace(self._asked.noting(choice), choice=choice)
+        return choice.isi_ms
 
     def ask_longer(self, least_ms: float, reason: str) -> float:
         """The next ISI [ms] as `ask` has it, or the first of the grid that is at least so long.
@@ -203,25 +174,11 @@ class Strategy:
             reason: why, as its `fallback_reason`.
         """
         isi_ms, longer = self.ask(), self.space.grid_ms[self.space.grid_ms >= least_ms]
-        fixed = self._choice is None or self._choice.by in {"initial", "plan"} or not self.acquisition.needs
+        fixed = self.choice is None or self.choice.by in {"initial", "plan"} or not self.acquisition.needs
         if fixed or isi_ms >= least_ms or not longer.size:
             return isi_ms
-        self._choice, self._fallback_reason = Choice(float(longer[0]), reason, by="fallback"), reason
+        self._asked = replace(self._asked, choice=Choice(float(longer[0]), reason, by="fallback"), fallback=reason)
         return float(longer[0])
-
-    def _next_choice(self, deadline_s: float | None) -> Choice:
-        course = self._course
-        if deadline_s is None or course.planned:
-            return course.choices[0]
-        answer: Future[tuple[Choice, ...]] = Future()
-        # A course never changes, so a late thread can go on with it and be forgotten.
-        choose = partial(course.chosen, course.posterior)
-        threading.Thread(target=_fulfil, args=(answer, choose), daemon=True).start()
-        try:
-            return answer.result(min(deadline_s, threading.TIMEOUT_MAX))[0]
-        except TimeoutError:
-            reason = f"No choice within {deadline_s:g} s: an evenly spaced ISI instead."
-            return Choice(evenly_spaced(self.space, course.told), reason, by="fallback")
 
     def ask_batch(self, n: int) -> list[float]:
         """The next n ISIs [ms], to be delivered before any outcome, which may come in any order; the first is `ask`'s.
@@ -236,23 +193,23 @@ class Strategy:
         n = whole("the size of a batch", n, least=1, most=MOST_OF_A_BATCH)
         chosen = [self.ask(), *self._course.ahead_ms(n)[1:]][:n]
         batch_ms = greedy_batch(self.posterior, self.acquisition, chosen, n, self._next_of_batch)
-        self._batch_ms = list(batch_ms)
+        self._asked = replace(self._asked, batch_ms=tuple(batch_ms))
         return batch_ms
 
     def _next_of_batch(self, posterior: Posterior) -> float:
         choice = self._course.chosen(posterior)[0]
-        self._fallback_reason = self._fallback_reason or choice.fallback
+        self._asked = self._asked.noting(choice)
         return choice.isi_ms
 
     @property
     def choice(self) -> Choice | None:
-        """The current ISI and what it was chosen by; None where nothing was asked since the last tell."""
-        return self._choice
+        """The current ISI and what it was chosen by; None if nothing was asked since the last tell."""
+        return self._asked.choice
 
     @property
     def fallback_reason(self) -> str | None:
-        """Why the current ISI, or one of the batch, is not the acquisition function's choice; None where all are."""
-        return self._fallback_reason
+        """Why the current ISI, or one of the batch, is not the acquisition function's choice; None if all are."""
+        return self._asked.fallback
 
     @property
     def trouble(self) -> str | None:
@@ -277,8 +234,8 @@ class Strategy:
             mep_mv: peak-to-peak amplitude [mV]; 0 is left-censored at the detection limit.
             response: whether a response was seen, instead of an amplitude; for a strategy of its own, as sessions log
                 amplitudes.
-            isi_sd_ms: SD of the realised ISI [ms], at most 50; 0 where it was measured.
-            mep_sd_mv: SD of the amplitude, as of the mean of several [mV]; 0 where it was measured once.
+            isi_sd_ms: SD of the realised ISI [ms], at most 50; 0 if it was measured.
+            mep_sd_mv: SD of the amplitude, as of the mean of several [mV]; 0 if it was measured once.
             mep_interval_mv: the interval that the amplitude lies in, instead of an amplitude [mV]; its end may be
                 infinite.
             pulse: whether the magnetic pulse was given. Without it, this is a tap alone, which uses up no budget:
@@ -300,16 +257,19 @@ class Strategy:
         plain_ms = None if isi_ms is None else number("a realised ISI [ms]", isi_ms)
         plain_mv = None if mep_mv is None else number("mep_mv", mep_mv, least=0)
         if not pulse:
-            return self.learn_tap(plain_ms, plain_mv)
-        asked_ms = None if plain_ms is None else self._meant_ms(plain_ms, plain_mv)
+            self.learn_tap(plain_ms, plain_mv)
+            return
+        asked_ms = None if plain_ms is None else self._asked.meant_ms(plain_ms, plain_mv, self.space)
         require_plausible(plain_ms, plain_mv, asked_ms, self.space, isi_sd_ms)
         more = Details(response=response, isi_sd_ms=isi_sd_ms, mep_sd_mv=mep_sd_mv, mep_interval_mv=mep_interval_mv)
         self.learn(isi_ms, mep_mv, **more)
+        self._warn_of(isi_far(plain_ms, asked_ms, self.space))
+
+    def _warn_of(self, far: Finding | None) -> None:
         evidence = Evidence(told=self._told, detection_limit_mv=self.detection_limit_mv)
-        self._doubts = self._doubts.after((isi_far(plain_ms, asked_ms, self.space), *findings(evidence)))
+        self._doubts = self._doubts.after((far, *findings(evidence)))
         if self._doubts.new is not None:
             warn(f"{self._doubts.new}", ImplausibleDataWarning)
-        return None
 
     def learn(self, isi_ms: float | None, mep_mv: float | None = None, **more: Unpack[Details]) -> None:
         """Learn from one trial that was judged before, as a session does: as `tell`, however implausible.
@@ -341,24 +301,18 @@ class Strategy:
             StrategyError: an ISI was asked or learnt before, trials of another level were learnt before, or the model
                 cannot learn from such a trial.
         """
-        if self.delivered or self._choice is not None or (self._earlier and not (same_level and self.same_level)):
+        if self.delivered or self.choice is not None or (self.earlier and not (same_level and self.same_level)):
             raise StrategyError(
                 "earlier trials are learnt once, before the first ask",
                 remedy="Make the strategy, then let it learn all of them.",
             )
         learnt = tuple(trial for trial in trials if trial.told)
         for trial in learnt:
-            mep_mv = None if trial.mep_interval_mv else trial.mep_mv
-            self._learn(Outcome(trial.isi_ms, mep_mv, **details_of(trial)))
+            self._learn(Outcome.of(trial))
         self._course = self._course.begun_here()
         if learnt and not same_level:
             self.note_change()
-        self._earlier, self.same_level = (*self._earlier, *learnt), same_level
-
-    @property
-    def earlier(self) -> tuple[Trial, ...]:
-        """The trials that it learnt before its first ask."""
-        return self._earlier
+        self.earlier, self.same_level = (*self.earlier, *learnt), same_level
 
     def _learn(self, outcome: Outcome) -> None:
         """Learn from one trial, wherever its ISI lies."""
@@ -371,8 +325,7 @@ class Strategy:
         self._outcomes, isi_ms, mep_mv = outcomes, outcome.isi_ms, outcome.mep_mv
         if mep_mv is not None:
             self._told.append(Told(mep_mv, isi_ms))
-        self._batch_ms = self._left_of_batch_ms(isi_ms)
-        self._choice = self._fallback_reason = None
+        self._asked = self._asked.after(isi_ms)
         self._lost = 0 if isi_ms is not None else self._lost
 
     def learn_tap(self, isi_ms: float | None, mep_mv: float | None) -> None:
@@ -394,29 +347,9 @@ class Strategy:
         outcomes = self._outcomes.after_tap(self.space.check_realised(isi_ms), amplitude("mep_mv", mep_mv))
         if outcomes.pulses:
             self._course = self._course.again(self.seed, outcomes.observations)
-            self._choice = self._fallback_reason = None
+            self._asked = self._asked.again()
         self._outcomes = outcomes
         self._controls += 1
-
-    def _meant_ms(self, isi_ms: float, mep_mv: float | None) -> float | None:
-        """Which ISI that was asked a trial is of [ms], be it told in seconds or swapped; None where none was asked."""
-        asked_ms = self._batch_ms if self._choice is None else [self._choice.isi_ms, *self._batch_ms]
-        if not asked_ms:
-            return None
-        told = (isi_ms, isi_ms if mep_mv is None else max(isi_ms, mep_mv), 1000 * isi_ms)
-        near_ms = [_nearest(asked_ms, value) for value in told]
-        meant = (near for near, value in zip(near_ms, told, strict=True) if not off_by(value, near, self.space))
-        return next(meant, near_ms[0])
-
-    def _left_of_batch_ms(self, isi_ms: float | None) -> list[float]:
-        """What is not told of the last batch [ms] after a trial; nothing where one was told that was asked since."""
-        if isi_ms is None or not self._batch_ms:
-            return self._batch_ms
-        told_ms = _nearest(self._batch_ms, isi_ms)
-        if self._choice is not None and _nearest([told_ms, self._choice.isi_ms], isi_ms) != told_ms:
-            return []
-        index = self._batch_ms.index(told_ms)
-        return [*self._batch_ms[:index], *self._batch_ms[index + 1 :]]
 
     def note_change(self) -> None:
         """Learn that something changed that may bear on all MEPs from here on, such as the place of the coil.
@@ -425,16 +358,17 @@ class Strategy:
         next is chosen again; to other models it means nothing.
         """
         self._course, self._outcomes = self._course.noting_change(), self._outcomes.after_change()
-        self._choice = self._fallback_reason = None
+        self._asked = self._asked.again()
 
     def count_mistrial(self) -> None:
         """Count a delivered stimulus without an outcome: it uses up budget, and its ISI is repeated at most twice."""
         self._mistrials += 1
         self._lost += 1
-        self._choice = None if self._choice is None else replace(self._choice, by="again")
+        choice = None if self.choice is None else replace(self.choice, by="again")
+        self._asked = replace(self._asked, choice=choice)
         other = instead_of_lost(self.space, self._lost, self._course.told + self._mistrials)
         if other is not None and not self._course.plans_ahead:
-            self._choice, self._fallback_reason, self._lost = other, other.fallback, 0
+            self._asked, self._lost = replace(self._asked, choice=other, fallback=other.fallback), 0
 
     def count_excluded(self) -> None:
         """Count a delivered stimulus whose outcome an operator excluded: it uses up budget, and was not lost."""
@@ -453,7 +387,7 @@ class Strategy:
         return estimate.noting(silent=True) if self._is_silent else estimate
 
     def prediction_mv(self) -> tuple[FloatArray, FloatArray] | None:
-        """The band of nine of ten next MEPs [mV], at the ISIs of the estimate; None where the model predicts none."""
+        """The band of nine of ten next MEPs [mV], at the ISIs of the estimate; None if the model predicts none."""
         return self.posterior.prediction_mv(0.9) if isinstance(self.posterior, PredictsMeps) else None
 
     def decision(self) -> StopDecision:

@@ -14,7 +14,7 @@ from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.errors import StudyError
 from isiw.estimate import WindowEstimate
 from isiw.lazy import pd, torch
-from isiw.models.protocol import Observation, Posterior, ReportsTrouble, ResponseModel, Tensor
+from isiw.models.protocol import Observation, Posterior, ReportsTrouble, Tensor
 from isiw.strategy.course import Choice, Method, instead_of_lost
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
@@ -41,7 +41,12 @@ class _Batch:
             )
         players = [_strategy(session.player()) for session in sessions]
         first = players[0]
-        acquisition, model = _together([player.acquisition for player in players]), _on_device(first.model, device)
+        model: Any = first.model
+        if is_dataclass(first.model) and hasattr(first.model, "device"):
+            model = replace(first.model, device=device)
+        acquisition, all_of_them = first.acquisition, [player.acquisition for player in players]
+        if any(each != acquisition for each in all_of_them):
+            acquisition = _EachTheirOwn(all_of_them)
         method = Method(first.space, model, acquisition, first.stopping, first.initial_ms, first.cost)
         self.stopping = first.stopping
         self.course = method.begin(first.seed, len(players))
@@ -103,13 +108,3 @@ class _EachTheirOwn:
     def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
         scores = (score(posterior, isi_ms).expand(len(self.functions), -1) for score in self.functions)
         return torch.stack([of_all[person] for person, of_all in enumerate(scores)])
-
-
-def _together(functions: Sequence[AcquisitionFunction]) -> AcquisitionFunction:
-    """The acquisition function of a batch."""
-    return functions[0] if all(function == functions[0] for function in functions) else _EachTheirOwn(functions)
-
-
-def _on_device(model: ResponseModel, device: str) -> Any:
-    """The model on a torch device, where it has one."""
-    return replace(model, device=device) if is_dataclass(model) and hasattr(model, "device") else model

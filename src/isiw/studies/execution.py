@@ -80,7 +80,7 @@ class Failure:
 
     Args:
         error: what was raised, in a line.
-        details: the traceback, where there is one.
+        details: the traceback, if there is one.
     """
 
     error: str
@@ -96,7 +96,7 @@ class Executor(Protocol):
         """Each item with its result, or with its failure, in the order of finishing.
 
         Args:
-            run: gives the result of an item; importable where it is to run in another process.
+            run: gives the result of an item; importable if it is to run in another process.
             items: the items.
         """
 
@@ -211,7 +211,7 @@ class DaskCluster:
 
 
 class _HandedOut(NamedTuple, Generic[_Item]):
-    """What a Dask cluster works on."""
+    """An item that a Dask cluster works on."""
 
     item: _Item
     future: Any
@@ -238,24 +238,19 @@ def _client(dask: Any, address: str) -> Any:
         ) from error
 
 
-def _require_reached(client: Any) -> None:
-    """Raise where the scheduler was lost, since then nothing more will come."""
-    if client.status != "running":
-        raise StudyError("the Dask scheduler was lost", remedy="Run again: what is finished is kept.")
-
-
 def _cancel(client: Any, held: Mapping[str, _HandedOut[Any]]) -> None:
     if client.status == "running":
         client.cancel([each.future for each in held.values()])
 
 
 def _result_of(future: Any, client: Any) -> Any:
-    """What a Dask future came to; what took its workers down is a failure."""
+    """The result of a Dask future; what took its workers down is a failure."""
     try:
         error = future.exception()
         return future.result() if error is None else Failure(_line(error))
     except (asyncio.CancelledError, CancelledError):
-        _require_reached(client)
+        if client.status != "running":  # nothing more will come
+            raise StudyError("the Dask scheduler was lost", remedy="Run again: what is finished is kept.") from None
         return _Lost()
 
 

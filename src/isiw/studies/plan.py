@@ -1,4 +1,4 @@
-"""What a study is: strategies × cohorts × people, and the units of work that it comes to.
+"""The plan of a study: strategies × cohorts × people, and the units of work that it comes to.
 
 Every strategy meets the same people with the same trial noise. As TOML:
 
@@ -16,7 +16,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from functools import partial
-from itertools import groupby, product
+from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, TypeAlias
 
@@ -27,7 +27,7 @@ from isiw.lazy import pd, torch
 from isiw.strategy.catalogue import settings_for
 from isiw.strategy.settings.common import settings_values
 from isiw.studies.batch import simulate_batch
-from isiw.studies.own import OWN, OwnCode
+from isiw.studies.players import OWN, OwnCode
 from isiw.studies.sessions import OWN_STRATEGY, SimulatedSession, Stopping, require_cohorts, simulate
 from isiw.text.toml_files import checked, read_toml
 
@@ -56,7 +56,7 @@ class StudyStrategy:
         name: a named strategy, or one of your own as `module:function`.
         settings: its settings that differ from what the name means; of one of your own, arguments of the function.
         label: what it is called in the table; by default its name, or that of the function.
-        code: the checksum of your own code; it is worked out where it is not given.
+        code: the checksum of your own code; it is worked out if it is not given.
         folder: where your own module is looked for first.
 
     Raises:
@@ -212,8 +212,10 @@ class Study(Checked):
         for first, cohort, strategy in product(range(0, self.people, size), self.cohorts, self.strategies):
             people = range(first, min(first + size, self.people))
             sessions = [self._session(strategy, cohort, person) for person in people]
-            alike = groupby(sorted(sessions, key=_settings_in_words), key=_settings_in_words)
-            units += [self._unit(tuple(side_by_side)) for _, side_by_side in alike]
+            settings = [repr(session.settings) for session in sessions]  # those of equal ones come side by side
+            for own in sorted(set(settings)):
+                alike = (session for session, theirs in zip(sessions, settings, strict=True) if theirs == own)
+                units.append(self._unit(tuple(alike)))
         return units
 
     def _session(self, strategy: StudyStrategy, cohort: str, person: int) -> SimulatedSession:
@@ -237,11 +239,6 @@ class Study(Checked):
     def _unit(self, sessions: tuple[SimulatedSession, ...]) -> Unit:
         first, last = sessions[0], f"-{sessions[-1].person:05d}" if self.engine == "batched" else ""
         return Unit(f"{first.label}.{first.cohort}.{first.person:05d}{last}", sessions, self.engine, self.device)
-
-
-def _settings_in_words(session: SimulatedSession) -> str:
-    """By which sessions of people with the same settings come side by side."""
-    return repr(session.settings)
 
 
 def _require_torch_device(device: str) -> None:
@@ -279,7 +276,7 @@ def begun_study(values: Mapping[str, Any], source: str) -> Study:
 
 
 def _several(values: Any) -> tuple[Any, ...]:
-    """What may be several, or one."""
+    """Several values, or one."""
     return tuple(values) if isinstance(values, Iterable) and not isinstance(values, str) else (values,)
 
 

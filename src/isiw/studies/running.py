@@ -47,7 +47,7 @@ def conduct(
     with store.locked():
         if left := store.left(retry=retry):
             store.require_same_code()
-        # Closed at once where it is interrupted, so that no worker goes on in vain.
+        # Closed at once if it is interrupted, so that no worker goes on in vain.
         with closing((executor or Processes()).results(run, left)) as results:
             for unit, result in results:
                 store.keep(unit, result)
@@ -149,7 +149,7 @@ def run_study(
     Args:
         sessions: the sessions.
         workers: how many processes; 1 runs them here.
-        run: runs one session; importable where it is to run in another process.
+        run: runs one session; importable if it is to run in another process.
         on_done: called after each session with its rows, for progress, and to keep them.
 
     Returns:

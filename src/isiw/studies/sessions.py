@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, TypeAlias
 
@@ -22,8 +22,7 @@ from isiw.strategy.catalogue import known_settings, make_strategy
 from isiw.strategy.course import Choice
 from isiw.strategy.stopping import stimuli_left
 from isiw.studies.execution import one_torch_thread
-from isiw.studies.own import OwnCode
-from isiw.studies.players import Crowd, Player, Reported, alone
+from isiw.studies.players import Crowd, OwnCode, Player, Reported, alone
 from isiw.subjects.cohorts import COHORTS, person_of
 from isiw.subjects.subject import Response, SimulatedSubject
 from isiw.window import Window, bayes_factor
@@ -36,13 +35,13 @@ _OF_THE_STOP = ("f1", "start_covered", "end_covered")
 _MOST_DELIVERIES = 1000
 
 OWN_STRATEGY = 'One of your own objects takes part through run_study: see "A strategy of your own" in docs/studies.md.'
-"""The way out where a strategy is given in the place of its name."""
+"""The way out if a strategy is given in the place of its name."""
 
 Stopping: TypeAlias = Literal["ignored", "noted", "ends"]
 
 
 def require_cohorts(names: Iterable[object]) -> None:
-    """Raise where something is not the name of a cohort."""
+    """Raise if something is not the name of a cohort."""
     if unknown := [name for name in names if not (isinstance(name, str) and name in COHORTS)]:
         raise InvalidValueError(
             "unknown cohorts",
@@ -58,7 +57,7 @@ class SimulatedSession(Checked):
 
     Args:
         strategy: a named strategy; with a player of one's own only what it is called.
-        cohort: a named cohort; where a subclass gives people of its own, only what they are called.
+        cohort: a named cohort; if a subclass gives people of its own, only what they are called.
         person: which person of it, from 0.
         seed: seed of the cohort; trial noise and strategy use `seed + person`.
         trials: how many trials to run at most.
@@ -96,14 +95,11 @@ class SimulatedSession(Checked):
             raise InvalidValueError(what, got=type(self.strategy).__name__, expected="a text", remedy=OWN_STRATEGY)
         if type(self).subject is SimulatedSession.subject:
             require_cohorts([self.cohort])
-        object.__setattr__(self, "marks", self._checked_marks())
-
-    def _checked_marks(self) -> tuple[int, ...]:
         given = tuple(self.marks) if isinstance(self.marks, Iterable) else (self.marks,)
         if not given:
             raise InvalidValueError("a session without a mark has no rows", remedy=f"Give it marks=({self.trials},).")
         what = f"a mark of a session of {self.trials} trials"
-        return tuple(whole(what, mark, least=0, most=self.trials) for mark in given)
+        object.__setattr__(self, "marks", tuple(whole(what, mark, least=0, most=self.trials) for mark in given))
 
     def subject(self) -> SimulatedSubject:
         """The simulated person."""
@@ -113,21 +109,21 @@ class SimulatedSession(Checked):
     def as_the_rig_states(self) -> SimulatedSession:
         """The same with what the person's rig states as a setting of the strategy, if it can use it.
 
-        It states its hit delay, where ISIs count from the valve command, and its conditioning stimulus.
+        It states its hit delay, if ISIs count from the valve command, and its conditioning stimulus.
         """
         subject = self.subject()
         delay_ms = subject.stated_hit_delay_ms if self.space.reference == "valve" else None
         stimulus = None if subject.conditioning == "tap" else subject.conditioning
-        if self.own is not None:  # which knows its settings alone
-            return self
-        known = known_settings(self.strategy, {"hit_delay_ms": delay_ms, "conditioning": stimulus})
-        return replace(self, settings=tuple((known | dict(self.settings)).items()))
+        return self._knowing({"hit_delay_ms": delay_ms, "conditioning": stimulus})
 
     def as_the_visit_states(self) -> SimulatedSession:
         """The same with the intensity as a setting of the strategy, if it is stated and the strategy can use it."""
-        if self.own is not None:
+        return self._knowing({"intensity_pct_rmt": self.subject().stated_intensity_pct_rmt})
+
+    def _knowing(self, stated: Mapping[str, Any]) -> SimulatedSession:
+        if self.own is not None:  # which knows its settings alone
             return self
-        known = known_settings(self.strategy, {"intensity_pct_rmt": self.subject().stated_intensity_pct_rmt})
+        known = known_settings(self.strategy, stated)
         return replace(self, settings=tuple((known | dict(self.settings)).items()))
 
     def player(self) -> Player:
@@ -156,7 +152,7 @@ def play(session: SimulatedSession, player: Player) -> pd.DataFrame:
 
 def examine(sessions: Sequence[SimulatedSession], crowd: Crowd) -> pd.DataFrame:
     """Run sessions of equally many trials side by side."""
-    people = [_Person(session, number, crowd) for number, session in enumerate(sessions)]
+    people = [_Participant(session, number, crowd) for number, session in enumerate(sessions)]
     for person in people:
         person.note_before()
     for trial in range(1, sessions[0].trials + 1):
@@ -175,7 +171,7 @@ def examine(sessions: Sequence[SimulatedSession], crowd: Crowd) -> pd.DataFrame:
     return pd.DataFrame([row for person in people for row in person.rows])
 
 
-class _Person:
+class _Participant:
     """One person in a running session, and what is noted about it."""
 
     def __init__(self, session: SimulatedSession, number: int, crowd: Crowd) -> None:
@@ -203,7 +199,7 @@ class _Person:
         return self.session.stopping == "ends" and not math.isnan(self.stop["stop_trial"])
 
     def respond(self, trial: int, choice: Choice) -> Response:
-        """Deliver the pair, and where its ISI makes it a mistrial what is asked instead, until one can be told.
+        """Deliver the pair, and if its ISI makes it a mistrial what is asked instead, until one can be learnt.
 
         The first delivery of a trial has the same noise with every strategy; what comes instead has noise of its own.
         """
@@ -243,14 +239,14 @@ class _Person:
         self._note_marks(trial, spent_ms, reached=True)
 
     def _note_marks(self, trial: int, spent_ms: dict[str, float], *, reached: bool) -> None:
-        """Note a trial that was told (`reached`), and where the session has ended all that would have come."""
+        """Note a trial that was learnt (`reached`), and if the session has ended all that would have come."""
         marks = [m for m in self.session.marks if (reached and m == trial) or (self.ended and m >= trial + reached)]
         if marks:
             row = self._row(trial - (not reached) + self.mistrials) | spent_ms
             self.rows += [row | {"trial": mark} for mark in marks]
 
     def _note_stop(self, delivered: int) -> None:
-        """Note where the rule fires first; it is not asked where it is ignored."""
+        """Note where the rule fires first; it is not asked if it is ignored."""
         if self.session.stopping == "ignored" or not math.isnan(self.stop["stop_trial"]):
             return
         rule = self.crowd.stopping

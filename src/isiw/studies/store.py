@@ -64,11 +64,7 @@ class Store:
     folder: Path
 
     def left(self, *, retry: bool = False) -> list[Unit]:
-        """The units that are still to be run.
-
-        Args:
-            retry: run those that failed once more.
-        """
+        """The units that are still to be run; with `retry` those that failed, too."""
         done = set(self._files("parts")) | (set() if retry else set(self._files("errors")))
         return [unit for unit in self.study.units() if unit.key not in done]
 
@@ -111,7 +107,7 @@ class Store:
             yield
 
     def rows(self) -> pd.DataFrame:
-        """All rows of the finished units, sorted; empty where there are none."""
+        """All rows of the finished units, sorted; empty if there are none."""
         return _table(self._files("parts").values(), _KEYS, self._state)
 
     def errors(self) -> pd.DataFrame:
@@ -132,7 +128,7 @@ class Store:
         raise StudyError("the study has no such unit", got=key, remedy="The rows have their units in the column unit.")
 
     def require_same_code(self) -> None:
-        """Raise where other code would go on than began: its rows do not belong in one table.
+        """Raise if other code would go on than began: its rows do not belong in one table.
 
         Raises:
             StudyError: isiw was changed since, though its version was not.
@@ -158,7 +154,7 @@ class Store:
 
 
 def begin_store(study: Study, folder: str | Path) -> Store:
-    """The folder of a study, made where it is missing, gone on with where it is there.
+    """The folder of a study, made if it is missing, continued if it is there.
 
     Args:
         study: the study.
@@ -176,7 +172,9 @@ def begin_store(study: Study, folder: str | Path) -> Store:
             remedy="Put that file back, or choose another folder.",
         )
     values = study_values(study)
-    text = tomli_w.dumps(values | {"checksum": _state(values), "versions": _versions()})
+    versions = {module.__name__: str(module.__version__) for module in (isiw, np, torch, pd)}
+    versions |= {"python": platform.python_version(), "code": code_checksum()}
+    text = tomli_w.dumps(values | {"checksum": _state(values), "versions": versions})
     with _disk_errors(store.folder):
         for kind in ("parts", "errors"):
             (store.folder / kind).mkdir(parents=True, exist_ok=True)
@@ -214,7 +212,6 @@ def open_store(folder: str | Path) -> Store:
 
 
 def _state(values: Mapping[str, Any]) -> str:
-    """The checksum of a study's values."""
     return _checksum(tomli_w.dumps(values).encode())
 
 
@@ -239,11 +236,6 @@ def _same(store: Store, kept: Store) -> Store:
 def _uncoded(values: Mapping[str, Any]) -> list[dict[str, Any]]:
     """The strategies of a study, without the checksums of one's own code."""
     return [{key: value for key, value in strategy.items() if key != "code"} for strategy in values["strategies"]]
-
-
-def _versions() -> dict[str, str]:
-    made_with = {module.__name__: str(module.__version__) for module in (isiw, np, torch, pd)}
-    return made_with | {"python": platform.python_version(), "code": code_checksum()}
 
 
 def _error_rows(unit: Unit, failure: Failure) -> pd.DataFrame:

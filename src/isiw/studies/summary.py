@@ -1,4 +1,4 @@
-"""What a study comes to: means over people by strategy, cohort and mark, and paired differences between strategies."""
+"""The results of a study: means over people by strategy, cohort and mark, and paired differences between strategies."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ def summarise(rows: pd.DataFrame, errors: pd.DataFrame | None = None) -> pd.Data
         the 90 % intervals; share that is sure and wrong, which expects an F1 of at least .7 and at least .35 more than
         it has (NaN if a method expects none); share to whom no window is reported, as if a method has no answer yet;
         mean of the pairs delivered; mean of the pairs after which the stopping rule fired and of the F1 then, over
-        those for whom it did; the same over all, where those for whom it has not count as they stand at this mark
-        (`end_delivered`, `end_f1`; NaN where the rule is ignored); share for whom it did so before the budget was used
+        those for whom it did; the same over all, in which those for whom it has not count as they stand at this mark
+        (`end_delivered`, `end_f1`; NaN if the rule is ignored); share for whom it did so before the budget was used
         up; people without rows because they failed; median time of an ask and a tell [ms]. A strategy that failed for
         everybody has one row, at trial 0.
     """

@@ -3,8 +3,17 @@
 from isiw.subjects.changes import Change, Plasticity, TapResponse
 from isiw.subjects.cohorts import COHORTS, another_day, cohort
 from isiw.subjects.measured import LABS, MEASURED_KIM, WIDTHS_KIM_MS, Lab, MeasuredPerson, lab
-from isiw.subjects.profiles import OpposedProfile, PeakProfile, Profile, TwoPeakProfile
-from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse, ResponseCurve, TrialNoise
+from isiw.subjects.responses import (
+    EmgFloor,
+    GainResponse,
+    OpposedProfile,
+    PeakProfile,
+    Profile,
+    RecruitmentResponse,
+    ResponseCurve,
+    TrialNoise,
+    TwoPeakProfile,
+)
 from isiw.subjects.subject import Drift, Responder, Response, SimulatedSubject
 from isiw.subjects.thresholds import THRESHOLD_COHORTS, HotSpot, StimulatedPerson, StimulatedResponder, threshold_cohort
 

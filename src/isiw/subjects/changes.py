@@ -1,4 +1,4 @@
-"""What else moves an MEP than the ISI and chance: changes during a session, the tap's own response, coarse amplitudes.
+"""Influences on an MEP besides the ISI and chance: changes during a session, the tap's own response, coarse amplitudes.
 
 A coil that is re-seated, a gain, or another intensity changes all evoked amplitudes at once; habituation and plasticity
 change the enhancement; and the tap itself may evoke a response in the muscle that is recorded [Kim2020, 2.2, Fig. 3.7].
@@ -30,11 +30,7 @@ class Plasticity(Checked):
     pairs: Positive = 100.0
 
     def log_gain(self, dose: float) -> float:
-        """The term that is added to the log gain.
-
-        Args:
-            dose: the facilitation, in 0–1, of all pairs so far, summed.
-        """
+        """The addition to the log gain after a dose: the facilitation, in 0–1, of all pairs so far, summed."""
         return -self.limit * math.expm1(-dose / self.pairs)
 
 
@@ -60,7 +56,7 @@ class Change(Checked):
         log_gain: change of everything that is evoked, natural log.
         intensity_pct_rmt: change of the intensity [% RMT]; of a person with a recruitment curve.
         shift_ms: by how much the window moves [ms].
-        half_life: after so many trials the enhancement is half of what it was, from the first trial on; None where it
+        half_life: after so many trials the enhancement is half of what it was, from the first trial on; None if it
             stays.
 
     Raises:
@@ -80,19 +76,11 @@ class Change(Checked):
             raise InvalidValueError("a change ends before it begins", got=(self.first, self.last))
 
     def share(self, trial: int) -> float:
-        """Share of the change that is reached at a trial, in 0–1.
-
-        Args:
-            trial: its number, from 1 on.
-        """
+        """The share of the change that there is at a trial, by its number from 1 on, in 0–1."""
         return float(np.clip((trial - self.first + 1) / (self.last - self.first + 1), 0.0, 1.0))
 
     def enhancement(self, trial: int) -> float:
-        """The factor on the enhancement at a trial.
-
-        Args:
-            trial: its number, from 1 on.
-        """
+        """The factor on the enhancement at a trial, by its number from 1 on."""
         return 1.0 if self.half_life is None else float(2.0 ** (-trial / self.half_life))
 
 
@@ -113,28 +101,19 @@ class TapResponse(Checked):
     log_sd: NonNegative
 
     def course(self, after_hit_ms: FloatArray) -> FloatArray:
-        """The burst as a share of its peak-to-peak amplitude, which is 1 over its whole length; same shape.
-
-        Args:
-            after_hit_ms: times after the hit [ms].
-        """
+        """The burst at some times after the hit [ms], as a share of its peak-to-peak amplitude; same shape."""
         phase_ms = np.asarray(after_hit_ms, dtype=np.float64) - self.start_ms
         whole = _burst(np.linspace(0.0, self.duration_ms, 401), self.duration_ms)
         return _burst(phase_ms, self.duration_ms) / np.ptp(whole)
 
     def sample_mv(self, rng: np.random.Generator) -> float:
-        """The peak-to-peak amplitude of one trial [mV].
-
-        Args:
-            rng: source of randomness.
-        """
+        """The peak-to-peak amplitude of one trial [mV]."""
         return float(self.median_mv * np.exp(self.log_sd * rng.standard_normal()))
 
 
 def amplitude_of_both_mv(evoked_mv: float, tap: TapResponse, tap_mv: float, isi_ms: float) -> float:
     """Peak-to-peak amplitude of what is in the MEP window: the MEP, and what the tap evoked [mV]."""
-    both = evoked_mv * _MEP + tap_mv * tap.course(isi_ms + _AFTER_PULSE_MS)
-    return float(np.ptp(both))
+    return float(np.ptp(evoked_mv * _MEP + tap_mv * tap.course(isi_ms + _AFTER_PULSE_MS)))
 
 
 def _burst(phase_ms: FloatArray, duration_ms: float) -> FloatArray:

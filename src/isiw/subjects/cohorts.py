@@ -12,10 +12,18 @@ from typing import Final, Literal, TypeAlias
 import numpy as np
 
 from isiw.checks import choice, whole
+from isiw.subjects.changes import Change, TapResponse
 from isiw.subjects.measured import LABS, MEASURED_KIM, WIDTHS_KIM_MS, lab, supra_threshold
-from isiw.subjects.profiles import PeakProfile, Profile, TwoPeakProfile
-from isiw.subjects.realities import CHANGED
-from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse, ResponseCurve
+from isiw.subjects.responses import (
+    EmgFloor,
+    GainResponse,
+    PeakProfile,
+    Profile,
+    RecruitmentResponse,
+    ResponseCurve,
+    TwoPeakProfile,
+    log_normal,
+)
 from isiw.subjects.subject import Drift, SimulatedSubject
 
 P_STAYS: Final = 0.7
@@ -50,6 +58,64 @@ def another_day(person: SimulatedSubject, stranger: SimulatedSubject, rng: np.ra
     return replace(person, profile=moved if stays else stranger.profile, response=response)
 
 
+_Changed: TypeAlias = Callable[[np.random.Generator, SimulatedSubject], SimulatedSubject]
+
+COARSE_STEPS_MV: Final = (0.005, 0.010, 0.020)
+"""Steps of converters and displays [mV]."""
+
+
+def _sign(rng: np.random.Generator) -> float:
+    return 1.0 if rng.random() < 0.5 else -1.0
+
+
+def _step(rng: np.random.Generator, subject: SimulatedSubject) -> SimulatedSubject:
+    """A coil re-seated, a gain, an electrode: by a factor of LN(4, .4), up or down."""
+    trial, log_factor = int(rng.integers(4, 31)), float(np.log(4.0) + 0.4 * rng.standard_normal())
+    return replace(subject, change=Change(trial, trial, log_gain=_sign(rng) * log_factor))
+
+
+def _ramp(rng: np.random.Generator, subject: SimulatedSubject) -> SimulatedSubject:
+    return replace(subject, change=Change(1, 60, log_gain=_sign(rng) * float(np.log(rng.uniform(2, 5)))))
+
+
+def _retuned(rng: np.random.Generator, subject: SimulatedSubject) -> SimulatedSubject:
+    trial, change_pct = int(rng.integers(5, 31)), float(rng.uniform(6, 14))
+    return replace(subject, change=Change(trial, trial, intensity_pct_rmt=_sign(rng) * change_pct))
+
+
+def _fading(rng: np.random.Generator, subject: SimulatedSubject) -> SimulatedSubject:
+    return replace(subject, change=Change(half_life=float(rng.uniform(15, 60))))
+
+
+def _moving(rng: np.random.Generator, subject: SimulatedSubject) -> SimulatedSubject:
+    first, last = int(rng.integers(5, 16)), int(rng.integers(20, 36))
+    return replace(subject, change=Change(first, last, shift_ms=25.0 * float(rng.standard_normal())))
+
+
+def _tap_response(rng: np.random.Generator, subject: SimulatedSubject) -> SimulatedSubject:
+    start_ms, duration_ms = float(rng.uniform(18, 60)), float(rng.uniform(10, 40))
+    median_mv = float(0.1 * np.exp(0.7 * rng.standard_normal()))
+    return replace(subject, tap_response=TapResponse(start_ms, duration_ms, median_mv, float(rng.uniform(0.2, 0.9))))
+
+
+def _coarse(rng: np.random.Generator, subject: SimulatedSubject) -> SimulatedSubject:
+    return replace(subject, amplitude_step_mv=float(rng.choice(COARSE_STEPS_MV)))
+
+
+CHANGED: Final[Mapping[str, _Changed]] = MappingProxyType(
+    {
+        "step": _step,
+        "ramp": _ramp,
+        "retuned": _retuned,
+        "fading": _fading,
+        "moving": _moving,
+        "tap-response": _tap_response,
+        "coarse": _coarse,
+    }
+)
+"""The change that makes a usual person one of a cohort in whose sessions something else than the ISI moves an MEP, or
+is not as most methods assume; half of its people have a window, unless the cohort says otherwise."""
+
 _Pair: TypeAlias = tuple[float, float]
 _Shape: TypeAlias = Callable[[np.random.Generator, float, float], Profile]
 
@@ -73,22 +139,18 @@ def _two_peak(rng: np.random.Generator, start_ms: float, width_ms: float) -> Pro
     return TwoPeakProfile(start_ms, width_ms, *heights)
 
 
-def _log_normal(rng: np.random.Generator, median: float, log_sd: float) -> float:
-    return float(median * np.exp(log_sd * rng.standard_normal()))
-
-
 def _span(rng: np.random.Generator, width_ms: tuple[float, float] | None = None) -> tuple[float, float]:
-    start_ms, usual_ms = float(rng.uniform(5, 110)), float(np.clip(_log_normal(rng, 100, 0.42), 40, 230))
+    start_ms, usual_ms = float(rng.uniform(5, 110)), float(np.clip(log_normal(rng, 100, 0.42), 40, 230))
     return start_ms, usual_ms if width_ms is None else float(rng.uniform(*width_ms))
 
 
 def _gain(rng: np.random.Generator) -> GainResponse:
-    floor = EmgFloor(_log_normal(rng, 0.008, 0.3), 0.35)
-    return GainResponse(floor, _log_normal(rng, 0.06, 0.5), float(rng.uniform(0.4, 0.9)))
+    floor = EmgFloor(log_normal(rng, 0.008, 0.3), 0.35)
+    return GainResponse(floor, log_normal(rng, 0.06, 0.5), float(rng.uniform(0.4, 0.9)))
 
 
 @dataclass(frozen=True)
-class _Law:
+class _CohortLaw:
     """Who has a recruitment curve: pairs are the ends of a uniform law, or median and log SD of a log-normal one.
 
     The first of those who are drawn by the usual law are the cohort `recruitment`.
@@ -109,10 +171,10 @@ class _Law:
     intensity_range_pct_rmt: _Pair | None = None
 
     def response(self, rng: np.random.Generator) -> RecruitmentResponse:
-        floor = EmgFloor(_log_normal(rng, 0.010, 0.25), float(rng.uniform(0.12, 0.25)))
+        floor = EmgFloor(log_normal(rng, 0.010, 0.25), float(rng.uniform(0.12, 0.25)))
         return RecruitmentResponse(
             floor,
-            amplitude_mv=_log_normal(rng, *self.amplitude_mv),
+            amplitude_mv=log_normal(rng, *self.amplitude_mv),
             slope_per_pct=self.slope_per_pct,
             x50_pct_rmt=float(rng.uniform(*self.x50_pct_rmt)),
             boost_pct_rmt=float(rng.uniform(*self.boost_pct_rmt)),
@@ -125,7 +187,7 @@ class _Law:
         if self.width_law == "uniform":
             width_ms = float(rng.uniform(*self.width_ms))
         else:
-            width_ms = float(np.clip(_log_normal(rng, *self.width_ms), *self.width_limits_ms))
+            width_ms = float(np.clip(log_normal(rng, *self.width_ms), *self.width_limits_ms))
         response = self.response(rng)
         subject = replace(
             _subject(rng, PeakProfile(start_ms, width_ms), response, self.hit_delay_ms),
@@ -141,18 +203,18 @@ class _Law:
         return replace(subject, response=response, stated_intensity_pct_rmt=stated)
 
 
-_USUAL: Final = _Law()
+_USUAL: Final = _CohortLaw()
 
-_OFF_THE_MAP: Final[Mapping[str, _Law]] = MappingProxyType(
+_OFF_THE_MAP: Final[Mapping[str, _CohortLaw]] = MappingProxyType(
     {
-        "other-rig": _Law(hit_delay_ms=(20, 300)),
-        "late": _Law(start_ms=(80, 200)),
-        "very-wide": _Law(start_ms=(0, 60), width_ms=(200, 0.25), width_limits_ms=(120, 320)),
-        "steep": _Law(sigma_x_pct_rmt=(2, 4), slope_per_pct=0.6),
-        "flat": _Law(sigma_x_pct_rmt=(9, 14), slope_per_pct=0.2),
-        "weak": _Law(boost_pct_rmt=(4, 8)),
-        "rmt-off": _Law(intensity_sd_pct_rmt=6.0),
-        "hand": _Law(
+        "other-rig": _CohortLaw(hit_delay_ms=(20, 300)),
+        "late": _CohortLaw(start_ms=(80, 200)),
+        "very-wide": _CohortLaw(start_ms=(0, 60), width_ms=(200, 0.25), width_limits_ms=(120, 320)),
+        "steep": _CohortLaw(sigma_x_pct_rmt=(2, 4), slope_per_pct=0.6),
+        "flat": _CohortLaw(sigma_x_pct_rmt=(9, 14), slope_per_pct=0.2),
+        "weak": _CohortLaw(boost_pct_rmt=(4, 8)),
+        "rmt-off": _CohortLaw(intensity_sd_pct_rmt=6.0),
+        "hand": _CohortLaw(
             amplitude_mv=(1.0, 0.6),
             slope_per_pct=0.23,
             x50_pct_rmt=(112, 122),
@@ -163,12 +225,12 @@ _OFF_THE_MAP: Final[Mapping[str, _Law]] = MappingProxyType(
 )
 """People whom the usual law does not cover."""
 
-_REALITIES: Final[Mapping[str, _Law]] = MappingProxyType(
+_REALITIES: Final[Mapping[str, _CohortLaw]] = MappingProxyType(
     {
         **dict.fromkeys(CHANGED, _USUAL),
-        "narrow-unstated": _Law(start_ms=(5, 90), width_ms=(15, 40), width_law="uniform"),
-        "wide-early": _Law(start_ms=(-40, 20), width_ms=(200, 320), width_law="uniform"),
-        "above-threshold": _Law(intensity_range_pct_rmt=(100, 110)),
+        "narrow-unstated": _CohortLaw(start_ms=(5, 90), width_ms=(15, 40), width_law="uniform"),
+        "wide-early": _CohortLaw(start_ms=(-40, 20), width_ms=(200, 320), width_law="uniform"),
+        "above-threshold": _CohortLaw(intensity_range_pct_rmt=(100, 110)),
         "hand-flat": replace(_OFF_THE_MAP["hand"], boost_pct_rmt=(0, 0)),
     }
 )
@@ -176,7 +238,7 @@ _REALITIES: Final[Mapping[str, _Law]] = MappingProxyType(
 
 _ALL_WITH_A_WINDOW: Final = frozenset({"narrow-unstated", "wide-early"})
 
-_NARROW: Final = _Law(start_ms=(5, 50), width_ms=(20, 0.3), width_limits_ms=(10, 40))
+_NARROW: Final = _CohortLaw(start_ms=(5, 50), width_ms=(20, 0.3), width_limits_ms=(10, 40))
 """Windows after an electrical pulse: 15–20 ms wide with TMS below the threshold (dissertation, 3.3.4)."""
 
 _KINDS_OF_ODD: Final = ("other-rig", "late", "very-wide", ("steep", "flat"), "weak", "rmt-off", "hand")

@@ -30,8 +30,7 @@ import numpy as np
 
 from isiw.checks import Checked, Number, Positive, choice, number, whole
 from isiw.lazy import scipy
-from isiw.subjects.profiles import OpposedProfile, PeakProfile
-from isiw.subjects.responses import EmgFloor, RecruitmentResponse
+from isiw.subjects.responses import EmgFloor, OpposedProfile, PeakProfile, RecruitmentResponse, log_normal
 from isiw.subjects.subject import SimulatedSubject
 
 PAIRED_PCT_RMT: Final = 90.0
@@ -58,7 +57,7 @@ class MeasuredPerson(Checked):
         width_ms: width of the measured window (Table 4.1) [ms].
         threshold_mv: amplitude from which an MEP counts as a response (4.1.1) [mV].
         peak_mv: mean MEP at the best ISI, EMG floor included [mV].
-        peak_error_mv: by how much it may be misread [mV]; None where no figure shows it.
+        peak_error_mv: by how much it may be misread [mV]; None if no figure shows it.
 
     Raises:
         InvalidValueError: an invalid number.
@@ -154,8 +153,8 @@ def supra_threshold(rng: np.random.Generator) -> SimulatedSubject:
     if rng.random() < 0.5:
         first, second = second, first
     response = RecruitmentResponse(
-        EmgFloor(_log_normal(rng, 0.010, 0.25), float(rng.uniform(0.12, 0.25))),
-        amplitude_mv=_log_normal(rng, 1.0, 0.4),
+        EmgFloor(log_normal(rng, 0.010, 0.25), float(rng.uniform(0.12, 0.25))),
+        amplitude_mv=log_normal(rng, 1.0, 0.4),
         slope_per_pct=0.23,
         x50_pct_rmt=float(rng.uniform(112, 122)),
         boost_pct_rmt=boost_pct,
@@ -174,13 +173,9 @@ def supra_threshold(rng: np.random.Generator) -> SimulatedSubject:
 
 def _segments(rng: np.random.Generator) -> tuple[PeakProfile, PeakProfile]:
     """Two segments one behind the other; what they leave of the range is cut at random."""
-    widths_ms = [float(np.clip(_log_normal(rng, 30.0, 0.3), *WIDTH_LIMITS_MS)) for _ in range(2)]
+    widths_ms = [float(np.clip(log_normal(rng, 30.0, 0.3), *WIDTH_LIMITS_MS)) for _ in range(2)]
     before_ms, until_ms = np.sort(rng.uniform(0.0, RANGE_MS - sum(widths_ms), 2)).tolist()
     return PeakProfile(before_ms, widths_ms[0]), PeakProfile(until_ms + widths_ms[0], widths_ms[1])
-
-
-def _log_normal(rng: np.random.Generator, median: float, log_sd: float) -> float:
-    return float(median * np.exp(log_sd * rng.standard_normal()))
 
 
 _Pair: TypeAlias = tuple[float, float]
@@ -232,17 +227,17 @@ class Lab:
 
     def subject(self, rng: np.random.Generator) -> SimulatedSubject:
         """One of its people."""
-        floor = EmgFloor(_drawn_log_normal(rng, self.floor_mv), _drawn_log_normal(rng, self.floor_log_sd))
+        floor = EmgFloor(log_normal(rng, *self.floor_mv), log_normal(rng, *self.floor_log_sd))
         response = RecruitmentResponse(
             floor,
-            amplitude_mv=_drawn_log_normal(rng, self.amplitude_mv),
+            amplitude_mv=log_normal(rng, *self.amplitude_mv),
             slope_per_pct=0.30,
             x50_pct_rmt=float(rng.uniform(103, 107)),
-            boost_pct_rmt=_drawn_log_normal(rng, self.boost_pct_rmt),
-            sigma_x_pct_rmt=_drawn_log_normal(rng, self.sigma_x_pct_rmt),
-            sigma_y=_drawn_log_normal(rng, self.sigma_y),
+            boost_pct_rmt=log_normal(rng, *self.boost_pct_rmt),
+            sigma_x_pct_rmt=log_normal(rng, *self.sigma_x_pct_rmt),
+            sigma_y=log_normal(rng, *self.sigma_y),
         )
-        width_ms = float(np.clip(_drawn_log_normal(rng, self.width_ms), 40, 230))
+        width_ms = float(np.clip(log_normal(rng, *self.width_ms), 40, 230))
         profile = PeakProfile(_normal(rng, self.start_ms), width_ms)
         subject = SimulatedSubject(profile, response, _normal(rng, self.hit_delay_ms), float(rng.uniform(1, 4)))
         correlation = float(rng.uniform(0, 0.2))
@@ -263,7 +258,7 @@ def lab(name: str, seed: int) -> Lab:
     rng = np.random.default_rng([zlib.crc32(b"law of a lab"), zlib.crc32(name.encode()), whole("seed", seed, least=0)])
 
     def about(median: float, log_sd: float, spread: _Pair) -> _Pair:
-        return _drawn_log_normal(rng, (median, log_sd)), float(rng.uniform(*spread))
+        return log_normal(rng, median, log_sd), float(rng.uniform(*spread))
 
     return Lab(
         start_ms=(float(rng.uniform(*centre.start_ms)), float(rng.uniform(10, 25))),
@@ -280,7 +275,3 @@ def lab(name: str, seed: int) -> Lab:
 
 def _normal(rng: np.random.Generator, law: _Pair) -> float:
     return float(law[0] + law[1] * rng.standard_normal())
-
-
-def _drawn_log_normal(rng: np.random.Generator, law: _Pair) -> float:
-    return float(law[0] * np.exp(law[1] * rng.standard_normal()))

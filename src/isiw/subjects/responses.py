@@ -1,4 +1,9 @@
-"""From facilitation to the MEP: two kinds of people, and where their noise enters.
+"""From the ISI to facilitation, and from facilitation to the MEP: profiles, two kinds of people, and their noise.
+
+A profile is a value that maps ISIs counted from the impact to facilitation in 0–1. The families are those that have
+been seen or argued for: a Gaussian [Kim2020, 4.2], skewed and flat-topped ones (8.1, appendix B), and two peaks
+(electrical conditioning has two facilitation windows). Above the motor threshold a tap may depress the MEP too, and
+facilitation is negative there (8.1.3).
 
 `GainResponse` multiplies: the MEP grows in proportion to the facilitation, with noise of a constant CV. It is the kind
 of noise that most methods assume. `RecruitmentResponse` is how MEPs near threshold behave: facilitation and noise both
@@ -16,12 +21,98 @@ from typing import Annotated, Protocol
 
 import numpy as np
 
-from isiw.checks import Checked, NonNegative, Positive, number
+from isiw.checks import Checked, NonNegative, Number, Positive, Share, number
+from isiw.errors import InvalidValueError
 from isiw.lazy import scipy
 from isiw.types import ArrayLike, FloatArray
 
 _NODES, _NODE_WEIGHTS = np.polynomial.hermite_e.hermegauss(80)
 _NODE_WEIGHTS = _NODE_WEIGHTS / _NODE_WEIGHTS.sum()
+
+
+class Profile(Protocol):
+    """Facilitation by ISI: at most 1, and negative if the tap depresses the MEP."""
+
+    def __call__(self, isi_ms: ArrayLike) -> FloatArray:
+        """Facilitation at ISIs counted from the impact [ms], same shape."""
+
+
+@dataclass(frozen=True)
+class PeakProfile(Checked):
+    """One peak whose flanks fall to exp(-2) at both ends of its span.
+
+    Args:
+        start_ms: where the rising flank has exp(-2) of the peak [ms from the impact].
+        width_ms: from there to the same level of the falling flank [ms].
+        peak_at: where the peak lies, as a share of the width; 0.5 is symmetric.
+        exponent: 2 is Gaussian (SD = width/4 if symmetric), more is flatter on top with steeper flanks.
+    """
+
+    start_ms: Number
+    width_ms: Positive
+    peak_at: Annotated[float, partial(number, above=0, below=1)] = 0.5
+    exponent: Positive = 2.0
+
+    def __call__(self, isi_ms: ArrayLike) -> FloatArray:
+        """Facilitation in 0–1 at ISIs counted from the impact [ms], same shape."""
+        share = (np.asarray(isi_ms, dtype=np.float64) - self.start_ms) / self.width_ms - self.peak_at
+        flank = np.where(share < 0, self.peak_at, 1.0 - self.peak_at)
+        return np.asarray(np.exp(-2.0 * np.abs(share / flank) ** self.exponent))
+
+
+@dataclass(frozen=True)
+class TwoPeakProfile(Checked):
+    """Two Gaussians at 0.27 and 0.73 of the span, each with an SD of width/7.5.
+
+    Args:
+        start_ms: start of the span [ms from the impact].
+        width_ms: width of the span [ms].
+        first: height of the first peak.
+        second: height of the second peak; the higher of the two has 1.
+
+    Raises:
+        InvalidValueError: an invalid span or height.
+    """
+
+    start_ms: Number
+    width_ms: Positive
+    first: Share
+    second: Share
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if 1 not in {self.first, self.second}:
+            raise InvalidValueError("the higher peak has height 1", got=(self.first, self.second))
+
+    def __call__(self, isi_ms: ArrayLike) -> FloatArray:
+        """Facilitation in 0–1 at ISIs counted from the impact [ms], same shape."""
+        share = (np.asarray(isi_ms, dtype=np.float64) - self.start_ms) / self.width_ms
+        peaks = [np.exp(-0.5 * ((share - at) * 7.5) ** 2) for at in (0.27, 0.73)]
+        return np.asarray(self.first * peaks[0] + self.second * peaks[1])
+
+
+@dataclass(frozen=True)
+class OpposedProfile(Checked):
+    """A segment that facilitates and one that depresses, in either order.
+
+    Args:
+        facilitated: the facilitation.
+        depressed: where the tap depresses, as a share of the deepest depression.
+        depth: the deepest depression, in units of the largest facilitation.
+    """
+
+    facilitated: PeakProfile
+    depressed: PeakProfile
+    depth: Positive
+
+    def __call__(self, isi_ms: ArrayLike) -> FloatArray:
+        """Facilitation at ISIs counted from the impact [ms], negative where the tap depresses, same shape."""
+        return self.facilitated(isi_ms) - self.depth * self.depressed(isi_ms)
+
+
+def log_normal(rng: np.random.Generator, median: float, log_sd: float) -> float:
+    """One draw of a log-normal law."""
+    return float(median * np.exp(log_sd * rng.standard_normal()))
 
 
 @dataclass(frozen=True)
@@ -69,7 +160,7 @@ class ResponseCurve(Protocol):
         """One trial's MEP above the EMG floor [mV].
 
         Args:
-            facilitation: at most 1; negative where the tap depresses.
+            facilitation: at most 1; negative if the tap depresses.
             noise: that of the trial.
             rng: what else is drawn from.
         """
@@ -83,7 +174,7 @@ class GainResponse(Checked):
         floor: the EMG floor.
         gain_mv: expected MEP above the floor at the best ISI [mV].
         cv: coefficient of variation of the gain noise.
-        max_response_probability: None where every trial responds; otherwise a trial responds with this probability
+        max_response_probability: None if every trial responds; otherwise a trial responds with this probability
             times the square root of the facilitation, and shows only the floor if not.
     """
 
@@ -141,7 +232,7 @@ class RecruitmentResponse(Checked):
         """MEP above the floor before output noise [mV], by facilitation and input noise; broadcast shape.
 
         Args:
-            facilitation: at most 1; negative where the tap depresses.
+            facilitation: at most 1; negative if the tap depresses.
             input_z: input noise in SDs.
         """
         x = self.intensity_pct_rmt + self.boost_pct_rmt * np.asarray(facilitation, dtype=np.float64)

@@ -15,20 +15,19 @@ import numpy as np
 from isiw.checks import (
     Checked,
     Flag,
+    MeanAndSd,
     NonNegative,
     Number,
     Positive,
     Share,
     choice,
-    mean_and_sd,
     number,
     whole,
 )
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.subjects.changes import Change, Plasticity, TapResponse, amplitude_of_both_mv
-from isiw.subjects.profiles import OpposedProfile, Profile
-from isiw.subjects.responses import RecruitmentResponse, ResponseCurve, TrialNoise
+from isiw.subjects.responses import OpposedProfile, Profile, RecruitmentResponse, ResponseCurve, TrialNoise
 from isiw.types import Conditioning, FloatArray, Reference
 from isiw.window import LEAST_DEPRESSED_MV, Window, window_from_excess
 
@@ -82,21 +81,21 @@ class SimulatedSubject(Checked):
         response: from facilitation to the MEP.
         hit_delay_ms: mean time from the valve command to the impact [ms].
         hit_delay_sd_ms: its SD from trial to trial [ms].
-        drift: drift of the gain; None where there is none.
+        drift: drift of the gain; None if there is none.
         input_correlation: lag-1 correlation of the input noise.
         outlier_probability: share of trials replaced by an artefact of 0.1–0.5 mV.
         isi_jitter_ms: SD of the realised about the commanded ISI, beside the hit delay's [ms].
         jitter_told: whether the jittered ISI is reported, or the commanded one with its SD.
         scale: factor on every amplitude.
-        stated_hit_delay_ms: mean and SD of the hit delay that the rig states, where it knows itself [ms]; by default
+        stated_hit_delay_ms: mean and SD of the hit delay that the rig states, if it knows itself [ms]; by default
             the tapping robot's, over people.
-        stated_intensity_pct_rmt: intensity of the pulse as the visit states it [% RMT]; None where it does not.
+        stated_intensity_pct_rmt: intensity of the pulse as the visit states it [% RMT]; None if it does not.
         conditioning: what is given to them first, a tap or an electrical pulse.
-        plasticity: how the pairs that are delivered change the gain; None where they do not. The true window and
+        plasticity: how the pairs that are delivered change the gain; None if they do not. The true window and
             profile are those before the first pair.
-        change: what else changes during a session; None where nothing does.
-        tap_response: what the tap alone evokes in the muscle; None where it evokes nothing.
-        amplitude_step_mv: step to which amplitudes are rounded [mV]; 0 where they are not.
+        change: what else changes during a session; None if nothing does.
+        tap_response: what the tap alone evokes in the muscle; None if it evokes nothing.
+        amplitude_step_mv: step to which amplitudes are rounded [mV]; 0 if they are not.
 
     Raises:
         InvalidValueError: an invalid number or choice, or a depressed segment or another intensity, but a response that
@@ -113,7 +112,7 @@ class SimulatedSubject(Checked):
     isi_jitter_ms: NonNegative = 0.0
     jitter_told: Flag = True
     scale: Positive = 1.0
-    stated_hit_delay_ms: tuple[float, float] = (180.0, 6.0)
+    stated_hit_delay_ms: MeanAndSd = (180.0, 6.0)
     stated_intensity_pct_rmt: Positive | None = None
     conditioning: Conditioning = "tap"
     plasticity: Plasticity | None = None
@@ -123,8 +122,6 @@ class SimulatedSubject(Checked):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        stated_ms = mean_and_sd("SimulatedSubject.stated_hit_delay_ms", self.stated_hit_delay_ms)
-        object.__setattr__(self, "stated_hit_delay_ms", stated_ms)
         retuned = self.change is not None and self.change.intensity_pct_rmt != 0
         if (retuned or isinstance(self.profile, OpposedProfile)) and not isinstance(self.response, RecruitmentResponse):
             raise InvalidValueError(
@@ -174,7 +171,7 @@ class SimulatedSubject(Checked):
         return window_from_excess(space.grid_ms, excess_mv, self.baseline_mv)
 
     def depressed(self, space: DesignSpace) -> Window | None:
-        """The true ISIs that depress the MEP: the window's rule for the deficit; None where there are none."""
+        """The true ISIs that depress the MEP: the window's rule for the deficit; None if there are none."""
         if self.baseline_mv < LEAST_DEPRESSED_MV:
             return None
         return window_from_excess(space.grid_ms, self.baseline_mv - self.expected_mep_mv(space), self.baseline_mv)
@@ -280,7 +277,7 @@ class Responder:
             self._rng = usual
 
     def _stimulate(self, isi_ms: float, reference: Reference) -> tuple[float, float]:
-        """The ISI as told, and the true one from the impact [ms]."""
+        """The ISI as reported, and the true one from the impact [ms]."""
         subject, rng = self.subject, self._rng
         late_ms = subject.hit_delay_sd_ms * rng.standard_normal()
         realised_ms = isi_ms + subject.isi_jitter_ms * rng.standard_normal()

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 import zlib
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
-from typing import Annotated, Final
+from functools import partial
+from typing import Annotated, Final, cast
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from isiw.errors import InvalidValueError
 from isiw.lazy import scipy
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.responses import RecruitmentResponse, TrialNoise
+from isiw.subjects.subject import SimulatedSubject
 from isiw.trials import RESPONSE_MV
 from isiw.types import FloatArray
 
@@ -91,26 +92,18 @@ class StimulatedPerson(Checked):
             )
         object.__setattr__(self, "response", replace(self.response, x50_pct_rmt=_x50(self.response)))
 
-    @cached_property
-    def _needed_drive_pct(self) -> FloatArray:
-        return _criterion_drive(self.response)
-
     def response_probability(self, intensity_pct_mso: float) -> float:
         """Probability of an MEP above 50 µV at the hot spot, by intensity [% MSO]."""
         drive = 100 * intensity_pct_mso / self.rmt_pct_mso - self.response.x50_pct_rmt
-        return _exceeding(drive, self._needed_drive_pct, self.response.sigma_x_pct_rmt)
+        return _exceeding(drive, _criterion_drive(self.response), self.response.sigma_x_pct_rmt)
 
     def begin(self, seed: int) -> StimulatedResponder:
-        """A responder, which answers stimuli.
-
-        Args:
-            seed: of the noise of the trials.
-        """
+        """A session with this person, its trial noise from this seed."""
         return StimulatedResponder(self, seed)
 
 
 def _criterion_drive(response: RecruitmentResponse) -> FloatArray:
-    """How far above x50 the input must be for an MEP of 50 µV [% RMT], by nodes of output noise and of the floor."""
+    """Input above x50 that an MEP of 50 µV takes [% RMT], by nodes of output noise and of the floor."""
     output = np.exp(response.sigma_y * _NODES)[:, None]
     floor_mv = response.floor.median_mv * np.exp(response.floor.log_sd * _NODES)
     share = (RESPONSE_MV - floor_mv) / (response.amplitude_mv * output)
@@ -180,18 +173,14 @@ def threshold_cohort(name: str, n: int, seed: int) -> list[StimulatedPerson]:
     """
     choice("the cohort", name, THRESHOLD_COHORTS)
     subjects = cohort(name, whole("n", n, least=0), seed)
-    return [
-        _person(name, seed, index, subject.response, subject.input_correlation)
-        for index, subject in enumerate(subjects)
-    ]
+    return [_person(name, seed, index, subject) for index, subject in enumerate(subjects)]
 
 
-def _person(name: str, seed: int, index: int, response: object, correlation: float) -> StimulatedPerson:
+def _person(name: str, seed: int, index: int, subject: SimulatedSubject) -> StimulatedPerson:
     rng = np.random.default_rng([zlib.crc32(f"threshold-{name}".encode()), seed, index])
     rmt = float(rng.uniform(*RMT_PCT_MSO))
     x_mm, y_mm = rng.uniform(-SPOT_RANGE_MM, SPOT_RANGE_MM, 2).tolist()
     spot = HotSpot(x_mm, y_mm, float(rng.uniform(*SPREAD_MM)))
-    if not isinstance(response, RecruitmentResponse):
-        raise TypeError(response)
+    response = cast("RecruitmentResponse", subject.response)  # as all people of these cohorts have
     usable = replace(response, amplitude_mv=max(response.amplitude_mv, SMALLEST_AMPLITUDE_MV))
-    return StimulatedPerson(rmt, usable, correlation, spot)
+    return StimulatedPerson(rmt, usable, subject.input_correlation, spot)

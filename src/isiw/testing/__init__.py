@@ -6,7 +6,6 @@ Run them from your own tests, and `check_device` for hardware with the coil on a
 from __future__ import annotations
 
 from isiw.testing.devices import check_device
-from isiw.testing.models import check_model
-from isiw.testing.strategies import check_acquisition, check_strategy
+from isiw.testing.suites import check_acquisition, check_model, check_strategy
 
 __all__ = ["check_acquisition", "check_device", "check_model", "check_strategy"]

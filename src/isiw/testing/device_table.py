@@ -1,4 +1,4 @@
-"""What a device's check found, as a table that a person reads before the first session."""
+"""The findings of a device's check, as a table that a person reads before the first session."""
 
 from __future__ import annotations
 
@@ -28,14 +28,7 @@ NEAR_PULSE_MS = 3.0
 
 @dataclass(frozen=True, eq=False)
 class Delivery:
-    """One stimulus of a check, and what came of it.
-
-    Args:
-        stimulus: what was commanded.
-        answer: what the device answered.
-        trial: what a session would have judged it to be.
-        took_s: how long the device took [s].
-    """
+    """One stimulus of a check, the device's answer, and the trial that a session would have made of it."""
 
     stimulus: Stimulus
     answer: Answer
@@ -45,11 +38,7 @@ class Delivery:
 
 @dataclass(frozen=True)
 class DeviceTable:
-    """What was found, a row a question.
-
-    Args:
-        rows: what was looked at, and what was found.
-    """
+    """The findings, a row a question."""
 
     rows: tuple[tuple[str, str], ...]
 
@@ -146,7 +135,7 @@ def wrong_hit_delay(deliveries: Sequence[Delivery]) -> str | None:
 
 
 def edges_ms(deliveries: Sequence[Delivery]) -> list[float]:
-    """When the steepest edge of each EMG comes, where one stands out and is not the tap's [ms after the pulse]."""
+    """When the steepest edge of each EMG comes, if one stands out and is not the tap's [ms after the pulse]."""
     found = [_edge_ms(delivery.answer, delivery.trial) for delivery in deliveries if isinstance(delivery.answer, Sweep)]
     return [edge_ms for edge_ms in found if edge_ms is not None]
 
@@ -183,7 +172,7 @@ FACTOR: Final = 3.0
 
 
 def artefact_in_window(deliveries: Sequence[Delivery], signals: SignalLimits) -> str | None:
-    """What is wrong where TMS alone, or more than one pair, shows an MEP without a muscle; None where nothing is.
+    """The fault if TMS alone, or more than one pair, shows an MEP without a muscle; None if there is none.
 
     An amplitude of less than a response is left to the EMG's noise. Where the coil alone is on a phantom, the reflex of
     a tap may lie in the window, but at one of the ISIs only; a tap's artefact may hide the stimulator's at another.
@@ -202,7 +191,7 @@ def artefact_in_window(deliveries: Sequence[Delivery], signals: SignalLimits) ->
 
 
 def late_artefact(deliveries: Sequence[Delivery]) -> str | None:
-    """What is wrong where the stimulator's artefact comes after the reported pulse; None where none does.
+    """The fault if the stimulator's artefact comes after the reported pulse; None if there is none.
 
     One that comes before it, or much later, is the likely fault of each sweep already. Where no edge stands out of the
     EMG, as behind an amplifier that blanks the pulse, nobody can tell.
@@ -219,7 +208,7 @@ def late_artefact(deliveries: Sequence[Delivery]) -> str | None:
 
 
 def _shown(delivery: Delivery, signals: SignalLimits) -> tuple[float, float] | None:
-    """The amplitude and that of the EMG before [mV], where the one is clearly above the other."""
+    """The amplitude and that of the EMG before [mV], if the one is clearly above the other."""
     mep_mv, rest_mv = delivery.trial.mep_mv, _at_rest_mv(delivery, signals)
     if mep_mv is None or rest_mv is None or mep_mv < max(RESPONSE_MV, FACTOR * rest_mv):
         return None
@@ -227,7 +216,7 @@ def _shown(delivery: Delivery, signals: SignalLimits) -> tuple[float, float] | N
 
 
 def _at_rest_mv(delivery: Delivery, signals: SignalLimits) -> float | None:
-    """Peak-to-peak of stretches as long as the MEP window, before pulse and tap [mV]; None where there is none."""
+    """Peak-to-peak of stretches as long as the MEP window, before pulse and tap [mV]; None if there is none."""
     sweep, trial = delivery.answer, delivery.trial
     if not isinstance(sweep, Sweep):
         return None

@@ -6,6 +6,7 @@ import gc
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 from isiw.checks import number
@@ -30,8 +31,8 @@ from isiw.testing.device_table import (
     late_artefact,
     wrong_hit_delay,
 )
-from isiw.testing.guarded import Guarded, Pace
-from isiw.testing.requirements import broken, require
+from isiw.testing.guarded import CheckPace, Guarded
+from isiw.testing.suites import broken, require
 from isiw.text.sanitize import shown
 from isiw.trials import Measurement, Stimulus, Sweep, Trial
 
@@ -51,18 +52,18 @@ def check_device(
 ) -> DeviceTable:
     """Check that a device keeps the promises of `isiw.Device`. It stimulates: put the coil on a phantom.
 
-    It delivers three pairs of stimuli, TMS alone, a tap alone where the device says that it can, and five pairs more
-    where the device has a memory. It tries six more times while the device is disarmed and must refuse. It says so
+    It delivers three pairs of stimuli, TMS alone, a tap alone if the device says that it can, and five pairs more
+    if the device has a memory. It tries six more times while the device is disarmed and must refuse. It says so
     beforehand, and ends with a table of what was found. Every delivery goes through the guards of a session: limits,
     readiness, deadlines, and signals, which disarm at once. Whatever happens, the device is disarmed at the end.
 
     Args:
-        make: makes the device, in the same state each time; called three times where the device has a memory.
+        make: makes the device, in the same state each time; called three times if the device has a memory.
         space: ISIs that it can deliver, on its reference.
         timeout_s: how long one delivery may take [s]; past it, the device is stopped from another thread.
         iti_s: how long to wait before each of these deliveries [s]; the limits may ask for more.
         limits: what may be delivered, as a session's; the space, 5 s between stimuli and 200 pulses by default.
-        clock: waits; a virtual one by default where the device is simulated.
+        clock: waits; a virtual one by default if the device is simulated.
         signals: what a session's sweeps must keep.
         say: takes what is said to whoever watches.
 
@@ -78,17 +79,14 @@ def check_device(
         InvalidValueError: an inter-trial interval that is negative or not finite.
     """
     rules = _Rules(space, signals or SignalLimits())
-
-    def pace_of(device: Device) -> Pace:
-        return _pace(device, space, limits, timeout_s=timeout_s, iti_s=iti_s, clock=clock)
-
+    pace_of = partial(_pace, space=space, limits=limits, timeout_s=timeout_s, iti_s=iti_s, clock=clock)
     table = _checked(make, rules, pace_of, say)
     gc.collect()  # a device that is gone offers no streams, whose listeners would stay away from the next one
     return table
 
 
 def _checked(
-    make: Callable[[], Device], rules: _Rules, pace_of: Callable[[Device], Pace], say: Callable[[str], None]
+    make: Callable[[], Device], rules: _Rules, pace_of: Callable[[Device], CheckPace], say: Callable[[str], None]
 ) -> DeviceTable:
     device = make()
     lacking = [verb for verb in _VERBS if not hasattr(device, verb)]
@@ -106,14 +104,14 @@ def _checked(
 
 
 def _pace(
-    device: Device, space: DesignSpace, limits: Limits | None, *, timeout_s: float, iti_s: float, clock: Clock | None
-) -> Pace:
+    device: Device, *, space: DesignSpace, limits: Limits | None, timeout_s: float, iti_s: float, clock: Clock | None
+) -> CheckPace:
     clock = clock or (VirtualClock() if device.describe().simulated else MonotonicClock())
     least_s = number("iti_s", iti_s, least=0)
-    return Pace(timeout_s, least_s, limits or Limits.of_space(space, min_iti_s=least_s), clock)
+    return CheckPace(timeout_s, least_s, limits or Limits.of_space(space, min_iti_s=least_s), clock)
 
 
-def _announcement(device: Device, pace: Pace) -> str:
+def _announcement(device: Device, pace: CheckPace) -> str:
     info = device.describe()
     if info.simulated:
         return f"{info.name} is simulated: nothing is delivered to anybody."
@@ -138,14 +136,18 @@ class _Rules:
         return judge_measurement(answer, stimulus, self.space, self.limits)
 
 
-def _check_delivery(device: Device, rules: _Rules, pace: Pace) -> list[Delivery]:
+def _check_delivery(device: Device, rules: _Rules, pace: CheckPace) -> list[Delivery]:
     guarded = Guarded(device, pace)
     with guarded.exclusive():
         guarded.require_stop()
         with guarded.armed(kept_disarmed=True):
             guarded.require_refusal("before stage()")
         with guarded.armed():
-            deliveries = [_delivery(guarded, stimulus, rules) for stimulus in _stimuli(device.describe(), rules.space)]
+            deliveries = []
+            for stimulus in _stimuli(device.describe(), rules.space):
+                answer, took_s = guarded.deliver(stimulus)
+                trial = _checked_answer(guarded.info, stimulus, answer, rules)
+                deliveries.append(Delivery(stimulus, answer, trial, took_s))
             for _ in range(2):
                 guarded.disarm()
                 guarded.require_refusal("after stop()")
@@ -162,11 +164,6 @@ def _stimuli(info: DeviceInfo, space: DesignSpace) -> list[Stimulus]:
     between_ms = float(space.grid_ms[(len(space.grid_ms) - 1) // 3])
     stimuli = [Stimulus(trial, isi) for trial, isi in enumerate((space.low_ms, None, between_ms, space.high_ms))]
     return stimuli + ([Stimulus(4, None, tap_alone=True)] if info.tap_alone else [])
-
-
-def _delivery(guarded: Guarded, stimulus: Stimulus, rules: _Rules) -> Delivery:
-    answer, took_s = guarded.deliver(stimulus)
-    return Delivery(stimulus, answer, _checked_answer(guarded.info, stimulus, answer, rules), took_s)
 
 
 def _check_description(device: Device, space: DesignSpace) -> None:
@@ -209,7 +206,7 @@ def _named(stimulus: Stimulus) -> str:
 
 
 def _require_usable(deliveries: Sequence[Delivery], rules: _Rules, *, real: bool) -> None:
-    """Raise where a session would reject what was delivered, or pause over it, or take an artefact for an MEP."""
+    """Raise if a session would reject what was delivered, or pause over it, or take an artefact for an MEP."""
     delay = wrong_hit_delay(deliveries) if rules.space.reference == "impact" else None
     lost, texts, said = Counter[Kind](), dict[Kind, str](), list[str]()
     for delivery in deliveries:
@@ -233,7 +230,7 @@ def _require_usable(deliveries: Sequence[Delivery], rules: _Rules, *, real: bool
     require(not said, "a session can use what deliver returns", f"\n\n{faults}")
 
 
-def _check_memory(make: Callable[[], Device], space: DesignSpace, pace: Pace) -> None:
+def _check_memory(make: Callable[[], Device], space: DesignSpace, pace: CheckPace) -> None:
     grid = space.grid_ms
     stimuli = [Stimulus(trial, float(grid[trial * (len(grid) - 1) // 3])) for trial in range(4)]
     uninterrupted = _answers(make(), stimuli, pace)
@@ -245,7 +242,7 @@ def _check_memory(make: Callable[[], Device], space: DesignSpace, pace: Pace) ->
     require(_same(last, uninterrupted[3]), promise, f"{shown(last)} instead of {shown(uninterrupted[3])}")
 
 
-def _answers(device: Device, stimuli: Sequence[Stimulus], pace: Pace) -> list[Answer]:
+def _answers(device: Device, stimuli: Sequence[Stimulus], pace: CheckPace) -> list[Answer]:
     guarded = Guarded(device, pace)
     with guarded.exclusive(), guarded.armed():
         return [guarded.deliver(stimulus)[0] for stimulus in stimuli]

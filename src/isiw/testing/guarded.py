@@ -14,19 +14,17 @@ from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, readine
 from isiw.errors import DeviceError, DeviceTimeoutError, NotDelivered, StillArmedError, error_text
 from isiw.session.rig import Rig, Safeguards, exclusive
 from isiw.session.sink import Sink
-from isiw.testing.requirements import broken, require
+from isiw.testing.suites import broken, require
 from isiw.trials import Stimulus
 
 
 @dataclass(frozen=True)
-class Pace:
-    """How fast deliveries of a check may follow each other.
+class CheckPace:
+    """The pace of the deliveries of a check.
 
     Args:
         timeout_s: how long one delivery may take [s].
-        iti_s: how long to wait before each delivery at least [s].
-        limits: what may be delivered at most; they may ask for longer waits.
-        clock: waits.
+        iti_s: how long to wait before each delivery at least [s]; the limits may ask for longer waits.
         given_s: when each delivery ended, by the clock [s], of all devices of the check.
     """
 
@@ -40,7 +38,7 @@ class Pace:
 class Guarded:
     """A device that is checked, behind the guards of a session."""
 
-    def __init__(self, device: Device, pace: Pace) -> None:
+    def __init__(self, device: Device, pace: CheckPace) -> None:
         self._device, self._pace, self._delivered = device, pace, 0
         self._kept = _KeptDisarmed(device)
         self._sink = Sink()
@@ -87,7 +85,7 @@ class Guarded:
         return self._tried(stimulus)
 
     def require_refusal(self, when: str) -> None:
-        """Raise where the disarmed device does not refuse to deliver."""
+        """Raise if the disarmed device does not refuse to deliver."""
         try:
             self._tried(Stimulus(0, None))
         except DeviceError:
@@ -95,7 +93,7 @@ class Guarded:
         raise broken(f"deliver raises a DeviceError {when}", "it delivered and raised nothing")
 
     def require_stop(self) -> None:
-        """Raise where `stop` fails before anything is armed; once the device is armed that would be too late."""
+        """Raise if `stop` fails before anything is armed; once the device is armed that would be too late."""
         punctual = PunctualDevice(self._device)
         try:
             punctual.stop()

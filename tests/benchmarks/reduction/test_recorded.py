@@ -9,8 +9,7 @@ import pytest
 from benchmarks.reduction.recorded import BASELINES, SWEPT, alone_at_rmt_mv, record, stops_inside
 
 from isiw.subjects.cohorts import cohort
-from isiw.subjects.profiles import PeakProfile
-from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse
+from isiw.subjects.responses import EmgFloor, GainResponse, PeakProfile, RecruitmentResponse
 from isiw.subjects.subject import SimulatedSubject
 from isiw.window import Window
 from known import instance, known

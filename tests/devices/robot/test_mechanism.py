@@ -9,7 +9,7 @@ import pytest
 from isiw.devices.robot.mechanism import (
     SEPARATION_RAD,
     SUPPLY_KPA,
-    Event,
+    EventTime,
     Faults,
     Geometry,
     draw_taps,
@@ -92,7 +92,7 @@ def test_faults_come_as_often_as_their_probability() -> None:
 def test_an_impossible_geometry_is_an_error(wrong: dict[str, tuple[float, float]]) -> None:
     times = {"descent": (131.0, 5.0), "hit": (183.0, 4.0), "contact": (15.0, 1.0)} | wrong
     with pytest.raises(InvalidValueError):
-        Geometry(Event(*times["descent"]), Event(*times["hit"]), Event(*times["contact"]))
+        Geometry(EventTime(*times["descent"]), EventTime(*times["hit"]), EventTime(*times["contact"]))
 
 
 @pytest.mark.parametrize("wrong", [{"stuck_probability": 1.5}, {"late_probability": 0.1, "late_ms": (20.0, 10.0)}])

@@ -13,8 +13,14 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel
 
 from isiw.models.gp.fit import Fit, fit, fixed_fit
-from isiw.models.gp.prior import FixedProcess, HyperparameterPrior, Hyperparameters
-from isiw.models.gp.scale import Scale, Transform, scale_of
+from isiw.models.gp.prior import (
+    FixedProcess,
+    HyperparameterPrior,
+    Hyperparameters,
+    Standardisation,
+    Transform,
+    scale_of,
+)
 from isiw.models.shared.history import PersonTrials
 from known import known
 
@@ -37,7 +43,7 @@ def fitted(told: PersonTrials, **options: Any) -> Fit:
 
 def test_the_marginal_likelihood_is_that_of_scikit_learn() -> None:
     told = trials()
-    scale = Scale("log", 0.005, FIXED.centre, FIXED.unit)
+    scale = Standardisation("log", 0.005, FIXED.centre, FIXED.unit)
     values = (np.log(told.mep_mv) - FIXED.centre) / FIXED.unit
     kernel = ConstantKernel(FIXED.amplitude**2) * RBF(FIXED.length_ms) + ConstantKernel(1.0)
     reference = GaussianProcessRegressor(kernel, alpha=FIXED.noise**2, optimizer=None).fit(told.isi_ms[:, None], values)
@@ -48,7 +54,7 @@ def test_the_marginal_likelihood_is_that_of_scikit_learn() -> None:
 
 def test_trials_of_tms_alone_are_the_constant_and_noise() -> None:
     told = trials(8, alone=3)
-    scale = Scale("log", 0.005, FIXED.centre, FIXED.unit)
+    scale = Standardisation("log", 0.005, FIXED.centre, FIXED.unit)
     values = torch.cat([scale.standardised(x) for x in (told.mep_mv, told.baseline_mv)])
     steps = torch.as_tensor((told.isi_ms[:, None] - told.isi_ms) / FIXED.length_ms)
     covariance = torch.ones((11, 11), dtype=torch.float64) + FIXED.noise**2 * torch.eye(11).double()
@@ -63,7 +69,7 @@ def test_the_evidence_is_a_density_of_log_amplitudes(transform: Transform) -> No
     # Summed over all amplitudes that the next trial may have, the predictive density is 1.
     centre, unit = {"log": (-3.0, 0.3), "sqrt": (0.3, 0.02), "none": (0.09, 0.005)}[transform]
     fixed = replace(FIXED, centre=centre, unit=unit)
-    scale, log_meps = Scale(transform, 1e-6, centre, unit), np.linspace(-7.0, 1.0, 801)
+    scale, log_meps = Standardisation(transform, 1e-6, centre, unit), np.linspace(-7.0, 1.0, 801)
     told = [PersonTrials(np.array([250.0]), np.array([math.exp(x)]), NOBODY) for x in log_meps]
     densities = np.exp([fixed_fit(PRIOR, "rbf", scale, one, fixed).log_evidence for one in told])
     assert densities.sum() * (log_meps[1] - log_meps[0]) == pytest.approx(1.0, abs=1e-3)
@@ -104,7 +110,7 @@ def test_where_nothing_is_impossible_it_stays_so() -> None:
 
 def test_a_singular_covariance_is_told_and_answered_by_the_medians() -> None:
     told = PersonTrials(np.full(10, 250.0), np.linspace(0.01, 0.1, 10), NOBODY)
-    sound = fixed_fit(PRIOR, "rbf", Scale("log", 0.005, FIXED.centre, FIXED.unit), told, FIXED)
+    sound = fixed_fit(PRIOR, "rbf", Standardisation("log", 0.005, FIXED.centre, FIXED.unit), told, FIXED)
     assert sound.trouble is None
     noiseless = Hyperparameters(*(torch.tensor([value], dtype=torch.float64) for value in (40.0, 1.0, 0.0)))
     singular = replace(sound, processes=noiseless, log_prior=torch.zeros(1)).conditioned(told)

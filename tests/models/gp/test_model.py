@@ -31,7 +31,7 @@ from isiw.models.shared.history import FloorTreatment
 from isiw.studies import SimulatedSession, run_study
 from isiw.subjects.cohorts import cohort
 from isiw.testing import check_model
-from isiw.testing.requirements import usual_trials
+from isiw.testing.suites import usual_trials
 from known import known
 
 FEW = GaussianProcess(samples=64)

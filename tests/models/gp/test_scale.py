@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from isiw.models.gp.scale import Scale, Transform, expected_mep_mv, scale_of, transformed
+from isiw.models.gp.prior import Standardisation, Transform, expected_mep_mv, scale_of, transformed
 from isiw.types import FloatArray
 
 MEPS_MV = np.random.default_rng(1).lognormal(np.log(0.03), 0.8, 200)
@@ -45,6 +45,6 @@ def test_the_expected_mep_is_the_mean_of_simulated_ones(transform: Transform) ->
 
 @pytest.mark.parametrize("transform", TRANSFORMS)
 def test_the_jacobian_makes_densities_of_log_amplitudes(transform: Transform) -> None:
-    scale = Scale(transform, 0.005, centre=0.3, unit=0.7)
+    scale = Standardisation(transform, 0.005, centre=0.3, unit=0.7)
     high, low = (scale.standardised(np.array([0.04 * np.exp(step)])).item() for step in (1e-6, -1e-6))
     assert scale.log_jacobian(np.array([0.04])) == pytest.approx(np.log((high - low) / 2e-6), abs=1e-6)

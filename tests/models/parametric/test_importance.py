@@ -6,7 +6,7 @@ import torch
 from scipy.stats import multivariate_normal, multivariate_t
 
 from isiw.models.parametric.ascent import Modes
-from isiw.models.parametric.importance import T_DEGREES, Effort, Mixture, WeightedDraws, importance_sample, worth
+from isiw.models.parametric.importance import T_DEGREES, Effort, Proposal, WeightedDraws, importance_sample, worth
 from isiw.models.protocol import Tensor
 from isiw.types import ArrayLike
 
@@ -35,13 +35,13 @@ def exact() -> tuple[float, float]:
 
 
 def sample(seed: int, effort: Effort = Effort()) -> WeightedDraws:  # noqa: B008 - a frozen value
-    return importance_sample(two_modes, Mixture.prior(DIMENSIONS), torch.Generator().manual_seed(seed), effort)
+    return importance_sample(two_modes, Proposal.prior(DIMENSIONS), torch.Generator().manual_seed(seed), effort)
 
 
 def test_the_density_of_a_mixture_is_that_of_its_parts() -> None:
     generator = np.random.default_rng(0)
     scale = np.array([[2.0, 0.5], [0.5, 1.0]])
-    mixture = Mixture(tensor([0.3, 0.7]), tensor([[1.0, -1.0]]), torch.linalg.cholesky(tensor(scale)).unsqueeze(0))
+    mixture = Proposal(tensor([0.3, 0.7]), tensor([[1.0, -1.0]]), torch.linalg.cholesky(tensor(scale)).unsqueeze(0))
     points = generator.normal(size=(20, 2))
     expected = np.stack(
         [
@@ -54,7 +54,7 @@ def test_the_density_of_a_mixture_is_that_of_its_parts() -> None:
 
 def test_draws_of_a_mixture_have_its_density() -> None:
     # E_q[f/q] = 1 for any density f that q covers, here a normal one around the component.
-    mixture = Mixture.at(Modes(tensor([[1.0, 0.0]]), tensor([0.0]), 0.5 * torch.eye(2, dtype=torch.double)[None]))
+    mixture = Proposal.at(Modes(tensor([[1.0, 0.0]]), tensor([0.0]), 0.5 * torch.eye(2, dtype=torch.double)[None]))
     points = mixture.draw(20_000, torch.Generator().manual_seed(1))
     target = multivariate_normal([1.0, 0.0], 0.4 * np.eye(2)).logpdf(points.numpy())
     ratio = np.exp(target - torch.logsumexp(mixture.log_parts(points), dim=0).numpy())
@@ -88,7 +88,7 @@ def test_the_same_seed_gives_the_same_draws() -> None:
 
 
 def test_a_fit_keeps_the_prior_in_the_mixture_and_its_components_proper() -> None:
-    mixture = Mixture.prior(DIMENSIONS)
+    mixture = Proposal.prior(DIMENSIONS)
     points = mixture.draw(200, torch.Generator().manual_seed(1))
     one_counts = torch.full((200,), -torch.inf, dtype=torch.double)
     one_counts[0] = 0.0

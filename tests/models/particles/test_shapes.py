@@ -3,7 +3,7 @@ import pytest
 import torch
 
 from isiw.models.particles.shapes import TOGETHER, Shape, ShapeKind, facilitation, reaches
-from isiw.subjects.profiles import PeakProfile, TwoPeakProfile
+from isiw.subjects.responses import PeakProfile, TwoPeakProfile
 
 ISI_MS = np.linspace(-50, 400, 451)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from isiw.errors import InvalidValueError
-from isiw.strategy.threshold.recruitment import DISTANCES_PCT, ODD, RecruitmentBelief, log_likelihood
+from isiw.strategy.threshold.bayes import DISTANCES_PCT, ODD, RecruitmentBelief, log_likelihood
 from isiw.subjects.responses import EmgFloor, RecruitmentResponse
 from isiw.subjects.thresholds import StimulatedPerson
 

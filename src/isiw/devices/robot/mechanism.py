@@ -36,15 +36,7 @@ SEPARATION_RAD = (math.pi - math.atan2(2 * DAMPING * _ROOT, 1 - 2 * DAMPING**2))
 
 @dataclass(frozen=True)
 class SensorNoise:
-    """Noise SD of each sensor, white unless said otherwise.
-
-    Args:
-        valve_v: voltage of the valve command [V].
-        pressure_kpa: chamber pressure [kPa].
-        acceleration_m_s2: acceleration of the hammer [m/s²].
-        force_n: load cell [N].
-        emg_uv: EMG at rest, in the amplifier's band of 10–1000 Hz [µV RMS].
-    """
+    """Noise SD of each sensor: white, but for the EMG at rest, in the amplifier's band of 10–1000 Hz [µV RMS]."""
 
     valve_v: float = 0.02
     pressure_kpa: float = 0.5
@@ -58,13 +50,8 @@ class SensorNoise:
 
 
 @dataclass(frozen=True)
-class Event(Checked):
-    """When something happens in a tap, and how it varies from tap to tap.
-
-    Args:
-        mean_ms: its mean [ms].
-        sd_ms: its SD [ms].
-    """
+class EventTime(Checked):
+    """The time of an event of a tap, and its SD from tap to tap [ms]."""
 
     mean_ms: Positive
     sd_ms: NonNegative
@@ -99,16 +86,16 @@ class Geometry(Checked):
         hit: impact [after the valve command]; it varies by friction and travel together.
         contact: for how long the tendon decelerates the hammer.
         memg: artefact of the impact in the EMG [after the impact].
-        artefact_mv: amplitude of that artefact [mV]; 0 where there is no EMG.
+        artefact_mv: amplitude of that artefact [mV]; 0 if there is no EMG.
         load_cell: whether the hammer taps a load cell.
         faults: occasional faults.
         noise: of the sensors.
     """
 
-    descent: Event
-    hit: Event
-    contact: Event
-    memg: Event = Event(20.0, 0.5)
+    descent: EventTime
+    hit: EventTime
+    contact: EventTime
+    memg: EventTime = EventTime(20.0, 0.5)
     artefact_mv: NonNegative = 0.1
     load_cell: bool = False
     faults: Faults = field(default_factory=Faults)
@@ -152,7 +139,7 @@ class Geometry(Checked):
 
     @property
     def travel_sd_ms(self) -> float | None:
-        """What the travel adds to the SD of the hit [ms]; None where nothing is left for it."""
+        """The travel's share in the SD of the hit [ms]; None if nothing is left for it."""
         left = self.hit.sd_ms**2 - (self.friction_share * self.descent.sd_ms) ** 2
         return math.sqrt(left) if left >= 0 else None
 
@@ -172,14 +159,14 @@ class Geometry(Checked):
 
 @dataclass(frozen=True, eq=False)
 class Taps:
-    """What n taps did: the generator's truth, which detectors do not see. Times [ms after the valve command].
+    """The course of n taps: the generator's truth, which detectors do not see. Times [ms after the valve command].
 
     Args:
-        descent_ms: start of the descent; NaN where there is none, shape (n,).
-        hit_ms: contact with the tendon; NaN where there is none, shape (n,).
+        descent_ms: start of the descent; NaN if there is none, shape (n,).
+        hit_ms: contact with the tendon; NaN if there is none, shape (n,).
         rad_ms: natural frequency of each contact [rad/ms], shape (n,).
         speed_m_s: speed at contact [m/s], shape (n,).
-        memg_ms: artefact in the EMG; NaN where there is no contact, shape (n,).
+        memg_ms: artefact in the EMG; NaN if there is no contact, shape (n,).
         late_ms: by how much the valve opened late, included in the others, shape (n,).
         geometry: of all of them.
     """
@@ -287,7 +274,7 @@ def restitution() -> float:
 
 
 def _decelerated_ms(speed_m_s: float, drive_m_s2: float, rad_ms: float) -> float:
-    """How long the tendon's force exceeds the drive [ms]."""
+    """The time for which the tendon's force exceeds the drive [ms]."""
     peak_m_s2 = 1000 * speed_m_s * rad_ms
     phase = np.linspace(0, SEPARATION_RAD, 2001)
     exceeds = np.flatnonzero(-rebound(phase) * peak_m_s2 > drive_m_s2)

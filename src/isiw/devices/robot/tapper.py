@@ -14,34 +14,40 @@ import numpy as np
 
 from isiw.checks import MOST_DELAY_MS, Checked, choice, number
 from isiw.devices.protocol import DeviceInfo
-from isiw.devices.robot.mechanism import Event, Faults, Geometry, Taps, draw_taps
+from isiw.devices.robot.mechanism import EventTime, Faults, Geometry, Taps, draw_taps
 from isiw.devices.robot.waveforms import UNITS, record_emg, record_robot, sample_times_ms
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.signals.impact import DETECTION_LATENCY_MS, VALVE_MS, impact_time
 from isiw.trials import Channel, Stimulus, Sweep
 from isiw.types import FloatArray, Reference
 
+Trigger: TypeAlias = Literal["open-loop", "impact"]
+
+MOST_RATE_HZ = 100_000.0
+SWEEP_MS = 1000.0
+AFTER_PULSE_MS = 60.0
+ALONE_MS = 200.0  # TMS alone comes as late after the valve command, which then moves nothing, as a usual pulse
+
 
 def _geometry(
     descent_ms: tuple[float, float], hit_ms: tuple[float, float], contact_ms: tuple[float, float], **others: Any
 ) -> Geometry:
-    return Geometry(Event(*descent_ms), Event(*hit_ms), Event(*contact_ms), **others)
-
-
-def _later_person(hit_ms: float) -> Geometry:
-    return _geometry((hit_ms - 53, 3), (hit_ms, 1.5), (14, 0.5))
+    return Geometry(EventTime(*descent_ms), EventTime(*hit_ms), EventTime(*contact_ms), **others)
 
 
 PRESETS: Mapping[str, Geometry] = MappingProxyType(
     {
         # Table 3.2; the load cell is hard, so the contact is short.
         "bench": _geometry((121, 2), (188, 1), (2, 0.2), artefact_mv=0, load_cell=True),
-        "subject1": _geometry((131, 5), (183, 4), (15, 1.0), memg=Event(18, 1.0)),
-        "subject2": _geometry((126, 4), (172, 2), (9, 0.5), memg=Event(23, 0.5)),
-        "subject3": _geometry((115, 2), (176, 1), (17, 0.3), memg=Event(19, 0.3)),
-        "subject4": _geometry((129, 2), (182, 1), (15, 0.3), memg=Event(22, 1.5)),
+        "subject1": _geometry((131, 5), (183, 4), (15, 1.0), memg=EventTime(18, 1.0)),
+        "subject2": _geometry((126, 4), (172, 2), (9, 0.5), memg=EventTime(23, 0.5)),
+        "subject3": _geometry((115, 2), (176, 1), (17, 0.3), memg=EventTime(19, 0.3)),
+        "subject4": _geometry((129, 2), (182, 1), (15, 0.3), memg=EventTime(22, 1.5)),
         # Fig. 4.9: mean hits of five later people, each with an SD "below 2 ms"; the rest is that of an average person.
-        **{f"subject{number}": _later_person(hit_ms) for number, hit_ms in enumerate((183, 182, 173, 177, 188), 7)},
+        **{
+            f"subject{number}": _geometry((hit_ms - 53, 3), (hit_ms, 1.5), (14, 0.5))
+            for number, hit_ms in enumerate((183, 182, 173, 177, 188), 7)
+        },
         # Section 5.3.1: the cushion of the precision study, once as its SD says and once as its mistrials say.
         "cushion": _geometry((125, 3), (180, 1.93), (15, 0.5)),
         "timing-fault": _geometry(
@@ -55,14 +61,6 @@ PRESETS: Mapping[str, Geometry] = MappingProxyType(
 def preset(name: str) -> Geometry:
     """A geometry by its name."""
     return PRESETS[choice("the preset of the tapping robot", name, PRESETS)]
-
-
-Trigger: TypeAlias = Literal["open-loop", "impact"]
-
-MOST_RATE_HZ = 100_000.0
-SWEEP_MS = 1000.0
-AFTER_PULSE_MS = 60.0
-ALONE_MS = 200.0  # TMS alone comes as late after the valve command, which then moves nothing, as a usual pulse
 
 
 class Evoked(Protocol):
@@ -185,16 +183,16 @@ class Tapper:
             self.require_possible(stimulus.isi_ms)
         rng = np.random.default_rng([self._seed, stimulus.trial])
         taps = draw_taps(self.geometry, 1, rng)
-        if stimulus.isi_ms is not None:
-            return self._pair(taps, stimulus.isi_ms, rng)
-        return self._tap_alone(taps, rng) if stimulus.tap_alone else self._pulse_alone(taps, rng)
+        if stimulus.isi_ms is None and not stimulus.tap_alone:
+            return self._pulse_alone(taps, rng)
+        return self._tap(taps, stimulus.isi_ms, rng)
 
     def _after_impact_ms(self, isi_ms: float) -> float:
         """The commanded ISI, counted from the impact as predicted [ms]."""
         return isi_ms if self.settings.reference == "impact" else isi_ms - self.hit_delay.mean_ms
 
     def require_possible(self, isi_ms: float) -> None:
-        """Raise DeviceError where an ISI is too short to be triggered by the impact."""
+        """Raise DeviceError if an ISI is too short to be triggered by the impact."""
         after_impact_ms = self._after_impact_ms(isi_ms)
         if self.settings.trigger == "impact" and after_impact_ms < DETECTION_LATENCY_MS:
             raise DeviceError(
@@ -210,24 +208,15 @@ class Tapper:
         channels["emg"] = self._emg(times, nothing, ALONE_MS, rng)
         return Sweep(channels, t_tms_ms=VALVE_MS + ALONE_MS)
 
-    def _tap_alone(self, taps: Taps, rng: np.random.Generator) -> Sweep:
-        predicted_ms, times = self.hit_delay.mean_ms, self._times_ms(ALONE_MS)
-        channels = self._channels(times, taps, rng)
-        channels["emg"] = self._emg(times, taps, None, rng)
-        measured_ms = self._measured_hit_ms(channels)
-        if measured_ms is not None:
-            self.hit_delay.measured(measured_ms)
-        blind = not self.settings.accelerometer
-        return Sweep(channels, t_valve_ms=VALVE_MS, t_hit_ms=VALVE_MS + predicted_ms if blind else None)
-
-    def _pair(self, taps: Taps, isi_ms: float, rng: np.random.Generator) -> Sweep:
-        after_impact_ms = self._after_impact_ms(isi_ms) + self._jitter_ms(rng)
+    def _tap(self, taps: Taps, isi_ms: float | None, rng: np.random.Generator) -> Sweep:
+        """A tap, and unless it comes alone, a pulse."""
+        after_impact_ms = None if isi_ms is None else self._after_impact_ms(isi_ms) + self._jitter_ms(rng)
         predicted_ms = self.hit_delay.mean_ms
-        times = self._times_ms(predicted_ms + after_impact_ms)
+        times = self._times_ms(ALONE_MS if after_impact_ms is None else predicted_ms + after_impact_ms)
         channels = self._channels(times, taps, rng)
         measured_ms = self._measured_hit_ms(channels)
         start_ms = predicted_ms if self.settings.trigger == "open-loop" else measured_ms
-        pulse_ms = None if start_ms is None else start_ms + after_impact_ms
+        pulse_ms = None if start_ms is None or after_impact_ms is None else start_ms + after_impact_ms
         channels["emg"] = self._emg(times, taps, pulse_ms, rng)
         if measured_ms is not None:
             self.hit_delay.measured(measured_ms)
@@ -237,7 +226,7 @@ class Tapper:
             t_valve_ms=VALVE_MS,
             t_tms_ms=None if pulse_ms is None else VALVE_MS + pulse_ms,
             t_hit_ms=VALVE_MS + predicted_ms if blind else None,
-            isi_sd_ms=self.settings.expected_tap_sd_ms if blind else 0.0,
+            isi_sd_ms=self.settings.expected_tap_sd_ms if blind and isi_ms is not None else 0.0,
         )
 
     def _jitter_ms(self, rng: np.random.Generator) -> float:
@@ -246,7 +235,7 @@ class Tapper:
         return float(sd_ms * rng.standard_normal()) if sd_ms else 0.0
 
     def _times_ms(self, pulse_ms: float) -> FloatArray:
-        """A sweep of 1 s, or longer where the pulse comes late [ms after the valve command]."""
+        """A sweep of 1 s, or longer if the pulse comes late [ms after the valve command]."""
         return sample_times_ms(
             self.settings.rate_hz, max(SWEEP_MS, VALVE_MS + pulse_ms + AFTER_PULSE_MS), valve_ms=VALVE_MS
         )

@@ -44,13 +44,13 @@ def sample_times_ms(rate_hz: float, duration_ms: float, valve_ms: float) -> Floa
 
 
 def record_robot(since_valve_ms: FloatArray, taps: Taps, rng: np.random.Generator) -> dict[str, FloatArray]:
-    """What the robot's sensors record of n taps, by channel in the units of `UNITS`, each of shape (n, w)."""
+    """Sensor signals of n taps, by channel in the units of `UNITS`, each of shape (n, w)."""
     noise, shape = taps.geometry.noise, (len(taps.hit_ms), len(since_valve_ms))
     times = np.broadcast_to(since_valve_ms, shape)
     moved = acceleration_m_s2(times, taps) + noise.acceleration_m_s2 * rng.standard_normal(shape)
     channels = {
-        "valve": valve_v(times, taps.late_ms) + noise.valve_v * rng.standard_normal(shape),
-        "pressure": chamber_kpa(times, taps) + noise.pressure_kpa * rng.standard_normal(shape),
+        "valve": np.where(times >= taps.late_ms[:, None], VALVE_V, 0.0) + noise.valve_v * rng.standard_normal(shape),
+        "pressure": pressure_kpa(times - taps.late_ms[:, None]) + noise.pressure_kpa * rng.standard_normal(shape),
         "acceleration": np.clip(moved, -ACCELEROMETER_M_S2, ACCELEROMETER_M_S2),
     }
     if taps.geometry.load_cell:
@@ -97,16 +97,6 @@ def scale_of_mep(resting_mv: FloatArray, mep_mv: FloatArray, amplitude_mv: float
         return 0.0
     # The sum's amplitude is at least scale * ptp(mep) - ptp(rest), so this scale is enough.
     return float(scipy.optimize.brentq(missing_mv, 0.0, (amplitude_mv + np.ptp(resting_mv)) / np.ptp(mep_mv)))
-
-
-def valve_v(since_valve_ms: FloatArray, late_ms: FloatArray) -> FloatArray:
-    """Voltage of the valve command [V]."""
-    return np.where(since_valve_ms >= late_ms[:, None], VALVE_V, 0.0)
-
-
-def chamber_kpa(since_valve_ms: FloatArray, taps: Taps) -> FloatArray:
-    """Pressure of the chamber above the room's [kPa]."""
-    return pressure_kpa(since_valve_ms - taps.late_ms[:, None])
 
 
 def acceleration_m_s2(since_valve_ms: FloatArray, taps: Taps) -> FloatArray:

@@ -25,6 +25,14 @@ from isiw.text import plain
 from isiw.text.sanitize import read_number
 from isiw.trials import Stimulus
 
+_T = TypeVar("_T")
+
+SET_TOLERANCE_MS: Final = 0.5
+"""How far the ISI that the hardware was set to may be from the one that was asked for: what a coarse timer rounds."""
+
+_GLANCE_S: Final = 0.05  # how long an answer is awaited before looking whether the request is still the newest
+_RESERVE_S: Final = 0.2  # of a delivery's time, kept for what follows the answer
+
 LONGEST_REPLY: Final = 65_536
 """The longest answer that is read [bytes]; waveforms are not part of it."""
 
@@ -34,12 +42,7 @@ _POINT: Final = "Write numbers with a decimal point, as in 0.25, and without a u
 
 @dataclass(frozen=True)
 class Reply:
-    """An answer of other software.
-
-    Args:
-        values: its values by key, as text or as numbers.
-        source: where it is from, such as the name of a file.
-    """
+    """An answer of other software: its values, as text or as numbers, and where it is from, such as a file's name."""
 
     values: Mapping[str, object]
     source: str
@@ -50,7 +53,7 @@ class Reply:
         return DeviceError(f"{self.source}: {what}", got=shown, expected=expected, remedy=remedy or None)
 
     def require_known(self, keys: Iterable[str]) -> None:
-        """Raise where there is a key that nobody asked for, such as one that was misspelt."""
+        """Raise if there is a key that nobody asked for, such as one that was misspelt."""
         known = sorted(keys)
         for key in self.values:
             if key not in known:
@@ -61,7 +64,7 @@ class Reply:
         return self.values.get(key) is not None
 
     def text(self, key: str) -> str:
-        """The text of a key, without anything that a terminal would obey; empty where there is none."""
+        """The text of a key, without anything that a terminal would obey; empty if there is none."""
         return plain(str(self.values.get(key, "")))[:_LONGEST_SHOWN]
 
     def number(self, key: str, **bounds: Unpack[Bounds]) -> float:
@@ -80,7 +83,7 @@ class Reply:
             raise self.broken(error.what, got=error.got) from error
 
     def optional_number(self, key: str, **bounds: Unpack[Bounds]) -> float | None:
-        """The number of a key; None where there is none."""
+        """The number of a key; None if there is none."""
         return self.number(key, **bounds) if self.has(key) else None
 
     def whole(self, key: str) -> int:
@@ -91,17 +94,8 @@ class Reply:
         return int(value)
 
 
-_T = TypeVar("_T")
-
-SET_TOLERANCE_MS: Final = 0.5
-"""How far the ISI that the hardware was set to may be from the one that was asked for: what a coarse timer rounds."""
-
-_GLANCE_S: Final = 0.05  # how long an answer is awaited before looking whether the request is still the newest
-_RESERVE_S: Final = 0.2  # of a delivery's time, kept for what follows the answer
-
-
 class Verb(StrEnum):
-    """What is asked for."""
+    """The three kinds of request."""
 
     ARM = "arm"
     DELIVER = "deliver"
@@ -114,15 +108,7 @@ _KEYS: Final = frozenset({"token", "number", "said", "reason", "trial", "set_isi
 
 @dataclass(frozen=True)
 class Request:
-    """One request.
-
-    Args:
-        token: of the device object that asks.
-        number: counts up from 1.
-        verb: what is asked for.
-        timeout_s: how long an answer is awaited [s]; what is read later must not be obeyed.
-        stimulus: what to deliver.
-    """
+    """One request of a device object, which has the token; what is read after `timeout_s` must not be obeyed."""
 
     token: str
     number: int
@@ -131,7 +117,7 @@ class Request:
     stimulus: Stimulus | None = None
 
     def values(self) -> dict[str, str | int | float]:
-        """What is sent, in the order in which it is written; TMS alone has no `isi_ms`."""
+        """The values that are sent, in the order in which they are written; TMS alone has no `isi_ms`."""
         values: dict[str, str | int | float] = {"token": self.token, "number": self.number, "verb": self.verb.value}
         if self.stimulus is not None:
             values |= {"trial": self.stimulus.trial, "kind": "tms_alone" if self.stimulus.isi_ms is None else "pair"}
@@ -151,7 +137,7 @@ class Carrier(Protocol):
         """
 
     def reply(self, request: Request, wait_s: float) -> Reply | None:
-        """The answer to a request; None where there is none yet.
+        """The answer to a request; None if there is none yet.
 
         Args:
             request: the request.
@@ -162,7 +148,7 @@ class Carrier(Protocol):
         """
 
     def silence(self, request: Request) -> DeviceError:
-        """The error to raise where no answer came in time."""
+        """The error to raise if no answer came in time."""
 
 
 class Exchange:
@@ -203,7 +189,7 @@ class Exchange:
             raise DeviceError(f"{self._name} was stopped while it was being armed")
 
     def require_staged(self) -> None:
-        """Raise where it is not known to be armed."""
+        """Raise if it is not known to be armed."""
         require_staged(self._name, staged=self._staged)
 
     def deliver(self, stimulus: Stimulus, timeout_s: float, read: Callable[[Reply], _T]) -> _T:
@@ -254,7 +240,7 @@ class Exchange:
         except NotDelivered:
             raise
         except BaseException:
-            with self._sending, suppress(DeviceError):  # whoever calls `stop` after the failure is told
+            with self._sending, suppress(DeviceError):  # who calls `stop` after the failure gets the error
                 if self._newest is request:
                     self._sent(Verb.DISARM, self._stop_timeout_s)
             raise
@@ -293,7 +279,7 @@ class Exchange:
 
 
 def _require_answer_to(stimulus: Stimulus, reply: Reply) -> None:
-    """Raise where an answer is not about the stimulus that was asked for."""
+    """Raise if an answer is not about the stimulus that was asked for."""
     if (trial := reply.whole("trial")) != stimulus.trial:
         raise reply.broken("the answer is about another trial", got=trial, expected=f"trial {stimulus.trial}")
     if stimulus.isi_ms is None:
@@ -311,5 +297,5 @@ def _require_answer_to(stimulus: Stimulus, reply: Reply) -> None:
 
 
 def described(info: DeviceInfo | Mapping[str, Any], **known: Any) -> DeviceInfo:
-    """What a device says about itself, from a table of a configuration or from the object."""
+    """A device's description, from a table of a configuration or from the object."""
     return dataclasses.replace(from_table(DeviceInfo, info, "info"), **known)

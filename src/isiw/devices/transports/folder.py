@@ -40,7 +40,7 @@ class FolderDevice:
         folder: the folder that both sides reach; it must exist.
         info: what the device is, as a `DeviceInfo` or a table of its fields. Without channels the other software
             measures the MEP itself; with channels it writes the waveforms, a column a channel in their order.
-        rate_hz: sampling rate of the waveforms [Hz]; needed where there are channels.
+        rate_hz: sampling rate of the waveforms [Hz]; needed if there are channels.
         stage_timeout_s: how long arming may take [s].
         stop_timeout_s: how long each attempt to disarm may take [s]; below the session's 5 s.
         poll_s: how often the folder is looked at [s].
@@ -91,7 +91,7 @@ class FolderDevice:
         self._exchange.disarm()
 
     def unstage(self) -> None:
-        """Disarm, where that is not known to be done."""
+        """Disarm, if that is not known to be done."""
         if self._exchange.may_be_armed:
             self._exchange.disarm()
 
@@ -143,7 +143,7 @@ def _waveforms(path: Path, columns: int) -> FloatArray:
 
 
 def _text(path: Path, largest: int) -> str | None:
-    """The text of a file; None where there is none, or where it is just being written."""
+    """The text of a file; None if there is none, or if it is just being written."""
     try:
         with opened(path, links=False) as file:
             content = file.read(largest + 1)
@@ -157,7 +157,7 @@ def _text(path: Path, largest: int) -> str | None:
 
 
 def _remove(path: Path) -> None:
-    """Remove a file that was read; where the other side still has it open, it stays."""
+    """Remove a file that was read; if the other side still has it open, it stays."""
     with suppress(PermissionError):
         path.unlink(missing_ok=True)
 
@@ -201,7 +201,7 @@ class _Folder:
             raise
 
     def reply(self, request: Request, wait_s: float) -> Reply | None:
-        """The answer to a request, where it is there and whole."""
+        """The answer to a request, if it is there and whole."""
         until_s = time.monotonic() + wait_s
         while True:
             path = self._answer(request)
@@ -226,7 +226,6 @@ class _Folder:
             )
 
     def silence(self, request: Request) -> DeviceError:
-        """The error to raise where no whole answer came in time."""
         path = self._answer(request)
         if path.exists():
             return DeviceError(
@@ -242,7 +241,6 @@ class _Folder:
         )
 
     def waveforms_of(self, reply: Reply) -> Path:
-        """Where the waveforms of an answer are."""
         return self._waveforms_for(reply.text("token"), reply.whole("number"))
 
     def _waveforms_for(self, token: str, number: int) -> Path:
@@ -253,7 +251,7 @@ class _Folder:
 
 
 def _parsed(text: str, source: str) -> Reply | None:
-    """The values of a whole answer; None where its last line is still missing."""
+    """The values of a whole answer; None if its last line is still missing."""
     lines = [line.strip() for line in text.splitlines() if line.strip()]
     if not lines or lines[-1] != _END or not text.endswith(("\n", _END)):
         return None

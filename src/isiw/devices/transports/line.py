@@ -1,4 +1,4 @@
-"""An instrument that is told what to do in lines of text, over a serial port or TCP; a table says in which words.
+"""An instrument that is commanded by lines of text, over a serial port or TCP; a table has the words.
 
 A trial is: set the ISI, read it back, arm, fire, ask what came of it. What fails before the command to fire is sent
 gave nothing; what fails after it may have fired. That command is sent once.
@@ -18,8 +18,8 @@ from isiw.devices.protocol import Answer, DeviceInfo, Readiness, require_staged
 from isiw.devices.transports.exchange import described
 from isiw.devices.transports.line_exchange import Line, LineSettings
 from isiw.devices.transports.line_table import (
-    Exchange,
     LineCommands,
+    LineExchange,
     isi_ms_of,
     mep_mv_of,
     number_of,
@@ -41,7 +41,7 @@ class LineDevice:
         info: what it is, as in `isiw.DeviceInfo`: at least name and reference.
         commands: what it understands, as in `LineCommands`.
         line: how lines are exchanged, as in `LineSettings`.
-        measure: returns the `Measurement` or `Sweep` of the stimulus that was just given, where the instrument measures
+        measure: returns the `Measurement` or `Sweep` of the stimulus that was just given, if the instrument measures
             no MEP; takes the stimulus, the realised ISI as the instrument says it (None for a control trial) and the
             time that is left [s].
 
@@ -69,7 +69,8 @@ class LineDevice:
         self._staged = self._may_be_armed = False
 
     def _require_measured(self) -> None:
-        measured = self._commands.all_measure if self._measure is None else not self._commands.some_measure
+        measuring = self._commands.measuring
+        measured = all(measuring) if self._measure is None else not any(measuring)
         if not measured:
             raise InvalidValueError(
                 "each MEP must be measured by the instrument or by `measure`, and by one of them only",
@@ -111,7 +112,7 @@ class LineDevice:
             return self._outcome(era, stimulus, said, end_s)
 
     def stop(self) -> None:
-        """Disarm: over the connection that there is, or over a fresh one where that one fails."""
+        """Disarm: over the connection that there is, or over a fresh one if that one fails."""
         self._staged, self._since_stop = False, object()
         with self._stopping:
             if self._busy.acquire(timeout=self._settings.timeout_s):
@@ -130,7 +131,7 @@ class LineDevice:
         finally:
             self._close()
 
-    def _firing(self, stimulus: Stimulus) -> Exchange:
+    def _firing(self, stimulus: Stimulus) -> LineExchange:
         if stimulus.isi_ms is not None:
             return self._commands.fire
         if not stimulus.tap_alone:
@@ -155,7 +156,7 @@ class LineDevice:
             raise NotDelivered("no time is left to fire", remedy="Give the session a longer timeout_s.")
 
     def _outcome(self, era: object, stimulus: Stimulus, said: Mapping[str, str], end_s: float) -> Answer:
-        """What came of a stimulus that was given."""
+        """The outcome of a stimulus that was given."""
         if self._commands.result is not None:
             said = {**said, **self._ask(era, self._commands.result, stimulus, end_s=end_s)}
         isi_ms, mep_mv = isi_ms_of(said), mep_mv_of(said)
@@ -168,7 +169,7 @@ class LineDevice:
         return Measurement(mep_mv, isi_ms, background_rms_uv=number_of(said, "background_rms_uv"))
 
     def _ask(
-        self, era: object, exchange: Exchange, stimulus: Stimulus | None = None, *, end_s: float
+        self, era: object, exchange: LineExchange, stimulus: Stimulus | None = None, *, end_s: float
     ) -> dict[str, str]:
         """One exchange, unless the device was stopped since."""
         with self._turn(era) as line:
@@ -182,8 +183,8 @@ class LineDevice:
                 given_up=lambda: self._since_stop is not era,
             )
 
-    def _limit_s(self, exchange: Exchange) -> float:
-        """How long an answer may take at most [s]; what fires and measures has all the time that is left."""
+    def _limit_s(self, exchange: LineExchange) -> float:
+        """The longest that an answer may take [s]; commands that fire and measure have all the time that is left."""
         if exchange.timeout_s is not None:
             return exchange.timeout_s
         patient = (*self._commands.firing, self._commands.result)

@@ -20,7 +20,7 @@ from isiw.checks import (
     Positive,
     choice,
 )
-from isiw.devices.transports.line_table import Connection, Exchange, command_values
+from isiw.devices.transports.line_table import ByteConnection, LineExchange, command_values
 from isiw.errors import DeviceError, DeviceTimeoutError
 from isiw.text.sanitize import read_whole
 
@@ -39,12 +39,12 @@ _sequence = itertools.count(secrets.randbelow(900_000) + 1)
 
 @dataclass(frozen=True)
 class LineSettings(Checked):
-    """How lines are exchanged.
+    """Settings of the exchange of lines.
 
     Args:
         baud: symbols a second of a serial port [1/s].
         line_end: what ends a command. Answers may end by a line feed, a carriage return, or both.
-        timeout_s: how long the instrument may take to answer where nothing else is said, and to take a command [s].
+        timeout_s: how long the instrument may take to answer if nothing else is said, and to take a command [s].
         connect_s: how long it may take from opening the connection until it says that it is disarmed [s]; boards that
             start again when their port is opened need a second or two. `stop` may need this and twice `timeout_s`.
         isi_tolerance_ms: how far the ISI that is read back may be from the one that was set [ms].
@@ -60,18 +60,18 @@ class LineSettings(Checked):
 class Line:
     """Commands and answers over one connection. Everything that fails is a `DeviceError`.
 
-    Answers are told from what came late by their sequence number. Where an instrument has none, what has come before a
+    An answer differs from what came late by its sequence number. If an instrument has none, what has come before a
     command is thrown away, and a connection whose last answer is missing is not `trusted` any more.
     """
 
-    def __init__(self, connection: Connection, settings: LineSettings, refusal: str) -> None:
+    def __init__(self, connection: ByteConnection, settings: LineSettings, refusal: str) -> None:
         self._connection, self._settings, self._refusal = connection, settings, refusal
         self._incoming = _Lines()
         self.trusted = True
 
     def ask(
         self,
-        exchange: Exchange,
+        exchange: LineExchange,
         trial: int = 0,
         isi_ms: float | None = None,
         *,
@@ -94,7 +94,7 @@ class Line:
         return said
 
     def drain(self) -> None:
-        """Throw away what has come so far, and say so; raises where the connection is broken."""
+        """Throw away what has come so far, and say so; raises if the connection is broken."""
         for _ in range(_MOST_READS):  # an instrument that never stops sending must not hold this up
             data = self._guarded(lambda: self._connection.receive(wait=False))
             if not data:
@@ -115,7 +115,7 @@ class Line:
             _log.warning("closing the connection failed: %s", error)
 
     def _answer(
-        self, command: str, exchange: Exchange, number: int, deadline_s: float, given_up: Callable[[], bool]
+        self, command: str, exchange: LineExchange, number: int, deadline_s: float, given_up: Callable[[], bool]
     ) -> dict[str, str]:
         others = _Others()
         try:
@@ -150,7 +150,7 @@ class Line:
             self._incoming.add(self._guarded(self._connection.receive))
 
     def _guarded(self, use: Callable[[], _T]) -> _T:
-        """What a connection does, where it still stands."""
+        """Use a connection; raises a `DeviceError` if it is broken."""
         try:
             return use()
         except OSError as error:

@@ -2,7 +2,7 @@ r"""The table of an instrument's commands: what is sent, and what the answer mus
 
     set = { send = "{sequence} SET {isi_us}", reply = '(?P<sequence>\d+) OK' }
 
-`send` may hold the fields {sequence}, {trial}, and the ISI as {isi_ms}, {isi_us} or {isi_s}, with a format where one is
+`send` may hold the fields {sequence}, {trial}, and the ISI as {isi_ms}, {isi_us} or {isi_s}, with a format if one is
 needed: {isi_ms:.1f}. `reply` is a regular expression that the whole line must match; named groups hold what it says.
 """
 
@@ -24,27 +24,34 @@ _TCP = "socket://"
 _MOST_BYTES = 4096
 _GLANCE_S = 0.05
 
+_MS: Final = {"isi_ms": 1.0, "isi_us": 1e-3, "isi_s": 1e3}
+_MV: Final = {"mep_mv": 1.0, "mep_uv": 1e-3}
+_ISI, _MEP = frozenset(_MS), frozenset(_MV)
+_OUTCOME = _MEP | {"background_rms_uv"}
+_STATE = frozenset({"coil_c", "intensity_pct_mso"})
+_NONE: frozenset[str] = frozenset()
 
-class Connection(Protocol):
+
+class ByteConnection(Protocol):
     """Bytes to and from an instrument; whatever fails is an OSError."""
 
     def send(self, data: bytes) -> None:
         """Send all of it, or fail within the time that the connection was opened with."""
 
     def receive(self, *, wait: bool = True) -> bytes:
-        """What has come, a few thousand bytes at most; nothing where nothing came, after a glance of 50 ms at most."""
+        """The bytes that have come, a few thousand at most; none if nothing came within 50 ms."""
 
     def close(self) -> None:
         """Close it; calling it again is harmless."""
 
 
-def open_connection(address: str, baud: int, timeout_s: float) -> Connection:
+def open_connection(address: str, baud: int, timeout_s: float) -> ByteConnection:
     """Open a connection."""
     return _Tcp(address, timeout_s) if address.startswith(_TCP) else _Serial(address, baud, timeout_s)
 
 
 def require_address(address: str) -> None:
-    """Raise where an address cannot be one."""
+    """Raise if an address cannot be one."""
     if not address or (address.startswith(_TCP) and None in _host_and_port(address)):
         raise InvalidValueError(
             "the address of an instrument is incomplete",
@@ -63,8 +70,6 @@ def _host_and_port(address: str) -> tuple[str | None, int | None]:
 
 
 class _Tcp:
-    """A TCP connection."""
-
     def __init__(self, address: str, timeout_s: float) -> None:
         host, port = _host_and_port(address)
         self._timeout_s = timeout_s
@@ -125,22 +130,14 @@ class _Serial:
         self._port.close()
 
 
-_MS: Final = {"isi_ms": 1.0, "isi_us": 1e-3, "isi_s": 1e3}
-_MV: Final = {"mep_mv": 1.0, "mep_uv": 1e-3}
-_ISI, _MEP = frozenset(_MS), frozenset(_MV)
-_OUTCOME = _MEP | {"background_rms_uv"}
-_STATE = frozenset({"coil_c", "intensity_pct_mso"})
-_NONE: frozenset[str] = frozenset()
-
-
 @dataclass(frozen=True)
-class Exchange(Checked):
+class LineExchange(Checked):
     r"""A command and the answer that it must get.
 
     Args:
         send: what is sent, without the end of the line: ASCII, with fields such as {sequence} and {isi_ms}.
         reply: the regular expression that the whole answer must match, with groups such as (?P<sequence>\d+).
-        timeout_s: how long the answer may take [s]; None where the whole line's time holds, and for what fires and
+        timeout_s: how long the answer may take [s]; None if the whole line's time holds, and for what fires and
             measures, all the time that a delivery has.
     """
 
@@ -152,7 +149,10 @@ class Exchange(Checked):
         super().__post_init__()
         if not self.send.isascii() or not self.send.isprintable() or not self.send:
             raise InvalidValueError("a command must be one line of ASCII", got=self.send)
-        self._require_pattern()
+        try:
+            re.compile(self.reply)
+        except re.error as error:
+            raise InvalidValueError(f"an answer's pattern is invalid: {error}", got=self.reply) from error
         try:
             self.command(command_values(1, 0, 1.5))
         except (ValueError, KeyError, IndexError, AttributeError) as error:
@@ -169,20 +169,14 @@ class Exchange(Checked):
                 expected=r"{sequence} in the command and (?P<sequence>\d+) in the answer",
             )
 
-    def _require_pattern(self) -> None:
-        try:
-            re.compile(self.reply)
-        except re.error as error:
-            raise InvalidValueError(f"an answer's pattern is invalid: {error}", got=self.reply) from error
-
     @property
     def fields(self) -> frozenset[str]:
-        """What is filled into the command."""
+        """The names of the values that are filled into the command."""
         return frozenset(name for _, name, _, _ in Formatter().parse(self.send) if name is not None)
 
     @property
     def groups(self) -> frozenset[str]:
-        """What the answer says."""
+        """The names of the values in the answer."""
         return frozenset(re.compile(self.reply).groupindex)
 
     @property
@@ -195,14 +189,14 @@ class Exchange(Checked):
         return self.send.format_map(values)
 
     def match(self, line: str) -> dict[str, str] | None:
-        """What an answer says by group; None where the line is no answer to this command."""
+        """The values in an answer by group; None if the line is no answer to this command."""
         found = re.fullmatch(self.reply, line)
         return None if found is None else {name: said for name, said in found.groupdict().items() if said is not None}
 
 
 @dataclass(frozen=True)
 class LineCommands:
-    r"""What an instrument understands. Each is an `Exchange`, or a table with its arguments.
+    r"""The commands of an instrument, each a `LineExchange` or a table with its arguments.
 
     Args:
         disarm: it cannot fire from here on; must work in any state.
@@ -211,30 +205,30 @@ class LineCommands:
         arm: it may fire from here on.
         fire: gives a pair of stimuli.
         alone: gives the magnetic pulse without a tap, whatever ISI is set.
-        tap_alone: gives the tap without the pulse; None where it cannot.
+        tap_alone: gives the tap without the pulse; None if it cannot.
         result: asks what came of it: the realised ISI, if the answer to `fire` does not say it, and the MEP.
         status: asks whether it is ready; the answer may say coil_c [°C] and intensity_pct_mso [% MSO].
-        refusal: what an answer looks like that refuses any command, with (?P<reason>.*) where it says why; empty where
-            it does not refuse in words. It holds (?P<sequence>\d+) where the answers do.
+        refusal: what an answer looks like that refuses any command, with (?P<reason>.*) where it says why; empty if
+            it does not refuse in words. It holds (?P<sequence>\d+) if the answers do.
     """
 
-    disarm: Exchange
-    set: Exchange
-    read_back: Exchange
-    arm: Exchange
-    fire: Exchange
-    alone: Exchange
-    tap_alone: Exchange | None = None
-    result: Exchange | None = None
-    status: Exchange | None = None
+    disarm: LineExchange
+    set: LineExchange
+    read_back: LineExchange
+    arm: LineExchange
+    fire: LineExchange
+    alone: LineExchange
+    tap_alone: LineExchange | None = None
+    result: LineExchange | None = None
+    status: LineExchange | None = None
     refusal: str = ""
 
     def __post_init__(self) -> None:
         for name, value in list(self._given()):
             if isinstance(value, Mapping):
-                object.__setattr__(self, name, from_table(Exchange, value, f"commands.{name}"))
+                object.__setattr__(self, name, from_table(LineExchange, value, f"commands.{name}"))
         for name, exchange in self._given():
-            if not isinstance(exchange, Exchange):
+            if not isinstance(exchange, LineExchange):
                 raise InvalidValueError(
                     f"the command {name} must be a table", got=exchange, expected='{ send = "…", reply = "…" }'
                 )
@@ -265,19 +259,14 @@ class LineCommands:
         return _NONE if self.result is None else self.result.groups
 
     @property
-    def firing(self) -> tuple[Exchange, ...]:
+    def firing(self) -> tuple[LineExchange, ...]:
         """The commands that give a stimulus."""
         return tuple(each for each in (self.fire, self.alone, self.tap_alone) if each is not None)
 
     @property
-    def some_measure(self) -> bool:
-        """True if an answer says an MEP."""
-        return any(each.groups & _MEP for each in self.firing) or bool(self._result_groups & _MEP)
-
-    @property
-    def all_measure(self) -> bool:
-        """True if the MEP of every kind of trial is said."""
-        return all((each.groups | self._result_groups) & _MEP for each in self.firing)
+    def measuring(self) -> list[bool]:
+        """True for each kind of trial whose MEP an answer says."""
+        return [bool((each.groups | self._result_groups) & _MEP) for each in self.firing]
 
 
 _FIELDS: Final = {
@@ -300,8 +289,8 @@ _GROUPS: Final = {
 """What an answer may say besides its sequence number."""
 
 
-def _require_known(name: str, exchange: Exchange) -> None:
-    """Raise where a command holds, or its answer says, what has no meaning there."""
+def _require_known(name: str, exchange: LineExchange) -> None:
+    """Raise if a command holds, or its answer says, what has no meaning there."""
     rules = (
         ("command", exchange.fields, _FIELDS.get(name, _NONE)),
         ("answer", exchange.groups, _GROUPS.get(name, _NONE)),
@@ -322,24 +311,24 @@ def _require_one(names: frozenset[str], there: frozenset[str], what: str, expect
 
 
 def command_values(sequence: int, trial: int, isi_ms: float | None) -> dict[str, float]:
-    """What may be filled into a command."""
+    """The values that may be filled into a command."""
     isi = {} if isi_ms is None else {name: _plain(isi_ms / ms) for name, ms in _MS.items()}
     return {"sequence": sequence, "trial": trial, **isi}
 
 
 def _plain(value: float) -> float:
-    """A number without the digits that only binary fractions have, and whole where it is."""
+    """A number without the digits that only binary fractions have, and whole if it is."""
     rounded = round(value, 9)
     return int(rounded) if rounded == int(rounded) else rounded
 
 
 def isi_ms_of(said: Mapping[str, str]) -> float | None:
-    """The ISI that an answer says [ms]; None where it says none."""
+    """The ISI that an answer says [ms]; None if it says none."""
     return _value(said, _MS)
 
 
 def mep_mv_of(said: Mapping[str, str]) -> float | None:
-    """The MEP that an answer says [mV]; None where it says none."""
+    """The MEP that an answer says [mV]; None if it says none."""
     return _value(said, _MV)
 
 
@@ -349,7 +338,7 @@ def _value(said: Mapping[str, str], units: Mapping[str, float]) -> float | None:
 
 
 def number_of(said: Mapping[str, str], name: str) -> float | None:
-    """A number that an answer says; None where it does not."""
+    """A number that an answer says; None if it does not."""
     if name not in said:
         return None
     try:

@@ -25,6 +25,10 @@ from isiw.trials import Channel, Stimulus, Sweep
 
 _GLANCE_S: Final = 0.02
 _MOST_KEPT: Final = 8
+_KEYS: Final = ("t_fired", "t_valve_ms", "t_hit_ms", "isi_sd_ms")
+_SEARCH_S: Final = 1.0  # in half a second liblsl finds only some of the streams
+_CLOCKS_S: Final = 0.05  # how far two clocks of the network may seem to be apart after their correction
+_BUFFER_S: Final = 10.0
 
 
 class Markers:
@@ -67,7 +71,7 @@ class Markers:
             )
 
     def correction_s(self, timeout_s: float) -> float:
-        """What has to be added to times of an echo to be on the local clock [s]."""
+        """The correction of the times of an echo to the local clock [s]."""
         try:
             return float(self._inlet.time_correction(timeout_s))
         except (self._lsl.util.TimeoutError, self._lsl.util.LostError) as error:
@@ -93,7 +97,7 @@ class Markers:
         return reply
 
     def silence(self, request: Request) -> DeviceError:
-        """The error to raise where no echo came in time."""
+        """The error to raise if no echo came in time."""
         others = f", and {self._others} echoes of other requests" if self._others else ""
         return DeviceTimeoutError(
             f"no echo of the request to {request.verb}",
@@ -122,7 +126,6 @@ class Markers:
 
 
 def _parsed(content: str, source: str) -> Reply:
-    """The values of an echo."""
     broken = Reply({}, source).broken
     if len(content) > LONGEST_REPLY:
         raise broken("too long", got=len(content), expected=f"at most {LONGEST_REPLY} characters")
@@ -133,14 +136,6 @@ def _parsed(content: str, source: str) -> Reply:
     if not isinstance(values, dict):
         raise broken("not a JSON object", got=content)
     return Reply(values, source)
-
-
-__all__ = ["LslChannel", "LslDevice"]
-
-_KEYS: Final = ("t_fired", "t_valve_ms", "t_hit_ms", "isi_sd_ms")
-_SEARCH_S: Final = 1.0  # in half a second liblsl finds only some of the streams
-_CLOCKS_S: Final = 0.05  # how far two clocks of the network may seem to be apart after their correction
-_BUFFER_S: Final = 10.0
 
 
 class LslDevice:
@@ -220,7 +215,7 @@ class LslDevice:
             self._exchange.disarm()
 
     def unstage(self) -> None:
-        """Disarm, where that is not known to be done, and let go of the streams of samples."""
+        """Disarm, if that is not known to be done, and let go of the streams of samples."""
         if self._exchange.may_be_armed:
             self._exchange.disarm()
         self._streams = {}
@@ -303,7 +298,7 @@ class LslDevice:
 
 
 def _left_s(end_s: float) -> float:
-    """How long it is until then, by the monotonic clock [s]; at least 0."""
+    """The time until then, by the monotonic clock [s]; at least 0."""
     return max(0.0, end_s - time.monotonic())
 
 
@@ -336,5 +331,5 @@ def _rates_hz(channels: Mapping[str, LslChannel]) -> dict[str, float]:
 def _pylsl() -> Any:
     try:
         return importlib.import_module("pylsl")
-    except (ImportError, RuntimeError) as error:  # the latter where liblsl itself is missing
+    except (ImportError, RuntimeError) as error:  # the latter if liblsl itself is missing
         raise ConfigError("pylsl is not installed", got=f"{error}", remedy='pip install "isiw[lsl]"') from error

@@ -45,13 +45,13 @@ class LslChannel(Checked):
 
 
 class Inlet(Protocol):
-    """What is used of a `pylsl.StreamInlet` of numbers."""
+    """The used part of a `pylsl.StreamInlet` of numbers."""
 
     def pull_chunk(self, timeout: float, max_samples: int, *, as_numpy: bool) -> tuple[FloatArray, FloatArray]:
         """Samples, shape (w, channels), and their timestamps [s], shape (w,)."""
 
     def time_correction(self, timeout: float) -> float:
-        """What has to be added to the sender's timestamps to be on the local clock [s]."""
+        """The correction of the sender's timestamps to the local clock [s]."""
 
 
 class SampleStream:
@@ -73,7 +73,7 @@ class SampleStream:
         self._correction_s = 0.0
 
     def require_live(self, clock: Callable[[], float], history_s: float) -> None:
-        """Raise where the stream is not running before anything is delivered."""
+        """Raise if the stream is not running before anything is delivered."""
         try:
             if not self._update(LATE_S):
                 raise self._silent()
@@ -155,7 +155,7 @@ class SampleStream:
 
 
 def check_timing(name: str, times_s: FloatArray, rate_hz: float, max_jitter_ms: float) -> None:
-    """Raise where samples are missing, or do not come at their rate."""
+    """Raise if samples are missing, or do not come at their rate."""
     if times_s.size < 2:
         raise DeviceError(f"the stream {name} has no samples in the sweep")
     steps_ms = 1e3 * (np.diff(times_s) - 1 / rate_hz)

@@ -39,14 +39,13 @@ from isiw.checks import (
     number,
     whole,
 )
-from isiw.dissertation.interval.task import score_pct
+from isiw.dissertation.interval.task import SHORTEST_MS, score_pct
 from isiw.errors import InvalidValueError
 from isiw.lazy import botorch, gpytorch, torch
 from isiw.log.headers import LONGEST_MS, Block
 from isiw.types import FloatArray
 
 SHORTEST_AIM_MS: Final = 50.0
-SHORTEST_MS: Final = 20.0
 TAIL: Final = 3
 """Degrees of freedom of the timing noise: now and then a press comes far too early or too late."""
 
@@ -107,7 +106,7 @@ def produce(block: Block, people: int, seed: int, producer: Producer | None = No
 
 
 class _State(NamedTuple):
-    """What people remember, m, and the SD of their search, s [ms], shape (b,)."""
+    """The remembered interval, m, and the SD of the search, s [ms], shape (b,)."""
 
     memory_ms: FloatArray
     search_ms: FloatArray
@@ -121,7 +120,7 @@ def _begun(law: Producer, block: Block, person: FloatArray) -> _State:
 
 
 def _tried(law: Producer, state: _State, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """What everybody aims at, and what they produce [ms], shape (b,) each."""
+    """The intervals that everybody aims at, and those that they produce [ms], shape (b,) each."""
     people = len(state.memory_ms)
     searching, pressing = rng.standard_normal((2, people))
     timing = rng.standard_t(TAIL, people) / np.sqrt(TAIL / (TAIL - 2))

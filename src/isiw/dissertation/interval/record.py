@@ -64,27 +64,22 @@ class ProductionRecord:
         Columns mode, target_ms, scale_pct, n, mean_ms, sd_ms (of the n trials; 0 for one), and near, the share within
         20 ms of the target.
         """
-        return pd.DataFrame([_row(block, self._produced_ms(index)) for index, block in self._begun()])
-
-    def _begun(self) -> list[tuple[int, Block]]:
-        begun = {production.block for production in self.productions}
-        return [(index, block) for index, block in enumerate(self.header.blocks) if index in begun]
-
-    def _produced_ms(self, block: int) -> list[float]:
-        return [production.produced_ms for production in self.productions if production.block == block]
-
-
-def _row(block: Block, produced_ms: list[float]) -> dict[str, float]:
-    times_ms = np.array(produced_ms)
-    return {
-        "mode": block.mode,
-        "target_ms": block.target_ms,
-        "scale_pct": block.scale_pct,
-        "n": len(times_ms),
-        "mean_ms": float(times_ms.mean()),
-        "sd_ms": float(times_ms.std()),
-        "near": float(np.mean(np.abs(times_ms - block.target_ms) <= NEAR_MS)),
-    }
+        rows: list[dict[str, float]] = []
+        for index, block in enumerate(self.header.blocks):
+            times_ms = np.array([each.produced_ms for each in self.productions if each.block == index])
+            if times_ms.size:
+                rows.append(
+                    {
+                        "mode": block.mode,
+                        "target_ms": block.target_ms,
+                        "scale_pct": block.scale_pct,
+                        "n": len(times_ms),
+                        "mean_ms": float(times_ms.mean()),
+                        "sd_ms": float(times_ms.std()),
+                        "near": float(np.mean(np.abs(times_ms - block.target_ms) <= NEAR_MS)),
+                    }
+                )
+        return pd.DataFrame(rows)
 
 
 def begin_log(

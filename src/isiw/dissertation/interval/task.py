@@ -6,22 +6,41 @@ import math
 import queue
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from isiw.checks import choice, number, whole
+from isiw.checks import choice, number
 from isiw.dissertation.interval.record import ProductionRecord, begin_log, continue_log, read_productions
-from isiw.errors import DeviceError, InvalidValueError
+from isiw.errors import DeviceError
 from isiw.log.headers import LONGEST_MS, MODES, Block, Production
 from isiw.log.schema import Event
 from isiw.log.writer import LogWriter
 from isiw.session.terminal import Keys, Screen, somebody_there
 from isiw.text.sanitize import counted
 from isiw.types import ArrayLike, FloatArray
+
+__all__ = ["SCORE_VARIANCE_MS2", "SESSIONS", "Block", "answer", "feedback", "score_pct", "session_blocks"]
+
+SCORE_VARIANCE_MS2: Final = 100.0
+"""V of equation 6.1 [ms²]. The text prints ms; its own example, a score of 70 at 294 ms, is that of ms²."""
+
+SESSIONS: Final[dict[int, tuple[Block, ...]]] = {
+    1: tuple(Block(mode, 300.0) for mode in (1, 2, 3, 4)),
+    2: tuple(Block(mode, 500.0) for mode in (1, 2, 3, 4)),
+    3: tuple(Block(mode, 300.0, scale_pct=50.0) for mode in (1, 2)),
+}
+"""The blocks of the three sessions [Kim2020, 6.2.3]."""
+
+_BAR = 40
+
+SHORTEST_MS: Final = 20.0
+"""Shorter than anybody's two presses; two keys that a stalled terminal hands over together lie closer."""
+
+REST_S: Final = 120.0
+"""Between blocks [s] [Kim2020, 6.2.3]."""
 
 START: Final = "f"
 END: Final = "j"
@@ -57,7 +76,7 @@ class Presses:
         self.left = True
 
     def next_ms(self) -> float | None:
-        """Wait for the next interval [ms]; None where the person leaves instead."""
+        """Wait for the next interval [ms]; None if the person leaves instead."""
         while not self.left:
             try:
                 return self._intervals.get(timeout=_GLANCE_S)
@@ -70,27 +89,12 @@ class Presses:
             self._begun_s = now_s
 
 
-__all__ = ["SCORE_VARIANCE_MS2", "SESSIONS", "Block", "answer", "feedback", "score_pct", "session_blocks"]
-
-SCORE_VARIANCE_MS2: Final = 100.0
-"""V of equation 6.1 [ms²]. The text prints ms; its own example, a score of 70 at 294 ms, is that of ms²."""
-
-SESSIONS: Final[dict[int, tuple[Block, ...]]] = {
-    1: tuple(Block(mode, 300.0) for mode in (1, 2, 3, 4)),
-    2: tuple(Block(mode, 500.0) for mode in (1, 2, 3, 4)),
-    3: tuple(Block(mode, 300.0, scale_pct=50.0) for mode in (1, 2)),
-}
-"""The blocks of the three sessions [Kim2020, 6.2.3]."""
-
-_BAR = 40
-
-
 def session_blocks(session: int, modes: Iterable[int] = (), trials: int = 200) -> tuple[Block, ...]:
     """The blocks of a session.
 
     Args:
         session: 1, 2 or 3.
-        modes: only these, in this order; all of the session where there are none.
+        modes: only these, in this order; all of the session if there are none.
         trials: in each block.
 
     Raises:
@@ -117,17 +121,14 @@ def score_pct(produced_ms: ArrayLike, target_ms: float, scale_pct: float = 100.0
 
 
 def answer(block: Block, index: int, trial: int, produced_ms: float, seed: int) -> Production:
-    """What a produced interval is answered with, as it is logged."""
-    if not (math.isfinite(produced_ms) and produced_ms > 0):
-        raise InvalidValueError("a produced interval must be a positive time in ms", got=produced_ms)
-    seed, trial = whole("seed", seed, least=0), whole("trial", trial, least=0)
+    """The answer to a produced interval, as it is logged."""
     score = float(score_pct(produced_ms, block.target_ms, block.scale_pct))
     light = bool(np.random.default_rng([seed, trial]).random() < score / 100) if block.mode == 2 else None
     return Production(trial=trial, block=index, produced_ms=produced_ms, score_pct=score, light=light)
 
 
 def feedback(block: Block, production: Production) -> str:
-    """What a person sees after a trial."""
+    """The feedback that a person sees after a trial."""
     target, produced = f"target {block.target_ms:.0f} ms", production.produced_ms
     if block.mode == 1:
         filled = round(_BAR * production.score_pct / 100)
@@ -137,15 +138,6 @@ def feedback(block: Block, production: Production) -> str:
     if block.mode == 3:
         return f"{target}, yours {produced:.0f} ms"
     return f"{target}, off by {abs(produced - block.target_ms):.0f} ms"
-
-
-SHORTEST_MS: Final = 20.0
-"""Shorter than anybody's two presses; two keys that a stalled terminal hands over together lie closer."""
-
-REST_S: Final = 120.0
-"""Between blocks [s] [Kim2020, 6.2.3]."""
-
-_NAP_S = 0.2
 
 
 def run_task(
@@ -161,7 +153,7 @@ def run_task(
         rest_s: between blocks [s].
 
     Returns:
-        What is in the log; `left` says what is missing where the person left before the end.
+        What is in the log; `left` says what is missing if the person left before the end.
 
     Raises:
         DeviceError: nobody is at a terminal, or its keys cannot be timed.
@@ -223,12 +215,12 @@ def _conduct(record: ProductionRecord, log: LogWriter, rest_s: float) -> Product
 
 def _open_block(record: ProductionRecord, index: int, screen: Screen, presses: Presses, rest_s: float) -> None:
     """Rest, and say what comes; the target of modes 1 and 2 stays hidden."""
-    with _resting(presses):
-        end_s = time.monotonic() + rest_s
-        while (left_s := end_s - time.monotonic()) > 0 and not presses.left:
-            screen.count_down(f"Rest: {math.ceil(left_s) // 60}:{math.ceil(left_s) % 60:02d} left")
-            time.sleep(min(left_s, _NAP_S))
-        screen.counted_down()
+    presses.resting, end_s = True, time.monotonic() + rest_s
+    while (left_s := end_s - time.monotonic()) > 0 and not presses.left:
+        screen.count_down(f"Rest: {math.ceil(left_s) // 60}:{math.ceil(left_s) % 60:02d} left")
+        time.sleep(min(left_s, _GLANCE_S))
+    screen.counted_down()
+    presses.resting = False
     block = record.header.blocks[index]
     target = f"target {block.target_ms:.0f} ms" if block.mode in {3, 4} else "find the hidden target"
     place = f"Block {index + 1} of {len(record.header.blocks)}"
@@ -237,19 +229,10 @@ def _open_block(record: ProductionRecord, index: int, screen: Screen, presses: P
     screen.say(f"{place}: {trials}, feedback: {MODES[block.mode]}; {target}.")
 
 
-@contextmanager
-def _resting(presses: Presses) -> Iterator[None]:
-    presses.resting = True
-    try:
-        yield
-    finally:
-        presses.resting = False
-
-
 def _one_trial(
     record: ProductionRecord, log: LogWriter, screen: Screen, presses: Presses, trial: int, index: int
 ) -> bool:
-    """Wait for an interval that counts, log it, and show its feedback; False where the person leaves."""
+    """Wait for an interval that counts, log it, and show its feedback; False if the person leaves."""
     block = record.header.blocks[index]
     while (produced_ms := presses.next_ms()) is not None:
         if SHORTEST_MS <= produced_ms <= LONGEST_MS:

@@ -27,10 +27,10 @@ from isiw.models.gp.prior import (
     Hyperparameters,
     KernelName,
     Process,
+    Standardisation,
     correlations,
     regression,
 )
-from isiw.models.gp.scale import Scale
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import PersonTrials
 from isiw.types import FloatArray
@@ -89,7 +89,7 @@ def _covariance(one: Tensor, other: Tensor) -> Tensor:
 
 
 def leave_one_out(covariance: Tensor, residuals: Tensor) -> Tensor:
-    """How far each value is from what all others predict, in SDs of that prediction, shape (n,).
+    """Distance of each value from what all others predict, in SDs of that prediction, shape (n,).
 
     [Rasmussen2006, equations 5.10–5.12]
     """
@@ -146,10 +146,6 @@ class Fit:
     """A few processes, and how believable each is.
 
     Args:
-        prior: of the hyperparameters.
-        kernel: the kernel's name.
-        scale: the scale of amplitudes.
-        told: the trials as told.
         processes: the hyperparameters, shape (q,).
         log_prior: what each one's log marginal likelihood is added to, shape (q,).
         noise: how the noise depends on the ISI.
@@ -158,7 +154,7 @@ class Fit:
 
     prior: HyperparameterPrior
     kernel: KernelName
-    scale: Scale
+    scale: Standardisation
     told: PersonTrials
     processes: Hyperparameters
     log_prior: Tensor
@@ -244,7 +240,7 @@ class Fit:
 def fit(
     prior: HyperparameterPrior,
     kernel: KernelName,
-    scale: Scale,
+    scale: Standardisation,
     told: PersonTrials,
     *,
     max_evaluations: int | None = None,
@@ -261,7 +257,7 @@ def fit(
 
 
 def fixed_fit(
-    prior: HyperparameterPrior, kernel: KernelName, scale: Scale, told: PersonTrials, fixed: FixedProcess
+    prior: HyperparameterPrior, kernel: KernelName, scale: Standardisation, told: PersonTrials, fixed: FixedProcess
 ) -> Fit:
     """One process of given hyperparameters, and the same without an amplitude."""
     present = torch.tensor([[fixed.length_ms, fixed.amplitude, fixed.noise]], dtype=torch.float64)
@@ -270,7 +266,7 @@ def fixed_fit(
 
 
 def _sound(found: Fit) -> Fit:
-    """The fit, or the prior's medians where none of its processes has a likelihood."""
+    """The fit, or the prior's medians if none of its processes has a likelihood."""
     if bool(found.log_joint.isfinite().any()):
         return found
     medians = found.prior.at(torch.zeros((2, 3), dtype=torch.float64))

@@ -19,11 +19,10 @@ from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
 from isiw.lazy import botorch, torch
 from isiw.models.gp.fit import Fit, fit, fixed_fit
-from isiw.models.gp.prior import FixedProcess, HyperparameterPrior, KernelName
+from isiw.models.gp.prior import FixedProcess, HyperparameterPrior, KernelName, Standardisation, Transform, scale_of
 from isiw.models.gp.samples import Paths, ProfileSample, draw_paths
-from isiw.models.gp.scale import Scale, Transform, scale_of
 from isiw.models.protocol import Observation, Tensor
-from isiw.models.shared.history import AmplitudeHistory, FloorTreatment, PersonTrials
+from isiw.models.shared.history import AmplitudeHistory, FloorTreatment, OfAmplitudes, PersonTrials
 from isiw.models.windows import Runs, SampledProfiles, profile_grid, sampled_estimate
 
 NoiseKind: TypeAlias = Literal["equal", "by-isi"]
@@ -95,7 +94,7 @@ class GaussianProcess(Checked):
         """Fit one person's trials."""
         told, process = self.seen(told), self.process
         if process.fixed is not None:
-            scale = Scale(self.transform, self.detection_limit_mv, process.fixed.centre, process.fixed.unit)
+            scale = Standardisation(self.transform, self.detection_limit_mv, process.fixed.centre, process.fixed.unit)
             return fixed_fit(process.prior, process.kernel, scale, told, process.fixed)
         return fit(
             process.prior,
@@ -107,23 +106,15 @@ class GaussianProcess(Checked):
         )
 
     def seen(self, told: PersonTrials) -> PersonTrials:
-        """Trials as they are fitted: small MEPs are 0 where the floor is `"zeroed"`."""
+        """Trials as they are fitted: small MEPs are 0 if the floor is `"zeroed"`."""
         return replace(
             told, mep_mv=self.floor.excess_mv(told.mep_mv), baseline_mv=self.floor.excess_mv(told.baseline_mv)
         )
 
 
 @dataclass(frozen=True, eq=False)
-class GaussianProcessPosterior:
-    """The posterior of b people.
-
-    Args:
-        model: the model's settings.
-        space: the design space.
-        seed: seed of all randomness.
-        told: the trials so far.
-        held: fits whose hyperparameters stay, one a person; None to fit again.
-    """
+class GaussianProcessPosterior(OfAmplitudes):
+    """The posterior of b people; `held` are fits whose hyperparameters stay, one a person, or None."""
 
     model: GaussianProcess
     space: DesignSpace
@@ -132,13 +123,8 @@ class GaussianProcessPosterior:
     held: tuple[Fit, ...] | None = None
 
     @property
-    def trials(self) -> int:
-        """Number of trials of each person that it has learnt."""
-        return self.told.trials
-
-    @property
     def pairs(self) -> int:
-        """Number of them that were pairs of stimuli; see `CountsPairs`."""
+        """Number of pairs of stimuli among them; see `CountsPairs`."""
         return int((~np.isnan(self.told.isi_ms[0])).sum())
 
     @property
@@ -190,7 +176,7 @@ class GaussianProcessPosterior:
     def log_evidence(self) -> Tensor:
         """Log marginal likelihood of the trials, as a density of log amplitudes [nat]; see `HasEvidence`.
 
-        It is that of equal noise also where the noise depends on the ISI, and of a process whose mean and scale come
+        It is that of equal noise also if the noise depends on the ISI, and of a process whose mean and scale come
         from the same trials (empirical Bayes): it compares these processes with each other, not with other models.
         """
         return torch.tensor([f.log_evidence for f in self.fits], dtype=torch.float32)

@@ -1,4 +1,4 @@
-"""Hyperparameters of the Gaussian process: what is believed about them, and a grid on which they are weighed."""
+"""Hyperparameters of the Gaussian process: their prior, the grid on which they are weighed, and the scale of MEPs."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Literal, NamedTuple, TypeAlias
 
+import numpy as np
+
 from isiw.checks import Checked, Number, Positive, number
 from isiw.errors import InvalidValueError
 from isiw.lazy import botorch, gpytorch, torch
 from isiw.models.protocol import Tensor
-from isiw.models.shared.scales import Scale, check_scales
+from isiw.models.shared.scales import PositiveScale, Scale
+from isiw.types import FloatArray
 
 GRID_SD = 2.25
 GRID_POINTS = (7, 5, 7)
@@ -26,7 +29,7 @@ class Hyperparameters(NamedTuple):
 
     Args:
         length_ms: over which the profile varies [ms].
-        amplitude: SD of the profile; 0 where a tap changes nothing.
+        amplitude: SD of the profile; 0 if a tap changes nothing.
         noise: SD of a trial about the profile, where the relative noise variance is 1.
     """
 
@@ -51,14 +54,13 @@ class HyperparameterPrior(Checked):
         p_window: probability that the tap changes anything.
     """
 
-    length_ms: Scale = Scale(30.0, 0.5)
-    amplitude: Scale = Scale(1.2, 0.3)
-    noise: Scale = Scale(0.6, 0.5)
+    length_ms: PositiveScale = Scale(30.0, 0.5)
+    amplitude: PositiveScale = Scale(1.2, 0.3)
+    noise: PositiveScale = Scale(0.6, 0.5)
     p_window: Annotated[float, partial(number, above=0, most=1)] = 0.75
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_scales(self, "length_ms", "amplitude", "noise")
         least = self.noise.median * math.exp(-GRID_SD * self.noise.sd)
         if least < LEAST_NOISE:
             raise InvalidValueError(
@@ -77,7 +79,7 @@ class HyperparameterPrior(Checked):
         return Hyperparameters(*(self._medians_and_sds[0] * torch.exp(self._medians_and_sds[1] * z)).unbind(-1))
 
     def z(self, hyperparameters: Hyperparameters) -> Tensor:
-        """How many prior SDs from their medians hyperparameters are, shape (q, 3)."""
+        """Distance of hyperparameters from their medians in prior SDs, shape (q, 3)."""
         medians, sds = self._medians_and_sds
         z: Tensor = (torch.stack(hyperparameters, dim=-1) / medians).log() / sds
         return z
@@ -129,15 +131,7 @@ KernelName: TypeAlias = Literal["rbf", "matern"]
 
 
 class Process(NamedTuple):
-    """Processes about an uncertain constant, fields of shape (...).
-
-    Args:
-        length_ms: over which the profile varies [ms].
-        amplitude: SD of the profile.
-        level: mean of the constant.
-        level_variance: its variance.
-        noise_variance: variance of a trial about the profile, where the relative variance is 1.
-    """
+    """Processes about an uncertain constant, whose mean is the level; fields of shape (...)."""
 
     length_ms: Tensor
     amplitude: Tensor
@@ -196,3 +190,69 @@ def _likelihood(noise_variance: Tensor) -> gpytorch.likelihoods.GaussianLikeliho
         batch_shape=noise_variance.shape, noise_constraint=gpytorch.constraints.Positive()
     ).double()
     return likelihood.initialize(noise=noise_variance.unsqueeze(-1))
+
+
+Transform: TypeAlias = Literal["log", "sqrt", "none"]
+
+USUAL_MEP_MV = 0.02
+"""About so large amplitudes are taken to be before the first trial [mV]."""
+
+USUAL_SPREAD: dict[Transform, float] = {"log": 1.0, "sqrt": 0.5, "none": 1.0}
+"""SD of transformed amplitudes over ISIs and trials: of the log [nat], or as a share of their mean."""
+
+
+@dataclass(frozen=True)
+class Standardisation:
+    """Standardisation of transformed amplitudes.
+
+    Args:
+        transform: what amplitudes are transformed by.
+        least_mv: amplitudes below are taken for this [mV], so that 0 has a logarithm.
+        centre: transformed amplitude that becomes 0.
+        unit: difference of transformed amplitudes that becomes 1.
+    """
+
+    transform: Transform
+    least_mv: float
+    centre: float
+    unit: float
+
+    def standardised(self, mep_mv: FloatArray) -> Tensor:
+        """Amplitudes [mV] on this scale, same shape."""
+        return torch.as_tensor((transformed(mep_mv, self.transform, self.least_mv) - self.centre) / self.unit)
+
+    def log_jacobian(self, mep_mv: FloatArray) -> float:
+        """The term that makes a log density on this scale one of log amplitudes [nat], summed over them."""
+        power = {"log": 0.0, "sqrt": 0.5, "none": 1.0}[self.transform]
+        log_mep = np.log(np.maximum(mep_mv, self.least_mv))
+        return float(power * log_mep.sum() + len(mep_mv) * math.log((power or 1.0) / self.unit))
+
+
+def transformed(mep_mv: FloatArray, transform: Transform, least_mv: float) -> FloatArray:
+    """Transformed amplitudes, same shape."""
+    known = np.maximum(mep_mv, least_mv)
+    if transform == "none":
+        return known
+    return np.log(known) if transform == "log" else np.sqrt(known)
+
+
+def scale_of(mep_mv: FloatArray, transform: Transform, least_mv: float) -> Standardisation:
+    """The scale on which amplitudes have mean 0 and SD 1, as if one more of them had had the usual spread.
+
+    That one keeps amplitudes apart that are few, or all equal.
+    """
+    values = transformed(mep_mv if len(mep_mv) else np.array([USUAL_MEP_MV]), transform, least_mv)
+    centre = float(values.mean())
+    usual = USUAL_SPREAD[transform] * (1.0 if transform == "log" else centre)
+    return Standardisation(
+        transform, least_mv, centre, math.sqrt((usual**2 + ((values - centre) ** 2).sum()) / len(values))
+    )
+
+
+def expected_mep_mv(level: Tensor, noise_sd: Tensor, transform: Transform) -> Tensor:
+    """Expected MEP [mV] if transformed MEPs are Gaussian, broadcast shape."""
+    if transform == "log":
+        return torch.exp(level + 0.5 * noise_sd.square())
+    # A path may run below zero where amplitudes do not.
+    positive = level.clamp_min(0.0)
+    return positive.square() + noise_sd.square() if transform == "sqrt" else positive

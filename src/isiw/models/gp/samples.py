@@ -10,7 +10,7 @@ import numpy as np
 
 from isiw.lazy import torch
 from isiw.models.gp.fit import Fit
-from isiw.models.gp.scale import Transform, expected_mep_mv
+from isiw.models.gp.prior import Transform, expected_mep_mv
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import FloorKind
 from isiw.models.shared.tables import systematic
@@ -32,7 +32,7 @@ PATH_JITTER = 1e-5
 """Share of a process's variance that is added to the diagonal before paths are drawn, for a stable factor."""
 
 FAR_LENGTHS = 100.0
-"""Further than this from all trials, nothing is told of a process but its constant."""
+"""Further than this from all trials, only the constant of a process is known."""
 
 OUTCOMES = 32
 """Values of the transformed MEP on which predictive distributions live."""
@@ -44,7 +44,7 @@ class Paths(NamedTuple):
     Args:
         level: mean of the transformed MEP on the paths' grid, shape (s, m).
         noise_sd: SD of a trial about it, shape (s, m).
-        alone: mean of the transformed MEP of TMS alone, shape (s,); NaN where it was not told.
+        alone: mean of the transformed MEP of TMS alone, shape (s,); NaN if there was none.
         alone_sd: SD of a trial about it, shape (s,).
         present: whether the tap changes anything, shape (s,).
     """
@@ -113,7 +113,6 @@ class ProfileSample:
     Args:
         isi_ms: ISIs of the paths' grid [ms], evenly spaced, shape (m,); what lies between is interpolated.
         paths: the paths, fields of shape (b, s, ...).
-        transform: what amplitudes were transformed by.
         floor: what the least-excess rule is applied above.
     """
 
@@ -129,7 +128,7 @@ class ProfileSample:
 
     @cached_property
     def floor_mv(self) -> Tensor:
-        """What the rule is applied above [mV], shape (b, s): expected MEP of TMS alone, or 0."""
+        """The level above which the rule is applied [mV], shape (b, s): expected MEP of TMS alone, or 0."""
         if self.floor != "subtracted":
             return torch.zeros_like(self.paths.alone)
         told = expected_mep_mv(self.paths.alone, self.paths.alone_sd, self.transform)
@@ -141,7 +140,7 @@ class ProfileSample:
 
     @cached_property
     def _edge_level_mv(self) -> Tensor:
-        """Expected MEP at the window's edge [mV], shape (b, s, 1); infinite where there is no window."""
+        """Expected MEP at the window's edge [mV], shape (b, s, 1); infinite if there is no window."""
         floor_mv = self.floor_mv
         peak_mv = self._expected_mv.amax(-1) - floor_mv
         level_mv = floor_mv + least_excess_mv(peak_mv, floor_mv)

@@ -15,7 +15,7 @@ SAME_MODE: Final = 1.0
 """Modes closer than this many SDs are one."""
 
 NEGLIGIBLE_NATS: Final = 9.0
-"""A mode is left out where its evidence is smaller than the best one's by more."""
+"""A mode is left out if its evidence is smaller than the best one's by more."""
 
 LEAST_CURVATURE: Final = 0.25
 """A standard normal prior has a curvature of 1; along a ridge that bends upwards the likelihood can take it away."""
@@ -118,7 +118,7 @@ def _shortened(direction: Tensor) -> Tensor:
 
 
 def _updated(inverse: Tensor, step: Tensor, bend: Tensor) -> Tensor:
-    """The BFGS update of inverse curvatures (k, d, d), left out where the curvature along the step is not positive."""
+    """The BFGS update of inverse curvatures (k, d, d), left out if the curvature along the step is not positive."""
     along = (step * bend).sum(-1)
     fine = along > 1e-10
     rho = torch.where(fine, along, 1.0).reciprocal()[:, None, None]

@@ -35,7 +35,7 @@ TOO_HEAVY: Final = 0.1
 
 @dataclass(frozen=True)
 class Effort(Checked):
-    """How much work a sample is worth.
+    """The work that goes into a sample.
 
     Args:
         scouts: draws that show where to climb from.
@@ -76,7 +76,7 @@ class WeightedDraws:
 
 
 @dataclass(frozen=True, eq=False)
-class Mixture:
+class Proposal:
     """The standard normal prior, and multivariate Student t components.
 
     Args:
@@ -90,7 +90,7 @@ class Mixture:
     factors: Tensor
 
     @classmethod
-    def at(cls, modes: Modes) -> Mixture:
+    def at(cls, modes: Modes) -> Proposal:
         """The prior, and a component at each mode.
 
         The modes' evidence is trusted less than it says, for Laplace's method is rough.
@@ -100,7 +100,7 @@ class Mixture:
         return cls(_defensive(shares), modes.points, torch.linalg.cholesky(modes.covariances))
 
     @classmethod
-    def prior(cls, latents: int) -> Mixture:
+    def prior(cls, latents: int) -> Proposal:
         """The prior, half of it with the heavier tails of the components."""
         half, centre = torch.full((2,), 0.5, dtype=torch.double), torch.zeros((1, latents), dtype=torch.double)
         return cls(half, centre, torch.diag_embed(1.0 + centre))
@@ -117,11 +117,11 @@ class Mixture:
         prior = -0.5 * points.square().sum(-1) - 0.5 * d * math.log(2.0 * math.pi)
         return torch.cat((prior.unsqueeze(0), student)) + self.shares.log().unsqueeze(-1)
 
-    def joined(self, other: Mixture, share: float) -> Mixture:
+    def joined(self, other: Proposal, share: float) -> Proposal:
         """This mixture and the components of another one."""
         theirs = other.shares[1:] / other.shares[1:].sum()
         shares = torch.cat(((1.0 - share) * self.shares, share * theirs))
-        return Mixture(shares, torch.cat((self.means, other.means)), torch.cat((self.factors, other.factors)))
+        return Proposal(shares, torch.cat((self.means, other.means)), torch.cat((self.factors, other.factors)))
 
     def draw(self, size: int, generator: torch.Generator) -> Tensor:
         """Draws, each part in proportion to its share, shape (size, d)."""
@@ -135,7 +135,7 @@ class Mixture:
         student = self.means[own] + stretch.unsqueeze(-1) * (self.factors[own] @ normal.unsqueeze(-1)).squeeze(-1)
         return torch.where((part == 0).unsqueeze(-1), normal, student)
 
-    def fitted(self, points: Tensor, log_weights: Tensor) -> Mixture:
+    def fitted(self, points: Tensor, log_weights: Tensor) -> Proposal:
         """The mixture after one step towards the weighted points, its scatter held to what they can tell."""
         d = points.shape[-1]
         belongs = torch.softmax(self.log_parts(points), dim=0) * log_weights.exp()
@@ -148,7 +148,7 @@ class Mixture:
         scatter = torch.einsum("km,kmi,kmj->kij", own, off, off)
         scales = trust * scatter + (1.0 - trust) * (self.factors @ self.factors.mT)
         ridge = 1e-6 * torch.eye(d, dtype=points.dtype)
-        return Mixture(_defensive(shares), means, torch.linalg.cholesky(scales + ridge))
+        return Proposal(_defensive(shares), means, torch.linalg.cholesky(scales + ridge))
 
 
 class _Round(NamedTuple):
@@ -156,7 +156,7 @@ class _Round(NamedTuple):
 
     points: Tensor
     log_density: Tensor
-    proposal: Mixture
+    proposal: Proposal
 
 
 def worth(log_weights: Tensor) -> float:
@@ -172,12 +172,12 @@ def _defensive(shares: Tensor) -> Tensor:
 
 
 def importance_sample(
-    log_density: LogDensity, scouting: Mixture, generator: torch.Generator, effort: Effort
+    log_density: LogDensity, scouting: Proposal, generator: torch.Generator, effort: Effort
 ) -> WeightedDraws:
     """Sample a posterior whose prior is a standard normal."""
     scouts = _drawn(log_density, scouting, effort.scouts, generator)
     modes = find_modes(log_density, _best_of_each_part(scouts, effort.starts), effort.steps)
-    mixture = Mixture.at(modes).joined(scouting, SCOUTED_SHARE)
+    mixture = Proposal.at(modes).joined(scouting, SCOUTED_SHARE)
     earlier = [scouts]
     for _ in range(effort.fits):
         rounds = _rounds(log_density, mixture, generator, effort)
@@ -190,15 +190,15 @@ def importance_sample(
     return WeightedDraws(_points(rounds), log_weights, log_evidence, modes)
 
 
-def _rounds(log_density: LogDensity, mixture: Mixture, generator: torch.Generator, effort: Effort) -> list[_Round]:
-    """One round of draws, and as many more as it takes where it shows that the mixture will do."""
+def _rounds(log_density: LogDensity, mixture: Proposal, generator: torch.Generator, effort: Effort) -> list[_Round]:
+    """One round of draws, and as many more as it takes if it shows that the mixture will do."""
     first = _drawn(log_density, mixture, effort.draws, generator)
     of_one = worth(_weighted([first])[0])
     more = math.ceil(effort.enough / of_one) - 1 if of_one >= GOOD_SHARE * effort.draws else 0
     return [first, *(_drawn(log_density, mixture, effort.draws, generator) for _ in range(more))]
 
 
-def _improved(log_density: LogDensity, mixture: Mixture, rounds: list[_Round], effort: Effort) -> Mixture:
+def _improved(log_density: LogDensity, mixture: Proposal, rounds: list[_Round], effort: Effort) -> Proposal:
     points, (log_weights, _) = _points(rounds), _weighted(rounds)
     heaviest = log_weights.argmax()
     fitted = mixture.fitted(points, log_weights)
@@ -206,10 +206,10 @@ def _improved(log_density: LogDensity, mixture: Mixture, rounds: list[_Round], e
         return fitted
     # One draw that weighs so much comes from a place that the mixture misses.
     missed = find_modes(log_density, points[heaviest].unsqueeze(0), effort.steps)
-    return fitted.joined(Mixture.at(missed), SCOUTED_SHARE)
+    return fitted.joined(Proposal.at(missed), SCOUTED_SHARE)
 
 
-def _drawn(log_density: LogDensity, proposal: Mixture, size: int, generator: torch.Generator) -> _Round:
+def _drawn(log_density: LogDensity, proposal: Proposal, size: int, generator: torch.Generator) -> _Round:
     points = proposal.draw(size, generator)
     return _Round(points, log_density(points).nan_to_num(nan=-torch.inf), proposal)
 

@@ -1,4 +1,4 @@
-"""How MEPs scatter around their expectation in the parametric window model: densities, intervals, and draws.
+"""The scatter of MEPs around their expectation in the parametric window model: densities, intervals, and draws.
 
 An MEP is the EMG floor plus what is evoked. Its mean and variance are the sums of theirs; so the CV falls or rises with
 the level as the one or the other dominates. It is gamma- or log-normally distributed. With noise on the input, what is

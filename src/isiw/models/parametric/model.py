@@ -58,9 +58,6 @@ class ParametricModel(Checked):
     detection_limit_mv: Positive = 0.005
     response_threshold_mv: Positive = 0.02
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-
     def program(self, space: DesignSpace) -> WindowProgram:
         """The Pyro program of one person."""
         return WindowProgram(self.prior, self.likelihood, space)
@@ -147,8 +144,7 @@ class WindowSample:
     Args:
         unknowns: fields of shape (b, s).
         present: whether there is any excess, shape (b, s).
-        likelihood: the likelihood.
-        space: the design space, in whose range a window is looked for.
+        space: in whose range a window is looked for.
     """
 
     unknowns: Unknowns
@@ -166,7 +162,7 @@ class WindowSample:
 
     @cached_property
     def least_excess_mv(self) -> Tensor:
-        """Excess at the window's edge [mV]; infinite where there is no window, shape (b, s)."""
+        """Excess at the window's edge [mV]; infinite if there is no window, shape (b, s)."""
         middle_ms = self.unknowns.start_ms + 0.5 * self.unknowns.width_ms
         reached_ms = middle_ms.clamp(self.space.low_ms, self.space.high_ms)
         return least_excess_mv(self._excess_mv(reached_ms.unsqueeze(-1)).squeeze(-1), self.unknowns.baseline_mv)
@@ -203,14 +199,11 @@ class ParametricPosterior:
     """The posterior of b people.
 
     Args:
-        model: the model's settings.
-        space: the design space.
-        seed: seed of all randomness.
-        history: the trials so far, in the order of telling.
+        history: the trials so far, in order.
         latents: equally weighted samples, shape (b, s, d).
         present: whether there is any excess, shape (b, s).
         evidence: log marginal likelihood of the trials [nat], shape (b,).
-        trouble: what went wrong with the last fit and what stands in for it; None where nothing did.
+        trouble: what went wrong with the last fit and what stands in for it; None if nothing did.
     """
 
     model: ParametricModel
@@ -234,7 +227,7 @@ class ParametricPosterior:
 
     @cached_property
     def sample(self) -> WindowSample:
-        """What the samples mean."""
+        """The unknowns that the samples stand for."""
         unknowns = self.model.program(self.space).unknowns(self.latents)
         return WindowSample(unknowns, self.present, self.model.likelihood, self.space)
 

@@ -1,4 +1,4 @@
-"""The unknowns of the parametric window model, and what is believed of them before the first trial.
+"""The unknowns of the parametric window model, and their prior.
 
 All unknowns are made from standard normal latents, so that the prior is the same simple thing for every likelihood and
 the latents have no bounds.
@@ -15,14 +15,14 @@ from isiw.checks import Checked, number
 from isiw.design import DesignSpace
 from isiw.lazy import torch
 from isiw.models.protocol import Tensor
-from isiw.models.shared.scales import Scale, check_scales
+from isiw.models.shared.scales import AnyScale, PositiveScale, Scale
 from isiw.models.shared.start import Span, StartPrior
 
 Likelihood = Literal["gamma", "log-normal", "input-noise"]
 """Families of the MEP around its expectation."""
 
 OUTPUT_CV: Final = 0.4
-"""CV of evoked MEPs where noise on the input makes the rest of their variability; 0.3-0.5 measured."""
+"""CV of evoked MEPs if noise on the input makes the rest of their variability; 0.3-0.5 measured."""
 
 _COMMON = ("start", "width", "floor", "floor_cv", "outliers", "amplitude", "noise")
 _INPUT_NOISE = (*_COMMON, "boost", "rest")
@@ -67,7 +67,7 @@ _Evoked = tuple[Tensor, Tensor, Tensor, Tensor, Tensor]
 
 
 @dataclass(frozen=True)
-class FloorPrior:
+class FloorPrior(Checked):
     """Of the EMG floor.
 
     Args:
@@ -75,15 +75,12 @@ class FloorPrior:
         cv: its CV from trial to trial; 0.12–0.35 measured.
     """
 
-    mean_mv: Scale = Scale(0.009, 0.8)
-    cv: Scale = Scale(0.24, 0.4)
-
-    def __post_init__(self) -> None:
-        check_scales(self, "mean_mv", "cv")
+    mean_mv: PositiveScale = Scale(0.009, 0.8)
+    cv: PositiveScale = Scale(0.24, 0.4)
 
 
 @dataclass(frozen=True)
-class InputNoisePrior:
+class InputNoisePrior(Checked):
     """Of a saturating curve with noise on its input, in probits.
 
     Args:
@@ -93,14 +90,10 @@ class InputNoisePrior:
         rest: the input without a tap: 90 % RMT, half-maximal at RMT + 4 %.
     """
 
-    saturation: Scale = Scale(16.0, 0.6)
-    input_sd: Scale = Scale(1.24, 0.25)
-    boost: Scale = Scale(1.94, 0.45)
-    rest: Scale = Scale(-2.7, 0.35)
-
-    def __post_init__(self) -> None:
-        check_scales(self, "saturation", "input_sd", "boost")
-        check_scales(self, "rest", positive=False)
+    saturation: PositiveScale = Scale(16.0, 0.6)
+    input_sd: PositiveScale = Scale(1.24, 0.25)
+    boost: PositiveScale = Scale(1.94, 0.45)
+    rest: AnyScale = Scale(-2.7, 0.35)
 
 
 @dataclass(frozen=True)
@@ -120,20 +113,15 @@ class WindowPrior(Checked):
 
     p_window: Annotated[float, partial(number, above=0, most=1)] = 0.75
     start: StartPrior = field(default_factory=lambda: StartPrior((Span(1.0, 0.0, 125.0),), p_anywhere=0.2))
-    width_ms: Scale = Scale(100.0, 0.45)
+    width_ms: PositiveScale = Scale(100.0, 0.45)
     floor: FloorPrior = field(default_factory=FloorPrior)
-    amplitude: Scale = Scale(7.0, 0.8)
-    cv: Scale = Scale(0.62, 0.3)
-    outliers: Scale = Scale(-3.5, 0.7)
+    amplitude: PositiveScale = Scale(7.0, 0.8)
+    cv: PositiveScale = Scale(0.62, 0.3)
+    outliers: AnyScale = Scale(-3.5, 0.7)
     input_noise: InputNoisePrior = field(default_factory=InputNoisePrior)
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_scales(self, "width_ms", "amplitude", "cv")
-        check_scales(self, "outliers", positive=False)
-
     def unknowns(self, latents: Tensor, likelihood: Likelihood, space: DesignSpace) -> Unknowns:
-        """What standard normal latents mean."""
+        """The unknowns that standard normal latents stand for."""
         z = dict(zip(latent_names(likelihood), latents.unbind(-1), strict=True))
         floor_mv = self.floor.mean_mv.log_normal(z["floor"])
         evoked = self._saturating(z, floor_mv) if likelihood == "input-noise" else self._proportional(z, floor_mv)
@@ -157,7 +145,7 @@ class WindowPrior(Checked):
         return baseline_mv, saturation_mv * (at_centre - at_rest), output_cv, saturation_mv, input_sd
 
     def _proportional(self, z: Mapping[str, Tensor], floor_mv: Tensor) -> _Evoked:
-        """Baseline, amplitude, CV, saturation and input SD where the MEP is in proportion to its level."""
+        """Baseline, amplitude, CV, saturation and input SD if the MEP is in proportion to its level."""
         amplitude_mv = floor_mv * self.amplitude.log_normal(z["amplitude"])
         ones = torch.ones_like(floor_mv)
         return floor_mv, amplitude_mv, self.cv.log_normal(z["noise"]), ones, 0.0 * ones

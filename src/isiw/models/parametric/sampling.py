@@ -12,7 +12,7 @@ from isiw.design import DesignSpace
 from isiw.lazy import pyro, torch
 from isiw.models import parametric
 from isiw.models.parametric.ascent import Modes
-from isiw.models.parametric.importance import Effort, Mixture, WeightedDraws, importance_sample, worth
+from isiw.models.parametric.importance import Effort, Proposal, WeightedDraws, importance_sample, worth
 from isiw.models.parametric.prior import Likelihood, Unknowns, WindowPrior, latent_names
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
@@ -24,14 +24,7 @@ TREE_DEPTH: Final = 6
 
 @dataclass(frozen=True)
 class WindowProgram:
-    """The model of one person in a design space; calling it runs it as a Pyro program.
-
-    Args:
-        prior: the prior over people.
-        likelihood: the likelihood.
-        space: the design space.
-        present: whether there is a window at all.
-    """
+    """The model of one person in a design space, with a window or without; calling it runs it as a Pyro program."""
 
     prior: WindowPrior
     likelihood: Likelihood
@@ -40,7 +33,7 @@ class WindowProgram:
 
     @property
     def latents(self) -> int:
-        """How many latents there are."""
+        """Number of latents."""
         return len(latent_names(self.likelihood))
 
     def without_window(self) -> WindowProgram:
@@ -58,7 +51,7 @@ class WindowProgram:
         return unknowns
 
     def log_density(self, latents: Tensor, trials: History) -> Tensor:
-        """What the trace of the program sums to for each of many latents (m, d), shape (m,)."""
+        """Log density of the program's trace for each of many latents (m, d), shape (m,)."""
         prior: Tensor = self._latents().log_prob(latents)
         return prior + self.log_likelihood(latents, trials)
 
@@ -67,7 +60,7 @@ class WindowProgram:
         return self._meps(self.unknowns(latents), trials).log_prob(_ends(trials)).sum(-1)
 
     def unknowns(self, latents: Tensor) -> Unknowns:
-        """What latents (..., d) mean."""
+        """The unknowns that latents (..., d) stand for."""
         return self.prior.unknowns(latents, self.likelihood, self.space)
 
     def _latents(self) -> pyro.distributions.Independent:
@@ -110,7 +103,7 @@ LEAST_WORTH: Final = 50.0
 
 @dataclass(frozen=True)
 class Chains(Checked):
-    """How long the no-U-turn sampler runs.
+    """Settings of the no-U-turn sampler.
 
     Args:
         warmup: draws for adaptation.
@@ -127,14 +120,7 @@ class Chains(Checked):
 
 @dataclass(frozen=True, eq=False)
 class PersonDraws:
-    """Equally weighted draws of one person's posterior.
-
-    Args:
-        latents: shape (s, d).
-        present: whether there is a window, shape (s,).
-        log_evidence: log marginal likelihood of the trials [nat].
-        trouble: what went wrong and what stands in for it, in sentences; None where nothing did.
-    """
+    """Equally weighted draws of one person's posterior: latents, shape (s, d), and which have a window, shape (s,)."""
 
     latents: Tensor
     present: Tensor
@@ -151,12 +137,12 @@ def sample_person(
     chains: Chains | None = None,
 ) -> PersonDraws:
     """Draw from the posterior of one person."""
-    everywhere = Mixture.prior(program.latents)
+    everywhere = Proposal.prior(program.latents)
     log_density = partial(program.log_density, trials=trials)
     log_density_without = partial(program.without_window().log_density, trials=trials)
     without = importance_sample(log_density_without, everywhere, generator, WITHOUT_WINDOW)
     # Without a window its place and size are as in the prior, and the floor is already known: good scouts.
-    with_ = importance_sample(log_density, Mixture.at(without.modes), generator, effort)
+    with_ = importance_sample(log_density, Proposal.at(without.modes), generator, effort)
     models = (with_, without)
     prior = torch.tensor([program.prior.p_window, 1.0 - program.prior.p_window], dtype=torch.double)
     log_joint = torch.tensor([model.log_evidence for model in models], dtype=torch.double) + prior.log()

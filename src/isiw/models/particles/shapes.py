@@ -1,6 +1,6 @@
 """Facilitation by ISI, as believed: profiles flexible enough for skew, plateau and two peaks, in torch.
 
-The simulated people of `isiw.subjects.profiles` have shapes of their own; this is the model's view of any person.
+The simulated people of `isiw.subjects.responses` have shapes of their own; this is the model's view of any person.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""What families of models have in common; the families do not know each other."""
+"""Parts that families of models have in common; the families do not know each other."""

@@ -1,4 +1,4 @@
-"""The trials told so far: as intervals of the log MEP, or as amplitudes for models that learn from nothing else."""
+"""The trials so far: as intervals of the log MEP, or as amplitudes for models that learn from nothing else."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _LEAST_MV: Final = 1e-3
 
 
 class Circumstances(NamedTuple):
-    """What else is known to bear on the amplitude of a trial; neutral by default.
+    """Known influences on the amplitude of a trial besides its ISI; neutral by default.
 
     Args:
         known_mv: a part of the amplitude that is not the pulse's, such as the tap's own response [mV].
@@ -38,15 +38,15 @@ class Circumstances(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """The trials told so far; amplitudes are intervals of log mV, which are points where the amplitude is known.
+    """The trials so far; amplitudes are intervals of log mV, which are points if the amplitude is known.
 
     Args:
         isi_ms: realised ISIs [ms]; NaN is TMS alone, shape (b, n).
         isi_sd_ms: their SDs [ms], shape (b, n).
         log_mep: lower end of the log MEP, shape (b, n).
         log_mep_high: upper end, shape (b, n).
-        order: how many trials were told before each, shape (b, n).
-        circumstances: the fields of `Circumstances`, shape (b, n, 5); None where all are neutral.
+        order: how many trials came before each, shape (b, n).
+        circumstances: the fields of `Circumstances`, shape (b, n, 5); None if all are neutral.
     """
 
     isi_ms: Tensor
@@ -118,13 +118,7 @@ def without_known(observation: Observation) -> Observation:
 
 @dataclass(frozen=True, eq=False)
 class PersonTrials:
-    """What was told of one person.
-
-    Args:
-        isi_ms: realised ISIs [ms], shape (n,).
-        mep_mv: their MEPs [mV], shape (n,).
-        baseline_mv: MEPs of TMS alone [mV], shape (m,).
-    """
+    """The trials of one person: ISIs [ms] and MEPs [mV], shape (n,), and MEPs of TMS alone [mV], shape (m,)."""
 
     isi_ms: FloatArray
     mep_mv: FloatArray
@@ -133,12 +127,7 @@ class PersonTrials:
 
 @dataclass(frozen=True, eq=False)
 class AmplitudeHistory:
-    """Trials of b people, in the order of telling.
-
-    Args:
-        isi_ms: realised ISIs [ms]; NaN is TMS alone, shape (b, n).
-        mep_mv: their MEPs [mV], shape (b, n).
-    """
+    """Trials of b people, in order: ISIs [ms], NaN for TMS alone, and MEPs [mV], shape (b, n)."""
 
     isi_ms: FloatArray
     mep_mv: FloatArray
@@ -150,12 +139,12 @@ class AmplitudeHistory:
 
     @property
     def trials(self) -> int:
-        """How many trials of each person."""
+        """Number of trials of each person."""
         return int(self.isi_ms.shape[1])
 
     @property
     def people(self) -> int:
-        """How many people."""
+        """Number of people."""
         return int(self.isi_ms.shape[0])
 
     def appended(self, observation: Observation) -> AmplitudeHistory:
@@ -174,10 +163,21 @@ class AmplitudeHistory:
         return replace(self, isi_ms=np.hstack((self.isi_ms, isi_ms)), mep_mv=np.hstack((self.mep_mv, mep_mv)))
 
     def person(self, person: int) -> PersonTrials:
-        """What was told of one person."""
+        """The trials of one person."""
         isi_ms, mep_mv = self.isi_ms[person], self.mep_mv[person]
         alone = np.isnan(isi_ms)
         return PersonTrials(isi_ms[~alone], mep_mv[~alone], mep_mv[alone])
+
+
+class OfAmplitudes:
+    """A posterior that keeps the amplitudes that it has learnt from."""
+
+    told: AmplitudeHistory
+
+    @property
+    def trials(self) -> int:
+        """Number of trials of each person that it has learnt from."""
+        return self.told.trials
 
 
 FloorKind: TypeAlias = Literal["subtracted", "median", "lowest", "zeroed", "raw"]
@@ -188,15 +188,15 @@ GUESSED_AT: Final = {"subtracted": 0.5, "median": 0.5, "lowest": 0.1}
 
 @dataclass(frozen=True)
 class FloorTreatment(Checked):
-    """How MEPs are corrected for what they amount to where the tap does nothing, before a curve is fitted.
+    """Correction of MEPs for their level without an effect of the tap, before a curve is fitted.
 
     The dissertation's plots have amplitudes of zero outside the window, and it does not say why [Kim2020, 4.3].
 
     Args:
         floor: `"subtracted"`: the mean MEP of TMS alone is subtracted; without TMS alone, the median of all MEPs.
             `"median"`, `"lowest"`: the median or the lowest tenth of all MEPs is, with or without TMS alone; the
-            median is too high where a method asks mostly inside the window. `"zeroed"`: an MEP below the threshold
-            is 0. `"raw"`: MEPs as they are; where the floor exceeds 0.135 of the peak, such a curve has no edges.
+            median is too high if a method asks mostly inside the window. `"zeroed"`: an MEP below the threshold
+            is 0. `"raw"`: MEPs as they are; if the floor exceeds 0.135 of the peak, such a curve has no edges.
         threshold_mv: of `"zeroed"` [mV]; the dissertation's thresholds of a response are 0.015–0.033 mV (4.1.1).
     """
 
@@ -204,7 +204,7 @@ class FloorTreatment(Checked):
     threshold_mv: Positive = 0.025
 
     def level_mv(self, trials: PersonTrials) -> float:
-        """What is subtracted from the MEPs of one person [mV]: the mean of TMS alone, or a guess at it."""
+        """The level that is subtracted from the MEPs of one person [mV]: the mean of TMS alone, or a guess at it."""
         if self.floor not in GUESSED_AT:
             return 0.0
         if self.floor == "subtracted" and len(trials.baseline_mv):
@@ -212,5 +212,5 @@ class FloorTreatment(Checked):
         return float(np.quantile(trials.mep_mv, GUESSED_AT[self.floor])) if len(trials.mep_mv) else 0.0
 
     def excess_mv(self, mep_mv: FloatArray, level_mv: FloatArray | float = 0.0) -> FloatArray:
-        """What MEPs have above the floor [mV], broadcast shape."""
+        """Excess of MEPs above the floor [mV], broadcast shape."""
         return np.where(mep_mv < self.threshold_mv, 0.0, mep_mv) if self.floor == "zeroed" else mep_mv - level_mv

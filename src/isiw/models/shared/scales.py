@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from functools import partial
+from typing import Annotated, Final, NamedTuple, TypeAlias
 
 from isiw.errors import InvalidValueError
 from isiw.lazy import torch
 from isiw.models.protocol import Tensor
 
 _MOST_MEDIAN: Final = 1e5
-"""In any unit that is used [ms, mV, % RMT, ratios]; nothing that is believed of a person is as large."""
+"""In any unit that is used [ms, mV, % RMT, ratios]; no quantity of a person is as large."""
 
 _MOST_LOG_SD: Final = 5.0
 """Of a logarithm: one person in three would have more than 150 times the median, or less than a 150th."""
 
 
 class Scale(NamedTuple):
-    """A latent z stands for the median plus SD z + tail z³, of the logarithm where the quantity is positive.
+    """A latent z stands for the median plus SD z + tail z³, of the logarithm if the quantity is positive.
 
     Args:
         median: the quantity's median.
@@ -52,17 +53,27 @@ class Scale(NamedTuple):
         return torch.sigmoid(self.normal(z))
 
 
+def scale(what: str, given: object, *, positive: bool = True, tailed: bool = True) -> Scale:
+    """A scale, also of a tuple or a list."""
+    value = tuple(given) if isinstance(given, tuple | list) else (given,)
+    if not _is_scale(value, positive=positive) or (any(value[2:]) and not tailed):
+        raise InvalidValueError(
+            f"{what} must be a scale",
+            got=value,
+            expected=f"a median, an SD{', and a cubic tail' if tailed else ''}, of sizes that a person can have",
+        )
+    return Scale(*map(float, value))
+
+
+PositiveScale: TypeAlias = Annotated[Scale, scale]
+AnyScale: TypeAlias = Annotated[Scale, partial(scale, positive=False)]
+
+
 def check_scales(owner: object, *names: str, positive: bool = True, tailed: bool = True) -> None:
     """Check fields of a frozen dataclass that are scales, and make scales of tuples and lists."""
     for name in names:
-        value = tuple(getattr(owner, name))
-        if not _is_scale(value, positive=positive) or (any(value[2:]) and not tailed):
-            raise InvalidValueError(
-                f"{type(owner).__name__}.{name} must be a scale",
-                got=value,
-                expected=f"a median, an SD{', and a cubic tail' if tailed else ''}, of sizes that a person can have",
-            )
-        object.__setattr__(owner, name, Scale(*map(float, value)))
+        what = f"{type(owner).__name__}.{name}"
+        object.__setattr__(owner, name, scale(what, getattr(owner, name), positive=positive, tailed=tailed))
 
 
 def _is_scale(value: tuple[object, ...], *, positive: bool) -> bool:

@@ -9,11 +9,11 @@ from typing import Final, NamedTuple
 
 from isiw.checks import (
     Checked,
+    MeanAndSd,
     Number,
     Positive,
     Share,
     ascending,
-    mean_and_sd,
     require_sum_of_one,
 )
 from isiw.design import DesignSpace
@@ -77,7 +77,7 @@ class StartPrior(Checked):
     Args:
         spans: starts counted from the impact; the first is the usual one.
         hit_delay_ms: mean and SD of the impact on the clock of the valve, of a person unknown [ms], as the rig states
-            it; None where it does not: then it is the tapping robot's with a probability of `p_robot`, else anything
+            it; None if it does not: then it is the tapping robot's with a probability of `p_robot`, else anything
             from 20 to 300 ms.
         p_robot: how probable it is that a rig that does not state its hit delay is the tapping robot.
         p_anywhere: probability that the start lies anywhere in the range instead, or up to 100 ms before it; more in a
@@ -85,15 +85,13 @@ class StartPrior(Checked):
     """
 
     spans: tuple[Span, ...] = TAP_SPANS
-    hit_delay_ms: tuple[float, float] | None = None
+    hit_delay_ms: MeanAndSd | None = None
     p_robot: Share = 0.5
     p_anywhere: Share = 0.04
 
     def __post_init__(self) -> None:
         super().__post_init__()
         require_sum_of_one("the shares of StartPrior.spans", (span.share for span in self.spans))
-        if self.hit_delay_ms is not None:
-            object.__setattr__(self, "hit_delay_ms", mean_and_sd("StartPrior.hit_delay_ms", self.hit_delay_ms))
 
     def start_ms(self, quantile: Tensor, space: DesignSpace) -> Tensor:
         """Starts in a space [ms] at some quantiles of the prior, same shape."""
@@ -101,11 +99,7 @@ class StartPrior(Checked):
         return law.start_ms.at(quantile)
 
     def knots(self, space: DesignSpace) -> tuple[Tensor, Tensor, Tensor]:
-        """Evenly spaced starts in a space [ms], the density there, and the probability of an earlier one; shape (k,).
-
-        Args:
-            space: the design space.
-        """
+        """Evenly spaced starts in a space [ms], the density there, and the probability of earlier ones, (k,) each."""
         law = _law(space, self, torch.float32, torch.device("cpu"))
         return law.density.x, law.density.y, law.start_ms.x
 
@@ -174,15 +168,15 @@ class _Line(NamedTuple):
         return self.y[left] + share.mul_(self.rise[left])
 
 
-class _Law(NamedTuple):
-    """Where windows start [ms]: the density by the start, and the start by its quantile."""
+class _Starts(NamedTuple):
+    """The density of window starts [ms] by the start, and the start by its quantile."""
 
     density: _Line
     start_ms: _Line
 
 
 @lru_cache(maxsize=64)
-def _law(space: DesignSpace, prior: StartPrior, dtype: torch.dtype, device: torch.device) -> _Law:
+def _law(space: DesignSpace, prior: StartPrior, dtype: torch.dtype, device: torch.device) -> _Starts:
     low_ms, high_ms = space.low_ms - BEFORE_MS, space.high_ms
     knots = min(MAX_KNOTS, math.ceil((high_ms - low_ms) / KNOT_MS) + 1)
     knots_ms = torch.linspace(low_ms, high_ms, knots, dtype=torch.float32).double()
@@ -196,4 +190,4 @@ def _law(space: DesignSpace, prior: StartPrior, dtype: torch.dtype, device: torc
     total = below[-1]
     exact = knots_ms, mixed / total, torch.nn.functional.pad(below / total, (1, 0))
     knots_ms, density, below = (values.to(device, dtype) for values in exact)
-    return _Law(_Line.through(knots_ms, density), _Line.through(below, knots_ms))
+    return _Starts(_Line.through(knots_ms, density), _Line.through(below, knots_ms))

@@ -26,7 +26,7 @@ def table_levels(device: torch.device) -> Tensor:
 
 
 def interpolated(table: Tensor, level: Tensor) -> Tensor:
-    """What lies between the rows of a table."""
+    """Values between the rows of a table."""
     position = level.clamp(0.0, 1.0).sqrt() * (LEVELS - 1)
     below = position.floor().clamp_max(LEVELS - 2)
     first = LEVELS * torch.arange(table.shape[0] * table.shape[1], device=level.device).view(*table.shape[:2], 1)

@@ -1,1 +1,1 @@
-"""What can be set about the named strategies, a module a family, each loaded when one of its strategies is made."""
+"""Settings of the named strategies: a module with their parts, and one with the usual settings of each family."""

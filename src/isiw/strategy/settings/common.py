@@ -1,4 +1,4 @@
-"""What can be set about a named strategy: the fields of its parts, each under a key of its own.
+"""The settings of a named strategy: the fields of its parts, each under a key of its own.
 
 A strategy has three parts: the model, what is asked, and when to stop. The keys that a
 configuration, a log and `make_strategy` know are the names of the parts' fields, so that no setting is written down
@@ -10,16 +10,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, fields, is_dataclass, replace
+from dataclasses import asdict, dataclass, field, fields, is_dataclass, replace
 from functools import partial
 from numbers import Integral
-from typing import Annotated, Any, Final, Protocol, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Final, Protocol, TypeAlias, get_args, get_origin, get_type_hints
 
 import docstring_parser
 import numpy as np
 
 from isiw.acquisition.protocol import AcquisitionFunction
-from isiw.acquisition.registry import acquisition_named
+from isiw.acquisition.registry import ACQUISITIONS, acquisition_named
 from isiw.checks import (
     MOST_OF_A_KIND,
     Checked,
@@ -27,6 +27,7 @@ from isiw.checks import (
     Natural,
     Positive,
     Share,
+    choice,
     share,
     whole,
 )
@@ -48,8 +49,23 @@ KNOWN: Final = {
 """Short keys of what is known of the rig and the person; they stand for fields deep in a model's prior."""
 
 
+@dataclass(frozen=True)
+class Recipe:
+    """The name, seed and settings of a strategy, from which a log can make it again.
+
+    Args:
+        name: its name in the catalogue; empty for a strategy built from a user's own objects.
+        seed: the seed of all its randomness.
+        settings: the settings it was made with, as TOML values.
+    """
+
+    name: str
+    seed: int
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+
 class AskingPart(Protocol):
-    """What is asked: the second part of a strategy's settings."""
+    """The choice of ISIs: the second part of a strategy's settings."""
 
     def function(self, seed: int) -> AcquisitionFunction:
         """The acquisition function."""
@@ -67,22 +83,19 @@ class StoppingPart(Protocol):
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of a strategy: three parts, frozen dataclasses whose fields are TOML values.
-
-    Args:
-        model: the model.
-        asking: what is asked.
-        stopping: when to stop.
-    """
+    """Settings of a strategy: three parts, frozen dataclasses whose fields are TOML values."""
 
     model: ResponseModel
     asking: AskingPart
     stopping: StoppingPart
 
 
+AcquisitionName: TypeAlias = Annotated[str, lambda _, name: choice("the acquisition function", name, ACQUISITIONS)]
+
+
 @dataclass(frozen=True)
-class Asking(Checked):
-    """What a strategy with a posterior of the window asks.
+class Choosing(Checked):
+    """The choice of ISIs by a strategy with a posterior of the window.
 
     Args:
         acquisition: what chooses the next ISI, one of `isiw.acquisition.registry.ACQUISITIONS`.
@@ -92,12 +105,8 @@ class Asking(Checked):
         InvalidValueError: an unknown acquisition function, or an invalid number.
     """
 
-    acquisition: str = "alternating"
+    acquisition: AcquisitionName = "alternating"
     initial_trials: Natural = 0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.function(0)
 
     def function(self, seed: int) -> AcquisitionFunction:
         """The acquisition function."""
@@ -116,7 +125,7 @@ class Stopping(Checked):
     Args:
         max_trials: stop after this many stimuli; mistrials count, control trials do not.
         stop_width_ms: stop when a window is 90 % probable and the 90 % credible intervals of both edges are at most
-            this wide [ms], under every kind of noise that is still probable where the model weighs more than one.
+            this wide [ms], under every kind of noise that is still probable if the model weighs more than one.
         stop_expected_f1: stop when the expected F1 of the reported window is at least this; never at 1.
         stop_gain: stop, after 35 pairs, when a window is probable (.97), and the last ten stimuli added less than this
             to the expected F1; never at 0.
@@ -137,14 +146,7 @@ class Stopping(Checked):
 
 @dataclass(frozen=True)
 class Setting:
-    """One thing that can be set.
-
-    Args:
-        path: the fields that lead to it, from the settings on.
-        owner: the class of the last of them.
-        kind: its type.
-        value: what it is.
-    """
+    """One thing that can be set: the fields that lead to it from the settings on, the last one's class, its type."""
 
     path: tuple[str, ...]
     owner: type
@@ -153,7 +155,7 @@ class Setting:
 
 
 def settings_keys(settings: Settings) -> dict[str, Setting]:
-    """What can be set about a strategy, by key."""
+    """The settings of a strategy, by key."""
     parts = ((part.name, getattr(settings, part.name)) for part in fields(settings))
     keys = {setting.path[-1]: setting for name, part in parts for setting in _settings_of(part, (name,))}
     known = ((key, _setting_at(settings, path)) for key, paths in KNOWN.items() for path in paths)
@@ -161,7 +163,7 @@ def settings_keys(settings: Settings) -> dict[str, Setting]:
 
 
 def _setting_at(owner: Any, path: tuple[str, ...]) -> Setting | None:
-    """The field at the end of a path; None where there is none."""
+    """The field at the end of a path; None if there is none."""
     for name in path[:-1]:
         owner = getattr(owner, name, None)
     if owner is None or not hasattr(owner, path[-1]):
@@ -180,9 +182,9 @@ def _settings_of(part: Any, path: tuple[str, ...]) -> Iterator[Setting]:
 
 
 def settings_values(settings: Settings) -> dict[str, Any]:
-    """All settings by key, as TOML values; those of `KNOWN` where they are given."""
+    """All settings by key, as TOML values; those of `KNOWN` if they are given."""
     keys = settings_keys(settings).items()
-    return {key: _plain(setting.value) for key, setting in keys if setting.value is not None}  # TOML has no None
+    return {key: as_toml(setting.value) for key, setting in keys if setting.value is not None}  # TOML has no None
 
 
 def settings_from(usual: Settings, values: Mapping[str, Any], name: str) -> Settings:
@@ -204,7 +206,7 @@ def settings_from(usual: Settings, values: Mapping[str, Any], name: str) -> Sett
 
 
 def _require_modest(value: Any, source: str) -> None:
-    """Raise where a number of trials, particles or the like would fill the memory before anything else could."""
+    """Raise if a number of trials, particles or the like would fill the memory before anything else could."""
     if is_dataclass(value) and not isinstance(value, type):
         value = {f.name: getattr(value, f.name) for f in fields(value)}
     if isinstance(value, Mapping):
@@ -260,13 +262,13 @@ def _merged(default: Any, given: Mapping[str, Any]) -> dict[str, Any]:
     return merged
 
 
-def _plain(value: Any) -> Any:
-    """As TOML has it: tables, lists, and plain values."""
+def as_toml(value: Any) -> Any:
+    """A value as TOML has it: tables, lists, and plain values; what is None is left out."""
     if is_dataclass(value) and not isinstance(value, type):
         value = asdict(value)
     if isinstance(value, Mapping):
-        return {key: _plain(inner) for key, inner in value.items() if inner is not None}
-    return [_plain(inner) for inner in value] if isinstance(value, tuple) else value
+        return {key: as_toml(inner) for key, inner in value.items() if inner is not None}
+    return [as_toml(inner) for inner in value] if isinstance(value, list | tuple) else value
 
 
 _UNITS: Final = {"ms": "ms", "ms2": "ms²", "mv": "mV", "uv": "µV", "s": "s", "hz": "Hz"}
@@ -279,8 +281,8 @@ class DescribedSetting:
     Args:
         key: its name as in a configuration or a call of `make_strategy`; those of a group follow it, after a dot, and
             what the tables of a list have, after brackets.
-        value: what it is by default; None where it is not set, and for a group. A list of tables is set as a whole.
-        unit: of the value; empty where it has none.
+        value: what it is by default; None if it is not set, and for a group. A list of tables is set as a whole.
+        unit: of the value; empty if it has none.
         meaning: what it is, in a sentence.
         group: whether its values are those of its members.
     """
@@ -293,7 +295,7 @@ class DescribedSetting:
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """What each number of the value is, where it has several with names of their own."""
+        """The names of the numbers of the value, if it has several."""
         return getattr(self.value, "_fields", ())
 
 
@@ -323,6 +325,6 @@ def _entries(key: str, value: Any, meaning: str) -> Iterator[DescribedSetting]:
 
 
 def _meanings(owner: type) -> dict[str, str]:
-    """What the docstring of a class says of each of its arguments, on one line."""
+    """The description of each argument in the docstring of a class, on one line."""
     documented = docstring_parser.parse(owner.__doc__ or "").params
     return {param.arg_name: " ".join((param.description or "").split()) for param in documented}

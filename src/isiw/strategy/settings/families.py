@@ -10,7 +10,7 @@ from isiw.models.gp import GaussianProcess
 from isiw.models.parametric import ParametricModel
 from isiw.models.particles import ParticleModel
 from isiw.models.particles.supra import SupraModel
-from isiw.strategy.settings.common import Asking, Settings, Stopping
+from isiw.strategy.settings.common import Choosing, Settings, Stopping
 from isiw.strategy.stopping import Budget, StoppingRule
 
 
@@ -29,7 +29,7 @@ class SupraStopping(Checked):
         return Budget(self.max_trials)
 
 
-PARTICLES: Final = Settings(ParticleModel(), Asking(), Stopping())
-SUPRA: Final = Settings(SupraModel(), Asking(), SupraStopping())
-PARAMETRIC: Final = Settings(ParametricModel(), Asking(), Stopping())
-GAUSSIAN_PROCESS: Final = Settings(GaussianProcess(), Asking("straddle", initial_trials=5), Stopping())
+PARTICLES: Final = Settings(ParticleModel(), Choosing(), Stopping())
+SUPRA: Final = Settings(SupraModel(), Choosing(), SupraStopping())
+PARAMETRIC: Final = Settings(ParametricModel(), Choosing(), Stopping())
+GAUSSIAN_PROCESS: Final = Settings(GaussianProcess(), Choosing("straddle", initial_trials=5), Stopping())

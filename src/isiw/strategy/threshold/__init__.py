@@ -1,8 +1,7 @@
 """Before any window: the resting motor threshold and the hot spot [Kim2020, 4.2.1]."""
 
-from isiw.strategy.threshold.bayes import BayesThreshold, FiveOfTen, MaximumLikelihood
+from isiw.strategy.threshold.bayes import BayesThreshold, FiveOfTen, MaximumLikelihood, RecruitmentBelief
 from isiw.strategy.threshold.pulses import IntensityRange, Pulse, ThresholdEstimate, ThresholdMethod
-from isiw.strategy.threshold.recruitment import RecruitmentBelief
 from isiw.strategy.threshold.search import ThresholdSearch, list_threshold_methods, make_threshold_search
 
 __all__ = [

@@ -1,4 +1,10 @@
-"""The threshold as a posterior on a grid: amplitudes tell how far an intensity is from it, not only on which side."""
+"""Methods for the motor threshold: by likelihood, by counting, and as a posterior that uses amplitudes, too.
+
+An amplitude says how far an intensity is from the threshold, not only on which side. The MEP is that of [Goetz2014]:
+`A / (1 + exp(-k (x + sigma_x z1 - x50))) exp(sigma_y z2)` above an EMG floor, with x in % of the threshold. A, k and
+sigma_x are not known; each is one of a few values, whose sources are in `docs/threshold.md`. x50 follows from them, as
+half of the MEPs at the threshold exceed 50 µV.
+"""
 
 from __future__ import annotations
 
@@ -7,15 +13,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from statistics import NormalDist
-from typing import Annotated, Final
+from typing import Annotated, Final, TypeAlias
 
 import numpy as np
 
-from isiw.checks import Checked, Count, Positive, number, whole
+from isiw.checks import Checked, Count, Positive, ascending, number, whole
 from isiw.lazy import scipy
 from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.strategy.threshold.pulses import IntensityRange, Pulse, ThresholdEstimate
-from isiw.strategy.threshold.recruitment import DISTANCES_PCT, RecruitmentBelief, log_likelihood
+from isiw.trials import RESPONSE_MV
 from isiw.types import FloatArray
 
 _DROP: Final = 0.5 * NormalDist().inv_cdf(0.95) ** 2  # of the log-likelihood at the ends of a 90 % interval
@@ -69,7 +75,7 @@ class MaximumLikelihood(Checked):
 
 
 def _best(thresholds: FloatArray, log_likelihood: FloatArray) -> float:
-    """The maximum; where it is flat, its middle."""
+    """The maximum; if it is flat, its middle."""
     best = thresholds[log_likelihood >= log_likelihood.max() - 1e-9]
     return float(best.mean())
 
@@ -122,43 +128,131 @@ class FiveOfTen(Checked):
         return suffices | {at: False for (at, yes), n in told.items() if not yes and n > self.of - self.enough}
 
     def _course(self, pulses: Sequence[Pulse], space: IntensityRange) -> tuple[float, StopDecision]:
-        """What is asked next, and whether that is needed."""
+        """The next intensity, and whether another pulse is needed."""
         verdicts = self._verdicts(pulses)
         enough = min((at for at, suffices in verdicts.items() if suffices), default=None)
         short = max((at for at in verdicts if not verdicts[at] and (enough is None or at < enough)), default=None)
         if enough is None:
             return self._upwards(short, space)
         if enough == space.low_pct_mso:
-            return enough, _over(
+            return enough, StopKind.THRESHOLD.stop(
                 f"{enough:g} % MSO is high enough (at least {self.enough} of {self.of} pulses evoke an MEP), "
                 "and it is the lowest intensity of the range: begin a new search lower."
             )
         if short is None:
-            return space.snap(enough - max(self.large_step_pct_mso, space.step_pct_mso)), _on(
-                f"{enough:g} % MSO is high enough."
-            )
+            lower = space.snap(enough - max(self.large_step_pct_mso, space.step_pct_mso))
+            return lower, StopKind.THRESHOLD.go_on(f"{enough:g} % MSO is high enough.")
         if enough - short > 1.5 * space.step_pct_mso:
-            return space.snap(enough - space.step_pct_mso), _on(
-                f"The threshold is between {short:g} and {enough:g} % MSO."
-            )
-        return enough, _over(f"{enough:g} % MSO is high enough, and {short:g} % MSO is not.")
+            between = f"The threshold is between {short:g} and {enough:g} % MSO."
+            return space.snap(enough - space.step_pct_mso), StopKind.THRESHOLD.go_on(between)
+        return enough, StopKind.THRESHOLD.stop(f"{enough:g} % MSO is high enough, and {short:g} % MSO is not.")
 
     def _upwards(self, short: float | None, space: IntensityRange) -> tuple[float, StopDecision]:
         if short is None:
-            return space.snap(self.start_pct_mso), _on("No intensity tested so far is high enough.")
+            none = "No intensity tested so far is high enough."
+            return space.snap(self.start_pct_mso), StopKind.THRESHOLD.go_on(none)
         if short == space.high_pct_mso:
-            return short, _over(f"{short:g} % MSO, the highest intensity of the range, is not high enough.")
-        return space.snap(short + max(self.large_step_pct_mso, space.step_pct_mso)), _on(
-            f"{short:g} % MSO is not high enough."
-        )
+            highest = f"{short:g} % MSO, the highest intensity of the range, is not high enough."
+            return short, StopKind.THRESHOLD.stop(highest)
+        higher = space.snap(short + max(self.large_step_pct_mso, space.step_pct_mso))
+        return higher, StopKind.THRESHOLD.go_on(f"{short:g} % MSO is not high enough.")
 
 
-def _over(reason: str) -> StopDecision:
-    return StopKind.THRESHOLD.stop(reason)
+DISTANCES_PCT: Final = np.arange(-70.0, 91.0)
+"""Of an intensity from the threshold [% of it]; beyond these ends nothing changes any more."""
+
+ODD: Final = 0.02
+"""Share of pulses whose MEP says nothing: a slip, a movement, an artefact."""
+
+_ODD_DENSITY: Final = 0.2  # what says nothing lies anywhere within a factor of 150
+_INPUTS_PCT: Final = np.arange(-120.0, 121.0)  # above x50
+_FLOOR_Z, _FLOOR_WEIGHTS = np.polynomial.hermite_e.hermegauss(5)
+_FLOOR_WEIGHTS = _FLOOR_WEIGHTS / _FLOOR_WEIGHTS.sum()
+
+_Possible: TypeAlias = Annotated[tuple[float, ...], partial(ascending, above=0)]
 
 
-def _on(reason: str) -> StopDecision:
-    return StopKind.THRESHOLD.go_on(reason)
+@dataclass(frozen=True)
+class RecruitmentBelief(Checked):
+    """The possible recruitment curves before the first pulse; all combinations are equally likely.
+
+    Args:
+        slopes_per_pct: k [1 / % of the threshold].
+        sigmas_x_pct: SD of the input noise [% of the threshold].
+        amplitudes_mv: A, the largest MEP [mV].
+        sigma_y: SD of the output noise, natural log.
+        floor_mv: median amplitude of a sweep without a response [mV].
+        floor_log_sd: its SD over people and trials, natural log.
+        visible_mv: a smaller amplitude may be the floor, and says no more than that [mV].
+
+    Raises:
+        InvalidValueError: values that are not positive, or do not ascend.
+    """
+
+    slopes_per_pct: _Possible = (0.20, 0.27, 0.36)
+    sigmas_x_pct: _Possible = (5.0, 8.0, 12.0)
+    amplitudes_mv: _Possible = (0.1, 0.18, 0.4, 1.0, 2.5)
+    sigma_y: Positive = 0.4
+    floor_mv: Positive = 0.010
+    floor_log_sd: Positive = 0.3
+    visible_mv: Annotated[float, partial(number, above=0, most=RESPONSE_MV)] = 0.030
+
+
+@lru_cache(maxsize=256)
+def log_likelihood(belief: RecruitmentBelief, mep_mv: float | None, *, responded: bool) -> FloatArray:
+    """Logarithm of the probability of what came of a pulse, by `DISTANCES_PCT` and recruitment curve, shape (t, c)."""
+    if mep_mv is not None and mep_mv >= belief.visible_mv:
+        density = _with_input_noise(belief, _density(belief, mep_mv))
+        return np.asarray(np.log((1 - ODD) * density + ODD * _ODD_DENSITY))
+    larger = _with_input_noise(belief, _exceeding(belief, RESPONSE_MV if mep_mv is None else belief.visible_mv))
+    return np.asarray(np.log((1 - ODD) * (larger if responded else 1 - larger) + 0.5 * ODD))
+
+
+def _log_evoked(belief: RecruitmentBelief) -> FloatArray:
+    """Logarithm of the MEP without noise, by input, slope and amplitude."""
+    log_share = scipy.special.log_expit(np.array(belief.slopes_per_pct) * _INPUTS_PCT[:, None])
+    return np.asarray(log_share[..., None] + np.log(belief.amplitudes_mv))
+
+
+def _above_floor(belief: RecruitmentBelief, amplitude_mv: float) -> FloatArray:
+    """Excess of an amplitude above the floor, by the floor's nodes [mV]."""
+    return np.maximum(amplitude_mv - belief.floor_mv * np.exp(belief.floor_log_sd * _FLOOR_Z), 1e-3)
+
+
+def _exceeding(belief: RecruitmentBelief, amplitude_mv: float) -> FloatArray:
+    """Probability of a larger MEP without input noise, by input, slope and amplitude."""
+    z = (_log_evoked(belief)[..., None] - np.log(_above_floor(belief, amplitude_mv))) / belief.sigma_y
+    return np.asarray(scipy.special.ndtr(z) @ _FLOOR_WEIGHTS)
+
+
+def _density(belief: RecruitmentBelief, amplitude_mv: float) -> FloatArray:
+    """Density of an MEP by its logarithm without input noise, by input, slope and amplitude."""
+    evoked_mv = _above_floor(belief, amplitude_mv)
+    z = (_log_evoked(belief)[..., None] - np.log(evoked_mv)) / belief.sigma_y
+    return np.asarray(scipy.stats.norm.pdf(z) / belief.sigma_y @ (_FLOOR_WEIGHTS * amplitude_mv / evoked_mv))
+
+
+def _with_input_noise(belief: RecruitmentBelief, by_input: FloatArray) -> FloatArray:
+    """The same by distance and recruitment curve, whose order is input noise, slope, amplitude."""
+    inputs_last = np.moveaxis(by_input, 0, -1)[..., None]
+    by_curve = (_input_noise(belief) @ inputs_last)[..., 0]
+    return np.moveaxis(by_curve, -1, 0).reshape(len(DISTANCES_PCT), -1)
+
+
+@lru_cache(maxsize=4)
+def _input_noise(belief: RecruitmentBelief) -> FloatArray:
+    """Weights of the inputs, by input noise, slope, amplitude and distance."""
+    sigmas, centres = np.array(belief.sigmas_x_pct), _INPUTS_PCT[::4]
+    larger = np.einsum("stx,xka->skat", _weights(centres, sigmas[:, None]), _exceeding(belief, RESPONSE_MV))
+    thresholds = np.array([np.interp(0.5, curve, centres) for curve in larger.reshape(-1, len(centres))])
+    return _weights(thresholds.reshape(larger.shape[:-1])[..., None] + DISTANCES_PCT, sigmas[:, None, None, None])
+
+
+def _weights(centres: FloatArray, sigmas: FloatArray) -> FloatArray:
+    """Normal weights of the inputs about some centres; the inputs are the last axis."""
+    z = (_INPUTS_PCT - centres[..., None]) / sigmas[..., None]
+    weights = np.exp(-0.5 * z * z)
+    return np.asarray(weights / weights.sum(axis=-1, keepdims=True))
 
 
 THRESHOLDS_PCT_MSO: Final = np.arange(10.0, 130.5, 0.5)
@@ -167,7 +261,7 @@ THRESHOLDS_PCT_MSO: Final = np.arange(10.0, 130.5, 0.5)
 
 @dataclass(frozen=True)
 class BayesThreshold(Checked):
-    """Asks at the posterior's median, and stops when its SD is small [Qi2011], with amplitudes where there are any.
+    """Asks at the posterior's median, and stops when its SD is small [Qi2011], with amplitudes if there are any.
 
     Args:
         prior_mean_pct_mso: of the threshold, before the first pulse [% MSO].
@@ -189,11 +283,7 @@ class BayesThreshold(Checked):
         return self.max_pulses
 
     def posterior(self, pulses: Sequence[Pulse]) -> FloatArray:
-        """Probability of each of `THRESHOLDS_PCT_MSO`.
-
-        Args:
-            pulses: the pulses so far.
-        """
+        """Probability of each of `THRESHOLDS_PCT_MSO` after some pulses."""
         told = sum((_told(self.curves, pulse) for pulse in pulses), start=np.zeros((1, 1)))
         prior = scipy.stats.norm.logpdf(THRESHOLDS_PCT_MSO, self.prior_mean_pct_mso, self.prior_sd_pct_mso)
         log = prior + scipy.special.logsumexp(told, axis=1)

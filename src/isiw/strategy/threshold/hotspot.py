@@ -17,8 +17,8 @@ from isiw.checks import Amplitude, Checked, Count, Number, Positive
 from isiw.errors import InvalidValueError
 from isiw.lazy import scipy
 from isiw.strategy.stopping import StopDecision, StopKind
+from isiw.strategy.threshold.bayes import DISTANCES_PCT, RecruitmentBelief, log_likelihood
 from isiw.strategy.threshold.pulses import IntensityRange, Pulse, ThresholdEstimate
-from isiw.strategy.threshold.recruitment import DISTANCES_PCT, RecruitmentBelief, log_likelihood
 from isiw.trials import RESPONSE_MV
 from isiw.types import FloatArray
 
@@ -47,13 +47,7 @@ class CoilPulse(Checked):
 
 
 class HotSpotEstimate(NamedTuple):
-    """The estimated place of the hot spot.
-
-    Args:
-        x_mm: its place [mm].
-        y_mm: the same, across [mm].
-        sd_mm: root of the mean squared distance from there [mm]; None where the method has none.
-    """
+    """The estimated place of the hot spot, and the root mean square of the distance from there, if known [mm]."""
 
     x_mm: float
     y_mm: float
@@ -86,7 +80,7 @@ class WalkedHotSpot(Checked):
 
     @property
     def pulses(self) -> int:
-        """How many pulses it takes."""
+        """Number of pulses that it takes."""
         return self.repeats * len(_places(self.half_width_mm, self.step_mm))
 
     def ask(self, pulses: Sequence[CoilPulse]) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from typing import Annotated, Final, Protocol, runtime_checkable
 
 import numpy as np
 
-from isiw.checks import Amplitude, Checked, number
+from isiw.checks import Amplitude, Checked, Flag, number
 from isiw.errors import InvalidValueError, LimitExceededError
 from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.trials import RESPONSE_MV
@@ -69,11 +69,7 @@ class IntensityRange(Checked):
         return float(self.grid_pct_mso[self._steps(inside)])
 
     def beyond(self, threshold_pct_mso: float) -> str | None:
-        """On which side of the range a threshold is, in words; None where it is within.
-
-        Args:
-            threshold_pct_mso: the threshold [% MSO].
-        """
+        """On which side of the range a threshold [% MSO] is, in words; None if it is within."""
         if threshold_pct_mso > self.high_pct_mso:
             return f"above the highest intensity, {self.high_pct_mso:g} % MSO"
         if threshold_pct_mso < self.low_pct_mso:
@@ -84,7 +80,7 @@ class IntensityRange(Checked):
         return round((intensity_pct_mso - self.low_pct_mso) / self.step_pct_mso)
 
     def require(self, intensity_pct_mso: float) -> None:
-        """Raise where an intensity must not be delivered.
+        """Raise if an intensity must not be delivered.
 
         Raises:
             InvalidValueError: it is not a finite number.
@@ -107,9 +103,9 @@ class Pulse(Checked):
 
     Args:
         intensity_pct_mso: its intensity [% MSO].
-        mep_mv: peak-to-peak amplitude of the MEP [mV]; 0 is below the detection limit. None where it was only seen
+        mep_mv: peak-to-peak amplitude of the MEP [mV]; 0 is below the detection limit. None if it was only seen
             whether there was a response.
-        response: whether there was a response; None where the amplitude says it.
+        response: whether there was a response; None if the amplitude says it.
         place_mm: the coil's place from the middle of the searched area [mm], if the hot spot is sought.
 
     Raises:
@@ -118,12 +114,12 @@ class Pulse(Checked):
 
     intensity_pct_mso: Annotated[float, partial(number, above=0, most=100)]
     mep_mv: Amplitude | None = None
-    response: bool | None = None
+    response: Flag | None = None
     place_mm: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if (self.mep_mv is None) == (self.response is None) or not isinstance(self.response, bool | None):
+        if (self.mep_mv is None) == (self.response is None):
             raise InvalidValueError(
                 "a pulse has either an amplitude or a response that was seen or not",
                 got=(self.mep_mv, self.response),
@@ -146,11 +142,11 @@ class ThresholdEstimate:
     """The estimate of the resting motor threshold.
 
     Args:
-        threshold_pct_mso: the threshold [% MSO]; None where there is no number to report, and `reason` says why.
-        low_pct_mso: lower end of its 90 % interval; None where the method has none.
+        threshold_pct_mso: the threshold [% MSO]; None if there is no number to report, and `reason` says why.
+        low_pct_mso: lower end of its 90 % interval; None if the method has none.
         high_pct_mso: upper end of its 90 % interval.
-        sd_pct_mso: SD of the posterior; None where the method has none.
-        reason: why there is no number; empty where there is one.
+        sd_pct_mso: SD of the posterior; None if the method has none.
+        reason: why there is no number; empty if there is one.
         hot_spot_mm: in a search for the hot spot, its place from the middle of the searched area [mm].
         hot_spot_sd_mm: root of the mean squared distance from there [mm].
     """
@@ -174,11 +170,7 @@ class ThresholdEstimate:
         return f"{told} (90 % interval {self.low_pct_mso:.1f}–{self.high_pct_mso:.1f})."
 
     def within(self, space: IntensityRange) -> ThresholdEstimate:
-        """The same, without its number where that is beyond the range.
-
-        Args:
-            space: the intensities that may be asked.
-        """
+        """The same, without its number if that is beyond the range of intensities."""
         side = None if self.threshold_pct_mso is None else space.beyond(self.threshold_pct_mso)
         return replace(self, threshold_pct_mso=None, reason=f"It is probably {side}.") if side else self
 
@@ -216,11 +208,7 @@ class PlacesCoil(Protocol):
     """Capability: a method that varies the coil's place instead of the intensity, and learns from amplitudes."""
 
     def place_mm(self, pulses: Sequence[Pulse]) -> tuple[float, float]:
-        """The next place of the coil [mm].
-
-        Args:
-            pulses: the pulses so far, in order.
-        """
+        """The next place of the coil [mm], after some pulses in their order."""
 
 
 @runtime_checkable
@@ -229,7 +217,7 @@ class HasPulseBudget(Protocol):
 
     @property
     def budget(self) -> int:
-        """How many pulses."""
+        """Number of pulses."""
 
 
 def one_sided(pulses: Sequence[Pulse], space: IntensityRange) -> StopDecision | None:
@@ -259,7 +247,7 @@ def one_sided(pulses: Sequence[Pulse], space: IntensityRange) -> StopDecision | 
 
 
 def not_growing(pulses: Sequence[Pulse]) -> str | None:
-    """That no pulse was answered at a higher intensity than one that was not, in words; None where one was."""
+    """That no pulse was answered at a higher intensity than one that was not, in words; None if one was."""
     answered = max(pulse.intensity_pct_mso for pulse in pulses if pulse.responded)
     missed = min(pulse.intensity_pct_mso for pulse in pulses if not pulse.responded)
     if answered > missed:
@@ -270,7 +258,7 @@ def not_growing(pulses: Sequence[Pulse]) -> str | None:
 
 
 def hardly_larger(pulses: Sequence[Pulse]) -> str | None:
-    """That the amplitudes of answered pulses are about those of the others, in words; None where they are larger."""
+    """That the amplitudes of answered pulses are about those of the others, in words; None if they are larger."""
     answered_mv = [pulse.mep_mv for pulse in pulses if pulse.responded and pulse.mep_mv is not None]
     missed_mv = [pulse.mep_mv for pulse in pulses if not pulse.responded and pulse.mep_mv is not None]
     if not (answered_mv and missed_mv):

@@ -32,7 +32,7 @@ METHODS: Final[Mapping[str, type[BayesThreshold | MaximumLikelihood | FiveOfTen]
 }
 
 _LOOK: Final = "Do the amplitudes grow with the intensity? If they do not, look for hum or an artefact in the EMG."
-"""What to do where the budget is used up and the pulses give no number."""
+"""What to do if the budget is used up and the pulses give no number."""
 
 HOT_SPOT: Final = "hot-spot"
 """The method that seeks the hot spot instead of a threshold."""
@@ -130,7 +130,7 @@ class ThresholdSearch:
     def estimate(self) -> ThresholdEstimate:
         """The estimate now.
 
-        There is no number before a pulse was answered at a higher intensity than one that was not, nor where answered
+        There is no number before a pulse was answered at a higher intensity than one that was not, nor if answered
         pulses are hardly larger than the others.
         """
         refused = self._refused()
@@ -143,7 +143,7 @@ class ThresholdSearch:
         return self._refused() or self.method.decision(self.pulses, self.space)
 
     def _refused(self) -> StopDecision | None:
-        """Why the pulses give no number, whatever the method says; None where they may."""
+        """Why the pulses give no number, whatever the method says; None if they may."""
         if isinstance(self.method, PlacesCoil):
             return None
         refused = one_sided(self.pulses, self.space) or self._like_hum()

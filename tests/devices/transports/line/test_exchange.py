@@ -11,11 +11,11 @@ import pytest
 from hypothesis import strategies as st
 
 from isiw.devices.transports.line_exchange import Line, LineSettings
-from isiw.devices.transports.line_table import Exchange
+from isiw.devices.transports.line_table import LineExchange
 from isiw.errors import DeviceError, DeviceTimeoutError
 
-ASKED = Exchange("{sequence} GET", r"(?P<sequence>\d+) ISI (?P<isi_ms>\S+)")
-PLAIN = Exchange("GET", r"ISI (?P<isi_ms>\S+)")
+ASKED = LineExchange("{sequence} GET", r"(?P<sequence>\d+) ISI (?P<isi_ms>\S+)")
+PLAIN = LineExchange("GET", r"ISI (?P<isi_ms>\S+)")
 
 
 class Scripted:
@@ -53,7 +53,7 @@ def test_an_answer_ends_by_a_line_feed_a_carriage_return_or_both(end: bytes) -> 
 
 
 def test_an_answer_without_the_number_that_it_must_have_is_none() -> None:
-    optional = Exchange("{sequence} GET", r"(?:(?P<sequence>\d+) )?ISI (?P<isi_ms>\S+)")
+    optional = LineExchange("{sequence} GET", r"(?:(?P<sequence>\d+) )?ISI (?P<isi_ms>\S+)")
     assert line(b"ISI 40\n{0} ISI 50\n")[0].ask(optional, timeout_s=1.0)["isi_ms"] == "50"
 
 
@@ -93,7 +93,7 @@ def test_a_refusal_is_one_to_its_own_command() -> None:
 
 
 @pytest.mark.parametrize("exchange", [ASKED, PLAIN])
-def test_a_line_without_end_takes_neither_memory_nor_more_than_its_time(exchange: Exchange) -> None:
+def test_a_line_without_end_takes_neither_memory_nor_more_than_its_time(exchange: LineExchange) -> None:
     asking, _ = line(b"", endless=True)
     tracemalloc.start()
     began_s = time.monotonic()

@@ -14,7 +14,7 @@ from benchmarks.pulse_peer import PEER_COMMANDS, Lie, PulsePeer
 import isiw
 from devices.transports.line.parts import HASTY, PAIR, TIMEOUT_S, made, over, staged, unnumbered
 from isiw.devices.transports.line_exchange import Line
-from isiw.devices.transports.line_table import Exchange
+from isiw.devices.transports.line_table import LineExchange
 from isiw.errors import DeviceError, NotDelivered
 from isiw.trials import Measurement, Stimulus
 
@@ -47,7 +47,7 @@ def test_a_stop_between_arming_and_firing_lets_nothing_be_fired(
 ) -> None:
     ask = Line.ask
 
-    def ask_and_stop(line: Line, exchange: Exchange, *args: Any, **keywords: Any) -> dict[str, str]:
+    def ask_and_stop(line: Line, exchange: LineExchange, *args: Any, **keywords: Any) -> dict[str, str]:
         said = ask(line, exchange, *args, **keywords)
         if "ARM" in exchange.send.split():
             device.stop()

@@ -9,7 +9,7 @@ from benchmarks.pulse_peer import PEER_COMMANDS
 
 import isiw
 from isiw.devices.transports.line_exchange import LineSettings
-from isiw.devices.transports.line_table import Exchange, LineCommands, command_values, isi_ms_of
+from isiw.devices.transports.line_table import LineCommands, LineExchange, command_values, isi_ms_of
 from isiw.errors import InvalidValueError
 
 
@@ -58,7 +58,7 @@ def test_what_an_instrument_must_understand_cannot_be_left_out() -> None:
     ],
 )
 def test_the_isi_is_sent_in_the_unit_and_format_of_the_instrument(send: str, sent: str) -> None:
-    assert Exchange(send, "OK").command(command_values(1, 0, 50.1)) == sent
+    assert LineExchange(send, "OK").command(command_values(1, 0, 50.1)) == sent
 
 
 def test_the_isi_is_read_in_the_unit_of_the_instrument() -> None:

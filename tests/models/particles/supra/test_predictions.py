@@ -16,8 +16,7 @@ from isiw.models.particles.prior import Person
 from isiw.models.particles.supra.predictions import SupraSample
 from isiw.models.particles.supra.prior import LATENTS, SupraLatents, SupraPrior
 from isiw.subjects.cohorts import cohort
-from isiw.subjects.profiles import OpposedProfile, PeakProfile
-from isiw.subjects.responses import RecruitmentResponse
+from isiw.subjects.responses import OpposedProfile, PeakProfile, RecruitmentResponse
 from isiw.subjects.subject import SimulatedSubject
 from isiw.window import Window
 from known import instance

@@ -1,4 +1,4 @@
-"""What a vane actuator is made of: the rotor and its chambers, what it carries, and the air that drives it.
+"""The parts of a vane actuator: the rotor and its chambers, its load, and the air that drives it.
 
     reservoir ── valve ── line (7.5 m) ── fitting ──▶ chamber 1 │vane│ chamber 2 ──▶ fitting ── line ── valve ── room
 
@@ -59,13 +59,13 @@ class Rotor(Checked):
 
     @property
     def break_away_bar(self) -> float:
-        """Pressure difference at which the vane begins to move where nothing else turns it [bar]."""
+        """Pressure difference at which the vane begins to move if nothing else turns it [bar]."""
         return self.friction_nm / (self.lever_m3 * PA_PER_BAR)
 
 
 @dataclass(frozen=True)
 class Load(Checked):
-    """What the rotor turns. The text has the forearm as a cylinder of 0.9 kg and 40 mm that turns about its own axis.
+    """The load of the rotor. The text has the forearm as a cylinder of 0.9 kg and 40 mm that turns about its own axis.
 
     Args:
         payload_n: weight of the added load, G_load [N].
@@ -135,7 +135,7 @@ class Supply(Checked):
 
     @property
     def delay_ms(self) -> float:
-        """What a line delays the valve's flow by, L/c (7.6) [ms]."""
+        """The delay of the valve's flow by a line, L/c (7.6) [ms]."""
         return 1000 * self.line_m / SOUND_M_S
 
 

@@ -9,9 +9,9 @@ The air in a volume is counted as P V = m R T [J]; at one temperature everywhere
 3. Speed under damping and dry friction is implicit too: a moment below the friction stops the vane within the step, and
    a vane at rest stays there until the moment exceeds the friction. Stops end the motion.
 
-The text's equations were judged as follows. (7.2) prints the inequality the wrong way round: a flow is choked where the
+The text's equations were judged as follows. (7.2) prints the inequality the wrong way round: a flow is choked if the
 downstream pressure is *less* than C_r of the upstream one. (7.7) lacks R T, which (7.5) has. (7.3) lets no air flow
-back from the line into the reservoir; here it may, where the line's pressure is higher. (7.8) is judged at
+back from the line into the reservoir; here it may, if the line's pressure is higher. (7.8) is judged at
 `Rotor.lever_m3`. The leak is proportional to what a chamber has above the room's pressure, so that none flows at rest.
 """
 
@@ -37,7 +37,7 @@ LONGEST_S = 60.0
 
 @dataclass(frozen=True, eq=False)
 class Rotations:
-    """What n actuators did.
+    """Rotations of n actuators.
 
     Args:
         t_ms: times of the samples after the first command [ms], shape (w,).
@@ -57,15 +57,8 @@ class Rotations:
 
     def one(self, index: int) -> Rotations:
         """One of them, as the only one."""
-        row = slice(index, index + 1)
-        return Rotations(
-            self.t_ms,
-            self.angle_rad[row],
-            self.chamber_bar[row],
-            self.line_bar[row],
-            self.valve_l_s[row],
-            self.delay_ms[row],
-        )
+        rows = {name: values[index : index + 1] for name, values in vars(self).items() if name != "t_ms"}
+        return Rotations(self.t_ms, **rows)
 
 
 def orifice_flow(conductance: ArrayLike, critical_ratio: ArrayLike, from_pa: ArrayLike, to_pa: ArrayLike) -> FloatArray:
@@ -131,7 +124,7 @@ class _Parts(NamedTuple):
     columns: IntArray
 
 
-class _State(NamedTuple):
+class _Motion(NamedTuple):
     """Air in the lines and chambers [J], shape (2, n), volumes of the chambers, and the vanes' motion, shape (n,)."""
 
     line_j: FloatArray
@@ -169,10 +162,10 @@ def _parts(vanes: Sequence[Vane], step_s: float) -> _Parts:
     )
 
 
-def _at_rest(parts: _Parts, start_rad: float) -> _State:
+def _at_rest(parts: _Parts, start_rad: float) -> _Motion:
     angle = np.full(len(parts.columns), start_rad)
     volumes = _chamber_m3(parts, angle)
-    return _State(
+    return _Motion(
         line_j=ROOM_PA * np.stack([parts.line_m3, parts.line_m3]),
         chamber_j=ROOM_PA * volumes,
         chamber_m3=volumes,
@@ -185,14 +178,14 @@ def _chamber_m3(parts: _Parts, angle_rad: FloatArray) -> FloatArray:
     return parts.dead_m3 + parts.lever_m3 * np.stack([angle_rad, math.pi - angle_rad])
 
 
-def _valve_flow(parts: _Parts, state: _State, filled: int) -> FloatArray:
-    """What flows through the valve into each line [J/s], shape (2, n) (7.3)."""
+def _valve_flow(parts: _Parts, state: _Motion, filled: int) -> FloatArray:
+    """Flow through the valve into each line [J/s], shape (2, n) (7.3)."""
     outside_pa = np.full_like(state.line_j, ROOM_PA)
     outside_pa[filled] = parts.reservoir_pa
     return orifice_flow(parts.valve, parts.critical_ratio, outside_pa, state.line_j / parts.line_m3)
 
 
-def _advanced(parts: _Parts, state: _State, arriving: FloatArray, step_s: float) -> _State:
+def _advanced(parts: _Parts, state: _Motion, arriving: FloatArray, step_s: float) -> _Motion:
     """The state a step later, with what arrives through the lines [J/s], shape (2, n)."""
     through = _fitting_flow(parts, state, step_s)
     leak = parts.leak_m3_s * (state.chamber_j / state.chamber_m3 - ROOM_PA)
@@ -200,11 +193,11 @@ def _advanced(parts: _Parts, state: _State, arriving: FloatArray, step_s: float)
     chamber_j = state.chamber_j + step_s * (through - leak)
     one_pa, other_pa = chamber_j / state.chamber_m3
     angle, speed = _turned(parts, state, (one_pa - other_pa) * parts.lever_m3, step_s)
-    return _State(line_j, chamber_j, _chamber_m3(parts, angle), angle, speed)
+    return _Motion(line_j, chamber_j, _chamber_m3(parts, angle), angle, speed)
 
 
-def _fitting_flow(parts: _Parts, state: _State, step_s: float) -> FloatArray:
-    """What flows from each line into its chamber within a step [J/s], shape (2, n) (7.4)."""
+def _fitting_flow(parts: _Parts, state: _Motion, step_s: float) -> FloatArray:
+    """Flow from each line into its chamber within a step [J/s], shape (2, n) (7.4)."""
     line_pa, chamber_pa = state.line_j / parts.line_m3, state.chamber_j / state.chamber_m3
     flow = orifice_flow(parts.fitting, parts.critical_ratio, line_pa, chamber_pa)
     difference = line_pa - chamber_pa
@@ -213,7 +206,7 @@ def _fitting_flow(parts: _Parts, state: _State, step_s: float) -> FloatArray:
     return implicit
 
 
-def _turned(parts: _Parts, state: _State, moment_nm: FloatArray, step_s: float) -> tuple[FloatArray, FloatArray]:
+def _turned(parts: _Parts, state: _Motion, moment_nm: FloatArray, step_s: float) -> tuple[FloatArray, FloatArray]:
     """Angle and speed a step later, by a moment of the air (7.8, 7.9)."""
     weight_nm = parts.weight_nm * np.sin(state.angle_rad - math.pi / 2)
     push = parts.inertia_kg_m2 * state.speed_rad_s + step_s * (moment_nm - weight_nm)
@@ -225,7 +218,7 @@ def _turned(parts: _Parts, state: _State, moment_nm: FloatArray, step_s: float) 
 
 
 def _rotations(
-    parts: _Parts, kept: list[tuple[int, _State, FloatArray]], step_ms: float, delay_ms: FloatArray
+    parts: _Parts, kept: list[tuple[int, _Motion, FloatArray]], step_ms: float, delay_ms: FloatArray
 ) -> Rotations:
     def over_time(samples: list[FloatArray]) -> FloatArray:
         return np.moveaxis(np.stack(samples, axis=-1), -2, 0)
@@ -243,7 +236,7 @@ def _rotations(
 
 @dataclass(frozen=True, eq=False)
 class Performance:
-    """What n actuators achieve under a square wave.
+    """Range and delay of n actuators under a square wave.
 
     Args:
         range_share: range of the rotation within a period, as a share of 180°, shape (n,).

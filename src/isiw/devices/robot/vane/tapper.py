@@ -30,10 +30,15 @@ UNITS = {"angle": "deg", "vane_pressure": "kPa"}
 STEP_MS = 0.25  # within 1 ms of a step of 0.1 ms
 LEAST_SHARE = 0.1  # of the mean: neither friction nor pressure ever vanishes
 
+STROKES = 32
+WAIT_MS = 60.0
+STILL_MS = 1000.0  # as long as a usual sweep
+LATEST_MEP_MS = max(end for _, end in MEP_WINDOWS_MS.values())
+
 
 @dataclass(frozen=True)
 class Variation(Checked):
-    """How strokes differ, and the noise of the sensors. The dissertation measured neither; these were chosen.
+    """Variation of strokes, and noise of the sensors. The dissertation measured neither; these were chosen.
 
     Args:
         friction_cv: SD of the friction from stroke to stroke, as a share of its mean.
@@ -70,7 +75,7 @@ def _varied(vane: Vane, friction: float, reservoir: float) -> Vane:
 def record_strokes(
     strokes: Rotations, rng: np.random.Generator, variation: Variation | None = None, *, rest_ms: float = VALVE_MS
 ) -> dict[str, FloatArray]:
-    """What the sensors record of n strokes, by channel in the units of `UNITS`, at `RATE_HZ`, each of shape (n, w)."""
+    """Sensor signals of n strokes, by channel in the units of `UNITS`, at `RATE_HZ`, each of shape (n, w)."""
     varied, rest = variation or Variation(), round(rest_ms * RATE_HZ / 1000)
     clean = {
         "angle": np.degrees(strokes.angle_rad),
@@ -81,16 +86,10 @@ def record_strokes(
     return {name: wave + noise_sd[name] * rng.standard_normal(wave.shape) for name, wave in waves.items()}
 
 
-STROKES = 32
-WAIT_MS = 60.0
-STILL_MS = 1000.0  # as long as a usual sweep
-LATEST_MEP_MS = max(end for _, end in MEP_WINDOWS_MS.values())
-
-
 class RotatingTapper:
     """A simulation of the tapping robot that turns the wrist by 180° after each tap; for `SimulatedDevice`.
 
-    The actuator's valve opens a while after the impact, or after the pulse where that comes later, so that nothing
+    The actuator's valve opens a while after the impact, or after the pulse if that comes later, so that nothing
     moves while the MEP is measured. TMS alone is followed by no rotation, nor is a tap whose accelerometer shows no
     impact; without an accelerometer the predicted impact counts. Before the next trial the hand has been brought back.
     The sweep has two channels more: the shaft's angle, and the pressure difference of the chambers.
@@ -126,7 +125,7 @@ class RotatingTapper:
         return replace(sweep, channels={**sweep.channels, **self._rotation(stimulus.trial, self._start_ms(sweep))})
 
     def _start_ms(self, sweep: Sweep) -> float | None:
-        """When the actuator's valve opens [ms on the sweep's clock]; None where there was no tap to turn after."""
+        """When the actuator's valve opens [ms on the sweep's clock]; None if there was no tap to turn after."""
         hit_ms, acceleration = sweep.t_hit_ms, sweep.channels.get("acceleration")
         if sweep.t_valve_ms is not None and acceleration is not None:
             hit_ms = impact_time(acceleration.values, acceleration.rate_hz, VALVE_MS)
