@@ -20,6 +20,7 @@ import typer
 from benchmarks.before_and_now import LATER, MARKS, study_of
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
+from isiw.studies import summary
 from isiw.studies.batch import _Batch
 from isiw.studies.sessions import SimulatedSession, examine
 from isiw.subjects.responses import RecruitmentResponse
@@ -56,10 +57,12 @@ class Noting(_Batch):
         super().tell(responses)
         self.told += 1
         for number, (session, told) in enumerate(zip(self.sessions, responses, strict=True)):
-            change = self.estimate(number).change
+            estimate = self.estimate(number)
+            change = estimate.change
             found = {} if change is None else {"kind": change.kind, "share": change.probability}
             who = {"cohort": session.cohort, "person": session.person, "seed": session.seed, "trial": self.told}
-            self.named.append(who | {"isi_ms": told.isi_ms, "mep_mv": told.mep_mv, "kind": "", "share": 0.0} | found)
+            who |= {"isi_ms": told.isi_ms, "mep_mv": told.mep_mv, "expected_f1": estimate.expected_f1}
+            self.named.append(who | {"kind": "", "share": 0.0} | found)
 
 
 @app.command()
@@ -133,6 +136,7 @@ def report(
     """Say how many steps are named in time, and how many that are none."""
     named = pd.concat([pd.read_parquet(file) for file in sorted((folder / "named").glob("*.parquet"))])
     lines = [f"- command: `{command_of('steps')}`, after `run`", f"- {made_with('torch', 'scipy')}"]
+    lines += ["", _at_stopping(folder, named).to_markdown(index=False, floatfmt=".3f")]
     stepped = named[named["cohort"] == "step"]
     if len(stepped):
         lines += ["", _in_time(stepped, sessions).to_markdown(index=False, floatfmt=".3f")]
@@ -141,6 +145,23 @@ def report(
         lines += ["", _without(others).to_markdown(index=False, floatfmt=".3f")]
     out.with_suffix(".md").write_text("\n".join([*lines, ""]), encoding="utf-8")
     print("\n".join(lines))
+
+
+def _at_stopping(folder: Path, named: pd.DataFrame) -> pd.DataFrame:
+    """Expected and actual F1 where the stopping rule ends the sessions, and how many are sure and wrong there."""
+    rows, who = pd.concat([pd.read_parquet(file) for file in sorted(folder.glob("*.parquet"))]), ["cohort", "person"]
+    ends = rows.sort_values("trial").groupby(who).tail(1).set_index(who)
+    trials = ends["stop_trial"].fillna(ends["trial"]).rename("trial")
+    expected = named.set_index([*who, "trial"])["expected_f1"]
+    f1, expected_f1 = (
+        ends["stop_f1"].fillna(ends["f1"]),
+        expected.reindex(pd.MultiIndex.from_frame(trials.reset_index())),
+    )
+    table = pd.DataFrame({"trials": trials, "f1": f1, "expected": expected_f1.to_numpy()})
+    wrong = (table["expected"] >= summary.SURE_F1) & (table["expected"] - table["f1"] >= summary.WRONG_F1)
+    table["sure and wrong"] = wrong.astype(float)
+    groups = table.groupby("cohort")
+    return groups.mean().assign(se=groups["sure and wrong"].sem(), people=groups.size()).reset_index()
 
 
 def _in_time(stepped: pd.DataFrame, sessions: int) -> pd.DataFrame:
