@@ -136,7 +136,8 @@ def honesty(before: Path, now: Path) -> pd.DataFrame:
         rows[f"start_{which}"], rows[f"end_{which}"] = both[f"start_covered_{which}"], both[f"end_covered_{which}"]
         rows[f"false_window_{which}"] = both[f"reported_window_{which}"].astype(float).mask(there)
         rows[f"false_sure_{which}"] = (both[f"probability_{which}"] >= 0.9).astype(float).mask(there)
-    unclear = both["reported_window_now"].astype(bool) & (both["bayes_factor"] < window.LEAST_FACTOR)
+    factor = both["bayes_factor_now" if "bayes_factor_now" in both else "bayes_factor"]  # which earlier versions lack
+    unclear = both["reported_window_now"].astype(bool) & (factor < window.LEAST_FACTOR)
     rows["undecided_now"] = (unclear & (both["probability_now"] < window.SURE)).astype(float)
     groups = pd.DataFrame(rows).groupby([both["cohort"], both["trial"]])
     table = groups.mean().assign(people=groups["people"].sum())

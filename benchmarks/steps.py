@@ -17,7 +17,7 @@ import pandas as pd
 import torch
 import typer
 
-from benchmarks.before_and_now import LATER, MARKS, study_of
+from benchmarks.before_and_now import LATER, MARKS, honesty, study_of
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
 from isiw.studies import summary
@@ -136,6 +136,7 @@ def report(
     """Say how many steps are named in time, and how many that are none."""
     named = pd.concat([pd.read_parquet(file) for file in sorted((folder / "named").glob("*.parquet"))])
     lines = [f"- command: `{command_of('steps')}`, after `run`", f"- {made_with('torch', 'scipy')}"]
+    lines += ["", _honest(folder).to_markdown(index=False, floatfmt=".3f")]
     lines += ["", _at_stopping(folder, named).to_markdown(index=False, floatfmt=".3f")]
     stepped = named[named["cohort"] == "step"]
     if len(stepped):
@@ -145,6 +146,21 @@ def report(
         lines += ["", _without(others).to_markdown(index=False, floatfmt=".3f")]
     out.with_suffix(".md").write_text("\n".join([*lines, ""]), encoding="utf-8")
     print("\n".join(lines))
+
+
+def _honest(folder: Path) -> pd.DataFrame:
+    """What `before_and_now honest` says of one version, with standard errors."""
+    tables = []
+    for file in sorted(folder.glob("*.parquet")):
+        table = honesty(file, file).set_index(["cohort", "trial"])
+        table = table[["people", *(column for column in table if column.endswith("_now"))]]
+        errors = pd.read_parquet(file).groupby(["cohort", "trial"])["f1"].sem()
+        table = table.rename(columns=lambda column: column.removesuffix("_now"))
+        table.insert(2, "f1_se", errors)
+        wrong = table["sure_and_wrong"]
+        table.insert(5, "sure_and_wrong_se", np.sqrt(wrong * (1.0 - wrong) / table["people"]))
+        tables.append(table.reset_index())
+    return pd.concat(tables)
 
 
 def _at_stopping(folder: Path, named: pd.DataFrame) -> pd.DataFrame:
