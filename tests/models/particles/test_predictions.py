@@ -49,7 +49,7 @@ def test_nine_of_ten_meps_of_people_in_general_lie_in_the_predicted_band() -> No
     isis_ms = profile_grid(VALVE_SPACE).double().numpy()
     low_mv, high_mv = model.begin(VALVE_SPACE, seed=5).prediction_mv(0.9)
     assert low_mv.shape == high_mv.shape == isis_ms.shape
-    meps_mv = np.stack([model.simulate(VALVE_SPACE, seed, [isis_ms[50]]).mep_mv for seed in range(200)])[:, 0]
+    meps_mv = np.stack([model.simulate(VALVE_SPACE, seed, [isis_ms[50]]).mep_mv for seed in range(600)])[:, 0]
     assert 0.85 < ((meps_mv >= low_mv[50]) & (meps_mv <= high_mv[50])).mean() < 0.95
     assert 0.02 < (meps_mv < low_mv[50]).mean() < 0.08
 
