@@ -27,7 +27,8 @@ from benchmarks.tables import write_tables
 from benchmarks.zero_trials import fixed_windows
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.metrics import trials_to_criterion
-from isiw.plots.study import save_study_plot
+from isiw.plots.study import study_figure
+from isiw.plots.style import save_figure
 from isiw.studies import (
     Processes,
     SimulatedSession,
@@ -129,13 +130,13 @@ def write(rows: pd.DataFrame, facts: dict[str, object], out: Path, fixed: pd.Dat
     }
     tables = {title: part for title, part in tables.items() if not part.empty}
     write_tables(tables, facts, out)
-    save_study_plot(table, out.with_suffix(".png"), overwrite=True)
+    save_figure(study_figure(table), out.with_suffix(".png"), overwrite=True)
 
 
 def redraw(out: Path) -> None:
     """The picture of results that are there, drawn again."""
     records = json.loads(out.with_suffix(".json").read_text(encoding="utf-8"))["F1 by trial"]
-    save_study_plot(pd.DataFrame(records), out.with_suffix(".png"), overwrite=True)
+    save_figure(study_figure(pd.DataFrame(records)), out.with_suffix(".png"), overwrite=True)
 
 
 def strategy_of(text: str) -> StudyStrategy:

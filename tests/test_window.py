@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
-from isiw.types import FloatArray
 from isiw.window import EDGE_LEVEL, Window, window_from_excess
 from known import known
 
@@ -222,23 +221,6 @@ def test_without_hypotheses_the_robust_interval_is_the_interval() -> None:
     estimate = WindowEstimate(1.0, None, edge_samples_ms=np.random.default_rng(7).uniform(0, 50, (300, 2)))
     assert estimate.robust_interval(0.8) == estimate.interval(0.8)
     assert WindowEstimate(None, Window(10, 20)).robust_interval() is None
-
-
-@pytest.mark.parametrize("samples", [None, np.zeros((3, 2))])
-def test_every_sample_has_one_hypothesis(samples: FloatArray | None) -> None:
-    with pytest.raises(InvalidValueError, match="one hypothesis"):
-        WindowEstimate(1.0, None, edge_samples_ms=samples, hypothesis_samples=np.zeros(2, dtype=int))
-
-
-def test_every_hypothesis_has_a_name() -> None:
-    with pytest.raises(InvalidValueError, match="has a name"):
-        WindowEstimate(
-            1.0,
-            None,
-            edge_samples_ms=np.zeros((2, 2)),
-            hypothesis_samples=np.array([0, 1]),
-            hypothesis_names=("only",),
-        )
 
 
 def test_edges_beyond_the_range_are_counted() -> None:

@@ -1,4 +1,4 @@
-"""What is known about one person's window: as a model knows it, with samples, and as it is logged, drawn and said."""
+"""The estimate of one person's window: as a model knows it, with samples, and as it is logged, drawn and said."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class BestISI(NamedTuple):
 class Enhancement(NamedTuple):
     """By how much the expected MEP is larger than without a tap [mV].
 
-    The shift of a recruitment curve's input that does so [% RMT] is None where the model has no such curve.
+    The shift of a recruitment curve's input that does so [% RMT] is None if the model has no such curve.
     """
 
     mep_mv: float
@@ -80,9 +80,9 @@ class WindowEstimate(Checked):
 
     Args:
         probability: probability that there is a window.
-        window: the reported decision; None where the probability is below one half.
-        start_ms: posterior median of the hull's start, given a window [ms]; -inf where it lies before the range.
-        end_ms: posterior median of the hull's end, given a window [ms]; +inf where it lies beyond the range.
+        window: the reported decision; None if the probability is below one half.
+        start_ms: posterior median of the hull's start, given a window [ms]; -inf if it lies before the range.
+        end_ms: posterior median of the hull's end, given a window [ms]; +inf if it lies beyond the range.
         grid_ms: the ISIs of `profile_quantiles_mv`, shape (t,).
         edge_samples_ms: posterior samples of (start, end) given a window, ±inf beyond the range, shape (s, 2).
         profile_quantiles_mv: the 0.05, 0.5 and 0.95 quantiles of the expected MEP by ISI [mV], shape (3, t).
@@ -96,20 +96,19 @@ class WindowEstimate(Checked):
         largest_excluded: an enhancement that, with 90 % probability, is larger than the largest at any ISI of the
             space; its shift is that of the window's peak, wherever it lies.
         unusual: how probable it is that parts of this person are of another law than the usual one, by their names.
-        pairs: how many pairs of stimuli it rests on; None where that is not known.
+        pairs: how many pairs of stimuli it rests on; None if that is not known.
         silent: whether no trial that it rests on showed an MEP, so that nothing is known about a window.
-        depressed: the ISIs that depress the MEP, as far as they are reported; None where there are none, or where
+        depressed: the ISIs that depress the MEP, as far as they are reported; None if there are none, or if
             nobody looked for them.
         depressed_probability: probability that there are any; None if the model does not look for them.
         change: what probably changed during the session, whatever the ISI; None if nothing did, or it is not sought.
         time_alone: probability that there is no window, but amplitudes changed with time; None if the model lacks it.
-        beforehand: probability of a window before the first trial; None where it is not known.
+        beforehand: probability of a window before the first trial; None if it is not known.
         tap_may_explain: whether the tap's own response may be what is larger within the window, as nobody knows what
             the tap alone does there.
 
     Raises:
-        InvalidValueError: a probability outside 0–1, a window or a depression reported against it, not one hypothesis a
-            sample, or one without a name.
+        InvalidValueError: a probability outside 0–1, or a window or a depression reported against it.
     """
 
     probability: Share | None
@@ -149,33 +148,16 @@ class WindowEstimate(Checked):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self._check_hypotheses()
         if self.depressed is not None and (self.depressed_probability or 0.0) < 0.5:
             raise InvalidValueError(
                 "a depression is reported although none is more probable", got=self.depressed_probability
             )
-        if self.probability is None:
-            return
-        if self.window is not None and self.probability < 0.5:
+        if self.window is not None and self.probability is not None and self.probability < 0.5:
             raise InvalidValueError("a window is reported although 'no window' is more probable", got=self.probability)
-
-    def _check_hypotheses(self) -> None:
-        kinds = self.hypothesis_samples
-        if kinds is None:
-            return
-        samples = 0 if self.edge_samples_ms is None else len(self.edge_samples_ms)
-        if len(kinds) != samples:
-            raise InvalidValueError(
-                "every sample of the edges has one hypothesis", got=len(kinds), expected=str(samples)
-            )
-        if samples and not 0 <= kinds.min() <= kinds.max() < len(self.hypothesis_names):
-            raise InvalidValueError(
-                "every hypothesis has a name", got=int(kinds.max()), expected=f"an index of {self.hypothesis_names}"
-            )
 
     @property
     def hypotheses(self) -> dict[str, float] | None:
-        """Probability of each of the model's hypotheses by name, given a window; None where it has none."""
+        """Probability of each of the model's hypotheses by name, given a window; None if it has none."""
         if self.hypothesis_samples is None or not len(self.hypothesis_samples):
             return None
         counts = np.bincount(self.hypothesis_samples, minlength=len(self.hypothesis_names))
@@ -209,7 +191,7 @@ class WindowEstimate(Checked):
             level: the credible level, in 0–1.
 
         Returns:
-            ((start low, start high), (end low, end high)), an edge beyond the range being ±inf; None where the method
+            ((start low, start high), (end low, end high)), an edge beyond the range being ±inf; None if the method
             has no posterior of the edges.
 
         Raises:
@@ -238,7 +220,7 @@ class WindowEstimate(Checked):
             min_share: the least probability of a hypothesis that is taken into account, given that there is a window.
 
         Returns:
-            As `interval` does; the same where the method has no hypotheses.
+            As `interval` does; the same if the method has no hypotheses.
 
         Raises:
             InvalidValueError: a level or a share outside 0–1.
@@ -270,7 +252,7 @@ class WindowEstimate(Checked):
                 are repeated: there they are no estimate.
 
         Returns:
-            The band [mV], or None where the method has none.
+            The band [mV], or None if the method has none.
         """
         if self.grid_ms is None or self.profile_quantiles_mv is None:
             return None
@@ -289,7 +271,7 @@ def _central(edges_ms: FloatArray, level: float) -> FloatArray:
 
 
 class Reported(BaseModel):
-    """What is reported of a window: `segments_ms` are starts and ends in turn, `best_isi_ms` median and 90 % interval.
+    """Reported figures of a window: `segments_ms` are starts and ends in turn, `best_isi_ms` a median and interval.
 
     `hypotheses` are probabilities by name, given a window; the band is that of the expected MEP at `grid_ms`.
     """
@@ -298,7 +280,7 @@ class Reported(BaseModel):
 
     probability: float | None = Field(description="That there is a window.")
     segments_ms: tuple[float, ...] = Field(
-        default=(), description="The reported window: starts and ends in turn; empty where none."
+        default=(), description="The reported window: starts and ends in turn; empty if none."
     )
     start_ms: Number | None = None
     start_low_ms: Number | None = None
@@ -316,12 +298,12 @@ class Reported(BaseModel):
 
 
 class Estimate(Reported):
-    """What is known about a window, in figures: what logs keep, and what pictures and sentences are made of.
+    """An estimate of a window in figures: logs keep them, and pictures and sentences are made of them.
 
     `start_beyond`, `end_beyond` and `split` are probabilities given a window: that an edge lies beyond the range, and
     that there is more than one segment. `unusual` are probabilities by name; `excluded_mv` and `excluded_pct_rmt` are
     the largest enhancement that is excluded with 90 % probability. `depressed_ms` are the segments in which the tap
-    depresses the MEP, and `depressed_probability` is that there are any; None where nobody looked for them. `change` is
+    depresses the MEP, and `depressed_probability` is that there are any; None if nobody looked for them. `change` is
     what probably changed during the session, whatever the ISI. `beforehand` is the probability of a window before the
     first trial. `tap_may_explain` says whether the tap's own response may be what is larger within the window.
     """

@@ -1,4 +1,4 @@
-"""What is wrong with data or a rig: a `Finding` says what, how badly, and what to do; and the slips of unit behind it.
+"""Findings about data or a rig: a `Finding` says what is wrong, how badly, and what to do; and slips of unit.
 
 A finding's kind and severity are what code goes by; its text and remedy are for people, and nothing reads them.
 """
@@ -18,7 +18,7 @@ ENOUGH_PAIRS: Final = 3
 
 
 class Severity(StrEnum):
-    """What follows: an error; a lost trial; a pause; a pause once, and a line in the log; nothing, but for several."""
+    """Consequences of a finding: an error; a lost trial; a pause; a pause once, and a line in the log; nothing."""
 
     REFUSED = "refused"
     MISTRIAL = "mistrial"
@@ -28,7 +28,7 @@ class Severity(StrEnum):
 
 
 class Kind(StrEnum):
-    """What is found. Those in `MISTRIALS` are the reasons of trials that are lost; the log has them by their values."""
+    """Kinds of findings. Those in `MISTRIALS` are the reasons of lost trials; the log has them by their values."""
 
     NO_IMPACT = "no impact"
     NO_PULSE = "no pulse"
@@ -125,7 +125,7 @@ TOO_FEW: Final = Finding(
 
 
 def lacking(pairs: int | None, *, silent: bool) -> Finding | None:
-    """What is missing to speak of a window; None where enough was measured."""
+    """The finding that too little was measured to speak of a window; None if enough was."""
     if silent:
         return NO_MEP
     return None if pairs is None or pairs >= ENOUGH_PAIRS else TOO_FEW
@@ -150,7 +150,7 @@ class Scale:
     usual: float = 1.0
 
     def slip(self, value: float) -> str | None:
-        """Which unit a value is probably in, as a question, and what to do; None where it is within the bounds."""
+        """Which unit a value is probably in, as a question, and what to do; None if it is within the bounds."""
         if value < self.least and self.too_small is not None:
             return f"Is it in {self.too_small[0]}? Multiply by {self.too_small[1]:g}."
         if value > self.most and self.too_large is not None:
@@ -158,7 +158,7 @@ class Scale:
         return None
 
     def likely_unit(self, values: Mapping[str, float]) -> str | None:
-        """The unit in which a value would be nearest to the usual one; None where none makes it possible."""
+        """The unit in which a value would be nearest to the usual one; None if none makes it possible."""
         possible = {unit: value for unit, value in values.items() if self.least <= value <= self.most}
         return min(possible, key=lambda unit: abs(math.log(possible[unit] / self.usual)), default=None)
 

@@ -35,7 +35,6 @@ THRESHOLD_PCT_RMT: Final = 100.0
 """Above this intensity a pulse evokes an MEP that can be depressed."""
 
 TOO_LITTLE: Final = "too little was measured"
-"""In the place of a window."""
 
 JUDGED_SINCE: Final = "Trials were excluded or included after this estimate; isiw estimate LOG computes it again."
 
@@ -72,10 +71,8 @@ def _between(edge: Edge, space: DesignSpace) -> str:
 
 def in_short(estimate: Estimate) -> str:
     """The reported window, or what there is in its place."""
-    if estimate.window is not None:
-        return str(estimate.window)
-    if not estimate.has_answer:
-        return "no answer yet"
+    if estimate.window is not None or not estimate.has_answer:
+        return str(estimate.window or "no answer yet")
     if estimate.probability is not None and estimate.probability >= 0.5:
         return "window not reported"
     return "no window" if rules_out(estimate.probability) else "undecided"
@@ -95,21 +92,14 @@ def _is_guess(estimate: Estimate) -> bool:
 
 
 def _chance(estimate: Estimate) -> str:
-    """The probability of a window and the Bayes factor, in brackets; empty where no probability is known."""
+    """The probability of a window and the Bayes factor, in brackets; empty if no probability is known."""
     if estimate.probability is None:
         return ""
-    factor = bayes_factor(estimate.probability, estimate.beforehand)
-    said = "" if factor is None else f"; Bayes factor {_factor(factor)}"
+    said, factor = "", bayes_factor(estimate.probability, estimate.beforehand)
+    if factor is not None:
+        size = "above 100" if factor > 100 else "below 0.01" if factor < 0.01 else f"{factor:.2g}"
+        said = f"; Bayes factor {size}"
     return f" (probability of a window: {estimate.probability:.2f}{said})"
-
-
-def _factor(value: float) -> str:
-    return "above 100" if value > 100 else "below 0.01" if value < 0.01 else f"{value:.2g}"
-
-
-def chance_text(probability: float | None) -> str:
-    """How probable a window is, in a picture."""
-    return "" if probability is None else f"P(window) = {probability:.2f}"
 
 
 def summary(estimate: Estimate) -> str:
@@ -139,7 +129,7 @@ def tap_unknown(estimate: Estimate) -> str:
 
 
 def at_a_trial(change: Change, trial: int | None) -> str:
-    """What changed during the session, whatever the ISI, and at which trial; without a full stop."""
+    """A change during the session, whatever the ISI, and its trial; without a full stop."""
     more = change.size > (0.0 if change.kind == "intensity" else 1.0)
     if change.kind == "intensity":
         sizes = f"{abs(change.size):.0f} % RMT {'higher' if more else 'lower'}"
@@ -198,11 +188,8 @@ def edges(estimate: Estimate, space: DesignSpace) -> str:
     start, end = estimate.start, estimate.end
     if estimate.window is None or not (start.is_known and end.is_known):
         return ""
-    given = (
-        "With 90 % probability each, it"
-        if _is_sure(estimate)
-        else "If there is a window, with 90 % probability each it"
-    )
+    each = "With 90 % probability each, it"
+    given = each if _is_sure(estimate) else "If there is a window, with 90 % probability each it"
     said = f"{given} starts {_between(start, space)} and ends {_between(end, space)}."
     unusual = {
         "starts before the range": start.beyond,
@@ -244,10 +231,9 @@ def _figure(value: float) -> str:
 
 
 def expected_f1(estimate: Estimate) -> str:
-    """How good the reported decision is expected to be."""
-    if estimate.expected_f1 is None:
-        return ""
-    return f"The expected F1 of this result is {estimate.expected_f1:.2f} (1 is the true window, 0 no overlap)."
+    """The expected F1 of the reported decision."""
+    f1 = estimate.expected_f1
+    return "" if f1 is None else f"The expected F1 of this result is {f1:.2f} (1 is the true window, 0 no overlap)."
 
 
 def unusual(estimate: Estimate) -> str:
@@ -307,18 +293,14 @@ def all_lost(reasons: Mapping[str, int], given: int, background_uv: float | None
     return f"Nothing was measured: {sum(reasons.values())} of {given} trials were rejected ({why})."
 
 
-def not_larger(medians_uv: tuple[float, float]) -> str:
-    """That the MEPs inside a reported window are no larger than those outside."""
-    said = f" (medians {medians_uv[0]:.0f} and {medians_uv[1]:.0f} µV)" if medians_uv[0] <= medians_uv[1] else ""
+def not_larger(medians_uv: tuple[float, float], p: float | None = None) -> str:
+    """That the MEPs inside a reported window are no larger than those outside, or with a p-value not clearly so."""
+    medians = f"medians {medians_uv[0]:.0f} and {medians_uv[1]:.0f} µV"
+    if p is not None:
+        hardly = "The data support this only weakly: the MEPs inside are not clearly larger than those outside"
+        return f"{hardly} ({medians}, p = {p:.2f})."
+    said = f" ({medians})" if medians_uv[0] <= medians_uv[1] else ""
     return f"The data do not bear this out: the MEPs inside are no larger than those outside{said}."
-
-
-def not_clearly_larger(medians_uv: tuple[float, float], p: float) -> str:
-    """The same, if it is possible that they are."""
-    return (
-        "The data support this only weakly: the MEPs inside are not clearly larger than those outside "
-        f"(medians {medians_uv[0]:.0f} and {medians_uv[1]:.0f} µV, p = {p:.2f})."
-    )
 
 
 def changed(word: str, p: float) -> str:
@@ -335,9 +317,8 @@ def at_rest(window_ms: tuple[float, float] | None, since: int | None) -> str:
     sought = f"in the MEP window, {window_ms[0]:g}–{window_ms[1]:g} ms after the pulse," if window_ms else ""
     emg = f"the EMG {sought or 'after the pulse'}"
     look = f"{_LOOK} {_PLACED}" if window_ms else _LOOK
-    if since is None:
-        return f"In no trial was {emg} larger than at rest. {look}"
-    return f"From trial {since} on, {emg} was never larger than at rest. {look}"
+    seen = f"In no trial was {emg}" if since is None else f"From trial {since} on, {emg} was never"
+    return f"{seen} larger than at rest. {look}"
 
 
 def few_outside(outside: int, pairs: int, alone: int) -> str:
@@ -350,7 +331,7 @@ def few_outside(outside: int, pairs: int, alone: int) -> str:
 
 
 def counts(given: int, told: int, controls: Mapping[str, int], mistrials: Mapping[str, int], unwanted: int) -> str:
-    """How many stimuli were delivered, how many count, and why the others do not."""
+    """The numbers of stimuli that were delivered and that count, and why the others do not."""
     pairs = counted(given, "pair of stimuli was delivered", "pairs of stimuli were delivered")
     if controls:
         kinds = " and ".join(f"{count} of {kind}" for kind, count in sorted(controls.items(), reverse=True))
@@ -369,21 +350,21 @@ def fit(troubled: int, trials: int) -> str:
 
 
 def doubt(trial: int | None, text: str) -> str:
-    """What was doubted while the session ran."""
+    """A doubt while the session ran."""
     return f"Doubt since trial {trial}: {text}"
 
 
 def truth(true: Window | None, found: Window | None, f1: float | None) -> str:
-    """How close the reported window is to a simulated person's true one; `f1` is None if nothing was found out."""
-    said = "has no window" if true is None else f"has the window {true}"
+    """Agreement of the reported window with a simulated person's true one; `f1` is None if nothing was found out."""
+    said = f"This simulated person in fact has {'no window' if true is None else f'the window {true}'}"
     if f1 is None:
-        return f"This simulated person in fact {said}."
+        return f"{said}."
     share = f"none was reported (F1 {f1:.2f})" if found is None else f"the F1 of the reported one is {f1:.2f}"
-    return f"This simulated person in fact {said}; {share}."
+    return f"{said}; {share}."
 
 
 def moved(probability: float | None, before: float) -> str:
-    """How probable it is that a window moved more than it does from day to day."""
+    """The probability that a window moved more than it does from day to day."""
     if probability is None:
         return ""
     chance = f"({100 * probability:.0f} %; {100 * before:.0f} % without data)"
@@ -391,19 +372,16 @@ def moved(probability: float | None, before: float) -> str:
 
 
 def later(starts_later: float | None, ends_later: float | None) -> str:
-    """How probable it is that a window starts later, and ends later, than another one."""
+    """The probabilities that a window starts later, and ends later, than another one."""
     if starts_later is None or ends_later is None:
         return ""
-    start, end = _direction(starts_later), _direction(ends_later)
+    chances = starts_later, ends_later
+    start, end = (f"{'later' if p >= 0.5 else 'earlier'} ({100 * max(p, 1 - p):.0f} %)" for p in chances)
     return f"the window probably starts {start} and ends {end}; 50 % means unknown."
 
 
-def _direction(later: float) -> str:
-    return f"{'later' if later >= 0.5 else 'earlier'} ({100 * max(later, 1 - later):.0f} %)"
-
-
 def asked(trial: Trial, first: StimulusWords = TAP) -> str:
-    """What a trial was to be: its ISI, or which control trial."""
+    """The ISI of a trial as it was asked, or the name of a control trial."""
     if trial.commanded_isi_ms is not None:
         return f"{trial.commanded_isi_ms:.4g} ms"
     if trial.tap_alone:
@@ -412,7 +390,7 @@ def asked(trial: Trial, first: StimulusWords = TAP) -> str:
 
 
 def outcome(trial: Trial) -> str:
-    """What came of a trial."""
+    """The outcome of a trial."""
     if trial.reason is not None:
         return f"mistrial: {trial.reason}"
     text = "–" if trial.mep_mv is None else f"{1e3 * trial.mep_mv:.0f} µV"

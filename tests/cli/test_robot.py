@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from cli.conftest import COMMAND, Command
-from isiw.config import device_of_log, load_config, session_for, truth_of
+from isiw.config import load_config, session_for
+from isiw.config.resume import device_of_log, truth_of
 from isiw.errors import ConfigError, DeviceError
 from isiw.log.reader import SessionRecord, read_session
 from isiw.trials import Status

@@ -6,7 +6,8 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from isiw.cli import app
-from isiw.session import read_threshold, search_of
+from isiw.session import read_threshold
+from isiw.session.threshold import search_of
 
 
 def run(*arguments: object, typed: str | None = None) -> Result:

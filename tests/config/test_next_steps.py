@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from isiw.config import after_error
+from isiw.config.resume import after_error
 from isiw.errors import LogError
 from isiw.session.loop import Session
 from scripted import ScriptedDevice, scripted_strategy

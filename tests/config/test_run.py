@@ -7,23 +7,15 @@ from typing import Any, TypeAlias
 import pytest
 import tomli_w
 
-from isiw.config import (
-    RunConfig,
-    Truth,
-    assumed_space,
-    device_for,
-    fresh_log_path,
-    load_config,
-    run_of_log,
-    session_for,
-    subject_for,
-    truth_of,
-)
+from isiw.config import RunConfig, device_for, load_config, session_for
+from isiw.config.resume import Truth, run_of_log, truth_of
+from isiw.config.session import assumed_space, fresh_log_path
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import ConfigError, DeviceError, InvalidValueError, StrategyError
 from isiw.log.reader import read_session
 from isiw.session.loop import Session
+from isiw.subjects.cohorts import person_of
 from scripted import ScriptedDevice, scripted_strategy
 
 WriteFile: TypeAlias = Callable[[str], Path]
@@ -232,11 +224,6 @@ def test_a_prior_for_a_strategy_that_learns_nothing_from_it_is_refused(tmp_path:
         session_for(config)
 
 
-def test_the_same_seed_makes_the_same_person() -> None:
-    assert subject_for(RunConfig(seed=3)) == subject_for(RunConfig(seed=3))
-    assert subject_for(RunConfig(seed=3)) != subject_for(RunConfig(seed=4))
-
-
 def test_a_fresh_log_path_is_free(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     first = fresh_log_path(RunConfig())
@@ -269,7 +256,9 @@ def test_a_log_holds_the_configuration_it_was_run_with(tmp_path: Path, config_fi
     record = read_session(tmp_path / "s.mcap")
     person = config.subject.model_dump(exclude={"data"})
     assert run_of_log(record).model_dump() == {"seed": 5, "subject": person, "device": None}
-    assert truth_of(record) == Truth(known=True, window=subject_for(config).window(record.header.space))
+    assert truth_of(record) == Truth(
+        known=True, window=person_of(config.subject.cohort, 0, 5).window(record.header.space)
+    )
     assert len(record.table) == 2
 
 

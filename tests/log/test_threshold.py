@@ -12,7 +12,9 @@ from isiw.errors import LogError
 from isiw.log.salvage import salvage
 from isiw.log.schema import PulseOutcome
 from isiw.log.writer import LogWriter
-from isiw.session import open_threshold, read_threshold, resume_threshold, run_simulated, search_of
+from isiw.session import open_threshold, read_threshold, resume_threshold
+from isiw.session.threshold import search_of
+from isiw.session.threshold_loops import run_simulated
 from isiw.strategy.threshold import IntensityRange, make_threshold_search
 
 FOLDER = Path(__file__).parents[1] / "data" / "logs" / "threshold"

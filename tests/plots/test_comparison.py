@@ -9,7 +9,8 @@ import pytest
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.log.reader import SessionRecord, read_session
-from isiw.plots.comparison import comparison_figure, save_comparison_plot
+from isiw.plots.comparison import comparison_figure
+from isiw.plots.style import save_figure
 from isiw.session.loop import Session
 from known import known
 from scripted import ScriptedDevice, scripted_strategy
@@ -38,8 +39,8 @@ def test_every_session_is_named_and_every_mark_explained_once(record: SessionRec
 
 def test_a_session_without_trials_and_a_code_that_is_markup_are_drawn(record: SessionRecord, tmp_path: Path) -> None:
     header = record.header.model_copy(update={"subject": "$\\frac{ \x1b[2J<script>" + 50 * "x"})
-    empty = type(record)(record.path, header, (), {}, (), False)
-    picture = save_comparison_plot([empty, replace(record, header=header)], tmp_path / "c.png")
+    empty = type(record)(record.path, header, (), (), False)
+    picture = save_figure(comparison_figure([empty, replace(record, header=header)]), tmp_path / "c.png")
     assert picture.stat().st_size > 3000
 
 

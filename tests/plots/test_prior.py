@@ -8,7 +8,8 @@ import pandas as pd
 import pytest
 
 from isiw.errors import InvalidValueError
-from isiw.plots.comparison import prior_figure, save_prior_plot
+from isiw.plots.comparison import prior_figure
+from isiw.plots.style import save_figure
 
 
 @pytest.fixture
@@ -28,6 +29,6 @@ def test_each_quantity_has_a_panel_with_both_priors_as_they_were_given(table: An
 
 
 def test_the_picture_is_written_in_a_format_that_is_known(table: Any, tmp_path: Path) -> None:
-    assert save_prior_plot(table, tmp_path / "new" / "p.png").stat().st_size > 3000
+    assert save_figure(prior_figure(table), tmp_path / "new" / "p.png").stat().st_size > 3000
     with pytest.raises(InvalidValueError, match="format"):
-        save_prior_plot(table, tmp_path / "p.docx")
+        save_figure(prior_figure(table), tmp_path / "p.docx")

@@ -121,7 +121,7 @@ def test_a_session_without_a_window_is_drawn(record: SessionRecord) -> None:
         profile = {} if grid_ms else {"grid_ms": (), "profile_mv": (), "band_low_mv": (), "band_high_mv": ()}
         update = {"segments_ms": (), "probability": probability, **profile}
         entries = [e.model_copy(update=update) if isinstance(e, EstimateRecord) else e for e in record.history]
-        none = type(record)(record.path, record.header, tuple(entries), {}, (), True)
+        none = type(record)(record.path, record.header, tuple(entries), (), True)
         assert session_figure(none).axes[0].get_title(loc="left").startswith(said)
         assert "window" not in labels(session_figure(none))
 
@@ -160,13 +160,13 @@ def test_mistrials_without_an_mep_are_at_the_lower_edge_and_named(record: Sessio
 
 
 def test_where_nothing_counts_the_panels_say_so(record: SessionRecord) -> None:
-    empty = type(record)(record.path, record.header, (), {}, (), False)
+    empty = type(record)(record.path, record.header, (), (), False)
     said = [[text.get_text() for text in axes.texts] for axes in session_figure(empty).axes]
     assert said == [["no trial counts"], *[["no estimate that rests on trials"]] * 2]
 
 
 def test_a_session_without_trials_is_drawn(record: SessionRecord, tmp_path: Path) -> None:
-    empty = type(record)(record.path, record.header, (), {}, (), False)
+    empty = type(record)(record.path, record.header, (), (), False)
     assert save_session_plot(empty, tmp_path / "empty.png").stat().st_size > 1000
 
 

@@ -11,8 +11,8 @@ import pytest
 from matplotlib.axes import Axes
 
 from isiw.errors import InvalidValueError
-from isiw.plots.study import save_study_plot, study_figure
-from isiw.plots.style import STRATEGY_COLOURS
+from isiw.plots.study import study_figure
+from isiw.plots.style import STRATEGY_COLOURS, save_figure
 
 OF_A_BELIEF = {"start_coverage": 0.9, "end_coverage": 0.8, "called_none": 0.0}
 
@@ -111,13 +111,13 @@ def test_coverage_has_both_edges_and_leaves_out_methods_without_intervals() -> N
 
 
 def test_a_picture_as_vector_graphics_is_the_same_each_time(tmp_path: Path) -> None:
-    first, second = (save_study_plot(table("wide"), tmp_path / f"{k}.svg").read_bytes() for k in range(2))
+    first, second = (save_figure(study_figure(table("wide")), tmp_path / f"{k}.svg").read_bytes() for k in range(2))
     assert first == second
     assert b"<svg" in first
 
 
 def test_vector_graphics_are_dark_in_a_dark_viewer_and_so_are_those_of_the_first_page(tmp_path: Path) -> None:
-    made = save_study_plot(table("wide"), tmp_path / "study.svg").read_text("utf-8")
+    made = save_figure(study_figure(table("wide")), tmp_path / "study.svg").read_text("utf-8")
     images = Path(__file__).parents[2] / "docs" / "images"
     for drawn in (made, *((images / f"{name}.svg").read_text("utf-8") for name in ("session", "results"))):
         (dark,) = re.findall(r"<style>@media \(prefers-color-scheme: dark\) (.*?)</style>", drawn)
@@ -133,7 +133,7 @@ def test_latency_has_the_times_of_ask_and_tell() -> None:
 
 def test_an_unknown_format_and_an_unknown_picture_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InvalidValueError, match="format"):
-        save_study_plot(table("wide"), tmp_path / "study.xyz")
+        save_figure(study_figure(table("wide")), tmp_path / "study.xyz")
     unknown: Any = "pie"
     with pytest.raises(InvalidValueError, match="frontier"):
         study_figure(table("wide"), unknown)

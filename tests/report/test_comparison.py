@@ -34,7 +34,7 @@ def test_the_table_has_a_line_a_session_with_its_window_and_intervals(record: Se
 def test_an_edge_that_lies_before_the_range_for_certain_is_said_to_do_so(record: SessionRecord) -> None:
     update = {"start_low_ms": -math.inf, "start_high_ms": -math.inf}
     entries = tuple(e.model_copy(update=update) if isinstance(e, EstimateRecord) else e for e in record.history)
-    early = type(record)(record.path, record.header, entries, {}, (), True)
+    early = type(record)(record.path, record.header, entries, (), True)
     assert "before the range  after 150 ms" in comparison_table([early])
 
 
@@ -44,7 +44,7 @@ def test_where_no_window_is_reported_it_may_still_be_undecided(
 ) -> None:
     update = {"segments_ms": (), "probability": probability}
     entries = tuple(e.model_copy(update=update) if isinstance(e, EstimateRecord) else e for e in record.history)
-    open_still = type(record)(record.path, record.header, entries, {}, (), True)
+    open_still = type(record)(record.path, record.header, entries, (), True)
     chance, column = (f" (P(window) = {probability})", probability) if probability else ("", "–   ")
     assert comparison_table([open_still]).splitlines()[1].endswith(f"{column}       {said}")
     words = [text.get_text() for text in comparison_figure([open_still]).axes[0].texts]
@@ -52,7 +52,7 @@ def test_where_no_window_is_reported_it_may_still_be_undecided(
 
 
 def test_a_session_in_which_too_little_was_measured_says_so(record: SessionRecord) -> None:
-    empty = type(record)(record.path, record.header, (), {}, (), False)
+    empty = type(record)(record.path, record.header, (), (), False)
     assert comparison_table([empty]).splitlines()[1].endswith("–          too little was measured")
 
 

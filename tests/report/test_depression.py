@@ -30,7 +30,7 @@ def session(folder: Path, intensity_pct_rmt: float | None) -> SessionRecord:
 def with_estimate(record: SessionRecord, **changes: Any) -> SessionRecord:
     entries = list(record.history)
     entries[-1] = instance(EstimateRecord, entries[-1]).model_copy(update=changes)
-    return type(record)(record.path, record.header, tuple(entries), {}, (), True)
+    return type(record)(record.path, record.header, tuple(entries), (), True)
 
 
 def test_above_the_threshold_it_says_that_only_enhancement_was_looked_for(tmp_path: Path) -> None:

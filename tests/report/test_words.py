@@ -34,7 +34,7 @@ def record(tmp_path: Path) -> SessionRecord:
 def with_estimate(record: SessionRecord, **changes: Any) -> SessionRecord:
     entries = list(record.history)
     entries[-1] = instance(EstimateRecord, entries[-1]).model_copy(update=changes)
-    return type(record)(record.path, record.header, tuple(entries), {}, (), True)
+    return type(record)(record.path, record.header, tuple(entries), (), True)
 
 
 def test_the_statement_has_window_intervals_counts_and_reason(record: SessionRecord) -> None:
@@ -67,7 +67,7 @@ def test_where_too_few_pairs_are_left_no_reason_speaks_of_a_window(record: Sessi
         replace(entry, isi_ms=None, commanded_isi_ms=None) if isinstance(entry, Trial) and entry.index > 1 else entry
         for entry in known.history
     ]
-    said = final_statement(type(record)(record.path, record.header, tuple(left), {}, (), True))
+    said = final_statement(type(record)(record.path, record.header, tuple(left), (), True))
     assert said.startswith(sentences.few_pairs(1, 4))
     assert "F1 is high." not in said
 
@@ -289,13 +289,13 @@ def test_an_exclusion_after_the_estimate_is_said(record: SessionRecord) -> None:
 
 
 def test_without_a_trial_there_is_nothing_to_say(record: SessionRecord) -> None:
-    empty = type(record)(record.path, record.header, (), {}, (), False)
+    empty = type(record)(record.path, record.header, (), (), False)
     assert final_statement(empty) == "No trial has been completed."
 
 
 def test_where_no_estimate_can_be_read_it_is_said_what_was_given_and_what_is_lost(record: SessionRecord) -> None:
     def said(*history: Any, losses: tuple[str, ...] = ()) -> str:
-        return final_statement(type(record)(record.path, record.header, history, {}, losses, False))
+        return final_statement(type(record)(record.path, record.header, history, losses, False))
 
     intents = [Intent(trial=number, isi_ms=70.0) for number in range(2)]
     assert said(losses=("Records 1 to 9 are lost.",)) == sentences.nothing_estimated(0, 0, damaged=True)
@@ -305,7 +305,7 @@ def test_where_no_estimate_can_be_read_it_is_said_what_was_given_and_what_is_los
 
 
 def test_a_log_of_which_a_header_is_left_says_how_many_pulses_it_asks_for(record: SessionRecord) -> None:
-    cut = type(record)(record.path, record.header, (), {}, ("It was cut off.",), False, end_lost=True)
+    cut = type(record)(record.path, record.header, (), ("It was cut off.",), False, end_lost=True)
     assert final_statement(cut).startswith(
         "No trial can be read, and the log is damaged. The end of the log is missing."
     )

@@ -15,16 +15,9 @@ from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, LogError
 from isiw.log.pulses import earlier_pulses_s
 from isiw.log.schema import Intent, PulseOutcome, ThresholdBelief
-from isiw.session import (
-    ThresholdRecorder,
-    open_session,
-    open_simulated,
-    open_threshold,
-    read_threshold,
-    resume_threshold,
-    run_simulated,
-    search_of,
-)
+from isiw.session import ThresholdRecorder, open_session, open_threshold, read_threshold, resume_threshold
+from isiw.session.threshold import search_of
+from isiw.session.threshold_loops import open_simulated, run_simulated
 from isiw.strategy.threshold import IntensityRange, MaximumLikelihood, ThresholdSearch, make_threshold_search
 from scripted import FakeRealClock, ScriptedDevice, scripted_strategy
 

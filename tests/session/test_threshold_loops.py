@@ -12,17 +12,9 @@ from isiw.devices.protocol import DeviceInfo
 from isiw.errors import ConfigError, InvalidValueError, LimitExceededError
 from isiw.log.pulses import pulses_s
 from isiw.log.salvage import salvage
-from isiw.session import (
-    ThresholdRecorder,
-    open_simulated,
-    open_threshold,
-    read_threshold,
-    resume_threshold,
-    run_by_hand,
-    run_simulated,
-    search_of,
-)
-from isiw.session.threshold_loops import amplitude_of
+from isiw.session import ThresholdRecorder, open_threshold, read_threshold, resume_threshold
+from isiw.session.threshold import search_of
+from isiw.session.threshold_loops import amplitude_of, open_simulated, run_by_hand, run_simulated
 from isiw.strategy.threshold import IntensityRange, make_threshold_search
 from isiw.subjects.thresholds import StimulatedResponder, threshold_cohort
 from known import known

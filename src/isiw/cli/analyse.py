@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
@@ -25,6 +25,7 @@ from isiw.cli.console import (
 from isiw.text.sanitize import command, counted
 
 if TYPE_CHECKING:
+    from isiw.existing import Layout
     from isiw.existing.batch import Person, Way
 
 app = typer.Typer()
@@ -74,17 +75,10 @@ def analyse(  # noqa: PLR0913, PLR0917 - an option each
     Called again with the same files and folder, it continues where it was interrupted.
     """
     with errors_reported("Interrupted: what is finished is kept; give the same command to continue."):
-        read = isiw.existing.read_layout(layout) if layout is not None else isiw.existing.Layout()
-        read = read.saying(
-            reference=reference,
-            columns=isiw.existing.pairs_of("--column", column or []),
-            units=tuple(unit or ()),
-            markers=isiw.existing.pairs_of("--marker", marker or []),
-            channels=isiw.existing.pairs_of("--channel", channel or []),
-            alone=alone,
-            decimal=decimal,
-            sheet=sheet,
-        )
+        markers = isiw.existing.pairs_of("--marker", marker or [])
+        channels = isiw.existing.pairs_of("--channel", channel or [])
+        said = {"reference": reference, "alone": alone, "decimal": decimal, "sheet": sheet}
+        read = _layout(layout, column, unit, **said, markers=markers, channels=channels)
         settings = isiw.config.load_config(config).with_overrides(strategy=strategy, seed=seed)
         way = isiw.existing.way_of(settings, read, simulated=simulated)
         with working(f"Reading {counted(len(files), 'file')}"):
@@ -109,13 +103,7 @@ def replay(  # noqa: PLR0913, PLR0917 - an option each
 ) -> None:
     """How many stimuli would it have taken? Strategies choose ISIs, and the trials of a file answer."""
     with errors_reported("Interrupted."):
-        read = isiw.existing.read_layout(layout) if layout is not None else isiw.existing.Layout()
-        read = read.saying(
-            reference=reference,
-            columns=isiw.existing.pairs_of("--column", column or []),
-            units=tuple(unit or ()),
-            sheet=sheet,
-        )
+        read = _layout(layout, column, unit, reference=reference, sheet=sheet)
         with working(f"Reading {file.name}"):
             found = isiw.existing.read_files([file], isiw.existing.Way(read), only=only)
         if len(found) > 1:
@@ -131,6 +119,13 @@ def replay(  # noqa: PLR0913, PLR0917 - an option each
         show(f"{replayed}")
         if output is not None:
             show(f"picture: {replayed.plot(output, overwrite=overwrite)}")
+
+
+def _layout(file: Path | None, columns: list[str] | None, units: list[str] | None, **said: Any) -> Layout:
+    """The layout of a file, with what the command line says otherwise."""
+    layout = isiw.existing.read_layout(file) if file is not None else isiw.existing.Layout()
+    columns_of = isiw.existing.pairs_of("--column", columns or [])
+    return layout.saying(columns=columns_of, units=tuple(units or ()), **said)
 
 
 def _analyse_all(people: list[Person], way: Way, source: Path) -> None:

@@ -1,4 +1,4 @@
-"""What all commands share: printing, and errors that end as a message and an exit code."""
+"""The parts that all commands share: printing, and errors that end as a message and an exit code."""
 
 from __future__ import annotations
 
@@ -37,11 +37,14 @@ SESSIONS, LOGS, STUDIES = "Sessions and devices", "Logs", "Strategies, priors an
 
 NO_DEFAULT: dict[str, Any] = {"show_default": False}
 
+Beside = Annotated[
+    Path | None, typer.Option("--output", "-o", help="The file to write; by default beside the log.", **NO_DEFAULT)
+]
 Overwrite = Annotated[bool, typer.Option(help="Replace an existing file (never a log).")]
 
 
 def show(text: str, *, style: str | None = None, stderr: bool = False) -> None:
-    """Print, coloured where the output is a terminal; what the terminal would obey is left out."""
+    """Print, coloured if the output is a terminal; what the terminal would obey is left out."""
     Console(stderr=stderr, highlight=False, soft_wrap=True, emoji=False).print(plain(text), style=style, markup=False)
 
 
@@ -110,7 +113,7 @@ def counting(doing: str, number: int, thing: str) -> Iterator[Callable[[int], No
 
 
 def exit_if_damaged(losses: Sequence[str]) -> None:
-    """Print what is lost of a log and end with the exit code of damaged ones; nothing where all is there."""
+    """Print what is lost of a log and end with the exit code of damaged ones; nothing if all is there."""
     for loss in losses:
         show(loss, style="red")
     if losses:
@@ -178,15 +181,21 @@ def _interruptible() -> Iterator[None]:
         signal.signal(signal.SIGINT, handler or signal.SIG_DFL)  # None if it was not set by Python
 
 
-def refuse_ignored(why: str, **options: object) -> None:
+def is_given(context: typer.Context, name: str) -> bool:
+    """True if an option stands on the command line, be it with its default."""
+    source = context.get_parameter_source(name)
+    return source is not None and source.name == "COMMANDLINE"
+
+
+def refuse_ignored(why: str, context: typer.Context, *names: str) -> None:
     """Refuse options that would be ignored."""
-    given = [f"--{name.replace('_', '-')}" for name, value in options.items() if value not in (None, [])]
+    given = [f"--{name.replace('_', '-')}" for name in names if is_given(context, name)]
     if given:
         raise isiw.errors.ConfigError(why, got=", ".join(given), remedy="Leave these options out.")
 
 
 def log_exists(source: str | Path) -> bool:
-    """Whether there is a log of this name, closed or not."""
+    """True if there is a log of this name, closed or not."""
     closed = str(source).removesuffix(".part")
     return Path(closed).is_file() or Path(f"{closed}.part").is_file()
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import typer
 
@@ -12,6 +12,7 @@ import isiw
 from isiw.cli.console import (
     LOGS,
     NO_DEFAULT,
+    Beside,
     Overwrite,
     counting,
     errors_reported,
@@ -23,9 +24,6 @@ from isiw.cli.console import (
     working,
 )
 from isiw.text.sanitize import command, counted
-
-if TYPE_CHECKING:
-    from isiw.log.schema import Event
 
 app = typer.Typer()
 
@@ -43,19 +41,15 @@ def show_log(
     with errors_reported():
         record = isiw.read_session(log)
         say_unread(record)
-        for fact in isiw.report.first_facts(record):
+        for fact in isiw.report.tables.first_facts(record):
             show(f"{fact.name + ':':10}{fact.value}")
         show("")
-        show(isiw.session.aligned(isiw.report.TRIAL_HEADINGS))
-        _list("trials", [isiw.session.aligned(row) for row in isiw.report.trial_rows(record)], whole=whole)
-        _list("events", [_event(event) for event in record.events], whole=whole)
+        show(isiw.session.aligned(isiw.report.words.TRIAL_HEADINGS))
+        _list("trials", [isiw.session.aligned(row) for row in isiw.report.words.trial_rows(record)], whole=whole)
+        events = [(e, "no trial" if e.trial is None else f"trial {e.trial}") for e in record.events]
+        _list("events", [f"{event.kind} ({when}): {event.text}" for event, when in events], whole=whole)
         show_paragraph(isiw.report.final_statement(record))
         exit_if_damaged(record.losses)
-
-
-def _event(event: Event) -> str:
-    when = "no trial" if event.trial is None else f"trial {event.trial}"
-    return f"{event.kind} ({when}): {event.text}"
 
 
 def _list(what: str, lines: list[str], *, whole: bool) -> None:
@@ -72,15 +66,10 @@ def _list(what: str, lines: list[str], *, whole: bool) -> None:
 @app.command(rich_help_panel=LOGS)
 def plot(
     log: Log,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output", "-o", help="The picture's file: .png, .pdf, .svg …; by default beside the log.", **NO_DEFAULT
-        ),
-    ] = None,
+    output: Beside = None,
     overwrite: Overwrite = False,  # noqa: FBT002 - a flag of the command line
 ) -> None:
-    """Draw a session: profile, trials, window, and how the edges developed."""
+    """Draw a session: profile, trials, window, and how the edges developed (.png, .pdf, .svg …)."""
     with errors_reported():
         _save("picture", isiw.plots.save_session_plot, log, output, ".png", overwrite=overwrite)
 
@@ -88,9 +77,7 @@ def plot(
 @app.command(rich_help_panel=LOGS)
 def report(
     log: Log,
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="The page's file; by default beside the log.", **NO_DEFAULT)
-    ] = None,
+    output: Beside = None,
     overwrite: Overwrite = False,  # noqa: FBT002 - a flag of the command line
 ) -> None:
     """Write a page about a session: what was found and how, trial by trial, for any browser, without a network."""
@@ -101,12 +88,12 @@ def report(
 def _save(
     what: str, save: Callable[..., Path], log: Path, output: Path | None, suffix: str, *, overwrite: bool
 ) -> None:
-    """Save what is made of a log, beside it where nobody gave a place, and say where it is."""
+    """Save what is made of a log, beside it if nobody gave a place, and say where it is."""
     record = isiw.read_session(log)
     say_unread(record)
     target = output or free_beside(record.path, suffix)
     with working(f"Drawing {record.path.name}"):
-        truth = isiw.config.truth_of(record)
+        truth = isiw.config.resume.truth_of(record)
         saved = save(record, target, truth=truth.window, overwrite=overwrite)
     show(f"{what}: {saved}")
     if truth.lacking:
@@ -192,15 +179,16 @@ def compare(
     with errors_reported():
         with working(f"Comparing {counted(len(logs), 'session')}"):
             records = [isiw.read_session(log) for log in logs]
-            table, differences = isiw.report.comparison_table(records), isiw.priors.differences(records)
+            table, differences = isiw.report.comparison.comparison_table(records), isiw.priors.differences(records)
         for record in records:
             say_unread(record)
         show(table)
         for difference in differences:
-            show(isiw.report.comparison_sentence(difference), style="bold")
+            show(isiw.report.comparison.comparison_sentence(difference), style="bold")
         if output is not None and output.suffix.lower() == ".html":
             show(f"page: {isiw.report.save_comparison(records, differences, output, overwrite=overwrite)}")
         elif output is not None:
-            show(f"picture: {isiw.plots.save_comparison_plot(records, output, overwrite=overwrite)}")
+            figure = isiw.plots.comparison_figure(records)
+            show(f"picture: {isiw.plots.save_figure(figure, output, overwrite=overwrite)}")
         losses = [f"{record.path.name}: {loss}" for record in records for loss in record.losses]
         exit_if_damaged(losses)

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 import isiw
-from isiw.cli import analyse, interval, logs, prior, rig, serve, session, strategies, study, threshold, timing
+from isiw.cli import analyse, logs, rig, session, strategies, study, tasks
 from isiw.cli.console import SESSIONS, STUDIES, show
 
 app = typer.Typer(
@@ -18,9 +18,9 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for commands in (session, rig, threshold, interval, timing, serve, analyse, logs, strategies):
+for commands in (session, rig, tasks, analyse, logs, strategies):
     app.add_typer(commands.app)
-app.add_typer(prior.app, name="prior", rich_help_panel=STUDIES)
+app.add_typer(strategies.prior, name="prior", rich_help_panel=STUDIES)
 app.add_typer(study.app, name="study", rich_help_panel=STUDIES)
 app.add_typer(rig.new, name="new", rich_help_panel=SESSIONS)
 

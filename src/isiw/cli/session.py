@@ -1,7 +1,8 @@
-"""The commands that run a session, and how a session ends on the command line."""
+"""The commands that run and serve sessions, and the end of a session on the command line."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -32,6 +33,11 @@ app = typer.Typer()
 _INTERRUPTED = "Interrupted: the device is disarmed and the log is closed."
 
 Data = Annotated[Path | None, typer.Option(help="The folder with the recorded EMG.", **NO_DEFAULT)]
+Day = Annotated[int | None, typer.Option(help="The number of the person's visit, for the log.", **NO_DEFAULT)]
+Earlier = Annotated[
+    list[Path] | None,
+    typer.Option(help="The log of an earlier session of the same person; repeat it for several, earliest first."),
+]
 Live = Annotated[
     bool, typer.Option("--live", help="Show the session in the browser while it runs, and operate it there.")
 ]
@@ -58,17 +64,12 @@ def run(  # noqa: PLR0913, PLR0917 - an option each
     lab: Annotated[
         Path | None, typer.Option("--prior", help="A lab's prior, as isiw prior learn writes it.", **NO_DEFAULT)
     ] = None,
-    after: Annotated[
-        list[Path] | None,
-        typer.Option(help="The log of an earlier session of the same person; repeat it for several, earliest first."),
-    ] = None,
+    after: Earlier = None,
     earlier: Annotated[
         list[Path] | None,
         typer.Option(help="A log of earlier trials of this visit, such as isiw analyse writes; repeat it for several."),
     ] = None,
-    day: Annotated[
-        int | None, typer.Option(help="The number of the person's visit, for the log.", **NO_DEFAULT)
-    ] = None,
+    day: Day = None,
     operator: Annotated[str | None, typer.Option(help="Who runs the session, for the log.", **NO_DEFAULT)] = None,
     live: Live = False,  # noqa: FBT002 - a flag of the command line
 ) -> None:
@@ -86,9 +87,9 @@ def run(  # noqa: PLR0913, PLR0917 - an option each
             day=day,
             operator=operator,
         )
-        show(isiw.config.assumed_space(settings) or "Preparing the session …")
+        show(isiw.config.session.assumed_space(settings) or "Preparing the session …")
         session = isiw.config.session_for(settings)
-        if imported := isiw.config.told_imported(settings):
+        if imported := isiw.config.session.told_imported(settings):
             show(imported)
         _run_to_the_end(session, config, live=live)
 
@@ -110,16 +111,16 @@ def resume(
 ) -> None:
     """Continue an interrupted session, with its own ISI range and strategy, within the limits in CONFIG."""
     with errors_reported():
-        record = isiw.config.read_to_resume(log, config)
+        record = isiw.config.resume.read_to_resume(log, config)
         changes: dict[str, Any] = {}
         differences: tuple[str, ...] = ()
         if config is None:  # then only what the log says of a simulated person, which names nothing to import or open
-            device: Device = isiw.config.device_of_log(record, data)
+            device: Device = isiw.config.resume.device_of_log(record, data)
         else:
             settings = isiw.config.load_config(config)
-            isiw.config.require_same_person(settings, [record])
-            changes = isiw.config.changes_on_resume(settings, record)
-            differences = isiw.config.differences_on_resume(settings, record)
+            isiw.config.session.require_same_person(settings, [record])
+            changes = isiw.config.resume.changes_on_resume(settings, record)
+            differences = isiw.config.resume.differences_on_resume(settings, record)
             device = isiw.config.device_for(settings.with_overrides(data=data))
         with counting("Replaying", len(record.table), "trial") as count:
             session = isiw.resume(log, device, lost_pulses=lost_pulses, verify=verify, replayed=count, **changes)
@@ -145,14 +146,14 @@ def _run_to_the_end(session: Session, config: Path | None, *, live: bool, resume
     except BaseException as end:
         delivered, refused = len(session.trials) > before, isinstance(end.__cause__, isiw.errors.DeviceError)
         if delivered or (refused and ours and log_exists(session.log_path)):
-            for line in isiw.config.after_error(session, config, end.__cause__, delivered=delivered):
+            for line in isiw.config.resume.after_error(session, config, end.__cause__, delivered=delivered):
                 show(line)
         raise
     record = isiw.read_session(result.log)
-    truth = isiw.config.truth_of(record)
+    truth = isiw.config.resume.truth_of(record)
     show_paragraph(f"\n{isiw.report.final_statement(record, config)}")
     if truth.known:
-        show(isiw.report.truth_sentence(record, truth.window))
+        show(isiw.report.words.truth_sentence(record, truth.window))
     show(f"log:     {result.log}")
     try:
         picture = isiw.plots.save_session_plot(record, free_beside(result.log, ".png"), truth=truth.window)
@@ -162,7 +163,7 @@ def _run_to_the_end(session: Session, config: Path | None, *, live: bool, resume
         show(f"The picture cannot be written ({error.strerror}). The log is complete; draw it later with: {later}")
     if not result.decision.stop:
         raise typer.Exit(NOT_OVER)
-    more = isiw.config.after_end(session, config, delivered=len(session.trials) > before)
+    more = isiw.config.resume.after_end(session, config, delivered=len(session.trials) > before)
     if more is not None:
         show(more)
 
@@ -173,3 +174,45 @@ def _shown_live(session: Session) -> Iterator[None]:
     with isiw.watch(session) as page:
         show(f"live page: {page.url}", style="bold")
         yield
+
+
+TOKEN = "ISIW_TOKEN"  # noqa: S105 - the variable's name
+
+
+@app.command(rich_help_panel=SESSIONS)
+def serve(
+    folder: Annotated[Path, typer.Argument(help="The folder for the logs; created if missing.", **NO_DEFAULT)],
+    host: Annotated[str, typer.Option(help="The address to listen on; any but 127.0.0.1 needs TLS.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="The port; 0 for any that is free.")] = 8473,
+    token_file: Annotated[
+        Path | None,
+        typer.Option(
+            help=f"A file with the token; by default the token is {TOKEN} from the environment, or a random one.",
+            **NO_DEFAULT,
+        ),
+    ] = None,
+    certificate: Annotated[Path | None, typer.Option(help="A TLS certificate (PEM).", **NO_DEFAULT)] = None,
+    key: Annotated[Path | None, typer.Option(help="Its key (PEM).", **NO_DEFAULT)] = None,
+) -> None:
+    """Serve sessions over HTTP to MATLAB, LabVIEW or any other software of this computer."""
+    with errors_reported("The server has ended; its sessions can be resumed."):
+        show("isiw serve starts …", stderr=True)  # standard output begins with the address
+        given = _token(token_file) if token_file else os.environ.get(TOKEN)
+        settings = isiw.server.ServerSettings(
+            folder, host, port, certificate=certificate, key=key, **({} if given is None else {"token": given})
+        )
+
+        def ready(url: str) -> None:
+            show(f"Ready: isiw serves the sessions of {folder} at {url}", style="bold")
+            show("token: as given" if given is not None else f"token: {settings.token}")
+
+        isiw.server.serve(settings, ready)
+
+
+def _token(file: Path) -> str:
+    try:
+        return file.read_text(encoding="utf-8-sig").strip()  # with the mark that Windows puts first
+    except UnicodeDecodeError as error:
+        raise isiw.errors.ConfigError(
+            "the token file is not text", got=str(file), remedy="Write the token into a file of its own."
+        ) from error

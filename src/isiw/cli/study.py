@@ -111,7 +111,7 @@ def summary(
         for name in isiw.plots.STUDY_PICTURES:
             target = folder / f"summary_{name}.svg"
             with working(f"Drawing {target.name}"):
-                isiw.plots.save_study_plot(table, target, picture=name, overwrite=True)
+                isiw.plots.save_figure(isiw.plots.study_figure(table, name), target, overwrite=True)
             show(f"picture: {target}")
 
 

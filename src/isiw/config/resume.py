@@ -16,7 +16,6 @@ from pydantic import BaseModel, ConfigDict, Field
 from isiw.config.run import RunConfig
 from isiw.config.sections import RobotConfig, SimulatedConfig, person_under
 from isiw.config.session import learns_from_earlier, simulated_device
-from isiw.devices.limits import Limits
 from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import ConfigError, InvalidValueError, IsiwError, LimitExceededError, LogError
 from isiw.log.headers import RUN_KEY, Header
@@ -32,7 +31,7 @@ from isiw.window import Window
 
 
 class _LoggedRun(BaseModel):
-    """What is read of a log's run section; everything else in it is for people."""
+    """The part of a log's run section that is read; everything else in it is for people."""
 
     model_config = ConfigDict(frozen=True)
 
@@ -47,7 +46,7 @@ class Truth:
 
     Args:
         known: whether somebody was simulated whose window is known.
-        window: the window; None where there is none.
+        window: the window; None if there is none.
         lacking: why it is not known, though the log says that somebody was simulated; else empty.
     """
 
@@ -57,11 +56,7 @@ class Truth:
 
 
 def run_of_log(record: SessionRecord) -> _LoggedRun:
-    """Seed, simulated person and robot of a session of `isiw run`.
-
-    Raises:
-        ConfigError: it was run with a device of the lab's own or by other software, or the person is not known here.
-    """
+    """Seed, simulated person and robot of a session of `isiw run`; raise if nobody known here was simulated."""
     require_session(record.path, record.header)
     run = record.header.config.get(RUN_KEY)
     device = run.get("device", {}) if isinstance(run, Mapping) else {}
@@ -90,36 +85,22 @@ def truth_of(record: SessionRecord) -> Truth:
 
 
 def device_of_log(record: SessionRecord, data: Path | None = None) -> SimulatedDevice:
-    """The simulated person of a log, as a device.
-
-    Args:
-        record: the session.
-        data: the folder with the recorded EMG, where MEPs were put into one.
-
-    Raises:
-        ConfigError: as for `run_of_log`, or recorded EMG without its folder.
-        DeviceError: no recordings in the folder.
-    """
+    """The simulated person of a log, as a device; MEPs are put into the recorded EMG of a folder if they were."""
     run = run_of_log(record)
     return simulated_device(run.seed, run.subject, record.header.space, data, run.device)
 
 
 def read_to_resume(log: Path, config: Path | None) -> SessionRecord:
-    """The session to continue.
-
-    Args:
-        log: its log.
-        config: the configuration to continue with; None if there is none.
-
-    Raises:
-        ConfigError: the two are swapped.
-        LogError: as for `isiw.read_session`.
-    """
+    """The session to continue; raise if its log and the configuration are swapped."""
     try:
         return read_session(log)
     except LogError as error:
-        if config is None or not _is_session(config):
+        if config is None:
             raise
+        try:
+            read_session(config)
+        except LogError:
+            raise error from None
         raise ConfigError(
             "the log and the configuration are swapped",
             got=f"{log} {config}",
@@ -128,26 +109,11 @@ def read_to_resume(log: Path, config: Path | None) -> SessionRecord:
         ) from error
 
 
-def _is_session(path: Path) -> bool:
-    try:
-        read_session(path)
-    except LogError:
-        return False
-    return True
-
-
 def changes_on_resume(config: RunConfig, record: SessionRecord) -> dict[str, Any]:
     """The limits, signals and time-out a session continues with, as arguments of `isiw.resume`.
 
     `[limits]` and `[signals]` count as wholes, as for `isiw run`; without one of them it stays as it was logged last,
     as `isiw.resume` says. The intensity that the session is bound to stays, unless the configuration names another one.
-
-    Args:
-        config: read from a file.
-        record: the session.
-
-    Raises:
-        ConfigError: the file has another design space, or simulates another person, than the session.
     """
     record.require_read()
     header, given = record.header, config.model_fields_set
@@ -155,7 +121,10 @@ def changes_on_resume(config: RunConfig, record: SessionRecord) -> dict[str, Any
     _require_same_simulated(config, record)
     changes: dict[str, Any] = {}
     if "limits" in given:
-        changes["limits"] = _limits(config, header.limits)
+        said = config.limits.model_dump()
+        if said["intensity_pct_mso"] is None:
+            said["intensity_pct_mso"] = header.limits.intensity_pct_mso
+        changes["limits"] = dataclasses.replace(header.limits, **said)
     if "signals" in given:
         changes["signals"] = config.signals
     if config.device is not None and "timeout_s" in config.device.model_fields_set:
@@ -164,13 +133,9 @@ def changes_on_resume(config: RunConfig, record: SessionRecord) -> dict[str, Any
 
 
 def differences_on_resume(config: RunConfig, record: SessionRecord) -> tuple[str, ...]:
-    """The differences between the file and the log, in words: what changes, and what a session keeps.
+    """The differences of the file from the log, in words.
 
-    Of limits, signals and time-out, which change, and of strategy, protocol and visit, which do not.
-
-    Args:
-        config: read from a file.
-        record: the session.
+    Those of limits, signals and time-out hold from here on, those of strategy, protocol and visit do not.
     """
     header, changes = record.header, changes_on_resume(config, record)
     changed = [
@@ -188,13 +153,6 @@ def differences_on_resume(config: RunConfig, record: SessionRecord) -> tuple[str
     )
 
 
-def _limits(config: RunConfig, logged: Limits) -> Limits:
-    said = config.limits.model_dump()
-    if said["intensity_pct_mso"] is None:
-        del said["intensity_pct_mso"]
-    return dataclasses.replace(logged, **said)
-
-
 def _require_space(config: RunConfig, header: Header) -> None:
     if not config.space_named or (space := config.space.design()) == header.space:
         return
@@ -208,7 +166,7 @@ def _require_space(config: RunConfig, header: Header) -> None:
 
 
 def _require_same_simulated(config: RunConfig, record: SessionRecord) -> None:
-    """Raise where another person is simulated; whom the log does not make out, nobody can compare."""
+    """Raise if another person is simulated; whom the log does not make out, nobody can compare."""
     try:
         was = run_of_log(record)
     except ConfigError:
@@ -217,15 +175,11 @@ def _require_same_simulated(config: RunConfig, record: SessionRecord) -> None:
     if (was.seed, was.subject, was.device) != (config.seed, now, config.robot):
         raise ConfigError(
             "the configuration simulates another person, or another robot",
-            got=f"seed {config.seed}, {config.subject}, {_robot_text(config.robot)}",
-            expected=f"seed {was.seed}, {was.subject}, {_robot_text(was.device)}",
+            got=f"seed {config.seed}, {config.subject}, {config.robot or 'no robot'}",
+            expected=f"seed {was.seed}, {was.subject}, {was.device or 'no robot'}",
             remedy="Leave the configuration out; the simulated person's settings are in the log: "
             f"{continued_by(record.path, record.header)}",
         )
-
-
-def _robot_text(robot: RobotConfig | None) -> str:
-    return "no robot" if robot is None else str(robot)
 
 
 def _differing(name: str, before: Any, after: Any) -> Iterator[tuple[str, object, object]]:
@@ -258,25 +212,16 @@ def _told(value: object) -> object:
 def after_error(session: Session, config: Path | None, error: BaseException | None, *, delivered: bool) -> list[str]:
     """The way to resume a session that an error has ended, in lines; the command comes last.
 
-    A session that was over when the error came, as where the device could not be let go of, cannot be resumed.
-
-    Args:
-        session: the session.
-        config: the configuration that it was run with; None where there was none.
-        error: what ended it.
-        delivered: whether it had delivered anything since it was begun or resumed.
+    A session that was over when the error came, as if the device could not be let go of, cannot be resumed.
     """
     if _is_over(session.log_path):
         seen = command("show", session.log_path)
         return [f"The session is over, and its log is complete. See what was found with: {seen}"]
     limited = config is not None and isinstance(error, LimitExceededError)
-    lines = (
-        [f"The limits are under [limits] in {config}; they are read again when the session is resumed."]
-        if limited
-        else []
-    )
     safe = "The session ended early. Its log is safe" if delivered else "No stimulus was delivered. The log is kept"
-    return [*lines, f"{safe}; resume with: {continued_by(session.log_path, session.header, config, changed=limited)}"]
+    way_on = f"{safe}; resume with: {continued_by(session.log_path, session.header, config, changed=limited)}"
+    limits = f"The limits are under [limits] in {config}; they are read again when the session is resumed."
+    return [limits, way_on] if limited else [way_on]
 
 
 def _is_over(log: Path) -> bool:
@@ -289,13 +234,7 @@ def _is_over(log: Path) -> bool:
 
 
 def after_end(session: Session, config: Path | None, *, delivered: bool) -> str | None:
-    """The way to deliver more to the same person after a session is over; None if nobody has asked for that.
-
-    Args:
-        session: the session, after a decision that stops.
-        config: the configuration that it was run with; None where there was none.
-        delivered: whether it has delivered anything since it was begun or resumed.
-    """
+    """The way to deliver more to the same person after a session is over; None if nobody has asked for that."""
     if not session.strategy.decision().stop:  # so that it was the limits
         where = f"in {config}" if config is not None else "of a configuration"
         way_on = continued_by(session.log_path, session.header, config, changed=True)

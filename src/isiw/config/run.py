@@ -13,9 +13,9 @@ Every key may be left out. Example:
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Self, get_args
+from typing import Any, Final, Self, get_args
 
 from pydantic import Field, model_validator
 
@@ -39,6 +39,15 @@ from isiw.errors import ConfigError, did_you_mean
 from isiw.signals.limits import SignalLimits
 from isiw.text.toml_files import checked, read_toml
 from isiw.visit import VisitProtocol
+
+_OPTIONS: Final[Mapping[str, tuple[str, str]]] = {
+    "subject": ("subject", "kind"),
+    "data": ("subject", "data"),
+    "strategy": ("strategy", "name"),
+    "day": ("visit", "day"),
+    "operator": ("visit", "operator"),
+}
+"""Sections and keys that options of the command line stand for; any other one is a key itself."""
 
 
 class RunConfig(Section):
@@ -86,7 +95,7 @@ class RunConfig(Section):
 
     @property
     def robot(self) -> RobotConfig | None:
-        """The simulated robot; None where there is none."""
+        """The simulated robot; None if there is none."""
         return None if self.device is None else self.device.robot
 
     @property
@@ -95,11 +104,7 @@ class RunConfig(Section):
         return "space" in self.model_fields_set
 
     def design(self) -> DesignSpace:
-        """The design space of a new session.
-
-        Raises:
-            ConfigError: a device of the lab's own, and the event from which its ISIs count is not stated.
-        """
+        """The design space of a new session; raise if the event from which a device's ISIs count is not stated."""
         if self.own_rig and not self.space_named:
             missing = missing_reference()
             raise ConfigError(
@@ -114,50 +119,28 @@ class RunConfig(Section):
         """Longest time that the device may take for one delivery [s]."""
         return self.device.timeout_s if self.device else TIMEOUT_S
 
-    def with_overrides(  # noqa: PLR0913 - an option of the command line each, all keyword-only
-        self,
-        *,
-        seed: int | None = None,
-        log: Path | None = None,
-        subject: str | None = None,
-        data: Path | None = None,
-        strategy: str | None = None,
-        prior: Path | None = None,
-        after: Sequence[Path] | None = None,
-        earlier: Sequence[Path] | None = None,
-        day: int | None = None,
-        operator: str | None = None,
-    ) -> RunConfig:
+    def with_overrides(self, **said: Any) -> RunConfig:
         """The same, with what was given on the command line; another strategy keeps the settings that were given.
 
         Args:
-            seed: of the person, the trials and the strategy.
-            log: where to log.
-            subject: `"simulated"` or `"recorded"`.
-            data: the folder with the recorded EMG.
-            strategy: one of `list_strategies()`.
-            prior: a lab's prior.
-            after: logs of earlier sessions of the same person, the first one first.
-            earlier: logs of earlier trials of the same visit, the first one first.
-            day: the number of the person's visit, from 1.
-            operator: who runs the session.
+            **said: keys of the configuration, or options of the command line that stand for one in a section; None or
+                nothing leaves it as it is.
         """
-        _require_simulation(subject)
+        _require_simulation(said.get("subject"))
         values = self.model_dump(exclude_unset=True)  # what nobody set is not known to be wanted
-        values |= _given(seed=seed, log=log, prior=prior, after=after or None, earlier=earlier or None)
-        sections = {
-            "subject": _given(kind=subject, data=data),
-            "visit": _given(day=day, operator=operator),
-            "strategy": _given(name=strategy),
-        }
-        for name, given in sections.items():
-            if given:
-                values[name] = values.get(name, {}) | given
-        return _validated(values, "the command line")
+        for option, value in said.items():
+            if value in (None, [], ()):
+                continue
+            section, key = _OPTIONS.get(option, (None, option))
+            if section is None:
+                values[key] = value
+            else:
+                values[section] = values.get(section, {}) | {key: value}
+        return checked(RunConfig, values, "the command line")
 
 
 def _require_simulation(kind: str | None) -> None:
-    """Raise where a person's code is where the kind of a simulated person should be."""
+    """Raise if a person's code is where the kind of a simulated person should be."""
     kinds = get_args(SubjectConfig.model_fields["kind"].annotation)
     if kind is not None and kind not in kinds:
         code = f'A person\'s code goes into the configuration: under [visit] write subject = "{kind}".'
@@ -167,10 +150,6 @@ def _require_simulation(kind: str | None) -> None:
             expected=" or ".join(kinds),
             remedy=did_you_mean(kind, kinds) or code,
         )
-
-
-def _given(**values: object) -> dict[str, object]:
-    return {key: value for key, value in values.items() if value is not None}
 
 
 def load_config(path: str | Path | None = None) -> RunConfig:
@@ -187,13 +166,12 @@ def load_config(path: str | Path | None = None) -> RunConfig:
         InvalidValueError: a rest or a period that limits nothing, or an interval in ms.
     """
     if path is None:
-        return _validated({}, "the defaults")
+        return checked(RunConfig, {}, "the defaults")
     values, folder = read_toml(path), Path(path).resolve().parent
-    if (
-        isinstance(device := values.get("device"), dict) and "factory" in device
-    ):  # a module of the user's own usually lies beside the file
+    device = values.get("device")
+    if isinstance(device, dict) and "factory" in device:  # a module of the user's own usually lies beside the file
         values["device"] = {"folder": folder} | device
-    config = _read_from(folder, _validated(values, str(path)))
+    config = _read_from(folder, checked(RunConfig, values, str(path)))
     require_units(values)
     require_together(values)
     limits_for(config).require_effect()
@@ -212,10 +190,6 @@ def _read_from(folder: Path, config: RunConfig) -> RunConfig:
     if config.subject.data is not None:
         found["subject"] = config.subject.model_copy(update={"data": (folder / config.subject.data).resolve()})
     return config.model_copy(update=found)
-
-
-def _validated(values: Mapping[str, Any], source: str) -> RunConfig:
-    return checked(RunConfig, values, source)
 
 
 def limits_for(config: RunConfig) -> Limits:

@@ -9,9 +9,9 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from isiw.checks import choice
 from isiw.design import DesignSpace, missing_reference
@@ -53,14 +53,14 @@ def require_units(values: Mapping[str, Any]) -> None:
 
 
 def _given(values: Any, *keys: str) -> float | None:
-    """The number that was given under some keys; None where there is none."""
+    """The number that was given under some keys; None if there is none."""
     for key in keys:
         values = values.get(key) if isinstance(values, Mapping) else None
     return values if isinstance(values, int | float) else None
 
 
 TIMEOUT_S = 30.0
-"""How long a device may take for one delivery [s], where the file does not say."""
+"""The longest time of one delivery [s], if the file does not say."""
 
 
 _TOGETHER = (
@@ -83,13 +83,8 @@ class SimulatedConfig(BaseModel):
     model_config = ConfigDict(frozen=True)
 
     kind: Literal["simulated", "recorded"] = "simulated"
-    cohort: str = "recruitment"
+    cohort: Annotated[str, AfterValidator(lambda name: choice("the cohort", name, COHORTS))] = "recruitment"
     number: int = Field(default=0, ge=0, lt=10_000)
-
-    @field_validator("cohort")
-    @classmethod
-    def _known(cls, name: str) -> str:
-        return str(choice("the cohort", name, COHORTS))
 
 
 class SubjectConfig(SimulatedConfig):
@@ -152,13 +147,8 @@ class StrategyConfig(Section):
         settings: its settings by key, as `isiw.list_settings` has them.
     """
 
-    name: str = "default"
+    name: Annotated[str, AfterValidator(lambda name: choice("the strategy", name, list_strategies()))] = "default"
     settings: dict[str, Any] = Field(default_factory=dict)
-
-    @field_validator("name")
-    @classmethod
-    def _known(cls, name: str) -> str:
-        return str(choice("the strategy", name, list_strategies()))
 
     @field_validator("settings")
     @classmethod
@@ -222,7 +212,7 @@ class DeviceConfig(Section):
 
     @property
     def robot(self) -> RobotConfig | None:
-        """The simulated robot; None where the rig is the lab's own."""
+        """The simulated robot; None if the rig is the lab's own."""
         return None if self.kind is None else RobotConfig(kind=self.kind, settings=self.settings)
 
     @field_validator("factory")
@@ -249,7 +239,7 @@ class VisitConfig(Section):
     electrodes: str = ""
 
     def noted(self) -> Visit:
-        """What is noted about the visit."""
+        """The notes about the visit."""
         return Visit(**self.model_dump(exclude={"subject"}))
 
 

@@ -28,13 +28,12 @@ from isiw.priors import after, read_lab_prior
 from isiw.session.loop import Session
 from isiw.strategy.catalogue import known_settings, make_strategy, settings_for
 from isiw.subjects.cohorts import person_of
-from isiw.subjects.subject import SimulatedSubject
 from isiw.text.named_code import named_code, require_fitting
 from isiw.trials import Trial
 from isiw.visit import Visit
 
 TEMPLATE_FILES = ("rig.py", "session.toml", "test_rig.py")
-"""What `write_rig_template` writes."""
+"""The files that `write_rig_template` writes."""
 
 
 def device_from_factory(factory: str, settings: Mapping[str, Any], folder: Path | None = None) -> Device:
@@ -53,18 +52,7 @@ def device_from_factory(factory: str, settings: Mapping[str, Any], folder: Path 
 
 
 def write_rig_template(folder: str | Path) -> tuple[Path, ...]:
-    """Write a commented starting point for a rig: device, configuration and test. It runs as it is, on made-up EMG.
-
-    Args:
-        folder: where to; it is made where it does not exist.
-
-    Returns:
-        The files.
-
-    Raises:
-        ConfigError: one of the files exists already; nothing is written.
-        InvalidValueError: the folder cannot be made.
-    """
+    """Write a commented starting point for a rig: device, configuration and test. It runs as it is, on made-up EMG."""
     target = Path(folder)
     files = tuple(target / name for name in TEMPLATE_FILES)
     there = [str(file) for file in files if os.path.lexists(file)]
@@ -104,7 +92,7 @@ def learns_from_earlier(name: str) -> bool:
 
 
 def _learned_prior(config: RunConfig, device: DeviceInfo) -> Prior:
-    """What the lab's people and the person's earlier sessions taught."""
+    """The prior that the lab's people and the person's earlier sessions taught."""
     lab = None if config.prior is None else read_lab_prior(config.prior)
     earlier = [read_session(path) for path in config.after]
     _require_people(config, earlier, device, [str(config.prior)] if lab is not None and lab.simulated else [])
@@ -146,25 +134,13 @@ def earlier_trials(config: RunConfig, device: DeviceInfo) -> tuple[Trial, ...]:
 
 
 def told_imported(config: RunConfig) -> str:
-    """Which of the earlier sessions were none, in words; empty if all were.
-
-    Args:
-        config: the configuration.
-    """
+    """That some of the earlier sessions were none, in words; empty if all were."""
     logs = (*config.after, *config.earlier)
     return imported_sentence([path.name for path in logs if read_session(path).header.imported])
 
 
 def require_same_person(config: RunConfig, records: Sequence[SessionRecord]) -> None:
-    """Check that sessions are of the person whom a configuration names, where both say whom they are of.
-
-    Args:
-        config: the configuration.
-        records: the sessions.
-
-    Raises:
-        ConfigError: a session of another subject than `visit.subject`.
-    """
+    """Raise if a session is of another person than the configuration names, if both name somebody."""
     subject = config.visit.subject
     others = [record for record in records if record.header.subject not in {"", subject}]
     if subject and others:
@@ -177,7 +153,7 @@ def require_same_person(config: RunConfig, records: Sequence[SessionRecord]) -> 
 
 
 def _require_like(config: RunConfig, visit: Visit, path: Path | None) -> None:
-    """Raise where what taught something is of another muscle, or another intensity, than the configuration says."""
+    """Raise if what taught something is of another muscle, or another intensity, than the configuration says."""
     if unlike := config.visit.noted().unlike(visit):
         raise ConfigError(
             f"[visit] and the sessions that were learnt from are of {unlike}",
@@ -199,15 +175,9 @@ def fresh_log_path(config: RunConfig) -> Path:
 
 
 def assumed_space(config: RunConfig) -> str | None:
-    """A sentence if a new session has the default design space; None if it has another."""
-    if config.space_named or config.own_rig:
-        return None
-    return f"No [space] is given, so ISIs are {config.space.design()}."
-
-
-def subject_for(config: RunConfig) -> SimulatedSubject:
-    """The simulated person."""
-    return person_of(config.subject.cohort, config.subject.number, config.seed)
+    """That a new session has the design space that is assumed; None if somebody has named one."""
+    is_stated = config.space_named or config.own_rig
+    return None if is_stated else f"No [space] is given, so ISIs are {config.space.design()}."
 
 
 def device_for(config: RunConfig) -> Device:
@@ -248,15 +218,7 @@ def simulated_device(
 
 
 def require_device(config: RunConfig, path: Path) -> None:
-    """Check that a configuration names a device of the lab's own.
-
-    Args:
-        config: the configuration.
-        path: its file, for the message.
-
-    Raises:
-        ConfigError: it would simulate a person.
-    """
+    """Raise if a configuration names no device of the lab's own, but would simulate a person."""
     if not config.own_rig:
         raise ConfigError(
             f"{path} names no device of your own, so there is nothing to check",
@@ -268,13 +230,10 @@ def require_device(config: RunConfig, path: Path) -> None:
 def session_for(config: RunConfig) -> Session:
     """The session that a configuration describes, ready to run.
 
-    Args:
-        config: the configuration.
-
     Raises:
         ConfigError: a device without a design space; no recordings, or no prior, where the configuration says, or
             recordings that would be ignored; earlier sessions of another person, or sessions or a prior of another
-            muscle or intensity, or simulated ones where the device is real.
+            muscle or intensity, or simulated ones if the device is real.
         LogError: an earlier session of the person that cannot be read, or has no accepted trial.
         StrategyError: a prior for a strategy that has none of this kind.
     """
@@ -292,12 +251,13 @@ def session_for(config: RunConfig) -> Session:
     strategy = make_strategy(config.strategy.name, space=space, seed=config.seed, **settings)
     if config.earlier:
         strategy.learn_all(earlier_trials(config, info))
+    code = "" if config.own_rig else f"{config.subject.cohort}-{config.seed}-{config.subject.number}"
     return Session(
         device,
         strategy,
         log=log,
         limits=limits_for(config),
-        subject=config.visit.subject or ("" if config.own_rig else _code(config)),
+        subject=config.visit.subject or code,
         signals=config.signals,
         config={} if config.own_rig else {RUN_KEY: _kept(config)},
         timeout_s=config.timeout_s,
@@ -315,12 +275,8 @@ def _require_used(subject: SubjectConfig) -> None:
         )
 
 
-def _code(config: RunConfig) -> str:
-    return f"{config.subject.cohort}-{config.seed}-{config.subject.number}"
-
-
 def _kept(config: RunConfig) -> dict[str, Any]:
-    """What a log keeps of how its person was simulated; never what names code to import.
+    """The part of a configuration that a log keeps; never what names code to import.
 
     What a prior came to is in the strategy's recipe; where it came from is kept for whoever reads the log.
     """

@@ -16,7 +16,8 @@ from isiw.errors import InvalidValueError
 from isiw.existing.analysis import analysed
 from isiw.existing.delivered import Delivered
 from isiw.metrics import f1
-from isiw.plots.study import save_replay_plot
+from isiw.plots.study import replay_figure
+from isiw.plots.style import save_figure
 from isiw.strategy.catalogue import make_strategy
 from isiw.trials import Trial
 from isiw.types import FloatArray
@@ -122,7 +123,7 @@ class Replay:
             overwrite: whether to replace a file that is there.
         """
         curves = {name: self.f1_by_trial(name) for name in self.strategies}
-        return save_replay_plot(curves, path, overwrite=overwrite)
+        return save_figure(replay_figure(curves), path, overwrite=overwrite)
 
 
 def replay(

@@ -97,7 +97,9 @@ def _write_session(part: Part, folder: Path) -> list[str]:
         stem = f"{name}_task-{TASK}_run-{number:02d}"
         _write_run(home / "emg" / stem, run, onsets_s, part)
         files.append(f"emg/{stem}_emg.bdf")
-    scans = [{"filename": file, "acq_time": _moment(part)} for file in files]
+    created = pd.to_datetime(part.record.header.created, errors="coerce", utc=True)
+    begun = "" if pd.isna(created) else created.strftime("%Y-%m-%dT%H:%M:%SZ")
+    scans = [{"filename": file, "acq_time": begun} for file in files]
     _tsv(home / f"{name}_scans.tsv", pd.DataFrame(scans))
     if part.record.path.is_file():
         source = folder / "sourcedata" / f"sub-{_label(part)}" / f"ses-{part.session}" / part.record.path.name
@@ -114,7 +116,7 @@ def _write_run(stem: Path, run: Run, onsets_s: Mapping[int, float], part: Part) 
 
 
 def _task(first: StimulusWords) -> dict[str, Any]:
-    """What is done in a session."""
+    """The task of a session."""
     given = f"{first.given[0].upper()}{first.given[1:]}"
     return {
         "TaskName": TASK,
@@ -124,7 +126,7 @@ def _task(first: StimulusWords) -> dict[str, Any]:
 
 
 def _sidecar(run: Run, part: Part) -> dict[str, Any]:
-    """What `_emg.json` says; what nobody has noted is said to be so."""
+    """The contents of `_emg.json`; what nobody has noted is said to be so."""
     visit, device = part.record.header.visit, part.record.header.device
     return _task(part.record.header.stimulus) | {
         "SamplingFrequency": run.layout.rate_hz,
@@ -163,7 +165,7 @@ def _write_heads(folder: Path, parts: Sequence[Part], lacking: Iterable[str]) ->
 
 
 def _write_behaviour(folder: Path, parts: Sequence[Part]) -> None:
-    """Write what the tables of trials say; where not all sessions have one stimulus, each says which it has."""
+    """Write what the tables of trials say; if not all sessions have one stimulus, each says which it has."""
     every = stimulus_of(parts)
     _json(folder / f"task-{TASK}_beh.json", _behaviour(every))
     for part in parts:
@@ -191,13 +193,8 @@ def _home(part: Part, folder: Path) -> Path:
     return folder / f"sub-{_label(part)}" / f"ses-{part.session}"
 
 
-def _moment(part: Part) -> str:
-    created = pd.to_datetime(part.record.header.created, errors="coerce", utc=True)
-    return "" if pd.isna(created) else created.strftime("%Y-%m-%dT%H:%M:%SZ")
-
-
 def _described(columns: Columns) -> dict[str, dict[str, str]]:
-    """What columns are; one with a unit must be finite, so an edge, which may lie beyond the range, has it in words."""
+    """Descriptions of columns; one with a unit must be finite, so an edge, which may be infinite, has it in words."""
     return {
         name: {"Description": f"{meaning} [{unit}]"}
         if name.startswith(("start_", "end_"))

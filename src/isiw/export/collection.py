@@ -51,22 +51,13 @@ def pseudonymised(
     names = [record.header.subject or f"unnamed session {number}" for number, record in enumerate(records)]
     order = sorted(set(names))
     draws.shuffle(order)
-    people = {
-        name: _Person(f"{number:03d}", _shift_days(_of(name, names, records), draws))
-        for number, name in enumerate(order, start=1)
-    }
+    people = {}
+    for number, name in enumerate(order, start=1):
+        begun = [_begin(record.header).date() for record, other in zip(records, names, strict=True) if other == name]
+        first_day = _FIRST_DAY + dt.timedelta(days=draws.randrange(_DAYS))
+        people[name] = _Person(f"{number:03d}", (first_day - min(begun)).days)
     changed = [_changed(record, people[name]) for record, name in zip(records, names, strict=True)]
     return changed, {name: people[name].pseudonym for name in sorted(people)}
-
-
-def _of(name: str, names: Sequence[str], records: Sequence[SessionRecord]) -> list[SessionRecord]:
-    return [record for record, other in zip(records, names, strict=True) if other == name]
-
-
-def _shift_days(records: Sequence[SessionRecord], draws: random.Random) -> int:
-    """By how many days the dates of a person move: the first one becomes a random day."""
-    new = _FIRST_DAY + dt.timedelta(days=draws.randrange(_DAYS))
-    return (new - min(_begin(record.header).date() for record in records)).days
 
 
 def _begin(header: Header) -> dt.datetime:
@@ -104,7 +95,7 @@ def _changed(record: SessionRecord, person: _Person) -> SessionRecord:
 def once_each(records: Sequence[SessionRecord]) -> tuple[list[SessionRecord], list[str]]:
     """Each session once, from the log that tells of most of it, and a sentence for each log that is left out.
 
-    Copies that went on differently are kept: with other stimuli, or, where nothing is lost, with other verdicts.
+    Copies that went on differently are kept: with other stimuli, or, if nothing is lost, with other verdicts.
     """
     kept: list[SessionRecord] = []
     left_out = []
@@ -132,7 +123,7 @@ class _Copy:
 
     @cached_property
     def alone(self) -> int:
-        """How many of its records the fuller log has not."""
+        """The number of its records that the fuller log has not."""
         return only_in(salvage_file(self.record.path), salvage_file(self.fuller.path))
 
     @property
@@ -165,7 +156,7 @@ class _Copy:
 
 
 def _told(record: SessionRecord) -> tuple[int | bool, ...]:
-    """How much a log tells of a session, what weighs most first; a whole and closed one before its like."""
+    """The amount that a log tells of a session, the weightiest part first; a whole and closed one before its like."""
     outcomes = len(record.table) - len(_unknown(record))
     verdicts = sum(event.kind in VERDICTS for event in record.events)
     believed = {estimate.trial for estimate in record.estimates}
@@ -180,7 +171,7 @@ def _told(record: SessionRecord) -> tuple[int | bool, ...]:
 
 
 def _begun(record: SessionRecord) -> tuple[str, str, int]:
-    """What a log says at its beginning, and a copy of it says as well."""
+    """The beginning of a log, which a copy of it has as well."""
     return record.header.created, record.header.subject, record.header.seed
 
 
@@ -210,7 +201,7 @@ def stimuli(record: SessionRecord) -> dict[int, int]:
 
 
 def _names(one: SessionRecord, other: SessionRecord) -> tuple[str, str]:
-    """What two logs are called; where they have one name, with their folders."""
+    """The names of two logs; if they have one name, with their folders."""
     first, second = one.path, other.path
     if first.name != second.name:
         return first.name, second.name
@@ -236,7 +227,7 @@ class Part:
 
     @property
     def whose(self) -> dict[str, str]:
-        """What the rows of this session begin with in every table."""
+        """The beginning of this session's rows in every table."""
         return {"subject": self.subject, "session": self.session}
 
 
@@ -303,12 +294,12 @@ def told_twice(parts: Iterable[Part]) -> list[str]:
 
 
 def stimulus_of(parts: Iterable[Part]) -> StimulusWords:
-    """What the conditioning stimulus of some sessions is called."""
+    """The words for the conditioning stimulus of some sessions."""
     return words_of(part.record.header.conditioning for part in parts)
 
 
 def log_losses(record: SessionRecord) -> list[str]:
-    """What a log lacks, a sentence each."""
+    """The losses of a log, a sentence each."""
     unknown = [str(intent.trial) for intent in record.unknown]
     has_onsets = not record.header.imported
     timeless = [str(trial.index) for trial in record.table if has_onsets and trial.index not in record.onsets]

@@ -56,7 +56,7 @@ _ASCII_UNITS: Final = {"µV": "uV", "μV": "uV", "m/s²": "m/s^2", "°C": "oC"}
 
 
 class Layout(NamedTuple):
-    """What sweeps of one run have in common."""
+    """The common layout of the sweeps of one run."""
 
     rate_hz: float
     samples: int
@@ -83,7 +83,7 @@ class Run:
 
     @property
     def sweep_s(self) -> float:
-        """How long a sweep is [s]."""
+        """The duration of a sweep [s]."""
         return self.layout.samples / self.layout.rate_hz
 
     @property
@@ -192,7 +192,7 @@ def _run(layout: Layout, sweeps: Sequence[tuple[Trial, Mapping[str, Channel]]], 
 
 
 def _sentences(left_out: Mapping[tuple[str, bool], Sequence[int]]) -> list[str]:
-    """What is left out: the numbers of the trials by the channel, and whether the trial has EMG."""
+    """Sentences about what is left out: the numbers of the trials by the channel, and whether the trial has EMG."""
     unlike = "it is not finite or too large, or has not the EMG's rate, begin and length"
     return [
         f"The channel {name} is not in the EMG file in {len(numbers)} trials (first {numbers[0]}): "
@@ -209,10 +209,10 @@ def bdf(run: Run) -> bytes:
         raise ConfigError("EMG-BIDS needs edfio", remedy='Install it: pip install "isiw[bids]".') from error
     samples = _record_samples(run.layout.rate_hz, run.layout.samples) or run.layout.samples
     duration_s = round(samples / run.layout.rate_hz, 6)
-    labels = _labels(run.layout)
+    labels, filled = _labels(run.layout), [np.pad(x, (0, -len(x) % samples), mode="edge") for x in run.values]
     signals = [
-        _signal(edfio.BdfSignal, _filled(values, samples), samples / duration_s, label, unit)
-        for values, label, (_, unit) in zip(run.values, labels, run.layout.channels, strict=True)
+        _signal(edfio.BdfSignal, values, samples / duration_s, label, unit)
+        for values, label, (_, unit) in zip(filled, labels, run.layout.channels, strict=True)
     ]
     file = io.BytesIO()
     edfio.Bdf(signals, data_record_duration=duration_s).write(file)
@@ -225,15 +225,10 @@ def _signal(kind: Callable[..., BdfSignal], values: FloatArray, rate_hz: float, 
     return kind(values, rate_hz, label=label, physical_dimension=_unit(unit), physical_range=range_)
 
 
-def _filled(values: FloatArray, samples: int) -> FloatArray:
-    """The values with the last one repeated up to a whole number of records."""
-    return np.pad(values, (0, -len(values) % samples), mode="edge")
-
-
 def _record_samples(rate_hz: float, sweep: int) -> int | None:
-    """How many samples a record of the file holds: a sweep's, or few; its duration must be written in eight digits.
+    """The number of samples in a record of the file: a sweep's, or few; its duration must be written in eight digits.
 
-    None where no duration that can be written holds a whole number of samples.
+    None if no duration that can be written holds a whole number of samples.
     """
     rate = Fraction(rate_hz).limit_denominator(1000)
     if abs(float(rate) - rate_hz) > 1e-9 * rate_hz:

@@ -20,7 +20,7 @@ from isiw.export.tables import write_tables
 
 @contextmanager
 def new_folder(target: str | Path) -> Iterator[Path]:
-    """A folder to write to, which takes its name once everything is in it; where anything fails it is gone."""
+    """A folder to write to, which takes its name once everything is in it; if anything fails it is gone."""
     place = Path(target)
     _require_free(place)
     place.parent.mkdir(parents=True, exist_ok=True)
@@ -51,7 +51,7 @@ FORMATS: Mapping[str, Callable[[Sequence[Part], Path], Sequence[str] | None]] = 
         "bids": write_bids,
     }
 )
-"""What writes each format."""
+"""The writer of each format."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Exported:
         sessions: how many sessions.
         trials: how many trials.
         lacking: what could not be read or exported, a sentence each.
-        pseudonyms: which code stands for whom, where the sessions are pseudonymised; it is kept nowhere else.
+        pseudonyms: which code stands for whom, if the sessions are pseudonymised; it is kept nowhere else.
     """
 
     folder: Path

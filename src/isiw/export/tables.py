@@ -99,28 +99,16 @@ def session_columns(first: StimulusWords) -> dict[str, tuple[str, str]]:
 
 def tidy(frame: pd.DataFrame) -> pd.DataFrame:
     """A table whose texts are on one line each, without what a terminal would obey."""
-    texts = [name for name in frame.columns if _has_texts(frame[name])]
-    return frame.assign(**{name: frame[name].map(_tidied) for name in texts})
-
-
-def _has_texts(column: pd.Series) -> bool:
-    return pd.api.types.is_object_dtype(column) or pd.api.types.is_string_dtype(column)
-
-
-def _tidied(value: Any) -> Any:
-    return one_line(value) if isinstance(value, str) else value
+    is_object, is_string = pd.api.types.is_object_dtype, pd.api.types.is_string_dtype
+    texts = [name for name in frame.columns if is_object(frame[name]) or is_string(frame[name])]
+    return frame.assign(**{name: frame[name].map(lambda x: one_line(x) if isinstance(x, str) else x) for name in texts})
 
 
 def all_trials(parts: Sequence[Part]) -> pd.DataFrame:
     """The trials of all sessions, a row a trial, each with its person, session and number."""
-    frames = [_led_by(part, part.record.trials.rename_axis("trial").reset_index()) for part in parts]
-    return pd.concat(frames, ignore_index=True)
-
-
-def _led_by(part: Part, frame: pd.DataFrame) -> pd.DataFrame:
-    for position, (name, value) in enumerate(part.whose.items()):
-        frame.insert(position, name, pd.Series(value, index=frame.index, dtype=object))
-    return frame
+    frames = [part.record.trials.rename_axis("trial").reset_index().assign(**part.whose) for part in parts]
+    table = pd.concat(frames, ignore_index=True).astype(dict.fromkeys(_WHOSE, object))
+    return table[[*_WHOSE, *(name for name in table.columns if name not in _WHOSE)]]
 
 
 def _sessions(parts: Sequence[Part]) -> pd.DataFrame:
@@ -138,7 +126,7 @@ def _events(parts: Iterable[Part]) -> pd.DataFrame:
 
 
 def session_facts(record: SessionRecord) -> dict[str, Any]:
-    """What a session is and found, as in `session_columns`."""
+    """The facts and the result of a session, as in `session_columns`."""
     return _what_it_is(record) | _what_came_of_it(record) | {"lacks": " ".join(log_losses(record))}
 
 
@@ -180,7 +168,7 @@ def _what_came_of_it(record: SessionRecord) -> dict[str, Any]:
 
 
 def _by_counts(record: SessionRecord) -> dict[str, Any]:
-    """What response counts say; nothing of values that are no MEPs."""
+    """The result of response counts; nothing of values that are no MEPs."""
     try:
         study = count_trials(by_isi(record.table))
     except InvalidValueError:

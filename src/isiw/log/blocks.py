@@ -21,24 +21,24 @@ from mcap.opcode import Opcode
 from mcap.stream_reader import StreamReader, breakup_chunk
 
 UNREADABLE: Final = (McapError, zstandard.ZstdError, struct.error, ValueError, KeyError, MemoryError, OverflowError)
-"""What the MCAP reader raises on damaged bytes; a failed checksum is a ValueError."""
+"""Errors that the MCAP reader raises on damaged bytes; a failed checksum is a ValueError."""
 
 MOST_UNPACKED: Final = (64 * 2**20, 100)
-"""What a log may unpack to [bytes], and how many times its own size besides; one of constant waveforms comes to 50."""
+"""The most that a log may unpack to: bytes, and times its own size; one of constant waveforms comes to 50."""
 
 MOST_RECORDS: Final = 500_000
-"""What a log may hold; two thousand trials of ten channels come to 30,000."""
+"""The most records of a log; two thousand trials of ten channels come to 30,000."""
 
 _MARK = b"\x04\x00\x00\x00zstd"
 _MARK_AT = 1 + 8 + 8 + 8 + 8 + 4  # behind the record's head, and the block's two times, size and checksum
 _HEAD: Final = struct.Struct("<BQQQQI4x4xQ")
-"""What a record is and its length, a block's two times, size and checksum, then the mark, and its data's length."""
+"""The head of a block: a record's kind and length, two times, size and checksum, the mark, and its data's length."""
 
 _RECORD_HEAD: Final = struct.Struct("<BQ")
-"""What a record is, and its length."""
+"""The head of a record: its kind, and its length."""
 
 _PACKED = b"\x28\xb5\x2f\xfd"
-"""What a block's data begin with (RFC 8878, section 3.1.1)."""
+"""The beginning of a block's data (RFC 8878, section 3.1.1)."""
 
 
 class LostBlockError(Exception):
@@ -74,7 +74,7 @@ class Unpacking:
         self._bytes_left, self._records_left = _most_unpacked(size), MOST_RECORDS
 
     def records(self, block: mcap.Chunk, offset: int) -> Sequence[mcap.McapRecord]:
-        """What a block holds."""
+        """The records of a block."""
         try:
             size = _honest_size(block)
             _require_room(offset, self._bytes_left, size)
@@ -103,7 +103,7 @@ def _unpacked(block: mcap.Chunk) -> mcap.Chunk:
 
 
 def _count(data: bytes, most: int) -> int:
-    """How many records an unpacked block holds; counting ends at the most, whatever follows."""
+    """The number of records in an unpacked block; counting ends at the most, whatever follows."""
     at = number = 0
     while at < len(data) and number < most:
         at += _RECORD_HEAD.size + _RECORD_HEAD.unpack_from(data, at)[1]
@@ -112,13 +112,13 @@ def _count(data: bytes, most: int) -> int:
 
 
 def _most_unpacked(size: int) -> int:
-    """How much a log of a size may unpack to [bytes]."""
+    """The most that a log of a size may unpack to [bytes]."""
     least, times = MOST_UNPACKED
     return least + times * size
 
 
 def _honest_size(block: mcap.Chunk) -> int:
-    """What a block unpacks to [bytes]."""
+    """The size that a block unpacks to [bytes]."""
     packed = {"": len, "zstd": zstandard.frame_content_size}
     if block.compression not in packed or packed[block.compression](block.data) != block.uncompressed_size:
         raise McapError(block.compression)
@@ -126,14 +126,14 @@ def _honest_size(block: mcap.Chunk) -> int:
 
 
 RECORD_HEAD_BYTES: Final = 1 + 8
-"""What a record is, and its length."""
+"""The head of a record: its kind, and its length."""
 
 _FOOTER_BYTES = 1 + 8 + 8 + 8 + 4
 _MAGIC = b"\x89MCAP0\r\n"
 
 
 def counted_records(file: IO[bytes]) -> mcap.Statistics | None:
-    """What the index of a file counts, if it agrees with its checksum, which the library leaves unchecked."""
+    """The counts of a file's index, if it agrees with its checksum, which the library leaves unchecked."""
     file.seek(0)
     data = file.read()
     footer_at = len(data) - len(_MAGIC) - _FOOTER_BYTES

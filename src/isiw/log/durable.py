@@ -27,7 +27,7 @@ _DAMAGED: Final = ".damaged"
 
 
 class Fingerprint(NamedTuple):
-    """Which file it is, and in which state: it differs where a file was written to, or another is in its place."""
+    """Which file it is, and in which state: it differs if a file was written to, or another is in its place."""
 
     device: int
     inode: int
@@ -58,13 +58,8 @@ def log_exists(log: Path) -> bool:
     return log.exists() or part_of(log).exists()
 
 
-def damaged_of(path: Path, number: int) -> Path:
-    """Where the damaged file of a log is kept when the log goes on."""
-    return path.with_name(f"{path.name}{_DAMAGED}{number or ''}")
-
-
 def kept_for(path: Path) -> Path | None:
-    """The log whose damaged file is kept at a path; None where the path's name does not say so."""
+    """The log whose damaged file is kept at a path; None if the path's name does not say so."""
     name, damaged, number = path.name.rpartition(_DAMAGED)
     return path.with_name(name) if damaged and name and (number.isdecimal() or not number) else None
 
@@ -138,7 +133,7 @@ class DurableFile:
             ) from error
 
     def displacement(self) -> str | None:
-        """What has become of the file's name or size behind its back, in words; None where it is as it was synced."""
+        """The change of the file's name or size behind its back, in words; None if it is as it was synced."""
         try:
             there = self.path.stat()
         except OSError as error:
@@ -218,7 +213,7 @@ def begun(path: Path) -> Iterator[DurableFile]:
 
 def keep_damaged(damaged: Path, target: Path) -> None:
     """Keep a damaged file's bytes under a name of their own."""
-    names = (damaged_of(target, number) for number in itertools.count())
+    names = (target.with_name(f"{target.name}{_DAMAGED}{number or ''}") for number in itertools.count())
     kept = next(name for name in names if not os.path.lexists(name))
     try:
         kept.hardlink_to(damaged)
@@ -239,30 +234,23 @@ _BYTE = 0x7FFF_FFF0
 
 
 def claim(file: IO[bytes]) -> bool:
-    """Lock an open file until it is closed; False where another process, or another opening of it, has the lock."""
+    """Lock an open file until it is closed; False if another process, or another opening of it, has the lock."""
+    handle = file.fileno()
     try:
-        _claim(file.fileno())
+        if sys.platform == "win32":
+            before = os.lseek(handle, 0, os.SEEK_CUR)
+            os.lseek(handle, _BYTE, os.SEEK_SET)
+            try:
+                msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
+            finally:
+                os.lseek(handle, before, os.SEEK_SET)
+        else:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
         if error.errno in _BUSY:
             return False
         raise
     return True
-
-
-if sys.platform == "win32":
-
-    def _claim(handle: int) -> None:
-        before = os.lseek(handle, 0, os.SEEK_CUR)
-        os.lseek(handle, _BYTE, os.SEEK_SET)
-        try:
-            msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
-        finally:
-            os.lseek(handle, before, os.SEEK_SET)
-
-else:
-
-    def _claim(handle: int) -> None:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def lock(file: IO[bytes], path: Path) -> None:
@@ -299,9 +287,3 @@ def claimed(path: Path) -> Iterator[IO[bytes]]:
     with file:
         lock(file, path)
         yield file
-
-
-def refuse_if_locked(path: Path) -> None:
-    """Raise where another process writes to a log."""
-    with claimed(path):
-        pass

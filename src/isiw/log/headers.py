@@ -10,10 +10,9 @@ Its two topics have no frozen channel number: the file announces them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Annotated, Any, Final, Literal, TypeAlias
 
 import tomli_w
@@ -43,7 +42,7 @@ from isiw.types import Conditioning, Reference
 from isiw.visit import Visit, VisitProtocol
 
 PRODUCTION_VERSION: Final = 1
-"""Grows only where an older isiw would misread the log."""
+"""Grows only if an older isiw would misread the log."""
 
 MODES: Final = {
     1: "score bar",
@@ -51,7 +50,7 @@ MODES: Final = {
     3: "target and produced time",
     4: "target and absolute error",
 }
-"""What a person sees after each trial, by mode [Kim2020, Table 6.1]."""
+"""The feedback after each trial, by mode [Kim2020, Table 6.1]."""
 
 LONGEST_MS: Final = 5000.0
 """Longer than a person who attends takes between the two presses [ms]."""
@@ -79,14 +78,19 @@ class Block(Checked):
     trials: Annotated[int, partial(whole, least=1, most=MOST_BLOCK_TRIALS)] = 200
 
 
-class _Record(BaseModel):
+class LogRecord(BaseModel):
     """A frozen record; keys that a newer version added are ignored."""
 
-    model_config = ConfigDict(frozen=True, extra="ignore")
+    model_config = ConfigDict(
+        frozen=True,
+        ser_json_inf_nan="strings",
+        extra="ignore",
+        coerce_numbers_to_str=True,  # an earlier version wrote a device's version as the number that it was given
+    )
 
 
-class ProductionHeader(_Record):
-    """What a task is; the seed draws the lights of mode 2."""
+class ProductionHeader(LogRecord):
+    """The header of a production task; the seed draws the lights of mode 2."""
 
     kind: Literal["production"] = "production"
     schema_version: int = PRODUCTION_VERSION
@@ -97,7 +101,7 @@ class ProductionHeader(_Record):
     blocks: tuple[Block, ...] = Field(min_length=1)
 
 
-class Production(_Record):
+class Production(LogRecord):
     """One interval that was produced, and what the person saw of it.
 
     `trial` counts through all blocks, from 0; `light` is None except in mode 2.
@@ -114,19 +118,8 @@ SCHEMA_VERSION = 4
 """4 since 0.1.0: control trials, and trials that an operator includes again or accepts. Before came 1 to 3."""
 
 
-class LogRecord(BaseModel):
-    """A frozen record; keys that a newer version added are ignored."""
-
-    model_config = ConfigDict(
-        frozen=True,
-        ser_json_inf_nan="strings",
-        extra="ignore",
-        coerce_numbers_to_str=True,  # an earlier version wrote a device's version as the number that it was given
-    )
-
-
 class StrategyRecipe(LogRecord):
-    """How the strategy was made; an empty name means from a user's own objects."""
+    """The recipe of a strategy; an empty name means from a user's own objects."""
 
     name: str
     seed: int
@@ -135,7 +128,7 @@ class StrategyRecipe(LogRecord):
     @field_validator("settings")
     @classmethod
     def _readable(cls, settings: dict[str, Any]) -> dict[str, Any]:
-        """What a header is read by, whatever the strategy."""
+        """Check what a header is read by, whatever the strategy."""
         if settings.get("conditioning", "tap") not in STIMULI:
             raise InvalidValueError("the conditioning stimulus is unknown", got=settings["conditioning"])
         if (limit_mv := settings.get("detection_limit_mv")) is not None:
@@ -157,7 +150,7 @@ def with_reference(space: object) -> object:
 
 
 class _Header(LogRecord):
-    """What the header of a log says in which a person is stimulated; its tag is `kind`, which older logs lack."""
+    """Common fields of headers of logs in which a person is stimulated; the tag is `kind`, which older logs lack."""
 
     schema_version: int = SCHEMA_VERSION
     isiw_version: str
@@ -170,9 +163,9 @@ class _Header(LogRecord):
 
 
 class Header(_Header):
-    """What a session is, written before anything else, and again before it goes on: the last one holds.
+    """The header of a session, written before anything else, and again before it goes on: the last one holds.
 
-    `asks_from` is the first trial that was asked with these versions. `belief_version` and `engine_version` grow where
+    `asks_from` is the first trial that was asked with these versions. `belief_version` and `engine_version` grow if
     the same settings come to another estimate, or compute it otherwise; 1 is what older logs mean. An "imported"
     one is of trials that were delivered without isiw, and `source` says where they are from: it was no session, and has
     no intents. `earlier` are trials that were learnt before the first ask, and count against nothing.
@@ -207,18 +200,18 @@ class Header(_Header):
 
     @property
     def stimulus(self) -> StimulusWords:
-        """What the conditioning stimulus is called."""
+        """The words for the conditioning stimulus."""
         return STIMULI[self.conditioning]
 
     @property
     def detection_limit_mv(self) -> float | None:
-        """What an amplitude of 0 is known to be below [mV]: as the device or the strategy's settings state it."""
+        """The amplitude that 0 is known to be below [mV]: as the device or the strategy's settings state it."""
         told = self.strategy.settings.get("detection_limit_mv")
         return self.device.detection_limit_mv if told is None else float(told)
 
 
 class ThresholdHeader(_Header):
-    """What a search for a motor threshold is: every pulse is TMS alone, at an intensity of a range."""
+    """The header of a search for a motor threshold: every pulse is TMS alone, at an intensity of a range."""
 
     kind: Literal["threshold"] = "threshold"
     search: StrategyRecipe
@@ -255,28 +248,20 @@ ANY_HEADER: Final[TypeAdapter[AnyHeader]] = TypeAdapter(
         Discriminator(kind_tag),
     ]
 )
-"""What turns a header into JSON and back, by its kind."""
+"""The converter of headers into JSON and back, by their kind."""
 
 _SPACE: Final[TypeAdapter[DesignSpace]] = TypeAdapter(Annotated[DesignSpace, BeforeValidator(with_reference)])
 
 _STAND_INS: Final[Mapping[str, Callable[[Mapping[str, Any]], object]]] = {
     "isiw_version": lambda _: "not known",
     "created": lambda _: "at an unknown time",
-    "subject": lambda _: "",
     "seed": lambda _: 0,
     "strategy": lambda values: {"name": _name(values.get("strategy")), "seed": 0},
     "limits": lambda values: Limits.of_space(_SPACE.validate_python(values.get("space"))),
     "device": lambda values: DeviceInfo("not known", _reference(values)),
     "signals": lambda _: SignalLimits(),
-    "timeout_s": lambda _: 30.0,
-    "ask_deadline_s": lambda _: None,
-    "visit": lambda _: {},
-    "protocol": lambda _: {},
-    "versions": lambda _: {},
-    "asks_from": lambda _: 0,
-    "config": lambda _: {},
 }
-"""What stands in for a part that cannot be read; without the others there is no header."""
+"""Stand-ins for parts that cannot be read and have no default; without any other such part there is no header."""
 
 
 def header_in_parts(values: Any) -> tuple[AnyHeader, dict[str, str]]:
@@ -287,10 +272,13 @@ def header_in_parts(values: Any) -> tuple[AnyHeader, dict[str, str]]:
             return ANY_HEADER.validate_python(values), unread
         except ValidationError as error:
             _, part, *_ = (*map(str, error.errors()[0]["loc"]), "", "")  # the first is the header's kind
-            if part in unread or part not in _STAND_INS:
+            field = Header.model_fields.get(part)
+            has_default = field is not None and not field.is_required() and part not in {"kind", "schema_version"}
+            if part in unread or not (has_default or part in _STAND_INS):
                 raise
             unread[part] = first_fault(error)
-            values = {**values, part: _STAND_INS[part](values)}
+            stand_in = {} if has_default else {part: _STAND_INS[part](values)}
+            values = {key: value for key, value in values.items() if key != part} | stand_in
 
 
 def _reference(values: Mapping[str, Any]) -> Reference:
@@ -302,19 +290,8 @@ def _name(strategy: Any) -> str:
     return name if isinstance(name, str) else "not known"
 
 
-def require_read(path: Path, unread: Mapping[str, str], parts: Sequence[str] = ()) -> None:
-    """Raise where a part of a header is needed that this version cannot read."""
-    needed = {part: why for part, why in unread.items() if part in parts or not parts}
-    if needed:
-        raise LogError(
-            f"what is needed of the log's header cannot be read: {', '.join(needed)}",
-            got=f"{path}: {'; '.join(needed.values())}",
-            remedy="Use the version of isiw that wrote it; isiw show, plot, report and export show the rest.",
-        )
-
-
 def first_fault(error: ValueError) -> str:
-    """What is wrong with a record, without what pydantic says of where to read more."""
+    """The first fault of a record, without what pydantic says of where to read more."""
     if isinstance(error, ValidationError):
         first = error.errors(include_url=False, include_input=False)[0]
         where = first["loc"][

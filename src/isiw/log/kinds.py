@@ -1,4 +1,4 @@
-"""What a log is of, how to look at it, and how to continue it."""
+"""The kinds of logs, and the commands that show and continue them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from isiw.log.headers import RUN_KEY, SERVED_KEY, AnyHeader, Header
 from isiw.text.sanitize import command
 
 OWN_LOOP: Final = "a loop of the lab's own"
-"""What the log calls the device of a session whose loop is not isiw's."""
+"""The device's name in the log of a session whose loop is not isiw's."""
 
 
 class LogKind(StrEnum):
@@ -25,35 +25,19 @@ class LogKind(StrEnum):
     IMPORTED = "trials that were delivered without isiw"
 
     def shown_by(self, path: Path) -> str:
-        """The command that shows a log of this kind.
-
-        Args:
-            path: the log.
-        """
-        match self:
-            case LogKind.SEARCH | LogKind.IMPORTED:
-                return command("show", path)
-            case LogKind.THRESHOLD:
-                return command("threshold", path, "--show")
-            case LogKind.PRODUCTION:
-                return command("interval", path, "--show")
+        """The command that shows a log of this kind."""
+        return command(_OWN_COMMAND[self], path, "--show") if self in _OWN_COMMAND else command("show", path)
 
     def continued_by(self, path: Path) -> str:
-        """The command that continues a log of this kind.
+        """The command that continues a log of this kind."""
+        if self in _OWN_COMMAND:
+            return command(_OWN_COMMAND[self], path, "--resume")
+        imported = self is LogKind.IMPORTED
+        return command("run", "CONFIG", "--earlier", path) if imported else command("resume", path)
 
-        Args:
-            path: the log.
-        """
-        match self:
-            case LogKind.SEARCH:
-                return command("resume", path)
-            case LogKind.THRESHOLD:
-                return command("threshold", path, "--resume")
-            case LogKind.PRODUCTION:
-                return command("interval", path, "--resume")
-            case LogKind.IMPORTED:
-                return command("run", "CONFIG", "--earlier", path)
 
+_OWN_COMMAND: Final = {LogKind.THRESHOLD: "threshold", LogKind.PRODUCTION: "interval"}
+"""Commands that show and continue logs of one kind."""
 
 _OF_TAG: Final = {
     "session": LogKind.SEARCH,
@@ -64,14 +48,14 @@ _OF_TAG: Final = {
 
 
 def kind_of(header: AnyHeader) -> LogKind:
-    """What a log is of."""
+    """The kind of a log."""
     return _OF_TAG[header.kind]
 
 
 def continued_by(
     path: Path, header: AnyHeader, config: Path | None = None, *, end_lost: bool = False, changed: bool = False
 ) -> str:
-    """How to continue what a log is of: a command, or the call that a loop of the lab's own was begun with."""
+    """The way to continue what a log is of: a command, or the call that a loop of the lab's own was begun with."""
     if not isinstance(header, Header) or header.imported:
         return kind_of(header).continued_by(path)
     if SERVED_KEY in header.config:
@@ -108,7 +92,7 @@ def imported_sentence(names: Sequence[str]) -> str:
 
 
 def of_another_kind(path: Path, kind: LogKind, wanted: LogKind) -> LogError:
-    """The error where a log is of something else than is wanted."""
+    """The error if a log is of something else than is wanted."""
     return LogError(
         f"the log is of {kind}, not of {wanted}", got=str(path), remedy=f"Look at it with: {kind.shown_by(path)}"
     )

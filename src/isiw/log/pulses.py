@@ -22,7 +22,7 @@ _TIMED = ("/intent", "/trial", "/event")
 
 
 def pulses_s(salvaged: Salvage, now_ns: int | None = None) -> list[float]:
-    """How long ago each stimulus of a log was about to be delivered [s]; refused ones do not count.
+    """The age of each stimulus of a log [s], from when it was about to be delivered; refused ones do not count.
 
     A stimulus whose intent is lost counts by the record of its trial.
     """
@@ -57,7 +57,7 @@ def _timed(message: Message) -> Record | None:
 
 
 def earlier_pulses_s(folder: str | Path, subject: str, period_s: float, *, but: Path) -> list[float]:
-    """How long ago each stimulus of a subject was, by the logs of a folder [s]; those of simulations do not count.
+    """The age of each stimulus of a subject, by the logs of a folder [s]; those of simulations do not count.
 
     Stimuli that several logs tell of, as an exported copy does, count once.
     """
@@ -86,7 +86,7 @@ def _recent(folder: Path, period_s: float) -> set[Path]:
 
 
 def _files(folder: Path) -> Iterator[Path]:
-    """What is in a folder and in its folders, each folder once, whatever links lead to it."""
+    """The files of a folder and of its folders, each folder once, whatever links lead to it."""
     seen = set()
     for place, folders, names in os.walk(folder, onerror=_raise, followlinks=True):
         if (real := os.path.realpath(place)) in seen:
@@ -110,7 +110,7 @@ def _went_on(damaged: Salvage) -> bool:
 
 
 def _resumed(salvaged: Salvage) -> int:
-    """How often a session was resumed, with a word on disk for each stimulus that may have been given before."""
+    """The number of resumptions, each with a word on disk for each stimulus that may have been given before."""
     records = (_timed(message) for message in salvaged.messages)
     return sum(isinstance(record, Event) and record.kind == "resume" for record in records)
 

@@ -8,17 +8,16 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, Final, Generic, TypeVar, cast
 
-from isiw.errors import DamagedLogError, InvalidValueError
+from isiw.errors import DamagedLogError, InvalidValueError, LogError
 from isiw.findings import lacking
 from isiw.lazy import pd
-from isiw.log.headers import SCHEMA_VERSION, Header, ThresholdHeader, require_read
+from isiw.log.headers import SCHEMA_VERSION, Header, ThresholdHeader
 from isiw.log.kinds import LogKind, continued_by, of_another_kind
 from isiw.log.records import Onset, Records, unknown_of
 from isiw.log.salvage import Salvage, salvage
-from isiw.log.schema import EstimateRecord, Event, Intent, Record
-from isiw.log.threshold import ThresholdRecord
+from isiw.log.schema import EstimateRecord, Event, Intent, PulseOutcome, Record
 from isiw.log.verdicts import VERDICTS, under_all
 from isiw.sentences import JUDGED_SINCE
 from isiw.signals.evidence import is_silent
@@ -28,34 +27,86 @@ from isiw.strategy.stopping import StopDecision
 from isiw.text.stimuli import TAP, StimulusWords, meanings
 from isiw.trials import Channel, Stimulus, Sweep, Trial, TrialTable
 
+HeaderT = TypeVar("HeaderT", Header, ThresholdHeader)
+
 
 @dataclass(frozen=True, eq=False)
-class SessionRecord:
-    """A session as its log tells it.
+class _StimuliRecord(Generic[HeaderT]):
+    """The contents of a log of stimuli.
 
     Args:
         path: the file that was read.
-        header: what the session is; of one that was resumed, what it went on with last.
-        history: intents, trials, estimates and events, in the order in which they were logged.
-        waveforms: the recorded channels, by trial and name.
-        losses: what could not be read, a sentence each; empty where the log is whole.
+        header: what the session or the search is; of one that was resumed, what it went on with last.
+        history: all records but headers and waveforms, in the order in which they were logged.
+        losses: what could not be read, a sentence each; empty if the log is whole.
         finished: whether the session closed its log.
         end_lost: whether its end is missing, so that nobody knows how many stimuli it told of.
-        delivered: how many stimuli were given by its index, or may have been; 0 where it has none.
-        onsets: when each stimulus was about to be delivered, by its trial's number.
+        delivered: how many stimuli were given by its index, or may have been; 0 if it has none.
         unread: parts of the header that this version cannot read, and why; something neutral stands in for each.
     """
 
     path: Path
-    header: Header
+    header: HeaderT
     history: tuple[Record, ...] = field(repr=False)
-    waveforms: Mapping[tuple[int, str], Channel] = field(repr=False)
     losses: tuple[str, ...]
     finished: bool
     end_lost: bool = False
     delivered: int = 0
-    onsets: Mapping[int, Onset] = field(default_factory=dict, repr=False)
     unread: Mapping[str, str] = field(default_factory=dict)
+
+    def require_read(self, *parts: str) -> None:
+        """Raise if a part of the header is needed that this version cannot read."""
+        needed = {part: why for part, why in self.unread.items() if part in parts or not parts}
+        if needed:
+            raise LogError(
+                f"what is needed of the log's header cannot be read: {', '.join(needed)}",
+                got=f"{self.path}: {'; '.join(needed.values())}",
+                remedy="Use the version of isiw that wrote it; isiw show, plot, report and export show the rest.",
+            )
+
+    @property
+    def intents(self) -> tuple[Intent, ...]:
+        """The intents to deliver."""
+        return tuple(record for record in self.history if isinstance(record, Intent))
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """The events of the session."""
+        return tuple(record for record in self.history if isinstance(record, Event))
+
+
+class ThresholdRecord(_StimuliRecord[ThresholdHeader]):
+    """A search for the motor threshold as its log tells it."""
+
+    @cached_property
+    def outcomes(self) -> tuple[PulseOutcome, ...]:
+        """The outcome of each pulse, as it counts after an operator's verdict."""
+        excluded = {event.trial: {"reason": event.text} for event in self.events if event.kind == "exclusion"}
+        pulses = (record for record in self.history if isinstance(record, PulseOutcome))
+        return tuple(pulse.model_copy(update=excluded.get(pulse.trial)) for pulse in pulses)
+
+    @property
+    def unknown(self) -> tuple[Intent, ...]:
+        """Pulses that were given, or may have been, and whose outcome is not in the log."""
+        return unknown_of(self.history, {outcome.trial for outcome in self.outcomes}, self.delivered)
+
+    @property
+    def given(self) -> int:
+        """The number of pulses that were given, or may have been; one that an operator has withdrawn does not count."""
+        return len(self.outcomes) + len(self.unknown)
+
+
+@dataclass(frozen=True, eq=False)
+class SessionRecord(_StimuliRecord[Header]):
+    """A session as its log tells it.
+
+    Args:
+        waveforms: the recorded channels, by trial and name.
+        onsets: when each stimulus was about to be delivered, by its trial's number.
+    """
+
+    waveforms: Mapping[tuple[int, str], Channel] = field(default_factory=dict, repr=False)
+    onsets: Mapping[int, Onset] = field(default_factory=dict, repr=False)
 
     def __str__(self) -> str:
         header, last = self.header, self.estimates[-1] if self.estimates else None
@@ -82,10 +133,6 @@ class SessionRecord:
         said = "The log's {} cannot be read by this version of isiw: {}"
         return tuple(said.format(part, why) for part, why in self.unread.items())
 
-    def require_read(self, *parts: str) -> None:
-        """Raise where a part of the header is needed that this version cannot read."""
-        require_read(self.path, self.unread, parts)
-
     @cached_property
     def table(self) -> TrialTable:
         """All trials whose outcome was logged, as they count after what an operator said about them."""
@@ -102,7 +149,7 @@ class SessionRecord:
 
     @cached_property
     def measures(self) -> Mapping[int, Measures]:
-        """What the sweeps of the trials that count show beside the amplitude, by the trial's number."""
+        """Measures of the sweeps of trials that count, beside the amplitude, by the trial's number."""
         emg = {trial: channel for (trial, name), channel in self.waveforms.items() if name == "emg"}
         signals, taps = self.header.signals, TapResponses(self.header.signals.mep_window_ms)
         for trial in self.table if any(trial.tap_mv for trial in self.table) else ():
@@ -110,7 +157,7 @@ class SessionRecord:
         return {t.index: measures(emg[t.index], t, signals, taps) for t in self.table.told if t.index in emg}
 
     def require_end(self) -> None:
-        """Raise where nobody knows how many stimuli were given."""
+        """Raise if nobody knows how many stimuli were given."""
         if self.end_lost:
             raise DamagedLogError(
                 "the log's end is missing, so the number of stimuli given is unknown",
@@ -132,7 +179,7 @@ class SessionRecord:
 
     @property
     def pairs(self) -> int:
-        """How many pairs of stimuli count; trials with TMS alone do not."""
+        """The number of pairs of stimuli that count; trials with TMS alone do not."""
         return sum(trial.isi_ms is not None for trial in self.table.told)
 
     @property
@@ -148,11 +195,6 @@ class SessionRecord:
         return any(isinstance(entry, Event) and entry.kind in VERDICTS for entry in since)
 
     @property
-    def intents(self) -> tuple[Intent, ...]:
-        """What was about to be delivered."""
-        return tuple(r for r in self.history if isinstance(r, Intent))
-
-    @property
     def estimates(self) -> tuple[EstimateRecord, ...]:
         """The estimates, trial by trial."""
         return tuple(r for r in self.history if isinstance(r, EstimateRecord))
@@ -161,11 +203,6 @@ class SessionRecord:
     def found(self) -> EstimateRecord | None:
         """The last estimate; None if there is none, or it rests on too little to speak of a window."""
         return self.estimates[-1] if self.estimates and self.rests_on_data else None
-
-    @property
-    def events(self) -> tuple[Event, ...]:
-        """What happened to the session."""
-        return tuple(r for r in self.history if isinstance(r, Event))
 
     @property
     def decision(self) -> StopDecision | None:
@@ -184,7 +221,7 @@ class SessionRecord:
 
     @property
     def given(self) -> int:
-        """How many stimuli were delivered, or may have been."""
+        """The number of stimuli that were delivered, or may have been."""
         return len(self.table) + len(self.unknown)
 
     def sweep(self, trial: int) -> dict[str, Channel]:
@@ -214,27 +251,23 @@ def read_salvaged(salvaged: Salvage) -> SessionRecord:
 
 
 def read_any(salvaged: Salvage, wanted: LogKind = LogKind.SEARCH) -> SessionRecord | ThresholdRecord:
-    """What was salvaged from a log in which a person is stimulated."""
+    """The record of a salvaged log in which a person is stimulated."""
     if of_production(salvaged):
         raise of_another_kind(salvaged.path, LogKind.PRODUCTION, wanted)
     records = Records.of(salvaged)
     header = cast("Header | ThresholdHeader", records.header_of((Header, ThresholdHeader), SCHEMA_VERSION))
-    history, losses = tuple(records.history), records.told_losses
-    finished, end_lost, unread = salvaged.finished, salvaged.end_lost, records.unread
+    read: dict[str, Any] = {
+        "path": salvaged.path,
+        "history": tuple(records.history),
+        "losses": records.told_losses,
+        "finished": salvaged.finished,
+        "end_lost": salvaged.end_lost,
+        "delivered": records.delivered,
+        "unread": records.unread,
+    }
     if isinstance(header, ThresholdHeader):
-        return ThresholdRecord(salvaged.path, header, history, losses, finished, end_lost, records.delivered, unread)
-    return SessionRecord(
-        salvaged.path,
-        header,
-        history,
-        records.waveforms,
-        losses,
-        finished,
-        end_lost,
-        records.delivered,
-        records.onsets.by_trial,
-        unread,
-    )
+        return ThresholdRecord(header=header, **read)
+    return SessionRecord(header=header, waveforms=records.waveforms, onsets=records.onsets.by_trial, **read)
 
 
 def of_production(salvaged: Salvage) -> bool:
@@ -243,7 +276,7 @@ def of_production(salvaged: Salvage) -> bool:
 
 
 def require_records(records: Iterable[object]) -> None:
-    """Raise where these are no records of sessions, but the paths of their logs, say."""
+    """Raise if these are no records of sessions, but the paths of their logs, say."""
     for record in records:
         if not isinstance(record, SessionRecord):
             raise InvalidValueError(

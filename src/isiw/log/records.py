@@ -11,7 +11,6 @@ import re
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Final, NamedTuple, TypeVar
 
 from pydantic import ValidationError
@@ -43,7 +42,7 @@ class Onset(NamedTuple):
 class Onsets:
     """The onsets of a log whose intents come one after the other.
 
-    A session's clock begins again where the session is resumed, so the time between the stimuli before and after
+    A session's clock begins again if the session is resumed, so the time between the stimuli before and after
     that is the log's, as it is where the session's clock stood still.
     """
 
@@ -181,11 +180,18 @@ class Records:
             header, self.unread = _header_from_attachment(self.salvaged)
         if not isinstance(header, kinds):
             raise _lost_header(self.salvaged)
-        return _checked_version(header, newest, self.salvaged.path)
+        if header.schema_version > newest:
+            raise LogError(
+                "the log was written by a newer isiw",
+                got=f"schema version {header.schema_version} in {self.salvaged.path}",
+                expected=f"{newest} or older",
+                remedy="Upgrade isiw.",
+            )
+        return header
 
     @property
     def delivered(self) -> int:
-        """How many stimuli the index counts, those of lost records among them; refused ones do not count."""
+        """The number of stimuli that the index counts, those of lost records among them; refused ones do not count."""
         counted, history = self.salvaged.counted, self.history
         lost = counted.get("/intent", 0) - sum(isinstance(record, Intent) for record in history)
         return max(lost + len(_standing(history)), counted.get("/trial", 0))
@@ -259,7 +265,7 @@ def unknown_of(history: Sequence[Record], known: AbstractSet[int], delivered: in
 
 
 def _standing(history: Sequence[Record]) -> dict[int, Intent]:
-    """What was about to be delivered and was not refused, by trial; what was asked for again is one stimulus."""
+    """Intents that were not refused, by trial; a stimulus that was asked for again is one."""
     intents: dict[int, Intent] = {}
     for entry in history:
         if isinstance(entry, Intent):
@@ -283,14 +289,3 @@ def _lost_header(salvaged: Salvage) -> DamagedLogError:
         got=str(salvaged.path),
         remedy="Its records may still be readable with any MCAP tool.",
     )
-
-
-def _checked_version(header: HeaderKind, newest: int, path: Path) -> HeaderKind:
-    if header.schema_version > newest:
-        raise LogError(
-            "the log was written by a newer isiw",
-            got=f"schema version {header.schema_version} in {path}",
-            expected=f"{newest} or older",
-            remedy="Upgrade isiw.",
-        )
-    return header

@@ -25,7 +25,7 @@ from isiw.text.sanitize import counted
 
 @dataclass
 class Salvage:
-    """What was read.
+    """Everything that was read of a log.
 
     Args:
         path: the file that was read.
@@ -33,10 +33,10 @@ class Salvage:
         fingerprint: which file it was, and in which state.
         messages: the records, in the order in which they were written.
         attachments: by name.
-        losses: what could not be read, a sentence each; empty where nothing is missing.
+        losses: what could not be read, a sentence each; empty if nothing is missing.
         finished: whether the session closed its log.
         end_lost: whether the end of a closed log is missing, so that nobody knows how many stimuli it told of.
-        counted: how many records of each topic the index at the end counts; empty where there is no such index.
+        counted: how many records of each topic the index at the end counts; empty if there is no such index.
         topics: by channel number; known beforehand, in case the chunk that defines the channels is lost.
     """
 
@@ -68,7 +68,7 @@ def current_file(path: str | Path) -> Path:
 def salvage(path: str | Path) -> Salvage:
     """Read everything that can be read from a log.
 
-    Where there are both `FILE.part` and `FILE`, the first is the second's continuation and is read; where it is not,
+    Where there are both `FILE.part` and `FILE`, the first is the second's continuation and is read; if it is not,
     the file that was named is.
     """
     if not isinstance(path, str | os.PathLike):
@@ -81,7 +81,7 @@ def salvage(path: str | Path) -> Salvage:
 
 
 def _continuation(part: Path, closed: Path) -> Salvage:
-    """What a log's `.part` holds, if that goes on from the closed log; else the closed log."""
+    """The contents of a log's `.part`, if that goes on from the closed log; else the closed log."""
     found = []
     for path in (part, closed):
         try:
@@ -99,7 +99,7 @@ def holds(later: Salvage, earlier: Salvage) -> bool:
 
 
 def only_in(found: Salvage, other: Salvage) -> int:
-    """How many records a log has that another one has not."""
+    """The number of records that a log has and another one has not."""
     own, others = (Counter((m.topic, m.data) for m in each.messages) for each in (found, other))
     return (own - others).total()
 
@@ -260,7 +260,7 @@ def _keep_attachment(attachment: mcap.Attachment, file: IO[bytes], start: int, f
 
 
 class _Exact:
-    """A file that raises where it ends too early; the reader would take half a record for a whole one."""
+    """A file that raises if it ends too early; the reader would take half a record for a whole one."""
 
     def __init__(self, file: IO[bytes]) -> None:
         self._file = file

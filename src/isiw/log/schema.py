@@ -1,4 +1,4 @@
-"""What is in a log: one kind of record per topic, as JSON with a JSON schema.
+"""The records of a log: one kind of record per topic, as JSON with a JSON schema.
 
     /header     who, with what, and how: everything needed to make the strategy again; once more on resuming
     /intent     about to be delivered; an intent without a trial was interrupted, or refused as an event says
@@ -27,12 +27,7 @@ from types import MappingProxyType
 from typing import Annotated, Any, Final, Literal, Self, TypeAlias
 
 import numpy as np
-from pydantic import (
-    ConfigDict,
-    Field,
-    FiniteFloat,
-    TypeAdapter,
-)
+from pydantic import ConfigDict, Field, FiniteFloat, TypeAdapter
 from pydantic_core import PydanticSerializationError
 
 from isiw.checks import MOST_MEP_MV
@@ -53,7 +48,7 @@ TrialNumber: TypeAlias = Annotated[int, Field(ge=0, lt=MOST_TRIALS)]
 
 
 class Intent(LogRecord):
-    """What is about to be delivered: a pair of stimuli, or without an ISI TMS alone or a tap alone."""
+    """The intent to deliver a pair of stimuli, or without an ISI TMS alone or a tap alone."""
 
     trial: TrialNumber
     isi_ms: float | None
@@ -69,9 +64,9 @@ class Intent(LogRecord):
 
 
 class PulseOutcome(LogRecord):
-    """What came of a pulse on the way to a motor threshold; with a `reason`, nothing was learnt from it.
+    """The outcome of a pulse on the way to a motor threshold; with a `reason`, nothing was learnt from it.
 
-    The intensity is None where the log has lost it.
+    The intensity is None if the log has lost it.
     """
 
     trial: TrialNumber
@@ -116,12 +111,12 @@ class Waveform(LogRecord):
 
 
 class EstimateRecord(Estimate):
-    """What was known after a trial, whether to stop, and what is asked next.
+    """The estimate after a trial, the decision to stop or not, and the ISI that is asked next.
 
     Nine of ten next MEPs lie between `predicted_low_mv` and `predicted_high_mv`, at the ISIs of the profile.
     `stop_kind` says what the decision rests on, `chosen_by` what chose the next ISI
     (`isiw.strategy.course.ChosenBy`), and `scores` are those of the acquisition function at `scored_ms`; both are
-    empty where nothing is asked next.
+    empty if nothing is asked next.
     """
 
     model_config = ConfigDict(title="Estimate")  # as its schema is called in every log
@@ -230,26 +225,17 @@ CHANNEL_IDS: Final[Mapping[str, int]] = MappingProxyType(
 )
 """The channel numbers of the topics that every log has. They are frozen: a damaged log is read by them.
 
-Any other topic takes the next free number in its file, and announces it there (`announcement`).
+Any other topic takes the next free number in its file, and announces it there.
 """
 
 ANNOUNCEMENT = "channel "
+"""The beginning of the name of metadata that say which topic a further channel number has."""
 
 
-def announcement(number: int, topic: str) -> tuple[str, dict[str, str]]:
-    """Name and content of the metadata that say which topic a further channel number has."""
-    return f"{ANNOUNCEMENT}{number}", {"id": str(number), "topic": topic}
-
-
-_ADAPTERS: dict[str, TypeAdapter[Any]] = {topic: TypeAdapter(kind) for topic, kind in _KINDS.items()} | {
-    "/header": ANY_HEADER
-}
-_WAVEFORM: TypeAdapter[Any] = TypeAdapter(Waveform)
-
-
+@cache
 def adapter(topic: str) -> TypeAdapter[Any]:
-    """What turns a topic's records into JSON and back; any topic that is not isiw's own holds waveforms."""
-    return _ADAPTERS.get(topic, _WAVEFORM)
+    """The converter of a topic's records into JSON and back; any topic that is not isiw's own holds waveforms."""
+    return ANY_HEADER if topic == "/header" else TypeAdapter(_KINDS.get(topic, Waveform))
 
 
 def is_of_isiw(topic: str) -> bool:
@@ -259,9 +245,7 @@ def is_of_isiw(topic: str) -> bool:
 
 def topic_of(record: Record, channel_name: str | None = None) -> str:
     """The topic of a record."""
-    if not isinstance(record, Waveform):
-        return _TOPIC_OF_KIND[type(record)]
-    return waveform_topic(channel_name or "")
+    return waveform_topic(channel_name or "") if isinstance(record, Waveform) else _TOPIC_OF_KIND[type(record)]
 
 
 def waveform_topic(channel_name: str) -> str:
@@ -295,13 +279,9 @@ def decode(topic: str, data: bytes) -> Record:
     return record
 
 
+@cache
 def json_schema(topic: str) -> tuple[str, bytes]:
     """Name and JSON schema of a topic's records; the root is an object."""
-    return _json_schema(topic if topic in _KINDS else "")
-
-
-@cache
-def _json_schema(topic: str) -> tuple[str, bytes]:
     kind = _KINDS.get(topic, Waveform)
     schema = {"type": "object"} | adapter(topic).json_schema(mode="serialization")
     return f"isiw.{schema.get('title', kind.__name__)}", json.dumps(schema).encode()
@@ -328,7 +308,7 @@ _END_NS: Final = 2**64
 
 
 def clock_ns() -> int:
-    """What the computer's clock says [ns since 1970]."""
+    """The time by the computer's clock [ns since 1970]."""
     now_ns = time.time_ns()
     if not 0 <= now_ns < _END_NS:
         raise LogError(
@@ -341,7 +321,7 @@ def clock_ns() -> int:
 
 
 def log_time_ns() -> int:
-    """The same for a record; 0 where the clock of a running session has been set to a time that no log can hold."""
+    """The same for a record; 0 if the clock of a running session has been set to a time that no log can hold."""
     return now_ns if 0 <= (now_ns := time.time_ns()) < _END_NS else 0
 
 

@@ -1,10 +1,10 @@
-"""What an operator says about a trial afterwards: an event that is appended; the trial's own record stays as it was."""
+"""An operator's verdict on a trial afterwards: an event that is appended; the trial's own record stays as it was."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterable
-from typing import Any, Final
+from typing import Final
 
 from isiw.checks import text
 from isiw.design import DesignSpace
@@ -18,9 +18,11 @@ VERDICTS: Final[dict[EventKind, Callable[[Trial, Event], Trial]]] = {
     "exclusion": lambda trial, _: dataclasses.replace(trial, excluded=True),
     "inclusion": lambda trial, _: dataclasses.replace(trial, excluded=False),
     "acceptance": lambda trial, _: trial.accepted_anyway(),
-    "correction": lambda trial, event: dataclasses.replace(trial, **_right_values(event)),
+    "correction": lambda trial, event: dataclasses.replace(
+        trial, **(event.corrected or Correction()).model_dump(exclude_none=True)
+    ),
 }
-"""What each kind of verdict makes of a trial."""
+"""The effect of each kind of verdict on a trial."""
 
 LOOKED_AT: Final = "Rejected by the operator after looking at the MEP."
 """The reason of an exclusion that rejects an MEP."""
@@ -29,7 +31,7 @@ _KEPT: Final = "It remains a mistrial; its waveforms, if any, stay in the log."
 
 
 def under(trial: Trial, event: Event) -> Trial:
-    """A trial as it counts after an event; the same where the event says nothing about it."""
+    """A trial as it counts after an event; the same if the event says nothing about it."""
     verdict = VERDICTS.get(event.kind)
     return trial if verdict is None or event.trial != trial.index else verdict(trial, event)
 
@@ -71,7 +73,9 @@ def acceptance(trials: TrialTable, number: int, space: DesignSpace) -> Event:
     if trial is not None and trial.excluded:
         return inclusion(trials, number)
     _require("accept", number, [trial.index for trial in trials if not trial.counts], "that does not count")
-    if trial is None or trial.mep_mv is None or not _placed(trial, space):
+    at_ms = None if trial is None else trial.isi_ms
+    placed = trial is not None and (trial.commanded_isi_ms is None or (at_ms is not None and space.admits(at_ms)))
+    if trial is None or trial.mep_mv is None or not placed:
         raise InvalidValueError(
             f"trial {number} cannot be accepted: no MEP was measured at an ISI that a strategy could learn from",
             got=None if trial is None else str(trial.reason),
@@ -94,12 +98,8 @@ def correction(trials: TrialTable, number: int, why: str, corrected: Correction)
     return Event(kind="correction", trial=number, text=why, corrected=corrected)
 
 
-def _right_values(event: Event) -> dict[str, Any]:
-    return {} if event.corrected is None else event.corrected.model_dump(exclude_none=True)
-
-
 def _require_of_a_muscle(trial: Trial, mep_mv: float) -> None:
-    """Raise where the amplitude cannot be an MEP's, whatever a person thinks of the trial."""
+    """Raise if the amplitude cannot be an MEP's, whatever a person thinks of the trial."""
     slip = implausible_amplitude(mep_mv)
     if slip is not None:
         raise InvalidValueError(
@@ -111,11 +111,6 @@ def _require_of_a_muscle(trial: Trial, mep_mv: float) -> None:
             got=mep_mv,
             remedy=f"Is the amplifier on? {_KEPT}",
         )
-
-
-def _placed(trial: Trial, space: DesignSpace) -> bool:
-    """True if a strategy could learn where the trial's pulse came."""
-    return trial.commanded_isi_ms is None or (trial.isi_ms is not None and space.admits(trial.isi_ms))
 
 
 def _require(verb: str, number: int, possible: list[int], which: str) -> None:

@@ -6,7 +6,6 @@ import threading
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
 from typing import IO, Final, Self, cast
 
 from mcap.writer import Writer
@@ -22,17 +21,16 @@ from isiw.log.durable import (
     keep_damaged,
     log_of,
     part_of,
-    refuse_if_locked,
 )
 from isiw.log.headers import AnyHeader, as_toml
 from isiw.log.kinds import continued_by
 from isiw.log.salvage import Salvage, holds, salvage_file
 from isiw.log.schema import (
+    ANNOUNCEMENT,
     CHANNEL_IDS,
     Event,
     Message,
     Record,
-    announcement,
     clock_ns,
     decode,
     encode,
@@ -48,7 +46,7 @@ CONFIGURATION = "configuration.toml"
 _FROM_MEMORY = "Header, trials and events are written from memory; waveforms and estimates may be lost."
 
 _COPYING = ".resuming"
-"""What a log's copy is called until it takes the log's place."""
+"""The ending of a log's copy until it takes the log's place."""
 
 
 class LogWriter:
@@ -117,7 +115,7 @@ class LogWriter:
             self.append(header)
         for message in salvage.messages:
             self._copy(message)
-            if is_of_isiw(message.topic):  # what a damaged byte costs is then a trial, as where a session wrote them
+            if is_of_isiw(message.topic):  # what a damaged byte costs is then a trial, as in a log that a session wrote
                 self._writer.flush()
         if as_resumed is not None:
             self.append(as_resumed)
@@ -163,7 +161,7 @@ class LogWriter:
             self._file.sync()
 
     def require_in_place(self) -> None:
-        """Raise where what was synced is no longer at the log's path; to be called after `sync`."""
+        """Raise if what was synced is no longer at the log's path; to be called after `sync`."""
         with self._lock:
             displacement = self._file.displacement()
         if displacement is not None:
@@ -184,7 +182,7 @@ class LogWriter:
     def close(self) -> None:
         """Finish the log and give it its name; what it went on from is the only file that it replaces.
 
-        Nothing happens where it is closed already.
+        Nothing happens if it is closed already.
         """
         with self._lock:
             if self.is_open:
@@ -240,9 +238,7 @@ class LogWriter:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _copy(self, message: Message) -> None:
@@ -259,7 +255,7 @@ class LogWriter:
                 topic, "json", self._writer.register_schema(name, "jsonschema", schema)
             )
             if topic not in CHANNEL_IDS:
-                self._writer.add_metadata(*announcement(number, topic))
+                self._writer.add_metadata(f"{ANNOUNCEMENT}{number}", {"id": str(number), "topic": topic})
             self._channels[topic] = number
         return self._channels[topic]
 
@@ -287,7 +283,7 @@ def _require_free(target: Path) -> None:
 
 
 def _way_on(existing: Path) -> str:
-    """What to do about a file that is in the way; only what can be resumed is suggested to be resumed."""
+    """The remedy for a file that is in the way; only what can be resumed is suggested to be resumed."""
     try:
         found = salvage_file(existing)
     except LogError:
@@ -317,11 +313,11 @@ def _require_unchanged(source: IO[bytes], salvage: Salvage) -> None:
 
 
 def _own_file(target: Path, salvage: Salvage) -> Fingerprint | None:
-    """The file at a log's final name, which its continuation may replace; None where there is none."""
+    """The file at a log's final name, which its continuation may replace; None if there is none."""
     if salvage.path == target:
         if part_of(target).exists():
-            refuse_if_locked(part_of(target))
-            raise _foreign(part_of(target), salvage)
+            with claimed(part_of(target)):  # which raises if a session writes to it
+                raise _foreign(part_of(target), salvage)
         return salvage.fingerprint
     if not target.exists():
         return None
@@ -363,7 +359,7 @@ class Memory:
         self._messages[message.sequence] = message
 
     def completing(self, found: Iterable[Message]) -> list[Message] | None:
-        """What was found and what is known beside it, in order; None where everything that is known was found."""
+        """The records that were found and those known beside them, in order; None if all that are known were found."""
         there = {message.sequence: message for message in found if is_of_isiw(message.topic)}
         if all(there.get(number, message).data == message.data for number, message in self._messages.items()) and (
             there.keys() >= self._messages.keys()
@@ -374,7 +370,7 @@ class Memory:
 
 
 def found_in(file: Path) -> list[Message]:
-    """The records that can still be read in a file; none where it is no log any more."""
+    """The records that can still be read in a file; none if it is no log any more."""
     try:
         return salvage_file(file).messages
     except LogError:

@@ -256,6 +256,11 @@ class ResponseModel(Protocol):
         """
 
 
+def profile_of(model: object) -> Any:
+    """The law of the profile that a model's prior expects; None for a model without one."""
+    return getattr(getattr(model, "prior", None), "profile", None)
+
+
 class PriorPerson(NamedTuple):
     """A person drawn from a model's prior.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -11,24 +10,9 @@ from matplotlib.figure import Figure
 from isiw.errors import InvalidValueError
 from isiw.lazy import pd
 from isiw.log.reader import SessionRecord
-from isiw.plots.style import BLUE, FAINT, INK, edge_intervals, explain, save_figure, session_name, tidied
-from isiw.sentences import TOO_LITTLE, chance_text, in_short
+from isiw.plots.style import BLUE, FAINT, INK, edge_intervals, explain, session_name, tidied
+from isiw.sentences import TOO_LITTLE, in_short
 from isiw.text.stimuli import words_of
-
-
-def save_comparison_plot(records: Sequence[SessionRecord], path: str | Path, *, overwrite: bool = False) -> Path:
-    """Draw sessions below each other into a file; its suffix chooses the format.
-
-    Args:
-        records: the sessions.
-        path: where to.
-        overwrite: whether to replace a file that is there; a log never is.
-
-    Raises:
-        InvalidValueError: no sessions, ISIs that count from different events, a format that matplotlib does not know,
-            or a file that is not to be replaced.
-    """
-    return save_figure(comparison_figure(records), path, overwrite=overwrite)
 
 
 def comparison_figure(records: Sequence[SessionRecord], names: Sequence[str] | None = None) -> Figure:
@@ -50,18 +34,17 @@ def comparison_figure(records: Sequence[SessionRecord], names: Sequence[str] | N
     for line, record in enumerate(records):
         _draw(axes, line, record)
     axes.set_yticks(range(len(records)), names or [session_name(record) for record in records])
-    axes.set_ylim(len(records) - 0.4, -0.6)
     spaces = [record.header.space for record in records]
-    axes.set_xlim(min(space.low_ms for space in spaces), max(space.high_ms for space in spaces))
+    isis_ms = (min(space.low_ms for space in spaces), max(space.high_ms for space in spaces))
     first = words_of(record.header.conditioning for record in records)
-    axes.set_xlabel(first.isi_axis(spaces[0].reference), fontsize=9)
+    axes.set(ylim=(len(records) - 0.4, -0.6), xlim=isis_ms, xlabel=first.isi_axis(spaces[0].reference))
     explain(figure, ncols=3, above=True)
     return figure
 
 
 def _draw(axes: Axes, line: int, record: SessionRecord) -> None:
     last = record.found
-    chance = "" if last is None else chance_text(last.probability)
+    chance = "" if last is None or last.probability is None else f"P(window) = {last.probability:.2f}"
     if last is None or last.window is None:
         said = TOO_LITTLE if last is None else f"{in_short(last)} ({chance})" if chance else in_short(last)
         axes.annotate(said, (0.02, line), xycoords=("axes fraction", "data"), va="center", fontsize=8, color=FAINT)
@@ -79,20 +62,6 @@ def _draw(axes: Axes, line: int, record: SessionRecord) -> None:
 
 
 _COLUMNS = 4
-
-
-def save_prior_plot(table: pd.DataFrame, path: str | Path, *, overwrite: bool = False) -> Path:
-    """Draw a lab's prior into a file; its suffix chooses the format.
-
-    Args:
-        table: as `isiw.priors.densities` returns it.
-        path: where to.
-        overwrite: whether to replace a file that is there; a log never is.
-
-    Raises:
-        InvalidValueError: a format that matplotlib does not know, or a file that is not to be replaced.
-    """
-    return save_figure(prior_figure(table), path, overwrite=overwrite)
 
 
 def prior_figure(table: pd.DataFrame) -> Figure:
@@ -117,6 +86,5 @@ def _draw_quantity(axes: Axes, curve: pd.DataFrame) -> None:
     axes.plot(curve["value"], curve["lab"], color=BLUE, lw=1.5, label="this lab")
     if curve["logarithmic"].iloc[0]:
         axes.set_xscale("log")
-    axes.set_ylim(bottom=0)
-    axes.set_yticks([])
+    axes.set(ylim=(0, None), yticks=[])
     tidied(axes)

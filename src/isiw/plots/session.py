@@ -62,7 +62,7 @@ def save_session_plot(
     Args:
         record: the session.
         path: where to, such as `session.png` or `session.pdf`.
-        truth: the true window, where the person is simulated.
+        truth: the true window, if the person is simulated.
         overwrite: whether to replace a file that is there; a log never is.
 
     Raises:
@@ -76,7 +76,7 @@ def session_figure(record: SessionRecord, *, truth: Window | None = None) -> Fig
 
     Args:
         record: the session.
-        truth: the true window, where the person is simulated.
+        truth: the true window, if the person is simulated.
     """
     figure = Figure(figsize=(7.2, 6.8), layout="constrained")
     profile, edges, chance = figure.subplots(3, 1, height_ratios=(3.2, 1.5, 0.9))
@@ -92,17 +92,13 @@ def session_figure(record: SessionRecord, *, truth: Window | None = None) -> Fig
     _draw_edges(edges, record, truth)
     _draw_probability(chance, record)
     if last is None:
-        _say_what_is_missing(profile, edges, chance, record)
+        told = len(record.table.told)
+        saying(profile, f"too few trials count ({told}): no estimate is drawn" if told else "no trial counts")
+        for axes in (edges, chance):
+            saying(axes, "no estimate that rests on trials")
     explain(figure, ncols=3, note=BELOW_THE_MEAN if last and last.grid_ms else None)
     figure.align_ylabels((profile, edges, chance))
     return figure
-
-
-def _say_what_is_missing(profile: Axes, edges: Axes, chance: Axes, record: SessionRecord) -> None:
-    told = len(record.table.told)
-    saying(profile, f"too few trials count ({told}): no estimate is drawn" if told else "no trial counts")
-    for axes in (edges, chance):
-        saying(axes, "no estimate that rests on trials")
 
 
 def _draw_window(axes: Axes, estimate: EstimateRecord | None, truth: Window | None) -> None:
@@ -162,15 +158,15 @@ def _place_ms(trial: Trial, alone_ms: float) -> float | None:
 
 
 def _finish_profile(axes: Axes, record: SessionRecord) -> None:
-    space = record.header.space
     axes.set_yscale("log")
     axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.yaxis.set_minor_formatter(NullFormatter())
     _finish_isis(axes, record)
-    axes.set_xlabel(record.header.stimulus.isi_axis(space.reference), fontsize=9)
-    axes.set_ylabel("MEP [µV]", fontsize=9)
-    axes.set_title(_title(record), fontsize=11, loc="left", color=INK, pad=12)
+    axes.set(xlabel=record.header.stimulus.isi_axis(record.header.space.reference), ylabel="MEP [µV]")
+    since = "; outdated: trials were judged since" if record.found and record.is_judged_since else ""
+    title = f"{_found(record)} ({counted(len(record.table), 'trial')}{since})"
+    axes.set_title(title, fontsize=11, loc="left", color=INK, pad=12)
 
 
 def _finish_isis(axes: Axes, record: SessionRecord) -> None:
@@ -185,11 +181,8 @@ def _finish_isis(axes: Axes, record: SessionRecord) -> None:
     alone_ms = _alone_ms(record)
     axes.set_xlim(2 * alone_ms - low_ms + room_ms, high_ms + room_ms)
     axes.axvline((alone_ms + low_ms) / 2, color=FAINT, lw=0.8)
-    ticks_ms = [
-        t
-        for t in MaxNLocator(8, steps=(1, 2, 5, 10)).tick_values(space.low_ms, space.high_ms)
-        if low_ms <= t <= high_ms
-    ]
+    candidates_ms = MaxNLocator(8, steps=(1, 2, 5, 10)).tick_values(space.low_ms, space.high_ms)
+    ticks_ms = [tick_ms for tick_ms in candidates_ms if low_ms <= tick_ms <= high_ms]
     axes.set_xticks([alone_ms, *ticks_ms], ["TMS\nalone", *(f"{tick_ms:g}" for tick_ms in ticks_ms)])
     if meps_mv:
         axes.axhline(_uv([float(np.mean(meps_mv))])[0], color=INK, lw=0.9, ls=":", label="mean of TMS alone")
@@ -206,11 +199,6 @@ def _alone_ms(record: SessionRecord) -> float:
     """Where on the axis of the ISIs TMS alone has its place."""
     space = record.header.space
     return _ends_ms(record)[0] - _ALONE * (space.high_ms - space.low_ms)
-
-
-def _title(record: SessionRecord) -> str:
-    since = "; outdated: trials were judged since" if record.found and record.is_judged_since else ""
-    return f"{_found(record)} ({counted(len(record.table), 'trial')}{since})"
 
 
 def _found(record: SessionRecord) -> str:
@@ -234,8 +222,7 @@ def _draw_edges(axes: Axes, record: SessionRecord, truth: Window | None) -> None
             axes.plot(trials, middle, color=colour, lw=1.6, label=f"{name} of the window, with 90 % interval")
     for edge in (truth.start_ms, truth.end_ms) if truth else ():
         axes.axhline(edge, color=INK, lw=0.8, ls=(0, (4, 3)))
-    axes.set_ylim(space.low_ms, space.high_ms)
-    axes.set_ylabel("edges [ms]", fontsize=9)
+    axes.set(ylim=(space.low_ms, space.high_ms), ylabel="edges [ms]")
 
 
 def _draw_probability(axes: Axes, record: SessionRecord) -> None:
@@ -245,16 +232,13 @@ def _draw_probability(axes: Axes, record: SessionRecord) -> None:
     lost = [trial.index for trial in record.table if trial.reason is not None]
     axes.plot(lost, [0.08] * len(lost), "x", ms=4, color=RED)
     numbers = [trial.index for trial in record.table] + [estimate.trial for estimate in record.estimates]
-    axes.set_xlim(-0.5, max(numbers, default=0) + 0.5)
+    axes.set(xlim=(-0.5, max(numbers, default=0) + 0.5), xlabel=TRIAL_AXIS)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.set_ylim(0, 1.03)
-    axes.set_yticks((0, 0.5, 1))
-    axes.set_ylabel("P(window)", fontsize=9)
-    axes.set_xlabel(TRIAL_AXIS, fontsize=9)
+    axes.set(yticks=(0, 0.5, 1), ylim=(0, 1.03), ylabel="P(window)")
 
 
 def _column(estimates: Sequence[EstimateRecord], name: str) -> FloatArray:
-    """One figure by trial; NaN where a method does not have it."""
+    """One figure by trial; NaN if a method does not have it."""
     return np.asarray([np.nan if (v := getattr(e, name)) is None else v for e in estimates], dtype=np.float64)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from types import MappingProxyType
 from typing import Final, Literal, TypeAlias
 
@@ -23,7 +22,6 @@ from isiw.plots.style import (
     ORANGE,
     RED,
     explain,
-    save_figure,
     saying,
     strategy_colours,
     tidied,
@@ -38,24 +36,6 @@ _SE_OF_BAND = 1.96
 _MOST_IN_A_PANEL = 3
 """More strategies than these have panels of their own, or their bands hide each other."""
 _DASHED = (0, (4, 2))
-
-
-def save_study_plot(
-    table: pd.DataFrame, path: str | Path, *, picture: StudyPicture = "f1", overwrite: bool = False
-) -> Path:
-    """Draw a study into a file; its suffix chooses the format.
-
-    Args:
-        table: as `isiw.studies.summarise` returns it.
-        path: where to.
-        picture: one of `STUDY_PICTURES`.
-        overwrite: whether to replace a file that is there; a log never is.
-
-    Raises:
-        InvalidValueError: no such picture, a format that matplotlib does not know, or a file that is not to be
-            replaced.
-    """
-    return save_figure(study_figure(table, picture), path, overwrite=overwrite)
 
 
 def study_figure(table: pd.DataFrame, picture: StudyPicture = "f1") -> Figure:
@@ -123,9 +103,7 @@ def _draw_apart(row: Sequence[Axes], cohort: str, curves: _Curves, colours: _Col
 
 
 def _name_f1_axes(axes: Axes) -> None:
-    axes.set_ylim(0, 1)
-    axes.set_xlabel("trials", fontsize=9)
-    axes.set_ylabel("mean F1, 95 % band", fontsize=9)
+    axes.set(ylim=(0, 1), xlabel="trials", ylabel="mean F1, 95 % band")
 
 
 def draw_curve(axes: Axes, curve: pd.DataFrame, name: str, colour: str, marker: str = "o") -> None:
@@ -156,7 +134,7 @@ def _from_first_estimate(curve: pd.DataFrame) -> pd.DataFrame:
 
 
 def _draw_frontier(axes: Axes, curves: _Curves, colours: _Colours) -> None:
-    """How many stimuli an F1 takes that is kept from then on, and what each strategy has when its rule stops it."""
+    """Draw the stimuli that an F1 takes, if it is kept from then on, and that at which a strategy's rule stops it."""
     for name, whole in curves.items():
         curve = _from_first_estimate(whole)
         kept = np.minimum.accumulate(curve["f1"].to_numpy()[::-1])[::-1]
@@ -164,9 +142,7 @@ def _draw_frontier(axes: Axes, curves: _Curves, colours: _Colours) -> None:
         last = curve.tail(1)
         axes.plot(last["end_delivered"], last["end_f1"], "o", ms=6, color=colours[name], mec=INK, clip_on=False)
     axes.plot([], [], "o", ms=6, color="none", mec=INK, label="where its rule stops it, or else at the end, on average")
-    axes.set_ylim(0, 1)
-    axes.set_xlabel("stimuli delivered", fontsize=9)
-    axes.set_ylabel("mean F1 from there on", fontsize=9)
+    axes.set(ylim=(0, 1), xlabel="stimuli delivered", ylabel="mean F1 from there on")
 
 
 def _draw_coverage(axes: Axes, curves: _Curves, colours: _Colours) -> None:
@@ -174,20 +150,16 @@ def _draw_coverage(axes: Axes, curves: _Curves, colours: _Colours) -> None:
     if not any(curve["start_coverage"].notna().any() for curve in curves.values()):
         saying(axes, "no true edges, or no intervals")
     _draw_pair(axes, curves, colours, {"start_coverage": "start", "end_coverage": "end"})
-    axes.set_ylim(0, 1.02)
-    axes.set_xlabel("trials", fontsize=9)
-    axes.set_ylabel("share of true edges inside", fontsize=9)
+    axes.set(ylim=(0, 1.02), xlabel="trials", ylabel="share of true edges inside")
 
 
 def _draw_latency(axes: Axes, curves: _Curves, colours: _Colours) -> None:
     _draw_pair(axes, curves, colours, {"ask_ms": "ask", "tell_ms": "tell"})
-    axes.set_yscale("log")
-    axes.set_xlabel("trials", fontsize=9)
-    axes.set_ylabel("median time [ms]", fontsize=9)
+    axes.set(yscale="log", xlabel="trials", ylabel="median time [ms]")
 
 
 def _draw_pair(axes: Axes, curves: _Curves, colours: _Colours, columns: Mapping[str, str]) -> None:
-    """Two columns of each strategy, the second dashed; where a method has neither, nothing."""
+    """Two columns of each strategy, the second dashed; if a method has neither, nothing."""
     for (column, meaning), style in zip(columns.items(), ("-", _DASHED), strict=True):
         axes.plot([], [], color=INK, ls=style, lw=1.5, label=meaning)
         for name, curve in curves.items():
@@ -204,11 +176,6 @@ STUDY_PICTURES: Final[Mapping[StudyPicture, Callable[[Axes, _Curves, _Colours], 
 """The pictures of a study by name, and what draws a panel of each."""
 
 
-def save_replay_plot(curves: Mapping[str, FloatArray], path: str | Path, *, overwrite: bool = False) -> Path:
-    """Draw F1 by the number of stimuli into a file."""
-    return save_figure(replay_figure(curves), path, overwrite=overwrite)
-
-
 def replay_figure(curves: Mapping[str, FloatArray]) -> Figure:
     """F1 of each strategy by the number of stimuli: the median, and from the least to the largest over its seeds."""
     figure = Figure(figsize=(7.2, 3.8), layout="constrained")
@@ -219,8 +186,6 @@ def replay_figure(curves: Mapping[str, FloatArray]) -> Figure:
         colour, trials = colours[number % len(colours)], np.arange(1, scores.shape[1] + 1)
         axes.fill_between(trials, scores.min(axis=0), scores.max(axis=0), color=colour, alpha=0.15, lw=0)
         axes.plot(trials, np.median(scores, axis=0), color=colour, lw=1.8, label=name)
-    axes.set_ylim(0, 1.02)
-    axes.set_xlabel("stimuli", fontsize=9)
-    axes.set_ylabel("F1 against all trials", fontsize=9)
+    axes.set(ylim=(0, 1.02), xlabel="stimuli", ylabel="F1 against all trials")
     explain(figure, ncols=3)
     return figure

@@ -1,4 +1,4 @@
-"""What all pictures have in common: colours, axes, and how they are written, also into a page.
+"""The common parts of all pictures: colours, axes, and how they are written, also into a page.
 
 Everything is drawn with matplotlib's object interface, so no display is needed and no global state is touched.
 """
@@ -110,6 +110,8 @@ def tidied(*panels: Axes) -> None:
     for axes in panels:
         axes.spines[["top", "right"]].set_visible(False)
         axes.tick_params(labelsize=8, color=FAINT)
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.label.set_fontsize(9)
 
 
 def explain(figure: Figure, ncols: int, *, above: bool = False, note: str | None = None) -> None:
@@ -132,7 +134,16 @@ def saying(axes: Axes, text: str) -> None:
 
 
 def save_figure(figure: Figure, path: str | Path, *, overwrite: bool = False) -> Path:
-    """Write a figure into a file, whose folder is made where it is missing; the suffix chooses the format."""
+    """Write a figure into a file, whose folder is made if it is missing; the suffix chooses the format.
+
+    Args:
+        figure: the figure.
+        path: where to, such as `session.png` or `session.pdf`.
+        overwrite: whether to replace a file that is there; a log never is.
+
+    Raises:
+        InvalidValueError: a format that matplotlib does not know, or a file that is not to be replaced.
+    """
     target = Path(path)
     known = figure.canvas.get_supported_filetypes()
     suffix = target.suffix.removeprefix(".").lower()

@@ -35,7 +35,9 @@ class _Trace(NamedTuple):
 
 def sweeps_figure(record: SessionRecord) -> Figure | None:
     """The EMG of all trials that count, a row a trial, ISIs ascending, TMS alone lowest."""
-    traces = _traces(record)
+    found = (_trace(trial, record.waveforms.get((trial.index, "emg"))) for trial in record.table.told)
+    placed = [(trace.trial.isi_ms, trace) for trace in found if trace is not None]
+    traces = [trace for _, trace in sorted(placed, key=lambda x: -math.inf if x[0] is None else x[0])]
     if not traces:
         return None
     figure = Figure(figsize=(7.2, 1.6 + min(7.4, 0.26 * len(traces))), layout="constrained")
@@ -51,11 +53,6 @@ def sweeps_figure(record: SessionRecord) -> Figure | None:
     _finish(axes, traces)
     figure.legend(loc="outside upper left", ncols=3, fontsize=7.5, frameon=False)
     return figure
-
-
-def _traces(record: SessionRecord) -> list[_Trace]:
-    found = (_trace(trial, record.waveforms.get((trial.index, "emg"))) for trial in record.table.told)
-    return sorted((t for t in found if t is not None), key=lambda t: -math.inf if t[0].isi_ms is None else t[0].isi_ms)
 
 
 def _trace(trial: Trial, emg: Channel | None) -> _Trace | None:
@@ -112,14 +109,8 @@ def _draw_hits(axes: Axes, traces: Sequence[_Trace], label: str) -> None:
             if t.trial.t_hit_ms is not None and t.trial.t_tms_ms is not None]  # fmt: skip
     near = [(hit_ms, row) for hit_ms, row in hits if -BEFORE_MS <= hit_ms <= AFTER_MS]
     if near:
-        axes.plot(
-            *zip(*near, strict=True),
-            "|",
-            ms=7 if len(near) < 100 else 4,
-            mew=1.6,
-            color=ORANGE,
-            label=label,
-        )
+        size = 7 if len(near) < 100 else 4
+        axes.plot(*zip(*near, strict=True), "|", ms=size, mew=1.6, color=ORANGE, label=label)
 
 
 def _draw_scale(axes: Axes, middle: float, bar_mv: float, rows_per_mv: float) -> None:
@@ -131,15 +122,11 @@ def _draw_scale(axes: Axes, middle: float, bar_mv: float, rows_per_mv: float) ->
 def _finish(axes: Axes, traces: Sequence[_Trace]) -> None:
     tidied(axes)
     rows = range(0, len(traces), max(1, -(-len(traces) // MOST_LABELS)))
-    axes.set_yticks(list(rows), [_label(traces[row].trial) for row in rows])
-    axes.set_ylim(-_rows_of_largest(traces), len(traces) - 1 + _rows_of_largest(traces))
-    axes.set_xlim(-BEFORE_MS, AFTER_MS)
-    axes.set_xlabel("time after the TMS pulse [ms]", fontsize=9)
-    axes.set_ylabel("ISI [ms]", fontsize=9)
-
-
-def _label(trial: Trial) -> str:
-    return "TMS alone" if trial.isi_ms is None else f"{trial.isi_ms:.0f}"
+    isis_ms = [traces[row].trial.isi_ms for row in rows]
+    axes.set_yticks(list(rows), ["TMS alone" if isi_ms is None else f"{isi_ms:.0f}" for isi_ms in isis_ms])
+    room = _rows_of_largest(traces)
+    axes.set(xlim=(-BEFORE_MS, AFTER_MS), ylim=(-room, len(traces) - 1 + room))
+    axes.set(xlabel="time after the TMS pulse [ms]", ylabel="ISI [ms]")
 
 
 def _round_mv(size_mv: float) -> float:

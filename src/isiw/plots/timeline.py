@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import statistics
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,7 +23,6 @@ from isiw.plots.style import (
     TRIAL_AXIS,
     edge_intervals,
     explain,
-    save_figure,
     saying,
     tidied,
 )
@@ -44,7 +42,6 @@ def timeline_figure(record: SessionRecord) -> Figure:
     axes = figure.subplots()
     tidied(axes)
     axes.spines["left"].set_visible(False)
-    axes.set_yticks([])
     events = {origin: 0.0} | _other_event(record)
     for name, place_ms in events.items():
         axes.axvline(place_ms, ymax=0.72, color=INK, lw=1.6)
@@ -56,15 +53,13 @@ def timeline_figure(record: SessionRecord) -> Figure:
     axes.axvspan(
         space.low_ms, space.high_ms, ymin=0, ymax=0.05, color=FAINT, alpha=0.5, lw=0, label="ISIs that may be delivered"
     )
-    axes.set_xlim(low - margin, high + margin)
-    axes.set_ylim(0, 1)
-    axes.set_xlabel(f"time after the {origin} [ms]", fontsize=9)
+    axes.set(xlim=(low - margin, high + margin), yticks=[], ylim=(0, 1), xlabel=f"time after the {origin} [ms]")
     explain(figure, ncols=3)
     return figure
 
 
 def _other_event(record: SessionRecord) -> dict[str, float]:
-    """The event that ISIs do not count from, where it usually came; empty where it was not measured."""
+    """The event that ISIs do not count from, where it usually came; empty if it was not measured."""
     delays_ms = [t.t_hit_ms - t.t_valve_ms for t in record.table if t.t_hit_ms is not None and t.t_valve_ms is not None]
     if not delays_ms:
         return {}
@@ -99,13 +94,11 @@ def course_figure(record: SessionRecord) -> Figure:
     for limit_ms in (-tolerance_ms, tolerance_ms):
         timing.axhline(limit_ms, color=ORANGE, lw=1.2, ls=(0, (4, 3)), label="tolerance" if limit_ms > 0 else None)
     _draw(timing, record.table.trials, lambda trial: trial.isi_error_ms)
-    timing.set_ylabel("realised − wanted ISI [ms]", fontsize=9)
+    timing.set(ylabel="realised − wanted ISI [ms]")
     limit_uv = header.signals.background_uv
     background.axhline(limit_uv, color=ORANGE, lw=1.2, ls=(0, (4, 3)), label=f"limit, {limit_uv:g} µV")
     _draw(background, record.table.trials, lambda trial: trial.background_rms_uv)
-    background.set_ylim(bottom=0)
-    background.set_ylabel("background EMG [µV RMS]", fontsize=9)
-    background.set_xlabel(TRIAL_AXIS, fontsize=9)
+    background.set(ylim=(0, None), ylabel="background EMG [µV RMS]", xlabel=TRIAL_AXIS)
     background.xaxis.set_major_locator(MaxNLocator(integer=True))
     for axes in (timing, background):
         axes.legend(fontsize=7.5, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
@@ -134,20 +127,6 @@ _NAMES = {
 }
 
 
-def save_timing_plot(study: TimingStudy, path: str | Path, *, overwrite: bool = False) -> Path:
-    """Draw a study into a file; its suffix chooses the format.
-
-    Args:
-        study: the study.
-        path: where to, such as `timing.png` or `timing.pdf`.
-        overwrite: whether to replace a file that is there; a log never is.
-
-    Raises:
-        InvalidValueError: a format that matplotlib does not know, or a file that is not to be replaced.
-    """
-    return save_figure(timing_figure(study), path, overwrite=overwrite)
-
-
 def timing_figure(study: TimingStudy) -> Figure:
     """A study as a figure: its events, and below them the ISI errors where ISIs were commanded."""
     errors = study.error_table
@@ -168,9 +147,7 @@ def _draw_events(axes: Axes, study: TimingStudy) -> None:
             label = f"{_NAMES[name]}  {found.mean():.0f} ± {table['sd_ms'][name]:.1f} ms"
             bins = np.arange(np.floor(found.min()), np.ceil(found.max()) + 1).tolist()
             axes.hist(found, bins=bins, color=_COLOURS[name], alpha=0.8, label=label)
-    axes.set_yscale("log")
-    axes.set_xlabel("time after the valve command [ms]", fontsize=9)
-    axes.set_ylabel(f"{study.kind} per ms", fontsize=9)
+    axes.set(yscale="log", xlabel="time after the valve command [ms]", ylabel=f"{study.kind} per ms")
     title = plain(f"{study.name}: {len(study.commanded_ms)} {study.kind}")
     axes.set_title(title, fontsize=11, loc="left", color=INK, parse_math=False)
     axes.legend(fontsize=7.5, frameon=False, loc="upper left", bbox_to_anchor=(0.1, 1.0))
@@ -189,8 +166,7 @@ def _draw_errors(axes: Axes, study: TimingStudy) -> None:
         axes.plot(beside[~accepted], errors[~accepted], "x", ms=5, color=RED, label="mistrial")
     axes.errorbar(place, table["mean_ms"], table["sd_ms"], fmt="o", ms=4, color=BLUE, capsize=3, label="mean ± SD")
     axes.set_xticks(place, [f"{isi:g}" for isi in table.index])
-    axes.set_xlabel("commanded ISI [ms]", fontsize=9)
-    axes.set_ylabel("ISI error [ms]", fontsize=9)
+    axes.set(xlabel="commanded ISI [ms]", ylabel="ISI error [ms]")
     pooled = "not known" if np.isnan(study.pooled_sd_ms) else f"{study.pooled_sd_ms:.2f} ms"
     found = f"pooled SD {pooled}, mistrials: {study.mistrials} of {np.isfinite(study.commanded_ms).sum()}"
     axes.set_title(found, fontsize=9, loc="left", color=INK)

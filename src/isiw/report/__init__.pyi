@@ -1,12 +1,7 @@
-from .comparison import comparison_page as comparison_page
-from .comparison import comparison_sentence as comparison_sentence
-from .comparison import comparison_table as comparison_table
+from . import comparison as comparison
+from . import tables as tables
+from . import words as words
 from .comparison import save_comparison as save_comparison
-from .methods import method_answers as method_answers
 from .page import report_page as report_page
 from .page import save_report as save_report
-from .tables import first_facts as first_facts
-from .words import TRIAL_HEADINGS as TRIAL_HEADINGS
 from .words import final_statement as final_statement
-from .words import trial_rows as trial_rows
-from .words import truth_sentence as truth_sentence

@@ -84,7 +84,7 @@ def _events(record: SessionRecord) -> str:
 
 
 def _known(record: SessionRecord, *, measured: bool) -> int:
-    """Of how many trials it is known when the pulse came; where no ISI was measured, by the trial's times alone."""
+    """Of how many trials it is known when the pulse came; if no ISI was measured, by the trial's times alone."""
     return sum(
         trial.commanded_isi_ms is None
         or (trial.isi_ms is not None and (measured or timed_isi_ms(trial, record.header.space) is not None))
@@ -121,7 +121,7 @@ def _not_for(record: SessionRecord, reasons: frozenset[Kind]) -> list[Trial]:
 
 
 def _verdict(record: SessionRecord, wrong: int, known: int) -> str:
-    """Whether it was right in all trials, as far as is known."""
+    """The verdict on all trials, as far as is known."""
     given = record.given
     if wrong:
         return f"not in {wrong} of {given} trials"
@@ -137,16 +137,12 @@ def _listed(rejected: list[str]) -> str:
 
 def _stopped(record: SessionRecord) -> Answer:
     question = "Why did it stop?"
-    decision, ending = record.decision, _ending(record)
+    since = itertools.takewhile(lambda entry: not isinstance(entry, EstimateRecord), reversed(record.history))
+    events = (entry for entry in since if isinstance(entry, Event))
+    decision, ending = record.decision, next((event.text for event in events if event.kind in _ENDING), "")
     if decision is None:
         return Answer(question, "before the first estimate", ending)
     if decision.stop:
         return Answer(question, decision.reason or "it ended", ending)
     answer = "it has not stopped" if not ending else "it was interrupted"
     return Answer(question, answer, f"{ending} {decision.reason}".strip())
-
-
-def _ending(record: SessionRecord) -> str:
-    """What happened last after the last estimate that can end a session, in the log's words."""
-    since = itertools.takewhile(lambda entry: not isinstance(entry, EstimateRecord), reversed(record.history))
-    return next((entry.text for entry in since if isinstance(entry, Event) and entry.kind in _ENDING), "")

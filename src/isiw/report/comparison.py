@@ -21,15 +21,11 @@ from isiw.report.words import counts_sentence, finding_sentences
 from isiw.text import one_line
 
 HEADINGS = ("session", "subject", "begun", "trials", "P(window)", "window", "start", "end")
-"""What the rows of the table hold."""
+"""The columns of the table."""
 
 
 def comparison_table(records: Sequence[SessionRecord]) -> str:
-    """The windows of sessions as their logs report them, a line each; start and end are 90 % intervals.
-
-    Args:
-        records: the sessions.
-    """
+    """The windows of sessions as their logs report them, a line each; start and end are 90 % intervals."""
     rows = [HEADINGS, *comparison_rows(records)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
@@ -39,26 +35,18 @@ def comparison_table(records: Sequence[SessionRecord]) -> str:
 
 
 def comparison_rows(records: Sequence[SessionRecord]) -> list[tuple[str, ...]]:
-    """The cells of that table, a row a session; empty where nothing is known."""
+    """The cells of that table, a row a session; empty if nothing is known."""
     return [_row(number, record) for number, record in enumerate(records, start=1)]
 
 
 def _row(number: int, record: SessionRecord) -> tuple[str, ...]:
-    header = record.header
-    who = (
-        str(number),
-        one_line(header.subject) or "unnamed",
-        header.created[:16].replace("T", " "),
-        str(len(record.table.told)),
-    )
-    if record.found is None:
+    header, last = record.header, record.found
+    begun, told = header.created[:16].replace("T", " "), len(record.table.told)
+    who = (str(number), one_line(header.subject) or "unnamed", begun, str(told))
+    if last is None:
         return (*who, "–", sentences.TOO_LITTLE, "", "")
-    return (*who, *_found(record.found))
-
-
-def _found(last: Estimate) -> tuple[str, ...]:
     chance = "–" if last.probability is None else f"{last.probability:.2f}"
-    return chance, sentences.in_short(last), *(_cell(last, edge) for edge in (last.start, last.end))
+    return (*who, chance, sentences.in_short(last), *(_cell(last, edge) for edge in (last.start, last.end)))
 
 
 def _cell(estimate: Estimate, edge: Edge) -> str:
@@ -74,11 +62,7 @@ def _cell(estimate: Estimate, edge: Edge) -> str:
 
 
 def comparison_sentence(difference: Difference) -> str:
-    """A sentence on the difference of two windows.
-
-    Args:
-        difference: between the sessions.
-    """
+    """A sentence on the difference of two windows."""
     kind = "the same person" if difference.same_person else "different subject codes"
     said = [
         f"{_whose(difference.second)} against {_whose(difference.first)}, {kind}:",
@@ -117,16 +101,7 @@ def save_comparison(
 
 
 def comparison_page(records: Sequence[SessionRecord], differences: Sequence[Difference]) -> str:
-    """A page of HTML that compares sessions; it needs no network and no JavaScript.
-
-    Args:
-        records: the sessions.
-        differences: as `isiw.priors.differences` finds them.
-
-    Raises:
-        ConfigError: jinja2 is not installed.
-        InvalidValueError: no sessions, or ISIs that count from different events.
-    """
+    """A page of HTML that compares sessions; it needs no network and no JavaScript."""
     names = [f"{number}: {session_name(record)}" for number, record in enumerate(records, start=1)]
     return rendered(
         "comparison.html",

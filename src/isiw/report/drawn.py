@@ -1,4 +1,4 @@
-"""What a page draws in the browser: the beliefs, trials and sweeps of a log as plain numbers, rounded and thinned."""
+"""The numbers that a page draws in the browser: estimates, trials and sweeps of a log, rounded and thinned."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def drawn(record: SessionRecord) -> dict[str, Any]:
 
 
 def _dotted(record: SessionRecord) -> str:
-    """What the dotted lines in a sweep are, in a sentence."""
+    """The meaning of the dotted lines in a sweep, in a sentence."""
     first = record.header.stimulus
     if first.by_valve or any(trial.t_valve_ms is not None for trial in record.table):
         return f"Dotted orange lines: valve command and {first.mark}."

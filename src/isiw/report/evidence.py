@@ -1,4 +1,4 @@
-"""What the trials themselves say about a finding: that nothing was measured, or that they do not bear it out."""
+"""The evidence of the trials themselves for a finding: that nothing was measured, or that they do not bear it out."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ ENOUGH_TO_STAND_OUT = 10
 
 
 def nothing_measured(record: SessionRecord) -> str | None:
-    """That too little was measured to speak of a window, and why; None where there was enough."""
+    """That too little was measured to speak of a window, and why; None if there was enough."""
     if record.rests_on_data:
         return None
     given, told = record.given, len(record.table.told)
@@ -48,7 +48,7 @@ def nothing_measured(record: SessionRecord) -> str | None:
 
 
 def contradiction(window: Window | None, trials: Sequence[Trial], *, without_probability: bool = False) -> str | None:
-    """That the MEPs inside a reported window are no larger than those outside; None where they are, or are too few."""
+    """That the MEPs inside a reported window are no larger than those outside; None if they are, or are too few."""
     if window is None:
         return None
     inside, outside = _inside_and_outside(window, trials)
@@ -58,7 +58,7 @@ def contradiction(window: Window | None, trials: Sequence[Trial], *, without_pro
     medians_uv = 1e3 * statistics.median(inside), 1e3 * statistics.median(outside)
     if p >= 0.5:
         return sentences.not_larger(medians_uv)
-    return sentences.not_clearly_larger(medians_uv, p) if without_probability and p >= NOT_CLEARLY else None
+    return sentences.not_larger(medians_uv, p) if without_probability and p >= NOT_CLEARLY else None
 
 
 def p_of_larger(inside: Sequence[float], outside: Sequence[float]) -> float:
@@ -71,7 +71,7 @@ def p_of_larger(inside: Sequence[float], outside: Sequence[float]) -> float:
 
 
 def changed_with_time(window: Window | None, trials: Sequence[Trial]) -> str | None:
-    """That amplitudes grew or shrank from trial to trial, whatever the ISI; None where they did not clearly.
+    """That amplitudes grew or shrank from trial to trial, whatever the ISI; None if they did not clearly.
 
     A window can be found in that alone, as ISIs are not asked in random order. Kendall's test of amplitude against
     order, within and outside the window, combined by Stouffer's method.
@@ -99,7 +99,7 @@ def growth(meps_mv: ArrayLike) -> float:
 
 
 def _tied(values: ArrayLike) -> FloatArray:
-    """How often each of the values is there."""
+    """The number of times that each of the values is there."""
     return np.unique(values, return_counts=True)[1].astype(float)
 
 
@@ -109,7 +109,7 @@ def _beyond(standard_errors: float) -> float:
 
 
 def nothing_stood_out(trials: Sequence[Trial], window_ms: tuple[float, float] | None = None) -> str | None:
-    """That no MEP was larger than EMG at rest, or none any more; None where some were, or too few trials say so.
+    """That no MEP was larger than EMG at rest, or none any more; None if some were, or too few trials say so.
 
     A muscle that the pulse alone does not reach looks like this, and so do a stimulator that does not fire and an MEP
     outside the window that it is sought in.
@@ -123,7 +123,7 @@ def nothing_stood_out(trials: Sequence[Trial], window_ms: tuple[float, float] | 
 
 
 def no_comparison(window: Window | None, trials: Sequence[Trial]) -> str | None:
-    """That hardly a trial shows the MEP outside a reported window; None where some do, or few are inside."""
+    """That hardly a trial shows the MEP outside a reported window; None if some do, or few are inside."""
     if window is None:
         return None
     inside, outside = _inside_and_outside(window, trials)

@@ -1,4 +1,4 @@
-"""What three methods say of the same trials: the belief, the mean MEPs by the dissertation's rule, response counts."""
+"""Three methods' answers from the same trials: the estimate, the dissertation's rule on mean MEPs, response counts."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ USUAL_TRIALS: Final = 10
 
 
 class MethodAnswer(NamedTuple):
-    """What a method says of a window, what it needs for that, and what it cannot say."""
+    """A method's answer about a window, what it needs for that, and what it cannot say."""
 
     method: str
     answer: str
@@ -30,11 +30,7 @@ class MethodAnswer(NamedTuple):
 
 
 def method_answers(record: SessionRecord) -> list[MethodAnswer]:
-    """The estimate of isiw, the dissertation's rule on mean MEPs, response counts, and the form of the profile.
-
-    Args:
-        record: the trials and their estimate.
-    """
+    """The estimate of isiw, the dissertation's rule on mean MEPs, response counts, and the form of the profile."""
     trials = by_isi(record.table)
     belief = MethodAnswer(
         "isiw's estimate",
@@ -90,7 +86,7 @@ def _by_counts(trials: TrialsByIsi) -> MethodAnswer:
 
 
 def _by_form(trials: TrialsByIsi) -> MethodAnswer:
-    """How many Gaussians the mean MEPs by ISI are made of, and whether they are normal."""
+    """The form of the mean MEPs by ISI: the number of Gaussians, and a test of normality."""
     at_ms, mean_mv, _ = _means(trials)
     said = []
     try:

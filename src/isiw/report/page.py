@@ -52,7 +52,7 @@ def save_report(
     Args:
         record: the session.
         path: where to, such as `report.html`.
-        truth: the true window, where the person is simulated.
+        truth: the true window, if the person is simulated.
         overwrite: whether to replace a file that is there; a log never is.
 
     Raises:
@@ -68,7 +68,7 @@ def report_page(record: SessionRecord, *, truth: Window | None = None) -> str:
 
     Args:
         record: the session.
-        truth: the true window, where the person is simulated.
+        truth: the true window, if the person is simulated.
 
     Raises:
         ConfigError: plotly or jinja2 is not installed.
@@ -80,7 +80,7 @@ def report_page(record: SessionRecord, *, truth: Window | None = None) -> str:
 
 
 def _contents(record: SessionRecord) -> dict[str, Any]:
-    """What the page says, before it is laid out."""
+    """The contents of the page, before it is laid out."""
     return {
         "subject": record.header.subject or "an unnamed subject",
         "states": _states(record),
@@ -102,7 +102,7 @@ def _contents(record: SessionRecord) -> dict[str, Any]:
 
 
 def _states(record: SessionRecord) -> list[str]:
-    """What a reader must know of the log before trusting the page."""
+    """The state of the log, which a reader must know before trusting the page."""
     said = []
     if record.end_lost:
         said.append("The log's end is missing: more stimuli may have been delivered than are shown.")
@@ -144,11 +144,13 @@ def rendered(template: str, scripts: Sequence[str] = (), **contents: Any) -> str
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    digests = (base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts)
+    hashes = [f"'sha256-{digest}'" for digest in digests]  # what the page's policy knows a script by
     page: str = environment.get_template(template).render(
         contents,
         style=asset("page.css"),
         scripts=scripts,
-        hashes=" ".join(map(_hash, scripts)) or "'none'",
+        hashes=" ".join(hashes) or "'none'",
     )
     return page
 
@@ -167,8 +169,3 @@ def library(name: str) -> Any:
         raise ConfigError(
             f"{missing} is not installed", remedy='Install it with: pip install "isiw[report]"'
         ) from error
-
-
-def _hash(script: str) -> str:
-    """What the page's policy knows a script by, so that no other is run."""
-    return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"

@@ -30,11 +30,7 @@ class Fact(NamedTuple):
 
 
 def first_facts(record: SessionRecord) -> list[Fact]:
-    """Subject, date, device, limits, strategy with its seed, and version, a line each whatever is in them.
-
-    Args:
-        record: the session.
-    """
+    """Subject, date, device, limits, strategy with its seed, and version, a line each whatever is in them."""
     header = record.header
     versions = ", ".join(f"{package} {version}" for package, version in header.versions.items())
     own = {"trials": f"imported from {header.source}; {_whose(header.device.simulated)}"}
@@ -72,7 +68,7 @@ def further_facts(record: SessionRecord) -> list[Fact]:
 
 
 def _loop(header: Header) -> dict[str, Any]:
-    """How the session's loop runs; an imported log had none."""
+    """The settings of the session's loop; an imported log had none."""
     return {
         "protocol": header.protocol,
         "deadline of a delivery": f"{header.timeout_s:g} s",
@@ -89,7 +85,7 @@ def settings_facts(record: SessionRecord) -> list[Fact]:
 
 
 def _read(record: SessionRecord, part: str, value: str) -> str:
-    """What is said of a part of the header, unless it cannot be read: then what it is by default says nothing."""
+    """The text of a part of the header, unless it cannot be read: then what it is by default says nothing."""
     return "cannot be read by this version of isiw" if part in record.unread else value
 
 
@@ -204,13 +200,11 @@ def _remark(trial: Trial, first: StimulusWords) -> str:
 
 def lost_rows(record: SessionRecord) -> list[tuple[int, str, str]]:
     """Trials that do not count: number, what was asked, and why; those of unknown outcome too."""
-    said = {event.trial: event.text for event in record.events if event.kind == "exclusion"}
+    texts = {event.trial: event.text for event in record.events if event.kind == "exclusion"}
+    said = {number: f"excluded by the operator: {text}".rstrip(": ") for number, text in texts.items()}
     lost = [trial for trial in (*record.table, *record.unknown_trials) if not trial.counts]
-    return sorted((t.index, asked(t, record.header.stimulus), _why(t, said.get(t.index, ""))) for t in lost)
-
-
-def _why(trial: Trial, said: str) -> str:
-    return str(trial.reason) if trial.reason is not None else f"excluded by the operator: {said}".rstrip(": ")
+    why = {t.index: str(t.reason or said.get(t.index, "excluded by the operator")) for t in lost}
+    return sorted((t.index, asked(t, record.header.stimulus), why[t.index]) for t in lost)
 
 
 def event_rows(record: SessionRecord) -> list[tuple[str, str, str]]:
@@ -219,7 +213,7 @@ def event_rows(record: SessionRecord) -> list[tuple[str, str, str]]:
 
 
 def counted_rows(record: SessionRecord) -> list[Counted]:
-    """What was delivered against what the limits allow."""
+    """The numbers of what was delivered, against what the limits allow."""
     limits, kinds = record.header.limits, Counter(event.kind for event in record.events)
     wanted_ms = [trial.commanded_isi_ms for trial in record.table] + [intent.isi_ms for intent in record.unknown]
     isis_ms = [isi_ms for isi_ms in wanted_ms if isi_ms is not None]
@@ -227,24 +221,20 @@ def counted_rows(record: SessionRecord) -> list[Counted]:
     kept = "limits" not in record.unread
     unknown = sum(trial.reason is Kind.OUTCOME_UNKNOWN for trial in record.table) + len(record.unknown)
     shortest_s = _shortest_s(record)
+    runs = (len(list(run)) for is_lost, run in groupby(t.reason is not None for t in record.table) if is_lost)
     return [
         Counted("stimuli delivered", f"{record.given}", f"at most {limits.max_pulses}" if kept else ""),
         Counted("of them with an unknown outcome", f"{unknown}", ""),
         Counted("shortest time between two stimuli", "not known" if shortest_s is None else f"{shortest_s:.2f} s",
                 f"at least {limits.iti_s:g} s" if kept else ""),
         Counted("ISIs commanded", asked_ms, f"{limits.low_ms:g}–{limits.high_ms:g} ms" if kept else ""),
-        Counted("most mistrials in a row", f"{_mistrials_in_a_row(record)}",
+        Counted("most mistrials in a row", f"{max(runs, default=0)}",
                 f"a pause after {limits.max_consecutive_mistrials}" if kept else ""),
         Counted("refused before delivery", f"{kinds['refused']}", ""),
         Counted("limits reached", f"{kinds['limit']}", ""),
         Counted("faults", f"{kinds['fault']}", ""),
         Counted("pauses", f"{kinds['pause']}", ""),
     ]  # fmt: skip
-
-
-def _mistrials_in_a_row(record: SessionRecord) -> int:
-    runs = (len(list(run)) for is_lost, run in groupby(t.reason is not None for t in record.table) if is_lost)
-    return max(runs, default=0)
 
 
 def _shortest_s(record: SessionRecord) -> float | None:

@@ -9,7 +9,6 @@ from isiw import sentences
 from isiw.findings import Kind
 from isiw.log.kinds import continued_by
 from isiw.log.reader import SessionRecord, require_records
-from isiw.log.schema import Event
 from isiw.metrics import f1
 from isiw.report.evidence import changed_with_time, contradiction, no_comparison, nothing_measured, nothing_stood_out
 from isiw.session.examination import change_found
@@ -19,7 +18,7 @@ from isiw.text.sanitize import command
 from isiw.window import Window
 
 TRIAL_HEADINGS = ("trial", "commanded", "outcome", "realised")
-"""What `trial_rows` hold."""
+"""The columns of `trial_rows`."""
 
 
 def final_statement(record: SessionRecord, config: Path | None = None) -> str:
@@ -58,13 +57,16 @@ def final_statement(record: SessionRecord, config: Path | None = None) -> str:
 
 
 def finding_sentences(record: SessionRecord) -> list[str]:
-    """Whether there is a window, which, and how sure that is."""
+    """Sentences about the window, and how sure it is."""
     if not record.estimates:
         return [sentences.nothing_estimated(len(record.table), record.given, damaged=bool(record.losses))]
     space, nothing, estimate = record.header.space, nothing_measured(record), record.estimates[-1]
     if nothing is not None:
         return [nothing]
     told, first, window = record.table.told, record.header.stimulus, estimate.window
+    sought_ms = record.header.signals.mep_window_ms if "emg" in record.header.device.channels else None
+    # Of a change the last estimate says more than a doubt on the way.
+    doubts = [event for event in record.events if event.kind == "doubt" and event.finding is not Kind.CHANGED]
     said = [
         sentences.finding(estimate, first, space),
         sentences.edges(estimate, space),
@@ -73,8 +75,8 @@ def finding_sentences(record: SessionRecord) -> list[str]:
         no_comparison(window, told),
         changed_with_time(window, told),
         f"{changed}" if (changed := change_found(estimate.change, told)) else "",
-        nothing_stood_out(told, _mep_window_ms(record)),
-        *(sentences.doubt(event.trial, event.text) for event in _doubts(record)),
+        nothing_stood_out(told, sought_ms),
+        *(sentences.doubt(event.trial, event.text) for event in doubts),
         sentences.best_isi(estimate),
         sentences.excluded(estimate),
         sentences.expected_f1(estimate),
@@ -84,18 +86,8 @@ def finding_sentences(record: SessionRecord) -> list[str]:
     return [sentence for sentence in said if sentence]
 
 
-def _doubts(record: SessionRecord) -> list[Event]:
-    """What was doubted on the way, but for a change, of which the last estimate says more."""
-    return [event for event in record.events if event.kind == "doubt" and event.finding is not Kind.CHANGED]
-
-
-def _mep_window_ms(record: SessionRecord) -> tuple[float, float] | None:
-    """Where the session sought the MEP [ms after the pulse]; None where its device, or somebody, measured it."""
-    return record.header.signals.mep_window_ms if "emg" in record.header.device.channels else None
-
-
 def counts_sentence(record: SessionRecord) -> str:
-    """How many stimuli were delivered, how many count, and why the others do not."""
+    """The numbers of stimuli that were delivered and that count, and why the others do not."""
     mistrials = Counter(str(trial.reason) for trial in record.table if trial.reason is not None)
     if unknown := len(record.unknown):
         mistrials["outcome unknown"] += unknown
@@ -105,13 +97,13 @@ def counts_sentence(record: SessionRecord) -> str:
 
 
 def fit_sentence(record: SessionRecord) -> str:
-    """In how many trials the fit had trouble; empty where it never had."""
+    """In how many trials the fit had trouble; empty if it never had."""
     troubled = {event.trial for event in record.events if event.kind == "fit"}
     return sentences.fit(len(troubled), len(record.table))
 
 
 def _unstated_hit_delay(record: SessionRecord) -> str:
-    """That stimuli went into what the rig states, or could have stated, where the strategy could have used it."""
+    """That stimuli went into what the rig states, or could have stated, if the strategy could have used it."""
     header, recipe = record.header, record.header.strategy
     if header.space.reference != "valve" or "hit_delay_ms" in recipe.settings or not record.rests_on_data:
         return ""
@@ -153,12 +145,7 @@ def _expects_a_tap(record: SessionRecord) -> str:
 
 
 def truth_sentence(record: SessionRecord, truth: Window | None) -> str:
-    """A sentence that compares the reported window with a simulated person's true one.
-
-    Args:
-        record: the session.
-        truth: the true window; None where there is none.
-    """
+    """A sentence that compares the reported window with a simulated person's true one."""
     space, last = record.header.space, record.estimates[-1] if record.estimates else None
     found = None if last is None else last.window
     says_nothing = not record.rests_on_data or (last is not None and sentences.is_unfinished(last, space))
@@ -167,17 +154,7 @@ def truth_sentence(record: SessionRecord, truth: Window | None) -> str:
 
 
 def trial_rows(record: SessionRecord) -> list[tuple[str, ...]]:
-    """All trials, as in `TRIAL_HEADINGS`; stimuli whose outcome the log does not have, too.
-
-    Args:
-        record: the session.
-    """
-    trials, first = (
-        sorted([*record.table, *record.unknown_trials], key=lambda trial: trial.index),
-        record.header.stimulus,
-    )
-    return [(str(t.index), sentences.asked(t, first), sentences.outcome(t), _isi(t.isi_ms)) for t in trials]
-
-
-def _isi(isi_ms: float | None) -> str:
-    return "–" if isi_ms is None else f"{isi_ms:.4g} ms"
+    """All trials, as in `TRIAL_HEADINGS`; stimuli whose outcome the log does not have, too."""
+    first, trials = record.header.stimulus, sorted([*record.table, *record.unknown_trials], key=lambda each: each.index)
+    rows = ((t, "–" if t.isi_ms is None else f"{t.isi_ms:.4g} ms") for t in trials)
+    return [(str(t.index), sentences.asked(t, first), sentences.outcome(t), isi) for t, isi in rows]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Final, Literal, Self
+from typing import Any, Final, Literal, Self
 
 from fastapi import Response
 from pydantic import BaseModel, ConfigDict, Field
@@ -28,14 +28,18 @@ class Refusal(RequestError):  # noqa: N818 - an answer as much as an error
         kind: str,
         what: str,
         *,
-        got: object = None,
-        expected: str | None = None,
-        remedy: str | None = None,
         field: str | None = None,
         retry_s: float | None = None,
+        **details: Any,
     ) -> None:
-        super().__init__(what, got=got, expected=expected, remedy=remedy)
+        super().__init__(what, **details)
         self.status, self.kind, self.field, self.retry_s = status, kind, field, retry_s
+
+    @classmethod
+    def of(cls, error: IsiwError, status: int, kind: str = "", field: str | None = None) -> Self:
+        """The refusal that an error of isiw is; its kind is the error's class unless it is stated."""
+        details: dict[str, Any] = {"got": error.got, "expected": error.expected, "remedy": error.remedy}
+        return cls(status, kind or type(error).__name__, error.what, field=field, **details)
 
 
 def as_refusal(error: BaseException) -> Refusal:
@@ -43,14 +47,12 @@ def as_refusal(error: BaseException) -> Refusal:
     if isinstance(error, Refusal):
         return error
     if isinstance(error, IsiwError):
-        status = 409 if isinstance(error, LimitExceededError | LogError) else 422
-        details = {"got": error.got, "expected": error.expected, "remedy": error.remedy}
-        return Refusal(status, type(error).__name__, error.what, **details)  # type: ignore[arg-type] # as they are
+        return Refusal.of(error, 409 if isinstance(error, LimitExceededError | LogError) else 422)
     return failed(error)
 
 
 def failed(error: BaseException) -> Refusal:
-    """The answer where the server has failed, and the request is not at fault."""
+    """The answer if the server has failed, and the request is not at fault."""
     return Refusal(
         500,
         "InternalError",
@@ -120,11 +122,6 @@ class DecisionAnswer(OkAnswer):
 
     stop: bool
     reason: str
-
-    @classmethod
-    def of(cls, decision: StopDecision) -> Self:
-        """The answer of a decision."""
-        return cls(stop=decision.stop, reason=decision.reason)
 
 
 class SessionAnswer(OkAnswer):

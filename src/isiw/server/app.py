@@ -7,7 +7,7 @@ import ipaddress
 import secrets
 import socket
 import ssl
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from functools import partial
@@ -18,6 +18,7 @@ import uvicorn
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.openapi.utils import get_openapi
+from fastapi.routing import APIRoute
 from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 from pydantic_core import ErrorDetails
@@ -30,33 +31,10 @@ from isiw.errors import ConfigError, IsiwError
 from isiw.server.answers import Refusal, answered, as_refusal
 from isiw.server.connections import Connections
 from isiw.server.guard import LOOPBACK, Guard, Rules, wants_200
-from isiw.server.requests import (
-    FORM,
-    JSON,
-    AskRequest,
-    CreateRequest,
-    ExcludeRequest,
-    IncludeRequest,
-    MistrialRequest,
-    NoteRequest,
-    ResumeRequest,
-    TellRequest,
-)
+from isiw.server.requests import FORM, JSON, BodyOf
 from isiw.server.routes import router
 from isiw.server.sessions import Sessions
 from isiw.text.toml_files import expected_instead
-
-_BODIES: Final[dict[str, type[BaseModel]]] = {
-    "/sessions": CreateRequest,
-    "/sessions/{id}/resume": ResumeRequest,
-    "/sessions/{id}/ask": AskRequest,
-    "/sessions/{id}/tell": TellRequest,
-    "/sessions/{id}/mistrial": MistrialRequest,
-    "/sessions/{id}/note": NoteRequest,
-    "/sessions/{id}/change": NoteRequest,
-    "/sessions/{id}/exclude": ExcludeRequest,
-    "/sessions/{id}/include": IncludeRequest,
-}
 
 _ABOUT: Final = (
     "Sessions of isiw for a lab's own software. Bodies are JSON, or forms whose fields have the same names: texts as "
@@ -69,19 +47,28 @@ def described(app: FastAPI) -> dict[str, Any]:
     """The description of an application's routes."""
     if app.openapi_schema is None:
         document = get_openapi(title=app.title, version=app.version, description=_ABOUT, routes=app.routes)
+        bodies = dict(_bodies())
         _, definitions = models_json_schema(
-            [(kind, "validation") for kind in _BODIES.values()], ref_template="#/components/schemas/{model}"
+            [(kind, "validation") for kind in bodies.values()], ref_template="#/components/schemas/{model}"
         )
         document["components"]["schemas"] |= definitions["$defs"]
         document["components"]["securitySchemes"] = {"token": {"type": "http", "scheme": "bearer"}}
         document["security"] = [{"token": []}]
-        for path, kind in _BODIES.items():
+        for path, kind in bodies.items():
             document["paths"][path]["post"]["requestBody"] = _body(kind)
         for operations in document["paths"].values():
             for operation in operations.values():
                 _allow_errors(operation["responses"]["200"]["content"])
         app.openapi_schema = document
     return app.openapi_schema
+
+
+def _bodies() -> Iterator[tuple[str, type[BaseModel]]]:
+    """The kind of body that each route reads, by its path."""
+    for route in (each for each in router.routes if isinstance(each, APIRoute)):
+        for dependency in route.dependant.dependencies:
+            if isinstance(dependency.call, BodyOf):
+                yield route.path, dependency.call.kind
 
 
 def _body(kind: type[BaseModel]) -> dict[str, Any]:
@@ -167,7 +154,7 @@ _AT_ONCE: Final = 10
 """Connections that are accepted before those there are heard: fewer than would push each other out."""
 
 _SILENT_S: Final = 5
-"""How long a connection may wait outside that has sent nothing yet [s]."""
+"""The longest wait outside of a connection that has sent nothing yet [s]."""
 
 _WAITING: Final = 2000
 """Connections that wait for this."""
@@ -280,7 +267,7 @@ class Server(uvicorn.Server):
 def settings_of(
     app: FastAPI, rules: Rules, tls: ssl.SSLContext | None = None, *, log_level: str = "error"
 ) -> uvicorn.Config:
-    """How uvicorn serves an application of isiw."""
+    """The settings by which uvicorn serves an application of isiw."""
     return uvicorn.Config(
         app,
         http=Connections(rules, tls),  # type: ignore[arg-type] # as much a maker of protocols as their class is

@@ -14,20 +14,18 @@ from http import HTTPStatus
 from typing import Any, Final, cast
 
 import h11
-import uvicorn
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol
-from uvicorn.server import ServerState
 
 from isiw.server.answers import Refusal, answered
 from isiw.server.guard import Rules, wants_200
 
 TAKING_S: Final = 30.0
-"""How long a client may take nothing of what it is sent [s]."""
+"""The longest time in which a client takes nothing of what it is sent [s]."""
 
 PIECE: Final = 2**16
-"""What is sent at a time [bytes]: a client that reads nothing holds little memory."""
+"""The size of a piece that is sent at a time [bytes]: a client that reads nothing holds little memory."""
 
 
 class Connections:
@@ -38,15 +36,9 @@ class Connections:
         self.strangers: dict[Connection, None] = {}  # the oldest first
         self.known: set[Connection] = set()
 
-    def __call__(
-        self,
-        config: uvicorn.Config,
-        server_state: ServerState,
-        app_state: dict[str, Any],
-        _loop: asyncio.AbstractEventLoop | None = None,
-    ) -> Connection:
+    def __call__(self, *args: Any, **kwargs: Any) -> Connection:
         """The protocol of a connection."""
-        return Connection(self, config, server_state, app_state, _loop)
+        return Connection(self, *args, **kwargs)
 
     def enter(self, connection: Connection) -> None:
         """Take a new connection in, at the cost of the oldest stranger where there are too many."""
@@ -60,7 +52,7 @@ class Connections:
         self.known.discard(connection)
 
     def lets_in(self, connection: Connection, path: str) -> bool:
-        """Whether there is room for a connection that has shown the token, or its request is urgent."""
+        """Let a connection in that has shown the token if there is room, or its request is urgent."""
         room = len(self.known) < self.rules.most_known
         if room or path in self.rules.urgent_paths:
             self.leave(connection)
@@ -72,15 +64,8 @@ class Connections:
 class Connection(H11Protocol):
     """One connection: uvicorn's protocol for HTTP/1.1, with deadlines, and words where it has none."""
 
-    def __init__(
-        self,
-        others: Connections,
-        config: uvicorn.Config,
-        server_state: ServerState,
-        app_state: dict[str, Any],
-        loop: asyncio.AbstractEventLoop | None,
-    ) -> None:
-        super().__init__(config, server_state, app_state, loop)
+    def __init__(self, others: Connections, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
         self._others, self._routes, self.app = others, cast("ASGIApp", self.app), cast("Any", self._answer)
         self._line: asyncio.Transport | None = None
         self._early = b""  # what comes with the end of a handshake, before the connection is made
@@ -198,7 +183,7 @@ class Connection(H11Protocol):
             self._deadline = None
 
     async def _answer(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a request by the routes, where there is room for whoever shows the token."""
+        """Answer a request by the routes, if there is room for whoever shows the token."""
         app, others = self._routes, self._others
         is_new = self not in others.known and others.rules.shows_token(Headers(scope=scope))
         if is_new and not others.lets_in(self, scope["path"]):
@@ -215,7 +200,7 @@ def _too_many(most: int, *, as_200: bool) -> ASGIApp:
 
 
 def _closing(send: Send) -> Send:
-    """What sends an answer that says that the connection ends with it, so that nobody asks again on it."""
+    """A sender of an answer that says that the connection ends with it, so that nobody asks again on it."""
 
     async def sent(message: Message) -> None:
         if message["type"] == "http.response.start":
@@ -226,7 +211,7 @@ def _closing(send: Send) -> Send:
 
 
 def _in_pieces(send: Send) -> Send:
-    """What sends an answer so that not more of it is held than a client takes."""
+    """A sender of an answer that holds no more of it than a client takes."""
 
     async def sent(message: Message) -> None:
         body = message.get("body", b"")

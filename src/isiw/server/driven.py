@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final
@@ -11,17 +12,17 @@ from isiw.errors import InvalidValueError, LimitExceededError, LogError
 from isiw.estimate import Estimate
 from isiw.findings import Kind
 from isiw.log.reader import SessionRecord
-from isiw.server.answers import AskAnswer, EstimateAnswer, Refusal, SessionAnswer, TrialAnswer, TrialRow, failed
-from isiw.server.requests import AskRequest, ExcludeRequest, MistrialRequest, NoteRequest, TellRequest
+from isiw.server.answers import AskAnswer, EstimateAnswer, Refusal, SessionAnswer, TrialAnswer, failed
+from isiw.server.requests import AskRequest, ExcludeRequest, MistrialRequest, TellRequest
 from isiw.session.recorder import Recorder
 from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.trials import Status, Trial
 
 BUSY_S: Final = 5.0
-"""How long a call waits for the one before it."""
+"""The longest wait of a call for the one before it."""
 
 _HARMLESS: Final = (Refusal, InvalidValueError, LimitExceededError)
-"""What changes nothing, unless a trial was logged and not concluded."""
+"""Errors that change nothing, unless a trial was logged and not concluded."""
 
 
 class DrivenSession:
@@ -72,11 +73,11 @@ class DrivenSession:
         return stands.model_copy(update={"open": False})
 
     def outcomes_after(self, trial: int) -> list[TrialAnswer]:
-        """What came of the trials after one, in order."""
+        """The outcomes of the trials after one, in order."""
         return [self._outcomes[number] for number in sorted(self._outcomes.copy()) if number > trial]
 
     def stands(self) -> SessionAnswer:
-        """How it stands."""
+        """The state of the session."""
         asked, trials, decision = self.recorder.asked, self.recorder.trials, self.recorder.decision()
         return SessionAnswer(
             id=self.name,
@@ -91,17 +92,13 @@ class DrivenSession:
             reason=decision.reason,
         )
 
-    def trials(self) -> list[TrialRow]:
-        """All trials, as they count now."""
-        return [TrialRow.of(trial) for trial in self.recorder.trials]
-
     def estimate(self) -> EstimateAnswer:
         """The estimate of the window now."""
         estimate = self.recorder.estimate()
         return EstimateAnswer.about(Estimate.of(estimate), estimate.too_little)
 
     def require_no_wait(self, most_s: float) -> None:
-        """Raise where the next stimulus is not allowed soon."""
+        """Raise if the next stimulus is not allowed soon."""
         wait_s = self.recorder.wait_s()
         if wait_s > most_s:
             raise Refusal(
@@ -140,7 +137,7 @@ class DrivenSession:
         return AskAnswer(trial=comes_next, isi_ms=isi_ms, again=asked is not None)
 
     def tell(self, request: TellRequest) -> TrialAnswer:
-        """What came of a trial; told again it is answered as at first."""
+        """Log the outcome of a trial; told again it is answered as at first."""
         if request.trial in self._outcomes:
             return self._known(request.trial, _told(request), f"isi_ms={request.isi_ms} mep_mv={request.mep_mv}")
         self._require_next(request.trial, asked=request.pulse and request.isi_ms is not None)
@@ -167,14 +164,6 @@ class DrivenSession:
             self.recorder.mistrial(Kind.OUTCOME_UNKNOWN)
             self._concluded()
 
-    def note(self, request: NoteRequest) -> None:
-        """Log a remark; with a key that was used before, nothing."""
-        self.recorder.note(request.text, key=request.key)
-
-    def note_change(self, request: NoteRequest) -> None:
-        """Log a change; with a key that was used before, nothing."""
-        self.recorder.note_change(request.text, key=request.key)
-
     def exclude(self, request: ExcludeRequest) -> None:
         """Let a trial not count; one that is excluded already stays so."""
         if not any(trial.index == request.trial and trial.excluded for trial in self.recorder.trials):
@@ -186,7 +175,7 @@ class DrivenSession:
             self.recorder.include(trial)
 
     def _require_next(self, trial: int, *, asked: bool) -> None:
-        """Raise where a trial cannot have an outcome, as it was not asked for."""
+        """Raise if a trial cannot have an outcome, as it was not asked for."""
         stimulus, comes_next = self.recorder.asked, len(self.recorder.trials)
         if trial == comes_next and (stimulus is not None or not asked):
             return
@@ -233,20 +222,16 @@ def not_open(name: str) -> Refusal:
 
 
 def _outcomes(record: SessionRecord) -> dict[int, TrialAnswer]:
-    """What was answered about the trials of a log when they were told."""
+    """The answers about the trials of a log when they were told."""
     decisions: dict[int, StopDecision] = {}
     for estimate in record.estimates:  # the first of a trial; later ones are of verdicts
         decisions.setdefault(estimate.trial, estimate.decision)
-    going_on = StopKind.OWN.go_on("")
-    doubts = [event for event in record.events if event.kind == "doubt"]
-    return {
-        trial.index: TrialAnswer.of(
-            trial,
-            decisions.get(trial.index, going_on),
-            [event.text for event in doubts if event.trial == trial.index],
-        )
-        for trial in record.table
-    }
+    unknown, doubts = StopKind.OWN.go_on(""), defaultdict[int | None, list[str]](list)
+    for event in record.events:
+        if event.kind == "doubt":
+            doubts[event.trial].append(event.text)
+    trials = ((trial, decisions.get(trial.index, unknown), doubts[trial.index]) for trial in record.table)
+    return {trial.index: TrialAnswer.of(trial, decision, said) for trial, decision, said in trials}
 
 
 def _told(request: TellRequest) -> tuple[object, ...]:
@@ -254,7 +239,7 @@ def _told(request: TellRequest) -> tuple[object, ...]:
 
 
 def _recorded(trial: Trial) -> tuple[object, ...]:
-    """What was told about a trial."""
+    """The values that were told about a trial."""
     if trial.status is Status.MISTRIAL:
         return (trial.reason,)
     return trial.isi_ms, trial.mep_mv, trial.isi_sd_ms, trial.background_rms_uv, not trial.tap_alone

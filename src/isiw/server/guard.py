@@ -1,4 +1,4 @@
-"""What stands before all routes: who may ask, from where, and how much and how slowly they may send."""
+"""The guard before all routes: who may ask, from where, and how much and how slowly they may send."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ class Guard:
 
 
 def wants_200(query: str) -> bool:
-    """Whether a client can read the words of an answer with status 200 only, as its query says."""
+    """True if a client can read the words of an answer with status 200 only, as its query says."""
     return parse_qs(query).get("errors") == ["200"]
 
 
@@ -161,7 +161,7 @@ def _hostname(url: str) -> str | None:
 
 
 def _beginning_with(first: Message, receive: Receive) -> Receive:
-    """What is received, with one message before all others."""
+    """A receiver with one message before all others."""
     messages = itertools.chain([first], itertools.repeat(None))
 
     async def received() -> Message:

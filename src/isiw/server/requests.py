@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Awaitable, Callable
-from typing import Annotated, Any, Final, TypeVar
+from typing import Annotated, Any, Final, Generic, TypeVar
 from urllib.parse import parse_qsl
 
 from fastapi import Request
@@ -142,13 +141,15 @@ class GoOnRequest(_Request):
     pause: int = Field(ge=1, description="The number of the pause that was shown; no other one is answered by this.")
 
 
-def body_of(kind: type[_Kind]) -> Callable[[Request], Awaitable[_Kind]]:
+class BodyOf(Generic[_Kind]):
     """A dependency of a route: its body as a request of this kind."""
 
-    async def body(request: Request) -> _Kind:
-        return _read(kind, request.headers.get("content-type", ""), await request.body())
+    def __init__(self, kind: type[_Kind]) -> None:
+        self.kind = kind
 
-    return body
+    async def __call__(self, request: Request) -> _Kind:
+        """The body of a request."""
+        return _read(self.kind, request.headers.get("content-type", ""), await request.body())
 
 
 def _read(kind: type[_Kind], content_type: str, body: bytes) -> _Kind:
@@ -203,9 +204,7 @@ def _refused(kind: type[BaseModel], error: ErrorDetails) -> Refusal:
     field = ".".join(map(str, error["loc"])) or None
     own = error.get("ctx", {}).get("error")
     if isinstance(own, IsiwError):
-        return Refusal(
-            422, type(own).__name__, own.what, got=own.got, expected=own.expected, remedy=own.remedy, field=field
-        )
+        return Refusal.of(own, 422, field=field)
     if error["type"] == "json_invalid":
         return Refusal(400, "MalformedBody", "the body is no JSON", expected=error["msg"])
     known = known_keys(kind, error["loc"][:-1]) if error["type"] in UNKNOWN else []

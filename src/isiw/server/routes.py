@@ -30,6 +30,7 @@ from isiw.server.driven import DrivenSession
 from isiw.server.requests import (
     NAME,
     AskRequest,
+    BodyOf,
     CreateRequest,
     ExcludeRequest,
     IncludeRequest,
@@ -37,7 +38,6 @@ from isiw.server.requests import (
     NoteRequest,
     ResumeRequest,
     TellRequest,
-    body_of,
 )
 from isiw.server.sessions import Sessions
 
@@ -86,7 +86,7 @@ def list_sessions(folder: Folder) -> Response:
 
 
 @router.post("/sessions", responses=_errors(400, 409, 415), response_model=SessionAnswer)
-def create(folder: Folder, body: Annotated[CreateRequest, Depends(body_of(CreateRequest))]) -> Response:
+def create(folder: Folder, body: Annotated[CreateRequest, Depends(BodyOf(CreateRequest))]) -> Response:
     """Begin a session. Safe to repeat until something was asked for."""
     return _json(folder.create(body))
 
@@ -98,13 +98,13 @@ def stands(folder: Folder, name: Name) -> Response:
 
 
 @router.post("/sessions/{id}/resume", responses=_errors(400, 404, 409, 415), response_model=SessionAnswer)
-def resume(folder: Folder, name: Name, body: Annotated[ResumeRequest, Depends(body_of(ResumeRequest))]) -> Response:
+def resume(folder: Folder, name: Name, body: Annotated[ResumeRequest, Depends(BodyOf(ResumeRequest))]) -> Response:
     """Continue a session. A trial without an outcome becomes a mistrial "outcome unknown"."""
     return _json(folder.resume(name, body.lost_pulses))
 
 
 @router.post("/sessions/{id}/ask", responses=_errors(400, 404, 409, 415, 429), response_model=AskAnswer)
-async def ask(folder: Folder, name: Name, body: Annotated[AskRequest, Depends(body_of(AskRequest))]) -> Response:
+async def ask(folder: Folder, name: Name, body: Annotated[AskRequest, Depends(BodyOf(AskRequest))]) -> Response:
     """The next ISI, on disk as about to be delivered. Safe to repeat where it names the trial."""
     await _patient(await run_in_threadpool(folder.opened, name), body.wait_s)
 
@@ -116,7 +116,7 @@ async def ask(folder: Folder, name: Name, body: Annotated[AskRequest, Depends(bo
 
 
 @router.post("/sessions/{id}/tell", responses=_errors(400, 404, 409, 415, 429), response_model=TrialAnswer)
-def tell(folder: Folder, name: Name, body: Annotated[TellRequest, Depends(body_of(TellRequest))]) -> Response:
+def tell(folder: Folder, name: Name, body: Annotated[TellRequest, Depends(BodyOf(TellRequest))]) -> Response:
     """What came of a trial. Safe to repeat."""
     with folder.driving(name) as session:
         return _json(session.tell(body))
@@ -124,7 +124,7 @@ def tell(folder: Folder, name: Name, body: Annotated[TellRequest, Depends(body_o
 
 @router.post("/sessions/{id}/mistrial", responses=_errors(400, 404, 409, 415), response_model=TrialAnswer)
 def mistrial(
-    folder: Folder, name: Name, body: Annotated[MistrialRequest, Depends(body_of(MistrialRequest))]
+    folder: Folder, name: Name, body: Annotated[MistrialRequest, Depends(BodyOf(MistrialRequest))]
 ) -> Response:
     """That a trial is lost: it counts as a stimulus, and nothing is learnt from it. Safe to repeat."""
     with folder.driving(name) as session:
@@ -132,23 +132,23 @@ def mistrial(
 
 
 @router.post("/sessions/{id}/note", responses=_errors(400, 404, 409, 415), response_model=OkAnswer)
-def note(folder: Folder, name: Name, body: Annotated[NoteRequest, Depends(body_of(NoteRequest))]) -> Response:
+def note(folder: Folder, name: Name, body: Annotated[NoteRequest, Depends(BodyOf(NoteRequest))]) -> Response:
     """Log a remark. Safe to repeat with a key."""
     with folder.driving(name) as session:
-        session.note(body)
+        session.recorder.note(body.text, key=body.key)
     return _json(OkAnswer())
 
 
 @router.post("/sessions/{id}/change", responses=_errors(400, 404, 409, 415), response_model=OkAnswer)
-def change(folder: Folder, name: Name, body: Annotated[NoteRequest, Depends(body_of(NoteRequest))]) -> Response:
+def change(folder: Folder, name: Name, body: Annotated[NoteRequest, Depends(BodyOf(NoteRequest))]) -> Response:
     """That something changed that may bear on all later MEPs, such as the coil's place. Safe to repeat with a key."""
     with folder.driving(name) as session:
-        session.note_change(body)
+        session.recorder.note_change(body.text, key=body.key)
     return _json(OkAnswer())
 
 
 @router.post("/sessions/{id}/exclude", responses=_errors(400, 404, 409, 415), response_model=SessionAnswer)
-def exclude(folder: Folder, name: Name, body: Annotated[ExcludeRequest, Depends(body_of(ExcludeRequest))]) -> Response:
+def exclude(folder: Folder, name: Name, body: Annotated[ExcludeRequest, Depends(BodyOf(ExcludeRequest))]) -> Response:
     """Let a trial not count. Safe to repeat."""
     with folder.driving(name) as session:
         session.exclude(body)
@@ -156,7 +156,7 @@ def exclude(folder: Folder, name: Name, body: Annotated[ExcludeRequest, Depends(
 
 
 @router.post("/sessions/{id}/include", responses=_errors(400, 404, 409, 415), response_model=SessionAnswer)
-def include(folder: Folder, name: Name, body: Annotated[IncludeRequest, Depends(body_of(IncludeRequest))]) -> Response:
+def include(folder: Folder, name: Name, body: Annotated[IncludeRequest, Depends(BodyOf(IncludeRequest))]) -> Response:
     """Let a trial count again that was excluded. Safe to repeat."""
     with folder.driving(name) as session:
         session.include(body.trial)
@@ -178,7 +178,8 @@ def estimate(folder: Folder, name: Name) -> Response:
 @router.get("/sessions/{id}/decision", responses=_errors(404, 409), response_model=DecisionAnswer)
 def decision(folder: Folder, name: Name) -> Response:
     """Whether to stop, and why."""
-    return _json(folder.decision(name))
+    stands = folder.stands(name)
+    return _json(DecisionAnswer(stop=stands.stop, reason=stands.reason))
 
 
 @router.get("/sessions/{id}/trials", responses=_errors(404, 409), response_model=TrialsAnswer)

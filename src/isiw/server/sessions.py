@@ -5,10 +5,10 @@ from __future__ import annotations
 import dataclasses
 import re
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeVar
 
 from isiw.devices.limits import Limits
 from isiw.errors import error_text
@@ -16,7 +16,7 @@ from isiw.files import made_folder
 from isiw.log.durable import log_exists, log_of, part_of
 from isiw.log.headers import SERVED_KEY
 from isiw.log.reader import SessionRecord, read_session
-from isiw.server.answers import DecisionAnswer, EstimateAnswer, Refusal, SessionAnswer, SessionEntry, TrialRow
+from isiw.server.answers import EstimateAnswer, Refusal, SessionAnswer, SessionEntry, TrialRow
 from isiw.server.driven import DrivenSession, not_open
 from isiw.server.requests import NAME, CreateRequest
 from isiw.session.replay import strategy_of
@@ -25,6 +25,8 @@ from isiw.session.terminal import alarm
 from isiw.strategy.catalogue import known_settings, make_strategy
 
 MOST_OPEN: Final = 20
+
+T = TypeVar("T")
 
 
 class Sessions:
@@ -94,7 +96,7 @@ class Sessions:
         return self.stands(name)
 
     def close_all(self) -> None:
-        """Close all sessions, as the server ends; where one cannot be closed, the reason is shown."""
+        """Close all sessions, as the server ends; if one cannot be closed, the reason is shown."""
         for name in list(self._open):
             try:
                 self.close(name)
@@ -103,49 +105,28 @@ class Sessions:
                     alarm(f"The session {name} was not closed ({error_text(error)}). It can be resumed.")
 
     def stands(self, name: str) -> SessionAnswer:
-        """How a session stands, open or not."""
-        if self._is_open(name):
-            with self.driving(name) as session:
-                return session.stands()
-        record = self.record(name)
-        decision, unknown = record.decision, record.unknown
-        return SessionAnswer(
-            id=name,
-            open=False,
-            subject=record.header.subject,
-            trials=len(record.table),
-            told=len(record.table.told),
-            open_trial=unknown[-1].trial if unknown else None,
-            open_isi_ms=unknown[-1].isi_ms if unknown else None,
-            stop=decision is not None and decision.stop,
-            reason=decision.reason if decision else "No trial has an outcome yet.",
-        )
+        """The state of a session, open or not."""
+        return self._of(name, DrivenSession.stands, lambda record: _stood(name, record))
 
     def trials(self, name: str) -> list[TrialRow]:
         """The trials of a session, open or not."""
-        if self._is_open(name):
-            with self.driving(name) as session:
-                return session.trials()
-        return [TrialRow.of(trial) for trial in self.record(name).table]
+        trials = self._of(name, lambda session: session.recorder.trials, lambda record: record.table)
+        return [TrialRow.of(trial) for trial in trials]
 
     def estimate(self, name: str) -> EstimateAnswer:
         """The estimate of the window, in a session that is open or not."""
-        if self._is_open(name):
-            with self.driving(name) as session:
-                return session.estimate()
-        record = self.record(name)
-        if not record.estimates:
-            raise not_open(name)
-        return EstimateAnswer.about(record.estimates[-1], record.too_little)
-
-    def decision(self, name: str) -> DecisionAnswer:
-        """Whether to stop a session, and why."""
-        stands = self.stands(name)
-        return DecisionAnswer(stop=stands.stop, reason=stands.reason)
+        return self._of(name, DrivenSession.estimate, lambda record: _estimated(name, record))
 
     def record(self, name: str) -> SessionRecord:
-        """What is in a session's log by now."""
+        """The contents of a session's log by now."""
         return read_session(self._existing(name))
+
+    def _of(self, name: str, opened: Callable[[DrivenSession], T], logged: Callable[[SessionRecord], T]) -> T:
+        """Something about a session: as it is open now, or else as its log has it."""
+        if self._is_open(name):
+            with self.driving(name) as session:
+                return opened(session)
+        return logged(self.record(name))
 
     def _is_open(self, name: str) -> bool:
         with self._lock:
@@ -186,7 +167,7 @@ class Sessions:
         return self._take(DrivenSession(request.id, request.visit.subject, recorder, doubts))
 
     def _require_same_beginning(self, request: CreateRequest) -> None:
-        """Raise where the session with this id is another one, or goes on already."""
+        """Raise if the session with this id is another one, or goes on already."""
         record = self.record(request.id)
         if record.intents or record.header.config.get(SERVED_KEY) != _kept(request):
             raise Refusal(
@@ -239,3 +220,25 @@ class Sessions:
 def _kept(request: CreateRequest) -> str:
     """A request as a log can keep it: in TOML there is no null."""
     return request.model_dump_json()
+
+
+def _stood(name: str, record: SessionRecord) -> SessionAnswer:
+    """The state in which a session is that is not open."""
+    decision, unknown = record.decision, record.unknown
+    return SessionAnswer(
+        id=name,
+        open=False,
+        subject=record.header.subject,
+        trials=len(record.table),
+        told=len(record.table.told),
+        open_trial=unknown[-1].trial if unknown else None,
+        open_isi_ms=unknown[-1].isi_ms if unknown else None,
+        stop=decision is not None and decision.stop,
+        reason=decision.reason if decision else "No trial has an outcome yet.",
+    )
+
+
+def _estimated(name: str, record: SessionRecord) -> EstimateAnswer:
+    if not record.estimates:
+        raise not_open(name)
+    return EstimateAnswer.about(record.estimates[-1], record.too_little)

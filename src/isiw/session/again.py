@@ -26,7 +26,7 @@ def estimate_again(
 
     Args:
         path: the log, with or without `.part`; no session may be writing it.
-        strategy: needed where the session's strategy was built from a user's own objects: the same again.
+        strategy: needed if the session's strategy was built from a user's own objects: the same again.
         replayed: called after each trial with how many the strategy knows.
 
     Raises:

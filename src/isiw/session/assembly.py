@@ -8,8 +8,8 @@ import platform
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import UnionType
-from typing import Any, Final, NamedTuple, TypedDict, get_args
+from types import MappingProxyType
+from typing import Any, Final, NamedTuple, TypedDict
 
 import isiw
 from isiw.checks import deadline, number, text
@@ -17,16 +17,16 @@ from isiw.compiled import version as engine_version
 from isiw.devices.clock import Clock
 from isiw.devices.limits import USUAL_ITI_S, Limits
 from isiw.devices.protocol import Device
-from isiw.errors import InvalidValueError
+from isiw.errors import InvalidValueError, StrategyError
 from isiw.log.durable import log_of
 from isiw.log.headers import Header, StrategyRecipe
 from isiw.log.schema import Event, Record, now
 from isiw.log.writer import LogWriter
-from isiw.session.console import Operated, OperatorConsole
+from isiw.session.console import OperatorConsole
 from isiw.session.examination import WindowExamination, examination_of
 from isiw.session.rig import Rig, Safeguards, require_matching
 from isiw.session.sink import SessionUpdate, Sink
-from isiw.session.steps import Asking, Pausing, Steps
+from isiw.session.steps import Pausing, Steps
 from isiw.signals.limits import SignalLimits
 from isiw.signals.tap import TapResponses
 from isiw.signals.watch import Watch
@@ -70,20 +70,40 @@ def versions() -> dict[str, str]:
     return {"isiw": isiw.__version__, "python": platform.python_version(), **installed, "engine": engine_version()}
 
 
-def require_parts(log: object, **parts: tuple[object, type | UnionType]) -> Path:
+def require_known(call: str, options: Mapping[str, Any], kind: type) -> None:
+    """Raise as Python does if a call has options that it does not know."""
+    if unknown := options.keys() - kind.__annotations__.keys():
+        raise TypeError(f"{call}() got an unexpected keyword argument {min(unknown)!r}")
+
+
+_OPTIONAL_PARTS: Final = {"limits": Limits, "visit": Visit, "protocol": VisitProtocol}
+
+
+def require_parts(log: object, options: Mapping[str, Any] = MappingProxyType({}), **parts: tuple[object, type]) -> Path:
     """The log's path; raise where a part of a session is something else than it should be."""
-    for name, (part, kind) in parts.items():
+    stated = {name: (options[name], kind) for name, kind in _OPTIONAL_PARTS.items() if options.get(name) is not None}
+    for name, (part, kind) in (parts | stated).items():
         if not isinstance(part, kind):
-            wanted, *_ = get_args(kind) or (kind,)
-            expected = f"an isiw.{wanted.__name__}"
+            expected = f"an isiw.{kind.__name__}"
             raise InvalidValueError(f"a session cannot use this {name}", got=part, expected=expected)
     if not isinstance(log, str | os.PathLike):
         raise InvalidValueError("a session needs a log", got=log, expected='a path, such as "P07.mcap"')
     return log_of(Path(log))
 
 
+def require_untold(strategy: Strategy, trials: int = 0) -> None:
+    """Raise if a strategy knows of more trials than a session has."""
+    if strategy.delivered > trials:
+        raise StrategyError(
+            "the strategy knows of trials that are not this session's",
+            got=f"{strategy.delivered} trials",
+            expected=f"{trials} trials",
+            remedy="Make a new one, or give the session strategy.restarted().",
+        )
+
+
 def require_room(strategy: Strategy, header: Header) -> None:
-    """Raise where the limits end a strategy's plan before its end, so that it would say nothing about most ISIs."""
+    """Raise if the limits end a strategy's plan before its end, so that it would say nothing about most ISIs."""
     planned, most = strategy.stimuli_planned, header.limits.max_pulses
     if planned is None or (needed := header.protocol.stimuli_for(planned)) <= most:
         return
@@ -116,7 +136,7 @@ def header_of(strategy: Strategy, **details: Any) -> Header:
 
 
 def begun(seed: int) -> dict[str, Any]:
-    """What the header of all says that begins now."""
+    """Fields of every header of something that begins now."""
     return {
         "isiw_version": isiw.__version__,
         "created": now().isoformat(timespec="seconds"),
@@ -125,8 +145,8 @@ def begun(seed: int) -> dict[str, Any]:
     }
 
 
-class ResumeOptions(TypedDict, total=False):
-    """What can be said of a session that begins, and otherwise than before of one that is resumed."""
+class Changeable(TypedDict, total=False):
+    """Options of a session that begins, and of one that is resumed."""
 
     limits: Limits | None
     signals: SignalLimits | None
@@ -137,17 +157,36 @@ class ResumeOptions(TypedDict, total=False):
     safeguards: Safeguards | None
 
 
-class Options(ResumeOptions, total=False):
-    """What can be said of a session that begins."""
+class ResumeOptions(Changeable, total=False):
+    """Options of a session that is resumed."""
 
+    lost_pulses: int | None
+    verify: bool
+    replayed: Callable[[int], None]
+
+
+class _Described(TypedDict, total=False):
     subject: str
     config: Mapping[str, Any] | None
     visit: Visit | None
     protocol: VisitProtocol | None
 
 
+class Options(Changeable, _Described, total=False):
+    """Options of a session that begins."""
+
+
+class OwnLoopOptions(_Described, total=False):
+    """Options of a session whose loop is the lab's own."""
+
+    limits: Limits | None
+    clock: Clock | None
+    lost_pulses: int | None
+    on_doubt: Callable[[str], None] | None
+
+
 class Parts(NamedTuple):
-    """What a session consists of."""
+    """The parts of a session."""
 
     log_path: Path
     header: Header
@@ -156,37 +195,25 @@ class Parts(NamedTuple):
     sink: Sink
     rig: Rig
     examination: WindowExamination
-    asking: Asking
     pausing: Pausing
     steps: Steps
-    console: OperatorConsole
 
 
 def assembled(
-    operated: Operated, device: Device, strategy: Strategy, log: str | Path, earlier: Earlier, options: Options
+    console: OperatorConsole, device: Device, strategy: Strategy, log: str | Path, earlier: Earlier, options: Options
 ) -> Parts:
-    """The parts of a session, which its operator's keys act on; arguments and errors are those of `Session`."""
-    if unknown := options.keys() - Options.__annotations__.keys():
-        raise TypeError(f"Session() got an unexpected keyword argument {min(unknown)!r}")
-    visit, protocol, limits = options.get("visit"), options.get("protocol"), options.get("limits")
-    path = require_parts(
-        log,
-        device=(device, Device),
-        strategy=(strategy, Strategy),
-        limits=(limits, Limits | None),
-        visit=(visit, Visit | None),
-        protocol=(protocol, VisitProtocol | None),
-    )
-    safeguards, protocol = options.get("safeguards") or Safeguards(), protocol or VisitProtocol()
-    limits = (limits or Limits.of_space(strategy.space)).stated(USUAL_ITI_S)
-    asking, sink = Asking(), Sink(options.get("on_trial"))
-    console = OperatorConsole(operated, asking)
+    """The parts of a session that an operator's console acts on; arguments and errors are those of `Session`."""
+    require_known("Session", options, Options)
+    path = require_parts(log, options, device=(device, Device), strategy=(strategy, Strategy))
+    safeguards, protocol = options.get("safeguards") or Safeguards(), options.get("protocol") or VisitProtocol()
+    limits = (options.get("limits") or Limits.of_space(strategy.space)).stated(USUAL_ITI_S)
+    sink = Sink(options.get("on_trial"))
     rig = Rig(device, limits, options.get("clock"), safeguards, sink, away=console.away)
     require_matching(rig.info, strategy, protocol)
     header = header_of(
         strategy,
         subject=text("subject", options.get("subject", "")),
-        visit=visit or Visit(),
+        visit=options.get("visit") or Visit(),
         protocol=protocol,
         limits=limits,
         device=rig.info,
@@ -200,10 +227,10 @@ def assembled(
             "earlier logs count for the same subject only, and there is none", remedy="Give the session a subject."
         )
     examination = examination_of(strategy, sink, earlier.trials, earlier.events, rig.interrupts.freely)
-    pausing = Pausing(rig, examination, asking)
+    pausing = Pausing(rig, examination, console.asking)
     watch = Watch(header.space, header.signals, limits.max_consecutive_mistrials, header.detection_limit_mv)
     if earlier.first_records:
         paused_for = [event.finding for event in earlier.events if event.kind == "pause" and event.finding is not None]
         watch = watch.resumed(earlier.trials, paused_for)
     steps = Steps(examination, rig, sink, pausing, watch, header, safeguards.backoffs_s, earlier.taps(header.signals))
-    return Parts(path, header, limits, safeguards, sink, rig, examination, asking, pausing, steps, console)
+    return Parts(path, header, limits, safeguards, sink, rig, examination, pausing, steps)

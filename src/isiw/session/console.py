@@ -25,13 +25,13 @@ from isiw.text.stimuli import TAP, StimulusWords
 from isiw.trials import TrialTable
 
 PROGRESS_HEADINGS: Final = ("trial", "ISI", "MEP", "P", "window", "start", "end", "left")
-"""What `progress_row` holds; start and end are 90 % intervals, left is what the budget still allows."""
+"""The columns of `progress_row`; start and end are 90 % intervals, left is what the budget still allows."""
 
 PROGRESS_LEGEND: Final = (
     "P: probability of a window. start, end: 90 % intervals of its edges [ms],",
     "< before and > after the range of ISIs. left: stimuli that are still allowed.",
 )
-"""What the headings and signs of the table mean."""
+"""The meaning of the headings and signs of the table."""
 
 SPARKS: Final = "▁▂▃▄▅▆▇█"
 MOST_SPARKS: Final = 28
@@ -65,7 +65,7 @@ def show_legend() -> None:
 
 
 def _most() -> int:
-    """How many columns a row may have: where a terminal is narrower than the table, its last cells are cut off."""
+    """The most columns of a row: if a terminal is narrower than the table, its last cells are cut off."""
     return columns() if is_terminal(sys.stdout) else COLUMNS
 
 
@@ -84,7 +84,7 @@ def _short_of(text: str, width: int) -> str:
 
 
 def standing(update: SessionUpdate, space: DesignSpace) -> str:
-    """How a session stands, in a line: the expected MEP over the ISIs, [ ] around the window, what is next and left."""
+    """A session's state in a line: the expected MEP over the ISIs, [ ] around the window, what is next and left."""
     following = "" if update.next_isi_ms is None else f"next {update.next_isi_ms:.4g} ms, "
     pace = "" if update.left_s is None else f", ~{_minutes(update.left_s)} min"
     text = f"{following}{update.stimuli_left} left{pace}"
@@ -97,7 +97,7 @@ def _minutes(duration_s: float) -> str:
 
 
 def _profile(estimate: WindowEstimate, space: DesignSpace) -> str:
-    """The expected MEP, on a logarithmic scale from its smallest to its largest; empty where there is none."""
+    """The expected MEP, on a logarithmic scale from its smallest to its largest; empty if there is none."""
     if estimate.grid_ms is None:
         return ""
     isi_ms = np.linspace(space.low_ms, space.high_ms, MOST_SPARKS)
@@ -137,44 +137,27 @@ KEYS: Final = (
 _WORTH_COUNTING_S = 15.0
 
 
-class Operated(Protocol):
-    """What the keys do something to: a session."""
+class _Operated(Protocol):
+    """The session that the keys act on."""
 
     @property
-    def trials(self) -> TrialTable:
-        """All trials so far."""
-
+    def trials(self) -> TrialTable: ...
     @property
-    def last_excluded(self) -> int | None:
-        """The trial that was excluded last, of those that are; None where none is."""
-
-    def pause(self, reason: str) -> None:
-        """Disarm now, and pause."""
-
-    def note(self, text: str) -> None:
-        """Log a remark."""
-
-    def note_change(self, text: str) -> None:
-        """Log that something changed that bears on all MEPs from here on."""
-
-    def exclude(self, trial: int, reason: str = "") -> None:
-        """Let a trial not count."""
-
-    def include(self, trial: int) -> None:
-        """Let an excluded trial count again."""
-
-    def accept(self, trial: int) -> None:
-        """Let a mistrial count."""
-
-    def reject(self, trial: int) -> None:
-        """Let a trial not count whose MEP was looked at."""
+    def last_excluded(self) -> int | None: ...
+    def pause(self, reason: str) -> None: ...
+    def note(self, text: str) -> None: ...
+    def note_change(self, text: str) -> None: ...
+    def exclude(self, trial: int, reason: str = "") -> None: ...
+    def include(self, trial: int) -> None: ...
+    def accept(self, trial: int) -> None: ...
+    def reject(self, trial: int) -> None: ...
 
 
 class OperatorConsole:
     """Turns keys into what a session does, and answers it when it has paused."""
 
-    def __init__(self, session: Operated, asking: Asking | None = None) -> None:
-        self._session, self.screen, self._asking = session, Screen(), asking or Asking()
+    def __init__(self, session: _Operated, asking: Asking | None = None) -> None:
+        self._session, self.screen, self.asking = session, Screen(), asking or Asking()
         self._keys: Keys | None = None
         self._note: str | None = None
         self._keep: Callable[[str], None] = session.note
@@ -219,11 +202,7 @@ class OperatorConsole:
             )
         if self._note is not None:
             self.screen.say("First finish the note with Enter, or drop it with Esc.")
-        return self._asking.wait(lambda: self._left_alone)
-
-    def show(self, row: str, standing: str) -> None:
-        """Show a row of the table, and below it how the session stands."""
-        self.screen.say(row, standing)
+        return self.asking.wait(lambda: self._left_alone)
 
     def count_down(self, left_s: float, text: str) -> None:
         """Show how long a wait still lasts, where it is worth it."""
@@ -255,7 +234,7 @@ class OperatorConsole:
     def _acts(self) -> dict[str, Callable[[], None]]:
         return {
             "p": lambda: self._session.pause("Paused by the operator."),
-            "x": self._exclude,
+            "x": lambda: self._judge(self._session.exclude, "is excluded; u undoes it", "Excluded by the operator."),
             "u": self._undo,
             "a": lambda: self._judge(self._session.accept, "counts"),
             "j": lambda: self._judge(self._session.reject, "is rejected and does not count"),
@@ -266,24 +245,19 @@ class OperatorConsole:
 
     def _decide(self, key: str) -> None:
         try:
-            self._asking.answer(goes_on=key == "r")
+            self.asking.answer(goes_on=key == "r")
         except InvalidValueError:
             self.screen.say("The session is not paused; p pauses it.")
 
-    def _judge(self, say: Callable[[int], None], outcome: str) -> None:
+    def _judge(self, say: Callable[..., None], outcome: str, *reason: str) -> None:
         number = self._last()
-        say(number)
+        say(number, *reason)
         self.screen.say(f"Trial {number} {outcome}.")
 
     def _last(self) -> int:
         if not self._session.trials:
             raise InvalidValueError("there is no trial yet")
         return self._session.trials[-1].index if self.shown is None else self.shown
-
-    def _exclude(self) -> None:
-        self._judge(
-            lambda number: self._session.exclude(number, "Excluded by the operator."), "is excluded; u undoes it"
-        )
 
     def _undo(self) -> None:
         if (number := self._session.last_excluded) is None:
@@ -334,17 +308,14 @@ class Table:
     def _show(self, update: SessionUpdate) -> None:
         row = progress_row(update, self._header.stimulus)
         if self._console.reads_keys and is_terminal(sys.stdout):
-            self._console.show(fitted(row)[: columns()], standing(update, self._header.space))
+            self._console.screen.say(fitted(row)[: columns()], standing(update, self._header.space))
         else:
             show_progress(row)
         self._console.shown = update.trial.index
 
-    def waiting(self, left_s: float, text: str) -> None:
+    def waiting(self, left_s: float | None, text: str) -> None:
         """Count down until the next stimulus."""
-        if self._console.reads_keys:
+        if self._console.reads_keys and left_s is not None:
             self._console.count_down(left_s, text)
-
-    def waited(self) -> None:
-        """The wait is over."""
-        if self._console.reads_keys:
+        elif self._console.reads_keys:
             self._console.counted_down()

@@ -47,7 +47,7 @@ LearnerT = TypeVar("LearnerT", bound="_Learner[Any, Any]")
 
 
 class _Learner(Protocol[TableT, TrialT_contra]):
-    """What learns from stimuli, of which it knows `known`: a strategy for a window, or a search for a threshold."""
+    """A learner from stimuli, of which it knows `known`: a strategy for a window, or a search for a threshold."""
 
     @property
     def known(self) -> int: ...
@@ -61,7 +61,7 @@ class _Learner(Protocol[TableT, TrialT_contra]):
 
 
 class Known(NamedTuple):
-    """What follows from what is known now: whether to stop, and the next ISI [ms] if it was asked for."""
+    """The decision that follows from what is known now, and the next ISI [ms] if it was asked for."""
 
     decision: StopDecision
     next_isi_ms: float | None
@@ -277,7 +277,7 @@ def examination_of(
 
 
 def change_found(change: Change | None, told: Sequence[Trial]) -> Finding | None:
-    """That something changed during the session, whatever the ISI; None where it is not sure."""
+    """That something changed during the session, whatever the ISI; None if it is not sure."""
     if change is None or not change.is_sure or not told:
         return None
     at = None if change.trial is None else told[min(change.trial, len(told) - 1)].index
@@ -321,13 +321,10 @@ def estimate_record(
 ) -> EstimateRecord:
     """The record of what a strategy knows after a trial; scores are those that it has worked out anyway."""
     record = EstimateRecord.after(trial, strategy.estimate(), decision, next_isi_ms)
-    predicted = _predicted(strategy) if record.grid_ms else {}
+    predicted: dict[str, Any] = {}
+    if record.grid_ms and (band := strategy.prediction_mv()) is not None:
+        predicted = {"predicted_low_mv": _rounded(band[0]), "predicted_high_mv": _rounded(band[1])}
     return record.model_copy(update=predicted | ({} if next_isi_ms is None else _chosen(strategy)))
-
-
-def _predicted(strategy: Strategy) -> dict[str, Any]:
-    band = strategy.prediction_mv()
-    return {} if band is None else {"predicted_low_mv": _rounded(band[0]), "predicted_high_mv": _rounded(band[1])}
 
 
 def _chosen(strategy: Strategy) -> dict[str, Any]:

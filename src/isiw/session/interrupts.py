@@ -13,7 +13,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import Any, Final, Never, ParamSpec, Self, TypeVar
 
 from isiw.log.schema import Event
@@ -108,9 +108,7 @@ class Interrupts:
             self._before = {number: signal.signal(number, self._receive) for number in heard}
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         if self._watcher is not None:
             self._over = True
             signal.set_wakeup_fd(self._mouth_before)
@@ -200,7 +198,7 @@ class Interrupts:
                     self._disarm()
 
     def _next(self) -> bytes:
-        """What is told next; where more than one signal waits for its handler, the main thread has to react by then."""
+        """The next byte; if more than one signal waits for its handler, the main thread has to react by then."""
         insisting = self._heard > max(self._disarmed, self._settled + 1)
         self._ears.settimeout(_REACTION_S if insisting else None)
         try:

@@ -1,4 +1,4 @@
-"""What an operator says about trials while a session is open, whoever drives its loop."""
+"""An operator's verdicts on trials while a session is open, whoever drives its loop."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Judging(ABC):
 
     @property
     def strategy(self) -> Strategy:
-        """What proposes ISIs and learns; another object once a trial was judged later."""
+        """The strategy; another object once a trial was judged later."""
         return self._examination.learner.strategy
 
     @property
@@ -44,7 +44,7 @@ class Judging(ABC):
 
     @property
     def last_excluded(self) -> int | None:
-        """The trial that was excluded last, of those that are; None where none is."""
+        """The trial that was excluded last, of those that are; None if none is."""
         return self._examination.last_excluded
 
     def exclude(self, trial: int, reason: str = "") -> None:

@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import Unpack
 
 from isiw.devices.protocol import Device
-from isiw.errors import NotDelivered, StrategyError
+from isiw.errors import NotDelivered
 from isiw.log.headers import Header
 from isiw.log.pulses import earlier_pulses_s
 from isiw.log.schema import Event
 from isiw.log.writer import LogWriter
-from isiw.session.assembly import Earlier, Options, assembled, require_room
-from isiw.session.console import Table
+from isiw.session.assembly import Earlier, Options, assembled, require_room, require_untold
+from isiw.session.console import OperatorConsole, Table
 from isiw.session.judging import Judging
 from isiw.session.sink import Follower, SessionResult
 from isiw.session.steps import Pause, ended, paused
@@ -69,11 +69,12 @@ class Session(Judging):
         **options: Unpack[Options],
     ) -> None:
         self._earlier = earlier or Earlier(partial(LogWriter.create, log))
-        parts = assembled(self, device, strategy, log, self._earlier, options)
+        self._console = OperatorConsole(self)
+        parts = assembled(self._console, device, strategy, log, self._earlier, options)
         self.log_path, self._header = parts.log_path, parts.header
         self._limits, self._safeguards = parts.limits, parts.safeguards
         self._sink, self._rig, self._examination, self._steps = parts.sink, parts.rig, parts.examination, parts.steps
-        self._asking, self._pausing, self._console = parts.asking, parts.pausing, parts.console
+        self._asking, self._pausing = self._console.asking, parts.pausing
 
     @property
     def header(self) -> Header:
@@ -108,7 +109,7 @@ class Session(Judging):
         In a terminal the operator's keys are heard, unless `Safeguards.on_pause` says who decides; ? lists them.
 
         Args:
-            progress: whether to print a row after each trial; by default in a terminal, where there is no `on_trial`.
+            progress: whether to print a row after each trial; by default in a terminal, if there is no `on_trial`.
             keys: whether keys may be heard.
 
         Raises:
@@ -126,7 +127,7 @@ class Session(Judging):
             self._sink.ended()
 
     def _run(self, *, progress: bool | None, keys: bool) -> SessionResult:
-        self._require_own_strategy()
+        require_untold(self.strategy, len(self.trials))
         self._require_effect()
         earlier_s, sink = self._earlier_s(), self._sink
         shown = sink.on_trial is None and is_terminal(sys.stdout) if progress is None else progress
@@ -165,11 +166,8 @@ class Session(Judging):
     def pause(self, reason: str) -> None:
         """Disarm now, and pause before the next stimulus; from any thread, also from `on_trial`.
 
-        `Safeguards.on_pause` or the operator decides how it goes on; where nobody can, the session ends, and can be
-        resumed.
-
-        Args:
-            reason: why, for the operator and the log.
+        `Safeguards.on_pause` or the operator decides how it goes on; if nobody can, the session ends, and can be
+        resumed. The reason is shown, and in the log.
         """
         self._pausing.now(reason)
 
@@ -188,10 +186,7 @@ class Session(Judging):
         """Disarm now, and end before the next stimulus; from any thread. The session can be resumed later.
 
         Where a pause is being decided by `Safeguards.on_pause` or in the terminal, it ends as soon as they have
-        answered, whatever they answer.
-
-        Args:
-            reason: why, for the log.
+        answered, whatever they answer. The reason is in the log.
         """
         self._pausing.end(reason)
 
@@ -203,15 +198,6 @@ class Session(Judging):
     def _judge(self, verdict: Callable[[TrialTable], Event]) -> None:
         self._examination.judge(verdict)
 
-    def _require_own_strategy(self) -> None:
-        if self.strategy.delivered > len(self.trials):
-            raise StrategyError(
-                "the strategy knows of trials that are not this session's",
-                got=f"{self.strategy.delivered} trials",
-                expected=f"{len(self.trials)} trials",
-                remedy="Make a new one, or give the session strategy.restarted().",
-            )
-
     def _require_effect(self) -> None:
         if not self._earlier.first_records:  # what an earlier log says goes on as it was
             self._limits.require_effect()
@@ -220,7 +206,7 @@ class Session(Judging):
             require_room(self.strategy, self._header)
 
     def _earlier_s(self) -> list[float]:
-        """How long ago each earlier stimulus was to the same person, as far as the logs to look at know [s]."""
+        """The ages of earlier stimuli to the same person [s], as far as the logs to look at know."""
         limits, folder = self._limits, self._safeguards.earlier_logs
         matter = (limits.max_block_pulses, limits.max_period_pulses, self._header.protocol.block_trials)
         if self._header.device.simulated or not any(matter):
@@ -239,8 +225,8 @@ class Session(Judging):
 
     def _log_locked_limits(self) -> None:
         """Log the intensity that the device reported when it was armed, so that a resumed session is held to it."""
-        if self._rig.limits != self._header.limits:
-            self._header = self._header.model_copy(update={"limits": self._rig.limits})
+        if self._rig.limited.limits != self._header.limits:
+            self._header = self._header.model_copy(update={"limits": self._rig.limited.limits})
             self._sink.append(self._header)
 
     def _loop(self, decide: Callable[[str], bool]) -> StopDecision:

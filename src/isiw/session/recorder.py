@@ -6,7 +6,6 @@ import itertools
 import threading
 from collections.abc import Callable
 from contextlib import ExitStack
-from types import TracebackType
 from typing import Self
 
 from isiw.checks import number
@@ -91,7 +90,7 @@ class Recorder(Judging):
         return isi_ms
 
     def _asked_now(self, deadline_s: float | None) -> float | None:
-        """What is asked [ms], already or from now on; None where limits and protocol do not allow a stimulus yet."""
+        """The ISI that is asked [ms], already or from now on; None if limits and protocol allow no stimulus yet."""
         with self._lock:
             if self.asked is not None and self.asked.isi_ms is not None:
                 return self.asked.isi_ms
@@ -131,8 +130,8 @@ class Recorder(Judging):
             isi_ms: the realised ISI on the space's reference [ms]; None is TMS alone, which was given without being
                 asked for. It counts for all limits, and `wait_s` says when it may be given.
             mep_mv: peak-to-peak amplitude [mV]; 0 is below the detection limit.
-            isi_sd_ms: SD of the realised ISI [ms]; 0 where it was measured.
-            background_rms_uv: EMG before the pulse [µV RMS], where known.
+            isi_sd_ms: SD of the realised ISI [ms]; 0 if it was measured.
+            background_rms_uv: EMG before the pulse [µV RMS], if known.
             mep_sd_mv: as for `Strategy.tell` [mV].
             mep_interval_mv: as for `Strategy.tell` [mV].
             pulse: False is a tap alone, as for `Strategy.tell`, which was given without a request.
@@ -228,11 +227,7 @@ class Recorder(Judging):
             return self.strategy.decision()
 
     def fail(self, error: BaseException) -> None:
-        """Log what ended the session, and close the log.
-
-        Args:
-            error: what was raised.
-        """
+        """Log the error that ended the session, and close the log."""
         try:
             if self._sink.is_open:
                 self._examination.log_failure(error)
@@ -248,9 +243,7 @@ class Recorder(Judging):
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         if error is None:
             self.close()
         else:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 from functools import partial
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from isiw.checks import whole
 from isiw.devices.limits import Limits
@@ -35,24 +34,18 @@ _RENAMED: Final = {"zero_below_mv": "threshold_mv"}
 """Settings by the names that earlier versions logged them under."""
 
 
-@dataclass(frozen=True)
-class Replayed:
-    """A strategy that has learned a log.
+class Replayed(NamedTuple):
+    """A strategy that has learned a log: all its trials, and of these those whose outcome is not in the log.
 
-    Args:
-        strategy: the strategy.
-        trials: all trials, those with unknown outcome included.
-        unknown: the trials whose outcome is not in the log.
-        differing: trials in which it would have asked something else than was logged with other versions.
-        asks_from: the first trial whose ask can be compared with the strategy's from here on; those before were asked
-            with other versions, or never compared.
+    In `differing` trials it would have asked something else than was logged with other versions. From `asks_from` on
+    asks can be compared with the strategy's; those before were asked with other versions, or never compared.
     """
 
     strategy: Strategy
     trials: TrialTable
     unknown: tuple[Trial, ...]
-    differing: tuple[int, ...] = ()
-    asks_from: int = 0
+    differing: tuple[int, ...]
+    asks_from: int
 
 
 def replay(
@@ -107,11 +100,7 @@ def replay(
 
 
 def strategy_of(header: Header) -> Strategy:
-    """The strategy of a logged session, before its first trial.
-
-    Warns:
-        OtherVersionsWarning: it has settings of an earlier version that this one does not know.
-    """
+    """The strategy of a logged session, before its first trial; it warns of settings that are not known any more."""
     recipe = header.strategy
     if not recipe.name:
         raise StrategyError(
@@ -134,7 +123,9 @@ def knowing_earlier(strategy: Strategy, header: Header) -> Strategy:
 def _known_settings(recipe: StrategyRecipe) -> dict[str, Any]:
     """The settings of an earlier version that this one knows; a warning names the others."""
     known = {}
-    settings = _renamed(recipe.settings)
+    settings = {_RENAMED.get(key, key): value for key, value in recipe.settings.items()}
+    if "max_iterations" in settings:  # which left the initial trials out
+        settings["max_trials"] = settings["initial"] + settings.pop("max_iterations")
     for key, value in settings.items():
         try:
             settings_for(recipe.name, **{key: value})
@@ -145,14 +136,6 @@ def _known_settings(recipe: StrategyRecipe) -> dict[str, Any]:
         text = f"Settings of an earlier version are not known any more, and are as by default: {', '.join(unknown)}."
         warn(text, OtherVersionsWarning)
     return known
-
-
-def _renamed(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings by the names that they have now."""
-    renamed = {_RENAMED.get(key, key): value for key, value in settings.items()}
-    if "max_iterations" in renamed:  # which left the initial trials out
-        renamed["max_trials"] = renamed["initial"] + renamed.pop("max_iterations")
-    return renamed
 
 
 def _require_same_space(strategy: Strategy, header: Header) -> None:
@@ -166,7 +149,7 @@ def _require_same_space(strategy: Strategy, header: Header) -> None:
 
 
 def _require_other_versions(intent: Intent, asked_ms: float, header: Header) -> None:
-    """Raise where the strategy has no reason to ask something else than it did."""
+    """Raise if the strategy has no reason to ask something else than it did."""
     same = (header.schema_version, header.belief_version, header.engine_version) == (
         SCHEMA_VERSION,
         BELIEF_VERSION,
@@ -198,11 +181,7 @@ def taken_up(
     verify: bool = True,
     replayed: Callable[[int], None] = lambda _: None,
 ) -> tuple[Strategy, Earlier]:
-    """The strategy that has learnt a log, and where the log ends.
-
-    Warns:
-        OtherVersionsWarning: with other versions than those that were logged it would have asked something else.
-    """
+    """The strategy that has learnt a log, and where the log ends; it warns if other versions ask something else."""
     record = _with_lost_pulses(record, lost_pulses)
     header = record.header
     strategy = knowing_earlier(strategy, header) if strategy else strategy_of(header)
@@ -221,7 +200,7 @@ def taken_up(
 
 
 def _taps(record: SessionRecord, signals: SignalLimits) -> TapResponses:
-    """What the sweeps of a log show of the first stimulus alone."""
+    """The first stimulus's own response, as the sweeps of a log show it."""
     taps = TapResponses(signals.mep_window_ms)
     for trial in (entry for entry in record.history if isinstance(entry, Trial)):
         taps, _ = taps.corrected(record.table)  # after the last trial the session itself does, if it ended before that
@@ -244,7 +223,7 @@ def _with_lost_pulses(record: SessionRecord, lost_pulses: int | None) -> Session
 
 
 def require_as_real(info: DeviceInfo, was: DeviceInfo) -> None:
-    """Raise where the session would go on without waiting or with answers from nobody, or a simulation on a person."""
+    """Raise if the session would go on without waiting or with answers from nobody, or a simulation on a person."""
     if info.simulated and not was.simulated:
         raise DeviceError(
             "the session was run with a real device, and cannot be continued with a simulated one",
@@ -264,7 +243,7 @@ def require_as_real(info: DeviceInfo, was: DeviceInfo) -> None:
 
 
 def require_same_person(subject: str, logged: Header) -> None:
-    """Raise where the trials of a log that a loop of the lab's own continues are another person's, or nobody's."""
+    """Raise if the trials of a log that a loop of the lab's own continues are another person's, or nobody's."""
     require_as_real(DeviceInfo(OWN_LOOP, logged.space.reference), logged.device)
     if subject and logged.subject and subject != logged.subject:
         raise InvalidValueError(
@@ -285,7 +264,7 @@ def _differing_text(replayed: Replayed, header: Header) -> str:
 
 
 def _resumption(record: SessionRecord, replayed: Replayed, limits: Limits) -> Event:
-    """What the log says about a resumption."""
+    """The event that logs a resumption."""
     was_s, now_s = record.header.limits.iti_s, limits.iti_s
     sentences = [f"Resumed after {len(replayed.trials)} trials."]
     if replayed.differing:
@@ -300,6 +279,6 @@ def _resumption(record: SessionRecord, replayed: Replayed, limits: Limits) -> Ev
 
 
 def _ages_s(salvaged: Salvage, trials: int) -> list[float]:
-    """How long ago each stimulus of a log was [s]; 0 for those of which nobody knows when they were."""
+    """The age of each stimulus of a log [s]; 0 for those of which nobody knows when they were."""
     known_s = pulses_s(salvaged)
     return [*known_s, *[0.0] * (trials - len(known_s))]

@@ -7,7 +7,7 @@ import math
 import tempfile
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Never
@@ -22,6 +22,7 @@ from isiw.devices.limits import Limits
 from isiw.devices.protocol import Answer, Device, DeviceInfo
 from isiw.errors import DeviceError, StillArmedError, error_text
 from isiw.log.schema import waveform_topic
+from isiw.models.protocol import profile_of
 from isiw.session.interrupts import INTERRUPTED, STILL_ARMED, Interrupts, end_process
 from isiw.session.sink import Sink
 from isiw.signals.limits import EMG_UNITS_MV
@@ -37,21 +38,13 @@ _guard = threading.Lock()
 @contextmanager
 def exclusive(device: Device, info: DeviceInfo) -> Iterator[None]:
     """Within, no other session drives this device: the same object, or any of the same address on this computer."""
-    with ExitStack() as held:
-        held.enter_context(_object_claimed(device, info))
-        if info.address:
-            held.enter_context(_address_claimed(info))
-        yield
-
-
-@contextmanager
-def _object_claimed(device: Device, info: DeviceInfo) -> Iterator[None]:
     with _guard:
         if id(device) in _driven:
             raise _taken(info.name)
         _driven.add(id(device))
     try:
-        yield
+        with _address_claimed(info) if info.address else nullcontext():
+            yield
     finally:
         _driven.discard(id(device))
 
@@ -139,7 +132,7 @@ class Rig:
             still_armed=self._end_armed,
         )
         self.clock = clock or (VirtualClock() if self.info.simulated else MonotonicClock())
-        self._limited = self._anew()
+        self.limited = self._anew()
         self._punctual.release_thread()
 
     def _anew(self, delivered: int = 0, earlier_s: Sequence[float] = ()) -> LimitedDevice:
@@ -158,16 +151,6 @@ class Rig:
         """The device's description."""
         return self._punctual.describe()
 
-    @property
-    def limits(self) -> Limits:
-        """What it may deliver; once it was staged, with the intensity that it reported."""
-        return self._limited.limits
-
-    @property
-    def pulses_left(self) -> int:
-        """How many deliveries are still allowed."""
-        return self._limited.pulses_left
-
     @contextmanager
     def exclusive(self) -> Iterator[None]:
         """Within, no other session drives the device, and every signal disarms it."""
@@ -176,7 +159,7 @@ class Rig:
 
     def begin(self, delivered: int, earlier_s: Sequence[float]) -> None:
         """Count what was delivered before, for the limits."""
-        self._limited = self._anew(delivered, earlier_s)
+        self.limited = self._anew(delivered, earlier_s)
 
     @contextmanager
     def armed(self) -> Iterator[None]:
@@ -192,42 +175,30 @@ class Rig:
     def stage(self) -> None:
         """Get ready and arm."""
         with self.interrupts.allowed():
-            self._limited.stage()
+            self.limited.stage()
         self.staged_once = True
 
     def disarm(self) -> None:
-        """Disarm, from any thread; where that cannot be done, the process ends."""
+        """Disarm, from any thread; if that cannot be done, the process ends."""
         try:
-            self._limited.stop()
+            self.limited.stop()
         except StillArmedError as error:
             self._end_armed(error)
 
-    def wait_s(self, interval_s: float = 0.0) -> float:
-        """How long until the limits, and an interval since the last delivery [s], allow the next one [s]."""
-        return self._limited.wait_s(interval_s)
-
-    def ahead_s(self, intervals_s: Sequence[float]) -> float:
-        """How long the next stimuli take, as `Pacing.ahead_s` has it [s]."""
-        return self._limited.ahead_s(intervals_s)
-
     def check(self, stimulus: Stimulus) -> None:
-        """Raise where this stimulus must not be delivered now, as `LimitedDevice.check` does."""
+        """Raise if this stimulus must not be delivered now, as `LimitedDevice.check` does."""
         with self.interrupts.allowed():
-            self._limited.check(stimulus)
-
-    def deliver(self, stimulus: Stimulus, timeout_s: float) -> Answer:
-        """Deliver one pair of stimuli, as `LimitedDevice.deliver` does."""
-        return self._limited.deliver(stimulus, timeout_s)
+            self.limited.check(stimulus)
 
     def late_answer(self) -> Answer | None:
-        """What came of a delivery after its deadline; None where nothing comes as long as `stop` may take."""
+        """The answer to a delivery after its deadline; None if nothing comes as long as `stop` may take."""
         return self._punctual.late_answer(self._safeguards.deadlines.stop_s)
 
     def _release(self, error: BaseException | None) -> None:
         """Disarm and let go; what fails besides an error is told with it."""
         self.disarm()
         try:
-            self._limited.unstage()
+            self.limited.unstage()
         except Exception as another:
             if error is None:
                 raise
@@ -245,7 +216,7 @@ class Rig:
 
 
 def own_reference(reference: Reference) -> str:
-    """What to do where a device counts ISIs from another event than the design space, in sentences."""
+    """The remedy if a device counts ISIs from another event than the design space."""
     return (
         f'If the device is right, set reference = "{reference}" under [space], or '
         f'DesignSpace(low_ms, high_ms, reference="{reference}"), and count low_ms and high_ms from there. If not, '
@@ -254,7 +225,7 @@ def own_reference(reference: Reference) -> str:
 
 
 def require_matching(info: DeviceInfo, strategy: Strategy, protocol: VisitProtocol) -> None:
-    """Raise where the strategy would misread the device's answers, or the device cannot do what the protocol asks."""
+    """Raise if the strategy would misread the device's answers, or the device cannot do what the protocol asks."""
     if info.reference != strategy.space.reference:
         raise DeviceError(
             "the device and the design space count ISIs from different events",
@@ -262,8 +233,7 @@ def require_matching(info: DeviceInfo, strategy: Strategy, protocol: VisitProtoc
             expected="the same one",
             remedy=own_reference(info.reference),
         )
-    profile = getattr(getattr(strategy.model, "prior", None), "profile", None)
-    assumed = getattr(profile, "stimulus", info.conditioning)
+    assumed = getattr(profile_of(strategy.model), "stimulus", info.conditioning)
     if info.conditioning not in {"tap", assumed}:  # a tap is also what a device says that states nothing
         raise DeviceError(
             "the device's conditioning stimulus is not the one that the strategy expects, so windows would be missed",

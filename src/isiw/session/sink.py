@@ -25,7 +25,7 @@ class SessionUpdate:
         trial: the trial.
         estimate: the window's estimate.
         decision: whether the session stops here, and why.
-        next_isi_ms: what is asked next [ms]; None where the session stops, or a control trial comes next.
+        next_isi_ms: what is asked next [ms]; None if the session stops, or a control trial comes next.
         stimuli_left: how many stimuli the budget and the limits still allow.
         left_s: about how long so many take at the pace of the last ones, rests and control trials among them [s]; None
             before there is a pace.
@@ -76,11 +76,10 @@ class Follower(Protocol):
 
 
 class _Screen(Protocol):
-    """What the operator sees while a session runs."""
+    """The operator's view of a running session."""
 
     def updated(self, update: SessionUpdate) -> None: ...
-    def waiting(self, left_s: float, text: str) -> None: ...
-    def waited(self) -> None: ...
+    def waiting(self, left_s: float | None, text: str) -> None: ...
 
 
 class Sink:
@@ -92,7 +91,7 @@ class Sink:
         self.writer = log
         self._screen: _Screen | None = None
         self.faults: deque[str] = deque()
-        """What went wrong and was overcome, in whichever thread, and is not in the log yet."""
+        """Faults that were overcome, in whichever thread, and are not in the log yet."""
 
     @contextmanager
     def writing(self, log: LogWriter, screen: _Screen | None = None) -> Iterator[None]:
@@ -132,15 +131,10 @@ class Sink:
         if self.on_trial is not None:
             self.on_trial(update)
 
-    def waiting(self, left_s: float, text: str) -> None:
-        """The next stimulus is waited for."""
+    def waiting(self, left_s: float | None, text: str = "") -> None:
+        """The session waits for its next stimulus; no longer, if nothing is left [s]."""
         if self._screen is not None:
             self._screen.waiting(left_s, text)
-
-    def waited(self) -> None:
-        """The wait is over."""
-        if self._screen is not None:
-            self._screen.waited()
 
     def ended(self) -> None:
         """The session has ended, and its log is closed."""

@@ -154,7 +154,7 @@ _FORESEEN: Final = 500  # pairs that are looked ahead to; how long more of them 
 _NAP_S = 0.25  # how long a pause may go unnoticed between two stimuli
 
 _NOTHING_GIVEN = (NotDelivered, LimitExceededError)
-"""What a device raises only before it delivers."""
+"""Errors that a device raises only before it delivers."""
 
 
 def paused(reason: str) -> StopDecision:
@@ -222,7 +222,7 @@ class Steps:
         """The decision to stop, by the strategy or the limits; None where there is a stimulus to deliver."""
         if (decision := self._own_response.decided(self._freely(self._strategy.decision))).stop:
             return decision
-        return None if self._rig.pulses_left else self._stop_at_limit()
+        return None if self._rig.limited.pulses_left else self._stop_at_limit()
 
     def log_belief(self) -> None:
         """Log what is known after the last trial, which a session that ended then may not have corrected others by."""
@@ -256,11 +256,11 @@ class Steps:
             return None
         intervals_s: list[float] = []
         first, pairs = len(self._examination.trials), 0
-        while pairs < min(left, _FORESEEN) and len(intervals_s) < self._rig.pulses_left:
+        while pairs < min(left, _FORESEEN) and len(intervals_s) < self._rig.limited.pulses_left:
             number = first + len(intervals_s)
             intervals_s.append(max(usual_s, protocol.rest_s) if protocol.rests_before(number) else usual_s)
             pairs += protocol.control(number, seed) is None
-        return self._rig.ahead_s(intervals_s) * (left / pairs if pairs == _FORESEEN else 1)
+        return self._rig.limited.ahead_s(intervals_s) * (left / pairs if pairs == _FORESEEN else 1)
 
     def _decision(self) -> StopDecision:
         """The strategy's decision; none is made on data that a person should look at first."""
@@ -271,7 +271,7 @@ class Steps:
 
     def _stimuli_left(self) -> int:
         budget = stimuli_left(self._strategy.stopping, self._strategy.spent)
-        return self._rig.pulses_left if budget is None else min(budget, self._rig.pulses_left)
+        return self._rig.limited.pulses_left if budget is None else min(budget, self._rig.limited.pulses_left)
 
     def _one_trial(self) -> None:
         """Ask and deliver; what was refused before firing is tried again."""
@@ -293,7 +293,7 @@ class Steps:
         return self._header.protocol.control(len(self._examination.trials), self._header.seed)
 
     def _next_isi_ms(self) -> float | None:
-        """What is asked next [ms]; None where a control trial comes next."""
+        """The ISI that is asked next [ms]; None if a control trial comes next."""
         if self._next_control:
             return None
         isi_ms: float = self._freely(self._strategy.ask, self._header.ask_deadline_s)
@@ -311,21 +311,17 @@ class Steps:
         """Sleep until limits and protocol allow the next stimulus, or an operator has another wish."""
         number = len(self._examination.trials)
         rests = self._header.protocol.rests_before(number)
+        interval_s = self._header.protocol.interval_s(number, self._header.seed)
         try:
-            while not self._disturbed and (wait_s := self._wait_s()) > 0:
+            while not self._disturbed and (wait_s := self._rig.limited.wait_s(interval_s)) > 0:
                 self._sink.waiting(wait_s, f"Rest after {number} trials" if rests else "Next stimulus")
                 self._rig.clock.sleep_s(min(wait_s, _NAP_S))
         finally:
-            self._sink.waited()
+            self._sink.waiting(None)
 
     @property
     def _disturbed(self) -> bool:
         return self._pausing.reason is not None or self._examination.overruled
-
-    def _wait_s(self) -> float:
-        """How long until limits and protocol allow the next stimulus [s]."""
-        protocol = self._header.protocol
-        return self._rig.wait_s(protocol.interval_s(len(self._examination.trials), self._header.seed))
 
     def _deliver(self, stimulus: Stimulus, fallback: str | None) -> None:
         """Deliver a pair of stimuli or a control trial, unless a trial was judged since it was asked for."""
@@ -369,14 +365,16 @@ class Steps:
             raise
 
     def _answer(self, stimulus: Stimulus) -> Answer:
-        """What came of a stimulus; its waveforms are logged, also where it comes too late."""
+        """The answer to a stimulus; its waveforms are logged, also if it comes too late."""
         try:
-            answer = self._rig.deliver(stimulus, self._header.timeout_s)
+            answer = self._rig.limited.deliver(stimulus, self._header.timeout_s)
         except DeviceTimeoutError:
             late = self._rig.late_answer()
             if late is not None:
                 self._log_waveforms(stimulus, late)
-                self._sink.append(Event(kind="late", trial=stimulus.trial, text=_late_text(late)))
+                what = f"{late.mep_mv:g} mV" if isinstance(late, Measurement) else "a sweep"
+                text = f"An answer came after the deadline: {what}. It is in the log, but is not used."
+                self._sink.append(Event(kind="late", trial=stimulus.trial, text=text))
             raise
         self._log_waveforms(stimulus, answer)
         return answer
@@ -397,8 +395,3 @@ class Steps:
             expected="an isiw.Sweep or an isiw.Measurement",
             remedy="Let it return what it recorded, or the MEP that it measured: isiw.Measurement(mep_mv, isi_ms).",
         )
-
-
-def _late_text(answer: Answer) -> str:
-    what = f"{answer.mep_mv:g} mV" if isinstance(answer, Measurement) else "a sweep"
-    return f"An answer came after the deadline: {what}. It is in the log, but is not used."

@@ -1,6 +1,6 @@
 """The terminal: single keys are read in a thread of their own, and what is shown is written in another.
 
-Neither waits for the other: who presses a key is heard also where the terminal takes no output.
+Neither waits for the other: who presses a key is heard also if the terminal takes no output.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ import textwrap
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from types import TracebackType
 from typing import Any, Final, Self
 
 from isiw.text import plain
@@ -27,12 +26,12 @@ else:
     import tty
 
 COLUMNS: Final = 80
-"""What all that is shown fits into, where nobody knows how wide the terminal is."""
+"""The width of all that is shown, if nobody knows that of the terminal."""
 
 _GLANCE_S = 0.1
 _LAST_WORDS_S = 1.0
 ERASED: Final = "\b \b"
-"""What takes back the last sign that was typed."""
+"""The text that takes back the last sign that was typed."""
 
 ESCAPE: Final = "\x1b"
 
@@ -52,7 +51,7 @@ def is_terminal(stream: object) -> bool:
 
 
 def columns() -> int:
-    """How wide the terminal is in which the operator reads; 80 where nobody knows."""
+    """The width of the terminal in which the operator reads; 80 if nobody knows."""
     return _wide() or COLUMNS
 
 
@@ -77,7 +76,7 @@ def somebody_there() -> bool:
 
 
 def drop_typed_ahead() -> None:
-    """Forget what was typed before it was asked for, where somebody sits at a terminal."""
+    """Forget what was typed before it was asked for, if somebody sits at a terminal."""
     if not is_terminal(sys.stdin):
         return
     if sys.platform == "win32":
@@ -106,9 +105,7 @@ class Screen:
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._line:
             self._texts.put("\n")
         self._texts.put(None)
@@ -139,7 +136,7 @@ class Screen:
             self._texts.put(f"\r{self._line}\x1b[K")
 
     def counted_down(self) -> None:
-        """Clear the line that counted down, where there is one."""
+        """Clear the line that counted down, if there is one."""
         if self._counting:
             self._counting = ""
             self._texts.put(f"\r\x1b[K{self._line}")
@@ -157,14 +154,9 @@ class Screen:
     def _write(self) -> None:
         with suppress(OSError, ValueError):  # the terminal is gone
             while (text := self._texts.get()) is not None:
-                sys.stderr.write(_writable(text))
+                encoding = sys.stderr.encoding or "utf-8"  # a question mark for each sign that the terminal lacks
+                sys.stderr.write(text.encode(encoding, "replace").decode(encoding))
                 sys.stderr.flush()
-
-
-def _writable(text: str) -> str:
-    """A text with a question mark for each sign that the terminal does not have."""
-    encoding = sys.stderr.encoding or "utf-8"
-    return text.encode(encoding, "replace").decode(encoding)
 
 
 def typed(text: str) -> tuple[str, str]:
@@ -192,9 +184,7 @@ class Keys:
         self._thread.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._over.set()
         self._thread.join(_LAST_WORDS_S)
         _set_back(self._terminal)
@@ -248,7 +238,7 @@ class Keys:
                 tty.setcbreak(self._terminal, termios.TCSANOW)
 
         def _next(self) -> bytes | None:
-            """What was typed; nothing after a glance without, and an empty text where the terminal is gone."""
+            """The bytes that were typed; None after a glance without, and none if the terminal is gone."""
             try:
                 if not _in_foreground(self._terminal):
                     self._over.wait(_GLANCE_S)
@@ -280,7 +270,7 @@ else:
 
 
 def goes_on(reason: str) -> bool:
-    """Ask in the terminal whether to go on; no, where there is no terminal."""
+    """Ask in the terminal whether to go on; no, if there is no terminal."""
     if not (is_terminal(sys.stdin) and is_terminal(sys.stderr)):
         return False
     alarm(f"\n{reason} The device is disarmed. Continue? [y/N] ", end="")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 from isiw.checks import number, text, whole
@@ -17,10 +16,9 @@ from isiw.errors import DamagedLogError, InvalidValueError, LimitExceededError
 from isiw.log.headers import StrategyRecipe, ThresholdHeader
 from isiw.log.kinds import LogKind, of_another_kind
 from isiw.log.pulses import pulses_s
-from isiw.log.reader import SessionRecord, read_any
+from isiw.log.reader import SessionRecord, ThresholdRecord, read_any
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Intent, PulseOutcome, ThresholdBelief
-from isiw.log.threshold import ThresholdRecord
 from isiw.log.writer import LogWriter
 from isiw.session.assembly import begun, require_parts
 from isiw.session.examination import Examination
@@ -92,7 +90,7 @@ def resume_threshold(
 
     Args:
         log: the log, finished or not.
-        search: needed where the method is one of your own: the same again.
+        search: needed if the method is one of your own: the same again.
         clock: as for `open_threshold`.
 
     Raises:
@@ -138,15 +136,7 @@ def _threshold_of(record: SessionRecord | ThresholdRecord) -> ThresholdRecord:
 
 
 def search_of(record: ThresholdRecord, search: ThresholdSearch | None = None) -> ThresholdSearch:
-    """The search of a log, which has learnt its pulses.
-
-    Args:
-        record: the log.
-        search: as for `resume_threshold`.
-
-    Raises:
-        InvalidValueError: as for `resume_threshold`.
-    """
+    """The search of a log, which has learnt its pulses."""
     recipe, space = record.header.search, record.header.intensities
     if search is not None and search.space != space:
         raise InvalidValueError(
@@ -164,7 +154,7 @@ def _a_reason(reason: str) -> str:
 
 
 def _learnable(outcomes: Iterable[PulseOutcome]) -> tuple[Pulse, ...]:
-    """What is learnt from some outcomes."""
+    """The pulses that are learnt from some outcomes."""
     return tuple(
         Pulse(number("intensity_pct_mso", each.intensity_pct_mso), each.mep_mv, each.response, each.place_mm)
         for each in outcomes
@@ -174,7 +164,7 @@ def _learnable(outcomes: Iterable[PulseOutcome]) -> tuple[Pulse, ...]:
 
 @dataclass(frozen=True)
 class _Pulses:
-    """What came of each pulse, as it counts now, in order; its length is how many were given, or may have been."""
+    """The outcomes of pulses as they count now, in order; the length is how many were given, or may have been."""
 
     outcomes: tuple[PulseOutcome, ...] = ()
 
@@ -355,9 +345,7 @@ class ThresholdRecorder:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         try:
             if error is not None and self._sink.is_open:
                 self._examination.log_failure(error)

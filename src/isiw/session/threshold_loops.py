@@ -39,19 +39,7 @@ _THOUSANDS: Final = re.compile(r"[.,][0-9]{3}$")
 def open_simulated(
     search: ThresholdSearch, log: str | Path, *, cohort: str, seed: int, **options: Any
 ) -> ThresholdRecorder:
-    """Open a search for the threshold of a simulated person, who is kept in the log.
-
-    Args:
-        search: as for `open_threshold`.
-        log: as for `open_threshold`.
-        cohort: whose recruitment curve it is: one of `isiw.subjects.THRESHOLD_COHORTS`.
-        seed: of the person and the noise.
-        **options: further ones of `open_threshold`.
-
-    Raises:
-        InvalidValueError: an unknown cohort or a negative seed, or as for `open_threshold`.
-        LogError: as for `open_threshold`.
-    """
+    """Open a search for the threshold of a simulated person of a cohort, who is kept in the log."""
     threshold_cohort(cohort, 1, seed)
     config = {_SIMULATED: {"cohort": cohort, "seed": seed}}
     return open_threshold(
@@ -60,14 +48,7 @@ def open_simulated(
 
 
 def simulated_person(header: ThresholdHeader) -> StimulatedPerson | None:
-    """The simulated person of a log; None where nobody, or somebody else's person, was simulated.
-
-    Args:
-        header: of the log.
-
-    Raises:
-        ConfigError: the log says that somebody is simulated, but not who.
-    """
+    """The simulated person of a log; None if nobody, or somebody else's person, was simulated."""
     drawn = header.config.get(_SIMULATED) if header.device.simulated else None
     if drawn is None:
         return None
@@ -77,16 +58,7 @@ def simulated_person(header: ThresholdHeader) -> StimulatedPerson | None:
 
 
 def run_simulated(recorder: ThresholdRecorder, say: Callable[[str], None]) -> StopDecision:
-    """Stimulate the simulated person of a log until the search is over.
-
-    Args:
-        recorder: as `open_simulated` or `resume_threshold` opened it.
-        say: shows a text.
-
-    Raises:
-        ConfigError: nobody is simulated in this log.
-        LimitExceededError: a limit is reached before the search is over.
-    """
+    """Stimulate the simulated person of a log until the search is over."""
     person = simulated_person(recorder.header)
     if person is None:
         raise ConfigError("the log is of no simulated person", got=recorder.header.device.name)
@@ -105,13 +77,7 @@ def run_simulated(recorder: ThresholdRecorder, say: Callable[[str], None]) -> St
 def run_by_hand(recorder: ThresholdRecorder, read: Callable[[str], str], say: Callable[[str], None]) -> StopDecision:
     """Let an operator set each intensity and type what came of it, until the search is over or the operator ends it.
 
-    Args:
-        recorder: the open search.
-        read: shows a question and returns what was typed; raises EOFError where nobody types any more.
-        say: shows a text.
-
-    Raises:
-        LimitExceededError: a limit is reached before the search is over.
+    `read` shows a question and returns what was typed; it raises EOFError if nobody types any more.
     """
     say(ANSWERS)
     going_on = True
@@ -126,7 +92,7 @@ def run_by_hand(recorder: ThresholdRecorder, read: Callable[[str], str], say: Ca
 
 
 def _answer(recorder: ThresholdRecorder, read: Callable[[str], str], say: Callable[[str], None]) -> str:
-    """What the operator types about the next pulse, or about the last one where none is asked any more."""
+    """The operator's answer about the next pulse, or about the last one if none is asked any more."""
     decision = recorder.decision()
     if decision.stop:
         return _typed(read, f"The search is over. {decision.reason} {_LAST_WORD}")
@@ -149,7 +115,7 @@ def _typed(read: Callable[[str], str], question: str) -> str:
 
 
 def _take(recorder: ThresholdRecorder, typed: str, say: Callable[[str], None]) -> bool:
-    """Log what was typed; False where the operator ends the search here."""
+    """Log what was typed; False if the operator ends the search here."""
     over = recorder.decision().stop
     if typed == "u":
         _take_back(recorder, say)
@@ -160,19 +126,14 @@ def _take(recorder: ThresholdRecorder, typed: str, say: Callable[[str], None]) -
     elif typed in {"q", "quit"}:
         recorder.withdraw()
         return False
-    else:
-        _tell(recorder, typed)
-    say(str(recorder.estimate()))
-    return True
-
-
-def _tell(recorder: ThresholdRecorder, typed: str) -> None:
-    if typed in {"y", "n"}:
+    elif typed in {"y", "n"}:
         recorder.tell(response=typed == "y")
     elif typed == "x":
         recorder.lost("lost, said the operator")
     else:
         recorder.tell(amplitude_of(typed))
+    say(str(recorder.estimate()))
+    return True
 
 
 def _take_back(recorder: ThresholdRecorder, say: Callable[[str], None]) -> None:

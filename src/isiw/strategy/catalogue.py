@@ -11,6 +11,7 @@ from isiw.checks import whole
 from isiw.design import VALVE_SPACE, DesignSpace, require_space
 from isiw.errors import StrategyError, did_you_mean
 from isiw.models.particles.profile import ProfilePrior
+from isiw.models.protocol import profile_of
 from isiw.strategy.settings.common import (
     DescribedSetting,
     Recipe,
@@ -153,8 +154,7 @@ def make_strategy(name: str = "default", space: DesignSpace = VALVE_SPACE, seed:
         InvalidValueError: an invalid seed or setting, or no design space.
     """
     strategy = remade_strategy(name, space, seed, **settings)
-    profile = getattr(getattr(strategy.model, "prior", None), "profile", None)
-    if isinstance(profile, ProfilePrior):
+    if isinstance(profile := profile_of(strategy.model), ProfilePrior):
         profile.require_rig(space)
     return strategy
 

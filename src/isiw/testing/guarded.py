@@ -104,11 +104,11 @@ class Guarded:
 
     def _tried(self, stimulus: Stimulus) -> tuple[Answer, float]:
         self._sleep(self._pace.iti_s)
-        while (wait_s := self._rig.wait_s()) > 0:
+        while (wait_s := self._rig.limited.wait_s()) > 0:
             self._sleep(wait_s)
         began_s, timeout_s = time.monotonic(), self._pace.timeout_s
         try:
-            answer = self._rig.deliver(stimulus, timeout_s)
+            answer = self._rig.limited.deliver(stimulus, timeout_s)
         except DeviceTimeoutError as error:
             if (spent_s := time.monotonic() - began_s) > timeout_s:
                 seen = f"nothing after {spent_s:.3g} s, when it timed out and was disarmed"

@@ -14,7 +14,7 @@ from isiw.errors import ConfigError, did_you_mean
 
 
 def named_code(reference: str, folder: Path | None, key: str) -> Any:
-    """What a configuration names, imported."""
+    """The code that a configuration names, imported."""
     module_name, _, name = reference.partition(":")
     with _importable(folder):
         try:

@@ -71,7 +71,7 @@ def read_number(text: str) -> float:
 
 
 def read_whole(text: str) -> int | None:
-    """The whole number that a text is, in ASCII digits without a sign; None where it is none."""
+    """The whole number that a text is, in ASCII digits without a sign; None if it is none."""
     return int(text) if _WHOLE.fullmatch(text) else None
 
 

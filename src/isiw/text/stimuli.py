@@ -1,4 +1,4 @@
-"""What the conditioning stimulus is called wherever it is spoken of: a tap on the tendon, or an electrical pulse."""
+"""The words for the conditioning stimulus wherever it is spoken of: a tap on the tendon, or an electrical pulse."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class StimulusWords:
         return "valve command" if reference == "valve" else self.moment
 
     def isi_axis(self, reference: Reference) -> str:
-        """What the axis of a picture over ISIs is called."""
+        """The label of the axis of a picture over ISIs."""
         return f"ISI after the {self.origin(reference)} [ms]"
 
     def shown(self, reference: Reference) -> str:
@@ -76,7 +76,7 @@ STIMULI: Final[Mapping[Conditioning, StimulusWords]] = MappingProxyType(
         ),
     }
 )
-"""What conditioning stimuli are called."""
+"""The words for each conditioning stimulus."""
 
 TAP: Final = STIMULI["tap"]
 

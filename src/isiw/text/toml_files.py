@@ -36,7 +36,7 @@ _KINDS: Final = {
 
 
 def expected_instead(error: ErrorDetails) -> str:
-    """What should have been there, for after "expected"."""
+    """The description of what should have been there, for after "expected"."""
     kind, _, fault = error["type"].partition("_")
     if kind in _KINDS and fault in {"type", "parsing", "from_float", "attributes_type"}:
         return _KINDS[kind]
@@ -44,7 +44,7 @@ def expected_instead(error: ErrorDetails) -> str:
 
 
 def meant_instead(error: ErrorDetails, keys: Sequence[str] = ()) -> str:
-    """What was probably meant, as a question; empty where nothing that there is comes near."""
+    """A question about what was probably meant; empty if nothing that there is comes near."""
     if error["type"] in UNKNOWN:
         return did_you_mean(error["loc"][-1], keys)
     if error["type"] == "literal_error":  # pydantic tells the values in quotes
@@ -89,7 +89,7 @@ def parsed(text: str) -> dict[str, Any]:
 
 
 def _require_moderate(value: object, key: str = "") -> None:
-    """Raise where a whole number is too large even to be printed."""
+    """Raise if a whole number is too large even to be printed."""
     if isinstance(value, int) and value.bit_length() > _MOST_BITS:
         raise ValueError(f"{key} is a whole number of {value.bit_length()} bits, at most {_MOST_BITS} can be read")
     items: Iterable[tuple[object, object]] = ()
@@ -179,7 +179,7 @@ def read_json(text: str | bytes) -> Any:
 
 
 def refuse_doubled(text: bytes) -> None:
-    """Raise where a JSON text has a key twice; quick where it is long because of lists of numbers."""
+    """Raise if a JSON text has a key twice; quick if it is long because of lists of numbers."""
     try:
         read_json(_NUMBERS.sub(b":0", text))
     except ValueError:  # a text may look like such a list

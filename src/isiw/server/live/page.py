@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import ipaddress
 import threading
-from types import TracebackType
 from typing import Final, Self
 
 from fastapi import FastAPI
@@ -54,9 +53,7 @@ class LivePage:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     async def _serve(self) -> None:

@@ -16,11 +16,11 @@ from plotly.offline import get_plotlyjs
 from isiw.errors import InvalidValueError
 from isiw.server.answers import OkAnswer, Refusal
 from isiw.server.live.view import View
-from isiw.server.requests import ExcludeRequest, GoOnRequest, IncludeRequest, NoteRequest, body_of
+from isiw.server.requests import BodyOf, ExcludeRequest, GoOnRequest, IncludeRequest, NoteRequest
 from isiw.session.loop import Session
 
 GLANCE_S, MOST_S = 0.05, 0.5
-"""How often is looked for news, and how long at most where none is put together for a while [s]."""
+"""The time between two looks for news, and the longest if none is put together for a while [s]."""
 
 QUIET_S: Final = 2.0
 """After so long without news, the page hears that the session is still there [s]."""
@@ -35,10 +35,10 @@ FILES: Final = {
     "/live.js": ("text/javascript", lambda: _asset("isiw.server", "live.js")),
     "/plotly.js": ("text/javascript", get_plotlyjs),
 }
-"""What says nothing of the session: the files of the page, by path, with their type."""
+"""Files that say nothing of the session: those of the page, by path, with their type."""
 
 URGENT: Final = frozenset({"/pause", "/stop"})
-"""What is answered however much there is to do."""
+"""Paths that are answered however much there is to do."""
 
 _POLICY: Final = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; connect-src 'self'; "
@@ -108,7 +108,7 @@ Running = Annotated[Session, Depends(_session)]
 
 @router.get("/updates")
 async def updates(view: Annotated[View, Depends(_view)]) -> StreamingResponse:
-    """What the page shows, whenever it changes, as Server-Sent Events; until the session has ended."""
+    """The contents of the page, whenever they change, as Server-Sent Events; until the session has ended."""
     return StreamingResponse(_followed(view), media_type="text/event-stream", headers=_UPDATES_HEADERS)
 
 
@@ -140,14 +140,12 @@ async def pause(session: Running) -> OkAnswer:
 
 
 @router.post("/resume")
-def resume(session: Running, body: Annotated[GoOnRequest, Depends(body_of(GoOnRequest))]) -> OkAnswer:
+def resume(session: Running, body: Annotated[GoOnRequest, Depends(BodyOf(GoOnRequest))]) -> OkAnswer:
     """Let the paused session go on, if it still waits in the pause that was shown."""
     try:
         session.go_on(body.pause)
     except InvalidValueError as error:
-        raise Refusal(
-            409, "OtherPause", error.what, got=error.got, expected=error.expected, remedy=error.remedy, field="pause"
-        ) from error
+        raise Refusal.of(error, 409, "OtherPause", field="pause") from error
     return OkAnswer()
 
 
@@ -159,28 +157,28 @@ async def stop(session: Running) -> OkAnswer:
 
 
 @router.post("/exclude")
-def exclude(session: Running, body: Annotated[ExcludeRequest, Depends(body_of(ExcludeRequest))]) -> OkAnswer:
+def exclude(session: Running, body: Annotated[ExcludeRequest, Depends(BodyOf(ExcludeRequest))]) -> OkAnswer:
     """Let a trial not count."""
     session.exclude(body.trial, body.reason or f"Excluded {BY_PAGE}.")
     return OkAnswer()
 
 
 @router.post("/include")
-def include(session: Running, body: Annotated[IncludeRequest, Depends(body_of(IncludeRequest))]) -> OkAnswer:
+def include(session: Running, body: Annotated[IncludeRequest, Depends(BodyOf(IncludeRequest))]) -> OkAnswer:
     """Let a trial count again that was excluded."""
     session.include(body.trial)
     return OkAnswer()
 
 
 @router.post("/note")
-def note(session: Running, body: Annotated[NoteRequest, Depends(body_of(NoteRequest))]) -> OkAnswer:
+def note(session: Running, body: Annotated[NoteRequest, Depends(BodyOf(NoteRequest))]) -> OkAnswer:
     """Log a remark."""
     session.note(body.text, key=body.key)
     return OkAnswer()
 
 
 @router.post("/change")
-def change(session: Running, body: Annotated[NoteRequest, Depends(body_of(NoteRequest))]) -> OkAnswer:
+def change(session: Running, body: Annotated[NoteRequest, Depends(BodyOf(NoteRequest))]) -> OkAnswer:
     """Log that something changed that may bear on all later MEPs."""
     session.note_change(body.text, key=body.key)
     return OkAnswer()

@@ -1,4 +1,4 @@
-"""What the live page shows of a session: gathered while it runs, and put into words when somebody looks."""
+"""The contents of a session's live page: gathered while it runs, and put into words when somebody looks."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ AWAY_S: Final = 60.0
 
 
 class Shown(NamedTuple):
-    """What a page shows, and of which state of the session."""
+    """The contents of a page, and the state of the session that they are of."""
 
     state: object
     json: str
@@ -86,7 +86,7 @@ class View:
         self.over = True
 
     def is_attended(self) -> bool:
-        """Whether somebody has the page open, or had it a moment ago."""
+        """True if somebody has the page open, or had it a moment ago."""
         seen_s = self._seen_s
         return self._viewers > 0 or (seen_s is not None and time.monotonic() - seen_s < AWAY_S)
 
@@ -105,7 +105,7 @@ class View:
         self._seen_s = time.monotonic()
 
     def shown(self) -> Shown:
-        """What the page shows now; put together once for all who look, and not too often."""
+        """The contents of the page now; put together once for all who look, and not too often."""
         state = (self._news, self._session.pause_waiting, self._session.running, self.over)
         if state != self._shown.state and (self.over or time.monotonic() >= self._next_s):
             begun_s = time.thread_time()
@@ -115,7 +115,7 @@ class View:
 
     @property
     def wait_s(self) -> float:
-        """How long nothing new is put together [s]."""
+        """The time in which nothing new is put together [s]."""
         return self._next_s - time.monotonic()
 
     def _contents(self) -> dict[str, Any]:
