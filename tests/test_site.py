@@ -9,7 +9,7 @@ import re
 from typing import Any
 
 import pytest
-from docs.generate import api, commands, configuration, topics
+from docs.generate import api, commands, configuration, docstrings, topics
 from pydantic import BaseModel
 from typer.main import get_command
 
@@ -87,3 +87,25 @@ def is_section(kind: Any) -> bool:
 def test_every_topic_of_a_log_is_in_the_reference(topic: str) -> None:
     ((_, page),) = topics.pages()
     assert f"\n## `{topic}`\n" in page
+
+
+def test_a_signature_shows_types_without_the_checks_that_they_declare() -> None:
+    number, choice = "<function number at 0x7f1c>", "functools.partial(<function choice at 0x7f1d>, known=(1, 2))"
+    whole = f"(low_ms: ~typing.Annotated[float, {number}], mode: typing.Annotated[int, {choice}] | None = None) -> None"
+    assert docstrings.without_checks(whole) == "(low_ms: float, mode: int | None = None) -> None"
+
+
+def test_every_field_of_a_log_has_a_meaning() -> None:
+    ((_, page),) = topics.pages()
+    rows = re.findall(r"^\| `(\w+)` \| (.*) \|$", page, re.MULTILINE)
+    assert len(rows) > 90
+    assert [name for name, row in rows if not re.search(r" \| \S", row)] == []
+    titles = {title.replace("`", "") for title in topics.kinds()}
+    assert topics.MEANINGS.keys() <= titles
+    fields = {name for name, _ in rows}
+    assert {name for meanings in topics.MEANINGS.values() for name in meanings} <= fields
+
+
+def test_a_protocol_that_is_called_shows_how() -> None:
+    entry = REFERENCE["api/isiw.acquisition.rst"].partition("isiw.acquisition.AcquisitionFunction\n")[2]
+    assert "   :special-members: __call__" in entry.partition("\n\n")[0].splitlines()

@@ -95,6 +95,8 @@ def _entry(full: str) -> str:
         kind, options = "class", "   :members:\n"
         if thing.__bases__ != (object,):
             options += "   :show-inheritance:\n"
+        if getattr(thing, "_is_protocol", False) and "__call__" in vars(thing):
+            options += "   :special-members: __call__\n"
     elif inspect.isroutine(thing):
         kind, options = "function", ""
     else:

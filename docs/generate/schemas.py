@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from docs.generate.tables import arguments, cell, code, table
 
 
-def fields(schema: dict[str, Any], kind: Any = None, definitions: dict[str, Any] | None = None) -> str:
-    """The fields of one record: name, type, and meaning, if anything says it."""
+def fields(
+    schema: dict[str, Any],
+    kind: Any = None,
+    definitions: dict[str, Any] | None = None,
+    known: Mapping[str, str] | None = None,
+) -> str:
+    """The fields of one record: name, type, and meaning, as the docstring, the schema or `known` has it."""
     definitions = definitions or schema.get("$defs", {})
     options = [_resolved(one, definitions) for one in schema.get("oneOf", [])] or [_resolved(schema, definitions)]
-    meanings = arguments(kind)
+    meanings = {**arguments(kind), **(known or {})}
     properties = {name: one for option in options for name, one in option.get("properties", {}).items()}
     rows = [
         [code(name), cell(type_of(one)), cell(one.get("description") or meanings.get(name, ""))]

@@ -38,7 +38,7 @@ def test_the_example_in_python_runs(
 
 
 def test_the_module_of_ones_own_takes_part_as_the_study_names_it(tmp_path: Path) -> None:
-    (tmp_path / "mine.py").write_text(blocks("python")[1], encoding="utf-8")
+    (tmp_path / "mine.py").write_text(blocks("python")[2], encoding="utf-8")
     values = tomllib.loads(blocks("toml")[1]) | {"people": 1, "trials": 2}
     values["strategies"] = values["strategies"][1:]
     rows = conduct(study_from(values, "docs", tmp_path), tmp_path / "own.study").rows()
@@ -47,17 +47,43 @@ def test_the_module_of_ones_own_takes_part_as_the_study_names_it(tmp_path: Path)
 
 def test_a_strategy_of_ones_own_meets_the_people_of_a_study(capsys: pytest.CaptureFixture[str]) -> None:
     names: dict[str, Any] = {"__name__": "docs"}
-    exec(compile(blocks("python")[2], "studies.md", "exec"), names)  # noqa: S102 - the point of the test
+    exec(compile(blocks("python")[3], "studies.md", "exec"), names)  # noqa: S102 - the point of the test
     assert set(names["rows"]["strategy"]) == {"straddle"}
     assert "10" in capsys.readouterr().out
 
 
 def test_people_of_ones_own_meet_named_strategies(capsys: pytest.CaptureFixture[str]) -> None:
     names: dict[str, Any] = {"__name__": "docs"}
-    exec(compile(blocks("python")[3], "studies.md", "exec"), names)  # noqa: S102 - as above
+    exec(compile(blocks("python")[4], "studies.md", "exec"), names)  # noqa: S102 - as above
     assert len(names["rows"]) == 2 * 2 * 2
     assert set(names["rows"]["cohort"]) == {"mine"}
     assert "random" in capsys.readouterr().out
+
+
+def test_the_true_edges_of_a_person_are_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    exec(compile(blocks("python")[1], "studies.md", "exec"), {"__name__": "docs"})  # noqa: S102 - as above
+    assert "Window" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_a_model_is_shown_to_be_calibrated(capsys: pytest.CaptureFixture[str]) -> None:
+    names: dict[str, Any] = {"__name__": "docs"}
+    exec(compile(blocks("python")[5], "studies.md", "exec"), names)  # noqa: S102 - as above
+    assert len(names["ranks"]) > 5
+    assert all(0 <= rank <= 1 for ranks in names["ranks"] for rank in ranks)
+    capsys.readouterr()
+
+
+def test_rows_of_several_folders_are_put_together(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for folder, name in (("a.study", "nr"), ("b.study", "pf")):
+        conduct(study_from({"strategies": [name], "cohorts": ["gaussian"], "people": 2, "trials": 2}, "docs"), folder)
+    names: dict[str, Any] = {"__name__": "docs"}
+    exec(compile(blocks("python")[7], "studies.md", "exec"), names)  # noqa: S102 - as above
+    assert names["differences"](names["rows"])["people"].tolist() == [2]
+    assert "pf" in capsys.readouterr().out
 
 
 def test_every_column_of_a_row_is_explained(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -28,7 +28,15 @@ class AcquisitionFunction(Protocol):
         """The capability protocols that a posterior must have."""
 
     def __call__(self, posterior: Any, isi_ms: Tensor) -> Tensor:
-        """Score the candidate ISIs [ms], shape (t,), for each person, shape (b, t)."""
+        """Score the candidate ISIs for each person.
+
+        Args:
+            posterior: the posterior of b people, with the capabilities of `needs`.
+            isi_ms: the candidate ISIs [ms], shape (t,).
+
+        Returns:
+            The scores, shape (b, t), or (t,) if they are the same for all people; one that is not finite loses.
+        """
 
 
 @runtime_checkable

@@ -61,8 +61,8 @@ def detect_events(
     Args:
         acceleration: of the hammer, positive towards the tendon, shape (n, w).
         rate_hz: sampling rate of all waveforms [Hz].
-        pressure: of the chamber, shape (n, w); None where not recorded.
-        emg: shape (n, w); None where not recorded.
+        pressure: of the chamber, shape (n, w); None if not recorded.
+        emg: shape (n, w); None if not recorded.
         valve_ms: the valve command [ms from the first sample].
         t_tms_ms: the magnetic pulse of each sweep [ms from the first sample], whose own artefact is passed over.
 

@@ -34,7 +34,7 @@ DETECTION_LATENCY_MS = 5.0
 
 
 def impact_time(acceleration: ArrayLike, rate_hz: float, after_ms: float = VALVE_MS) -> float | None:
-    """The impact in one sweep [ms from its first sample], or None where there is none.
+    """The impact in one sweep [ms from its first sample], or None if there is none.
 
     Args:
         acceleration: acceleration of the hammer, positive towards the tendon, any unit, shape (w,).

@@ -104,7 +104,7 @@ def mep_amplitudes(
 def mep_onset(
     emg_mv: ArrayLike, rate_hz: float, t_tms_ms: float, window_ms: tuple[float, float] = MEP_WINDOW_MS
 ) -> float | None:
-    """Latency of the MEP in one sweep [ms after the pulse], or None where no MEP stands out of the noise.
+    """Latency of the MEP in one sweep [ms after the pulse], or None if no MEP stands out of the noise.
 
     Args:
         emg_mv: EMG [mV], shape (w,).
@@ -184,7 +184,7 @@ def background_rms(
         emg_mv: EMG [mV], shape (n, w).
         rate_hz: sampling rate [Hz].
         t_tms_ms: the magnetic pulse [ms from the first sample], one or shape (n,).
-        t_hit_ms: the impact [ms from the first sample], NaN or None where unknown.
+        t_hit_ms: the impact [ms from the first sample], NaN or None if unknown.
         tap_ms: how long after the impact the EMG may show it [ms]; that is passed over.
 
     Raises:

@@ -130,7 +130,7 @@ class ImpactDetector:
 
         Args:
             samples: acceleration, positive towards the tendon, any unit, shape (w,).
-            first: number of the first of them, as what delivers them counts; None where it does not count.
+            first: number of the first of them, as what delivers them counts; None if it does not count.
 
         Raises:
             InvalidValueError: samples that are not finite, or that do not follow on those before.

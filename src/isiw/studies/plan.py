@@ -126,7 +126,7 @@ class Unit:
 
 
 def run_unit(unit: Unit) -> pd.DataFrame:
-    """The rows of a unit; columns as in `isiw.studies.sessions.examine`, and its key and one's own code's checksum."""
+    """The rows of a unit, with the :doc:`columns </studies>` of a study, its key and one's own code's checksum too."""
     rows = simulate_batch(unit.sessions, unit.device) if unit.engine == "batched" else simulate(*unit.sessions)
     own = unit.sessions[0].own
     return rows.assign(unit=unit.key, code="" if own is None else own.checksum)

@@ -153,7 +153,7 @@ def run_study(
         on_done: called after each session with its rows, for progress, and to keep them.
 
     Returns:
-        One row a mark of each session, sorted; columns as in `isiw.studies.sessions.examine`.
+        One row a mark of each session, sorted, with the :doc:`columns </studies>` of a study but `unit` and `code`.
 
     Raises:
         InvalidValueError: no sessions, or fewer than one worker.

@@ -135,13 +135,13 @@ class SimulatedSession(Checked):
 
 
 def simulate(session: SimulatedSession) -> pd.DataFrame:
-    """Run one session with its named strategy; columns as in `examine`."""
+    """Run one session with its named strategy, to rows with the :doc:`columns </studies>` of a study."""
     with one_torch_thread():
         return play(session, session.player())
 
 
 def play(session: SimulatedSession, player: Player) -> pd.DataFrame:
-    """Run one session with any player; columns as in `examine`.
+    """Run one session with any player, to rows with the :doc:`columns </studies>` of a study.
 
     Args:
         session: the session.
