@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 from docs.generate import api, commands, configuration, docstrings, topics
+from docs.generate.meanings import MEANINGS
 from pydantic import BaseModel
 from typer.main import get_command
 
@@ -101,9 +102,9 @@ def test_every_field_of_a_log_has_a_meaning() -> None:
     assert len(rows) > 90
     assert [name for name, row in rows if not re.search(r" \| \S", row)] == []
     titles = {title.replace("`", "") for title in topics.kinds()}
-    assert topics.MEANINGS.keys() <= titles
+    assert MEANINGS.keys() <= titles
     fields = {name for name, _ in rows}
-    assert {name for meanings in topics.MEANINGS.values() for name in meanings} <= fields
+    assert {name for meanings in MEANINGS.values() for name in meanings} <= fields
 
 
 def test_a_protocol_that_is_called_shows_how() -> None:

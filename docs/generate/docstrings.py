@@ -18,7 +18,7 @@ def connect(app: Any) -> None:
 
 def _process(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:  # noqa: ARG001
     if what in {"attribute", "data", "property"}:
-        lines.insert(0, "")  # else napoleon takes what is before a colon for a type
+        lines[:0] = ["..", ""]  # an empty comment, else napoleon takes what is before a first colon for a type
     for index in range(len(lines) - 1, 1, -1):
         before = lines[index - 2]
         if lines[index].startswith("    ") and not lines[index - 1].strip() and before.strip() and before[0] != " ":
