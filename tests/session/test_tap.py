@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from isiw.design import DesignSpace
+from isiw.devices.limits import Limits
 from isiw.log.reader import read_session
 from isiw.log.schema import Event, Intent
 from isiw.session import own_response
@@ -173,6 +174,16 @@ def test_where_a_reflex_may_explain_a_window_a_longer_isi_is_asked_that_shows_it
 def test_no_session_stops_on_a_window_that_a_longer_isi_could_show_to_be_a_reflex(log: Path) -> None:
     session = of_a_reflex(0.1, 3, log.parent, NO_TAPS)
     assert not session.strategy.estimate().tap_may_explain
+
+
+def test_a_session_that_wants_longer_isis_stops_all_the_same_when_its_budget_is_used_up(
+    log: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(own_response.OwnResponse, "least_isi_ms", 100.0)
+    strategy = make_strategy(space=IMPACT, max_trials=5, particles=100, stop_no_window=0.01)
+    limits = Limits.of_space(IMPACT, max_pulses=9)
+    session = ran(TapRig(tap_alone=False), log, strategy, protocol=NO_TAPS, limits=limits)
+    assert len(session.trials) == 5
 
 
 def test_where_all_isis_are_too_short_to_show_a_reflex_the_estimate_says_so(log: Path) -> None:

@@ -13,7 +13,7 @@ from isiw.log.schema import Correction
 from isiw.log.verdicts import correction
 from isiw.session.examination import WindowExamination
 from isiw.signals.tap import TapResponses
-from isiw.strategy.stopping import OF_THE_WINDOW, StopDecision
+from isiw.strategy.stopping import OF_THE_WINDOW, StopDecision, stimuli_left
 from isiw.trials import Sweep, Trial
 from isiw.visit import PAIRS_FIRST
 
@@ -63,7 +63,10 @@ class OwnResponse:
         return None if least_ms is None or least_ms > self._high_ms else least_ms
 
     def decided(self, decision: StopDecision) -> StopDecision:
-        """A decision to stop on a window waits until an ISI has shown that it is not the response."""
+        """A decision to stop on a window waits until an ISI has shown that it is not the response, or none is left."""
         if not decision.stop or decision.kind not in OF_THE_WINDOW or self.least_isi_ms is None:
+            return decision
+        strategy = self._examination.learner.strategy
+        if stimuli_left(strategy.stopping, strategy.spent) == 0:
             return decision
         return decision.kind.go_on(f"It is too early to stop. {LONGER}")
