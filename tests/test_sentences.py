@@ -74,7 +74,7 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
         (
             sentences.edges(SURE, SPACE),
             (
-                "With 90 % probability each, it starts before 34 ms and ends between 150 and 171 ms. "
+                "It starts before 34 ms and ends between 150 and 171 ms, each with 90 % probability. "
                 "Given a window, it "
                 "starts before the range with probability 0.10."
             ),
@@ -82,8 +82,8 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
         (
             sentences.edges(PROBABLE, SPACE),
             (
-                "If there is a window, with 90 % probability each it starts before 34 ms and ends "
-                "between 150 and 171 ms. "
+                "If there is a window, it starts before 34 ms and ends "
+                "between 150 and 171 ms, each with 90 % probability. "
                 "Given a window, it starts before the range with probability 0.10, it has more than one segment with "
                 "probability 0.25."
             ),

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 from isiw.change import Change
 from isiw.design import DesignSpace
 from isiw.text.sanitize import counted
-from isiw.text.stimuli import TAP, StimulusWords
+from isiw.text.stimuli import STIMULI, TAP, StimulusWords, words_of
 from isiw.trials import Trial
 from isiw.window import LEAST_FACTOR, MIN_EXCESS_MV, SURE, Window, bayes_factor, rules_out
 
@@ -33,6 +33,8 @@ UNUSUAL: Final = 0.9
 
 THRESHOLD_PCT_RMT: Final = 100.0
 """Above this intensity a pulse evokes an MEP that can be depressed."""
+
+_EITHER: Final = words_of(STIMULI)
 
 TOO_LITTLE: Final = "too little was measured"
 
@@ -118,12 +120,12 @@ def summary(estimate: Estimate) -> str:
     return "\n".join((*lines, *filter(None, (tap_unknown(estimate),))))
 
 
-def tap_unknown(estimate: Estimate) -> str:
+def tap_unknown(estimate: Estimate, first: StimulusWords = _EITHER) -> str:
     """That the first stimulus's own response may be what is larger within a window."""
     if not estimate.tap_may_explain:
         return ""
     return (
-        "The first stimulus alone was not measured within this window: its own response, and not the MEP, may be what "
+        f"The {first.alone} was not measured within this window: its own response, and not the MEP, may be what "
         "is larger there. In the next session deliver it alone a few times (in a configuration: [protocol] tap_alone)."
     )
 
@@ -188,9 +190,8 @@ def edges(estimate: Estimate, space: DesignSpace) -> str:
     start, end = estimate.start, estimate.end
     if estimate.window is None or not (start.is_known and end.is_known):
         return ""
-    each = "With 90 % probability each, it"
-    given = each if _is_sure(estimate) else "If there is a window, with 90 % probability each it"
-    said = f"{given} starts {_between(start, space)} and ends {_between(end, space)}."
+    given = "It" if _is_sure(estimate) else "If there is a window, it"
+    said = f"{given} starts {_between(start, space)} and ends {_between(end, space)}, each with 90 % probability."
     unusual = {
         "starts before the range": start.beyond,
         "ends beyond the range": end.beyond,

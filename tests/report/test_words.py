@@ -41,7 +41,7 @@ def test_the_statement_has_window_intervals_counts_and_reason(record: SessionRec
     assert final_statement(record) == (
         "The tap probably enhances the MEP at ISIs of 33–93 ms after the valve command "
         "(probability of a window: 0.90; Bayes factor 9). "
-        "If there is a window, with 90 % probability each it starts between 28 and 38 ms and ends after 150 ms. "
+        "If there is a window, it starts between 28 and 38 ms and ends after 150 ms, each with 90 % probability. "
         "Given a window, it ends beyond the range with probability 0.67. "
         "4 pairs of stimuli were delivered; 3 count; mistrials: 1 background activity. "
         "The budget of 4 stimuli is used up."

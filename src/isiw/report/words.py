@@ -70,7 +70,7 @@ def finding_sentences(record: SessionRecord) -> list[str]:
     said = [
         sentences.finding(estimate, first, space),
         sentences.edges(estimate, space),
-        sentences.tap_unknown(estimate),
+        sentences.tap_unknown(estimate, first),
         contradiction(window, told, without_probability=estimate.probability is None),
         no_comparison(window, told),
         changed_with_time(window, told),
