@@ -12,8 +12,8 @@ from typer.main import get_command
 from isiw.cli.main import app
 
 _CODES = """
-Exit codes: 0 all is well, 1 an error, 2 wrong usage, 3 a damaged log, 5 a session that a person should look at, 130
-Ctrl-C.
+Exit codes: 0 all is well, 1 an error, 2 wrong usage, 3 a damaged log, 4 a device that could not be disarmed, so that
+the process ended, 5 a session that has paused or was ended early, 130 Ctrl-C or a signal.
 """
 
 

@@ -144,7 +144,8 @@ class StrategyConfig(Section):
 
     Args:
         name: one of `isiw.list_strategies()`.
-        settings: its settings by key, as `isiw.list_settings` has them.
+        settings: its settings by key, as `isiw.list_settings` has them. Where no device of isiw's states an electrical
+            pulse in the place of the tap, as over HTTP and in `isiw analyse`, `conditioning = "electrical"` does.
     """
 
     name: Annotated[str, AfterValidator(lambda name: choice("the strategy", name, list_strategies()))] = "default"
