@@ -29,6 +29,9 @@ from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial, Tr
 from scripted import ScriptedDevice, scripted_strategy
 from wrong_rigs import NAMED, SPACE, WRONG, rig
 
+NEVER: dict[str, Any] = {"stop_width_ms": 0.001, "stop_expected_f1": 1.0, "stop_gain": 0.0, "stop_no_window": 1.0}
+"""Settings of a strategy that stops for no finding."""
+
 
 def strategy_for_rigs(max_trials: int = 20) -> Strategy:
     return make_strategy("default", SPACE, max_trials=max_trials, particles=200)
@@ -129,8 +132,7 @@ def test_microvolts_pause_a_session_once(log: Path) -> None:
 
 def test_a_stimulator_that_stops_firing_pauses_the_session(log: Path) -> None:
     device = ScriptedDevice(lambda s: Measurement(0.1 + 0.02 * s.trial if s.trial < 8 else 0.0, s.isi_ms))
-    never: dict[str, Any] = {"stop_width_ms": 0.001, "stop_expected_f1": 1.0, "stop_gain": 0.0, "stop_no_window": 1.0}
-    result = Session(device, make_strategy("random", particles=50, max_trials=60, **never), log=log).run()
+    result = Session(device, make_strategy("random", particles=200, max_trials=60, **NEVER), log=log).run()
     assert len(result.trials) < 40
     assert "Does the stimulator still fire" in result.decision.reason
 
@@ -259,7 +261,7 @@ def test_what_is_wrong_with_a_rig_that_returns_sweeps_pauses_it_once_and_a_movem
     info = DeviceInfo("own", "impact", simulated=True, channels={"emg": "mV"})
     device = CallbackDevice(lambda stimulus, _: answer(stimulus), info)
     going_on = Safeguards(on_pause=lambda _reason: True)
-    strategy = make_strategy("even", DesignSpace(40, 280, reference="impact"), max_trials=trials)
+    strategy = make_strategy("even", DesignSpace(40, 280, reference="impact"), max_trials=trials, **NEVER)
     Session(device, strategy, log=log, safeguards=going_on).run()
     pauses = [event.finding for event in read_session(log).events if event.kind == "pause"]
     assert [kind for kind in pauses if kind is not None] == found
