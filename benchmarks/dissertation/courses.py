@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -73,17 +73,31 @@ def live(method: str, people: Sequence[SimulatedSubject], person: int, seed: int
         response = responder.respond(isi_ms, "valve")
         return isi_ms if response.isi_ms is None else response.isi_ms, response.mep_mv
 
-    return _followed(strategy, unrelated(answer, SPACE, seed + person) if wrong == UNRELATED else answer, person)
+    asked = unrelated(answer, SPACE, seed + person) if wrong == UNRELATED else answer
+    return _followed(strategy, _asked(strategy, asked), person)
 
 
-def _followed(strategy: isiw.Strategy, answer: Answer, person: int) -> Course:
-    """A session until the strategy stops, with what it believed on the way."""
-    course = Course(person, [], [], [], [], np.array([]), ())
-    generation: list[float] = []
+def _asked(strategy: isiw.Strategy, answer: Answer) -> Iterator[tuple[float, float]]:
+    """The trials of a session until the strategy stops, each told to it."""
     while not strategy.decision().stop:
         answered = answer(strategy.ask())
-        course.told.append(answered)
         strategy.tell(*answered)
+        yield answered
+
+
+def _learnt(strategy: isiw.Strategy, trials: Iterable[tuple[float, float]]) -> Iterator[tuple[float, float]]:
+    """The trials of a session that is over, each learnt by the strategy."""
+    for trial in trials:
+        strategy.learn(*trial)
+        yield trial
+
+
+def _followed(strategy: isiw.Strategy, trials: Iterable[tuple[float, float]], person: int) -> Course:
+    """The estimates of a strategy after each of the trials."""
+    course = Course(person, [], [], [], [], np.array([]), ())
+    generation: list[float] = []
+    for answered in trials:
+        course.told.append(answered)
         estimate = strategy.estimate()
         generation.append(answered[0])
         if estimate.spread_ms is not None and (window := estimate.window) is not None and len(generation) == GENERATION:
@@ -109,7 +123,6 @@ def online(people: Sequence[SimulatedSubject], person: int, seed: int) -> Course
     pair = Pair("impact", "open-loop", seed, person, seed + person, 0)
     played = session_of(robot(people[person], pair), isiw.make_strategy("nr", IMPACT_SPACE, seed + person))
     told = [(trial.isi_ms, trial.mep_mv) for trial in played.trials if trial.reason is None and not trial.tap_alone]
-    # The same strategy once more, on what the session measured: a session does not keep its profiles.
-    again = isiw.make_strategy("nr", IMPACT_SPACE, seed + person, max_trials=len(told))
-    measured = iter(told)
-    return _followed(again, lambda _: next(measured), person)
+    # Once more, on what the session measured: a session does not keep its profiles.
+    again = isiw.make_strategy("nr", IMPACT_SPACE, seed + person)
+    return _followed(again, _learnt(again, told), person)
