@@ -40,7 +40,7 @@ from isiw.models.particles.profile import ShapeShares
 from isiw.models.shared.scales import Scale
 from isiw.priors import LabPrior
 from isiw.priors.lab import share_of
-from isiw.priors.population import Block, People, hyper_prior, place
+from isiw.priors.population import LatentBlock, People, hyper_prior, place
 from isiw.priors.population import learnt as law_of
 from isiw.studies import SimulatedSession, simulate
 from isiw.subjects import LABS, Lab, SimulatedSubject, cohort, lab
@@ -111,7 +111,7 @@ def with_known_windows(prior: Prior, people: Sequence[SimulatedSubject]) -> Prio
         people: some of the lab.
     """
     windows = [[p.profile.start_ms + p.hit_delay_ms, math.log(p.profile.width_ms)] for p in people]
-    block = Block(
+    block = LatentBlock(
         np.array(windows)[:, None], np.full((len(people), 1), CERTAIN), np.full((len(people), 1), fill_value=True)
     )
     hyper = {"place": hyper_prior(Prior(), VALVE_SPACE)["place"]}
