@@ -51,7 +51,8 @@ def run(
         folder = store.folder
         processes = (os.cpu_count() or 1) if workers is None else workers
         executor = studies.DaskCluster(scheduler) if scheduler else studies.Processes(processes)
-        kept = f"Interrupted. All that is finished is kept; continue with: {command('study', 'run', folder)}"
+        again = ("study", "run", source, "--out", folder) if source.is_file() else ("study", "run", folder)
+        kept = f"Interrupted. All that is finished is kept; continue with: {command(*again)}"
         with errors_reported(kept), _bar(left) as on_done:
             studies.conduct(store.study, folder, executor, retry=retry, on_done=on_done)
         _say_what_is_there(store)

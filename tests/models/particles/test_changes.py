@@ -161,10 +161,9 @@ def test_no_session_stops_on_a_window_that_time_alone_may_explain() -> None:
 
 @pytest.mark.slow
 def test_of_people_without_a_window_whose_amplitudes_rise_hardly_any_is_sure_to_have_one() -> None:
-    # Eight people of seeds for work; all amplitudes are multiplied by 5 after 14 trials.
+    # People of seeds for work; all amplitudes are multiplied by 5 after 14 trials. One in twelve is sure on average.
     sure = named = 0
-    for seed in range(8):
-        person = cohort("recruitment", seed + 1, 500)[seed]
+    for seed, person in enumerate(cohort("recruitment", 24, 500)):
         assert isinstance(person.response, RecruitmentResponse)
         responder = replace(person, response=replace(person.response, boost_pct_rmt=0.0)).begin(seed)
         strategy = isiw.make_strategy("default", seed=seed, space=VALVE_SPACE)
@@ -174,5 +173,5 @@ def test_of_people_without_a_window_whose_amplitudes_rise_hardly_any_is_sure_to_
         estimate = strategy.estimate()
         sure += (estimate.probability or 0.0) >= 0.9
         named += estimate.change is not None and estimate.change.is_sure
-    assert sure <= 1  # seven for a belief that knows no changes
-    assert named >= 7
+    assert sure <= 6  # seven of eight if the prior knows no changes
+    assert named >= 20
