@@ -105,6 +105,12 @@ def test_the_mark_of_tms_alone_is_what_somebody_says(mark: str, cell: Any) -> No
     assert [trial.is_control for trial in person.trials] == [False, True, False]
 
 
+def test_columns_of_which_nothing_is_read_are_named() -> None:
+    (person,) = read_people(frame(note=["", "cough", "", "", ""], Ausschluss=["", "x", "", "", ""]), IMPACT)
+    assert person.unused == ("note",)
+    assert [trial.counts for trial in person.trials] == [True, False, True, True, True]
+
+
 @pytest.mark.parametrize(
     "judged",
     [

@@ -135,6 +135,8 @@ def _analyse_all(people: list[Person], way: Way, source: Path) -> None:
         for person in people:
             _analyse_one(person, way, source, several=several)
             progress.advance(task)
+    if unused := people[0].delivered.unused:
+        show(f"Columns not used: {', '.join(unused)}. If one excludes trials, name it: --column exclude=NAME.")
 
 
 def _analyse_one(person: Person, way: Way, source: Path, *, several: bool) -> None:

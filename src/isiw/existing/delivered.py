@@ -41,6 +41,7 @@ class Delivered:
         conditioning: the conditioning stimulus.
         simulated: true if nobody was stimulated: the person is simulated.
         units: the units in which ISIs and amplitudes are stated where they are from.
+        unused: the columns of a table of which nothing was read.
 
     Raises:
         InvalidValueError: no pair of stimuli, more trials than any session has, or numbers that are probably in another
@@ -59,6 +60,7 @@ class Delivered:
     conditioning: Conditioning = "tap"
     simulated: bool = False
     units: tuple[str, str] = ("ms", "mV")
+    unused: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if len(self.trials) >= MOST_TRIALS:

@@ -98,6 +98,7 @@ def _person(
         source=source,
         created=_created(columns, rows[0]),
         units=columns.units,
+        unused=columns.unused,
         blocks={n: block for n, block in enumerate(blocks) if n and block != blocks[n - 1]},
     )
 

@@ -163,6 +163,7 @@ class Columns:
     factors: Mapping[str, float]
     rows: int
     units: tuple[str, str]
+    unused: tuple[str, ...] = ()
 
     @classmethod
     def found(cls, frame: pd.DataFrame, layout: Layout, source: str) -> Columns:
@@ -187,7 +188,8 @@ class Columns:
                 factors[key] = ISI_UNITS_MS[_told(columns[key].name, ISI_UNITS_MS) or isi_unit]
         if "background" in columns:
             factors["background"] = 1e3 * EMG_UNITS_MV[_told(columns["background"].name, EMG_UNITS_MV) or "uV"]
-        return cls(columns, factors, len(frame), (isi_unit, mep_unit))
+        unused = tuple(name for name in names if name not in held.values() and name.strip())
+        return cls(columns, factors, len(frame), (isi_unit, mep_unit), unused)
 
     def number(self, key: str, row: int) -> float | None:
         """A number of a row, in ms, mV or µV; None if there is none."""
