@@ -259,7 +259,7 @@ def test_ctrl_c_says_that_all_is_kept_and_how_to_go_on(tmp_path: Path, started: 
     os.killpg(started.pid, signal.SIGINT)  # a terminal tells the workers, too
     _, errors = started.communicate(timeout=30)
     assert started.returncode == 130, errors
-    assert f"continue with: isiw study run {tmp_path / 'tiny.study'}" in errors
+    assert f"continue with: isiw study run {tmp_path / 'tiny.toml'} --out {tmp_path / 'tiny.study'}" in errors
     assert "Traceback" not in errors
     finished_to_the_end(tmp_path / "tiny.study")
 
