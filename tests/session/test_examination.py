@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,9 @@ from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Intent
 from isiw.log.verdicts import exclusion
 from isiw.log.writer import LogWriter
+from isiw.models.particles.prior import Prior
 from isiw.session import Recorder, ThresholdRecorder, examination, open_threshold
+from isiw.session.assembly import BELIEF_VERSION
 from isiw.session.examination import WindowExamination, examination_of
 from isiw.session.sink import Sink
 from isiw.strategy.threshold import IntensityRange, make_threshold_search
@@ -99,6 +102,11 @@ def test_a_header_says_what_its_log_is_of_and_one_of_a_threshold_has_no_isis(tmp
     assert (header("own.mcap")["kind"], header("rmt.mcap")["kind"]) == ("session", "threshold")
     assert header("own.mcap").keys() >= {"belief_version", "engine_version"}
     assert header("rmt.mcap").keys().isdisjoint({"space", "signals", "limits", "strategy"})
+
+
+def test_another_prior_has_another_belief_version() -> None:
+    digest = hashlib.sha256(repr(Prior()).encode()).hexdigest()[:16]
+    assert {BELIEF_VERSION: digest} == {3: "48b39c36be862aae"}  # of a new prior: the next number, and its digest
 
 
 def test_an_option_that_a_session_does_not_have_is_refused(tmp_path: Path) -> None:
