@@ -117,6 +117,7 @@ def replay(  # noqa: PLR0913, PLR0917 - an option each
                 found[0].delivered, names, seeds=seeds, trials=trials, on_done=lambda: progress.advance(task)
             )
         show(f"{replayed}")
+        _say_unused(found)
         if output is not None:
             show(f"picture: {replayed.plot(output, overwrite=overwrite)}")
 
@@ -135,7 +136,12 @@ def _analyse_all(people: list[Person], way: Way, source: Path) -> None:
         for person in people:
             _analyse_one(person, way, source, several=several)
             progress.advance(task)
-    if unused := people[0].delivered.unused:
+    _say_unused(people)
+
+
+def _say_unused(people: list[Person]) -> None:
+    """Name the columns of which nothing was read: one of them may exclude trials, which count then."""
+    if unused := dict.fromkeys(name for person in people for name in person.delivered.unused):
         show(f"Columns not used: {', '.join(unused)}. If one excludes trials, name it: --column exclude=NAME.")
 
 
