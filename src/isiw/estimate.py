@@ -24,10 +24,7 @@ PROFILE_DECIMALS: Final = 6  # a nanovolt; the profile is a picture of the poste
 
 
 class Edge(NamedTuple):
-    """An edge of a window, given that there is one: median, 90 % interval [ms], and how probably it is out of range.
-
-    Beyond the range it is ±inf; what a method does not have is None.
-    """
+    """An edge, given a window: median, 90 % interval [ms], ±inf beyond the range, and how probably it is there."""
 
     median_ms: float | None = None
     low_ms: float | None = None
@@ -62,10 +59,7 @@ class BestISI(NamedTuple):
 
 
 class Enhancement(NamedTuple):
-    """By how much the expected MEP is larger than without a tap [mV].
-
-    The shift of a recruitment curve's input that does so [% RMT] is None if the model has no such curve.
-    """
+    """By how much the tap enlarges the expected MEP [mV], and the shift of the recruitment curve's input [% RMT]."""
 
     mep_mv: float
     shift_pct_rmt: float | None = None

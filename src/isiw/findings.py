@@ -1,7 +1,4 @@
-"""Findings about data or a rig: a `Finding` says what is wrong, how badly, and what to do; and slips of unit.
-
-A finding's kind and severity are what code goes by; its text and remedy are for people, and nothing reads them.
-"""
+"""Findings about data or a rig: code goes by kind and severity, people by text and remedy; and slips of unit."""
 
 from __future__ import annotations
 
@@ -91,14 +88,7 @@ MISTRIALS: Final = tuple(Kind)[: tuple(Kind).index(Kind.OUTCOME_UNKNOWN) + 1]
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that is wrong with a sweep, an amplitude, an ISI or a rig.
-
-    Args:
-        kind: what it is.
-        severity: what follows from it.
-        text: what was seen, as a sentence without a full stop.
-        remedy: the likely cause and what to do, in full sentences.
-    """
+    """A fault of a sweep, an amplitude, an ISI or a rig; its text has no full stop, its remedy is full sentences."""
 
     kind: Kind
     severity: Severity
@@ -133,15 +123,7 @@ def lacking(pairs: int | None, *, silent: bool) -> Finding | None:
 
 @dataclass(frozen=True)
 class Scale:
-    """The values that a quantity can have, and the units in which a value beyond them was probably told.
-
-    Args:
-        least: the smallest.
-        most: the largest.
-        too_small: the unit that a smaller value is in, and by what to multiply it.
-        too_large: the unit that a larger value is in, and by what to divide it.
-        usual: what it is in the median.
-    """
+    """A quantity's possible values, its usual one, and the unit and factor that smaller and larger ones were in."""
 
     least: float = 0.0
     most: float = math.inf

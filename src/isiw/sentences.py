@@ -1,7 +1,4 @@
-"""Sentences about a result: each is written here once, for the terminal, reports, pages, pictures and comparisons.
-
-A sentence takes figures and values, and decides nothing but its words; one that does not apply is empty.
-"""
+"""Sentences about a result, for all who show one; each decides only its words, and is empty if it does not apply."""
 
 from __future__ import annotations
 

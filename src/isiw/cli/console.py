@@ -128,10 +128,7 @@ def say_unread(record: SessionRecord) -> None:
 
 @contextmanager
 def errors_reported(interrupted: str = "Interrupted.") -> Iterator[None]:
-    """Turn what isiw raises, and what the operating system refuses, into a message and an exit code.
-
-    What a lab's own code raises, or a fault of isiw, is shown with its traceback, and its message again at the end.
-    """
+    """Turn errors into a message and an exit code; those of a lab's own code keep their traceback."""
     try:
         with _interruptible():
             yield

@@ -1,7 +1,4 @@
-"""Continuing a logged session with a configuration: what it says holds, is refused, or is said to be left aside.
-
-Whom a logged session simulated is read as names and numbers; nothing that a log names is imported or opened.
-"""
+"""Continuing a logged session with a configuration: nothing that a log names is imported or opened."""
 
 from __future__ import annotations
 
@@ -42,13 +39,7 @@ class _LoggedRun(BaseModel):
 
 @dataclass(frozen=True)
 class Truth:
-    """The true window of the person whom `isiw run` simulated.
-
-    Args:
-        known: whether somebody was simulated whose window is known.
-        window: the window; None if there is none.
-        lacking: why it is not known, though the log says that somebody was simulated; else empty.
-    """
+    """The true window of the person whom `isiw run` simulated, or why it is not known though one was simulated."""
 
     known: bool = False
     window: Window | None = None
@@ -110,11 +101,7 @@ def read_to_resume(log: Path, config: Path | None) -> SessionRecord:
 
 
 def changes_on_resume(config: RunConfig, record: SessionRecord) -> dict[str, Any]:
-    """The limits, signals and time-out a session continues with, as arguments of `isiw.resume`.
-
-    `[limits]` and `[signals]` count as wholes, as for `isiw run`; without one of them it stays as it was logged last,
-    as `isiw.resume` says. The intensity that the session is bound to stays, unless the configuration names another one.
-    """
+    """What holds from here on as arguments of `isiw.resume`: each of `[limits]` and `[signals]` counts as a whole."""
     record.require_read()
     header, given = record.header, config.model_fields_set
     _require_space(config, header)
@@ -133,10 +120,7 @@ def changes_on_resume(config: RunConfig, record: SessionRecord) -> dict[str, Any
 
 
 def differences_on_resume(config: RunConfig, record: SessionRecord) -> tuple[str, ...]:
-    """The differences of the file from the log, in words.
-
-    Those of limits, signals and time-out hold from here on, those of strategy, protocol and visit do not.
-    """
+    """The differences of the file from the log, in words; only limits, signals and time-out hold from here on."""
     header, changes = record.header, changes_on_resume(config, record)
     changed = [
         *_differing("limits", header.limits, changes.get("limits", limits_of_log(header))),
@@ -210,10 +194,7 @@ def _told(value: object) -> object:
 
 
 def after_error(session: Session, config: Path | None, error: BaseException | None, *, delivered: bool) -> list[str]:
-    """The way to resume a session that an error has ended, in lines; the command comes last.
-
-    A session that was over when the error came, as if the device could not be let go of, cannot be resumed.
-    """
+    """The lines that say how to continue after an error; the command comes last."""
     if _is_over(session.log_path):
         seen = command("show", session.log_path)
         return [f"The session is over, and its log is complete. See what was found with: {seen}"]

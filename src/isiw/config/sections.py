@@ -1,7 +1,4 @@
-"""The sections of a configuration file, the robots that they name, and values that are probably in another unit.
-
-These are refused where somebody states them; a log that was made with them is read, and continues.
-"""
+"""The sections of a configuration file; a slip of unit is refused where somebody states it, and not in a log."""
 
 from __future__ import annotations
 

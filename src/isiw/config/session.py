@@ -276,10 +276,7 @@ def _require_used(subject: SubjectConfig) -> None:
 
 
 def _kept(config: RunConfig) -> dict[str, Any]:
-    """The part of a configuration that a log keeps; never what names code to import.
-
-    What a prior came to is in the strategy's recipe; where it came from is kept for whoever reads the log.
-    """
+    """The part of a configuration that a log keeps: for readers, where a prior came from; no names of code."""
     kept = config.model_dump(mode="json", exclude_none=True, exclude={"log", "device", "signals"})
     if config.subject.data is not None:
         kept["subject"]["data"] = str(config.subject.data.resolve())

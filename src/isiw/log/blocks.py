@@ -1,8 +1,4 @@
-"""The blocks of records in a log's file: found by their marks where nothing else leads to them, unpacked within limits.
-
-A log may come from anywhere, so what it unpacks to is limited by its own size, and so is the number of its records. The
-index at the end of a closed log counts them.
-"""
+"""The blocks of records in a log's file: found by their marks, and unpacked within limits, whoever made the log."""
 
 from __future__ import annotations
 

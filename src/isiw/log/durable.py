@@ -145,10 +145,7 @@ class DurableFile:
         return None
 
     def rescued(self, wanted: Path) -> Path:
-        """Copy what the open file holds to a free name near the wanted one, and return it.
-
-        The folder is made again where it is gone, and the one for temporary files stands in where that cannot be.
-        """
+        """Copy what the open file holds to a free name near the wanted one, or in the folder for temporary files."""
         try:
             wanted.parent.mkdir(parents=True, exist_ok=True)
             return self._copied(wanted.parent, wanted)

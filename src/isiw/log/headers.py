@@ -102,10 +102,7 @@ class ProductionHeader(LogRecord):
 
 
 class Production(LogRecord):
-    """One interval that was produced, and what the person saw of it.
-
-    `trial` counts through all blocks, from 0; `light` is None except in mode 2.
-    """
+    """One produced interval and what the person saw; `trial` counts through all blocks, `light` is of mode 2."""
 
     trial: int = Field(ge=0)
     block: int = Field(ge=0)

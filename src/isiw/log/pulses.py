@@ -22,10 +22,7 @@ _TIMED = ("/intent", "/trial", "/event")
 
 
 def pulses_s(salvaged: Salvage, now_ns: int | None = None) -> list[float]:
-    """The age of each stimulus of a log [s], from when it was about to be delivered; refused ones do not count.
-
-    A stimulus whose intent is lost counts by the record of its trial.
-    """
+    """The age of each stimulus of a log [s], refused ones left out; without an intent its trial's record counts."""
     return _ages_s(_given(salvaged), now_ns)
 
 
@@ -57,10 +54,7 @@ def _timed(message: Message) -> Record | None:
 
 
 def earlier_pulses_s(folder: str | Path, subject: str, period_s: float, *, but: Path) -> list[float]:
-    """The age of each stimulus of a subject, by the logs of a folder [s]; those of simulations do not count.
-
-    Stimuli that several logs tell of, as an exported copy does, count once.
-    """
+    """The ages of a subject's stimuli in a folder's logs [s], each once; those of simulations do not count."""
     folder = Path(folder)
     if not folder.is_dir():
         raise LogError("there is no such folder of logs", got=str(folder), remedy="Check Safeguards.earlier_logs.")

@@ -32,17 +32,10 @@ HeaderT = TypeVar("HeaderT", Header, ThresholdHeader)
 
 @dataclass(frozen=True, eq=False)
 class _StimuliRecord(Generic[HeaderT]):
-    """The contents of a log of stimuli.
+    """The contents of a log of stimuli; `history` has all records but headers and waveforms, in order.
 
-    Args:
-        path: the file that was read.
-        header: what the session or the search is; of one that was resumed, what it went on with last.
-        history: all records but headers and waveforms, in the order in which they were logged.
-        losses: what could not be read, a sentence each; empty if the log is whole.
-        finished: whether the session closed its log.
-        end_lost: whether its end is missing, so that nobody knows how many stimuli it told of.
-        delivered: how many stimuli were given by its index, or may have been; 0 if it has none.
-        unread: parts of the header that this version cannot read, and why; something neutral stands in for each.
+    `losses` are sentences; with `end_lost` nobody knows how many stimuli there were; `delivered` is 0 without an index,
+    and `unread` are parts of the header in whose place something neutral stands, and why.
     """
 
     path: Path
@@ -98,12 +91,7 @@ class ThresholdRecord(_StimuliRecord[ThresholdHeader]):
 
 @dataclass(frozen=True, eq=False)
 class SessionRecord(_StimuliRecord[Header]):
-    """A session as its log tells it.
-
-    Args:
-        waveforms: the recorded channels, by trial and name.
-        onsets: when each stimulus was about to be delivered, by its trial's number.
-    """
+    """A session as its log has it; `waveforms` are by trial and channel, `onsets` by trial."""
 
     waveforms: Mapping[tuple[int, str], Channel] = field(default_factory=dict, repr=False)
     onsets: Mapping[int, Onset] = field(default_factory=dict, repr=False)

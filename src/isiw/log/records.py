@@ -28,23 +28,14 @@ from isiw.trials import Channel, Trial
 
 
 class Onset(NamedTuple):
-    """When a stimulus was about to be delivered.
-
-    Args:
-        onset_s: since the first one of the log, by the session's clock [s].
-        at_ns: when its intent was logged [ns since 1970].
-    """
+    """When a stimulus was about to be delivered: since the log's first one [s], and by the computer's clock."""
 
     onset_s: float
     at_ns: int
 
 
 class Onsets:
-    """The onsets of a log whose intents come one after the other.
-
-    A session's clock begins again if the session is resumed, so the time between the stimuli before and after
-    that is the log's, as it is where the session's clock stood still.
-    """
+    """The onsets of a log's stimuli; if the session's clock began again or stood still, the log's time counts."""
 
     def __init__(self) -> None:
         self.by_trial: dict[int, Onset] = {}
@@ -132,17 +123,7 @@ MOST_LOSSES: Final = 50
 
 @dataclass
 class Records:
-    """The records of a log by their kind, and what makes no sense.
-
-    Args:
-        salvaged: what was read from the log.
-        header: the last header.
-        history: all other records but waveforms, in order; of a trial that is there twice, the first.
-        waveforms: the recorded channels, by trial and name.
-        losses: what was left out, a sentence each.
-        onsets: when each stimulus was about to be delivered.
-        unread: parts of the header that cannot be read, and why.
-    """
+    """The records of a log by kind, the last header, `losses` in sentences, and unreadable parts of the header."""
 
     salvaged: Salvage
     header: AnyHeader | None = None

@@ -25,19 +25,9 @@ from isiw.text.sanitize import counted
 
 @dataclass
 class Salvage:
-    """Everything that was read of a log.
+    """All that was read of a log; `losses` are sentences, and topics are known even if their definition is lost.
 
-    Args:
-        path: the file that was read.
-        size: its size [bytes].
-        fingerprint: which file it was, and in which state.
-        messages: the records, in the order in which they were written.
-        attachments: by name.
-        losses: what could not be read, a sentence each; empty if nothing is missing.
-        finished: whether the session closed its log.
-        end_lost: whether the end of a closed log is missing, so that nobody knows how many stimuli it told of.
-        counted: how many records of each topic the index at the end counts; empty if there is no such index.
-        topics: by channel number; known beforehand, in case the chunk that defines the channels is lost.
+    With `end_lost` nobody knows how many stimuli there were; `counted` has the index's counts by topic.
     """
 
     path: Path

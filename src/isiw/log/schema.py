@@ -64,10 +64,7 @@ class Intent(LogRecord):
 
 
 class PulseOutcome(LogRecord):
-    """The outcome of a pulse on the way to a motor threshold; with a `reason`, nothing was learnt from it.
-
-    The intensity is None if the log has lost it.
-    """
+    """The outcome of a pulse on the way to a threshold; with a `reason` nothing was learnt from it."""
 
     trial: TrialNumber
     intensity_pct_mso: float | None
@@ -289,14 +286,7 @@ def json_schema(topic: str) -> tuple[str, bytes]:
 
 @dataclass(frozen=True)
 class Message:
-    """One record, still as bytes.
-
-    Args:
-        topic: its topic.
-        data: its JSON.
-        log_time_ns: when it was logged [ns since 1970].
-        sequence: its number in the file, from 0.
-    """
+    """One record, still as bytes of JSON; `sequence` is its number in the file."""
 
     topic: str
     data: bytes

@@ -88,11 +88,7 @@ class LogWriter:
     def continuing(
         cls, path: str | Path, salvage: Salvage, header: AnyHeader, as_resumed: AnyHeader | None = None
     ) -> Self:
-        """Continue a log: everything that was salvaged, and then what comes.
-
-        The old file keeps its place until the copy is durable. Where something was lost it is kept for good, as
-        `FILE.damaged`.
-        """
+        """Continue a salvaged log; the old file stays until the copy is durable, and for good if it is damaged."""
         target = log_of(Path(path))
         with claimed(salvage.path) as source, disk_errors(target, "the log cannot be continued", "It stays as it was."):
             _require_unchanged(source, salvage)

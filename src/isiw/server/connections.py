@@ -1,8 +1,7 @@
 """Connections: how many there may be, and how long each may take.
 
-A stranger is a connection that has not shown the token yet. Strangers never count against those that have: of too many
-strangers the oldest is closed for a new one, counted from the moment that it is accepted, before TLS. Whoever opens too
-many with the token is answered so, and still pauses and stops a session.
+Whoever has not shown the token is a stranger: of too many the oldest is closed, before TLS, and they never count
+against those that have. Whoever opens too many with the token is answered so, and still pauses and stops a session.
 """
 
 from __future__ import annotations

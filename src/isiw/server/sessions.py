@@ -84,10 +84,7 @@ class Sessions:
             return self._resume(name, read_session(self._existing(name)), lost_pulses)
 
     def close(self, name: str) -> SessionAnswer:
-        """Close a session; one that is closed already stays so.
-
-        One that was open when its server was killed is resumed first, so that its log is finished, too.
-        """
+        """Close a session, if it is open; one that was open when its server was killed is resumed first."""
         if not self._is_open(name) and part_of(self._existing(name)).exists():
             self.resume(name)
         if self._is_open(name):

@@ -43,17 +43,7 @@ _PACKAGES = ("numpy", "torch", "botorch", "gpytorch")
 
 @dataclass(frozen=True)
 class Earlier:
-    """Where an earlier run of a session ended; by default there was none.
-
-    Args:
-        open_log: opens the log, with the header that holds from here on.
-        trials: what was delivered; the strategy has learnt it.
-        events: what happened.
-        kept: fields of the header that stay as they were logged.
-        first_records: what is logged first; never empty if there was an earlier run.
-        ages_s: how long ago each stimulus was [s].
-        taps: what its sweeps show of the first stimulus alone, by what a sweep must satisfy.
-    """
+    """Where an earlier run ended, and the header's fields that stay; without `first_records` there was none."""
 
     open_log: Callable[[Header], LogWriter]
     trials: TrialTable = field(default_factory=TrialTable)

@@ -1,9 +1,7 @@
 """The examination: what is known of a person, and the one way in which a trial or a verdict changes it.
 
-Ask, log the intent, log what came of it, learn it, log what is known then: the same for the closed loop, for a loop of
-the lab's own, and for the search for a motor threshold. The intent is on disk before the stimulus is delivered, the
-trial before it is learnt, and it is learnt before the next stimulus. Each step is taken once, even if the next one is
-interrupted. After a verdict all trials are learnt again, as they count from then on.
+The intent is on disk before the stimulus, the trial before it is learnt, and it is learnt before the next stimulus.
+Each step is taken once, even if the next one is interrupted. After a verdict all trials are learnt again.
 """
 
 from __future__ import annotations
@@ -162,10 +160,7 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
             self.unconcluded = trial
 
     def judge(self, verdict: Callable[[TableT], Event]) -> None:
-        """Put on disk what an operator says about a trial; from then on all trials have to be learnt again.
-
-        With a key that an event has already, nothing is.
-        """
+        """Put a verdict on disk, unless its key was logged before; all trials are then learnt again."""
         with self._lock:
             event = verdict(self.trials)
             if event.key is not None and event.key in self._keys:

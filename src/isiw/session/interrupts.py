@@ -1,7 +1,6 @@
-"""Signals of the operator and the system: each disarms at once, and interrupts where nothing is in flight.
+"""Signals of the operator and the system: each disarms at once, and interrupts if nothing is in flight.
 
-If nothing else helps the process ends, with the reason on the screen and in the log. What it holds open, such as a
-serial port, is closed by that; a rig with an interlock disarms then.
+If nothing else helps the process ends, which closes what it holds open; a rig with an interlock disarms then.
 """
 
 from __future__ import annotations
@@ -137,10 +136,7 @@ class Interrupts:
         return self._ended > self._settled or self.insisted
 
     def acknowledge(self) -> None:
-        """Deliver no KeyboardInterrupt for what was heard so far; it is being dealt with.
-
-        Returns when the device was disarmed for it, so that whoever arms it again is not disarmed by an old signal.
-        """
+        """Let no KeyboardInterrupt come for what was heard, and return once the device was disarmed for it."""
         self._acknowledged = self._handled  # before the next line: a signal between them is heard later
         self._pending = False
         self._wait_until(self._is_disarmed, _DISARMING_S)

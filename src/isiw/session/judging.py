@@ -36,10 +36,7 @@ class Judging(ABC):
         self._examination.note(text, key=key)
 
     def note_change(self, text: str, *, key: str | None = None) -> None:
-        """Log that something changed that may bear on all MEPs from here on, such as a coil that was re-seated.
-
-        A strategy that reckons with changes takes one for likely then.
-        """
+        """Log that something bears on all MEPs from here on; a strategy that reckons with changes expects one."""
         self._judge(lambda trials: change(trials, text, key))
 
     @property

@@ -1,7 +1,4 @@
-"""The closed loop: ask, log the intent, deliver, judge, log the trial, learn.
-
-What is on disk is always ahead of what happens next: the intent before its stimulus, the trial before it is learnt.
-"""
+"""The closed loop: what is on disk is always ahead of what happens next, by intent, trial and learning."""
 
 from __future__ import annotations
 

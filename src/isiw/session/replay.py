@@ -35,11 +35,7 @@ _RENAMED: Final = {"zero_below_mv": "threshold_mv"}
 
 
 class Replayed(NamedTuple):
-    """A strategy that has learned a log: all its trials, and of these those whose outcome is not in the log.
-
-    In `differing` trials it would have asked something else than was logged with other versions. From `asks_from` on
-    asks can be compared with the strategy's; those before were asked with other versions, or never compared.
-    """
+    """A strategy that has learned a log; asks in `differing` trials, and before `asks_from`, are other versions'."""
 
     strategy: Strategy
     trials: TrialTable

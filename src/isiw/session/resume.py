@@ -236,11 +236,7 @@ def _session_resumed(
 
 
 def limits_of_log(header: Header) -> Limits:
-    """The limits that a device goes on with where none are stated: those that were logged last.
-
-    A loop of the lab's own keeps its intervals itself, and has none by default; a device that takes it over has at
-    least the default one.
-    """
+    """The limits that were logged last; a device gets at least the default interval, which an own loop has not."""
     limits = header.limits
     if header.device.name != OWN_LOOP or limits.iti_s >= USUAL_ITI_S:
         return limits

@@ -1,7 +1,4 @@
-"""The steps of a session: ask, wait, log the intent, deliver, judge, log the trial, and conclude it; and its pauses.
-
-A pause disarms at once; whoever answers it first decides, and only an answer arms again.
-"""
+"""The steps of a session, from asking to concluding a trial, and its pauses, which disarm until somebody answers."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The terminal: single keys are read in a thread of their own, and what is shown is written in another.
-
-Neither waits for the other: who presses a key is heard also if the terminal takes no output.
-"""
+"""The terminal: a thread reads single keys, and another writes, so that keys are heard if no output is taken."""
 
 from __future__ import annotations
 
@@ -167,11 +164,7 @@ def typed(text: str) -> tuple[str, str]:
 
 
 class Keys:
-    """Reads single keys of standard input while it is entered; Ctrl-C and its like stay signals.
-
-    Nothing is read while the process is in the background, where reading would stop it. Arrows and function keys are
-    passed over.
-    """
+    """Reads single keys while it is entered, but not in the background, where reading would stop the process."""
 
     def __init__(self, press: Callable[[str], None], gone: Callable[[], None]) -> None:
         self._press, self._gone = press, gone

@@ -75,10 +75,7 @@ def run_simulated(recorder: ThresholdRecorder, say: Callable[[str], None]) -> St
 
 
 def run_by_hand(recorder: ThresholdRecorder, read: Callable[[str], str], say: Callable[[str], None]) -> StopDecision:
-    """Let an operator set each intensity and type what came of it, until the search is over or the operator ends it.
-
-    `read` shows a question and returns what was typed; it raises EOFError if nobody types any more.
-    """
+    """Let an operator set intensities and type outcomes; `read` raises EOFError if nobody types any more."""
     say(ANSWERS)
     going_on = True
     while going_on:

@@ -12,13 +12,7 @@ from isiw.strategy.course import Choice
 
 @dataclass(frozen=True)
 class Asked:
-    """The ISIs that were asked for and not learnt yet.
-
-    Args:
-        choice: the next one; None if nothing was asked since the last trial.
-        fallback: why it, or one of the batch, is not the acquisition function's choice; None if all are.
-        batch_ms: those of the last batch [ms].
-    """
+    """The ISIs that were asked for and not learnt yet: the next one, and the rest of a batch [ms]."""
 
     choice: Choice | None = None
     fallback: str | None = None

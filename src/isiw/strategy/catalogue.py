@@ -26,10 +26,7 @@ from isiw.strategy.strategy import Strategy
 
 @dataclass(frozen=True)
 class _Entry:
-    """A named strategy, and the settings that it stands for.
-
-    The family is where its usual settings are: they are loaded, with its model, only when the strategy is made.
-    """
+    """A named strategy, and where its usual settings are: they are loaded only when it is made."""
 
     summary: str
     family: str

@@ -1,8 +1,4 @@
-"""The course of the examination of b people: what is asked of each next, and what a stopping rule looks back on.
-
-A `Course` never changes: a trial more gives the next one. One person's `Strategy` and a batch of people wrap the
-same course, so that both follow the same rules.
-"""
+"""The course of the examination of b people, one of a `Strategy` or a batch of them; a trial gives the next one."""
 
 from __future__ import annotations
 
@@ -47,14 +43,7 @@ that one, or is asked again because its trial was lost."""
 
 @dataclass(frozen=True)
 class Choice:
-    """The next ISI of one person.
-
-    Args:
-        isi_ms: the ISI [ms], on the grid.
-        fallback: why it is not the acquisition function's choice; None if it is.
-        by: what it was chosen by.
-        scores: of `candidate_isis`, less their cost, shape (t,); None if none were worked out.
-    """
+    """The next ISI of one person, on the grid; scores are of `candidate_isis`, less their cost, shape (t,)."""
 
     isi_ms: float
     fallback: str | None = None
@@ -64,10 +53,7 @@ class Choice:
 
 @cache
 def candidate_isis(space: DesignSpace) -> Tensor:
-    """Evenly spaced ISIs of the design grid to score [ms], both ends included, shape (t,); at most `MAX_CANDIDATES`.
-
-    One tensor for all callers, who leave it as it is.
-    """
+    """Evenly spaced ISIs to score [ms], both ends included, shape (t,); one tensor for all, who leave it as it is."""
     grid = space.grid_ms
     stride = max(1, math.ceil((len(grid) - 1) / (MAX_CANDIDATES - 1)))
     picked = sorted({*range(0, len(grid), stride), len(grid) - 1})
@@ -130,14 +116,7 @@ class Method:
 
 @dataclass(frozen=True, eq=False)
 class Estimates:
-    """The estimates of b people after some trials, each made once, and only if somebody asks.
-
-    Args:
-        posterior: None once all estimates are made.
-        pairs: how many pairs of stimuli of each person it has learnt.
-        made: those made so far, by person.
-        first: that before the first trial; None if it is this.
-    """
+    """The estimates of b people after so many pairs, each made once, and only if somebody asks."""
 
     posterior: Posterior | None
     pairs: int
@@ -163,14 +142,8 @@ class Estimates:
 class Course:
     """The trials of b people so far, the posterior, and what is asked of each next.
 
-    Args:
-        first: the state before the first trial.
-        told: trials of each.
-        alone: how many of those were TMS alone.
-        earlier: the states before the last trial, as far as the stopping rule looks back on them.
-        paired: whether the last trial was a pair of stimuli.
-        known: pairs that were learnt of each before the first ask; no plan and no budget counts them.
-        known_told: trials that were, those with TMS alone among them.
+    `alone` of the `told` trials were TMS alone; `earlier` are the states that the stopping rule looks back on. What was
+    learnt before the first ask, `known` pairs and `known_told` trials, counts for no plan and no budget.
     """
 
     method: Method

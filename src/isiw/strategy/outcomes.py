@@ -81,15 +81,7 @@ class Outcome(Checked):
 
 @dataclass(frozen=True)
 class Outcomes:
-    """All outcomes so far.
-
-    Args:
-        reference: what ISIs count from.
-        stated_step_mv: the step of the amplitudes [mV]; 0 for none, None to have it found.
-        pulses: what came of each pulse.
-        taps: ISI [ms] and amplitude [mV] of each tap alone.
-        changes: after how many pulses something changed that may bear on all of them.
-    """
+    """All outcomes so far: of pulses, and ISI [ms] and amplitude [mV] of taps alone; changes by pulses before."""
 
     reference: Reference
     stated_step_mv: float | None = None

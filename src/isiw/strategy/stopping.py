@@ -1,7 +1,4 @@
-"""When to stop: rules that look at the progress of a session and answer with a reason.
-
-A rule is a frozen settings object called with a `Progress`. Rules compose with `AnyOf`.
-"""
+"""When to stop: rules, frozen settings that compose with `AnyOf`, answer a `Progress` with a decision and a reason."""
 
 from __future__ import annotations
 
@@ -64,15 +61,7 @@ class StopDecision:
 
 @dataclass(frozen=True)
 class Progress:
-    """The progress of a session.
-
-    Args:
-        delivered: pairs of stimuli delivered so far; mistrials count.
-        told: pairs learnt so far.
-        estimate: of the window now.
-        past: the estimates after each of the last few pairs told, as many as `looks_back(rule)`; the first is the one
-            after the last of the initial ISIs.
-    """
+    """A session's delivered pairs, mistrials included, those learnt, and the estimates now and before."""
 
     delivered: int
     told: int
@@ -114,11 +103,7 @@ class HasBudget(Protocol):
 
 @dataclass(frozen=True)
 class Budget(Checked):
-    """Stop when `max_trials` stimuli have been delivered; mistrials count.
-
-    Args:
-        max_trials: how many stimuli.
-    """
+    """Stop when `max_trials` stimuli have been delivered; mistrials count."""
 
     max_trials: Count
 
@@ -138,14 +123,8 @@ class Budget(Checked):
 class CredibleWidth(Checked):
     """Stop when the credible intervals of both edges are narrow enough, and a window is likely.
 
-    Where the model weighs hypotheses (`WindowEstimate.hypotheses`), the intervals must be narrow and agree under each
-    that is still probable: sessions that stop early do so on the hypothesis that promises most (decision 10).
-
-    Args:
-        width_ms: the largest acceptable width of each edge's interval [ms].
-        level: the credible level of the intervals.
-        min_probability: the least probability of a window.
-        min_share: the least probability of a hypothesis that must be reckoned with.
+    If the model weighs hypotheses, the intervals must be narrow and agree under each of at least `min_share`: sessions
+    that stop early do so on the hypothesis that promises most (decision 10).
     """
 
     width_ms: Positive
@@ -176,11 +155,7 @@ class CredibleWidth(Checked):
 
 @dataclass(frozen=True)
 class NoWindow(Checked):
-    """Stop when it is all but certain that there is no window.
-
-    Args:
-        probability: the least probability of "no window" to stop at.
-    """
+    """Stop when "no window" is at least this probable."""
 
     probability: Annotated[float, partial(number, above=0, most=1)] = 0.9
 
@@ -199,12 +174,7 @@ class NoWindow(Checked):
 
 @dataclass(frozen=True)
 class ExpectedF1(Checked):
-    """Stop when the reported window is expected to be right enough.
-
-    Args:
-        f1: the least expected F1 to stop at; 1 for never, as finitely many samples may all agree on one window.
-        min_probability: the least probability of a window.
-    """
+    """Stop at this expected F1 of a probable window; never at 1, as finitely many samples may all agree on one."""
 
     f1: Share = 0.9
     min_probability: Share = 0.9
@@ -227,14 +197,7 @@ class ExpectedF1(Checked):
 
 @dataclass(frozen=True)
 class SmallGain(Checked):
-    """Stop when another few stimuli would hardly add anything: returns diminish, so the last few tell what they would.
-
-    Args:
-        gain: what the last stimuli must have added to the expected F1 for the session to go on; 0 for any, also a loss.
-        last: how many stimuli.
-        min_told: the fewest pairs to stop after.
-        min_probability: the least probability of a window.
-    """
+    """Stop when the `last` stimuli added less than `gain` to the expected F1, as the next would; never at 0."""
 
     gain: Share = 0.02
     last: Count = 10
@@ -263,11 +226,7 @@ class SmallGain(Checked):
 
 @dataclass(frozen=True)
 class AnyOf:
-    """Stop as soon as one of the rules says so; its reason is given.
-
-    Args:
-        rules: the rules, asked in order.
-    """
+    """Stop as soon as one of the rules, asked in order, says so; its reason is given."""
 
     rules: tuple[StoppingRule, ...]
 

@@ -53,10 +53,7 @@ def require_fitting(make: Callable[..., object], settings: Mapping[str, Any], ke
 
 @contextmanager
 def _importable(folder: Path | None) -> Iterator[None]:
-    """Within, modules of a folder can be imported before any others of their name; later, after them.
-
-    Drivers are often imported late, and a lab's file may have the name of a module that isiw imports late.
-    """
+    """Within, a folder's modules are imported first; later, as drivers may be imported late, after all others."""
     if folder is None:
         yield
         return

@@ -1,7 +1,4 @@
-"""Text from elsewhere, made harmless, values, numbers and counts in a few words, and commands as one types them.
-
-What a terminal, a page or a picture would obey is taken out.
-"""
+"""Text from elsewhere without what a terminal, a page or a picture would obey; values and commands in few words."""
 
 from __future__ import annotations
 

@@ -14,15 +14,9 @@ from isiw.types import Conditioning, Reference
 class StimulusWords:
     """The words for a conditioning stimulus, or for several of them.
 
-    Args:
-        name: in a sentence, behind "the".
-        one: the same with its article.
-        given: what is given, and where to.
-        moment: when it comes, behind "the"; ISIs count from it.
-        mark: the same in a picture.
-        hit: the same, before "time".
-        pulse: what the magnetic pulse is called beside it.
-        by_valve: whether a valve is commanded before it.
+    `name` and `moment`, from which ISIs count, stand behind "the"; `one` has its article; `given` says what and where
+    to; `mark` is short, for a picture; `hit` stands before "time"; `pulse` is the magnetic pulse beside it. `by_valve`
+    says whether a valve is commanded before it.
     """
 
     name: str

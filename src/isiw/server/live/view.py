@@ -41,10 +41,7 @@ class Shown(NamedTuple):
 
 
 class View:
-    """Follows one session. It keeps the last sweep, the last estimate and the last events, and no others.
-
-    The session's threads call a follower's methods, the server's thread everything else.
-    """
+    """Keeps one session's last sweep, estimate and events; its threads call the follower's methods."""
 
     def __init__(self, session: Session) -> None:
         self._session = session

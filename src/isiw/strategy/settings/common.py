@@ -1,9 +1,7 @@
-"""The settings of a named strategy: the fields of its parts, each under a key of its own.
+"""The settings of a named strategy: the fields of its model, its asking and its stopping, each under a key of its own.
 
-A strategy has three parts: the model, what is asked, and when to stop. The keys that a
-configuration, a log and `make_strategy` know are the names of the parts' fields, so that no setting is written down
-twice. A field that a part marks with `metadata={"spread": True}` gives its own fields keys in its place. What a rig or
-a lab knows, `KNOWN`, has short keys of its own.
+The keys are the fields' names, so that no setting is written down twice. A field with `metadata={"spread": True}` gives
+its own fields keys in its place; what a rig or a lab knows, `KNOWN`, has short keys.
 """
 
 from __future__ import annotations
@@ -247,10 +245,7 @@ def _converted(setting: Setting, value: Any, source: str) -> Any:
 
 
 def _merged(default: Any, given: Mapping[str, Any]) -> dict[str, Any]:
-    """The default's fields, with what is given in their place, nested ones merged in the same way.
-
-    Of shares what is not named is 0: they sum to 1 in a log of a version that did not know all of today's kinds.
-    """
+    """The default's fields, nested ones merged, with what is given; of shares, which sum to 1, the others are 0."""
     merged, inner = asdict(default), {f.name: getattr(default, f.name) for f in fields(default)}
     shares = {f.name for f in fields(default) if f.metadata.get("shares")}
     for key, value in given.items():
@@ -276,16 +271,7 @@ _UNITS: Final = {"ms": "ms", "ms2": "ms²", "mv": "mV", "uv": "µV", "s": "s", "
 
 @dataclass(frozen=True)
 class DescribedSetting:
-    """One setting, or a group of them.
-
-    Args:
-        key: its name as in a configuration or a call of `make_strategy`; those of a group follow it, after a dot, and
-            what the tables of a list have, after brackets.
-        value: what it is by default; None if it is not set, and for a group. A list of tables is set as a whole.
-        unit: of the value; empty if it has none.
-        meaning: what it is, in a sentence.
-        group: whether its values are those of its members.
-    """
+    """A setting, or a group, whose members' keys follow its own after a dot, or after brackets in a list of tables."""
 
     key: str
     value: Any

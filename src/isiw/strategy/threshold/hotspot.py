@@ -1,8 +1,4 @@
-"""The hot spot: where the coil evokes an MEP at the lowest intensity, sought with pulses of one intensity.
-
-The effect of the coil falls off as a Gaussian of its distance from the hot spot; an MEP then says how far the pulse was
-above or below the threshold, as on the way to the threshold itself.
-"""
+"""The hot spot: where the threshold is lowest; the effect of a pulse falls off from there as a Gaussian."""
 
 from __future__ import annotations
 
@@ -33,13 +29,7 @@ _USEFUL_PCT: Final = (-25.0, 30.0)  # beyond these distances from the threshold 
 
 @dataclass(frozen=True)
 class CoilPulse(Checked):
-    """One pulse and what came of it, by the coil's place.
-
-    Args:
-        x_mm: the coil's place from the middle of the searched area [mm].
-        y_mm: the same, across [mm].
-        mep_mv: peak-to-peak amplitude of the MEP [mV].
-    """
+    """One pulse by the coil's place from the middle of the searched area [mm], and its MEP's amplitude [mV]."""
 
     x_mm: Number
     y_mm: Number
@@ -66,13 +56,7 @@ def _require_a_response(pulses: Sequence[CoilPulse]) -> None:
 
 @dataclass(frozen=True)
 class WalkedHotSpot(Checked):
-    """The classical way: the same number of pulses at every place of a grid; the largest mean MEP is the hot spot.
-
-    Args:
-        half_width_mm: of the searched square [mm].
-        step_mm: between two places [mm].
-        repeats: pulses at each place.
-    """
+    """The classical way: `repeats` pulses at every place of a grid; the largest mean MEP is the hot spot."""
 
     half_width_mm: Positive = 25.0
     step_mm: Positive = 10.0
@@ -100,15 +84,7 @@ class WalkedHotSpot(Checked):
 
 @dataclass(frozen=True)
 class BayesHotSpot(Checked):
-    """A posterior on a grid of places, spreads, intensities and recruitment curves.
-
-    It asks where the posterior knows least how much the coil acts.
-
-    Args:
-        half_width_mm: of the searched square [mm].
-        step_mm: between two places [mm].
-        curves: the possible recruitment curves.
-    """
+    """A posterior of places, spreads, intensities and recruitment curves; it asks where the effect is least known."""
 
     half_width_mm: Positive = 25.0
     step_mm: Positive = 5.0
@@ -140,13 +116,7 @@ class BayesHotSpot(Checked):
 
 @dataclass(frozen=True)
 class HotSpotSearch(Checked):
-    """Seeks the hot spot at the highest intensity of the range: the coil goes where its effect is least known.
-
-    Args:
-        half_width_mm: of the searched square [mm].
-        stop_sd_mm: stop when the hot spot is known this well [mm].
-        max_pulses: stop after so many pulses in any case.
-    """
+    """Seeks the hot spot at the highest intensity of the range: the coil goes where its effect is least known."""
 
     half_width_mm: Positive = 25.0
     stop_sd_mm: Positive = 4.0

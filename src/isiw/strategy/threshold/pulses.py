@@ -1,7 +1,4 @@
-"""Single pulses of TMS by intensity: which may be asked, what came of them, and what they say about the threshold.
-
-The resting motor threshold is the intensity at which half of the pulses evoke an MEP above 50 µV [Rossini2015].
-"""
+"""Single pulses of TMS by intensity: which may be asked, and what they say about the threshold [Rossini2015]."""
 
 from __future__ import annotations
 
