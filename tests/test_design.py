@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.devices.limits import Limits
 from isiw.errors import InvalidValueError, LimitExceededError, OutOfSpaceError
-from isiw.strategy.course import candidate_isis
+from isiw.strategy.choice import candidate_isis
 
 spaces = st.builds(
     lambda low, step, count: DesignSpace(low, low + step * count, step_ms=step, reference="impact"),

@@ -14,9 +14,8 @@ from isiw.log.schema import EstimateRecord, decode, encode
 from isiw.session.examination import estimate_record
 from isiw.session.loop import Session
 from isiw.session.resume import open_session
-from isiw.strategy.asked import Asked
 from isiw.strategy.catalogue import make_strategy
-from isiw.strategy.course import candidate_isis
+from isiw.strategy.choice import Asked, candidate_isis
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Measurement
 from known import instance, known

@@ -15,7 +15,7 @@ from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import StrategyError
 from isiw.models.protocol import Posterior, Tensor
 from isiw.strategy.catalogue import make_strategy
-from isiw.strategy.course import Choice, best_choices, candidate_isis, evenly_spaced
+from isiw.strategy.choice import Choice, best_choices, candidate_isis, evenly_spaced
 
 FIVE = DesignSpace(0, 4, reference="impact")
 

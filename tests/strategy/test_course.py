@@ -14,7 +14,8 @@ from isiw.dissertation.strategies import Settling
 from isiw.models.particles import ParticlePosterior
 from isiw.models.protocol import Observation, Posterior, Tensor
 from isiw.strategy.catalogue import make_strategy
-from isiw.strategy.course import Choice, Course, Method, evenly_spaced
+from isiw.strategy.choice import Choice, evenly_spaced
+from isiw.strategy.course import Course, Method
 from isiw.strategy.stopping import Budget
 from known import instance
 

@@ -11,7 +11,7 @@ import pytest
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.strategy.catalogue import make_strategy
-from isiw.strategy.outcomes import Outcome, Outcomes, found_step_mv
+from isiw.strategy.course import Outcome, Outcomes, found_step_mv
 from isiw.strategy.strategy import Strategy
 from isiw.window import Window
 from known import known

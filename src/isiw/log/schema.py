@@ -112,7 +112,7 @@ class EstimateRecord(Estimate):
 
     Nine of ten next MEPs lie between `predicted_low_mv` and `predicted_high_mv`, at the ISIs of the profile.
     `stop_kind` says what the decision rests on, `chosen_by` what chose the next ISI
-    (`isiw.strategy.course.ChosenBy`), and `scores` are those of the acquisition function at `scored_ms`; both are
+    (`isiw.strategy.choice.ChosenBy`), and `scores` are those of the acquisition function at `scored_ms`; both are
     empty if nothing is asked next.
     """
 

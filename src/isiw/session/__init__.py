@@ -2,8 +2,8 @@
 
 from isiw.log.kinds import LogKind, imported_sentence
 from isiw.session import threshold_loops
-from isiw.session.again import estimate_again
 from isiw.session.console import PROGRESS_HEADINGS, aligned, progress_row
+from isiw.session.judging import estimate_again
 from isiw.session.loop import Session
 from isiw.session.recorder import Recorder
 from isiw.session.resume import open_session, resume

@@ -25,7 +25,7 @@ from isiw.signals.evidence import Evidence, told_of
 from isiw.signals.limits import isi_far, require_plausible
 from isiw.signals.rig import remedy_for
 from isiw.signals.watch import Doubts, findings
-from isiw.strategy.outcomes import Outcome
+from isiw.strategy.course import Outcome
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Status, Stimulus, Trial, TrialTable

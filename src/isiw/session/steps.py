@@ -15,8 +15,7 @@ from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, Limi
 from isiw.findings import Finding, Kind
 from isiw.log.headers import Header
 from isiw.log.schema import Event, Intent, Waveform
-from isiw.session.examination import WindowExamination
-from isiw.session.own_response import LONGER, OwnResponse
+from isiw.session.examination import LONGER, OwnResponse, WindowExamination
 from isiw.session.rig import Rig
 from isiw.session.sink import SessionUpdate, Sink
 from isiw.signals.judgement import judge, judge_measurement

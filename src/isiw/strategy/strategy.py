@@ -17,9 +17,8 @@ from isiw.models.protocol import Posterior, PredictsMeps, ReportsTrouble, Respon
 from isiw.signals.evidence import Evidence, Told, is_silent
 from isiw.signals.limits import isi_far, require_plausible
 from isiw.signals.watch import Doubts, findings
-from isiw.strategy.asked import Asked
-from isiw.strategy.course import Choice, Cost, Method, instead_of_lost
-from isiw.strategy.outcomes import Details, Outcome, Outcomes
+from isiw.strategy.choice import Asked, Choice, Cost, instead_of_lost
+from isiw.strategy.course import Details, Method, Outcome, Outcomes
 from isiw.strategy.settings.common import Recipe
 from isiw.strategy.stopping import StopDecision, StopKind, StoppingRule, stimuli_left
 from isiw.trials import Trial

@@ -15,7 +15,8 @@ from isiw.errors import StudyError
 from isiw.estimate import WindowEstimate
 from isiw.lazy import pd, torch
 from isiw.models.protocol import Observation, Posterior, ReportsTrouble, Tensor
-from isiw.strategy.course import Choice, Method, instead_of_lost
+from isiw.strategy.choice import Choice, instead_of_lost
+from isiw.strategy.course import Method
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.studies.execution import one_torch_thread

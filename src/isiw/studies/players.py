@@ -20,7 +20,7 @@ from isiw.errors import ConfigError, StudyError
 from isiw.estimate import WindowEstimate
 from isiw.models.protocol import ResponseModel
 from isiw.strategy.catalogue import make_strategy
-from isiw.strategy.course import Choice
+from isiw.strategy.choice import Choice
 from isiw.strategy.stopping import StopDecision, StopKind, StoppingRule
 from isiw.strategy.strategy import Strategy
 from isiw.subjects.subject import Response

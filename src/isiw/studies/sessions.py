@@ -19,7 +19,7 @@ from isiw.lazy import pd
 from isiw.metrics import covers, f1
 from isiw.signals import wrong_isi
 from isiw.strategy.catalogue import known_settings, make_strategy
-from isiw.strategy.course import Choice
+from isiw.strategy.choice import Choice
 from isiw.strategy.stopping import stimuli_left
 from isiw.studies.execution import one_torch_thread
 from isiw.studies.players import Crowd, OwnCode, Player, Reported, alone
