@@ -23,7 +23,7 @@ import numpy as np
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-KERNELS: Final = 2
+KERNELS: Final = 3
 """Version of the kernels: it grows if the same draws come to other numbers."""
 
 LANES: Final = 16
@@ -186,11 +186,13 @@ else:
 
 
 _ONE, _HALF, _MOST = np.float32(1.0), np.float32(0.5), np.float32(126.0)
+_WHOLE = np.float32(1.5 * 2**23)
+_BELL, _LEAST_BELL = np.float32(-0.5 * 1.4426950408889634), np.float32(-60.5 * 1.4426950408889634)
 _TWO, _THREE_HALVES = np.float32(2.0), np.float32(1.5)
 _LOG2E, _LN2 = np.float32(1.4426950408889634), np.float32(0.6931471805599453)
 _E1, _E2, _E3 = np.float32(0.6931472067), np.float32(0.2402264923), np.float32(0.0555032721)
 _E4, _E5, _E6 = np.float32(0.0096184373), np.float32(0.0013400429), np.float32(0.0001546976)
-_SQRT_HALF = np.float32(0.70710678)
+_SQRT_HALF = np.int32(0x3F3504F3)
 _L0, _L1, _L2 = np.float32(7.0376836292e-2), np.float32(-1.1514610310e-1), np.float32(1.1676998740e-1)
 _L3, _L4, _L5 = np.float32(-1.2420140846e-1), np.float32(1.4249322787e-1), np.float32(-1.6668057665e-1)
 _L6, _L7, _L8 = np.float32(2.0000714765e-1), np.float32(-2.4999993993e-1), np.float32(3.3333331174e-1)
@@ -214,13 +216,18 @@ def smaller(a: Any, b: Any) -> Any:
 
 
 @inlined
+def _exp2(x: Any) -> Any:
+    """Power of 2, in single precision, within ±126."""
+    shifted = x + _WHOLE  # whose last bits are the whole number next to it
+    f = x - (shifted - _WHOLE)
+    power = _ONE + f * (_E1 + f * (_E2 + f * (_E3 + f * (_E4 + f * (_E5 + f * _E6)))))
+    return _float_of(np.int32(_bits_of(power) + np.int32(_bits_of(shifted) << 23)))
+
+
+@inlined
 def exp2(x: Any) -> Any:
     """Power of 2, in single precision; beyond ±126 as at ±126."""
-    inside = smaller(larger(x, -_MOST), _MOST)
-    whole = np.floor(inside + _HALF)
-    f = inside - whole
-    power = _ONE + f * (_E1 + f * (_E2 + f * (_E3 + f * (_E4 + f * (_E5 + f * _E6)))))
-    return power * _float_of(np.int32((np.int32(whole) + 127) << 23))
+    return _exp2(smaller(larger(x, -_MOST), _MOST))
 
 
 @inlined
@@ -230,17 +237,20 @@ def exp(x: Any) -> Any:
 
 
 @inlined
+def bell(z: Any) -> Any:
+    """exp(-z² / 2), in single precision; what is as good as 0 stays a normal number, which is much faster."""
+    return _exp2(larger(_BELL * z * z, _LEAST_BELL))
+
+
+@inlined
 def log(x: Any) -> Any:
     """Natural logarithm of a positive number, in single precision."""
     bits = _bits_of(larger(x, _TINY))
-    exponent = np.float32(np.int32((bits >> 23) - 126))
-    mantissa = _float_of(np.int32((bits & 0x007FFFFF) | 0x3F000000))
-    low = mantissa < _SQRT_HALF
-    exponent = exponent - _ONE if low else exponent
-    m = (mantissa + mantissa if low else mantissa) - _ONE
+    exponent = np.int32((bits - _SQRT_HALF) >> 23)
+    m = _float_of(np.int32(bits - (exponent << 23))) - _ONE  # from √½ to √2, less 1
     tail = _L5 + m * (_L4 + m * (_L3 + m * (_L2 + m * (_L1 + m * _L0))))
     square = m * m
-    return m - _HALF * square + square * m * (_L8 + m * (_L7 + m * (_L6 + m * tail))) + exponent * _LN2
+    return m - _HALF * square + square * m * (_L8 + m * (_L7 + m * (_L6 + m * tail))) + np.float32(exponent) * _LN2
 
 
 @inlined

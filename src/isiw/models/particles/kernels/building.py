@@ -56,7 +56,7 @@ def prior_tables(
     where[: len(at)] = [latents if index < 0 else index for index in at]
     most_kinds = max(map(len, moves["kinds"]))
     law: dict[str, Any] = {"at": where, "spreads": spreads.numpy().copy(), "log_shares": log_shares, "below": below}
-    law |= {"means": means, "sds": sds}
+    law |= {"means": means, "sds": sds, "per_sds": 1.0 / sds}
     law |= {"first": np.array(first), "size": np.array(size), "components": np.array(components)}
     law |= dict(zip(("start_ms", "density", "quantiles"), knots, strict=True)) | _of_places(places)
     made: dict[str, Any] = {

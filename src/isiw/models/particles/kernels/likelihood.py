@@ -10,7 +10,22 @@ from typing import Any, Final
 
 import numpy as np
 
-from isiw.compiled import exp, exp2, larger, log, loop, ndtr, part, per, per_root, smaller, total, writer
+from isiw.compiled import (
+    bell,
+    exp,
+    exp2,
+    inlined,
+    larger,
+    log,
+    loop,
+    ndtr,
+    part,
+    per,
+    per_root,
+    smaller,
+    total,
+    writer,
+)
 from isiw.models.particles.kernels.records import (
     BOOST,
     CHANGED,
@@ -89,8 +104,6 @@ _PEAK_SD, _APART_SD, _TOGETHER = _f(PEAK_SD), _f(APART_SD), _f(TOGETHER)
 _SQUARED = _f(-2.0 / math.log(2.0))
 _FURTHEST = _f(34.0)  # squares of the distance from the peak, in flanks: behind it facilitation is below 1e-29
 _LEAST_SIZE, _LEAST_REACH, _LEAST_MASS = _f(1e-9), _f(1e-12), _f(1e-9)
-_BELL = _f(-0.5 / math.log(2.0))
-_END = _f(11.0)
 _ROOT = _f(1.0 / math.sqrt(2.0 * math.pi))
 _OUT_LOW, _OUT_HIGH = _f(OUTLIER_LOG_RANGE[0]), _f(OUTLIER_LOG_RANGE[1])
 _OUT_DENSITY = _f(1.0 / (OUTLIER_LOG_RANGE[1] - OUTLIER_LOG_RANGE[0]))
@@ -121,8 +134,7 @@ def facilitations(particle: Any, isi_ms: Any, level: Any, count: int) -> None:
         for i in range(count):
             share = (isi_ms[i] - start) / width
             a, b = (share - _FIRST_PEAK) * per_sd, (share - _SECOND_PEAK) * per_sd
-            a, b = smaller(a * a, _f(150.0)), smaller(b * b, _f(150.0))
-            level[i] = first * exp2(_BELL * a) + second * exp2(_BELL * b)
+            level[i] = first * bell(a) + second * bell(b)
     else:
         peak_at = _HALF + _f(0.33) * form if kind == _SKEWED else _HALF
         rise, fall = -_ONE / (peak_at * width), _ONE / ((_ONE - peak_at) * width)
@@ -242,50 +254,64 @@ def _inputs(particle: Any, trials: Any, count: int, node: Any, work: Any) -> Non
             responds[i] = most * math.sqrt(level[i]) if kind == _MISSING else _ONE
 
 
+@inlined
+def _normal(share: Any, variance: Any, of_trial: Any) -> Any:
+    """Density of a log MEP by the evoked part of its mean, in floors, and that part's variance, but for a constant."""
+    _, _, known, relative, floor_variance, _, _ = of_trial
+    mean = _ONE + share + known
+    inverse_sd = mean * per_root(share * share * variance + floor_variance)
+    return inverse_sd * bell((log(mean) - relative) * inverse_sd)
+
+
+@inlined
+def _node(curve: Any, q: int, of_trial: Any) -> Any:
+    """The part of the density that one node adds, for a curve without a threshold."""
+    drive, scale, _, _, _, output, _ = of_trial
+    sigmoid = per(_ONE + exp(-(drive + curve[0, q])))
+    flat = _ONE - sigmoid
+    return NODE_WEIGHTS[q] * _normal(sigmoid * scale, flat * flat * curve[1, q] + output, of_trial)
+
+
+@inlined
+def _node_above(curve: Any, q: int, of_trial: Any) -> Any:
+    """The part of the density that one node adds, for a curve that starts at a threshold."""
+    drive, scale, _, _, _, output, start = of_trial
+    sigmoid = per(_ONE + exp(-(drive + curve[0, q])))
+    steep, over = sigmoid * (_ONE - sigmoid), sigmoid - start
+    variance = steep * steep * curve[1, q]
+    reach = larger(over * over + _CORNER * variance, _LEAST_REACH)
+    share = (math.sqrt(reach) + over) * (_HALF / (_ONE - start)) * scale
+    return NODE_WEIGHTS[q] * _normal(share, variance / reach + output, of_trial)
+
+
 @loop
 def _density(particle: Any, trials: Any, count: int, curve: Any, work: Any, likelihood: Any) -> None:
     """Write the density of each trial's log MEP, shape (n,)."""
     drive, scale, responds, known, varies = work[1], work[2], work[3], work[4], work[5]
     relative, evoked = work[6], work[7]
     low, floor = trials[LOW], particle[LOG_FLOOR]
-    floor_sd = particle[FLOOR_SD]
-    floor_variance = floor_sd * floor_sd
+    floor_variance, start = particle[FLOOR_SD] * particle[FLOOR_SD], particle[ONSET]
     output = particle[OUTPUT_SD] * particle[OUTPUT_SD] if is_curved(particle) else _NIL
     for i in range(count):
         relative[i] = low[i] - floor
-        evoked[i] = _NIL
     _step(trials, count, particle[CHANGED], -particle[STEP_SCALE], relative)
-    start = particle[ONSET]
-    for q in range(NODES):
-        at, between, weight = curve[0, q], curve[1, q], NODE_WEIGHTS[q]
-        if start > _NIL:
-            rescaled = _HALF / (_ONE - start)
-            for i in range(count):
-                sigmoid = per(_ONE + exp(-(drive[i] + at)))
-                steep = sigmoid * (_ONE - sigmoid)
-                variance = steep * steep * between
-                over = sigmoid - start
-                reach = larger(over * over + _CORNER * variance, _LEAST_REACH)
-                share = (math.sqrt(reach) + over) * rescaled * scale[i]
-                total = _ONE + share + known[i]
-                varied = share * share * (variance / reach + output) + floor_variance + varies[i]
-                inverse_sd = total * per_root(varied)
-                z = smaller(larger((log(total) - relative[i]) * inverse_sd, -_END), _END)
-                evoked[i] += weight * inverse_sd * exp2(_BELL * z * z)
-        else:
-            for i in range(count):
-                sigmoid = per(_ONE + exp(-(drive[i] + at)))
-                flat = _ONE - sigmoid
-                share = sigmoid * scale[i]
-                total = _ONE + share + known[i]
-                varied = share * share * (flat * flat * between + output) + floor_variance + varies[i]
-                inverse_sd = total * per_root(varied)
-                z = smaller(larger((log(total) - relative[i]) * inverse_sd, -_END), _END)
-                evoked[i] += weight * inverse_sd * exp2(_BELL * z * z)
+    # All nodes in one pass: what one waits for another works out meanwhile, and no sums go through memory.
+    if start > _NIL:
+        for i in range(count):
+            one = drive[i], scale[i], known[i], relative[i], floor_variance + varies[i], output, start
+            first = _node_above(curve, 0, one) + _node_above(curve, 1, one)
+            second = _node_above(curve, 2, one) + _node_above(curve, 3, one)
+            third = _node_above(curve, 4, one) + _node_above(curve, 5, one)
+            evoked[i] = first + second + (third + (_node_above(curve, 6, one) + _node_above(curve, 7, one)))
+    else:
+        for i in range(count):
+            one = drive[i], scale[i], known[i], relative[i], floor_variance + varies[i], output, start
+            first, second = _node(curve, 0, one) + _node(curve, 1, one), _node(curve, 2, one) + _node(curve, 3, one)
+            third, fourth = _node(curve, 4, one) + _node(curve, 5, one), _node(curve, 6, one) + _node(curve, 7, one)
+            evoked[i] = first + second + (third + fourth)
     for i in range(count):
-        still = (_ONE + known[i]) / math.sqrt(floor_variance + varies[i])
-        z = smaller(larger((log(_ONE + known[i]) - relative[i]) * still, -_END), _END)
-        silent = still * exp2(_BELL * z * z)
+        still = (_ONE + known[i]) * per_root(floor_variance + varies[i])
+        silent = still * bell((log(_ONE + known[i]) - relative[i]) * still)
         outlier = (_OUT_DENSITY if _OUT_LOW < relative[i] < _OUT_HIGH else _NIL) + _TINY
         density = _ROOT * (responds[i] * evoked[i] + (_ONE - responds[i]) * silent)
         likelihood[i] = _IN * density + _OUT * outlier

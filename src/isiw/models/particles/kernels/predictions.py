@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from isiw.compiled import LANES, exp, exp2, inlined, kernel, larger, log, loop, per, per_root, smaller, total
+from isiw.compiled import LANES, bell, exp, inlined, kernel, larger, log, loop, per, per_root, smaller, total
 from isiw.models.particles.kernels.likelihood import (
     NODE_WEIGHTS,
     NODES_AT,
@@ -47,7 +47,7 @@ _NIL, _HALF, _ONE = _f(0.0), _f(0.5), _f(1.0)
 _PER_NODE, _FAR, _CORNER = _f(1.0 / ON_NODES), _f(FAR_BELOW), _f(CORNER)
 _MISSING, _ALL_OR_NONE = _f(NoiseKind.MISSING), _f(NoiseKind.ALL_OR_NONE)
 _LEAST_SIZE, _LEAST_REACH, _TINY = _f(1e-9), _f(1e-12), _f(1e-6)
-_BELL, _END, _ROOT = _f(-0.5 / math.log(2.0)), _f(11.0), _f(1.0 / math.sqrt(2.0 * math.pi))
+_ROOT = _f(1.0 / math.sqrt(2.0 * math.pi))
 _OUT_LOW, _OUT_HIGH = _f(OUTLIER_LOG_RANGE[0]), _f(OUTLIER_LOG_RANGE[1])
 _OUT_DENSITY = _f(1.0 / (OUTLIER_LOG_RANGE[1] - OUTLIER_LOG_RANGE[0]))
 _OUT, _IN = _f(OUTLIER_PROBABILITY), _f(1.0 - OUTLIER_PROBABILITY)
@@ -126,20 +126,19 @@ def _components(particle: Any, drive: Any, scale: Any, at: Any, between: Any, me
         mean[row] = log(_ONE + size)
 
 
+@inlined
+def _node(over: Any, mean: Any, inverse_sd: Any, q: int) -> Any:
+    """The part of the density of a log MEP over the floor that one node adds, but for a constant."""
+    return NODE_WEIGHTS[q] * inverse_sd[q] * bell((over - mean[q]) * inverse_sd[q])
+
+
 @loop
-def _outcomes(particle: Any, levels: Any, gain: Any, lines: Any, cells: Any, table: Any) -> None:
+def _outcomes(particle: Any, levels: Any, gain: Any, lines: Any, nodes: Any, table: Any) -> None:
     """Write the probability of each outcome at some facilitations, shape (l, y)."""
-    relative, width, drive, mean, inverse_sd, spread, between = (
-        lines[0],
-        lines[1],
-        lines[2],
-        lines[3],
-        lines[4],
-        lines[5],
-        lines[6],
-    )
+    relative, width, drive, cell, spread, between = lines[0], lines[1], lines[2], lines[3], lines[4], lines[5]
+    mean, inverse_sd = nodes[0], nodes[1]
     rows, count = len(levels), lines.shape[1]
-    curve_of(particle, spread[:NODES], between[:NODES], mean)
+    curve_of(particle, spread[:NODES], between[:NODES], cell)
     curved, per_sd, floor = is_curved(particle), _ONE / particle[FLOOR_SD], particle[LOG_FLOOR]
     scale = exp(particle[LOG_RATIO] + gain + (_NIL if curved else _FAR))
     rest, boost, whole = particle[REST], particle[BOOST], particle[NOISE] == _ALL_OR_NONE
@@ -148,22 +147,21 @@ def _outcomes(particle: Any, levels: Any, gain: Any, lines: Any, cells: Any, tab
             drive[row] = rest + boost * levels[row]
         else:
             drive[row] = _NIL if whole else log(larger(levels[row], _LEAST_SIZE))
-        for y in range(count):
-            cells[row, y] = _NIL
     for q in range(NODES):
-        _components(particle, drive, scale, spread[q], between[q], mean, inverse_sd)
-        for row in range(rows):
-            cell, at, per, weight = cells[row], mean[row] + floor, inverse_sd[row], NODE_WEIGHTS[q] * inverse_sd[row]
-            for y in range(count):
-                z = smaller(larger((relative[y] - at) * per, -_END), _END)
-                cell[y] += weight * exp2(_BELL * z * z)
+        _components(particle, drive, scale, spread[q], between[q], mean[q], inverse_sd[q])
     for row in range(rows):
-        cell, responds = cells[row], _responds(particle, larger(levels[row], _NIL))
+        responds, at, per_node = _responds(particle, larger(levels[row], _NIL)), mean[:, row], inverse_sd[:, row]
         for y in range(count):
             over = relative[y] - floor
-            z = smaller(larger(over * per_sd, -_END), _END)
+            # All nodes in one pass, as for the likelihood.
+            first, second = _node(over, at, per_node, 0), _node(over, at, per_node, 1)
+            third, fourth = _node(over, at, per_node, 2), _node(over, at, per_node, 3)
+            evoked = first + second + (third + fourth)
+            first, second = _node(over, at, per_node, 4), _node(over, at, per_node, 5)
+            third, fourth = _node(over, at, per_node, 6), _node(over, at, per_node, 7)
+            evoked += first + second + (third + fourth)
             outlier = (_OUT_DENSITY if _OUT_LOW < over < _OUT_HIGH else _NIL) + _TINY
-            density = _ROOT * (responds * cell[y] + (_ONE - responds) * (per_sd * exp2(_BELL * z * z)))
+            density = _ROOT * (responds * evoked + (_ONE - responds) * (per_sd * bell(over * per_sd)))
             cell[y] = (_IN * density + _OUT * outlier) * width[y]
         per_sum = _ONE / total(cell, count)
         for y in range(table.shape[1]):
@@ -176,11 +174,8 @@ def outcome_tables(particles: Any, levels: Any, order: int, log_mep: Any, width:
     people, size, rows = levels.shape
     outcomes = log_mep.shape[1]
     padded = (larger(outcomes, rows) + LANES - 1) // LANES * LANES
-    table, cells = (
-        np.empty((people, size, rows, outcomes), dtype=np.float32),
-        np.empty((rows, padded), dtype=np.float32),
-    )
-    lines = np.zeros((7, padded), dtype=np.float32)
+    table = np.empty((people, size, rows, outcomes), dtype=np.float32)
+    lines, nodes = np.zeros((6, padded), dtype=np.float32), np.empty((2, NODES, padded), dtype=np.float32)
     lines[1, :outcomes] = width
     startle, relaxed = gain_of(order)
     for person in range(people):
@@ -188,7 +183,7 @@ def outcome_tables(particles: Any, levels: Any, order: int, log_mep: Any, width:
         for i in range(size):
             particle = particles[person, i]
             gain = particle[DRIFT] * relaxed + particle[STARTLED] * startle
-            _outcomes(particle, levels[person, i], gain, lines, cells, table[person, i])
+            _outcomes(particle, levels[person, i], gain, lines, nodes, table[person, i])
     return table
 
 
