@@ -17,9 +17,12 @@ from types import UnionType
 from typing import (
     Annotated,
     Any,
+    Generic,
     Literal,
+    Protocol,
     TypeAlias,
     TypedDict,
+    TypeGuard,
     TypeVar,
     Union,
     Unpack,
@@ -56,13 +59,17 @@ class Bounds(TypedDict, total=False):
 
 def number(what: str, value: object, *, remedy: str | None = None, **bounds: Unpack[Bounds]) -> float:
     """A finite number within some bounds."""
-    plain = math.nan
-    if isinstance(value, Real) and not isinstance(value, bool):
-        with suppress(OverflowError):  # a whole number that no float can hold
-            plain = float(value)
+    plain = value if type(value) is float else _float(value)
     if not (math.isfinite(plain) and _within(plain, bounds)):
         raise InvalidValueError(f"{what} must be {_described('a finite number', bounds)}", got=value, remedy=remedy)
     return plain
+
+
+def _float(value: object) -> float:
+    """The value as a float; NaN if it is no number, or a whole one that no float can hold."""
+    with suppress(OverflowError):
+        return float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
+    return math.nan
 
 
 def amplitude(what: str, value: object) -> float:
@@ -195,6 +202,17 @@ Text: TypeAlias = Annotated[str, text]
 Flag: TypeAlias = Annotated[bool, flag]
 
 
+def can(value: object, capability: Callable[..., _T]) -> TypeGuard[_T]:
+    """True if a value has all that a protocol names: `isinstance`, which collects the names whenever it is asked."""
+    return all(hasattr(value, name) for name in _names(capability))
+
+
+@cache
+def _names(capability: Any) -> frozenset[str]:
+    bases = (base for base in capability.__mro__ if base not in {object, Protocol, Generic})
+    return frozenset(name for base in bases for name in vars(base) if not name.startswith("_"))
+
+
 class Checked:
     """A frozen dataclass whose fields are checked as their annotations say, and hold plain values."""
 
@@ -223,9 +241,10 @@ def _declared(owner: type) -> tuple[tuple[str, str, bool, Callable[[str, object]
 
 
 def _within(plain: float, bounds: Bounds) -> bool:
-    return bounds.get("above", -math.inf) < plain < bounds.get("below", math.inf) and bounds.get(
-        "least", -math.inf
-    ) <= plain <= bounds.get("most", math.inf)
+    return not bounds or (
+        bounds.get("above", -math.inf) < plain < bounds.get("below", math.inf)
+        and bounds.get("least", -math.inf) <= plain <= bounds.get("most", math.inf)
+    )
 
 
 _WORDS = {"above": "above", "least": "of at least", "below": "below", "most": "of at most"}

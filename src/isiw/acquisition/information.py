@@ -14,7 +14,7 @@ import numpy as np
 
 from isiw.acquisition.protocol import ForeseesWindows
 from isiw.acquisition.twostep import expected_variance_reduction
-from isiw.checks import Checked, whole
+from isiw.checks import Checked, can, whole
 from isiw.compiled import AVAILABLE, first_of, kernel, larger, log, loop, total
 from isiw.lazy import torch
 from isiw.models.protocol import (
@@ -201,7 +201,7 @@ def window_gain(posterior: ForeseesWindows, isi_ms: Tensor) -> Tensor:
     Where a posterior has depressed segments too, membership in them counts as much.
     """
     masks = posterior.window_masks(isi_ms)
-    if isinstance(posterior, SamplesDepression):
+    if can(posterior, SamplesDepression):
         masks = torch.cat((masks, posterior.depressed_masks(isi_ms)), dim=-1)
     mass = posterior.outcome_mass(isi_ms)
     if _is_for_kernels(mass):
@@ -260,5 +260,5 @@ class Alternating:
 
     def __call__(self, posterior: _CountedWindows, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs."""
-        pairs = posterior.pairs if isinstance(posterior, CountsPairs) else posterior.trials
+        pairs = posterior.pairs if can(posterior, CountsPairs) else posterior.trials
         return mutual_information(posterior, isi_ms) if pairs % 2 else window_gain(posterior, isi_ms)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -74,12 +74,12 @@ class Runs:
         """The first run of each window, shape (w,)."""
         return np.flatnonzero(np.diff(self.sample, prepend=-1))
 
-    @property
+    @cached_property
     def found(self) -> IntArray:
         """The samples that have a window, shape (w,)."""
         return self.sample[self._leads]
 
-    @property
+    @cached_property
     def hulls(self) -> tuple[IntArray, IntArray]:
         """Index of the first and of the last ISI of each window, each of shape (w,)."""
         lasts = np.append(self._leads[1:], len(self.sample))[: len(self._leads)] - 1
@@ -103,15 +103,18 @@ class Runs:
         return np.cumsum(steps[0] - steps[1])[:-1] / max(1, len(self._leads))
 
 
+_LEVELS: Final = np.linspace(0.1, 0.9, 17)
+
+
 def best_window(windows: Runs, grid_ms: FloatArray) -> tuple[Window | None, float]:
     """The window of largest expected F1 among the level sets of the posterior's membership, and that F1."""
     membership = windows.membership
-    candidates = membership[:, None] >= np.linspace(0.1, 0.9, 17) * membership.max()
+    candidates = membership[:, None] >= _LEVELS * membership.max()
     # Candidates are last, so that what a run adds is looked up at once.
     below = np.zeros((windows.points + 1, candidates.shape[1]), dtype=np.float32)
     np.cumsum(candidates, axis=0, out=below[1:])
-    overlap = windows.summed(below[windows.behind] - below[windows.first])
-    expected_f1 = (2.0 * overlap / (below[-1] + windows.sizes[:, None])).mean(0, dtype=float)
+    overlap = windows.summed(below.take(windows.behind, axis=0) - below.take(windows.first, axis=0))
+    expected_f1 = 2.0 * (overlap / (below[-1] + windows.sizes[:, None])).mean(0, dtype=float)
     best = int(expected_f1.argmax())
     return Window.from_mask(grid_ms, candidates[:, best]), float(expected_f1[best])
 

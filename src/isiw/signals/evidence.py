@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import statistics
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final, NamedTuple, TypeAlias
 
 from isiw.findings import ENOUGH_PAIRS, Finding, Kind, Severity
@@ -195,6 +195,9 @@ def told_of(trials: Iterable[Trial]) -> tuple[Told, ...]:
     return tuple(Told(t.mep_mv, t.isi_ms, t.background_rms_uv) for t in trials if t.told and t.mep_mv is not None)
 
 
+_USUAL_LIMITS: Final = SignalLimits()
+
+
 @dataclass(frozen=True, eq=False)
 class Evidence:
     """What is known after a trial; what is not known is None or empty.
@@ -209,7 +212,7 @@ class Evidence:
 
     trial: Trial | None = None
     answer: Sweep | Measurement | None = None
-    limits: SignalLimits = field(default_factory=SignalLimits)
+    limits: SignalLimits = _USUAL_LIMITS
     told: Sequence[Told] = ()
     detection_limit_mv: float | None = None
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from isiw.acquisition.batch import own_plan
 from isiw.acquisition.protocol import AcquisitionFunction, FollowsPlan
-from isiw.checks import Amplitude, AmplitudeInterval, Checked, Flag, NonNegative
+from isiw.checks import Amplitude, AmplitudeInterval, Checked, Flag, NonNegative, can
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
@@ -166,7 +166,7 @@ class Course:
     def ahead_ms(self, n: int) -> list[float]:
         """The next ISIs [ms] of one person that stand already, whatever comes of them; at most n of a design's."""
         acquisition, space, left = self.method.acquisition, self.method.space, self.initial_left
-        if isinstance(acquisition, FollowsPlan):
+        if can(acquisition, FollowsPlan):
             pairs = range(self.paired_trials + len(left), self.paired_trials + n)
             return [*left, *(acquisition.planned_isi_ms(space, pair) for pair in pairs)]
         return [*left, *map(space.snap, own_plan(self.posterior, acquisition))]
@@ -176,14 +176,14 @@ class Course:
         """True if the model or the design has a plan of ISIs, so that a lost one is asked again."""
         acquisition = self.method.acquisition
         proposes = ProposesIsi in acquisition.needs and isinstance(self.posterior, ProposesIsi)
-        return proposes or isinstance(acquisition, FollowsPlan)
+        return proposes or can(acquisition, FollowsPlan)
 
     @cached_property
     def planned(self) -> tuple[Choice, ...] | None:
         """Each person's next ISI, if that stands already; None if the acquisition function chooses."""
         if self.initial_left:
             return (Choice(self.initial_left[0], by="initial"),) * self.people
-        if isinstance(acquisition := self.method.acquisition, FollowsPlan):
+        if can(acquisition := self.method.acquisition, FollowsPlan):
             isi_ms = acquisition.planned_isi_ms(self.method.space, self.paired_trials)
             return (Choice(isi_ms, by="plan"),) * self.people
         if self.plans_ahead and isinstance(self.posterior, ProposesIsi):
@@ -218,7 +218,7 @@ class Course:
 
     def chosen(self, posterior: Posterior) -> tuple[Choice, ...]:
         """The ISI that the acquisition function chooses for each person, whatever is planned."""
-        if isinstance(posterior, ExpectsTheUsual):
+        if can(posterior, ExpectsTheUsual):
             posterior = posterior.as_usual
         method = self.method
         return best_choices(

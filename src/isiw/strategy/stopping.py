@@ -8,7 +8,7 @@ from enum import StrEnum
 from functools import partial
 from typing import Annotated, Final, Protocol, runtime_checkable
 
-from isiw.checks import Checked, Count, Positive, Share, number
+from isiw.checks import Checked, Count, Positive, Share, can, number
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
 from isiw.text.sanitize import counted
@@ -257,7 +257,7 @@ class AnyOf:
 
 def stimuli_left(rule: StoppingRule, delivered: int) -> int | None:
     """Number of stimuli that a rule's budget still allows; None if it sets none."""
-    return rule.stimuli_left(delivered) if isinstance(rule, HasBudget) else None
+    return rule.stimuli_left(delivered) if can(rule, HasBudget) else None
 
 
 def looks_back(rule: StoppingRule) -> int:

@@ -284,8 +284,7 @@ class Strategy:
             OutOfSpaceError: as for `tell`.
             StrategyError: as for `tell`.
         """
-        outcome = Outcome(isi_ms, mep_mv, **more)
-        self._learn(replace(outcome, isi_ms=None if isi_ms is None else self.space.check_realised(isi_ms)))
+        self._learn(Outcome(None if isi_ms is None else self.space.check_realised(isi_ms), mep_mv, **more))
 
     def learn_all(self, trials: Iterable[Trial], *, same_level: bool = False) -> None:
         """Learn trials that were delivered before the first ask, at whatever ISIs; no plan and no budget counts them.

@@ -283,7 +283,8 @@ class Prior(Checked):
 
     def hypothesis(self, latents: Latents) -> Tensor:
         """Which of `hypotheses` each particle belongs to, shape (b, p)."""
-        recruitment = latents.values[..., latents_of("recruitment", device=latents.values.device)]
+        first = LATENTS.index(BLOCKS["recruitment"][0])
+        recruitment = latents.values[..., first : first + len(BLOCKS["recruitment"])]
         muscles = self._muscle_numbers.to(recruitment.device)
         kind = len(_WITHOUT_MUSCLE) + muscles[self.mixtures["recruitment"].component(recruitment)]
         for number, noise in enumerate(_WITHOUT_MUSCLE):

@@ -87,8 +87,14 @@ class FacilitationTables:
 def log_ends(response: Response, evoked: Tensor) -> tuple[Tensor, Tensor]:
     """Between which log MEPs outcomes lie, each of shape (b,)."""
     top = response.log_floor + torch.log1p(evoked.amax(-1))
-    low = torch.quantile(response.log_floor, 0.05, dim=-1) - 1.0
-    return low, torch.quantile(top, 0.95, dim=-1) + 1.5
+    return _quantile(response.log_floor, 0.05) - 1.0, _quantile(top, 0.95) + 1.5
+
+
+def _quantile(values: Tensor, share: float) -> Tensor:
+    """A quantile of values (b, s), shape (b,); `torch.quantile` takes ten times as long for so few."""
+    place = share * (values.shape[-1] - 1)
+    ordered, below = values.sort(dim=-1).values, int(place)
+    return torch.lerp(ordered[:, below], ordered[:, min(below + 1, values.shape[-1] - 1)], place - below)
 
 
 def cell_ends(device: torch.device) -> Tensor:

@@ -264,24 +264,24 @@ def _normal(share: Any, variance: Any, of_trial: Any) -> Any:
 
 
 @inlined
-def _node(curve: Any, q: int, of_trial: Any) -> Any:
+def _node(at: Any, between: Any, weight: Any, of_trial: Any) -> Any:
     """The part of the density that one node adds, for a curve without a threshold."""
     drive, scale, _, _, _, output, _ = of_trial
-    sigmoid = per(_ONE + exp(-(drive + curve[0, q])))
+    sigmoid = per(_ONE + exp(-(drive + at)))
     flat = _ONE - sigmoid
-    return NODE_WEIGHTS[q] * _normal(sigmoid * scale, flat * flat * curve[1, q] + output, of_trial)
+    return weight * _normal(sigmoid * scale, flat * flat * between + output, of_trial)
 
 
 @inlined
-def _node_above(curve: Any, q: int, of_trial: Any) -> Any:
+def _node_above(at: Any, between: Any, weight: Any, of_trial: Any) -> Any:
     """The part of the density that one node adds, for a curve that starts at a threshold."""
     drive, scale, _, _, _, output, start = of_trial
-    sigmoid = per(_ONE + exp(-(drive + curve[0, q])))
+    sigmoid = per(_ONE + exp(-(drive + at)))
     steep, over = sigmoid * (_ONE - sigmoid), sigmoid - start
-    variance = steep * steep * curve[1, q]
+    variance = steep * steep * between
     reach = larger(over * over + _CORNER * variance, _LEAST_REACH)
     share = (math.sqrt(reach) + over) * (_HALF / (_ONE - start)) * scale
-    return NODE_WEIGHTS[q] * _normal(share, variance / reach + output, of_trial)
+    return weight * _normal(share, variance / reach + output, of_trial)
 
 
 @loop
@@ -296,18 +296,22 @@ def _density(particle: Any, trials: Any, count: int, curve: Any, work: Any, like
         relative[i] = low[i] - floor
     _step(trials, count, particle[CHANGED], -particle[STEP_SCALE], relative)
     # All nodes in one pass: what one waits for another works out meanwhile, and no sums go through memory.
+    at, between, w = curve[0], curve[1], NODE_WEIGHTS
     if start > _NIL:
         for i in range(count):
             one = drive[i], scale[i], known[i], relative[i], floor_variance + varies[i], output, start
-            first = _node_above(curve, 0, one) + _node_above(curve, 1, one)
-            second = _node_above(curve, 2, one) + _node_above(curve, 3, one)
-            third = _node_above(curve, 4, one) + _node_above(curve, 5, one)
-            evoked[i] = first + second + (third + (_node_above(curve, 6, one) + _node_above(curve, 7, one)))
+            first = _node_above(at[0], between[0], w[0], one) + _node_above(at[1], between[1], w[1], one)
+            second = _node_above(at[2], between[2], w[2], one) + _node_above(at[3], between[3], w[3], one)
+            third = _node_above(at[4], between[4], w[4], one) + _node_above(at[5], between[5], w[5], one)
+            fourth = _node_above(at[6], between[6], w[6], one) + _node_above(at[7], between[7], w[7], one)
+            evoked[i] = first + second + (third + fourth)
     else:
         for i in range(count):
             one = drive[i], scale[i], known[i], relative[i], floor_variance + varies[i], output, start
-            first, second = _node(curve, 0, one) + _node(curve, 1, one), _node(curve, 2, one) + _node(curve, 3, one)
-            third, fourth = _node(curve, 4, one) + _node(curve, 5, one), _node(curve, 6, one) + _node(curve, 7, one)
+            first = _node(at[0], between[0], w[0], one) + _node(at[1], between[1], w[1], one)
+            second = _node(at[2], between[2], w[2], one) + _node(at[3], between[3], w[3], one)
+            third = _node(at[4], between[4], w[4], one) + _node(at[5], between[5], w[5], one)
+            fourth = _node(at[6], between[6], w[6], one) + _node(at[7], between[7], w[7], one)
             evoked[i] = first + second + (third + fourth)
     for i in range(count):
         still = (_ONE + known[i]) * per_root(floor_variance + varies[i])

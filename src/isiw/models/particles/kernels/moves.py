@@ -134,7 +134,7 @@ def _jump(tables: Any, steps: Any, dice: Any, z: Any, kinds: Any, scratch: Any) 
     return jump, ratio
 
 
-@loop
+@part
 def _shift(tables: Any, theirs: Any, dice: Any, moves: Any, densities: Any, scratch: Any) -> float:
     """Add a scaled difference of two of the others to the latents that move; log of the ratio of prior densities."""
     others, z, found, ratio = theirs.shape[0], scratch[1], scratch[5], 0.0

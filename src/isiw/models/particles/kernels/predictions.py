@@ -127,16 +127,16 @@ def _components(particle: Any, drive: Any, scale: Any, at: Any, between: Any, me
 
 
 @inlined
-def _node(over: Any, mean: Any, inverse_sd: Any, q: int) -> Any:
+def _node(over: Any, mean: Any, inverse_sd: Any, weight: Any) -> Any:
     """The part of the density of a log MEP over the floor that one node adds, but for a constant."""
-    return NODE_WEIGHTS[q] * inverse_sd[q] * bell((over - mean[q]) * inverse_sd[q])
+    return weight * inverse_sd * bell((over - mean) * inverse_sd)
 
 
 @loop
 def _outcomes(particle: Any, levels: Any, gain: Any, lines: Any, nodes: Any, table: Any) -> None:
     """Write the probability of each outcome at some facilitations, shape (l, y)."""
     relative, width, drive, cell, spread, between = lines[0], lines[1], lines[2], lines[3], lines[4], lines[5]
-    mean, inverse_sd = nodes[0], nodes[1]
+    mean, inverse_sd, w = nodes[0], nodes[1], NODE_WEIGHTS
     rows, count = len(levels), lines.shape[1]
     curve_of(particle, spread[:NODES], between[:NODES], cell)
     curved, per_sd, floor = is_curved(particle), _ONE / particle[FLOOR_SD], particle[LOG_FLOOR]
@@ -150,16 +150,15 @@ def _outcomes(particle: Any, levels: Any, gain: Any, lines: Any, nodes: Any, tab
     for q in range(NODES):
         _components(particle, drive, scale, spread[q], between[q], mean[q], inverse_sd[q])
     for row in range(rows):
-        responds, at, per_node = _responds(particle, larger(levels[row], _NIL)), mean[:, row], inverse_sd[:, row]
+        responds, at, per = _responds(particle, larger(levels[row], _NIL)), mean[:, row], inverse_sd[:, row]
         for y in range(count):
             over = relative[y] - floor
             # All nodes in one pass, as for the likelihood.
-            first, second = _node(over, at, per_node, 0), _node(over, at, per_node, 1)
-            third, fourth = _node(over, at, per_node, 2), _node(over, at, per_node, 3)
+            first = _node(over, at[0], per[0], w[0]) + _node(over, at[1], per[1], w[1])
+            second = _node(over, at[2], per[2], w[2]) + _node(over, at[3], per[3], w[3])
+            third = _node(over, at[4], per[4], w[4]) + _node(over, at[5], per[5], w[5])
+            fourth = _node(over, at[6], per[6], w[6]) + _node(over, at[7], per[7], w[7])
             evoked = first + second + (third + fourth)
-            first, second = _node(over, at, per_node, 4), _node(over, at, per_node, 5)
-            third, fourth = _node(over, at, per_node, 6), _node(over, at, per_node, 7)
-            evoked += first + second + (third + fourth)
             outlier = (_OUT_DENSITY if _OUT_LOW < over < _OUT_HIGH else _NIL) + _TINY
             density = _ROOT * (responds * evoked + (_ONE - responds) * (per_sd * bell(over * per_sd)))
             cell[y] = (_IN * density + _OUT * outlier) * width[y]

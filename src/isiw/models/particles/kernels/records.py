@@ -33,6 +33,8 @@ ISI, ISI_SD, LOW, HIGH, ORDER, KNOWN, KNOWN_SD, OFFSET, SHIFT, FACTOR = range(10
 STARTLE, RELAXED, REAL, NUMBER = 4, 10, 11, 12
 TRIAL: Final = 13
 PIECE: Final = 128
+FEW: Final = 2
+"""So few trials take longer side by side with lanes that are empty than one after the other."""
 
 _f = np.float32
 _FIRST, _SECOND = _f(STARTUP[0]), _f(STARTUP[1])
@@ -48,9 +50,11 @@ def person_of(records: FloatArray) -> Person:
     column = torch.from_numpy(records).unbind(-1)
     shape = Shape(column[SHAPE], column[START], column[WIDTH], column[FORM])
     response = Response(column[NOISE], *column[LOG_FLOOR : SLOPE + 1])
-    low = Shape(torch.zeros_like(column[SHAPE]), column[LOW_START], column[LOW_WIDTH], torch.zeros_like(column[SHAPE]))
-    depression = Depression(low, column[DEPTH], column[DEPTH] > 0) if (records[..., DEPTH] > 0).any() else None
-    return Person(shape, response, column[PRESENT] > 0, depression)
+    if not records[..., DEPTH].any():
+        return Person(shape, response, column[PRESENT] > 0)
+    nothing = torch.zeros_like(column[SHAPE])
+    low = Shape(nothing, column[LOW_START], column[LOW_WIDTH], nothing)
+    return Person(shape, response, column[PRESENT] > 0, Depression(low, column[DEPTH], column[DEPTH] > 0))
 
 
 def people_of(person: Person) -> FloatArray:
@@ -120,7 +124,7 @@ def settle(particle: Any, order: Any) -> None:
 def trial_records(columns: Any) -> Any:
     """The trials of each person in pieces, those whose amplitude is known and those that are censored.
 
-    Records of shape (b, 2, pieces, TRIAL, PIECE), and how many trials each piece has, in whole lanes.
+    Records of shape (b, 2, pieces, TRIAL, PIECE), and how many trials each piece has, in whole lanes but for a few.
     """
     people, trials = columns.shape[:2]
     pieces = (trials + PIECE - 1) // PIECE
@@ -145,5 +149,6 @@ def trial_records(columns: Any) -> Any:
             sizes[person, sort, piece] += 1
         for sort in range(2):
             for piece in range(pieces):
-                sizes[person, sort, piece] = (sizes[person, sort, piece] + LANES - 1) // LANES * LANES
+                over = sizes[person, sort, piece] % LANES
+                sizes[person, sort, piece] += LANES - over if over > FEW else 0
     return records, sizes

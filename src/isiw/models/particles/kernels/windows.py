@@ -33,8 +33,8 @@ def _highest(particle: Any, isi_ms: Any, fine: Any, room: Any) -> Any:
     """Largest facilitation at some ISIs; where they are close to each other, in all of their range."""
     count = len(isi_ms)
     if fine:
-        count, low, high = 3, isi_ms[0], isi_ms[len(isi_ms) - 1]
-        at = room[1]
+        low, high, at = isi_ms[0], isi_ms[count - 1], room[1, :3]
+        count = len(at)
         at[0], at[1], at[2] = _peak_at(particle), _FIRST_PEAK, _SECOND_PEAK
         for i in range(count):
             at[i] = smaller(larger(particle[START] + at[i] * particle[WIDTH], low), high)
