@@ -98,11 +98,8 @@ def _minutes(duration_s: float) -> str:
 
 def _profile(estimate: WindowEstimate, space: DesignSpace) -> str:
     """The expected MEP, on a logarithmic scale from its smallest to its largest; empty if there is none."""
-    if estimate.grid_ms is None:
-        return ""
     isi_ms = np.linspace(space.low_ms, space.high_ms, MOST_SPARKS)
-    band = estimate.profile(isi_ms)
-    if band is None:
+    if (band := estimate.profile(isi_ms)) is None:
         return ""
     size = np.log(np.maximum(band.median_mv, 1e-6))
     level = (size - size.min()) / max(float(np.ptp(size)), math.log(2.0))  # what hardly differs is drawn flat
@@ -250,14 +247,11 @@ class OperatorConsole:
             self.screen.say("The session is not paused; p pauses it.")
 
     def _judge(self, say: Callable[..., None], outcome: str, *reason: str) -> None:
-        number = self._last()
-        say(number, *reason)
-        self.screen.say(f"Trial {number} {outcome}.")
-
-    def _last(self) -> int:
         if not self._session.trials:
             raise InvalidValueError("there is no trial yet")
-        return self._session.trials[-1].index if self.shown is None else self.shown
+        number = self._session.trials[-1].index if self.shown is None else self.shown
+        say(number, *reason)
+        self.screen.say(f"Trial {number} {outcome}.")
 
     def _undo(self) -> None:
         if (number := self._session.last_excluded) is None:
@@ -299,19 +293,16 @@ class Table:
         """Show a trial: in a terminal with a last line that says how the session stands."""
         if not self._shown:
             return
+        row = progress_row(update, self._header.stimulus)
         try:
-            self._show(update)
+            if self._console.reads_keys and is_terminal(sys.stdout):
+                self._console.screen.say(fitted(row)[: columns()], standing(update, self._header.space))
+            else:
+                show_progress(row)
+            self._console.shown = update.trial.index
         except (OSError, UnicodeError) as error:  # a full disk, a reader who has gone, a sign that is lacking
             self._faults.append(f"the table of trials cannot be shown any more: {error_text(error)}")
             self._shown = False
-
-    def _show(self, update: SessionUpdate) -> None:
-        row = progress_row(update, self._header.stimulus)
-        if self._console.reads_keys and is_terminal(sys.stdout):
-            self._console.screen.say(fitted(row)[: columns()], standing(update, self._header.space))
-        else:
-            show_progress(row)
-        self._console.shown = update.trial.index
 
     def waiting(self, left_s: float | None, text: str) -> None:
         """Count down until the next stimulus."""

@@ -186,21 +186,18 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
         if not self.overruled and trial is None:
             return None
         if self.overruled:
-            self._learn_again()
+            self.overruled = False
+            try:
+                self._freely(self.learner.learn_again, self.trials)
+            except BaseException:
+                self.overruled = True
+                raise
         if trial is not None:
             self._learn(trial)
         known = self.log_belief(decide, ask_next) if len(self.trials) else None
         if trial is not None:
             self.unconcluded = None
         return known
-
-    def _learn_again(self) -> None:
-        self.overruled = False
-        try:
-            self._freely(self.learner.learn_again, self.trials)
-        except BaseException:
-            self.overruled = True
-            raise
 
     def _learn(self, trial: TrialT) -> None:
         if self.learner.known < len(self.trials):
@@ -280,9 +277,7 @@ def change_found(change: Change | None, told: Sequence[Trial]) -> Finding | None
     if change is None or not change.is_sure or not told:
         return None
     at = None if change.trial is None else told[min(change.trial, len(told) - 1)].index
-    remedy = (
-        "" if change.trial is None else "Did the coil or an electrode move, or was a gain or the intensity changed?"
-    )
+    remedy = "" if at is None else "Did the coil or an electrode move, or was a gain or the intensity changed?"
     return Finding(Kind.CHANGED, Severity.DOUBT, sentences.at_a_trial(change, at), remedy)
 
 
@@ -320,19 +315,15 @@ def estimate_record(
 ) -> EstimateRecord:
     """The record of what a strategy knows after a trial; scores are those that it has worked out anyway."""
     record = EstimateRecord.after(trial, strategy.estimate(), decision, next_isi_ms)
-    predicted: dict[str, Any] = {}
+    more: dict[str, Any] = {}
     if record.grid_ms and (band := strategy.prediction_mv()) is not None:
-        predicted = {"predicted_low_mv": _rounded(band[0]), "predicted_high_mv": _rounded(band[1])}
-    return record.model_copy(update=predicted | ({} if next_isi_ms is None else _chosen(strategy)))
-
-
-def _chosen(strategy: Strategy) -> dict[str, Any]:
-    choice = strategy.choice
-    if choice is None or choice.scores is None:
-        return {} if choice is None else {"chosen_by": choice.by}
-    isis_ms = tuple(candidate_isis(strategy.space).tolist())
-    scores = _rounded(choice.scores.detach().double().numpy())
-    return {"chosen_by": choice.by, "scored_ms": isis_ms, "scores": scores}
+        more = {"predicted_low_mv": _rounded(band[0]), "predicted_high_mv": _rounded(band[1])}
+    if next_isi_ms is not None and (choice := strategy.choice) is not None:
+        more["chosen_by"] = choice.by
+        if choice.scores is not None:
+            more["scored_ms"] = tuple(candidate_isis(strategy.space).tolist())
+            more["scores"] = _rounded(choice.scores.detach().double().numpy())
+    return record.model_copy(update=more)
 
 
 def _rounded(values: FloatArray) -> tuple[float, ...]:

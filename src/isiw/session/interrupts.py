@@ -26,17 +26,24 @@ INTERRUPTED: Final = 130
 """The exit code where a session did not react to Ctrl-C: what shells report for it."""
 
 _PATIENCE_S = 2.0
-_GLANCE_S = 0.02
 
 
 def end_process(reason: str, log: LogWriter | None, code: int) -> Never:
     """End the process at once, whatever its threads are busy with."""
     ends = f"{reason} The process ends."
     end_s = time.monotonic() + _PATIENCE_S
+
+    def show() -> None:
+        restore()
+        alarm(f"\n{ends}" if log is None else f"\n{ends}\nThe log is safe; resume with {log.path}.")
+
+    def write() -> None:
+        if log is not None:
+            log.append(Event(kind="fault", text=ends))
+            log.sync()
+
     # Each in a thread of its own: a terminal or a disk that holds one up, or is gone, holds up nothing else.
-    steps = [threading.Thread(target=_show, args=(ends, log), daemon=True)]
-    if log is not None:
-        steps.append(threading.Thread(target=_write, args=(ends, log), daemon=True))
+    steps = [threading.Thread(target=step, daemon=True) for step in (show, write)]
     try:
         for step in steps:
             step.start()
@@ -45,17 +52,6 @@ def end_process(reason: str, log: LogWriter | None, code: int) -> Never:
                 time.sleep(_GLANCE_S)
     finally:
         os._exit(code)
-
-
-def _show(text: str, log: LogWriter | None) -> None:
-    restore()
-    safe = "" if log is None else f"\nThe log is safe; resume with {log.path}."
-    alarm(f"\n{text}{safe}")
-
-
-def _write(text: str, log: LogWriter) -> None:
-    log.append(Event(kind="fault", text=text))
-    log.sync()
 
 
 P = ParamSpec("P")
@@ -139,7 +135,7 @@ class Interrupts:
         """Let no KeyboardInterrupt come for what was heard, and return once the device was disarmed for it."""
         self._acknowledged = self._handled  # before the next line: a signal between them is heard later
         self._pending = False
-        self._wait_until(self._is_disarmed, _DISARMING_S)
+        self._wait_until_disarmed()
 
     def settle(self) -> None:
         """Forget what was acknowledged, as the operator has decided to go on; what came since still holds."""
@@ -169,18 +165,14 @@ class Interrupts:
             self._mouth.send(bytes([_HANDLED]))  # behind the signals that this is for: two at once are handled as one
         if number not in _PAUSING_SIGNALS:
             self._ended = self._handled
-        if number == _SUSPENDING:
-            self._suspend()
+        if number == _SUSPENDING:  # stop the process as Ctrl-Z does, but disarmed; it goes on here
+            self._wait_until_disarmed()
+            with self._away():
+                os.kill(os.getpid(), signal.SIGSTOP)
         if self._allowed:
             self._allowed = False  # one is enough; the next must not interrupt the cleanup
             raise KeyboardInterrupt
         self._pending = True
-
-    def _suspend(self) -> None:
-        """Stop the process as Ctrl-Z does, but disarmed; it goes on here."""
-        self._wait_until(self._is_disarmed, _DISARMING_S)
-        with self._away():
-            os.kill(os.getpid(), signal.SIGSTOP)
 
     def _watch(self) -> None:
         """Disarm at every signal, however busy the main thread is."""
@@ -205,11 +197,7 @@ class Interrupts:
             self._ears.settimeout(None)
             return self._ears.recv(1)
 
-    def _is_disarmed(self) -> bool:
-        return self._disarmed >= self._handled
-
-    @staticmethod
-    def _wait_until(holds: Callable[[], bool], at_most_s: float) -> None:
-        end_s = time.monotonic() + at_most_s
-        while not holds() and time.monotonic() < end_s:
+    def _wait_until_disarmed(self) -> None:
+        end_s = time.monotonic() + _DISARMING_S
+        while self._disarmed < self._handled and time.monotonic() < end_s:
             time.sleep(_GLANCE_S)

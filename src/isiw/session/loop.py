@@ -124,14 +124,16 @@ class Session(Judging):
             self._sink.ended()
 
     def _run(self, *, progress: bool | None, keys: bool) -> SessionResult:
-        require_untold(self.strategy, len(self.trials))
-        self._require_effect()
+        self._require_possible()
         earlier_s, sink = self._earlier_s(), self._sink
         shown = sink.on_trial is None and is_terminal(sys.stdout) if progress is None else progress
         table = Table(self._console, self._header, sink.faults, shown=shown)
         with self._rig.exclusive(), self._earlier.open_log(self._header) as log, sink.writing(log, table):
             try:
-                self._log_beginning()
+                for record in self._earlier.first_records:
+                    sink.append(record)
+                if self.trials:
+                    self._steps.log_belief()
                 self._rig.begin(len(self.trials), earlier_s)
                 decision = self._steps.at_the_end()  # of a session that was resumed; it need not be armed for nothing
                 if decision is None:
@@ -192,15 +194,16 @@ class Session(Judging):
         """True if its log is open."""
         return self._sink.is_open
 
-    def _judge(self, verdict: Callable[[TrialTable], Event]) -> None:
-        self._examination.judge(verdict)
-
-    def _require_effect(self) -> None:
+    def _require_possible(self) -> None:
+        require_untold(self.strategy, len(self.trials))
         if not self._earlier.first_records:  # what an earlier log says goes on as it was
             self._limits.require_effect()
             self._header.protocol.require_effect(self._limits.iti_s)
             self._header.signals.require_behind_artefact()
             require_room(self.strategy, self._header)
+
+    def _judge(self, verdict: Callable[[TrialTable], Event]) -> None:
+        self._examination.judge(verdict)
 
     def _earlier_s(self) -> list[float]:
         """The ages of earlier stimuli to the same person [s], as far as the logs to look at know."""
@@ -213,12 +216,6 @@ class Session(Judging):
             period_s = max(limits.period_s, limits.rest_s)
             earlier_s += earlier_pulses_s(folder, self._header.subject, period_s, but=self.log_path)
         return earlier_s
-
-    def _log_beginning(self) -> None:
-        for record in self._earlier.first_records:
-            self._sink.append(record)
-        if self.trials:
-            self._steps.log_belief()
 
     def _log_locked_limits(self) -> None:
         """Log the intensity that the device reported when it was armed, so that a resumed session is held to it."""

@@ -148,17 +148,12 @@ class Recorder(Judging):
         """
         with self._lock:
             self._examination.conclude()
-            if isi_ms is None or not pulse:
-                self._begin_alone(tap_alone=not pulse)
+            if (isi_ms is None or not pulse) and self.asked is None:  # it was given, whatever the limits allow
+                self._begin(None, tap_alone=not pulse)
+                if len(self.trials) >= self._limits.max_pulses:
+                    self._examination.event("limit", f"TMS alone was given beyond {self._limits.max_pulses} pulses.")
             outcome = Outcome(isi_ms, mep_mv, None, isi_sd_ms, mep_sd_mv, mep_interval_mv)
             self._tell(outcome, background_rms_uv, pulse=pulse)
-
-    def _begin_alone(self, *, tap_alone: bool) -> None:
-        """Put on disk that one stimulus was given alone, whatever the limits allow."""
-        if self.asked is None:
-            self._begin(None, tap_alone=tap_alone)
-            if len(self.trials) >= self._limits.max_pulses:
-                self._examination.event("limit", f"TMS alone was given beyond {self._limits.max_pulses} pulses.")
 
     def _tell(self, outcome: Outcome, background_rms_uv: float | None, *, pulse: bool) -> None:
         isi_ms, mep_mv, space = outcome.isi_ms, outcome.mep_mv, self.strategy.space

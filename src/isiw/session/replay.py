@@ -56,7 +56,13 @@ def replay(
     What an operator said about a trial holds from then on; asks before it are compared as they were made. Of a long
     session the first and the last asks are compared: the last ones depend on all that was told before.
     """
-    _require_same_space(strategy, record.header)
+    if strategy.space != record.header.space:
+        raise StrategyError(
+            "the strategy has another design space than the session",
+            got=str(strategy.space),
+            expected=str(record.header.space),
+            remedy="Make it with space=isiw.read_session(LOG).header.space.",
+        )
     told: list[Trial] = []
     changes: list[int] = []
     differing: list[int] = []
@@ -134,16 +140,6 @@ def _known_settings(recipe: StrategyRecipe) -> dict[str, Any]:
     return known
 
 
-def _require_same_space(strategy: Strategy, header: Header) -> None:
-    if strategy.space != header.space:
-        raise StrategyError(
-            "the strategy has another design space than the session",
-            got=str(strategy.space),
-            expected=str(header.space),
-            remedy="Make it with space=isiw.read_session(LOG).header.space.",
-        )
-
-
 def _require_other_versions(intent: Intent, asked_ms: float, header: Header) -> None:
     """Raise if the strategy has no reason to ask something else than it did."""
     same = (header.schema_version, header.belief_version, header.engine_version) == (
@@ -190,7 +186,7 @@ def taken_up(
         record.events,
         {"created": header.created, "asks_from": told.asks_from},
         (*told.unknown, _resumption(record, told, limits)),
-        partial(_ages_s, salvaged, len(told.trials)),
+        lambda: [*(known_s := pulses_s(salvaged)), *[0.0] * (len(told.trials) - len(known_s))],  # 0 s ago if not known
         partial(_taps, record),
     )
 
@@ -272,9 +268,3 @@ def _resumption(record: SessionRecord, replayed: Replayed, limits: Limits) -> Ev
         sentences.append(f"At least {now_s:g} s between two stimuli from here on; it was {was_s:g} s.")
     last = len(replayed.trials) - 1 if replayed.trials else None
     return Event(kind="resume", trial=last, text=" ".join((*sentences, *record.losses)))
-
-
-def _ages_s(salvaged: Salvage, trials: int) -> list[float]:
-    """The age of each stimulus of a log [s]; 0 for those of which nobody knows when they were."""
-    known_s = pulses_s(salvaged)
-    return [*known_s, *[0.0] * (trials - len(known_s))]

@@ -84,7 +84,10 @@ def open_session(
         changes = {name: value for name, value in stated.items() if options.get(name) not in (None, "")}
         salvaged = salvage(path)
         return _own_loop_resumed(salvaged, read_salvaged(salvaged), strategy, changes, options)
-    return _begun(path, strategy, stated, options)
+    header = _header(strategy, **stated)
+    require_room(strategy, header)
+    clock, on_doubt = options.get("clock") or MonotonicClock(), options.get("on_doubt")
+    return Recorder(strategy, LogWriter.create(path, header), header, clock, on_doubt=on_doubt)
 
 
 def _stated(space: DesignSpace, options: OwnLoopOptions) -> dict[str, Any]:
@@ -104,13 +107,6 @@ def _stated(space: DesignSpace, options: OwnLoopOptions) -> dict[str, Any]:
     subject, visit = text("subject", options.get("subject", "")), options.get("visit") or Visit()
     config = dict(options.get("config") or {})
     return {"subject": subject, "visit": visit, "protocol": protocol, "limits": limits, "config": config}
-
-
-def _begun(path: Path, strategy: Strategy, stated: Mapping[str, Any], options: OwnLoopOptions) -> Recorder:
-    header = _header(strategy, **stated)
-    require_room(strategy, header)
-    clock, on_doubt = options.get("clock") or MonotonicClock(), options.get("on_doubt")
-    return Recorder(strategy, LogWriter.create(path, header), header, clock, on_doubt=on_doubt)
 
 
 def _own_loop_resumed(

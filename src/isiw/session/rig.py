@@ -120,7 +120,8 @@ class Rig:
         away: Callable[[], AbstractContextManager[None]] = nullcontext,
         waits_for_nobody: bool = False,
     ) -> None:
-        self.interrupts = Interrupts(self.disarm, self._end_stuck, away)
+        stuck = "The session does not react. The device is disarmed."
+        self.interrupts = Interrupts(self.disarm, lambda: end_process(stuck, sink.writer, INTERRUPTED), away)
         self.staged_once = False
         self._raw, self._limits, self._safeguards, self._sink = device, limits, safeguards, sink
         self._waits_for_nobody = waits_for_nobody
@@ -210,9 +211,6 @@ class Rig:
 
     def _end_armed(self, error: StillArmedError) -> Never:
         end_process(error_text(error), self._sink.writer, STILL_ARMED)
-
-    def _end_stuck(self) -> None:
-        end_process("The session does not react. The device is disarmed.", self._sink.writer, INTERRUPTED)
 
 
 def own_reference(reference: Reference) -> str:

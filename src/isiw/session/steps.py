@@ -91,7 +91,8 @@ class Pausing:
     def _goes_on(self, reason: str, decide: Callable[[str], bool]) -> bool:
         if self._asking.over:
             return False
-        self.waiting = Pause(self._asking.next(), reason)
+        self._asking.number += 1
+        self.waiting = Pause(self._asking.number, reason)
         try:
             return self._rig.interrupts.freely(decide, reason) is True and not self._asking.over
         finally:
@@ -106,14 +107,9 @@ class Asking:
 
     def __init__(self) -> None:
         self.asked = self.over = False
-        self._number = 0
+        self.number = 0
         self._answer: bool | None = None
         self._lock = threading.Lock()
-
-    def next(self) -> int:
-        """The number of the question that comes next."""
-        self._number += 1
-        return self._number
 
     def wait(self, nobody: Callable[[], bool]) -> bool:
         """Wait for an answer; where nobody is left who could give one, it is no."""
@@ -132,9 +128,9 @@ class Asking:
         with self._lock:
             if not self.asked or (goes_on and (self.over or self._answer is False)):
                 raise InvalidValueError("the session does not wait for an answer", remedy="Pause it first.")
-            if number not in {None, self._number}:
+            if number not in {None, self.number}:
                 raise InvalidValueError(
-                    "the session has paused again since", got=number, expected=f"pause {self._number}",
+                    "the session has paused again since", got=number, expected=f"pause {self.number}",
                     remedy="Read why it is paused now, then answer that pause.",
                 )  # fmt: skip
             self._answer = goes_on
@@ -218,7 +214,12 @@ class Steps:
         """The decision to stop, by the strategy or the limits; None where there is a stimulus to deliver."""
         if (decision := self._own_response.decided(self._freely(self._strategy.decision))).stop:
             return decision
-        return None if self._rig.limited.pulses_left else self._stop_at_limit()
+        if self._rig.limited.pulses_left:
+            return None
+        decision = StopKind.LIMIT.stop(f"The limit of {self._header.limits.max_pulses} pulses is reached.")
+        self._examination.event("limit", decision.reason)
+        self._examination.log_belief(lambda: decision)
+        return decision
 
     def log_belief(self) -> None:
         """Log what is known after the last trial, which a session that ended then may not have corrected others by."""
@@ -229,12 +230,6 @@ class Steps:
     def seen(self) -> None:
         """A person has seen the reason of a pause, and the session goes on."""
         self._watch = self._watch.seen()
-
-    def _stop_at_limit(self) -> StopDecision:
-        decision = StopKind.LIMIT.stop(f"The limit of {self._header.limits.max_pulses} pulses is reached.")
-        self._examination.event("limit", decision.reason)
-        self._examination.log_belief(lambda: decision)
-        return decision
 
     def _report(self, trial: Trial, decision: StopDecision, next_isi_ms: float | None) -> None:
         """Tell the sink that a trial is concluded, and pause where a person should look at the data first."""
@@ -368,8 +363,8 @@ class Steps:
             late = self._rig.late_answer()
             if late is not None:
                 self._log_waveforms(stimulus, late)
-                what = f"{late.mep_mv:g} mV" if isinstance(late, Measurement) else "a sweep"
-                text = f"An answer came after the deadline: {what}. It is in the log, but is not used."
+                seen = f"{late.mep_mv:g} mV" if isinstance(late, Measurement) else "a sweep"
+                text = f"An answer came after the deadline: {seen}. It is in the log, but is not used."
                 self._sink.append(Event(kind="late", trial=stimulus.trial, text=text))
             raise
         self._log_waveforms(stimulus, answer)

@@ -260,7 +260,11 @@ class ThresholdRecorder:
     def ask(self) -> float:
         """The next intensity [% MSO], the same until its outcome; on disk as about to be given before this returns."""
         if self._asked is None:
-            self._require_left()
+            if self.given >= self.header.max_pulses:
+                raise LimitExceededError(
+                    f"the limit of {self.header.max_pulses} pulses is reached, so no further pulse follows",
+                    remedy="For more pulses begin a new log with a larger --max-pulses (max_pulses in Python).",
+                )
             intensity, self.place_mm = self.search.ask(), self.search.place_mm
             self._clock.sleep_s(self._pacing.wait_s())
             now_s, at = self._clock.now_s(), {"intensity_pct_mso": intensity, "place_mm": self.place_mm}
@@ -351,13 +355,6 @@ class ThresholdRecorder:
                 self._examination.log_failure(error)
         finally:
             self.close()
-
-    def _require_left(self) -> None:
-        if self.given >= self.header.max_pulses:
-            raise LimitExceededError(
-                f"the limit of {self.header.max_pulses} pulses is reached, so no further pulse follows",
-                remedy="For more pulses begin a new log with a larger --max-pulses (max_pulses in Python).",
-            )
 
     def _require_asked(self) -> float:
         if self._asked is None:
