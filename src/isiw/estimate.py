@@ -291,6 +291,10 @@ class Reported(BaseModel):
     band_high_mv: Numbers = ()
 
 
+_SAME: Final = ("probability", "expected_f1", "depressed_probability", "change", "beforehand", "tap_may_explain")
+"""Figures that an estimate with samples has by the same names."""
+
+
 class Estimate(Reported):
     """An estimate of a window in figures: logs keep them, and pictures and sentences are made of them.
 
@@ -323,21 +327,15 @@ class Estimate(Reported):
             for part, value in zip(("ms", "low_ms", "high_ms", "beyond"), edge, strict=True)
         }
         excluded = estimate.largest_excluded
-        figures: dict[str, Any] = {
-            "probability": estimate.probability,
+        figures: dict[str, Any] = {name: getattr(estimate, name) for name in _SAME} | {
             "segments_ms": () if estimate.window is None else estimate.window.edges_ms,
             "split": estimate.split_probability,
             "hypotheses": estimate.hypotheses or {},
             "unusual": dict(estimate.unusual),
-            "expected_f1": estimate.expected_f1,
             "best_isi_ms": tuple(estimate.best_isi or ()),
             "excluded_mv": None if excluded is None else excluded.mep_mv,
             "excluded_pct_rmt": None if excluded is None else excluded.shift_pct_rmt,
             "depressed_ms": () if estimate.depressed is None else estimate.depressed.edges_ms,
-            "depressed_probability": estimate.depressed_probability,
-            "change": estimate.change,
-            "beforehand": estimate.beforehand,
-            "tap_may_explain": estimate.tap_may_explain,
         }
         return cls(**figures, **edges, **_profile(estimate), **more)
 
@@ -376,8 +374,7 @@ class Estimate(Reported):
 
 
 def _profile(estimate: WindowEstimate) -> Mapping[str, Any]:
-    band = None if estimate.grid_ms is None else estimate.profile(estimate.grid_ms)
-    if band is None or estimate.grid_ms is None:
+    if estimate.grid_ms is None or (band := estimate.profile(estimate.grid_ms)) is None:
         return {}
     named = {"profile_mv": band.median_mv, "band_low_mv": band.low_mv, "band_high_mv": band.high_mv}
     rounded = {name: tuple(np.asarray(mv, float).round(PROFILE_DECIMALS).tolist()) for name, mv in named.items()}

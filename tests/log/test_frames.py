@@ -11,7 +11,7 @@ import pytest
 from isiw.log.headers import Header
 from isiw.log.reader import TRIAL_COLUMNS, read_session
 from isiw.log.records import Onsets
-from isiw.log.schema import Intent
+from isiw.log.schema import Event, Intent
 from isiw.log.writer import LogWriter
 from isiw.session.loop import Session
 from isiw.session.resume import resume
@@ -24,7 +24,7 @@ def onsets_s(*intents: tuple[float, float] | None) -> list[float]:
     onsets = Onsets()
     for trial, intent in enumerate(intents):
         if intent is None:
-            onsets.resumed()
+            onsets.take(Event(kind="resume"), 0)
         else:
             onsets.take(Intent(trial=trial, isi_ms=5.0, t_s=intent[0]), int(1e9 * intent[1]))
     return [onset.onset_s for onset in onsets.by_trial.values()]
@@ -48,7 +48,7 @@ def test_a_stimulus_that_was_refused_is_not_the_first() -> None:
     onsets = Onsets()
     for t_s in (100.0, 101.0):
         onsets.take(Intent(trial=0, isi_ms=5.0, t_s=t_s), int(1e9 * t_s))
-        onsets.refused()
+        onsets.take(Event(kind="refused"), 0)
     for trial, t_s in enumerate((102.0, 107.0)):
         onsets.take(Intent(trial=trial, isi_ms=5.0, t_s=t_s), int(1e9 * t_s))
     assert [onset.onset_s for onset in onsets.by_trial.values()] == [0.0, 5.0]

@@ -33,6 +33,8 @@ _HEAD: Final = struct.Struct("<BQQQQI4x4xQ")
 _RECORD_HEAD: Final = struct.Struct("<BQ")
 """The head of a record: its kind, and its length."""
 
+RECORD_HEAD_BYTES: Final = _RECORD_HEAD.size
+
 _PACKED = b"\x28\xb5\x2f\xfd"
 """The beginning of a block's data (RFC 8878, section 3.1.1)."""
 
@@ -71,31 +73,26 @@ class Unpacking:
 
     def records(self, block: mcap.Chunk, offset: int) -> Sequence[mcap.McapRecord]:
         """The records of a block."""
+        packed = len(block.data)
         try:
             size = _honest_size(block)
             _require_room(offset, self._bytes_left, size)
             self._bytes_left -= size  # whatever becomes of it, as unpacking it takes time
-            unpacked = _unpacked(block)
-            number, left = _count(unpacked.data, self._records_left + 1), self._records_left
+            if block.compression:
+                block = replace(block, compression="", data=zstandard.decompress(block.data, size))
+            number, left = _count(block.data, self._records_left + 1), self._records_left
             self._records_left = max(0, left - number)
             _require_room(offset, left, number)
-            return breakup_chunk(unpacked, validate_crc=True)
+            return breakup_chunk(block, validate_crc=True)
         except UNREADABLE as error:
             raise LostBlockError(
-                f"A block of {len(block.data)} bytes at byte {offset} fails its checksum and is lost."
+                f"A block of {packed} bytes at byte {offset} fails its checksum and is lost."
             ) from error
 
 
 def _require_room(offset: int, left: int, needed: int) -> None:
     if needed > left:
         raise LostBlockError(f"The block at byte {offset} makes the log too large to be one, and is left out.")
-
-
-def _unpacked(block: mcap.Chunk) -> mcap.Chunk:
-    """The same block without compression."""
-    if not block.compression:
-        return block
-    return replace(block, compression="", data=zstandard.decompress(block.data, block.uncompressed_size))
 
 
 def _count(data: bytes, most: int) -> int:
@@ -120,9 +117,6 @@ def _honest_size(block: mcap.Chunk) -> int:
         raise McapError(block.compression)
     return block.uncompressed_size
 
-
-RECORD_HEAD_BYTES: Final = 1 + 8
-"""The head of a record: its kind, and its length."""
 
 _FOOTER_BYTES = 1 + 8 + 8 + 8 + 4
 _MAGIC = b"\x89MCAP0\r\n"

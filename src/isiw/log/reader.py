@@ -107,10 +107,7 @@ class SessionRecord(_StimuliRecord[Header]):
             + (f", {len(self.unknown)} of unknown outcome" if self.unknown else ""),
         ]
         if last is not None:
-            lines += [
-                self.too_little or str(last),
-                f"{'Ended' if last.stop else 'Not over'}: {last.reason}",
-            ]
+            lines += [self.too_little or str(last), f"{'Ended' if last.stop else 'Not over'}: {last.reason}"]
             if self.is_judged_since:
                 lines.append(JUDGED_SINCE)
         return "\n".join([*lines, *self.told_unread, *(f"Lost: {loss}" for loss in self.losses), f"Log: {self.path}"])
@@ -333,8 +330,9 @@ def trial_frame(
 ) -> pd.DataFrame:
     """All trials as a DataFrame, a row a trial, columns as in `TRIAL_COLUMNS`, indexed by `index`."""
     beliefs = {estimate.trial: estimate for estimate in estimates}
+    times = {trial: {"onset_s": onset.onset_s, "intent_utc": onset.at_ns} for trial, onset in onsets.items()}
     rows = [
-        _timing(onsets.get(trial.index))
+        times.get(trial.index, {})
         | _outcome(trial)
         | measured.get(trial.index, Measures())._asdict()
         | _belief(beliefs.get(trial.index))
@@ -344,10 +342,6 @@ def trial_frame(
     frame = pd.DataFrame(rows, index=index, columns=list(TRIAL_COLUMNS))
     kinds = dict.fromkeys(_NUMBERS, "float64") | dict.fromkeys(_FLAGS, "bool")
     return frame.astype(kinds).assign(intent_utc=pd.to_datetime(frame["intent_utc"], unit="ns", utc=True))
-
-
-def _timing(onset: Onset | None) -> dict[str, Any]:
-    return {} if onset is None else {"onset_s": onset.onset_s, "intent_utc": onset.at_ns}
 
 
 def _outcome(trial: Trial) -> dict[str, Any]:

@@ -42,21 +42,17 @@ class Onsets:
         self._last: Onset | None = None
         self._clock_s: float | None = None
 
-    def take(self, intent: Intent, at_ns: int) -> None:
-        """Take the next intent; a second one for the same trial counts."""
-        self._last = Onset(self._onset_s(intent.t_s, at_ns), at_ns)
-        self._clock_s = intent.t_s
-        self.by_trial[intent.trial] = self._last
-
-    def refused(self) -> None:
-        """Take note that the last stimulus was not given: where nothing was given before, the next is the first one."""
-        if len(self.by_trial) == 1:
-            self.by_trial.clear()
+    def take(self, record: Record, at_ns: int) -> None:
+        """Take the next record; of two intents for the same trial the second counts."""
+        if isinstance(record, Intent):
+            self._last = Onset(self._onset_s(record.t_s, at_ns), at_ns)
+            self._clock_s = record.t_s
+            self.by_trial[record.trial] = self._last
+        elif isinstance(record, Event) and record.kind == "resume":
+            self._clock_s = None
+        elif isinstance(record, Event) and record.kind == "refused" and len(self.by_trial) == 1:
+            self.by_trial.clear()  # nothing was given before, so that the next stimulus is the first one
             self._last = None
-
-    def resumed(self) -> None:
-        """Take note that the session was resumed."""
-        self._clock_s = None
 
     def _onset_s(self, clock_s: float, at_ns: int) -> float:
         if self._last is None:
@@ -192,21 +188,16 @@ class Records:
             return
         if isinstance(record, AnyHeader):
             self.header, self.unread = record, unread
-        elif (trial := _concluded(record)) is not None and trial in self._trials:
-            self.losses.append(f"A second record of trial {trial} is left out.")
+        elif isinstance(record, Trial | PulseOutcome | Production):
+            trial = record.index if isinstance(record, Trial) else record.trial
+            if trial in self._trials:
+                self.losses.append(f"A second record of trial {trial} is left out.")
+                return
+            self._trials.add(trial)
+            self.history.append(record)
         elif not isinstance(record, Waveform):
             self.history.append(record)
-            self._note(record, message.log_time_ns)
-
-    def _note(self, record: Record, at_ns: int) -> None:
-        if (trial := _concluded(record)) is not None:
-            self._trials.add(trial)
-        elif isinstance(record, Intent):
-            self.onsets.take(record, at_ns)
-        elif isinstance(record, Event) and record.kind == "resume":
-            self.onsets.resumed()
-        elif isinstance(record, Event) and record.kind == "refused":
-            self.onsets.refused()
+            self.onsets.take(record, message.log_time_ns)
 
 
 def _decoded(message: Message) -> tuple[Record, dict[str, str]]:
@@ -227,13 +218,6 @@ def _is_beyond(message: Message) -> bool:
         return False
     number = values.get("index" if message.topic == "/trial" else "trial") if isinstance(values, dict) else None
     return isinstance(number, int) and number >= MOST_TRIALS
-
-
-def _concluded(record: Record) -> int | None:
-    """The number of the trial whose outcome a record is; None for any other record."""
-    if isinstance(record, Trial):
-        return record.index
-    return record.trial if isinstance(record, PulseOutcome | Production) else None
 
 
 def unknown_of(history: Sequence[Record], known: AbstractSet[int], delivered: int) -> tuple[Intent, ...]:

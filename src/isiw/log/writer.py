@@ -181,20 +181,17 @@ class LogWriter:
         Nothing happens if it is closed already.
         """
         with self._lock:
-            if self.is_open:
-                self._close()
-
-    def _close(self) -> None:
-        try:
-            self._writer.finish()
-            self._file.flush()
-            self._save_if_displaced()
-            with disk_errors(
-                self._file.path, "the finished log cannot be renamed", f"It is complete, at {self._file.path}."
-            ):
-                self._take_its_name()
-        finally:
-            self._file.close()
+            if not self.is_open:
+                return
+            try:
+                self._writer.finish()
+                self._file.flush()
+                self._save_if_displaced()
+                complete = f"It is complete, at {self._file.path}."
+                with disk_errors(self._file.path, "the finished log cannot be renamed", complete):
+                    self._take_its_name()
+            finally:
+                self._file.close()
 
     def _take_its_name(self) -> None:
         own = self.path.exists() and Fingerprint.of(self.path) == self._replaces
@@ -247,9 +244,8 @@ class LogWriter:
     def _register(self, topic: str) -> int:
         if topic not in self._channels:
             name, schema = json_schema(topic)
-            number = self._writer.register_channel(
-                topic, "json", self._writer.register_schema(name, "jsonschema", schema)
-            )
+            schema_number = self._writer.register_schema(name, "jsonschema", schema)
+            number = self._writer.register_channel(topic, "json", schema_number)
             if topic not in CHANNEL_IDS:
                 self._writer.add_metadata(f"{ANNOUNCEMENT}{number}", {"id": str(number), "topic": topic})
             self._channels[topic] = number

@@ -52,13 +52,16 @@ def described(app: FastAPI) -> dict[str, Any]:
             [(kind, "validation") for kind in bodies.values()], ref_template="#/components/schemas/{model}"
         )
         document["components"]["schemas"] |= definitions["$defs"]
+        error = {"$ref": "#/components/schemas/ErrorAnswer"}
         document["components"]["securitySchemes"] = {"token": {"type": "http", "scheme": "bearer"}}
         document["security"] = [{"token": []}]
         for path, kind in bodies.items():
             document["paths"][path]["post"]["requestBody"] = _body(kind)
         for operations in document["paths"].values():
-            for operation in operations.values():
-                _allow_errors(operation["responses"]["200"]["content"])
+            for operation in operations.values():  # an answer with status 200 may be an error
+                content = operation["responses"]["200"]["content"]
+                usual = content.get(JSON, {}).get("schema")
+                content[JSON] = {"schema": {"anyOf": [usual, error]} if usual else error}
         app.openapi_schema = document
     return app.openapi_schema
 
@@ -75,13 +78,6 @@ def _body(kind: type[BaseModel]) -> dict[str, Any]:
     required = any(field.is_required() for field in kind.model_fields.values())
     schema = {"$ref": f"#/components/schemas/{kind.__name__}"}
     return {"required": required, "content": {JSON: {"schema": schema}, FORM: {"schema": schema}}}
-
-
-def _allow_errors(content: dict[str, Any]) -> None:
-    """Say that an answer with status 200 may be an error."""
-    error = {"$ref": "#/components/schemas/ErrorAnswer"}
-    usual = content.get(JSON, {}).get("schema")
-    content[JSON] = {"schema": {"anyOf": [usual, error]} if usual else error}
 
 
 def make_app(folder: str | Path, rules: Rules) -> FastAPI:

@@ -139,7 +139,9 @@ class DrivenSession:
     def tell(self, request: TellRequest) -> TrialAnswer:
         """Log the outcome of a trial; told again it is answered as at first."""
         if request.trial in self._outcomes:
-            return self._known(request.trial, _told(request), f"isi_ms={request.isi_ms} mep_mv={request.mep_mv}")
+            uv = request.background_rms_uv
+            told = (request.isi_ms, request.mep_mv, request.isi_sd_ms, uv, request.pulse)
+            return self._known(request.trial, told, f"isi_ms={request.isi_ms} mep_mv={request.mep_mv}")
         self._require_next(request.trial, asked=request.pulse and request.isi_ms is not None)
         self.recorder.tell(
             request.isi_ms,
@@ -192,7 +194,8 @@ class DrivenSession:
     def _known(self, number: int, told: tuple[object, ...], words: str) -> TrialAnswer:
         """The first answer about a trial, to who tells it again."""
         trial = self.recorder.trials[number]
-        if told == _recorded(trial):
+        recorded, recorded_words = _recorded(trial)
+        if told == recorded:
             return self._outcomes[number]
         late = trial.reason is Kind.OUTCOME_UNKNOWN
         if late:
@@ -203,7 +206,7 @@ class DrivenSession:
             "Late" if late else "OtherOutcome",
             f"trial {number} has another outcome already",
             got=words,
-            expected=f"what is recorded: {_in_words(trial)}",
+            expected=f"what is recorded: {recorded_words}",
             remedy="It stays as it is." + (" What came too late is in the log as a note." if late else ""),
             field="trial",
         )
@@ -234,18 +237,9 @@ def _outcomes(record: SessionRecord) -> dict[int, TrialAnswer]:
     return {trial.index: TrialAnswer.of(trial, decision, said) for trial, decision, said in trials}
 
 
-def _told(request: TellRequest) -> tuple[object, ...]:
-    return request.isi_ms, request.mep_mv, request.isi_sd_ms, request.background_rms_uv, request.pulse
-
-
-def _recorded(trial: Trial) -> tuple[object, ...]:
-    """The values that were told about a trial."""
+def _recorded(trial: Trial) -> tuple[tuple[object, ...], str]:
+    """The values that were told about a trial, and the same in words."""
     if trial.status is Status.MISTRIAL:
-        return (trial.reason,)
-    return trial.isi_ms, trial.mep_mv, trial.isi_sd_ms, trial.background_rms_uv, not trial.tap_alone
-
-
-def _in_words(trial: Trial) -> str:
-    if trial.status is Status.MISTRIAL:
-        return f"mistrial, {trial.reason}"
-    return f"isi_ms={trial.isi_ms} mep_mv={trial.mep_mv}"
+        return (trial.reason,), f"mistrial, {trial.reason}"
+    told = (trial.isi_ms, trial.mep_mv, trial.isi_sd_ms, trial.background_rms_uv, not trial.tap_alone)
+    return told, f"isi_ms={trial.isi_ms} mep_mv={trial.mep_mv}"

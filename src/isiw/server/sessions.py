@@ -63,7 +63,9 @@ class Sessions:
                 yield session
         finally:
             if session.closed:
-                self._forget(session)
+                with self._lock:
+                    if self._open.get(name) is session:
+                        del self._open[name]
 
     def create(self, request: CreateRequest) -> SessionAnswer:
         """Begin a session; the same request once more is answered as at first, as long as nothing was asked for."""
@@ -158,7 +160,7 @@ class Sessions:
             subject=request.visit.subject,
             visit=request.visit.noted(),
             protocol=request.protocol,
-            config={SERVED_KEY: _kept(request)},
+            config={SERVED_KEY: request.model_dump_json()},  # a text, as in TOML there is no null
             on_doubt=doubts.append,
         )
         return self._take(DrivenSession(request.id, request.visit.subject, recorder, doubts))
@@ -166,7 +168,7 @@ class Sessions:
     def _require_same_beginning(self, request: CreateRequest) -> None:
         """Raise if the session with this id is another one, or goes on already."""
         record = self.record(request.id)
-        if record.intents or record.header.config.get(SERVED_KEY) != _kept(request):
+        if record.intents or record.header.config.get(SERVED_KEY) != request.model_dump_json():
             raise Refusal(
                 409, "Exists", "there is a session with this id", got=request.id,
                 remedy="Choose another id, or resume it.", field="id",
@@ -174,13 +176,8 @@ class Sessions:
 
     def _resume(self, name: str, record: SessionRecord, lost_pulses: int | None) -> SessionAnswer:
         header, doubts = record.header, list[str]()
-        recorder = open_session(
-            strategy_of(header),
-            self._existing(name),
-            resume=True,
-            lost_pulses=lost_pulses,
-            on_doubt=doubts.append,
-        )
+        path, strategy = self._existing(name), strategy_of(header)
+        recorder = open_session(strategy, path, resume=True, lost_pulses=lost_pulses, on_doubt=doubts.append)
         return self._take(DrivenSession(name, header.subject, recorder, doubts, record))
 
     def _take(self, session: DrivenSession) -> SessionAnswer:
@@ -192,11 +189,6 @@ class Sessions:
         with self._lock:
             self._open[session.name] = session
         return stands
-
-    def _forget(self, session: DrivenSession) -> None:
-        with self._lock:
-            if self._open.get(session.name) is session:
-                del self._open[session.name]
 
     def _path(self, name: str) -> Path:
         """Where the log of a session is, which is in the folder itself whatever its name."""
@@ -212,11 +204,6 @@ class Sessions:
         if not (path.is_file() or part_of(path).is_file()):
             raise Refusal(404, "NoSuchSession", "there is no such session", got=name, remedy="Create it first.")
         return path
-
-
-def _kept(request: CreateRequest) -> str:
-    """A request as a log can keep it: in TOML there is no null."""
-    return request.model_dump_json()
 
 
 def _stood(name: str, record: SessionRecord) -> SessionAnswer:

@@ -124,7 +124,8 @@ class Session(Judging):
             self._sink.ended()
 
     def _run(self, *, progress: bool | None, keys: bool) -> SessionResult:
-        self._require_possible()
+        require_untold(self.strategy, len(self.trials))
+        self._require_effect()
         earlier_s, sink = self._earlier_s(), self._sink
         shown = sink.on_trial is None and is_terminal(sys.stdout) if progress is None else progress
         table = Table(self._console, self._header, sink.faults, shown=shown)
@@ -194,8 +195,7 @@ class Session(Judging):
         """True if its log is open."""
         return self._sink.is_open
 
-    def _require_possible(self) -> None:
-        require_untold(self.strategy, len(self.trials))
+    def _require_effect(self) -> None:
         if not self._earlier.first_records:  # what an earlier log says goes on as it was
             self._limits.require_effect()
             self._header.protocol.require_effect(self._limits.iti_s)

@@ -12,7 +12,7 @@ from isiw.checks import amplitude, deadline, number, whole
 from isiw.design import DesignSpace, require_space
 from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError, warn
 from isiw.estimate import WindowEstimate
-from isiw.findings import NO_MEP, Finding
+from isiw.findings import NO_MEP
 from isiw.models.protocol import Posterior, PredictsMeps, ReportsTrouble, ResponseModel
 from isiw.signals.evidence import Evidence, Told, is_silent
 from isiw.signals.limits import isi_far, require_plausible
@@ -262,11 +262,8 @@ class Strategy:
         require_plausible(plain_ms, plain_mv, asked_ms, self.space, isi_sd_ms)
         more = Details(response=response, isi_sd_ms=isi_sd_ms, mep_sd_mv=mep_sd_mv, mep_interval_mv=mep_interval_mv)
         self.learn(isi_ms, mep_mv, **more)
-        self._warn_of(isi_far(plain_ms, asked_ms, self.space))
-
-    def _warn_of(self, far: Finding | None) -> None:
         evidence = Evidence(told=self._told, detection_limit_mv=self.detection_limit_mv)
-        self._doubts = self._doubts.after((far, *findings(evidence)))
+        self._doubts = self._doubts.after((isi_far(plain_ms, asked_ms, self.space), *findings(evidence)))
         if self._doubts.new is not None:
             warn(f"{self._doubts.new}", ImplausibleDataWarning)
 

@@ -21,15 +21,6 @@ _ADDRESS: Final = ipaddress.IPv4Address("127.0.0.1")
 _LEAVING_S: Final = 5.0
 
 
-def make_live_app(session: Session, view: View, rules: Rules) -> FastAPI:
-    """The application that serves a session's page."""
-    app = FastAPI(title="isiw", version=isiw.__version__, docs_url=None, redoc_url=None, openapi_url=None)
-    app.state.session, app.state.view = session, view
-    app.include_router(router)
-    guarded(app, rules)
-    return app
-
-
 class LivePage:
     """The live page of a session, served until it is closed; a context manager.
 
@@ -41,7 +32,10 @@ class LivePage:
     def __init__(self, session: Session, port: int) -> None:
         self._view, token = View(session), new_token()
         rules = Rules(token, open_paths=frozenset(FILES), urgent_paths=URGENT)
-        app = make_live_app(session, self._view, rules)
+        app = FastAPI(title="isiw", version=isiw.__version__, docs_url=None, redoc_url=None, openapi_url=None)
+        app.state.session, app.state.view = session, self._view
+        app.include_router(router)
+        guarded(app, rules)
         config = settings_of(app, rules, log_level="critical")  # the screen is the operator's
         self._listener = listening(_ADDRESS, port)
         self.url = f"http://{_ADDRESS}:{self._listener.getsockname()[1]}/#{token}"
