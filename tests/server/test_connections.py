@@ -17,8 +17,8 @@ from pathlib import Path
 import httpx
 import pytest
 
-from isiw.server.connections import Connection
-from isiw.server.live.routes import file_of
+from isiw.server.guard import Connection
+from isiw.server.live.page import file_of
 from server.live.watched import Watched
 from server.serving import BEARER, client_of, done, refused, server
 

@@ -29,8 +29,7 @@ import isiw
 from isiw.checks import Checked, Text, whole
 from isiw.errors import ConfigError, IsiwError
 from isiw.server.answers import Refusal, answered, as_refusal
-from isiw.server.connections import Connections
-from isiw.server.guard import LOOPBACK, Guard, Rules, wants_200
+from isiw.server.guard import LOOPBACK, Connections, Guard, Rules, wants_200
 from isiw.server.requests import FORM, JSON, BodyOf
 from isiw.server.routes import router
 from isiw.server.sessions import Sessions

@@ -14,7 +14,7 @@ import pytest
 import isiw
 from isiw.errors import ConfigError
 from isiw.log.writer import LogWriter
-from isiw.server.live.routes import FILES, file_of
+from isiw.server.live.page import FILES, file_of
 from isiw.server.live.view import Shown, View
 from isiw.text import plain
 from server.live.watched import HOSTILE, Watched

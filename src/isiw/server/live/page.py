@@ -1,21 +1,194 @@
-"""Serving the live page of one session to this computer, in a thread beside the session's loop."""
+"""The live page of one session, served to this computer in a thread beside the session's loop, and its calls."""
 
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import ipaddress
 import threading
-from typing import Final, Self
+from collections.abc import AsyncIterator, Awaitable, Callable
+from functools import cache
+from importlib import resources
+from typing import Annotated, Final, NamedTuple, Self
 
-from fastapi import FastAPI
+from fastapi import APIRouter, Depends, FastAPI, Request, Response
+from fastapi.responses import StreamingResponse
+from plotly.offline import get_plotlyjs
 
 import isiw
 from isiw.checks import whole
+from isiw.errors import InvalidValueError
+from isiw.server.answers import OkAnswer, Refusal
 from isiw.server.app import Server, guarded, listening, new_token, settings_of
 from isiw.server.guard import Rules
-from isiw.server.live.routes import FILES, URGENT, router
 from isiw.server.live.view import View
+from isiw.server.requests import BodyOf, ExcludeRequest, GoOnRequest, IncludeRequest, NoteRequest
 from isiw.session.loop import Session
+
+GLANCE_S, MOST_S = 0.05, 0.5
+"""The time between two looks for news, and the longest if none is put together for a while [s]."""
+
+QUIET_S: Final = 2.0
+"""After so long without news, the page hears that the session is still there [s]."""
+
+BY_PAGE: Final = "on the live page"
+
+FILES: Final = {
+    "/": ("text/html", lambda: _asset("isiw.server", "live.html")),
+    "/page.css": ("text/css", lambda: _asset("isiw.report", "page.css")),
+    "/live.css": ("text/css", lambda: _asset("isiw.server", "live.css")),
+    "/draw.js": ("text/javascript", lambda: _asset("isiw.report", "draw.js")),
+    "/live.js": ("text/javascript", lambda: _asset("isiw.server", "live.js")),
+    "/plotly.js": ("text/javascript", get_plotlyjs),
+}
+"""Files that say nothing of the session: those of the page, by path, with their type."""
+
+URGENT: Final = frozenset({"/pause", "/stop"})
+"""Paths that are answered however much there is to do."""
+
+_POLICY: Final = (
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; connect-src 'self'; "
+    "img-src data: blob:; form-action 'none'; base-uri 'none'; frame-ancestors 'none'"
+)
+_HEADERS: Final = {
+    "Content-Security-Policy": _POLICY,
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+}
+_UPDATES_HEADERS: Final = {**_HEADERS, "Cache-Control": "no-store"}
+
+router = APIRouter()
+
+
+def _asset(room: str, name: str) -> str:
+    return (resources.files(room) / "assets" / name).read_text(encoding="utf-8")
+
+
+class _File(NamedTuple):
+    """A file of the page, made once: to read and encode the largest takes as long as a good many updates."""
+
+    content: bytes
+    kind: str
+    headers: dict[str, str]
+
+
+@cache
+def file_of(path: str) -> _File:
+    """A file of the page."""
+    kind, text = FILES[path]
+    content = text().encode()
+    tag = f'"{hashlib.sha256(content).hexdigest()}"'
+    return _File(content, kind, {**_HEADERS, "Cache-Control": "no-cache", "ETag": tag})
+
+
+def _serving(path: str) -> Callable[[Request], Awaitable[Response]]:
+    async def file(request: Request) -> Response:
+        content, kind, headers = file_of(path)
+        if request.headers.get("if-none-match") == headers["ETag"]:
+            return Response(status_code=304, headers=headers)
+        return Response(content, media_type=kind, headers=headers)
+
+    return file
+
+
+for _path in FILES:
+    router.get(_path)(_serving(_path))
+
+
+async def _view(request: Request) -> View:
+    view: View = request.app.state.view
+    return view
+
+
+async def _session(request: Request, view: Annotated[View, Depends(_view)]) -> Session:
+    """The session, while it runs."""
+    session: Session = request.app.state.session
+    view.seen()
+    if not session.running:
+        raise Refusal(409, "NotRunning", "the session is not running", remedy="Nothing was done.")
+    return session
+
+
+Running = Annotated[Session, Depends(_session)]
+
+
+@router.get("/updates")
+async def updates(view: Annotated[View, Depends(_view)]) -> StreamingResponse:
+    """The contents of the page, whenever they change, as Server-Sent Events; until the session has ended."""
+    return StreamingResponse(_followed(view), media_type="text/event-stream", headers=_UPDATES_HEADERS)
+
+
+async def _followed(view: View) -> AsyncIterator[str]:
+    """Each viewer gets the latest when it has taken what came before; what it missed it need not know."""
+    seen: object = None
+    quiet_s = 0.0
+    with view.attended():
+        while True:
+            over, shown = view.over, view.shown()
+            if shown.state != seen:
+                seen, quiet_s = shown.state, 0.0
+                yield f"data: {shown.json}\n\n"
+            elif quiet_s >= QUIET_S:
+                quiet_s = 0.0
+                yield ": still here\n\n"
+            if over:
+                return
+            glance_s = max(GLANCE_S, min(view.wait_s, MOST_S))
+            await asyncio.sleep(glance_s)
+            quiet_s += glance_s
+
+
+@router.post("/pause")
+async def pause(session: Running) -> OkAnswer:
+    """Disarm now, and pause."""
+    await asyncio.to_thread(session.pause, f"Paused {BY_PAGE}.")  # threads that other calls cannot all be holding
+    return OkAnswer()
+
+
+@router.post("/resume")
+def resume(session: Running, body: Annotated[GoOnRequest, Depends(BodyOf(GoOnRequest))]) -> OkAnswer:
+    """Let the paused session go on, if it still waits in the pause that was shown."""
+    try:
+        session.go_on(body.pause)
+    except InvalidValueError as error:
+        raise Refusal.of(error, 409, "OtherPause", field="pause") from error
+    return OkAnswer()
+
+
+@router.post("/stop")
+async def stop(session: Running) -> OkAnswer:
+    """Disarm now, and end the session, which can be resumed later."""
+    await asyncio.to_thread(session.end, f"Ended {BY_PAGE}.")
+    return OkAnswer()
+
+
+@router.post("/exclude")
+def exclude(session: Running, body: Annotated[ExcludeRequest, Depends(BodyOf(ExcludeRequest))]) -> OkAnswer:
+    """Let a trial not count."""
+    session.exclude(body.trial, body.reason or f"Excluded {BY_PAGE}.")
+    return OkAnswer()
+
+
+@router.post("/include")
+def include(session: Running, body: Annotated[IncludeRequest, Depends(BodyOf(IncludeRequest))]) -> OkAnswer:
+    """Let a trial count again that was excluded."""
+    session.include(body.trial)
+    return OkAnswer()
+
+
+@router.post("/note")
+def note(session: Running, body: Annotated[NoteRequest, Depends(BodyOf(NoteRequest))]) -> OkAnswer:
+    """Log a remark."""
+    session.note(body.text, key=body.key)
+    return OkAnswer()
+
+
+@router.post("/change")
+def change(session: Running, body: Annotated[NoteRequest, Depends(BodyOf(NoteRequest))]) -> OkAnswer:
+    """Log that something changed that may bear on all later MEPs."""
+    session.note_change(body.text, key=body.key)
+    return OkAnswer()
+
 
 _ADDRESS: Final = ipaddress.IPv4Address("127.0.0.1")
 _LEAVING_S: Final = 5.0
