@@ -101,7 +101,7 @@ def read_to_resume(log: Path, config: Path | None) -> SessionRecord:
 
 
 def changes_on_resume(config: RunConfig, record: SessionRecord) -> dict[str, Any]:
-    """What holds from here on as arguments of `isiw.resume`: each of `[limits]` and `[signals]` counts as a whole."""
+    """Arguments of `isiw.resume` that a file changes: each of `[limits]` and `[signals]` counts as a whole."""
     record.require_read()
     header, given = record.header, config.model_fields_set
     _require_space(config, header)
@@ -128,9 +128,9 @@ def differences_on_resume(config: RunConfig, record: SessionRecord) -> tuple[str
         ("device.timeout_s", header.timeout_s, changes.get("timeout_s", header.timeout_s)),
     ]
     return (
-        *(f"{key} is {_told(now)} from here on; it was {_told(was)}." for key, was, now in changed if was != now),
+        *(f"{key} is {_said(now)} from here on; it was {_said(was)}." for key, was, now in changed if was != now),
         *(
-            f"{key} stays as the session began, {_told(was)}; the configuration says {_told(now)}."
+            f"{key} stays as the session began, {_said(was)}; the configuration says {_said(now)}."
             for key, was, now in _unchangeable(config, header)
             if was != now
         ),
@@ -187,7 +187,7 @@ def _unchangeable(config: RunConfig, header: Header) -> Iterator[tuple[str, obje
         yield f"visit.{name}", getattr(header.visit, name), getattr(noted, name)
 
 
-def _told(value: object) -> object:
+def _said(value: object) -> object:
     if isinstance(value, dict):
         return "another one"
     return "not set" if value in (None, "") else value
@@ -216,20 +216,16 @@ def _is_over(log: Path) -> bool:
 
 def after_end(session: Session, config: Path | None, *, delivered: bool) -> str | None:
     """The way to deliver more to the same person after a session is over; None if nobody has asked for that."""
+    header = session.header
     if not session.strategy.decision().stop:  # so that it was the limits
         where = f"in {config}" if config is not None else "of a configuration"
-        way_on = continued_by(session.log_path, session.header, config, changed=True)
+        way_on = continued_by(session.log_path, header, config, changed=True)
         return f"For more pulses set a higher max_pulses under [limits] {where}, then resume with: {way_on}"
     if delivered:
         return None
     same = "" if config else ", with the same configuration if there was one"
-    more = f"For more trials with this person begin a new session{same}: {_anew(session, config)}"
-    return f"The session is over, so no stimulus was delivered. {more}"
-
-
-def _anew(session: Session, config: Path | None) -> str:
-    """The command that begins a session of the same person, from what this one has found where its strategy can."""
-    header = session.header
     seed = ["--seed", header.seed] if RUN_KEY in header.config else []
     after = ["--after", session.log_path] if learns_from_earlier(header.strategy.name) else []
-    return command("run", *([config] if config else []), *seed, *after)
+    more = command("run", *([config] if config else []), *seed, *after)
+    new = f"For more trials with this person begin a new session{same}: {more}"
+    return f"The session is over, so no stimulus was delivered. {new}"

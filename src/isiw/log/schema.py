@@ -20,7 +20,6 @@ from __future__ import annotations
 import datetime as dt
 import json
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from types import MappingProxyType
@@ -206,20 +205,9 @@ _KINDS: dict[str, type[Any]] = {
 }
 _TOPIC_OF_KIND = {kind: topic for topic, kind in _KINDS.items()} | {ThresholdHeader: "/header"}
 
-CHANNEL_IDS: Final[Mapping[str, int]] = MappingProxyType(
-    {
-        "/header": 1,
-        "/intent": 2,
-        "/trial": 3,
-        "/estimate": 4,
-        "/event": 5,
-        "/emg": 6,
-        "/acceleration": 7,
-        "/pressure": 8,
-        "/force": 9,
-        "/valve": 10,
-    }
-)
+_FROZEN: Final = "header intent trial estimate event emg acceleration pressure force valve"
+
+CHANNEL_IDS: Final = MappingProxyType({f"/{topic}": number for number, topic in enumerate(_FROZEN.split(), start=1)})
 """The channel numbers of the topics that every log has. They are frozen: a damaged log is read by them.
 
 Any other topic takes the next free number in its file, and announces it there.

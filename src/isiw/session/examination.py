@@ -140,10 +140,9 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
 
     def log_failure(self, error: BaseException) -> None:
         """Log what ends a session before its time."""
-        if error is self._refusal:
-            return
-        kind: EventKind = "limit" if isinstance(error, LimitExceededError) else "fault"
-        self.event(kind, "Interrupted by the operator." if isinstance(error, KeyboardInterrupt) else error_text(error))
+        if error is not self._refusal:
+            text = "Interrupted by the operator." if isinstance(error, KeyboardInterrupt) else error_text(error)
+            self.event("limit" if isinstance(error, LimitExceededError) else "fault", text)
 
     def intend(self, intent: Intent, fallback: str | None = None) -> bool:
         """Put on disk what is about to be delivered; False, and nothing is, if a trial was judged since the ask."""
@@ -202,8 +201,7 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
     def _learn(self, trial: TrialT) -> None:
         if self.learner.known < len(self.trials):
             self._freely(self.learner.learn, trial)
-        trouble = self.learner.trouble_with(trial)
-        if trouble is not None and self._sink.is_open:
+        if (trouble := self.learner.trouble_with(trial)) is not None and self._sink.is_open:
             self.event("fit", trouble)
         doubt = self._freely(self.learner.doubt, self.trials)
         if doubt is not None and doubt.kind not in self._doubted and self._sink.is_open:
@@ -224,7 +222,7 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
         return known
 
 
-class _Window:
+class _WindowLearner:
     """A strategy as an examination sees it; another one once all trials were learnt again."""
 
     def __init__(self, strategy: Strategy, events: Iterable[Event] = ()) -> None:
@@ -257,7 +255,7 @@ class _Window:
         return estimate_record(self.strategy, trial, decision, next_isi_ms)
 
 
-WindowExamination: TypeAlias = Examination[_Window, TrialTable, Trial]
+WindowExamination: TypeAlias = Examination[_WindowLearner, TrialTable, Trial]
 
 
 def examination_of(
@@ -269,7 +267,7 @@ def examination_of(
 ) -> WindowExamination:
     """The examination in which a strategy looks for a window; it has learnt the earlier trials."""
     events = tuple(events)
-    return Examination(_Window(strategy, events), trials or TrialTable(), sink, events, freely)
+    return Examination(_WindowLearner(strategy, events), trials or TrialTable(), sink, events, freely)
 
 
 def change_found(change: Change | None, told: Sequence[Trial]) -> Finding | None:
@@ -359,7 +357,7 @@ class OwnResponse:
 
     @property
     def wants_tap(self) -> bool:
-        """Whether a tap alone should come next."""
+        """True if a tap alone should come next."""
         trials = self._examination.trials
         if not self._gives_taps or len(trials) < PAIRS_FIRST:
             return False

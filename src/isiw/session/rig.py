@@ -133,11 +133,12 @@ class Rig:
             still_armed=self._end_armed,
         )
         self.clock = clock or (VirtualClock() if self.info.simulated else MonotonicClock())
-        self.limited = self._anew()
+        self.begin(0, ())
         self._punctual.release_thread()
 
-    def _anew(self, delivered: int = 0, earlier_s: Sequence[float] = ()) -> LimitedDevice:
-        return LimitedDevice(
+    def begin(self, delivered: int, earlier_s: Sequence[float]) -> None:
+        """Count what was delivered before, for the limits."""
+        self.limited = LimitedDevice(
             self._punctual,
             self._limits,
             self.clock,
@@ -157,10 +158,6 @@ class Rig:
         """Within, no other session drives the device, and every signal disarms it."""
         with exclusive(self._raw, self.info), self.interrupts:
             yield
-
-    def begin(self, delivered: int, earlier_s: Sequence[float]) -> None:
-        """Count what was delivered before, for the limits."""
-        self.limited = self._anew(delivered, earlier_s)
 
     @contextmanager
     def armed(self) -> Iterator[None]:

@@ -61,6 +61,7 @@ def open_threshold(
         LogError: there is a log already, or it cannot be written.
     """
     path = require_parts(log, search=(search, ThresholdSearch), device=(device, DeviceInfo))
+    clock = _clock_for(device, clock)
     if search.pulses:
         raise InvalidValueError("the search knows of pulses that are not this log's", got=len(search.pulses))
     header = ThresholdHeader(
@@ -73,7 +74,6 @@ def open_threshold(
         device=device,
         config=dict(config or {}),
     )
-    clock = _clock_for(device, clock)
     return ThresholdRecorder(search, LogWriter.create(path, header), header, clock)
 
 
@@ -175,7 +175,7 @@ class _Pulses:
         return _Pulses(tuple(sorted((*self.outcomes, outcome), key=lambda each: each.trial)))
 
 
-class _Search:
+class _ThresholdLearner:
     """A search as an examination sees it."""
 
     def __init__(self, search: ThresholdSearch, known: int) -> None:
@@ -228,8 +228,8 @@ class ThresholdRecorder:
     ) -> None:
         self.header, self._log, self._clock = header, log, clock
         table, self._sink = _Pulses(tuple(earlier)), Sink(log=log)
-        self._examination: Examination[_Search, _Pulses, PulseOutcome] = Examination(
-            _Search(search, len(table)), table, self._sink
+        self._examination: Examination[_ThresholdLearner, _Pulses, PulseOutcome] = Examination(
+            _ThresholdLearner(search, len(table)), table, self._sink
         )
         self._pacing = Pacing(Limits(0.0, 0.0, header.min_iti_s), clock, ages_s)  # a pulse alone has no ISI
         self._asked: float | None = None
@@ -363,15 +363,9 @@ class ThresholdRecorder:
             )
         return self._asked
 
-    def _outcome(self, mep_mv: float | None = None, response: bool | None = None, reason: str = "") -> PulseOutcome:  # noqa: FBT001 - as `tell` was told
-        return PulseOutcome(
-            trial=self.given,
-            intensity_pct_mso=self._require_asked(),
-            mep_mv=mep_mv,
-            response=response,
-            reason=reason,
-            place_mm=self.place_mm,
-        )
+    def _outcome(self, **outcome: Any) -> PulseOutcome:
+        intensity = self._require_asked()
+        return PulseOutcome(trial=self.given, intensity_pct_mso=intensity, place_mm=self.place_mm, **outcome)
 
     def _conclude(self, outcome: PulseOutcome) -> None:
         """Put a pulse on disk, then learn it, then put on disk what is known."""

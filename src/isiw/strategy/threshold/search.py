@@ -146,19 +146,15 @@ class ThresholdSearch:
         """Why the pulses give no number, whatever the method says; None if they may."""
         if isinstance(self.method, PlacesCoil):
             return None
-        refused = one_sided(self.pulses, self.space) or self._like_hum()
-        budget = self._budget
+        budget = self.method.budget if isinstance(self.method, HasPulseBudget) else None
+        refused = one_sided(self.pulses, self.space) or self._like_hum(budget)
         if refused is None or refused.stop or budget is None or len(self.pulses) < budget:
             return refused
         return StopKind.BUDGET.stop(f"{refused.reason} The budget of {budget} pulses is used up. {_LOOK}")
 
-    @property
-    def _budget(self) -> int | None:
-        return self.method.budget if isinstance(self.method, HasPulseBudget) else None
-
-    def _like_hum(self) -> StopDecision | None:
+    def _like_hum(self, budget: int | None) -> StopDecision | None:
         seen = not_growing(self.pulses) or hardly_larger(self.pulses)
         if seen is None or self.method.estimate(self.pulses, self.space).threshold_pct_mso is None:
             return None
-        over = self._budget is None and self.method.decision(self.pulses, self.space).stop
+        over = budget is None and self.method.decision(self.pulses, self.space).stop
         return StopDecision(over, f"{seen} {_LOOK}" if over else seen, StopKind.THRESHOLD)
