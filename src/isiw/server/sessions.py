@@ -71,7 +71,12 @@ class Sessions:
         """Begin a session; the same request once more is answered as at first, as long as nothing was asked for."""
         path = self._path(request.id)
         if log_exists(path):
-            self._require_same_beginning(request)
+            record = self.record(request.id)
+            if record.intents or record.header.config.get(SERVED_KEY) != request.model_dump_json():
+                raise Refusal(
+                    409, "Exists", "there is a session with this id", got=request.id,
+                    remedy="Choose another id, or resume it.", field="id",
+                )  # fmt: skip
             return self.resume(request.id)
         with self._opened_as(request.id):
             return self._begin(request)
@@ -164,15 +169,6 @@ class Sessions:
             on_doubt=doubts.append,
         )
         return self._take(DrivenSession(request.id, request.visit.subject, recorder, doubts))
-
-    def _require_same_beginning(self, request: CreateRequest) -> None:
-        """Raise if the session with this id is another one, or goes on already."""
-        record = self.record(request.id)
-        if record.intents or record.header.config.get(SERVED_KEY) != request.model_dump_json():
-            raise Refusal(
-                409, "Exists", "there is a session with this id", got=request.id,
-                remedy="Choose another id, or resume it.", field="id",
-            )  # fmt: skip
 
     def _resume(self, name: str, record: SessionRecord, lost_pulses: int | None) -> SessionAnswer:
         header, doubts = record.header, list[str]()

@@ -86,14 +86,11 @@ def _short_of(text: str, width: int) -> str:
 def standing(update: SessionUpdate, space: DesignSpace) -> str:
     """A session's state in a line: the expected MEP over the ISIs, [ ] around the window, what is next and left."""
     following = "" if update.next_isi_ms is None else f"next {update.next_isi_ms:.4g} ms, "
-    pace = "" if update.left_s is None else f", ~{_minutes(update.left_s)} min"
+    left_s = None if update.left_s is None else round(update.left_s)
+    pace = "" if left_s is None else f", ~{left_s // 60}:{left_s % 60:02d} min"
     text = f"{following}{update.stimuli_left} left{pace}"
     drawn = f"{_profile(update.estimate, space)}{text}"
     return _short_of(text if len(drawn) >= columns() else drawn, COLUMNS - 1)
-
-
-def _minutes(duration_s: float) -> str:
-    return f"{round(duration_s) // 60}:{round(duration_s) % 60:02d}"
 
 
 def _profile(estimate: WindowEstimate, space: DesignSpace) -> str:

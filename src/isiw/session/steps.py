@@ -74,19 +74,15 @@ class Pausing:
         if not self._goes_on(reason, decide):
             if interrupts.heard:
                 raise KeyboardInterrupt
-            return self._last(reason)
+            if self.reason is not None:  # what somebody said meanwhile
+                reason, self.reason = self.reason, None
+                self._examination.event("pause", reason)
+            return reason
         interrupts.settle()
         self._examination.event("pause", "The operator continued.")
         if not self.due:
             rig.stage()
         return None
-
-    def _last(self, reason: str) -> str:
-        """Why a paused session ends: what it has paused for, or what somebody said meanwhile."""
-        if self.reason is not None:
-            reason, self.reason = self.reason, None
-            self._examination.event("pause", reason)
-        return reason
 
     def _goes_on(self, reason: str, decide: Callable[[str], bool]) -> bool:
         if self._asking.over:

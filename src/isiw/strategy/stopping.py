@@ -186,9 +186,8 @@ class ExpectedF1(Checked):
             return StopKind.KNOWN.go_on("The F1 to be expected is not known.")
         if estimate.too_little is not None:
             return StopKind.TOO_LITTLE.go_on(estimate.too_little)
-        expected = (
-            f"an expected F1 of {math.floor(100 * estimate.expected_f1 + 1e-9) / 100:.2f}"  # never what is not reached
-        )
+        floored = math.floor(100 * estimate.expected_f1 + 1e-9) / 100  # so that nothing is said that is not reached
+        expected = f"an expected F1 of {floored:.2f}"
         if self.f1 < 1.0 and estimate.expected_f1 >= self.f1 and estimate.probability >= self.min_probability:
             return _stop_unless_by_time(StopKind.KNOWN, estimate, f"The window is known, with {expected}.")
         ends = f"; {self.f1:g} ends the session" if self.f1 < 1.0 else ""

@@ -74,7 +74,6 @@ class Strategy:
                 remedy="Choose another acquisition function, or a model whose posterior has the capability.",
             )
         self._mistrials = self._controls = self._lost = 0
-        self._told: list[Told] = []
         self._outcomes = Outcomes(space.reference, self.amplitude_step_mv)
         self.earlier: tuple[Trial, ...] = ()  # learnt before the first ask
         self.same_level = True
@@ -262,7 +261,8 @@ class Strategy:
         require_plausible(plain_ms, plain_mv, asked_ms, self.space, isi_sd_ms)
         more = Details(response=response, isi_sd_ms=isi_sd_ms, mep_sd_mv=mep_sd_mv, mep_interval_mv=mep_interval_mv)
         self.learn(isi_ms, mep_mv, **more)
-        evidence = Evidence(told=self._told, detection_limit_mv=self.detection_limit_mv)
+        told = [Told(one.mep_mv, one.isi_ms) for one in self._outcomes.pulses if one.mep_mv is not None]
+        evidence = Evidence(told=told, detection_limit_mv=self.detection_limit_mv)
         self._doubts = self._doubts.after((isi_far(plain_ms, asked_ms, self.space), *findings(evidence)))
         if self._doubts.new is not None:
             warn(f"{self._doubts.new}", ImplausibleDataWarning)
@@ -317,9 +317,7 @@ class Strategy:
             if outcomes.step_mv == self._outcomes.step_mv
             else self._course.again(self.seed, outcomes.observations)
         )
-        self._outcomes, isi_ms, mep_mv = outcomes, outcome.isi_ms, outcome.mep_mv
-        if mep_mv is not None:
-            self._told.append(Told(mep_mv, isi_ms))
+        self._outcomes, isi_ms = outcomes, outcome.isi_ms
         self._asked = self._asked.after(isi_ms)
         self._lost = 0 if isi_ms is not None else self._lost
 
@@ -392,4 +390,5 @@ class Strategy:
 
     @property
     def _is_silent(self) -> bool:
-        return is_silent([told.mep_mv for told in self._told], self.detection_limit_mv)
+        meps_mv = [one.mep_mv for one in self._outcomes.pulses if one.mep_mv is not None]
+        return is_silent(meps_mv, self.detection_limit_mv)
