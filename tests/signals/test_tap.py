@@ -14,7 +14,7 @@ from isiw.signals import judge
 from isiw.signals.tap import LONGER_MS, TapResponses
 from isiw.subjects.changes import TapResponse
 from isiw.trials import Channel, Stimulus, Sweep, Trial, TrialTable
-from isiw.types import FloatArray
+from isiw.types import BoolArray, FloatArray
 from isiw.window import Window
 from known import known
 from tapped import IMPACT, TapRig, reflex
@@ -51,10 +51,64 @@ def test_a_response_that_is_always_the_same_leaves_the_mep_as_it_is() -> None:
     assert told[0].mep_sd_mv < 0.06
 
 
+@pytest.mark.parametrize("isi_ms", [25.0, 40.0, 50.0, 60.0])  # it begins within the MEP window, before, or ends in it
+def test_a_response_is_subtracted_in_the_size_that_the_trial_shows_outside_its_mep_window(isi_ms: float) -> None:
+    rig = TapRig(TapResponse(50.0, 50.0, 0.3, 0.5))
+    for _ in range(6):
+        rig.trial(None, pulse=False)
+    told = [rig.trial(isi_ms, 0.05) for _ in range(20)]
+    assert max(abs(known(trial.mep_mv) - 0.055) for trial in told) < 0.015
+    assert max(known(trial.tap_mv) + trial.mep_sd_mv for trial in told) < 0.03
+
+
+class TwoWaves(TapResponse):
+    """A response whose second wave is of a size of its own."""
+
+    def sample_mv(self, rng: np.random.Generator) -> float:
+        first_mv, later_mv = super().sample_mv(rng), super().sample_mv(rng)
+        self.__dict__["ratio"] = later_mv / first_mv
+        return first_mv
+
+    def course(self, after_hit_ms: FloatArray) -> FloatArray:
+        later = TapResponse(self.start_ms + 20.0, self.duration_ms, 1.0, 0.0)
+        return np.asarray(super().course(after_hit_ms) + self.__dict__["ratio"] * later.course(after_hit_ms))
+
+
+def test_where_the_size_outside_the_mep_window_says_nothing_of_that_within_it_no_more_is_claimed_to_be_known() -> None:
+    rig = TapRig(TwoWaves(30.0, 20.0, 0.3, 0.5))
+    for _ in range(12):
+        rig.trial(None, pulse=False)
+    told = [rig.trial(36.0, 0.0) for _ in range(30)]
+    left = [known(trial.mep_mv) - 0.01 for trial in told]
+    assert np.mean(left) == pytest.approx(np.mean([known(trial.tap_mv) for trial in told]), rel=0.5)
+    far = [abs(one - known(trial.tap_mv)) > 2 * trial.mep_sd_mv for one, trial in zip(left, told, strict=True)]
+    assert np.mean(far) <= 0.1
+
+
+def test_an_mep_that_lasts_longer_than_its_window_is_not_taken_for_the_response() -> None:
+    class Late(TapRig):
+        def deliver(self, stimulus: Stimulus, timeout_s: float = 1.0) -> Sweep:
+            sweep = super().deliver(stimulus, timeout_s)
+            emg = sweep.channels["emg"]
+            since_ms = emg.t0_ms + np.arange(emg.values.size) * 1000 / emg.rate_hz - 33.0
+            tail = 0.05 * np.where((since_ms > 0) & (since_ms < 12), np.sin(np.pi * since_ms / 12), 0)
+            late = replace(emg, values=emg.values + (not stimulus.tap_alone) * tail)
+            return replace(sweep, channels={"emg": late})
+
+    rig = Late(TapResponse(50.0, 50.0, 0.1, 0.5))
+    for _ in range(6):
+        rig.trial(None, pulse=False)
+    told = [rig.trial(40.0, 0.3) for _ in range(20)]
+    assert np.median([known(trial.mep_mv) - known(trial.tap_mv) for trial in told]) == pytest.approx(0.3, abs=0.04)
+
+
 def test_how_far_a_trial_is_known_depends_on_its_isi_and_not_on_its_amplitude() -> None:
-    rig = TapRig(reflex(0.3))
-    rig.trials(LONG_MS)
-    sizes = [(trial.tap_mv, trial.mep_sd_mv) for trial in (rig.trial(20.0, mep_mv) for mep_mv in (0.0, 0.1, 1.0))]
+    sizes = []
+    for mep_mv in (0.0, 0.1, 1.0):  # with the same noise and the same response
+        rig = TapRig(reflex(0.3))
+        rig.trials(LONG_MS)
+        trial = rig.trial(20.0, mep_mv)
+        sizes.append((trial.tap_mv, trial.mep_sd_mv))
     assert sizes[0] == pytest.approx(sizes[1])
     assert sizes[0] == pytest.approx(sizes[2])
     assert known(rig.trial(200.0).tap_mv) == 0.0
@@ -100,7 +154,7 @@ def test_a_trial_of_a_long_session_is_corrected_without_a_look_at_all_courses_fo
     rig, looked = TapRig(reflex(0.3)), 0
     covering = TapResponses._covering  # noqa: SLF001 - its calls are counted
 
-    def counted(responses: TapResponses, since_hit_ms: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def counted(responses: TapResponses, since_hit_ms: FloatArray) -> tuple[BoolArray, FloatArray, BoolArray, float]:
         nonlocal looked
         looked += 1
         return covering(responses, since_hit_ms)

@@ -2,8 +2,10 @@
 
 What a tap evokes comes at its own times after the hit. The EMG before the pulse of a pair shows what the tap alone does
 until then, a tap alone shows all of it. Where the MEP window of a trial meets these times, the mean course is
-subtracted. How much is left of the response then is known from how far each course is from the mean of the others,
-never from the trial's own amplitude. An electrical first pulse has an artefact and an M-wave, and the same holds.
+subtracted, and as far as the sweeps so far say that sizes outside the window tell those within it, the course of the
+size that the trial shows outside. How much is left of the response then is known from how far each course is from what
+the others say of it, never from the trial's own amplitude. An electrical first pulse has an artefact and an M-wave, and
+the same holds.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ import numpy as np
 
 from isiw.signals.disturbance import TAP_MS, at_rest, disturbance
 from isiw.signals.limits import EMG_UNITS_MV
-from isiw.signals.mep import MEP_WINDOW_MS
+from isiw.signals.mep import EARLIEST_ONSET_MS, MEP_WINDOW_MS
 from isiw.signals.waveforms import PULSE_GUARD_MS, samples
 from isiw.trials import Sweep, Trial, TrialTable
 from isiw.types import BoolArray, FloatArray
@@ -41,19 +43,33 @@ LONGER_MS: Final = 10.0
 CLEAR: Final = 0.7
 """By this share, over the root of the number of sweeps, EMG after the hit is larger than at rest by chance at most."""
 
+TINY: Final = 1e-12
 USUAL_VARIANCE, USUAL_COUNTS = 0.43, 3.0
 """Relative variance of the response's size that is expected, that of a log SD of .6; it counts as so many sweeps."""
+
+LEAST_WEIGHT: Final = 0.1
+"""The least sum of squared sizes, with a mean of 1, that a course of a size of 1 is made of."""
+
+LEAST_BOTH: Final = 6
+"""So many sweeps say whether the response's size outside an MEP window tells that within: three agree by chance."""
+
+TOGETHER_MS: Final = 2.5
+"""EMG within so much time says the same of the response's size, as neighbouring samples rise and fall together."""
+
+ARTEFACT_MS: Final = 5.0
+"""So long after the pulse its artefact hides the response."""
 
 SAME_MV, SAME_SHARE = 0.003, 0.1
 """What changes an amplitude by less is not worth a correction."""
 
 
 class Left(NamedTuple):
-    """What is left of the response in an amplitude: mean and SD [mV]; and how many sweeps say so."""
+    """What is left of the response in an amplitude: mean and SD [mV]; how many sweeps say so; what was subtracted."""
 
     mean_mv: float
     sd_mv: float
     shown: int
+    course_mv: FloatArray
 
 
 class _Shown(NamedTuple):
@@ -66,12 +82,28 @@ class _Shown(NamedTuple):
 
 
 class _MepWindow(NamedTuple):
-    """A trial's MEP window: its EMG, its times after the hit, when responses end, and how many sweeps it rests on."""
+    """A trial's MEP window: its EMG, its times after the hit, when responses end, and how many sweeps it rests on.
+
+    And the trial's EMG at `GRID_MS`, and which of it can show neither an MEP nor the pulse's artefact.
+    """
 
     emg_mv: FloatArray
     since_hit_ms: FloatArray
     over_ms: float
+    course_mv: FloatArray
+    is_outside: BoolArray
     told_by: int = 0
+
+
+class _Subtracted(NamedTuple):
+    """What is subtracted from a trial's MEP window, and from those of the sweeps that show it, if others say it.
+
+    With the relative variance of the response's size that is left, as a share of its mean.
+    """
+
+    course_mv: FloatArray
+    others_mv: FloatArray
+    variance: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,16 +134,20 @@ class TapResponses:
         values = values if found is None else values - found.course_mv
         values = values - np.median(values[rest]) if rest.any() else values
         shown, windows = self.shown, dict(self.windows)
+        from_ms, ends_ms = times_ms[0] - hit_ms, times_ms[-1] - hit_ms
+        course = np.interp(GRID_MS, times_ms - hit_ms, values)
         if trial.counts:
-            from_ms = times_ms[0] - hit_ms
-            until_ms = (times_ms[-1] if trial.t_tms_ms is None else trial.t_tms_ms - PULSE_GUARD_MS) - hit_ms
-            course = np.interp(GRID_MS, times_ms - hit_ms, values)
+            until_ms = ends_ms if trial.t_tms_ms is None else trial.t_tms_ms - PULSE_GUARD_MS - hit_ms
             shown = (*shown, _Shown(course, from_ms, until_ms, self._size_mv(values[rest], emg.rate_hz)))
         if trial.mep_mv is not None and trial.t_tms_ms is not None:
             first, last = (trial.t_tms_ms + edge for edge in self.mep_window_ms)
             within = (times_ms >= first - 1e-6) & (times_ms <= last + 1e-6)
             over_ms = float(GRID_MS[-1]) if trial.t_hit_ms is None else TAP_MS
-            windows[trial.index] = _MepWindow(values[within], times_ms[within] - hit_ms, over_ms)
+            since_pulse = GRID_MS + hit_ms - trial.t_tms_ms
+            outside = (since_pulse < -PULSE_GUARD_MS) | (since_pulse > self.mep_window_ms[1])
+            outside |= (since_pulse > ARTEFACT_MS) & (since_pulse < EARLIEST_ONSET_MS)
+            outside &= (from_ms <= GRID_MS) & (ends_ms >= GRID_MS)
+            windows[trial.index] = _MepWindow(values[within], times_ms[within] - hit_ms, over_ms, course, outside)
         return replace(self, shown=shown, windows=windows)
 
     def _size_mv(self, resting_mv: FloatArray, rate_hz: float) -> float:
@@ -126,15 +162,14 @@ class TapResponses:
         left = None if window is None else self._left(window)
         if window is None or left is None or trial.mep_mv is None:
             return trial
-        mep_mv = float(np.ptp(window.emg_mv - self._mean(window.since_hit_ms))) if left.mean_mv else trial.mep_mv
+        mep_mv = float(np.ptp(window.emg_mv - left.course_mv)) if left.mean_mv else trial.mep_mv
         return replace(trial, mep_mv=mep_mv, mep_sd_mv=left.sd_mv, tap_mv=left.mean_mv)
 
     def without(self, emg_mv: FloatArray, since_hit_ms: FloatArray) -> FloatArray:
         """Some EMG without the mean course, as far as it is known [mV], shape (w,)."""
         courses = np.array([one.course_mv for one in self.shown]).reshape(-1, GRID_MS.size)
-        are_shown = (self._spans_ms[:, :1] <= GRID_MS) & (self._spans_ms[:, 1:] >= GRID_MS)
-        count = are_shown.sum(axis=0)
-        mean_mv = np.where(count >= LEAST_SHOWN, (courses * are_shown).sum(axis=0) / np.maximum(count, 1), 0.0)
+        count = self._shows.sum(axis=0)
+        mean_mv = np.where(count >= LEAST_SHOWN, (courses * self._shows).sum(axis=0) / np.maximum(count, 1), 0.0)
         return np.asarray(emg_mv - np.interp(since_hit_ms, GRID_MS, mean_mv, left=0.0, right=0.0))
 
     def corrected(self, trials: Iterable[Trial]) -> tuple[TapResponses, list[Trial]]:
@@ -184,6 +219,11 @@ class TapResponses:
         """Between which times each sweep shows the EMG after the hit, shape (k, 2)."""
         return np.array([(one.from_ms, one.until_ms) for one in self.shown]).reshape(-1, 2)
 
+    @property
+    def _shows(self) -> BoolArray:
+        """Which of `GRID_MS` each sweep shows, shape (k, g)."""
+        return (self._spans_ms[:, :1] <= GRID_MS) & (self._spans_ms[:, 1:] >= GRID_MS)
+
     def _which(self, since_hit_ms: FloatArray) -> tuple[BoolArray, BoolArray]:
         """The times of `GRID_MS` that some times meet, and the sweeps that show all of these."""
         meets = (since_hit_ms[0] - STEP_MS <= GRID_MS) & (since_hit_ms[-1] + STEP_MS >= GRID_MS)
@@ -203,37 +243,32 @@ class TapResponses:
         enough = self._count(window.since_hit_ms) >= LEAST_SHOWN
         return enough and not all(math.isnan(one.rest_mv) for one in self.shown)
 
-    def _covering(self, since_hit_ms: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The courses that show some times, as far as a response lasts, shape (k, t), and what they have at rest."""
+    def _covering(self, since_hit_ms: FloatArray) -> tuple[BoolArray, FloatArray, BoolArray, float]:
+        """What of `GRID_MS` some times meet; the courses that show these, what else they show, and their rest [mV]."""
         meets, which = self._which(since_hit_ms)
-        courses = [self.shown[number] for number in np.flatnonzero(which)]
-        waves = np.array([one.course_mv[meets] for one in courses]).reshape(len(courses), int(meets.sum()))
-        return waves, np.array([one.rest_mv for one in courses])
-
-    def _mean(self, since_hit_ms: FloatArray) -> FloatArray:
-        """The mean course at some times after the hit [mV]; the level that it begins with where it is over."""
-        meets = (since_hit_ms[0] - STEP_MS <= GRID_MS) & (since_hit_ms[-1] + STEP_MS >= GRID_MS)
-        mean = self._covering(since_hit_ms)[0].mean(axis=0)
-        return np.asarray(np.interp(since_hit_ms, GRID_MS[meets], mean))
+        waves, rests = np.array([one.course_mv for one in self.shown]), np.array([one.rest_mv for one in self.shown])
+        rest_mv = float(np.nanmean(rests if np.isnan(rests[which]).all() else rests[which]))
+        return meets, waves[which], self._shows[which], rest_mv
 
     def _left(self, window: _MepWindow) -> Left | None:
-        """What subtracting the mean course leaves of the response in a trial's MEP window; None where unknown."""
+        """What subtracting the course leaves of the response in a trial's MEP window; None where unknown."""
+        nothing = Left(0.0, 0.0, LEAST_SHOWN, np.zeros_like(window.since_hit_ms))
         if _is_outside(window):
-            return Left(0.0, 0.0, LEAST_SHOWN)
+            return nothing
         if not self._is_known(window):
             return None
-        waves, rests = self._covering(window.since_hit_ms)
-        count = len(waves)
-        if np.isnan(rests).all():
-            rests = np.array([one.rest_mv for one in self.shown])
-        rest, size, mean = float(np.nanmean(rests)), float(np.ptp(waves, axis=-1).mean()), waves.mean(axis=0)
-        whole = float(np.ptp(mean))
+        meets, waves, shows, rest = self._covering(window.since_hit_ms)
+        within, count = waves[:, meets], len(waves)
+        size, whole = float(np.ptp(within, axis=-1).mean()), float(np.ptp(within.mean(axis=0)))
         if size <= rest * (1 + CLEAR / math.sqrt(count)) and whole <= 2 * rest / math.sqrt(count):
-            return Left(0.0, 0.0, count)
-        apart = np.ptp(waves - (count * mean - waves) / (count - 1), axis=-1)
+            return nothing._replace(shown=count)
+        found = _subtracted(window, waves, shows, meets, rest / math.sqrt(count))
+        apart = np.ptp(within - found.others_mv, axis=-1)
         excess = max(0.0, float(apart.mean()) - rest * math.sqrt(count / (count - 1)))
-        mean_share, sd_share = _left_of_varying_size(waves, mean)
-        return Left(max(excess, whole * mean_share), max(float(apart.std()), whole * sd_share), count)
+        mean_share, sd_share = _left_of_varying_size(found.variance, count)
+        course_mv = np.interp(window.since_hit_ms, GRID_MS[meets], found.course_mv)
+        mean_mv = max(excess, math.hypot(whole * mean_share, rest) - rest)  # what is added to EMG at rest
+        return Left(mean_mv, max(float(apart.std()), whole * sd_share), count, course_mv)
 
 
 def _is_outside(window: _MepWindow) -> bool:
@@ -241,14 +276,64 @@ def _is_outside(window: _MepWindow) -> bool:
     return bool(window.since_hit_ms[-1] < 0 or window.since_hit_ms[0] > window.over_ms)
 
 
-def _left_of_varying_size(waves: FloatArray, mean: FloatArray) -> tuple[float, float]:
+def _subtracted(
+    window: _MepWindow, waves: FloatArray, shows: BoolArray, meets: BoolArray, clear_mv: float
+) -> _Subtracted:
+    """What is subtracted: the mean course, moved towards that of the size which is shown outside the window.
+
+    By how much is fitted to the sweeps that show both, as if some more had been seen in which the response's size
+    varied as usual and was the same outside as within.
+    """
+    within, count = waves[:, meets], len(waves)
+    mean, sizes = within.mean(axis=0), _sizes(within)
+    others = (count * mean - within) / (count - 1)
+    parts, weights = shows * sizes[:, None] * waves, shows * sizes[:, None] ** 2
+    one = parts.sum(axis=0) / np.maximum(weights.sum(axis=0), LEAST_WEIGHT)
+    seen = window.is_outside & (shows.sum(axis=0) >= LEAST_SHOWN) & (np.abs(one) > clear_mv)
+    power = (seen & shows) @ one**2
+    both = power > 0.5 * power.max()
+    pieces = float(seen @ one**2) ** 2 / max(float(seen @ one**4), TINY) * STEP_MS / TOGETHER_MS
+    if pieces <= 1 or both.sum() < LEAST_BOTH:
+        return _Subtracted(mean, others, _variance(sizes - 1))
+    without = (parts.sum(axis=0) - parts) / np.maximum(weights.sum(axis=0) - weights, LEAST_WEIGHT)
+    outside = np.where(both, _sizes_shown(waves, without, seen & shows), 1.0)
+    own = float(_sizes_shown(window.course_mv, one, seen))
+    apart = seen * (one * (window.course_mv - own * one)) ** 2
+    error = float(apart.sum() / (seen @ one**2) ** 2) * TOGETHER_MS / STEP_MS * pieces / (pieces - 1)
+    usual, known = USUAL_COUNTS * USUAL_VARIANCE, both.sum() + USUAL_COUNTS
+    products = usual + float((sizes - 1) @ (outside - 1))
+    share = float(np.clip(products / (usual + ((outside - 1) ** 2).sum() + known * error), 0.0, 1.0))
+    left = np.where(both, sizes - 1 - share * (outside - 1), (1 - share) * (sizes - 1))
+    variance = _variance(left, (1 - share) ** 2)
+    course = mean + share * (own * one[meets] - mean)
+    others = others + share * (outside[:, None] * without[:, meets] - others)
+    return _Subtracted(course, others, variance + share**2 * error)
+
+
+def _sizes(waves: FloatArray) -> FloatArray:
+    """The size of each response as a share of that of their mean course, shape (k,)."""
+    mean = waves.mean(axis=0)
+    centred = mean - mean.mean()
+    return np.asarray(waves @ centred / max(float(centred @ centred), TINY))
+
+
+def _sizes_shown(waves: FloatArray, unit: FloatArray, shown: BoolArray) -> FloatArray:
+    """The size of responses of the course `unit` at the times that show them, shape (k,)."""
+    power = (shown * unit**2).sum(axis=-1)
+    return np.asarray((shown * unit * waves).sum(axis=-1) / np.maximum(power, TINY))
+
+
+def _variance(left: FloatArray, usual_share: float = 1.0) -> float:
+    """Relative variance of the response's size, from what is left of it in each sweep and of the usual variance."""
+    usual = USUAL_COUNTS * USUAL_VARIANCE * usual_share
+    return (usual + float((left**2).sum())) / (USUAL_COUNTS + len(left) - 1)
+
+
+def _left_of_varying_size(variance: float, count: int) -> tuple[float, float]:
     """Mean and SD of what is left of a response of log-normal size without its mean, as shares of its mean size."""
-    count, centred = len(waves), mean - mean.mean()
-    sizes = waves @ centred / max(float(centred @ centred), 1e-12)
-    variance = (USUAL_COUNTS * USUAL_VARIANCE + float(((sizes - sizes.mean()) ** 2).sum())) / (USUAL_COUNTS + count - 1)
     log_sd = math.sqrt(math.log1p(variance) * (1 + 2 / count))  # as the mean, too, is known from so few only
     left = 2 * math.erf(log_sd / math.sqrt(8))
-    return left, math.sqrt(math.expm1(log_sd**2) - left**2)
+    return left, math.sqrt(max(math.expm1(log_sd**2) - left**2, 0.0))
 
 
 def hit_of(trial: Trial) -> float | None:
