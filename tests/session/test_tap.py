@@ -131,9 +131,10 @@ def test_a_session_that_ends_between_a_trial_and_its_corrections_has_them_once_i
 
 
 @pytest.mark.slow
-def test_a_person_whose_tap_evokes_no_response_and_who_has_no_window_gets_no_sure_one(log: Path) -> None:
-    strategy = make_strategy(space=IMPACT, seed=1, max_trials=40)
-    session = ran(TapRig(seed=1, mep_mv=on_nothing, tap_alone=False), log, strategy)
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_person_whose_tap_evokes_no_response_and_who_has_no_window_gets_no_sure_one(log: Path, seed: int) -> None:
+    strategy = make_strategy(space=IMPACT, seed=seed, max_trials=40)
+    session = ran(TapRig(seed=seed, mep_mv=on_nothing, tap_alone=False), log, strategy)
     assert known(session.strategy.estimate().probability) < 0.9
     short = [known(trial.mep_mv) for trial in session.trials if known(trial.isi_ms) < 4]
     assert min(short, default=1.0) > 0.02
