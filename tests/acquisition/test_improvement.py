@@ -10,18 +10,8 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.hand_made import ISIS_MS, Score, expected_gain, some_posterior
-from isiw.acquisition.improvement import (
-    KnowledgeGradient,
-    LogExpectedImprovement,
-    Thompson,
-    UpperConfidenceBound,
-    knowledge_gradient,
-    log_expected_improvement,
-    thompson,
-    upper_confidence_bound,
-)
-from isiw.acquisition.protocol import AcquisitionFunction
+from acquisition.hand_made import ISIS_MS, expected_gain, some_posterior
+from isiw.acquisition.improvement import KnowledgeGradient, LogExpectedImprovement, Thompson, UpperConfidenceBound
 from isiw.errors import InvalidValueError
 
 seeds = st.integers(0, 2**31)
@@ -33,14 +23,16 @@ def test_log_improvement_is_the_logarithm_of_the_mean_improvement_over_the_best_
     profiles = p.profiles.double().numpy()
     best = profiles.mean(axis=1).max(axis=-1)
     improvement = np.clip(profiles - best[:, None, None], 0, None).mean(axis=1)
-    ours = log_expected_improvement(p, ISIS_MS, softness=1e-4).exp()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("isiw.acquisition.improvement.SOFTNESS", 1e-4)
+        ours = LogExpectedImprovement()(p, ISIS_MS).exp()
     np.testing.assert_allclose(ours, improvement, rtol=0.01, atol=1e-3)
 
 
 def test_far_below_the_best_nearer_still_scores_higher_and_finite() -> None:
     p = some_posterior(0, people=1, samples=2)
     profiles = torch.tensor([[[1.0, 2.0, 3.0, 1e4], [1.0, 2.0, 3.0, 1.1e4]]])
-    scores = log_expected_improvement(replace(p, profiles=profiles), ISIS_MS)[0]
+    scores = LogExpectedImprovement()(replace(p, profiles=profiles), ISIS_MS)[0]
     assert scores.isfinite().all()
     assert scores.tolist() == sorted(scores.tolist())
 
@@ -50,21 +42,21 @@ def test_the_bound_is_mean_and_so_many_sds(seed: int) -> None:
     p = some_posterior(seed)
     profiles = p.profiles.numpy()
     expected = profiles.mean(axis=1) + 1.5 * profiles.std(axis=1)
-    np.testing.assert_allclose(upper_confidence_bound(p, ISIS_MS, 1.5), expected, rtol=1e-4)
+    np.testing.assert_allclose(UpperConfidenceBound(1.5)(p, ISIS_MS), expected, rtol=1e-4)
 
 
 @given(seeds)
 def test_thompson_scores_by_one_of_the_samples_of_each_person(seed: int) -> None:
     p = some_posterior(seed)
-    scores = thompson(p, ISIS_MS, seed=3)
+    scores = Thompson(3)(p, ISIS_MS)
     for person in range(2):
         assert scores[person].tolist() in p.profiles[person].tolist()
-    assert torch.equal(scores, thompson(p, ISIS_MS, seed=3))
+    assert torch.equal(scores, Thompson(3)(p, ISIS_MS))
 
 
 def test_thompson_takes_every_sample_in_the_course_of_time() -> None:
     p = some_posterior(1, people=1)
-    taken = {tuple(thompson(replace(p, trials=n), ISIS_MS)[0].tolist()) for n in range(60)}
+    taken = {tuple(Thompson()(replace(p, trials=n), ISIS_MS)[0].tolist()) for n in range(60)}
     assert taken == {tuple(row) for row in p.profiles[0].tolist()}
 
 
@@ -72,22 +64,7 @@ def test_thompson_takes_every_sample_in_the_course_of_time() -> None:
 def test_the_knowledge_gradient_is_what_the_best_mean_is_expected_to_gain(seed: int) -> None:
     p = some_posterior(seed)
     expected = expected_gain(p.mass, p.profiles, lambda weights, profiles: -float((weights @ profiles).max()))
-    np.testing.assert_allclose(knowledge_gradient(p, ISIS_MS), expected, rtol=1e-3, atol=1e-4)
-
-
-@pytest.mark.parametrize(
-    ("acquisition", "score"),
-    [
-        (LogExpectedImprovement(), log_expected_improvement),
-        (UpperConfidenceBound(1.0), lambda p, isi_ms: upper_confidence_bound(p, isi_ms, 1.0)),
-        (Thompson(5), lambda p, isi_ms: thompson(p, isi_ms, 5)),
-        (KnowledgeGradient(), knowledge_gradient),
-    ],
-)
-def test_the_settings_class_scores_as_its_function_does(acquisition: AcquisitionFunction, score: Score) -> None:
-    p = some_posterior(2)
-    torch.testing.assert_close(acquisition(p, ISIS_MS), score(p, ISIS_MS))
-    assert all(isinstance(p, capability) for capability in acquisition.needs)
+    np.testing.assert_allclose(KnowledgeGradient()(p, ISIS_MS), expected, rtol=1e-3, atol=1e-4)
 
 
 def test_a_negative_width_is_refused() -> None:

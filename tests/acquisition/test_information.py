@@ -24,9 +24,6 @@ from isiw.acquisition.information import (
     MutualInformation,
     WindowGain,
     WindowInformation,
-    mutual_information,
-    window_gain,
-    window_information,
 )
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.design import VALVE_SPACE
@@ -35,7 +32,7 @@ from isiw.models.particles import ParticleModel
 from isiw.models.protocol import Observation, Posterior, PredictsOutcomes, SamplesWindows, Tensor
 
 ROUNDING = 1e-5
-ALL = [mutual_information, window_gain, window_information]
+ALL = [MutualInformation(), WindowGain(), WindowInformation()]
 
 seeds = st.integers(0, 2**31)
 
@@ -49,13 +46,13 @@ def entropy(weights: np.ndarray) -> float:
 def test_mutual_information_is_what_the_entropy_of_the_samples_is_expected_to_lose(seed: int) -> None:
     p = some_posterior(seed)
     expected = expected_gain(p.mass, p.masks, lambda weights, _values: entropy(weights))
-    np.testing.assert_allclose(mutual_information(p, ISIS_MS), expected, atol=ROUNDING)
+    np.testing.assert_allclose(MutualInformation()(p, ISIS_MS), expected, atol=ROUNDING)
 
 
 @given(seeds)
 def test_window_gain_is_the_expected_reduction_of_summed_variance(seed: int) -> None:
     p = some_posterior(seed)
-    np.testing.assert_allclose(window_gain(p, ISIS_MS), expected_gain(p.mass, p.masks, summed_variance), atol=ROUNDING)
+    np.testing.assert_allclose(WindowGain()(p, ISIS_MS), expected_gain(p.mass, p.masks, summed_variance), atol=ROUNDING)
 
 
 @dataclass(frozen=True)
@@ -70,7 +67,7 @@ def test_depressed_segments_count_as_much_as_the_window() -> None:
     p = some_posterior(4)
     both = WithDepression(p.mass, p.masks, p.profiles, p.baselines)
     # What is not in the window varies exactly as what is.
-    np.testing.assert_allclose(window_gain(both, ISIS_MS), 2.0 * window_gain(p, ISIS_MS), rtol=1e-4)
+    np.testing.assert_allclose(WindowGain()(both, ISIS_MS), 2.0 * WindowGain()(p, ISIS_MS), rtol=1e-4)
 
 
 @given(seeds)
@@ -87,13 +84,13 @@ def test_window_information_is_what_the_entropy_of_distinct_windows_is_expected_
         return entropy(np.array(list(share.values())))
 
     expected = expected_gain(p.mass, p.masks, entropy_of_windows)
-    np.testing.assert_allclose(window_information(p, ISIS_MS, cells=5), expected, atol=ROUNDING)
+    np.testing.assert_allclose(WindowInformation(cells=5)(p, ISIS_MS), expected, atol=ROUNDING)
 
 
 @given(seeds)
 def test_the_window_is_never_more_informative_than_everything(seed: int) -> None:
     p = some_posterior(seed, samples=12)
-    assert (window_information(p, ISIS_MS, cells=3) <= mutual_information(p, ISIS_MS) + ROUNDING).all()
+    assert (WindowInformation(cells=3)(p, ISIS_MS) <= MutualInformation()(p, ISIS_MS) + ROUNDING).all()
 
 
 @pytest.mark.parametrize("score", ALL)
@@ -111,25 +108,25 @@ def test_an_outcome_that_does_not_depend_on_the_sample_says_nothing(score: Score
 
 @given(seeds)
 def test_mutual_information_is_at_most_the_entropy_of_the_samples(seed: int) -> None:
-    assert (mutual_information(some_posterior(seed, samples=5), ISIS_MS) <= math.log(5) + ROUNDING).all()
+    assert (MutualInformation()(some_posterior(seed, samples=5), ISIS_MS) <= math.log(5) + ROUNDING).all()
 
 
 def test_an_outcome_that_tells_the_samples_apart_says_all_there_is_to_know() -> None:
     masks = torch.tensor([[[1.0, 1.0], [1.0, 0.0]]])
     p = HandMadePosterior(torch.eye(2)[None, :, None, :].expand(1, 2, 2, 2), masks, masks, masks[..., 0])
     isis_ms = torch.arange(2.0)
-    assert mutual_information(p, isis_ms)[0, 0].item() == pytest.approx(math.log(2), abs=ROUNDING)
-    assert window_information(p, isis_ms)[0, 0].item() == pytest.approx(math.log(2), abs=ROUNDING)
+    assert MutualInformation()(p, isis_ms)[0, 0].item() == pytest.approx(math.log(2), abs=ROUNDING)
+    assert WindowInformation()(p, isis_ms)[0, 0].item() == pytest.approx(math.log(2), abs=ROUNDING)
     # Only the second ISI is in doubt, with variance 0.5 (1 - 0.5).
-    assert window_gain(p, isis_ms)[0, 0].item() == pytest.approx(0.25, abs=ROUNDING)
+    assert WindowGain()(p, isis_ms)[0, 0].item() == pytest.approx(0.25, abs=ROUNDING)
 
 
 def test_a_window_that_is_known_has_nothing_to_gain_where_other_unknowns_have() -> None:
     p = some_posterior(1)
     known = replace(p, masks=p.masks[:, :1].expand_as(p.masks))
-    assert window_gain(known, ISIS_MS).abs().max() < ROUNDING
-    assert window_information(known, ISIS_MS).abs().max() < ROUNDING
-    assert (mutual_information(known, ISIS_MS) > 0.01).all()
+    assert WindowGain()(known, ISIS_MS).abs().max() < ROUNDING
+    assert WindowInformation()(known, ISIS_MS).abs().max() < ROUNDING
+    assert (MutualInformation()(known, ISIS_MS) > 0.01).all()
 
 
 @pytest.mark.parametrize("score", ALL)

@@ -10,15 +10,8 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.hand_made import ISIS_MS, HandMadePosterior, Score, expected_gain, some_posterior
-from isiw.acquisition.levelset import (
-    IntegratedFeasibility,
-    Straddle,
-    expected_feasibility,
-    integrated_feasibility_reduction,
-    straddle,
-)
-from isiw.acquisition.protocol import AcquisitionFunction
+from acquisition.hand_made import ISIS_MS, HandMadePosterior, expected_gain, some_posterior
+from isiw.acquisition.levelset import IntegratedFeasibility, Straddle, expected_feasibility
 from isiw.errors import InvalidValueError
 
 seeds = st.integers(0, 2**31)
@@ -44,7 +37,7 @@ def test_the_straddle_is_how_far_the_interval_reaches_across_the_level(seed: int
     p = some_posterior(seed)
     margins = margins_of(p).numpy()
     expected = 1.5 * margins.std(axis=1) - np.abs(margins.mean(axis=1))
-    np.testing.assert_allclose(straddle(p, ISIS_MS, 1.5), expected, atol=1e-4, rtol=1e-4)
+    np.testing.assert_allclose(Straddle(1.5)(p, ISIS_MS), expected, atol=1e-4, rtol=1e-4)
 
 
 @given(seeds)
@@ -57,28 +50,15 @@ def test_the_integrated_feasibility_is_expected_to_fall_by_so_much(seed: int) ->
         return float(expected_feasibility(torch.tensor(mean), torch.tensor(sd)).sum())
 
     expected = expected_gain(p.mass, margins_of(p), summed_feasibility)
-    np.testing.assert_allclose(integrated_feasibility_reduction(p, ISIS_MS), expected, atol=2e-3, rtol=1e-2)
+    np.testing.assert_allclose(IntegratedFeasibility()(p, ISIS_MS), expected, atol=2e-3, rtol=1e-2)
 
 
 def test_the_interval_reaches_furthest_where_the_sign_of_the_margin_is_least_clear() -> None:
     p = some_posterior(0, people=1, samples=2)
     # Both samples agree on a peak of 1 at the last ISI; at the second they disagree about the edge's level of 0.135.
     profiles = torch.tensor([[[0.0, 0.035, 0.6, 1.0], [0.0, 0.235, 0.6, 1.0]]])
-    scores = straddle(replace(p, profiles=profiles, baselines=torch.zeros(1, 2)), ISIS_MS)
+    scores = Straddle()(replace(p, profiles=profiles, baselines=torch.zeros(1, 2)), ISIS_MS)
     assert scores.argmax().item() == 1
-
-
-@pytest.mark.parametrize(
-    ("acquisition", "score"),
-    [
-        (Straddle(1.5), lambda p, isi_ms: straddle(p, isi_ms, 1.5)),
-        (IntegratedFeasibility(1.5), lambda p, isi_ms: integrated_feasibility_reduction(p, isi_ms, 1.5)),
-    ],
-)
-def test_the_settings_class_scores_as_its_function_does(acquisition: AcquisitionFunction, score: Score) -> None:
-    p = some_posterior(2)
-    torch.testing.assert_close(acquisition(p, ISIS_MS), score(p, ISIS_MS))
-    assert all(isinstance(p, capability) for capability in acquisition.needs)
 
 
 @pytest.mark.parametrize("kind", [Straddle, IntegratedFeasibility])

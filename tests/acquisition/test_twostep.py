@@ -9,8 +9,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from acquisition.hand_made import ISIS_MS, HandMadePosterior, some_posterior, summed_variance
-from isiw.acquisition.information import window_gain
-from isiw.acquisition.twostep import TwoStep, two_step_gain
+from isiw.acquisition.information import WindowGain
+from isiw.acquisition.twostep import TwoStep
 from isiw.errors import InvalidValueError
 
 seeds = st.integers(0, 2**31)
@@ -45,19 +45,19 @@ def enumerated(posterior: HandMadePosterior) -> np.ndarray:
 def test_two_steps_are_those_of_an_enumeration(seed: int) -> None:
     p = some_posterior(seed)
     assume(p.mass.mean(1).min() > 1 / GROUPS)
-    got = two_step_gain(p.mass, p.masks, shortlist=4, groups=GROUPS, stride=1)
+    got = TwoStep(shortlist=4, groups=GROUPS, stride=1)(p, ISIS_MS)
     np.testing.assert_allclose(got, enumerated(p), atol=2e-5)
 
 
 @given(seeds)
 def test_a_second_trial_never_costs(seed: int) -> None:
     p = some_posterior(seed, outcomes=6)
-    assert bool((TwoStep()(p, ISIS_MS) >= window_gain(p, ISIS_MS) - 1e-6).all())
+    assert bool((TwoStep()(p, ISIS_MS) >= WindowGain()(p, ISIS_MS) - 1e-6).all())
 
 
 def test_candidates_off_the_shortlist_keep_their_own_gain() -> None:
     p = some_posterior(3)
-    one, two = window_gain(p, ISIS_MS), TwoStep(shortlist=1)(p, ISIS_MS)
+    one, two = WindowGain()(p, ISIS_MS), TwoStep(shortlist=1)(p, ISIS_MS)
     assert torch.equal(((two - one).abs() > 1e-6).sum(-1), torch.ones(2, dtype=torch.long))
     assert torch.equal((two - one).argmax(-1), one.argmax(-1))
 

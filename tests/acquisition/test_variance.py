@@ -5,21 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.hand_made import ISIS_MS, Score, expected_gain, some_posterior, summed_variance
-from isiw.acquisition.protocol import AcquisitionFunction
-from isiw.acquisition.variance import (
-    EdgeVariance,
-    IntegratedVariance,
-    ProfileVariance,
-    edge_variance_reduction,
-    integrated_variance_reduction,
-    profile_variance,
-)
+from acquisition.hand_made import ISIS_MS, expected_gain, some_posterior, summed_variance
+from isiw.acquisition.variance import EdgeVariance, IntegratedVariance, ProfileVariance
 
 ROUNDING = 1e-4
 seeds = st.integers(0, 2**31)
@@ -38,38 +29,24 @@ def variance_of_edges(weights: np.ndarray, masks: np.ndarray) -> float:
 @given(seeds)
 def test_the_profiles_variance_is_that_of_its_samples(seed: int) -> None:
     p = some_posterior(seed)
-    np.testing.assert_allclose(profile_variance(p, ISIS_MS), p.profiles.numpy().var(axis=1), rtol=1e-4)
+    np.testing.assert_allclose(ProfileVariance()(p, ISIS_MS), p.profiles.numpy().var(axis=1), rtol=1e-4)
 
 
 @given(seeds)
 def test_the_integrated_variance_is_expected_to_fall_by_so_much(seed: int) -> None:
     p = some_posterior(seed)
     expected = expected_gain(p.mass, p.profiles, summed_variance)
-    np.testing.assert_allclose(integrated_variance_reduction(p, ISIS_MS), expected, rtol=1e-3, atol=ROUNDING)
+    np.testing.assert_allclose(IntegratedVariance()(p, ISIS_MS), expected, rtol=1e-3, atol=ROUNDING)
 
 
 @given(seeds)
 def test_the_edges_variance_is_expected_to_fall_by_so_much(seed: int) -> None:
     p = some_posterior(seed)
     expected = expected_gain(p.mass, p.masks, variance_of_edges)
-    np.testing.assert_allclose(edge_variance_reduction(p, ISIS_MS), expected, atol=ROUNDING)
+    np.testing.assert_allclose(EdgeVariance()(p, ISIS_MS), expected, atol=ROUNDING)
 
 
 def test_where_no_sample_has_a_window_no_isi_is_better_than_another() -> None:
     p = some_posterior(1)
-    scores = edge_variance_reduction(replace(p, masks=torch.zeros_like(p.masks)), ISIS_MS)
+    scores = EdgeVariance()(replace(p, masks=torch.zeros_like(p.masks)), ISIS_MS)
     assert scores.tolist() == [[0.0] * 4] * 2
-
-
-@pytest.mark.parametrize(
-    ("acquisition", "score"),
-    [
-        (ProfileVariance(), profile_variance),
-        (IntegratedVariance(), integrated_variance_reduction),
-        (EdgeVariance(), edge_variance_reduction),
-    ],
-)
-def test_the_settings_class_scores_as_its_function_does(acquisition: AcquisitionFunction, score: Score) -> None:
-    p = some_posterior(2)
-    torch.testing.assert_close(acquisition(p, ISIS_MS), score(p, ISIS_MS))
-    assert all(isinstance(p, capability) for capability in acquisition.needs)

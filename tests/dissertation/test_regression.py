@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 
-from isiw.acquisition.variance import profile_variance
+from isiw.acquisition.variance import ProfileVariance
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.dissertation.nonlinear import NonlinearRegression
 from isiw.dissertation.regression import FittedCurve, RegressionModel
@@ -75,7 +75,7 @@ def test_the_less_noise_the_better_an_outcome_tells_samples_apart() -> None:
 def test_the_next_isi_is_where_the_curve_is_least_known() -> None:
     trials = [trial for trial in NOISY if not 215.0 <= known(trial[0]) <= 255.0]
     isi_ms = torch.tensor(VALVE_SPACE.grid_ms)
-    scores = profile_variance(told(NR, trials), isi_ms)[0]
+    scores = ProfileVariance()(told(NR, trials), isi_ms)[0]
     assert 205.0 <= float(isi_ms[scores.argmax()]) <= 265.0
 
 

@@ -19,8 +19,7 @@ class BotorchAcquisition:
     Args:
         make: from a BoTorch model to a BoTorch acquisition function. The model's input is the ISI [ms], so `grid_ms`
             above is a double tensor of ISIs [ms] of shape (N, 1); its outcome is on the scale of the model.
-        seed: of what BoTorch draws from torch's generator, the same for every posterior: equal posteriors have equal
-            scores, and whatever else draws from that generator is not disturbed.
+        seed: of BoTorch's draws, which disturb nobody else's: equal posteriors have equal scores.
     """
 
     make: Callable[[Any], Callable[[Tensor], Tensor]]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import ClassVar, Final, Protocol
 
 import numpy as np
 
@@ -23,40 +23,8 @@ class _CountedProfiles(Posterior, SamplesProfiles, Protocol):
     """A posterior of profiles that knows how many trials there were."""
 
 
-def log_expected_improvement(posterior: SamplesProfiles, isi_ms: Tensor, softness: float = 0.01) -> Tensor:
-    """Log expected improvement of the expected MEP over the best posterior mean [log mV], shape (b, t).
-
-    Where no sample improves, a soft hinge still tells near from far.
-    """
-    profiles = posterior.profiles_mv(isi_ms)
-    best = profiles.mean(dim=1).amax(dim=-1)[:, None, None]
-    scale = (softness * profiles.std(dim=1, correction=0).amax(dim=-1)).clamp_min(1e-9)[:, None, None]
-    steps = (profiles - best) / scale
-    # log softplus(x) is x itself far below the hinge, where softplus would underflow.
-    log_hinge = torch.where(steps < -15.0, steps, torch.log(torch.nn.functional.softplus(steps.clamp_min(-15.0))))
-    score: Tensor = torch.logsumexp(log_hinge, dim=1) - math.log(profiles.shape[1]) + scale.squeeze(-1).log()
-    return score
-
-
-def upper_confidence_bound(posterior: SamplesProfiles, isi_ms: Tensor, width_sd: float = 2.0) -> Tensor:
-    """Posterior mean of the expected MEP and some SDs [mV], shape (b, t)."""
-    profiles = posterior.profiles_mv(isi_ms)
-    return profiles.mean(dim=1) + width_sd * profiles.std(dim=1, correction=0)
-
-
-def thompson(posterior: _CountedProfiles, isi_ms: Tensor, seed: int = 0) -> Tensor:
-    """The expected MEP under one posterior sample [mV], shape (b, t)."""
-    profiles = posterior.profiles_mv(isi_ms)
-    people, samples = profiles.shape[:2]
-    rng = np.random.default_rng([seed, 1 + posterior.trials])  # [seed, 0] is the stream of seed
-    return profiles[torch.arange(people), torch.as_tensor(rng.integers(samples, size=people))]
-
-
-def knowledge_gradient(posterior: ForeseesProfiles, isi_ms: Tensor) -> Tensor:
-    """By how much the next MEP is expected to raise the largest posterior mean [mV], shape (b, t)."""
-    profiles = posterior.profiles_mv(isi_ms)
-    ahead = lookahead(posterior.outcome_mass(isi_ms), profiles)
-    return (ahead.probability * ahead.mean.amax(dim=-1)).sum(-1) - profiles.mean(dim=1).amax(dim=-1, keepdim=True)
+SOFTNESS: Final = 0.01
+"""Width of the hinge at the best posterior mean, as a share of the largest SD; it tells near from far below."""
 
 
 @dataclass(frozen=True)
@@ -66,8 +34,15 @@ class LogExpectedImprovement:
     needs: ClassVar[tuple[type, ...]] = (SamplesProfiles,)
 
     def __call__(self, posterior: SamplesProfiles, isi_ms: Tensor) -> Tensor:
-        """Score the candidate ISIs."""
-        return log_expected_improvement(posterior, isi_ms)
+        """Log expected improvement of the expected MEP [log mV], shape (b, t)."""
+        profiles = posterior.profiles_mv(isi_ms)
+        best = profiles.mean(dim=1).amax(dim=-1)[:, None, None]
+        scale = (SOFTNESS * profiles.std(dim=1, correction=0).amax(dim=-1)).clamp_min(1e-9)[:, None, None]
+        steps = (profiles - best) / scale
+        # log softplus(x) is x itself far below the hinge, where softplus would underflow.
+        log_hinge = torch.where(steps < -15.0, steps, torch.log(torch.nn.functional.softplus(steps.clamp_min(-15.0))))
+        score: Tensor = torch.logsumexp(log_hinge, dim=1) - math.log(profiles.shape[1]) + scale.squeeze(-1).log()
+        return score
 
 
 @dataclass(frozen=True)
@@ -82,8 +57,9 @@ class UpperConfidenceBound(Checked):
     needs: ClassVar[tuple[type, ...]] = (SamplesProfiles,)
 
     def __call__(self, posterior: SamplesProfiles, isi_ms: Tensor) -> Tensor:
-        """Score the candidate ISIs."""
-        return upper_confidence_bound(posterior, isi_ms, self.width_sd)
+        """The upper bound of the expected MEP [mV], shape (b, t)."""
+        profiles = posterior.profiles_mv(isi_ms)
+        return profiles.mean(dim=1) + self.width_sd * profiles.std(dim=1, correction=0)
 
 
 @dataclass(frozen=True)
@@ -98,8 +74,11 @@ class Thompson:
     needs: ClassVar[tuple[type, ...]] = (SamplesProfiles,)
 
     def __call__(self, posterior: _CountedProfiles, isi_ms: Tensor) -> Tensor:
-        """Score the candidate ISIs."""
-        return thompson(posterior, isi_ms, self.seed)
+        """The expected MEP under that sample [mV], shape (b, t)."""
+        profiles = posterior.profiles_mv(isi_ms)
+        people, samples = profiles.shape[:2]
+        rng = np.random.default_rng([self.seed, 1 + posterior.trials])  # [seed, 0] is the stream of seed
+        return profiles[torch.arange(people), torch.as_tensor(rng.integers(samples, size=people))]
 
 
 @dataclass(frozen=True)
@@ -109,5 +88,7 @@ class KnowledgeGradient:
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesProfiles)
 
     def __call__(self, posterior: ForeseesProfiles, isi_ms: Tensor) -> Tensor:
-        """Score the candidate ISIs."""
-        return knowledge_gradient(posterior, isi_ms)
+        """By how much the next MEP is expected to raise the largest posterior mean [mV], shape (b, t)."""
+        profiles = posterior.profiles_mv(isi_ms)
+        ahead = lookahead(posterior.outcome_mass(isi_ms), profiles)
+        return (ahead.probability * ahead.mean.amax(dim=-1)).sum(-1) - profiles.mean(dim=1).amax(dim=-1, keepdim=True)

@@ -149,32 +149,9 @@ def _entropy(mass: Tensor) -> Tensor:
     return entropy
 
 
-def mutual_information(posterior: PredictsOutcomes, isi_ms: Tensor) -> Tensor:
-    """Mutual information of the next MEP and all unknowns [nat], shape (b, t)."""
-    mass = posterior.outcome_mass(isi_ms)
-    if _is_for_kernels(mass):
-        with first_of("scores"):
-            return torch.from_numpy(entropy_reductions(mass.numpy()))
-    return _entropy(mass.mean(dim=1)) - _entropy(mass).mean(dim=1)
-
-
 def _is_for_kernels(mass: Tensor) -> bool:
     """True if compiled loops are there for it: in single precision, on the CPU."""
     return AVAILABLE and mass.dtype == torch.float32 and mass.device.type == "cpu"
-
-
-def window_information(posterior: ForeseesWindows, isi_ms: Tensor, cells: int = 5) -> Tensor:
-    """Mutual information of the next MEP and the window alone [nat], shape (b, t).
-
-    The window is described as precisely as the samples allow: the quantile cell of its start and of its end, or
-    that there is none. Whatever else differs among the samples of a cell is averaged out, as far as a cell has
-    many: with few samples the value is too high, by .01 to .04 nat with 192, and good for comparing ISIs only.
-    """
-    mass, cell = posterior.outcome_mass(isi_ms), _cells(posterior.window_masks(isi_ms), cells)
-    members = torch.nn.functional.one_hot(cell, cells * cells + 1).to(mass.dtype)
-    share = members.mean(dim=1)
-    within = torch.einsum("bsc,bsty->bcty", members, mass) / members.sum(dim=1).clamp_min(1.0)[..., None, None]
-    return _entropy(mass.mean(dim=1)) - torch.einsum("bc,bct->bt", share, _entropy(within))
 
 
 def _cells(masks: Tensor, cells: int) -> Tensor:
@@ -195,21 +172,6 @@ def _quantile_cell(edge: Tensor, found: Tensor, cells: int) -> Tensor:
     )
 
 
-def window_gain(posterior: ForeseesWindows, isi_ms: Tensor) -> Tensor:
-    """Expected reduction of the summed variance of membership in the window, shape (b, t).
-
-    Where a posterior has depressed segments too, membership in them counts as much.
-    """
-    masks = posterior.window_masks(isi_ms)
-    if can(posterior, SamplesDepression):
-        masks = torch.cat((masks, posterior.depressed_masks(isi_ms)), dim=-1)
-    mass = posterior.outcome_mass(isi_ms)
-    if _is_for_kernels(mass):
-        with first_of("scores of windows"):
-            return torch.from_numpy(variance_reductions(mass.numpy(), masks.to(torch.float32).numpy()))
-    return expected_variance_reduction(mass, masks)
-
-
 @dataclass(frozen=True)
 class MutualInformation:
     """Mutual information of the next MEP and all unknowns."""
@@ -217,13 +179,21 @@ class MutualInformation:
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes,)
 
     def __call__(self, posterior: PredictsOutcomes, isi_ms: Tensor) -> Tensor:
-        """Score the candidate ISIs."""
-        return mutual_information(posterior, isi_ms)
+        """The information [nat], shape (b, t)."""
+        mass = posterior.outcome_mass(isi_ms)
+        if _is_for_kernels(mass):
+            with first_of("scores"):
+                return torch.from_numpy(entropy_reductions(mass.numpy()))
+        return _entropy(mass.mean(dim=1)) - _entropy(mass).mean(dim=1)
 
 
 @dataclass(frozen=True)
 class WindowInformation(Checked):
     """Mutual information of the next MEP and the window alone.
+
+    The window is described as precisely as the samples allow: the quantile cell of its start and of its end, or
+    that there is none. Whatever else differs among the samples of a cell is averaged out, as far as a cell has
+    many: with few samples the value is too high, by .01 to .04 nat with 192, and good for comparing ISIs only.
 
     Args:
         cells: into how many cells each edge falls.
@@ -233,19 +203,30 @@ class WindowInformation(Checked):
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesWindows)
 
     def __call__(self, posterior: ForeseesWindows, isi_ms: Tensor) -> Tensor:
-        """Score the candidate ISIs."""
-        return window_information(posterior, isi_ms, self.cells)
+        """The information [nat], shape (b, t)."""
+        mass, cell = posterior.outcome_mass(isi_ms), _cells(posterior.window_masks(isi_ms), self.cells)
+        members = torch.nn.functional.one_hot(cell, self.cells * self.cells + 1).to(mass.dtype)
+        share = members.mean(dim=1)
+        within = torch.einsum("bsc,bsty->bcty", members, mass) / members.sum(dim=1).clamp_min(1.0)[..., None, None]
+        return _entropy(mass.mean(dim=1)) - torch.einsum("bc,bct->bt", share, _entropy(within))
 
 
 @dataclass(frozen=True)
 class WindowGain:
-    """Expected reduction of the uncertainty about which ISIs are in the window."""
+    """Expected reduction of the uncertainty about which ISIs are in the window, or are depressed."""
 
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesWindows)
 
     def __call__(self, posterior: ForeseesWindows, isi_ms: Tensor) -> Tensor:
-        """Score the candidate ISIs."""
-        return window_gain(posterior, isi_ms)
+        """Expected reduction of the summed variance of membership, shape (b, t)."""
+        masks = posterior.window_masks(isi_ms)
+        if can(posterior, SamplesDepression):
+            masks = torch.cat((masks, posterior.depressed_masks(isi_ms)), dim=-1)
+        mass = posterior.outcome_mass(isi_ms)
+        if _is_for_kernels(mass):
+            with first_of("scores of windows"):
+                return torch.from_numpy(variance_reductions(mass.numpy(), masks.to(torch.float32).numpy()))
+        return expected_variance_reduction(mass, masks)
 
 
 @dataclass(frozen=True)
@@ -261,4 +242,4 @@ class Alternating:
     def __call__(self, posterior: _CountedWindows, isi_ms: Tensor) -> Tensor:
         """Score the candidate ISIs."""
         pairs = posterior.pairs if can(posterior, CountsPairs) else posterior.trials
-        return mutual_information(posterior, isi_ms) if pairs % 2 else window_gain(posterior, isi_ms)
+        return MutualInformation()(posterior, isi_ms) if pairs % 2 else WindowGain()(posterior, isi_ms)

@@ -26,12 +26,6 @@ def _margins_mv(posterior: SamplesProfiles, isi_ms: Tensor) -> Tensor:
     return excess - EDGE_LEVEL * excess.amax(dim=-1, keepdim=True).clamp_min(0.0)
 
 
-def straddle(posterior: SamplesProfiles, isi_ms: Tensor, width_sd: float = 1.96) -> Tensor:
-    """How far the margin's credible interval reaches across zero [mV], shape (b, t)."""
-    margins = _margins_mv(posterior, isi_ms)
-    return width_sd * margins.std(dim=1, correction=0) - margins.mean(dim=1).abs()
-
-
 def expected_feasibility(mean: Tensor, sd: Tensor, band_sd: float = 2.0) -> Tensor:
     """Expected depth inside a band of `band_sd` SDs around the level, of a Gaussian margin."""
     z = mean / sd.clamp_min(1e-12)
@@ -49,19 +43,6 @@ def _density(z: Tensor) -> Tensor:
     return _INV_SQRT_2PI * torch.exp(-0.5 * z.square())
 
 
-def integrated_feasibility_reduction(posterior: ForeseesProfiles, isi_ms: Tensor, band_sd: float = 2.0) -> Tensor:
-    """By how much the next MEP is expected to reduce the summed expected feasibility [mV], shape (b, t)."""
-    margins = _margins_mv(posterior, isi_ms)
-    now = expected_feasibility(margins.mean(dim=1), margins.std(dim=1, correction=0), band_sd).sum(-1, keepdim=True)
-    centre = margins.mean(dim=1, keepdim=True)
-    offset = margins - centre
-    ahead = lookahead(posterior.outcome_mass(isi_ms), torch.cat((offset, offset.square()), dim=-1))
-    first, second = ahead.mean.chunk(2, dim=-1)
-    sd = (second - first.square()).clamp_min(0.0).sqrt()
-    later = expected_feasibility(centre.unsqueeze(1) + first, sd, band_sd).sum(-1)
-    return now - (ahead.probability * later).sum(-1)
-
-
 @dataclass(frozen=True)
 class Straddle(Checked):
     """Ask where the margin's credible interval reaches furthest across the edge's level.
@@ -74,8 +55,9 @@ class Straddle(Checked):
     needs: ClassVar[tuple[type, ...]] = (SamplesProfiles,)
 
     def __call__(self, posterior: SamplesProfiles, isi_ms: Tensor) -> Tensor:
-        """Score the candidate ISIs."""
-        return straddle(posterior, isi_ms, self.width_sd)
+        """The reach of the margin's credible interval across zero [mV], shape (b, t)."""
+        margins = _margins_mv(posterior, isi_ms)
+        return self.width_sd * margins.std(dim=1, correction=0) - margins.mean(dim=1).abs()
 
 
 @dataclass(frozen=True)
@@ -90,5 +72,14 @@ class IntegratedFeasibility(Checked):
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesProfiles)
 
     def __call__(self, posterior: ForeseesProfiles, isi_ms: Tensor) -> Tensor:
-        """Score the candidate ISIs."""
-        return integrated_feasibility_reduction(posterior, isi_ms, self.band_sd)
+        """By how much the next MEP is expected to reduce the summed expected feasibility [mV], shape (b, t)."""
+        margins = _margins_mv(posterior, isi_ms)
+        mean, sd = margins.mean(dim=1), margins.std(dim=1, correction=0)
+        now = expected_feasibility(mean, sd, self.band_sd).sum(-1, keepdim=True)
+        centre = margins.mean(dim=1, keepdim=True)
+        offset = margins - centre
+        ahead = lookahead(posterior.outcome_mass(isi_ms), torch.cat((offset, offset.square()), dim=-1))
+        first, second = ahead.mean.chunk(2, dim=-1)
+        left_sd = (second - first.square()).clamp_min(0.0).sqrt()
+        later = expected_feasibility(centre.unsqueeze(1) + first, left_sd, self.band_sd).sum(-1)
+        return now - (ahead.probability * later).sum(-1)

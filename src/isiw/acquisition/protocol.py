@@ -1,14 +1,22 @@
-"""What an acquisition function is, and how its scores become the next ISI."""
+"""The protocol of acquisition functions, and how scores become the next ISI, or a batch of them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any, Protocol, runtime_checkable
 
 from isiw.design import DesignSpace
 from isiw.errors import StrategyError
 from isiw.lazy import torch
-from isiw.models.protocol import PredictsOutcomes, SamplesProfiles, SamplesWindows, Tensor
+from isiw.models.protocol import (
+    Conditions,
+    Posterior,
+    PredictsOutcomes,
+    ProposesIsi,
+    SamplesProfiles,
+    SamplesWindows,
+    Tensor,
+)
 
 
 class ForeseesProfiles(PredictsOutcomes, SamplesProfiles, Protocol):
@@ -41,19 +49,19 @@ class AcquisitionFunction(Protocol):
 
 @runtime_checkable
 class FollowsPlan(Protocol):
-    """An acquisition function whose choice is known beforehand, on the grid of the space, whatever is believed."""
+    """An acquisition function whose choice is known beforehand, on the grid of the space, whatever is known."""
 
     def planned_isi_ms(self, space: DesignSpace, pairs: int) -> float:
         """The ISI [ms] of the pair of stimuli after so many pairs.
 
         Args:
             space: the ISIs that may be asked.
-            pairs: how many pairs were told; TMS alone is none.
+            pairs: how many pairs were learnt; TMS alone is none.
         """
 
 
 def require_acquisition(given: object) -> None:
-    """Raise where something else is given for an acquisition function."""
+    """Raise if something else is given for an acquisition function."""
     if isinstance(given, type):
         raise StrategyError(
             "an acquisition function is needed, and not its class", got=given, remedy=f"Make one: {given.__name__}()."
@@ -84,3 +92,46 @@ def best_candidate(scores: Tensor, cost: Tensor | None = None, first: int = 0) -
     net = scores if cost is None else scores - cost
     net = torch.where(torch.isfinite(net), net, -torch.inf).roll(-first, dims=-1)
     return (net.argmax(dim=-1) + first) % scores.shape[-1]
+
+
+def own_plan(posterior: Posterior, acquisition: AcquisitionFunction) -> list[float]:
+    """The ISIs [ms] that the method itself wants next for one person; empty where it is not asked for them."""
+    if ProposesIsi in acquisition.needs and isinstance(posterior, ProposesIsi):
+        return [float(isi_ms) for isi_ms in posterior.proposed_isis_ms()[0]]
+    return []
+
+
+def greedy_batch(
+    posterior: Posterior,
+    acquisition: AcquisitionFunction,
+    chosen_ms: list[float],
+    n: int,
+    choose: Callable[[Posterior], float],
+) -> list[float]:
+    """ISIs [ms] for the next n trials of one person.
+
+    A method with a plan of its own keeps to it. For all others the posterior is conditioned on the median MEP that it
+    expects at each ISI chosen so far (the kriging believer [Ginsbourger2010]).
+    """
+    batch = chosen_ms[:n]
+    if len(batch) < n and own_plan(posterior, acquisition):
+        raise StrategyError("the method plans no further ahead", got=n, expected=f"at most {len(batch)} ISIs")
+    imagined = 0
+    while len(batch) < n:
+        for isi_ms in batch[imagined:]:
+            posterior = _as_expected(posterior, isi_ms)
+        imagined = len(batch)
+        batch.append(choose(posterior))
+    return batch
+
+
+def _as_expected(posterior: Posterior, isi_ms: float) -> Posterior:
+    missing = [c.__name__ for c in (Conditions, SamplesProfiles) if not isinstance(posterior, c)]
+    if not (isinstance(posterior, Conditions) and isinstance(posterior, SamplesProfiles)):
+        raise StrategyError(
+            f"{type(posterior).__name__} cannot imagine trials, which a batch needs",
+            got=f"a posterior without {', '.join(missing)}",
+            remedy="Ask for one ISI at a time, or choose another model.",
+        )
+    isi = torch.tensor([isi_ms], dtype=torch.float32)
+    return posterior.condition(isi, posterior.profiles_mv(isi).median(dim=1).values.squeeze(-1))

@@ -12,15 +12,10 @@ from isiw.models.protocol import PredictsOutcomes, SamplesWindows, Tensor
 
 
 class Lookahead(NamedTuple):
-    """Expectations after the next MEP.
+    """Expectations after the next MEP."""
 
-    Args:
-        probability: of each value of the next MEP, shape (b, t, y).
-        mean: expectation of each quantity given that value, shape (b, t, y, g).
-    """
-
-    probability: Tensor
-    mean: Tensor
+    probability: Tensor  # of each value of the next MEP, (b, t, y)
+    mean: Tensor  # of each quantity given that value, (b, t, y, g)
 
 
 def lookahead(mass: Tensor, values: Tensor, weights: Tensor | None = None) -> Lookahead:
@@ -36,10 +31,7 @@ def lookahead(mass: Tensor, values: Tensor, weights: Tensor | None = None) -> Lo
 
 
 def expected_variance_reduction(mass: Tensor, values: Tensor, weights: Tensor | None = None) -> Tensor:
-    """By how much the next MEP is expected to reduce the summed variance of some quantities.
-
-    By the law of total variance it is the variance of their means after the next MEP.
-    """
+    """Expected reduction of summed variances by the next MEP: by the law of total variance that of means after it."""
     mean = values.mean(dim=1, keepdim=True) if weights is None else weights.unsqueeze(1) @ values
     # Centred, so that a small reduction is not the difference of two large numbers.
     ahead = lookahead(mass, values - mean, weights)
@@ -67,25 +59,17 @@ class TwoStep(Checked):
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesWindows)
 
     def __call__(self, posterior: ForeseesWindows, isi_ms: Tensor) -> Tensor:
-        """Score the candidate ISIs."""
+        """Expected reduction of the summed variance of membership, shape (b, t); by one trial off the shortlist."""
         mass, masks = posterior.outcome_mass(isi_ms), posterior.window_masks(isi_ms)
-        return two_step_gain(mass, masks, self.shortlist, self.groups, self.stride)
-
-
-def two_step_gain(mass: Tensor, masks: Tensor, shortlist: int, groups: int, stride: int) -> Tensor:
-    """Expected reduction of the summed variance of membership by two trials, shape (b, t).
-
-    Candidates that are not on the shortlist have their own gain alone, which is less.
-    """
-    gain = expected_variance_reduction(mass, masks)
-    second, total = mass[:, :, ::stride], gain.clone()
-    for candidate in gain.topk(min(shortlist, gain.shape[-1]), dim=-1).indices.unbind(-1):
-        index = candidate[:, None, None, None].expand(-1, mass.shape[1], 1, mass.shape[-1])
-        by_group = _grouped(mass.gather(2, index).squeeze(2), groups)
-        behind = torch.stack([_best_gain(second, masks, weights) for weights in by_group.unbind(-1)], dim=-1)
-        column = candidate.unsqueeze(-1)
-        total.scatter_add_(1, column, (by_group.mean(dim=1) * behind).sum(-1, keepdim=True))
-    return total
+        gain = expected_variance_reduction(mass, masks)
+        second, total = mass[:, :, :: self.stride], gain.clone()
+        for candidate in gain.topk(min(self.shortlist, gain.shape[-1]), dim=-1).indices.unbind(-1):
+            index = candidate[:, None, None, None].expand(-1, mass.shape[1], 1, mass.shape[-1])
+            by_group = _grouped(mass.gather(2, index).squeeze(2), self.groups)
+            behind = torch.stack([_best_gain(second, masks, weights) for weights in by_group.unbind(-1)], dim=-1)
+            column = candidate.unsqueeze(-1)
+            total.scatter_add_(1, column, (by_group.mean(dim=1) * behind).sum(-1, keepdim=True))
+        return total
 
 
 def _grouped(mass: Tensor, groups: int) -> Tensor:

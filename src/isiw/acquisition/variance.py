@@ -11,37 +11,6 @@ from isiw.lazy import torch
 from isiw.models.protocol import PredictsOutcomes, SamplesProfiles, SamplesWindows, Tensor
 
 
-def profile_variance(posterior: SamplesProfiles, isi_ms: Tensor) -> Tensor:
-    """Posterior variance of the expected MEP at each ISI [mV²], shape (b, t)."""
-    return posterior.profiles_mv(isi_ms).var(dim=1, correction=0)
-
-
-def integrated_variance_reduction(posterior: ForeseesProfiles, isi_ms: Tensor) -> Tensor:
-    """Expected reduction of the profile's variance, summed over the candidates [mV²], shape (b, t).
-
-    The best ISI is the one of least integrated posterior variance: qNIPV of BoTorch with one point [Seo2000], for any
-    posterior.
-    """
-    return expected_variance_reduction(posterior.outcome_mass(isi_ms), posterior.profiles_mv(isi_ms))
-
-
-def edge_variance_reduction(posterior: ForeseesWindows, isi_ms: Tensor) -> Tensor:
-    """Expected reduction of the summed variance of start and end of the window, given that there is one, shape (b, t).
-
-    Edges are counted in candidates, so that the score does not depend on the range; an edge beyond the range counts as
-    its last ISI.
-    """
-    masks = posterior.window_masks(isi_ms)
-    edges = torch.stack((masks.argmax(-1), masks.shape[-1] - 1 - masks.flip(-1).argmax(-1)), dim=-1).to(masks.dtype)
-    found = masks.any(-1)
-    # Samples without a window have no edges, and are left out.
-    count = found.sum(-1).clamp_min(1)[:, None, None]
-    mean = torch.where(found.unsqueeze(-1), edges, 0.0).sum(dim=1, keepdim=True) / count
-    centred = torch.where(found.unsqueeze(-1), edges - mean, 0.0)
-    mass = posterior.outcome_mass(isi_ms) * found[..., None, None]
-    return expected_variance_reduction(mass, centred)
-
-
 @dataclass(frozen=True)
 class ProfileVariance:
     """Posterior variance of the expected MEP: ask where the profile is least known."""
@@ -49,27 +18,42 @@ class ProfileVariance:
     needs: ClassVar[tuple[type, ...]] = (SamplesProfiles,)
 
     def __call__(self, posterior: SamplesProfiles, isi_ms: Tensor) -> Tensor:
-        """Score the candidate ISIs."""
-        return profile_variance(posterior, isi_ms)
+        """The variance at each ISI [mV²], shape (b, t)."""
+        return posterior.profiles_mv(isi_ms).var(dim=1, correction=0)
 
 
 @dataclass(frozen=True)
 class IntegratedVariance:
-    """Expected reduction of the integrated posterior variance: ask what says most about the whole profile."""
+    """Expected reduction of the integrated posterior variance: ask what says most about the whole profile.
+
+    It is qNIPV of BoTorch with one point [Seo2000], for any posterior.
+    """
 
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesProfiles)
 
     def __call__(self, posterior: ForeseesProfiles, isi_ms: Tensor) -> Tensor:
-        """Score the candidate ISIs."""
-        return integrated_variance_reduction(posterior, isi_ms)
+        """Expected reduction of the profile's variance, summed over the candidates [mV²], shape (b, t)."""
+        return expected_variance_reduction(posterior.outcome_mass(isi_ms), posterior.profiles_mv(isi_ms))
 
 
 @dataclass(frozen=True)
 class EdgeVariance:
-    """Expected reduction of the variance of both edges."""
+    """Expected reduction of the summed variance of start and end of the window, given that there is one.
+
+    Edges are counted in candidates, so that the score does not depend on the range; an edge beyond the range counts as
+    its last ISI.
+    """
 
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesWindows)
 
     def __call__(self, posterior: ForeseesWindows, isi_ms: Tensor) -> Tensor:
-        """Score the candidate ISIs."""
-        return edge_variance_reduction(posterior, isi_ms)
+        """Score the candidate ISIs, shape (b, t)."""
+        masks = posterior.window_masks(isi_ms)
+        edges = torch.stack((masks.argmax(-1), masks.shape[-1] - 1 - masks.flip(-1).argmax(-1)), dim=-1).to(masks.dtype)
+        found = masks.any(-1)
+        # Samples without a window have no edges, and are left out.
+        count = found.sum(-1).clamp_min(1)[:, None, None]
+        mean = torch.where(found.unsqueeze(-1), edges, 0.0).sum(dim=1, keepdim=True) / count
+        centred = torch.where(found.unsqueeze(-1), edges - mean, 0.0)
+        mass = posterior.outcome_mass(isi_ms) * found[..., None, None]
+        return expected_variance_reduction(mass, centred)

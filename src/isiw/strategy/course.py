@@ -12,8 +12,7 @@ from typing import Final, TypedDict
 
 import numpy as np
 
-from isiw.acquisition.batch import own_plan
-from isiw.acquisition.protocol import AcquisitionFunction, FollowsPlan
+from isiw.acquisition.protocol import AcquisitionFunction, FollowsPlan, own_plan
 from isiw.checks import Amplitude, AmplitudeInterval, Checked, Flag, NonNegative, can
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError

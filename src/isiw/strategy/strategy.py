@@ -6,8 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Unpack
 
-from isiw.acquisition.batch import greedy_batch
-from isiw.acquisition.protocol import AcquisitionFunction, require_acquisition
+from isiw.acquisition.protocol import AcquisitionFunction, greedy_batch, require_acquisition
 from isiw.checks import amplitude, deadline, number, whole
 from isiw.design import DesignSpace, require_space
 from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError, warn

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from isiw.acquisition.information import mutual_information
+from isiw.acquisition.information import MutualInformation
 from isiw.design import VALVE_SPACE
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
@@ -374,7 +374,7 @@ def test_mutual_information_agrees_with_brute_force_within_its_error(isi_ms: flo
     own = each.gather(0, torch.arange(samples).repeat_interleave(draws)[None]).squeeze(0)
     information = own - torch.logsumexp(each, dim=0) + math.log(samples)
     error = information.std().item() / math.sqrt(len(information))
-    score = mutual_information(posterior, torch.tensor([isi_ms])).item()
+    score = MutualInformation()(posterior, torch.tensor([isi_ms])).item()
     assert score == pytest.approx(information.mean().item(), abs=3 * error)
 
 
