@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from isiw.devices.robot.mechanism import Geometry, Taps, draw_taps
+from isiw.devices.robot.mechanism import Geometry, SensorNoise, Taps, draw_taps
 from isiw.devices.robot.tapper import preset
 from isiw.devices.robot.waveforms import record_emg, record_robot, sample_times_ms
 from isiw.trials import Channel, Sweep
@@ -39,7 +39,8 @@ def render(name: str, n: int = 100, seed: int = 0, *, harsh: bool = False, **cha
     geometry: Geometry = replace(preset(name), **changes)
     rng = np.random.default_rng(seed)
     if harsh:
-        geometry = replace(geometry, noise=geometry.noise.scaled(2.0))
+        noise = SensorNoise(**{name: 2.0 * value for name, value in vars(geometry.noise).items()})
+        geometry = replace(geometry, noise=noise)
     taps = draw_taps(geometry, n, rng)
     taps = replace(taps, speed_m_s=0.9 * taps.speed_m_s) if harsh else taps
     times = sample_times_ms(RATE_HZ, 1000.0, valve_ms=500.0)

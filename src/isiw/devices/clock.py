@@ -59,10 +59,7 @@ class VirtualClock:
 
 
 class Pacing:
-    """The times of a session's stimuli, and how long its limits have the next one wait.
-
-    The first one waits a whole interval, too: nobody knows what came before.
-    """
+    """The times of a session's stimuli, and the waits before each; the first waits too, as nobody knows what came."""
 
     def __init__(self, limits: Limits, clock: Clock, earlier_s: Sequence[float] = ()) -> None:
         self._limits, self._clock = limits, clock

@@ -108,10 +108,7 @@ class _Worker:
 
 
 class _GivenUp:
-    """The verbs of all devices that were given up and may still be busy: each may yet arm its device, or fire.
-
-    They are kept beyond the session that gave them up, as the next one may drive the same device.
-    """
+    """Verbs of any session that were given up and may still be busy: each may yet arm its device, or fire."""
 
     def __init__(self) -> None:
         self._calls: list[tuple[Device, _Call[Any]]] = []  # few, if any; a device need not be hashable
@@ -267,14 +264,11 @@ class PunctualDevice:
             else "Nothing was armed by this session. Check the device, then start again.",
         )
         if name != "describe":
-            self._stop_after(error)
+            try:
+                self.stop()
+            except StillArmedError as armed:
+                raise armed from error
         raise error
-
-    def _stop_after(self, error: DeviceTimeoutError) -> None:
-        try:
-            self.stop()
-        except StillArmedError as armed:
-            raise armed from error
 
     def _give_up(self) -> None:
         """Leave the thread to the verb it is busy with; when that ends it disarms the device once more, and ends."""
@@ -293,7 +287,10 @@ class PunctualDevice:
     def _failure_to_stop(self) -> str | None:
         """Why an attempt to disarm failed; None if it did not."""
         own = self._idle and self._owner == threading.get_ident()
-        call = self._begun(self._device.stop) if own else _outside(self._device.stop)
+        outside = None if own else _Worker()
+        call = self._begun(self._device.stop) if outside is None else outside.begin(self._device.stop)
+        if outside is not None:
+            outside.end()
         call.wait(self._deadlines.stop_s)
         if not call.ended:
             if own:
@@ -304,11 +301,3 @@ class PunctualDevice:
         except BaseException as error:  # noqa: BLE001 - whatever it is, the device may still be armed
             return error_text(error)
         return None
-
-
-def _outside(verb: Callable[[], _T]) -> _Call[_T]:
-    """A verb in a thread that does nothing else."""
-    worker = _Worker()
-    call = worker.begin(verb)
-    worker.end()
-    return call

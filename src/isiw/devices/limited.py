@@ -83,14 +83,6 @@ class LimitedDevice:
                 expected=f"at least {self._limits.iti_s:g} s between stimuli, and the rests of the limits",
                 remedy="This stimulus was not delivered. Sleep for wait_s() first.",
             )
-        self._check_state()
-        if self._dead_man is not None and self._dead_man() is not True:
-            raise LimitExceededError(
-                "the dead man's switch is not held",
-                remedy="This stimulus was not delivered. Resume the session when the switch is held.",
-            )
-
-    def _check_state(self) -> None:
         state = readiness_of(self._device)
         if not state.ready:
             raise NotDelivered(
@@ -98,6 +90,11 @@ class LimitedDevice:
                 remedy="This stimulus was not delivered. Continue when the device is ready.",
             )
         self._limits.require_state(state)
+        if self._dead_man is not None and self._dead_man() is not True:
+            raise LimitExceededError(
+                "the dead man's switch is not held",
+                remedy="This stimulus was not delivered. Resume the session when the switch is held.",
+            )
 
     def describe(self) -> DeviceInfo:
         """The description of the guarded device."""

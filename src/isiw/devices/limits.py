@@ -14,7 +14,7 @@ from isiw.errors import InvalidValueError, LimitExceededError
 from isiw.visit import interval_s
 
 _GRID_TOLERANCE_MS = 1e-6
-_SAME_PCT_MSO = 0.01
+_SAME_PCT_MSO = 0.01  # what a conversion on the way may lose
 
 USUAL_ITI_S = 5.0
 """Between two stimuli that isiw delivers, if nobody states another interval [s]."""
@@ -27,8 +27,7 @@ class Limits(Checked):
     Args:
         low_ms: shortest ISI on the device's reference [ms].
         high_ms: longest ISI [ms].
-        min_iti_s: shortest time between two deliveries [s]; if it is not stated, 5 s if isiw delivers, and none in a
-            loop of your own, as of `isiw.open_session`.
+        min_iti_s: shortest time between two deliveries [s]; by default 5 s, and none in a loop of your own.
         max_pulses: largest number of deliveries in a session, failed ones included.
         step_ms: ISIs are whole multiples of it above the shortest [ms]; None if any ISI of the range is allowed.
         max_block_pulses: most deliveries in a row without a rest; None if none is needed.
@@ -38,12 +37,8 @@ class Limits(Checked):
         max_coil_c: highest temperature of the coil at which to deliver [°C]; the device must report it.
         intensity_pct_mso: the only intensity at which to deliver [% of the maximum stimulator output]; the device must
             report it. Where None, one that is reported when the device is staged may not change any more.
-        max_consecutive_mistrials: after so many trials in a row that are rejected, or show a faulty rig, a session
-            pauses, so that a person can look.
+        max_consecutive_mistrials: a session pauses after so many rejected trials, or of a faulty rig, in a row.
         isis_ms: the only ISIs that are allowed [ms]; by default all of the range, or of its grid.
-
-    Raises:
-        InvalidValueError: values that are not finite or limit nothing, or a number that is not whole.
     """
 
     low_ms: Number
@@ -80,8 +75,7 @@ class Limits(Checked):
             space: the design space.
             min_iti_s: as for `Limits` [s].
             max_pulses: largest number of deliveries in a session.
-            max_consecutive_mistrials: after so many trials in a row that are rejected, or show a faulty rig, a session
-                pauses.
+            max_consecutive_mistrials: as for `Limits`.
 
         Raises:
             InvalidValueError: no design space, or values that are not finite or limit nothing.
@@ -107,13 +101,9 @@ class Limits(Checked):
         return replace(self, min_iti_s=iti_s) if self.min_iti_s is None else self
 
     def require_effect(self) -> None:
-        """Raise if the interval alone keeps what a rest or a period asks for, so that these limit nothing.
+        """Raise InvalidValueError if the interval alone keeps what a rest or a period asks for, or is probably in ms.
 
         It is for limits that somebody states: those of earlier logs stay readable.
-
-        Raises:
-            InvalidValueError: a rest that is no longer than the interval, or a period that always lets a stimulus pass;
-                or an interval in ms.
         """
         interval_s("Limits.min_iti_s", self.iti_s)
         if self.max_block_pulses is not None and self.rest_s <= self.iti_s:
@@ -133,11 +123,7 @@ class Limits(Checked):
             )
 
     def require_left(self, delivered: int) -> None:
-        """Raise if so many deliveries leave none.
-
-        Raises:
-            LimitExceededError: as many as are allowed.
-        """
+        """Raise LimitExceededError if so many deliveries leave none."""
         if delivered >= self.max_pulses:
             raise LimitExceededError(
                 f"the limit of {self.max_pulses} pulses is reached",
@@ -145,11 +131,7 @@ class Limits(Checked):
             )
 
     def require_isi(self, isi_ms: float) -> None:
-        """Raise if an ISI must not be delivered.
-
-        Raises:
-            LimitExceededError: it is beyond the range, or off the grid.
-        """
+        """Raise LimitExceededError if an ISI is beyond the range, or off the grid."""
         if not self.low_ms <= isi_ms <= self.high_ms:
             raise LimitExceededError(
                 "the ISI is beyond the limits",
@@ -175,12 +157,8 @@ class Limits(Checked):
             )
 
     def require_state(self, state: Readiness) -> None:
-        """Raise if what the device reports does not allow a stimulus.
-
-        Raises:
-            LimitExceededError: the coil is too hot, the intensity is another one, or a limited value is not reported.
-        """
-        coil_c, intensity = state.coil_c, state.intensity_pct_mso
+        """Raise LimitExceededError if the device reports a hot coil or another intensity, or lacks what is limited."""
+        coil_c, intensity, own = state.coil_c, state.intensity_pct_mso, self.intensity_pct_mso
         if self.max_coil_c is not None and not (coil_c is not None and coil_c <= self.max_coil_c):
             way_on = "Let the device's readiness() report coil_c" if coil_c is None else "Let the coil cool"
             raise LimitExceededError(
@@ -189,20 +167,15 @@ class Limits(Checked):
                 expected=f"at most {self.max_coil_c:g} °C",
                 remedy=f"This stimulus was not delivered. {way_on}, then resume the session.",
             )
-        if self.intensity_pct_mso is not None and not self._is_own(intensity):
+        if own is not None and (intensity is None or abs(intensity - own) > _SAME_PCT_MSO):
             reporting = "Let the device's readiness() report intensity_pct_mso"
             raise LimitExceededError(
                 "the intensity is not the session's, or is not known",
                 got="no intensity" if intensity is None else f"{intensity:g} % MSO",
-                expected=f"{self.intensity_pct_mso:g} % MSO",
+                expected=f"{own:g} % MSO",
                 remedy="This stimulus was not delivered. "
                 f"{reporting if intensity is None else 'Set the intensity back'}, then resume the session.",
             )
-
-    def _is_own(self, intensity_pct_mso: float | None) -> bool:
-        """True if an intensity is the one to deliver at, up to what a conversion on the way may lose."""
-        own = self.intensity_pct_mso
-        return own is not None and intensity_pct_mso is not None and abs(intensity_pct_mso - own) <= _SAME_PCT_MSO
 
     def earliest_s(self, times_s: Sequence[float], since_s: float) -> float:
         """When the next stimulus may come at the earliest [s].

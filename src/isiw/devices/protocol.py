@@ -37,8 +37,7 @@ class DeviceInfo(Checked):
         detection_limit_mv: amplitudes below it are reported as 0 [mV]; None if there is no such limit.
         hit_delay_ms: from the valve command to the impact, mean and SD over people [ms]; `isiw timing LOG` measures it.
             None if it is not known, or if ISIs count from the impact.
-        conditioning: what it delivers first: a tap on the tendon, or an electrical pulse to the nerve, from which ISIs
-            count as from an impact.
+        conditioning: what it delivers first: a tap on the tendon, or an electrical pulse to the nerve, as an impact.
         address: what it is connected to, such as "COM3"; no two sessions of a computer drive a device of one address.
         tap_alone: whether it can deliver a tap without the magnetic pulse, which `Stimulus.tap_alone` asks for.
 
@@ -155,10 +154,6 @@ def require_staged(name: str, *, staged: bool) -> None:
         raise NotDelivered(f"{name} is not staged, so it delivers nothing", remedy="Call stage() first.")
 
 
-def _nothing() -> None:
-    """Arm or disarm hardware that needs neither."""
-
-
 class CallbackDevice:
     """Calls your functions.
 
@@ -174,8 +169,8 @@ class CallbackDevice:
         self,
         fire: Callable[[Stimulus, float], Answer],
         info: DeviceInfo,
-        arm: Callable[[], None] = _nothing,
-        disarm: Callable[[], None] = _nothing,
+        arm: Callable[[], None] = lambda: None,
+        disarm: Callable[[], None] = lambda: None,
     ) -> None:
         self._fire, self._info, self._arm, self._disarm = fire, info, arm, disarm
         self._staged = False

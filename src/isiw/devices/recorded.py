@@ -1,9 +1,7 @@
-"""Simulated people in recorded EMG: semi-synthetic sweeps, for tests of the whole chain.
+"""Simulated people in recorded EMG [UEF2023]: semi-synthetic sweeps, for tests of the whole chain.
 
-A simulated person answers the stimulus with an amplitude. The sweep is a recorded one without an MEP, plus a recorded
-MEP that is scaled so that the sum has the person's amplitude from 15 to 35 ms. Noise, offset, artefact and waveform are
-therefore real; whether an MEP follows, and how large, is simulated. The recordings [UEF2023] are not part of the
-package.
+The sweep is a recorded one without an MEP, plus a recorded MEP that is scaled so that the sum has the person's
+amplitude from 15 to 35 ms: noise, offset, artefact and waveform are real. The recordings are not part of the package.
 """
 
 from __future__ import annotations
@@ -33,17 +31,11 @@ ONSET_MS = (10.0, 14.0)  # forearm MEPs begin 17.5 ms after the pulse: the templ
 
 @dataclass(frozen=True, eq=False)
 class Recordings:
-    """Recorded sweeps without an MEP, and recorded MEPs.
-
-    Args:
-        time_ms: time from the magnetic pulse [ms], shape (w,).
-        quiet_mv: sweeps without an MEP, as recorded [mV], shape (n, w).
-        mep_mv: MEPs alone, offset taken out and faded in before their onset [mV], shape (m, w).
-    """
+    """Recorded sweeps without an MEP, (n, w), recorded MEPs alone, (m, w), and times from the magnetic pulse, (w,)."""
 
     time_ms: FloatArray
     quiet_mv: FloatArray
-    mep_mv: FloatArray
+    mep_mv: FloatArray  # offset taken out, and faded in before the onset
 
     def __post_init__(self) -> None:
         if not len(self.quiet_mv) or not len(self.mep_mv):
@@ -63,11 +55,7 @@ class Recordings:
         return (self.time_ms >= MEP_WINDOW_MS[0]) & (self.time_ms <= MEP_WINDOW_MS[1])
 
     def sweep_mv(self, mep_mv: float, rng: np.random.Generator) -> FloatArray:
-        """A recorded sweep plus a recorded MEP, together of this amplitude [mV], shape (w,).
-
-        The recorded floor is part of the amplitude and is not counted twice: the MEP is scaled until the *sum* has it.
-        An amplitude below the floor is the quiet sweep alone.
-        """
+        """A recorded sweep with an MEP with which the *sum* has this amplitude [mV], (w,); none if the floor has it."""
         quiet = self.quiet_mv[rng.integers(len(self.quiet_mv))]
         template = self.mep_mv[rng.integers(len(self.mep_mv))]
         floor, unit = quiet[self.in_mep_window], template[self.in_mep_window]
@@ -88,7 +76,13 @@ def load_recordings(folder: str | os.PathLike[str]) -> Recordings:
     time_ms = frames[0].columns.to_numpy()
     if any(list(frame.columns) != list(frames[0].columns) for frame in frames):
         raise DeviceError("the recorded files do not share their times", got=[file.name for file in files])
-    return _sorted_recordings(time_ms, np.concatenate([frame.to_numpy() for frame in frames]) / 1e3)
+    sweeps_mv = np.concatenate([frame.to_numpy() for frame in frames]) / 1e3
+    in_window = (time_ms >= MEP_WINDOW_MS[0]) & (time_ms <= MEP_WINDOW_MS[1])
+    amplitude = np.ptp(sweeps_mv[:, in_window], axis=1)
+    offset = sweeps_mv[:, time_ms < BACKGROUND_UNTIL_MS].mean(axis=1, keepdims=True)
+    fade_in = np.clip((time_ms - ONSET_MS[0]) / (ONSET_MS[1] - ONSET_MS[0]), 0.0, 1.0)
+    clear = amplitude > CLEAR_MV
+    return Recordings(time_ms, sweeps_mv[amplitude < QUIET_MV], (sweeps_mv[clear] - offset[clear]) * fade_in)
 
 
 def _read_sweeps(file: Path) -> pd.DataFrame:
@@ -97,15 +91,6 @@ def _read_sweeps(file: Path) -> pd.DataFrame:
         return frame.set_axis(frame.columns.astype(np.float64), axis=1)
     except (OSError, EOFError, ValueError, zlib.error) as error:
         raise DeviceError(f"a recorded file cannot be read: {error}", got=str(file), remedy="Copy it again.") from error
-
-
-def _sorted_recordings(time_ms: FloatArray, sweeps_mv: FloatArray) -> Recordings:
-    in_window = (time_ms >= MEP_WINDOW_MS[0]) & (time_ms <= MEP_WINDOW_MS[1])
-    amplitude = np.ptp(sweeps_mv[:, in_window], axis=1)
-    offset = sweeps_mv[:, time_ms < BACKGROUND_UNTIL_MS].mean(axis=1, keepdims=True)
-    fade_in = np.clip((time_ms - ONSET_MS[0]) / (ONSET_MS[1] - ONSET_MS[0]), 0.0, 1.0)
-    clear = amplitude > CLEAR_MV
-    return Recordings(time_ms, sweeps_mv[amplitude < QUIET_MV], (sweeps_mv[clear] - offset[clear]) * fade_in)
 
 
 class RecordedPerson:

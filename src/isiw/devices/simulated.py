@@ -172,11 +172,7 @@ class RecordedTrials:
         self._left: list[Trial] = [trial for trial in table.told if trial.isi_sd_ms <= MOST_ISI_SD_MS]
 
     def answer(self, stimulus: Stimulus) -> Measurement:
-        """The recorded answer nearest to the next pair of stimuli.
-
-        Raises:
-            DeviceError: no trial is left.
-        """
+        """The recorded answer nearest to the next pair of stimuli; a DeviceError if no trial is left."""
         asked_ms = stimulus.isi_ms
         fitting = [trial for trial in self._left if (trial.isi_ms is None) == (asked_ms is None)]
         if not fitting:

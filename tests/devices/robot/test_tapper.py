@@ -3,6 +3,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from isiw.design import DesignSpace
 from isiw.devices.protocol import Device, HasMemory
 from isiw.devices.robot.mechanism import Faults, Geometry
-from isiw.devices.robot.tapper import Evoked, HitDelay, Tapper, TapperSettings, Trigger, preset
+from isiw.devices.robot.tapper import Evoked, Tapper, TapperSettings, Trigger, preset
 from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.findings import Kind
@@ -139,17 +140,19 @@ def test_the_command_is_corrected_by_the_measured_hits() -> None:
     robot = Tapper(Listener(), "subject2", TapperSettings(expected_hit_ms=190.0))
     for trial in range(30):
         robot.answer(Stimulus(trial, 60.0))
-    assert robot.hit_delay.mean_ms == pytest.approx(172.0, abs=1.0)
+    assert robot.hit_delay_ms == pytest.approx(172.0, abs=1.0)
     later = [robot.answer(Stimulus(trial, 60.0)) for trial in range(30, 90)]
     error = [known(judge(sweep, Stimulus(0, 60.0), IMPACT).isi_ms) - 60.0 for sweep in later]
     assert np.mean(error) == pytest.approx(0.0, abs=0.8)
 
 
 def test_a_few_late_valves_do_not_move_the_expected_hit_delay() -> None:
-    delay = HitDelay(180.0)
-    for hit in (175.0, 176.0, 195.0, 174.0, 176.0, 193.0, 175.0):
-        delay.measured(hit)
-    assert delay.mean_ms == 176.0
+    usual, late = preset("subject2"), Faults(late_probability=0.15, late_ms=(15.0, 20.0))
+    robots = [Tapper(Listener(), geometry) for geometry in (usual, replace(usual, faults=late))]
+    for robot, trial in product(robots, range(15)):
+        robot.answer(Stimulus(trial, 60.0))
+    assert robots[1].hit_delay_ms != robots[0].hit_delay_ms  # some came late
+    assert robots[1].hit_delay_ms == pytest.approx(robots[0].hit_delay_ms, abs=1.0)
 
 
 def test_an_isi_shorter_than_the_detection_is_refused_before_anything_happens() -> None:

@@ -44,10 +44,6 @@ class SensorNoise:
     force_n: float = 0.1
     emg_uv: float = 1.0
 
-    def scaled(self, factor: float) -> SensorNoise:
-        """The same sensors with all their noise multiplied."""
-        return SensorNoise(**{name: factor * value for name, value in vars(self).items()})
-
 
 @dataclass(frozen=True)
 class EventTime(Checked):
@@ -59,17 +55,11 @@ class EventTime(Checked):
 
 @dataclass(frozen=True)
 class Faults(Checked):
-    """Occasional faults.
-
-    Args:
-        stuck_probability: share of taps in which the hammer does not move.
-        late_probability: share of taps whose valve opens late.
-        late_ms: by how much those are late, uniform between the two [ms].
-    """
+    """Shares of taps in which the hammer does not move, or the valve opens late."""
 
     stuck_probability: Share = 0.0
     late_probability: Share = 0.0
-    late_ms: tuple[float, float] = (0.0, 0.0)
+    late_ms: tuple[float, float] = (0.0, 0.0)  # uniform between the two
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -79,25 +69,14 @@ class Faults(Checked):
 
 @dataclass(frozen=True)
 class Geometry(Checked):
-    """One person's wrist under the robot, by its mean event times and how they vary from tap to tap.
+    """One person's wrist under the robot, by its mean event times and how they vary from tap to tap."""
 
-    Args:
-        descent: start of the descent [after the valve command]; it varies by the static friction.
-        hit: impact [after the valve command]; it varies by friction and travel together.
-        contact: for how long the tendon decelerates the hammer.
-        memg: artefact of the impact in the EMG [after the impact].
-        artefact_mv: amplitude of that artefact [mV]; 0 if there is no EMG.
-        load_cell: whether the hammer taps a load cell.
-        faults: occasional faults.
-        noise: of the sensors.
-    """
-
-    descent: EventTime
-    hit: EventTime
-    contact: EventTime
-    memg: EventTime = EventTime(20.0, 0.5)
+    descent: EventTime  # its start after the valve command, which varies by the static friction
+    hit: EventTime  # the impact after the valve command, which varies by friction and travel together
+    contact: EventTime  # for how long the tendon decelerates the hammer
+    memg: EventTime = EventTime(20.0, 0.5)  # artefact of the impact in the EMG, after the impact
     artefact_mv: NonNegative = 0.1
-    load_cell: bool = False
+    load_cell: bool = False  # tapped instead of a person
     faults: Faults = field(default_factory=Faults)
     noise: SensorNoise = field(default_factory=SensorNoise)
 
@@ -147,9 +126,13 @@ class Geometry(Checked):
     def stiffness_rad_ms(self) -> float:
         """Natural frequency of the hammer on the tendon [rad/ms], from the contact's length."""
         drive_m_s2 = float(drive(self.hit.mean_ms, self.kinetic_share))
+        phase = np.linspace(0, SEPARATION_RAD, 2001)
 
         def too_short(rad_ms: float) -> float:
-            return float(_decelerated_ms(self.hit_speed_m_s, drive_m_s2, rad_ms)) - self.contact.mean_ms
+            peak_m_s2 = 1000 * self.hit_speed_m_s * rad_ms
+            exceeds = np.flatnonzero(-rebound(phase) * peak_m_s2 > drive_m_s2)
+            decelerated_ms = float(phase[exceeds[-1]] / rad_ms) if exceeds.size else 0.0
+            return decelerated_ms - self.contact.mean_ms
 
         softest = 3 * drive_m_s2 / (1000 * self.hit_speed_m_s)  # below it the drive all but wins against the spring
         if too_short(softest) < 0:
@@ -159,24 +142,14 @@ class Geometry(Checked):
 
 @dataclass(frozen=True, eq=False)
 class Taps:
-    """The course of n taps: the generator's truth, which detectors do not see. Times [ms after the valve command].
-
-    Args:
-        descent_ms: start of the descent; NaN if there is none, shape (n,).
-        hit_ms: contact with the tendon; NaN if there is none, shape (n,).
-        rad_ms: natural frequency of each contact [rad/ms], shape (n,).
-        speed_m_s: speed at contact [m/s], shape (n,).
-        memg_ms: artefact in the EMG; NaN if there is no contact, shape (n,).
-        late_ms: by how much the valve opened late, included in the others, shape (n,).
-        geometry: of all of them.
-    """
+    """The course of n taps, which detectors do not see: times after the valve command, NaN if nothing came, (n,)."""
 
     descent_ms: FloatArray
     hit_ms: FloatArray
-    rad_ms: FloatArray
-    speed_m_s: FloatArray
-    memg_ms: FloatArray
-    late_ms: FloatArray
+    rad_ms: FloatArray  # natural frequency of each contact [rad/ms]
+    speed_m_s: FloatArray  # at contact
+    memg_ms: FloatArray  # artefact in the EMG
+    late_ms: FloatArray  # by how much the valve opened late, included in the others
     geometry: Geometry
 
     def none(self) -> Taps:
@@ -271,11 +244,3 @@ def restitution() -> float:
     """Speed of the hammer as it leaves the tendon, as a share of that with which it came."""
     turn = _ROOT * SEPARATION_RAD
     return -math.exp(-DAMPING * SEPARATION_RAD) * (math.cos(turn) - DAMPING / _ROOT * math.sin(turn))
-
-
-def _decelerated_ms(speed_m_s: float, drive_m_s2: float, rad_ms: float) -> float:
-    """The time for which the tendon's force exceeds the drive [ms]."""
-    peak_m_s2 = 1000 * speed_m_s * rad_ms
-    phase = np.linspace(0, SEPARATION_RAD, 2001)
-    exceeds = np.flatnonzero(-rebound(phase) * peak_m_s2 > drive_m_s2)
-    return float(phase[exceeds[-1]] / rad_ms) if exceeds.size else 0.0

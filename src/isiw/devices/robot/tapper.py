@@ -24,6 +24,7 @@ from isiw.types import FloatArray, Reference
 Trigger: TypeAlias = Literal["open-loop", "impact"]
 
 MOST_RATE_HZ = 100_000.0
+LAST_HITS = 21
 SWEEP_MS = 1000.0
 AFTER_PULSE_MS = 60.0
 ALONE_MS = 200.0  # TMS alone comes as late after the valve command, which then moves nothing, as a usual pulse
@@ -83,8 +84,7 @@ class TapperSettings(Checked):
         expected_hit_ms: what is known of a person's hit delay before the first tap [ms].
         expected_hit_sd_ms: its SD from person to person [ms].
         expected_tap_sd_ms: its SD from tap to tap [ms].
-        pulse_jitter_ms: SD by which the software that triggers the pulse misses its time [ms]; the pulse's time is
-            recorded all the same.
+        pulse_jitter_ms: SD by which the triggering software misses the pulse's time, which is recorded anyway [ms].
 
     Raises:
         InvalidValueError: an unknown reference or trigger, a value that is not positive, a negative jitter, or without
@@ -112,25 +112,6 @@ class TapperSettings(Checked):
             )
 
 
-class HitDelay:
-    """The running estimate of the delay from the valve command to the impact."""
-
-    LAST = 21
-
-    def __init__(self, expected_ms: float) -> None:
-        self._expected_ms = expected_ms
-        self._hits_ms: deque[float] = deque(maxlen=self.LAST)
-
-    def measured(self, delay_ms: float) -> None:
-        """Learn from a measured hit [ms after the valve command]."""
-        self._hits_ms.append(delay_ms)
-
-    @property
-    def mean_ms(self) -> float:
-        """The hit delay to expect [ms]: the median of the last hits, which a few late valves do not move."""
-        return float(np.median(self._hits_ms)) if self._hits_ms else self._expected_ms
-
-
 class Tapper:
     """A simulation of the tapping robot, its stimulator, and a person who answers.
 
@@ -151,7 +132,7 @@ class Tapper:
     ) -> None:
         self.geometry = preset(geometry) if isinstance(geometry, str) else geometry
         self.settings = settings or TapperSettings()
-        self.hit_delay = HitDelay(self.settings.expected_hit_ms)
+        self._hits_ms: deque[float] = deque(maxlen=LAST_HITS)
         self._respond, self._seed = respond, seed
 
     @property
@@ -170,15 +151,16 @@ class Tapper:
         )
 
     @property
+    def hit_delay_ms(self) -> float:
+        """The next hit delay to expect [ms]: the median of the last ones, which a few late valves do not move."""
+        return float(np.median(self._hits_ms)) if self._hits_ms else self.settings.expected_hit_ms
+
+    @property
     def _has(self) -> dict[str, bool]:
         return {"acceleration": self.settings.accelerometer, "force": self.geometry.load_cell}
 
     def answer(self, stimulus: Stimulus) -> Sweep:
-        """Tap, pulse, and record.
-
-        Raises:
-            DeviceError: an ISI too short to be triggered by the impact.
-        """
+        """Tap, pulse, and record; a DeviceError if the ISI is too short to be triggered by the impact."""
         if stimulus.isi_ms is not None:
             self.require_possible(stimulus.isi_ms)
         rng = np.random.default_rng([self._seed, stimulus.trial])
@@ -189,7 +171,7 @@ class Tapper:
 
     def _after_impact_ms(self, isi_ms: float) -> float:
         """The commanded ISI, counted from the impact as predicted [ms]."""
-        return isi_ms if self.settings.reference == "impact" else isi_ms - self.hit_delay.mean_ms
+        return isi_ms if self.settings.reference == "impact" else isi_ms - self.hit_delay_ms
 
     def require_possible(self, isi_ms: float) -> None:
         """Raise DeviceError if an ISI is too short to be triggered by the impact."""
@@ -210,8 +192,10 @@ class Tapper:
 
     def _tap(self, taps: Taps, isi_ms: float | None, rng: np.random.Generator) -> Sweep:
         """A tap, and unless it comes alone, a pulse."""
-        after_impact_ms = None if isi_ms is None else self._after_impact_ms(isi_ms) + self._jitter_ms(rng)
-        predicted_ms = self.hit_delay.mean_ms
+        sd_ms = self.settings.pulse_jitter_ms if isi_ms is not None else 0.0
+        jitter_ms = float(sd_ms * rng.standard_normal()) if sd_ms else 0.0  # without jitter nothing is drawn
+        after_impact_ms = None if isi_ms is None else self._after_impact_ms(isi_ms) + jitter_ms
+        predicted_ms = self.hit_delay_ms
         times = self._times_ms(ALONE_MS if after_impact_ms is None else predicted_ms + after_impact_ms)
         channels = self._channels(times, taps, rng)
         measured_ms = self._measured_hit_ms(channels)
@@ -219,7 +203,7 @@ class Tapper:
         pulse_ms = None if start_ms is None or after_impact_ms is None else start_ms + after_impact_ms
         channels["emg"] = self._emg(times, taps, pulse_ms, rng)
         if measured_ms is not None:
-            self.hit_delay.measured(measured_ms)
+            self._hits_ms.append(measured_ms)
         blind = not self.settings.accelerometer
         return Sweep(
             channels,
@@ -228,11 +212,6 @@ class Tapper:
             t_hit_ms=VALVE_MS + predicted_ms if blind else None,
             isi_sd_ms=self.settings.expected_tap_sd_ms if blind and isi_ms is not None else 0.0,
         )
-
-    def _jitter_ms(self, rng: np.random.Generator) -> float:
-        """By how much this pulse misses its time [ms]; without jitter nothing is drawn, so noise stays as it is."""
-        sd_ms = self.settings.pulse_jitter_ms
-        return float(sd_ms * rng.standard_normal()) if sd_ms else 0.0
 
     def _times_ms(self, pulse_ms: float) -> FloatArray:
         """A sweep of 1 s, or longer if the pulse comes late [ms after the valve command]."""

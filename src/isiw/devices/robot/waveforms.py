@@ -84,11 +84,7 @@ def record_emg(
 
 
 def scale_of_mep(resting_mv: FloatArray, mep_mv: FloatArray, amplitude_mv: float) -> float:
-    """The factor on an MEP with which its sum with EMG at rest has a given amplitude.
-
-    A person's amplitudes include the EMG floor, which would otherwise count twice. Where the EMG at rest alone has the
-    amplitude, there is no MEP.
-    """
+    """The factor on an MEP with which its sum with EMG at rest has an amplitude; 0 if the EMG at rest alone has it."""
 
     def missing_mv(scale: float) -> float:
         return amplitude_mv - float(np.ptp(resting_mv + scale * mep_mv))

@@ -1,9 +1,7 @@
 """Requests to the software that drives the hardware, and its answers, whatever carries them.
 
-Each request has a number and the token of the device object, and its answer has both, so that no answer to another
-request or of an earlier run is ever taken. The newest request replaces all before it. Nothing counts as armed,
-delivered or disarmed because nobody objected: each needs an answer that says so. A delivery or an arming that is not
-answered as it should be is followed by a request to disarm at once.
+Request and answer have a number and the token of the device object, so that no answer to anything else is taken; the
+newest request replaces all before it. Nothing counts as armed, delivered or disarmed without an answer that says so.
 """
 
 from __future__ import annotations
@@ -23,7 +21,7 @@ from isiw.devices.protocol import DeviceInfo, require_staged
 from isiw.errors import DeviceError, InvalidValueError, NotDelivered
 from isiw.text import plain
 from isiw.text.sanitize import read_number
-from isiw.trials import Stimulus
+from isiw.trials import Channel, Stimulus, Sweep
 
 _T = TypeVar("_T")
 
@@ -294,6 +292,12 @@ def _require_answer_to(stimulus: Stimulus, reply: Reply) -> None:
             expected=f"{stimulus.isi_ms:g} ms",
             remedy="set_isi_ms is what was read back from the hardware. Does the software read isi_ms as ms?",
         )
+
+
+def sweep_of(channels: Mapping[str, Channel], t_tms_ms: float, reply: Reply) -> Sweep:
+    """The sweep of an answer that says when the first stimulus came, as far as is known."""
+    t_valve_ms, t_hit_ms = reply.optional_number("t_valve_ms"), reply.optional_number("t_hit_ms")
+    return Sweep(channels, t_valve_ms, t_tms_ms, t_hit_ms, reply.optional_number("isi_sd_ms") or 0.0)
 
 
 def described(info: DeviceInfo | Mapping[str, Any], **known: Any) -> DeviceInfo:

@@ -1,8 +1,7 @@
 """A device behind software that can only read and write files: a shared folder with requests and answers.
 
-There is one file of requests, which is replaced in one step, so that the newest request is the only one: a delivery
-that nobody has read is gone as soon as it is stopped. Each request names the file that its answer goes into, which no
-other answer ever has. Both are lines of `key=value` and then a line `end`, which any script can write and read.
+The newest request replaces the one before in one step, so that a delivery that nobody has read is gone once it is
+stopped; it names the file of its answer. Both are lines of `key=value` and then a line `end`.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ import numpy as np
 
 from isiw.checks import number
 from isiw.devices.protocol import Answer, DeviceInfo
-from isiw.devices.transports.exchange import LONGEST_REPLY, Exchange, Reply, Request, Verb, described
+from isiw.devices.transports.exchange import LONGEST_REPLY, Exchange, Reply, Request, Verb, described, sweep_of
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError
 from isiw.files import opened, written_beside
 from isiw.trials import Channel, Measurement, Stimulus, Sweep
@@ -109,13 +108,7 @@ class FolderDevice:
             name: Channel(values[:, column], self._rate_hz, unit, t0_ms)
             for column, (name, unit) in enumerate(self._info.channels.items())
         }
-        return Sweep(
-            channels,
-            t_tms_ms=reply.number("t_tms_ms"),
-            t_valve_ms=reply.optional_number("t_valve_ms"),
-            t_hit_ms=reply.optional_number("t_hit_ms"),
-            isi_sd_ms=reply.optional_number("isi_sd_ms") or 0.0,
-        )
+        return sweep_of(channels, reply.number("t_tms_ms"), reply)
 
 
 def _measurement(stimulus: Stimulus, reply: Reply) -> Measurement:
@@ -163,8 +156,6 @@ def _remove(path: Path) -> None:
 
 
 class _Folder:
-    """Carries requests and answers as files."""
-
     def __init__(self, place: Path, poll_s: float, *, waveforms: bool) -> None:
         self._place, self._poll_s, self._waveforms = place, poll_s, waveforms
 

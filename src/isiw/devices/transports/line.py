@@ -1,7 +1,6 @@
 """An instrument that is commanded by lines of text, over a serial port or TCP; a table has the words.
 
-A trial is: set the ISI, read it back, arm, fire, ask what came of it. What fails before the command to fire is sent
-gave nothing; what fails after it may have fired. That command is sent once.
+What fails before the command to fire is sent gave nothing; what fails after it may have fired. It is sent once.
 """
 
 from __future__ import annotations
@@ -62,20 +61,16 @@ class LineDevice:
         self._settings = from_table(LineSettings, line or {}, "line")
         self._info = described(info, address=address, tap_alone=self._commands.tap_alone is not None)
         self._measure = measure
-        self._require_measured()
-        self._line: Line | None = None
-        self._busy, self._stopping = threading.Lock(), threading.Lock()
-        self._since_stop = object()  # another one after each stop: what began before it sends nothing any more
-        self._staged = self._may_be_armed = False
-
-    def _require_measured(self) -> None:
         measuring = self._commands.measuring
-        measured = all(measuring) if self._measure is None else not any(measuring)
-        if not measured:
+        if not (all(measuring) if measure is None else not any(measuring)):
             raise InvalidValueError(
                 "each MEP must be measured by the instrument or by `measure`, and by one of them only",
                 expected=r"(?P<mep_mv>[\d.]+) in the answers to fire and alone, or to result; or a function `measure`",
             )
+        self._line: Line | None = None
+        self._busy, self._stopping = threading.Lock(), threading.Lock()
+        self._since_stop = object()  # another one after each stop: what began before it sends nothing any more
+        self._staged = self._may_be_armed = False
 
     def describe(self) -> DeviceInfo:
         """The instrument's description."""
@@ -103,7 +98,9 @@ class LineDevice:
         """Set the ISI, read it back, arm, fire once, and report what came of it."""
         era, end_s = self._since_stop, time.monotonic() + timeout_s - min(_SPARE_S, 0.1 * timeout_s)
         require_staged(self._info.name, staged=self._staged)
-        command = self._firing(stimulus)
+        control = self._commands.tap_alone if stimulus.tap_alone else self._commands.alone
+        if (command := self._commands.fire if stimulus.isi_ms is not None else control) is None:
+            raise NotDelivered(f"{self._info.name} has no command for a tap alone")
         with _nothing_given():
             self._connect(era, end_s)
             self._prepare(era, stimulus, end_s)
@@ -131,15 +128,6 @@ class LineDevice:
         finally:
             self._close()
 
-    def _firing(self, stimulus: Stimulus) -> LineExchange:
-        if stimulus.isi_ms is not None:
-            return self._commands.fire
-        if not stimulus.tap_alone:
-            return self._commands.alone
-        if self._commands.tap_alone is None:
-            raise NotDelivered(f"{self._info.name} has no command for a tap alone")
-        return self._commands.tap_alone
-
     def _prepare(self, era: object, stimulus: Stimulus, end_s: float) -> None:
         """Everything of a trial but its firing."""
         if stimulus.isi_ms is not None:
@@ -156,7 +144,6 @@ class LineDevice:
             raise NotDelivered("no time is left to fire", remedy="Give the session a longer timeout_s.")
 
     def _outcome(self, era: object, stimulus: Stimulus, said: Mapping[str, str], end_s: float) -> Answer:
-        """The outcome of a stimulus that was given."""
         if self._commands.result is not None:
             said = {**said, **self._ask(era, self._commands.result, stimulus, end_s=end_s)}
         isi_ms, mep_mv = isi_ms_of(said), mep_mv_of(said)

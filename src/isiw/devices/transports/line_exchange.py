@@ -141,7 +141,6 @@ class Line:
             raise DeviceError("the instrument refuses", got=(said.get("reason") or line)[:_LONGEST_TOLD])
 
     def _lines_until(self, deadline_s: float, given_up: Callable[[], bool]) -> Iterator[str]:
-        """The lines that come until a moment."""
         while time.monotonic() < deadline_s:
             while (line := self._incoming.next()) is not None:
                 yield line

@@ -240,7 +240,6 @@ class LineCommands:
         self._require_refusal()
 
     def _given(self) -> Iterator[tuple[str, Any]]:
-        """The commands by name, as far as there are any."""
         values = ((field.name, getattr(self, field.name)) for field in fields(self) if field.name != "refusal")
         return ((name, value) for name, value in values if value is not None)
 

@@ -1,7 +1,6 @@
 """A device on the Lab Streaming Layer: markers out, echoes in, and the sweep cut out of the streams by timestamps.
 
-A marker asks and an echo answers, both as JSON. The hardware times the ISI: a marker reaches the software that drives
-it within a millisecond usually and within tens of milliseconds at times, which is far too much for an ISI.
+The hardware times the ISI: a marker may take tens of milliseconds, which is far too much for it.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from typing import Any, Final
 
 from isiw.checks import from_table, number, text
 from isiw.devices.protocol import DeviceInfo
-from isiw.devices.transports.exchange import LONGEST_REPLY, Exchange, Reply, Request, Verb, described
+from isiw.devices.transports.exchange import LONGEST_REPLY, Exchange, Reply, Request, Verb, described, sweep_of
 from isiw.devices.transports.lsl_samples import LATE_S, LslChannel, SampleStream
 from isiw.errors import ConfigError, DeviceError, DeviceTimeoutError, InvalidValueError, NotDelivered
 from isiw.text.toml_files import read_json
@@ -148,8 +147,7 @@ class LslDevice:
         echo: the name of the stream of echoes, which the other software sends.
         before_ms: how much of a sweep comes before the pulse [ms].
         after_ms: how much of it comes after the pulse [ms].
-        max_jitter_ms: how far a sample's timestamp may be from where the rate puts it [ms]; a longer gap is a fault, a
-            shorter one is not seen.
+        max_jitter_ms: how far a timestamp may be from where the rate puts it [ms]; a longer gap is a fault.
         stage_timeout_s: how long connecting and arming may take [s].
         stop_timeout_s: how long each attempt to disarm may take [s]; below the session's 5 s.
 
@@ -231,13 +229,7 @@ class LslDevice:
             begin_s, values = cuts[channel.stream]
             t0_ms = 1e3 * (begin_s - fired_s)
             channels[name] = Channel(values[:, channel.column], channel.rate_hz, channel.unit, t0_ms)
-        return Sweep(
-            channels,
-            t_tms_ms=0.0,
-            t_valve_ms=reply.optional_number("t_valve_ms"),
-            t_hit_ms=reply.optional_number("t_hit_ms"),
-            isi_sd_ms=reply.optional_number("isi_sd_ms") or 0.0,
-        )
+        return sweep_of(channels, 0.0, reply)
 
     def _fired_s(self, asked_s: float, end_s: float, reply: Reply) -> float:
         """When the pulse was, by the local LSL clock [s]: after it was asked for, and before now."""
@@ -316,7 +308,6 @@ def _require_once(there: Iterable[Any]) -> None:
 
 
 def _rates_hz(channels: Mapping[str, LslChannel]) -> dict[str, float]:
-    """The rate of each stream [Hz]."""
     if "emg" not in channels:
         raise InvalidValueError("a sweep needs its EMG", got=", ".join(channels), expected="a channel named emg")
     rates_hz: dict[str, float] = {}

@@ -1,8 +1,7 @@
 """A stream of samples of the Lab Streaming Layer: what is kept of it, and the sweep that is cut out by timestamps.
 
-The timestamps are taken as the sender gave them, plus the clock correction that liblsl measures. liblsl could smooth
-them (`proc_dejitter`), but that takes 30 to 120 s to settle and smooths away the step that shows dropped samples; and
-once any of its processing is switched on, the sender's own timestamps are gone.
+The timestamps are the sender's, plus liblsl's clock correction. liblsl's own smoothing (`proc_dejitter`) would take 30
+to 120 s to settle, hide the step that shows dropped samples, and remove the sender's timestamps.
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Any, Final
 
 import numpy as np
 
@@ -44,22 +43,12 @@ class LslChannel(Checked):
     column: Natural = 0
 
 
-class Inlet(Protocol):
-    """The used part of a `pylsl.StreamInlet` of numbers."""
-
-    def pull_chunk(self, timeout: float, max_samples: int, *, as_numpy: bool) -> tuple[FloatArray, FloatArray]:
-        """Samples, shape (w, channels), and their timestamps [s], shape (w,)."""
-
-    def time_correction(self, timeout: float) -> float:
-        """The correction of the sender's timestamps to the local clock [s]."""
-
-
 class SampleStream:
     """The newest samples of a stream."""
 
     def __init__(
         self,
-        inlet: Inlet,
+        inlet: Any,  # a pylsl.StreamInlet of numbers
         name: str,
         rate_hz: float,
         max_jitter_ms: float,

@@ -4,14 +4,18 @@ import numpy as np
 import pytest
 
 from isiw.devices.robot.vane.actuator import Vane
-from isiw.devices.robot.vane.tapper import UNITS, Variation, draw_strokes, record_strokes
-from isiw.errors import InvalidValueError
+from isiw.devices.robot.vane.tapper import UNITS, draw_strokes, record_strokes
+
+MODULE = "isiw.devices.robot.vane.tapper"
 
 
-def test_without_variation_all_strokes_are_one_and_without_noise_they_are_recorded_as_they_are() -> None:
-    exact = Variation(friction_cv=0, reservoir_cv=0, angle_sd_deg=0, pressure_sd_kpa=0)
-    strokes = draw_strokes(Vane(), 2, np.random.default_rng(0), exact)
-    waves = record_strokes(strokes, np.random.default_rng(0), exact, rest_ms=100)
+def test_without_variation_all_strokes_are_one_and_without_noise_they_are_recorded_as_they_are(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for name, value in {"FRICTION_CV": 0, "RESERVOIR_CV": 0, "NOISE_SD": dict.fromkeys(UNITS, 0)}.items():
+        monkeypatch.setattr(f"{MODULE}.{name}", value)
+    strokes = draw_strokes(Vane(), 2, np.random.default_rng(0))
+    waves = record_strokes(strokes, np.random.default_rng(0), rest_ms=100)
     assert set(waves) == set(UNITS)
     assert (waves["angle"][0] == waves["angle"][1]).all()
     assert (waves["angle"][:, :100] == 0).all()
@@ -19,15 +23,10 @@ def test_without_variation_all_strokes_are_one_and_without_noise_they_are_record
     assert waves["vane_pressure"].max() == pytest.approx(300, rel=0.05)  # 4 bar on one side, 1 bar on the other
 
 
-def test_more_friction_starts_later() -> None:
-    strokes = draw_strokes(Vane(), 20, np.random.default_rng(1), Variation(friction_cv=0.3, reservoir_cv=0))
+def test_more_friction_starts_later(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(f"{MODULE}.FRICTION_CV", 0.3)
+    monkeypatch.setattr(f"{MODULE}.RESERVOIR_CV", 0)
+    strokes = draw_strokes(Vane(), 20, np.random.default_rng(1))
     friction = 1 + 0.3 * np.random.default_rng(1).standard_normal((2, 20))[0]
     assert (np.argsort(strokes.delay_ms, kind="stable") == np.argsort(friction)).sum() > 10
     assert strokes.delay_ms.std() > 0.5
-
-
-def test_a_negative_variation_is_refused() -> None:
-    with pytest.raises(InvalidValueError, match="friction_cv"):
-        Variation(friction_cv=-0.1)
-    with pytest.raises(InvalidValueError, match="n must be"):
-        draw_strokes(Vane(), 0, np.random.default_rng(0))

@@ -103,8 +103,7 @@ class Supply(Checked):
 
     Args:
         reservoir_bar: absolute pressure of the reservoir [bar].
-        valve_l_s_bar: sonic conductance of the valve, C_0 [l/(s bar)]; by default that of a small five-port valve
-            [CKD2020].
+        valve_l_s_bar: sonic conductance of the valve, C_0 [l/(s bar)]; by default a small five-port valve's [CKD2020].
         fitting_l_s_bar: sonic conductance of the fitting, C_f, with what the line's friction takes away [l/(s bar)].
         critical_ratio: pressure ratio below which either flow is choked, C_r; by default that of the same valve.
         line_m: length of a line [m].

@@ -37,23 +37,14 @@ LONGEST_S = 60.0
 
 @dataclass(frozen=True, eq=False)
 class Rotations:
-    """Rotations of n actuators.
+    """Rotations of n actuators: angle [rad], (n, w), and of both chambers and their lines (n, 2, w)."""
 
-    Args:
-        t_ms: times of the samples after the first command [ms], shape (w,).
-        angle_rad: θ, from 0 to π [rad], shape (n, w).
-        chamber_bar: pressures of the two chambers [bar], shape (n, 2, w).
-        line_bar: pressures of the two lines at the fitting [bar], shape (n, 2, w).
-        valve_l_s: what flows through the valve into each line [l/s of free air], shape (n, 2, w).
-        delay_ms: the break-away delay: from the first command to the first motion [ms], NaN without one, shape (n,).
-    """
-
-    t_ms: FloatArray
-    angle_rad: FloatArray
+    t_ms: FloatArray  # after the first command, (w,)
+    angle_rad: FloatArray  # θ, from 0 to π
     chamber_bar: FloatArray
-    line_bar: FloatArray
-    valve_l_s: FloatArray
-    delay_ms: FloatArray
+    line_bar: FloatArray  # at the fitting
+    valve_l_s: FloatArray  # of free air into each line
+    delay_ms: FloatArray  # from the first command to the first motion, NaN without one, (n,)
 
     def one(self, index: int) -> Rotations:
         """One of them, as the only one."""
@@ -80,10 +71,7 @@ def rotate(
     step_ms: float = 0.1,
     sample_ms: float = 1.0,
 ) -> Rotations:
-    """Command actuators by a square wave: chamber 1 is filled and chamber 2 emptied, then the other way round.
-
-    All chambers and lines begin at the room's pressure, all vanes at rest.
-    """
+    """Fill chamber 1 and empty chamber 2, then the other way round, from rest at the room's pressure."""
     duration_s = number("duration_s", duration_s, above=0, most=LONGEST_S)
     half_wave_s = number("half_wave_s", half_wave_s, above=0)
     start_rad = number("start_rad", start_rad, least=0, most=math.pi)
@@ -236,15 +224,10 @@ def _rotations(
 
 @dataclass(frozen=True, eq=False)
 class Performance:
-    """Range and delay of n actuators under a square wave.
-
-    Args:
-        range_share: range of the rotation within a period, as a share of 180°, shape (n,).
-        delay_ms: break-away delay after the first command, from rest in mid-range [ms]; NaN without motion, shape (n,).
-    """
+    """Range of n rotations within a period, as a share of 180°, and break-away delay from rest in mid-range, (n,)."""
 
     range_share: FloatArray
-    delay_ms: FloatArray
+    delay_ms: FloatArray  # NaN without motion
 
 
 def performance(

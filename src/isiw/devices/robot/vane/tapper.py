@@ -5,12 +5,14 @@ The strokes of one actuator differ as real ones do, and its sensors record them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from functools import lru_cache
+from types import MappingProxyType
 
 import numpy as np
 
-from isiw.checks import MOST_DELAY_MS, Checked, NonNegative, number, whole
+from isiw.checks import MOST_DELAY_MS, number, whole
 from isiw.devices.protocol import DeviceInfo
 from isiw.devices.robot.tapper import Tapper
 from isiw.devices.robot.vane.actuator import ATMOSPHERE_BAR, PA_PER_BAR, Vane
@@ -36,29 +38,19 @@ STILL_MS = 1000.0  # as long as a usual sweep
 LATEST_MEP_MS = max(end for _, end in MEP_WINDOWS_MS.values())
 
 
-@dataclass(frozen=True)
-class Variation(Checked):
-    """Variation of strokes, and noise of the sensors. The dissertation measured neither; these were chosen.
+FRICTION_CV, RESERVOIR_CV = 0.1, 0.02
+"""SD from stroke to stroke of the friction, and of what the reservoir has above the room's pressure; chosen, as the
+dissertation measured neither."""
 
-    Args:
-        friction_cv: SD of the friction from stroke to stroke, as a share of its mean.
-        reservoir_cv: SD of what the reservoir has above the room's pressure, as a share of its mean.
-        angle_sd_deg: noise of the angle sensor [°].
-        pressure_sd_kpa: noise of the pressure difference [kPa].
-    """
-
-    friction_cv: NonNegative = 0.1
-    reservoir_cv: NonNegative = 0.02
-    angle_sd_deg: NonNegative = 0.2
-    pressure_sd_kpa: NonNegative = 0.5
+NOISE_SD: Mapping[str, float] = MappingProxyType({"angle": 0.2, "vane_pressure": 0.5})
+"""Of each channel, in its unit."""
 
 
-def draw_strokes(vane: Vane, n: int, rng: np.random.Generator, variation: Variation | None = None) -> Rotations:
+def draw_strokes(vane: Vane, n: int, rng: np.random.Generator) -> Rotations:
     """Strokes from one end of the range to the other, n of them."""
-    varied = variation or Variation()
-    z = rng.standard_normal((2, whole("n", n, least=1)))
-    friction = np.maximum(1 + varied.friction_cv * z[0], LEAST_SHARE)
-    reservoir = np.maximum(1 + varied.reservoir_cv * z[1], LEAST_SHARE)
+    z = rng.standard_normal((2, n))
+    friction = np.maximum(1 + FRICTION_CV * z[0], LEAST_SHARE)
+    reservoir = np.maximum(1 + RESERVOIR_CV * z[1], LEAST_SHARE)
     vanes = [_varied(vane, float(one), float(other)) for one, other in zip(friction, reservoir, strict=True)]
     return rotate(vanes, duration_s=STROKE_S, half_wave_s=STROKE_S, start_rad=0.0, step_ms=STEP_MS)
 
@@ -72,18 +64,15 @@ def _varied(vane: Vane, friction: float, reservoir: float) -> Vane:
     )
 
 
-def record_strokes(
-    strokes: Rotations, rng: np.random.Generator, variation: Variation | None = None, *, rest_ms: float = VALVE_MS
-) -> dict[str, FloatArray]:
+def record_strokes(strokes: Rotations, rng: np.random.Generator, rest_ms: float = VALVE_MS) -> dict[str, FloatArray]:
     """Sensor signals of n strokes, by channel in the units of `UNITS`, at `RATE_HZ`, each of shape (n, w)."""
-    varied, rest = variation or Variation(), round(rest_ms * RATE_HZ / 1000)
+    rest = round(rest_ms * RATE_HZ / 1000)
     clean = {
         "angle": np.degrees(strokes.angle_rad),
         "vane_pressure": PA_PER_BAR / 1000 * (strokes.chamber_bar[:, 0] - strokes.chamber_bar[:, 1]),
     }
-    noise_sd = {"angle": varied.angle_sd_deg, "vane_pressure": varied.pressure_sd_kpa}
     waves = {name: np.pad(values, ((0, 0), (rest, 0)), mode="edge") for name, values in clean.items()}
-    return {name: wave + noise_sd[name] * rng.standard_normal(wave.shape) for name, wave in waves.items()}
+    return {name: wave + NOISE_SD[name] * rng.standard_normal(wave.shape) for name, wave in waves.items()}
 
 
 class RotatingTapper:
@@ -116,11 +105,7 @@ class RotatingTapper:
         return replace(robot, name=f"{robot.name} with vane actuator", channels={**robot.channels, **UNITS})
 
     def answer(self, stimulus: Stimulus) -> Sweep:
-        """Tap, pulse, turn the wrist, and record.
-
-        Raises:
-            DeviceError: as the tapping robot.
-        """
+        """Tap, pulse, turn the wrist, and record; it fails as the tapping robot does."""
         sweep = self.tapper.answer(stimulus)
         return replace(sweep, channels={**sweep.channels, **self._rotation(stimulus.trial, self._start_ms(sweep))})
 
