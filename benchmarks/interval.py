@@ -24,6 +24,7 @@ from scipy.optimize import minimize
 
 import isiw
 from benchmarks.dissertation.claims import Claim, claims_as_json, put_to_test
+from benchmarks.dissertation.counted import study_counts
 from benchmarks.interval_pictures import draw
 from benchmarks.interval_wrong import PUT_IN, WRONG, WRONG_GROUPS
 from benchmarks.provenance import facts_of
@@ -315,10 +316,9 @@ def _extremes(where: str, what: str, theirs: tuple[float, float], times_ms: Time
 def figure_65() -> tuple[pd.DataFrame, list[Claim]]:
     """Responses in ten trials by ISI of simulated people, of whom the first two are drawn."""
     cohort = isiw.subjects.cohort("recruitment", 40, seed=SEED)
-    count = isiw.response_counts.study_counts
     isi_ms = np.arange(0.0, 205.0, 10.0)
     counts = [
-        count(person, isi_ms, trials=10, threshold_mv=0.05, seed=SEED + number).counts["responses"]
+        study_counts(person, isi_ms, trials=10, threshold_mv=0.05, seed=SEED + number).counts["responses"]
         for number, person in enumerate(cohort)
     ]
     best = np.array([each.max() for each in counts])

@@ -43,7 +43,8 @@ from isiw.priors.lab import share_of
 from isiw.priors.population import LatentBlock, People, hyper_prior, place
 from isiw.priors.population import learnt as law_of
 from isiw.studies import SimulatedSession, simulate
-from isiw.subjects import LABS, Lab, SimulatedSubject, cohort, lab
+from isiw.subjects import SimulatedSubject, cohort
+from isiw.subjects.measured import LABS, Lab, lab
 
 MARKS = (1, 5, 10, 20, 40)
 PRIORS = ("built-in", "learnt", "told", "windows known")

@@ -21,7 +21,8 @@ from benchmarks.quick import understood
 from benchmarks.reduction.readings import PEOPLE
 from benchmarks.reduction.recorded import RecordedSweep, record
 from isiw.design import VALVE_SPACE
-from isiw.subjects import MEASURED_KIM, MeasuredPerson, SimulatedSubject
+from isiw.subjects import SimulatedSubject
+from isiw.subjects.measured import MEASURED_KIM, MeasuredPerson
 from isiw.types import FloatArray
 
 ALONE = 2000

@@ -20,7 +20,7 @@ from benchmarks.provenance import facts_of
 from benchmarks.quick import understood
 from benchmarks.recorded_people import FOLDER, PEOPLE, RecordedSession
 from isiw.studies import Failure, Processes, SimulatedSession
-from isiw.studies.batch import simulate_batch
+from isiw.studies.sessions import simulate_batch
 
 
 def batches(

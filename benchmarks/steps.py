@@ -21,8 +21,7 @@ from benchmarks.before_and_now import LATER, MARKS, honesty, study_of
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
 from isiw.studies import summary
-from isiw.studies.batch import _Batch
-from isiw.studies.sessions import SimulatedSession, examine
+from isiw.studies.sessions import SimulatedSession, _Batch, examine
 from isiw.subjects.responses import RecruitmentResponse
 from isiw.subjects.subject import Response, SimulatedSubject
 from isiw.types import FloatArray

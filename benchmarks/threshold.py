@@ -17,12 +17,11 @@ import numpy as np
 import pandas as pd
 import typer
 
-import isiw
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
 from isiw.strategy.threshold import IntensityRange, ThresholdSearch, make_threshold_search
 from isiw.strategy.threshold.hotspot import BayesHotSpot, CoilPulse, WalkedHotSpot
-from isiw.subjects.thresholds import StimulatedPerson, threshold_cohort
+from isiw.subjects.thresholds import THRESHOLD_COHORTS, StimulatedPerson, threshold_cohort
 from isiw.trials import RESPONSE_MV
 
 SPACE = IntensityRange(20, 100)
@@ -89,7 +88,7 @@ def threshold_row(cohort: str, way: Way, n: int, seed: int) -> dict[str, object]
     """A row of the table: one way on the people of a cohort.
 
     Args:
-        cohort: one of `isiw.subjects.THRESHOLD_COHORTS`.
+        cohort: one of `isiw.subjects.thresholds.THRESHOLD_COHORTS`.
         way: how.
         n: how many people.
         seed: of the people and their noise.
@@ -135,7 +134,7 @@ def spot_rows(cohort: str, n: int, seed: int) -> Iterable[dict[str, object]]:
     """Rows of the table about the hot spot.
 
     Args:
-        cohort: one of `isiw.subjects.THRESHOLD_COHORTS`.
+        cohort: one of `isiw.subjects.thresholds.THRESHOLD_COHORTS`.
         n: how many people.
         seed: of the people and their noise.
     """
@@ -164,7 +163,7 @@ def main(
     seed: Annotated[int, typer.Option(help="Of the people and their noise.")] = 10_000,
 ) -> None:
     """Print both tables."""
-    rows = [threshold_row(cohort, way, n, seed) for cohort in isiw.subjects.THRESHOLD_COHORTS for way in WAYS]
+    rows = [threshold_row(cohort, way, n, seed) for cohort in THRESHOLD_COHORTS for way in WAYS]
     found = [row for cohort in ("recruitment", "hand") for row in spot_rows(cohort, spots, seed)]
     print(f"""# The resting motor threshold and the hot spot
 

@@ -11,14 +11,16 @@ from matplotlib.figure import Figure
 
 import isiw
 from benchmarks.dissertation.claims import Claim, put_to_test
+from benchmarks.dissertation.counted import STIMULATION, study_counts
 from benchmarks.dissertation.parts import Told, verdict
 from benchmarks.dissertation.size import Size
 from benchmarks.reduction.look import OURS, THEIRS, panels
 from isiw.config.sections import own_wrist
 from isiw.devices.robot.mechanism import Geometry
 from isiw.devices.robot.tapper import preset
-from isiw.dissertation.response_counts import EFFECTIVE_SHARE, STIMULATION, CountStudy, study_counts
-from isiw.subjects import MEASURED_KIM, WIDTHS_KIM_MS, SimulatedSubject, cohort
+from isiw.dissertation.response_counts import EFFECTIVE_SHARE, CountStudy
+from isiw.subjects import SimulatedSubject, cohort
+from isiw.subjects.measured import MEASURED_KIM, WIDTHS_KIM_MS
 from isiw.types import FloatArray
 
 __all__ = ["tell"]

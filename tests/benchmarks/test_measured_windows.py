@@ -3,7 +3,7 @@ from __future__ import annotations
 import pandas as pd
 from benchmarks.measured_windows import verdicts
 
-from isiw.subjects import MEASURED_KIM
+from isiw.subjects.measured import MEASURED_KIM
 
 
 def test_the_sweeps_that_show_no_window_are_told_beside_the_widths() -> None:

@@ -6,8 +6,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from isiw.cli import app
-from isiw.dissertation.interval.record import begin_log
-from isiw.dissertation.interval.task import answer, session_blocks
+from isiw.dissertation.interval.task import answer, begin_log, session_blocks
 
 
 def run(*arguments: object) -> Result:

@@ -4,15 +4,14 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from benchmarks.dissertation.counted import STIMULATION, study_counts
 
 from isiw.dissertation.response_counts import (
-    STIMULATION,
     by_isi,
     count_trials,
     effective_window,
     response_counts,
     response_threshold_mv,
-    study_counts,
 )
 from isiw.errors import InvalidValueError
 from isiw.trials import Status, Trial
@@ -112,12 +111,6 @@ def test_amplitudes_in_another_unit_are_not_counted(meps_mv: list[float], thresh
 def test_a_share_is_no_percentage(share: float) -> None:
     with pytest.raises(InvalidValueError, match="the share of responses"):
         effective_window(response_counts([10.0, 20.0], [0.04, 0.06], 0.03), share)
-
-
-@pytest.mark.parametrize("trials", [0, -1, 2.5])
-def test_trials_of_a_study_are_counted_in_whole_numbers(trials: Any) -> None:
-    with pytest.raises(InvalidValueError, match="trials"):
-        study_counts(STIMULATION["mechanical"], [60.0], trials=trials)
 
 
 def test_the_trials_of_a_session_are_counted_by_its_own_tms_alone() -> None:

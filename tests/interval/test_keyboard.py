@@ -13,8 +13,7 @@ if os.name == "nt":
     pytest.skip("a POSIX terminal", allow_module_level=True)
 
 from interval.terminals import Person, somebody
-from isiw.dissertation.interval.record import read_productions
-from isiw.dissertation.interval.task import resume_task, run_task, session_blocks
+from isiw.dissertation.interval.task import read_productions, resume_task, run_task, session_blocks
 from isiw.errors import DeviceError, InvalidValueError
 
 

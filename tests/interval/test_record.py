@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 
 from isiw.devices.protocol import DeviceInfo
-from isiw.dissertation.interval.record import begin_log, continue_log, read_productions
-from isiw.dissertation.interval.task import answer, session_blocks
+from isiw.dissertation.interval.task import answer, begin_log, continue_log, read_productions, session_blocks
 from isiw.errors import DamagedLogError, InvalidValueError, LogError
 from isiw.log.headers import AnyHeader, Block, StrategyRecipe, ThresholdHeader
 from isiw.log.reader import read_session

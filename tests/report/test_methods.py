@@ -5,7 +5,7 @@ import pytest
 
 import isiw
 from isiw.dissertation.profiles import best_fit, profile_fits
-from isiw.report.methods import method_answers
+from isiw.report.answers import method_answers
 
 SPACE = isiw.DesignSpace(0, 150, 5, reference="impact")
 

@@ -17,8 +17,7 @@ from isiw.errors import InvalidValueError
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy
 from isiw.studies import SimulatedSession, simulate
-from isiw.studies.batch import simulate_batch
-from isiw.studies.sessions import Stopping
+from isiw.studies.sessions import Stopping, simulate_batch
 from isiw.subjects.subject import Responder, Response
 from isiw.types import Reference
 from studies.tiny import FEW, timeless

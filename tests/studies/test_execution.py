@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 from pathlib import Path
-from typing import Any, Never
+from typing import Any
 
 import pytest
 
-from isiw.errors import InvalidValueError, StudyError
+from isiw.errors import ConfigError, InvalidValueError
 from isiw.studies.execution import DaskCluster, Failure, Processes, _attempt_alone
 from known import instance
 from studies.tiny import double, double_or_die, double_or_die_once, process_id
@@ -87,9 +88,6 @@ def test_a_worker_of_many_threads_runs_one_session_at_a_time() -> None:
 
 
 def test_without_dask_the_message_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    def missing(name: str) -> Never:
-        raise ModuleNotFoundError(name)
-
-    monkeypatch.setattr("isiw.studies.execution.importlib.import_module", missing)
-    with pytest.raises(StudyError, match=r"isiw\[dask\]"):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(ConfigError, match=r"isiw\[dask\]"):
         list(DaskCluster("tcp://127.0.0.1:1").results(double, [1]))

@@ -23,20 +23,20 @@ from isiw.studies import (
     Processes,
     Study,
     StudyStrategy,
-    begin_store,
     conduct,
     load_study,
     open_store,
     replay,
     run_unit,
     sessions,
-    unit_of_row,
 )
 from isiw.studies import plan as plan_module
 from isiw.studies import running as running_module
 from isiw.studies import store as store_module
 from isiw.studies.plan import Engine, Unit
+from isiw.studies.running import unit_of_row
 from isiw.studies.sessions import SimulatedSession
+from isiw.studies.store import begin_store
 from studies.tiny import TOML, timeless, tiny
 
 posix = pytest.mark.skipif(os.name == "nt", reason="POSIX signals")

@@ -16,7 +16,7 @@ from isiw.signals.judgement import wrong_isi
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy
 from isiw.studies import SimulatedSession, paired_sessions, play, run_study, simulate
-from isiw.studies.batch import simulate_batch
+from isiw.studies.sessions import simulate_batch
 from isiw.subjects import SimulatedSubject, cohort
 from isiw.subjects.subject import Responder, Response
 from isiw.types import Reference

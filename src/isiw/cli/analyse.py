@@ -75,14 +75,14 @@ def analyse(  # noqa: PLR0913, PLR0917 - an option each
     Called again with the same files and folder, it continues where it was interrupted.
     """
     with errors_reported("Interrupted: what is finished is kept; give the same command to continue."):
-        markers = isiw.existing.pairs_of("--marker", marker or [])
-        channels = isiw.existing.pairs_of("--channel", channel or [])
+        markers = isiw.existing.layout.pairs_of("--marker", marker or [])
+        channels = isiw.existing.layout.pairs_of("--channel", channel or [])
         said = {"reference": reference, "alone": alone, "decimal": decimal, "sheet": sheet}
         read = _layout(layout, column, unit, **said, markers=markers, channels=channels)
         settings = isiw.config.load_config(config).with_overrides(strategy=strategy, seed=seed)
-        way = isiw.existing.way_of(settings, read, simulated=simulated)
+        way = isiw.existing.batch.way_of(settings, read, simulated=simulated)
         with working(f"Reading {counted(len(files), 'file')}"):
-            people = isiw.existing.read_files(files, way, output, only)
+            people = isiw.existing.batch.read_files(files, way, output, only)
         _analyse_all(people, way, files[0])
 
 
@@ -105,9 +105,9 @@ def replay(  # noqa: PLR0913, PLR0917 - an option each
     with errors_reported("Interrupted."):
         read = _layout(layout, column, unit, reference=reference, sheet=sheet)
         with working(f"Reading {file.name}"):
-            found = isiw.existing.read_files([file], isiw.existing.Way(read), only=only)
+            found = isiw.existing.batch.read_files([file], isiw.existing.batch.Way(read), only=only)
         if len(found) > 1:
-            people = isiw.existing.told_people([one.delivered for one in found])
+            people = isiw.existing.delivered.codes_of([one.delivered for one in found])
             raise isiw.errors.ConfigError("a replay is of one person", got=people, remedy="Say whose: --only CODE.")
         names = strategy or ["default"]
         progress = Progress(console=Console(stderr=True))
@@ -124,8 +124,8 @@ def replay(  # noqa: PLR0913, PLR0917 - an option each
 
 def _layout(file: Path | None, columns: list[str] | None, units: list[str] | None, **said: Any) -> Layout:
     """The layout of a file, with what the command line says otherwise."""
-    layout = isiw.existing.read_layout(file) if file is not None else isiw.existing.Layout()
-    columns_of = isiw.existing.pairs_of("--column", columns or [])
+    layout = isiw.existing.layout.read_layout(file) if file is not None else isiw.existing.Layout()
+    columns_of = isiw.existing.layout.pairs_of("--column", columns or [])
     return layout.saying(columns=columns_of, units=tuple(units or ()), **said)
 
 
@@ -147,13 +147,13 @@ def _say_unused(people: list[Person]) -> None:
 
 def _analyse_one(person: Person, way: Way, source: Path, *, several: bool) -> None:
     name = f"{person.delivered.subject}: " if several else ""
-    if person.log is not None and isiw.existing.is_there(person):
+    if person.log is not None and isiw.existing.batch.is_there(person):
         show(f"{name}{person.log} is there already, of the same file and settings.")
         if not person.log.with_suffix(".png").exists():  # interrupted between the two
             isiw.plots.save_session_plot(isiw.read_session(person.log), person.log.with_suffix(".png"))
         return
     with nullcontext() if several else working(f"Analysing {counted(len(person.delivered.trials), 'trial')}"):
-        analysis = isiw.existing.analyse_person(person, way)
+        analysis = isiw.existing.batch.analyse_person(person, way)
     show(f"{name}{analysis}", style=None if several else "bold")
     if person.log is not None:
         show(f"log:     {person.log}")

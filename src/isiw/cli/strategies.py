@@ -84,7 +84,7 @@ def learn(
     done: list[SessionRecord] = []
     with errors_reported("Interrupted: nothing was written."):
         with counting("Learning from", len(logs), "session") as count:
-            isiw.priors.check_lab_output(output, overwrite=overwrite)  # the import takes a second
+            isiw.priors.file.check_lab_output(output, overwrite=overwrite)  # the import takes a second
 
             def note(record: SessionRecord) -> None:
                 done.append(record)

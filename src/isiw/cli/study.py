@@ -74,7 +74,7 @@ def replay(
         with working(f"Opening {folder}"):
             store = isiw.studies.open_store(folder) if study is None else _store(study, folder)
         if (row := read_whole(key)) is not None:
-            key, person = isiw.studies.unit_of_row(store, row)
+            key, person = isiw.studies.running.unit_of_row(store, row)
         with working(f"Running {key} again"):
             result = isiw.studies.replay(store, key, person)
         show(result.again.T.to_string(header=False))
@@ -123,7 +123,7 @@ def _store(source: Path, out: Path | None) -> Store:
     if source.is_dir() and out in {None, source}:
         return isiw.studies.open_store(source)
     plan = isiw.studies.load_study(source)
-    return isiw.studies.begin_store(plan, out or source.with_name(f"{source.stem}.study"))
+    return isiw.studies.store.begin_store(plan, out or source.with_name(f"{source.stem}.study"))
 
 
 @contextmanager

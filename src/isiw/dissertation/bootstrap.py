@@ -1,8 +1,8 @@
 """The bootstrap particle filter: the dissertation's PF [Kim2020, 4.3.2], after [Gordon1993].
 
-Particles are ISIs that search for the best one. Each generation is diffused, measured with one MEP a particle, weighted
-by these MEPs, and resampled. Nothing is learnt before all particles of a generation have been measured. The profile is
-a Gaussian fitted to all MEPs so far, as NR fits it (Fig. 4.13, 4.14).
+Particles are ISIs. Each generation is diffused, measured with one MEP a particle, weighted by these MEPs, and
+resampled, and nothing is learnt before. The profile is a Gaussian fitted to all MEPs so far, as NR fits it (Fig. 4.13,
+4.14).
 """
 
 from __future__ import annotations
@@ -53,8 +53,7 @@ class BootstrapFilter(Checked):
         window: what is reported: the posterior `"expectation"` plus and minus a half width (4.3.2), where the `"fit"`
             of a Gaussian has at least 0.135 of its maximum (Fig. 4.13), or from the first to the last of the
             `"particles"` (4.4.4, Fig. 4.29).
-        half_width_ms: the half width: three SDs of 25 ms in the text (4.3.2), two of them, 50 ms, in the caption of
-            Fig. 4.13.
+        half_width_ms: the half width: three SDs of 25 ms in the text (4.3.2), two of them, 50 ms, in Fig. 4.13.
         floor: what is subtracted from an MEP before it becomes a weight; the text has the MEPs as they are.
     """
 
@@ -145,35 +144,22 @@ class BootstrapFilter(Checked):
 
 @dataclass(frozen=True, eq=False)
 class BootstrapPosterior(OfAmplitudes):
-    """Where b people's particles are.
-
-    Args:
-        plan_ms: the present generation [ms], shape (b, p).
-        count: how many of it have been measured, shape (b,).
-        measured_ms: where they were measured, NaN if they were not yet, shape (b, p).
-        mep_mv: their MEPs [mV], shape (b, p).
-        expectation_ms: the posterior expectation after the last generation [ms], NaN before, shape (b,).
-        spread_ms: SD of the particles after it [ms], shape (b,).
-        weightless: whether no MEP of it had any weight, shape (b,).
-        support_ms: the first and the last particle after it [ms], NaN before, shape (b, 2).
-        fits: the Gaussian of each person after it; None before.
-        floors_mv: what was subtracted from the MEPs for it [mV], NaN before, shape (b,).
-    """
+    """The particles of b people: the present generation (b, p), and the last one's result (b,), NaN without one."""
 
     model: BootstrapFilter
     space: DesignSpace
     seed: int
     told: AmplitudeHistory
     plan_ms: FloatArray
-    count: IntArray
-    measured_ms: FloatArray
+    count: IntArray  # how many of it have been measured, (b,)
+    measured_ms: FloatArray  # NaN if not measured yet
     mep_mv: FloatArray
     expectation_ms: FloatArray
-    spread_ms: FloatArray
-    weightless: BoolArray
-    support_ms: FloatArray
+    spread_ms: FloatArray  # SD of the particles
+    weightless: BoolArray  # no MEP had any weight
+    support_ms: FloatArray  # the first and the last particle, (b, 2)
     fits: tuple[FittedCurve | None, ...]
-    floors_mv: FloatArray
+    floors_mv: FloatArray  # subtracted from the MEPs for the fits
 
     @property
     def trouble(self) -> str | None:
@@ -194,19 +180,17 @@ class BootstrapPosterior(OfAmplitudes):
         if fit is None:
             return WindowEstimate(probability=None, window=None, spread_ms=spread_ms)
         low, high = fit.confidence_mv(0.9)
+        about_ms = self.expectation_ms[person] + self.model.half_width_ms * np.array((-1.0, 1.0))
+        ends_ms = (about_ms if self.model.window == "expectation" else self.support_ms[person]).tolist()
+        if self.model.window == "fit":
+            window = Window.from_mask(fit.grid_ms, curve_masks(fit.mean_mv[None], floor_mv)[0])
+        else:
+            start_ms, end_ms = map(self.space.snap, ends_ms)
+            window = Window(start_ms, end_ms)
         return WindowEstimate(
             probability=None,
-            window=self._window(person, fit),
+            window=window,
             spread_ms=spread_ms,
             grid_ms=fit.grid_ms,
             profile_quantiles_mv=np.stack((low, fit.mean_mv, high)) + floor_mv,
         )
-
-    def _window(self, person: int, fit: FittedCurve) -> Window | None:
-        if self.model.window == "fit":
-            return Window.from_mask(fit.grid_ms, curve_masks(fit.mean_mv[None], float(self.floors_mv[person]))[0])
-        ends_ms = self.support_ms[person]
-        if self.model.window == "expectation":
-            ends_ms = self.expectation_ms[person] + self.model.half_width_ms * np.array((-1.0, 1.0))
-        start_ms, end_ms = (self.space.snap(end_ms) for end_ms in ends_ms.tolist())
-        return Window(start_ms, end_ms)

@@ -83,10 +83,7 @@ class SweepPosterior(OfAmplitudes):
         return torch.as_tensor(sweep[(done + np.arange(len(sweep))) % len(sweep)], dtype=torch.float32)
 
     def _means(self, trials: PersonTrials) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """The ISIs swept so far, ascending, and the means and their standard errors there, each of shape (t,).
-
-        A trial belongs to the stop that is nearest to its realised ISI; the first ones of each block are left out.
-        """
+        """ISIs swept so far, ascending, with mean MEP and standard error, (t,); a trial belongs to the nearest stop."""
         per_isi, discarded = self.model.trials_per_isi, self.model.discarded
         kept = np.arange(len(trials.isi_ms)) % per_isi >= discarded
         mep_mv, last = self.model.floor.excess_mv(trials.mep_mv[kept], 0.0), len(self._stops_ms) - 1

@@ -110,7 +110,6 @@ def _blas() -> ThreadpoolController:
 
 
 def _cost(process: Any, theta: FloatArray) -> tuple[float, FloatArray]:
-    """Negative log marginal likelihood of a process, and its gradient."""
     value, gradient = process.log_marginal_likelihood(theta, eval_gradient=True, clone_kernel=False)
     return -float(value), -gradient
 

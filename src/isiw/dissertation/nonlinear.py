@@ -102,7 +102,11 @@ class NonlinearRegression(Checked):
     ) -> FittedCurve:
         """Fit the Gaussians; see `RegressionMethod`."""
         amplitude_mv = self.amplitude_mv or max(float(excess_mv.max(initial=0.0)), LEAST_AMPLITUDE_MV)
-        known = self._known(space, amplitude_mv, rng)
+        sd = [amplitude_mv, (space.high_ms - space.low_ms) / math.sqrt(12.0), self.width_ms / 8.0]
+        low = [0.0, space.low_ms, 0.25 * self.min_width_ms]
+        high = [math.inf, space.high_ms, 0.25 * self.max_width_ms]
+        start = np.ravel(self.starts(space, amplitude_mv, rng))
+        known = _Known(start, *(np.tile(values, self.peaks) for values in (sd, low, high)))
         estimate = self._least_squares(isi_ms, excess_mv, known)
         values, vectors = np.linalg.eigh(estimate.covariance)
         root = vectors * np.sqrt(values.clip(0.0))
@@ -119,13 +123,6 @@ class NonlinearRegression(Checked):
             amplitudes_mv=tuple(sorted(estimate.parameters[::3].tolist(), reverse=True)),
             fitted=estimate.fitted,
         )
-
-    def _known(self, space: DesignSpace, amplitude_mv: float, rng: np.random.Generator) -> _Known:
-        sd = [amplitude_mv, (space.high_ms - space.low_ms) / math.sqrt(12.0), self.width_ms / 8.0]
-        low = [0.0, space.low_ms, 0.25 * self.min_width_ms]
-        high = [math.inf, space.high_ms, 0.25 * self.max_width_ms]
-        start = np.ravel(self.starts(space, amplitude_mv, rng))
-        return _Known(start, *(np.tile(values, self.peaks) for values in (sd, low, high)))
 
     def starts(self, space: DesignSpace, amplitude_mv: float, rng: np.random.Generator) -> list[list[float]]:
         """Amplitude [mV], mean and SD [ms] from which the search for each Gaussian starts."""

@@ -1,8 +1,7 @@
 """The form of an ISI–MEP profile: how many Gaussians it is made of, and whether its values are normal [Kim2020, 8.1.3].
 
-Figure 8.2 draws sums of one to five Gaussians and a smoothing spline through a profile measured above the motor
-threshold, and leaves the choice open. Here the corrected information criterion of Akaike chooses [Hurvich1989]: it
-weighs what a curve explains against the number of parameters that it needs for that.
+Figure 8.2 draws sums of one to five Gaussians and a smoothing spline, and leaves the choice open; here the corrected
+information criterion of Akaike chooses [Hurvich1989].
 """
 
 from __future__ import annotations
@@ -34,23 +33,14 @@ _START_SDS_MS: Final = (3.0, 6.0, 12.0, 24.0)
 
 @dataclass(frozen=True, eq=False)
 class ProfileFit:
-    """A curve through the mean MEPs of a profile.
-
-    Args:
-        name: which curve, such as "2 Gaussians" or "smoothing spline".
-        parameters: how many parameters it has, the noise among them; of a spline the effective number.
-        aicc: the corrected information criterion of Akaike; the smallest is best. Infinite with too few ISIs.
-        bic: the Bayesian information criterion.
-        rms_mv: root mean square of the residuals [mV].
-        gaussians: amplitude [mV], mean [ms] and SD [ms] of each Gaussian, shape (k, 3); negative if it is depressed.
-    """
+    """A curve through the mean MEPs of a profile, with its information criteria, of which the smallest is best."""
 
     name: str
-    parameters: float
-    aicc: float
+    parameters: float  # the noise among them; of a spline the effective number
+    aicc: float  # infinite with too few ISIs
     bic: float
     rms_mv: float
-    gaussians: FloatArray
+    gaussians: FloatArray  # amplitude [mV], mean [ms] and SD [ms] of each, (k, 3); negative if it is depressed
     _curve: Callable[[FloatArray], FloatArray] = field(repr=False)
 
     def mean_mv(self, isi_ms: ArrayLike) -> FloatArray:
@@ -59,13 +49,7 @@ class ProfileFit:
 
 
 class Normality(NamedTuple):
-    """A test of Shapiro and Wilk.
-
-    Args:
-        statistic: W, at most 1.
-        p_value: of values as far from normal, if they are drawn from a normal law.
-        normal: whether the test passes.
-    """
+    """W, p-value and result of a test of Shapiro and Wilk."""
 
     statistic: float
     p_value: float

@@ -1,7 +1,6 @@
 """Regression of the MEP on the ISI, again after each trial: the part that NR, SVMR and GPR share [Kim2020, 4.3].
 
-A method fits a curve to what the MEPs of one person have above the floor; its window is where the curve has at least
-0.135 of its maximum.
+The window is where the curve that is fitted above the floor has at least 0.135 of its maximum.
 """
 
 from __future__ import annotations
@@ -27,29 +26,17 @@ Segments = Literal["peak", "all"]
 
 @dataclass(frozen=True, eq=False)
 class FittedCurve:
-    """The expected MEP above the floor, by ISI, as one fit has it.
-
-    Args:
-        grid_ms: the design grid [ms], shape (t,).
-        mean_mv: the curve, shape (t,).
-        sd_mv: standard error of the curve, shape (t,).
-        samples_mv: curves that would fit as well, shape (s, t).
-        noise_sd_mv: SD of one MEP about the curve.
-        dof: degrees of freedom of that SD.
-        trouble: what went wrong, and what stands in for it, as full sentences; None if nothing did.
-        amplitudes_mv: of the Gaussians that the curve is made of, largest first; empty if it is not made of any.
-        fitted: whether trials determine it; if they do not, a curve stands in that says nothing of a window.
-    """
+    """The expected MEP above the floor, by ISI, as one fit has it."""
 
     grid_ms: FloatArray
     mean_mv: FloatArray
-    sd_mv: FloatArray
-    samples_mv: FloatArray
-    noise_sd_mv: float
-    dof: float = math.inf
-    trouble: str | None = None
-    amplitudes_mv: tuple[float, ...] = ()
-    fitted: bool = True
+    sd_mv: FloatArray  # standard error of the curve
+    samples_mv: FloatArray  # curves that would fit as well, (s, t)
+    noise_sd_mv: float  # SD of one MEP about the curve
+    dof: float = math.inf  # of that SD
+    trouble: str | None = None  # and what stands in, in sentences
+    amplitudes_mv: tuple[float, ...] = ()  # of its Gaussians, largest first
+    fitted: bool = True  # else a curve stands in that says nothing of a window
 
     def confidence_mv(self, level: float) -> tuple[FloatArray, FloatArray]:
         """The interval that holds the expected MEP with this confidence [mV], each shape (t,)."""

@@ -1,11 +1,8 @@
-"""The repeatability study: when the events of taps and rotations happen, and how far the realised ISI is off.
+"""The repeatability study: times of taps and rotations, and ISI errors, found in waveforms [Kim2020, 3.3.2, 5.2–5.3].
 
-All figures come from detection on waveforms, simulated or recorded, as in [Kim2020, 3.3.2, 5.2–5.3].
-
-Its precision study reports an SD of the ISI error of 1.93 ms over 900 trials, and 8 trials in which the pulse came
-before the impact, all of them at an ISI of 10 ms. No single Gaussian does both: an error below −10 ms is more than five
-of those SDs away. So there are two presets of the cushion. `cushion` has Gaussian errors of that SD and no mistrials;
-`timing-fault` has valves that open late occasionally, and loses about 8 in 100 trials at 10 ms and none elsewhere.
+Its precision study reports an SD of the ISI error of 1.93 ms, and 8 mistrials of 900, all at an ISI of 10 ms, which is
+more than five SDs. No single Gaussian does both, so `cushion` has that SD and no mistrials, and `timing-fault` has
+valves that open late occasionally: about 8 in 100 trials at 10 ms are lost, and none elsewhere.
 """
 
 from __future__ import annotations
@@ -88,8 +85,7 @@ class TimingStudy:
     """The findings of a repeatability study.
 
     Args:
-        events: the events of all taps, or of all rotations [ms from the trial's start, 500 ms before its valve
-            command].
+        events: those of all taps, or of all rotations [ms from the trial's start, 500 ms before its valve command].
         commanded_ms: commanded ISIs from the impact [ms], NaN for a tap without a pulse, shape (n,).
         realised_ms: realised ISIs [ms], NaN where no impact was found, shape (n,).
     """
@@ -226,7 +222,8 @@ def study_sweeps(name: str, sweeps: Iterable[Sweep], commanded_isi_ms: Iterable[
     for sweep in sweeps:
         events = sweep_events(sweep)  # raises if the valve's time is unknown
         realised.append(np.nan if sweep.t_tms_ms is None else sweep.t_tms_ms - events.hit_ms[0])
-        parts.append(_later(events, VALVE_MS - (sweep.t_valve_ms or 0.0)))
+        shift_ms = VALVE_MS - (sweep.t_valve_ms or 0.0)
+        parts.append(TapEvents(*(times_ms + shift_ms for times_ms in events.columns().values())))
     if not parts:
         raise InvalidValueError(
             "a study needs sweeps with an acceleration and the valve's time",
@@ -301,11 +298,6 @@ def _tap(geometry: Geometry, pulse_ms: FloatArray, rate_hz: float, rng: np.rando
     waves = record_robot(times, taps, rng)
     emg = record_emg(times, rate_hz, taps, rng, pulse_ms=pulse_ms - VALVE_MS, evoked_mv=np.zeros(len(pulse_ms)))
     return detect_events(waves["acceleration"], rate_hz, pressure=waves["pressure"], emg=emg, t_tms_ms=pulse_ms)
-
-
-def _later(events: TapEvents, shift_ms: float) -> TapEvents:
-    """The same events on a clock that began so much earlier [ms]."""
-    return TapEvents(*(times + shift_ms for times in events.columns().values()))
 
 
 def _joined(parts: Iterable[TapEvents]) -> TapEvents:

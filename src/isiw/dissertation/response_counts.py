@@ -1,28 +1,24 @@
 """The effective window from response counts: an earlier definition, which needs a threshold [Kim2020, 3.3.4].
 
-A trial responds when its MEP exceeds a threshold, and an ISI is effective when more than 40 % of its trials respond.
-Each person has a threshold of their own: the text chose it by looking at their responses (4.1.1), here it can come from
-their trials of TMS alone. Chapter 4 gives all this up for amplitudes, because the window depends on the threshold
-(4.1.1); it is here to compare.
+A trial responds if its MEP exceeds a person's own threshold, chosen by eye in the text (4.1.1) and from TMS alone
+here; an ISI is effective if more than 40 % of its trials respond. Chapter 4 gives it up, as the window depends on the
+threshold.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Final, Literal, NamedTuple, TypeAlias, get_args
 
 import numpy as np
 
-from isiw.checks import choice, number, whole
+from isiw.checks import choice, number
 from isiw.dissertation.profiles import paired
 from isiw.errors import InvalidValueError
 from isiw.findings import AMPLITUDE_MV
 from isiw.lazy import pd
 from isiw.signals.limits import require_amplitude
-from isiw.subjects.responses import EmgFloor, PeakProfile, RecruitmentResponse
-from isiw.subjects.subject import SimulatedSubject
 from isiw.trials import RESPONSE_MV, Trial
 from isiw.types import ArrayLike, FloatArray
 from isiw.window import Window
@@ -34,28 +30,6 @@ EFFECTIVE_SHARE = 0.40
 
 BIN_MS: Final = 5.0
 """Into such steps ISIs are put that hardly repeat; the dissertation's own step [Kim2020, 4.2.1]."""
-
-_FLOOR = EmgFloor(0.008, 0.2)
-
-
-def _person(start_ms: float, width_ms: float) -> SimulatedSubject:
-    response = RecruitmentResponse(
-        _FLOOR,
-        amplitude_mv=0.16,
-        slope_per_pct=0.30,
-        x50_pct_rmt=104.0,
-        boost_pct_rmt=14.0,
-        sigma_x_pct_rmt=7.0,
-        sigma_y=0.4,
-    )
-    return SimulatedSubject(PeakProfile(start_ms, width_ms), response, hit_delay_ms=180.0, hit_delay_sd_ms=0.0)
-
-
-STIMULATION: Mapping[str, SimulatedSubject] = MappingProxyType(
-    # An electric shock excites all afferents at once; a tap's spindles fire one after the other (3.3.4).
-    {"electrical": _person(10.0, 30.0), "mechanical": _person(20.0, 78.0)}
-)
-"""One person with both kinds of peripheral stimulation, as in Fig. 3.12: about 20 ms effective against about 50 ms."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,24 +117,3 @@ def effective_window(
     peak_ms = isi_ms[shares.argmax()]
     low, high = next(segment for segment in window.segments if segment[0] <= peak_ms <= segment[1])
     return Window(low, high)
-
-
-def study_counts(
-    subject: SimulatedSubject,
-    isi_ms: ArrayLike,
-    *,
-    trials: int = 12,
-    threshold_mv: float | None = 0.03,
-    alone: int = 0,
-    seed: int = 0,
-) -> CountStudy:
-    """Sweep a simulated person over ISIs and count."""
-    person = subject.begin(seed)
-    alone, trials = whole("alone", alone, least=0), whole("trials", trials, least=1)
-    alone_mv = np.array([person.respond(None, "impact").mep_mv for _ in range(alone)])
-    threshold_mv = response_threshold_mv(alone_mv) if threshold_mv is None else threshold_mv
-    isi = np.repeat(np.asarray(isi_ms, dtype=np.float64), trials)
-    mep = [person.respond(each, "impact").mep_mv for each in isi.tolist()]
-    counts = response_counts(isi, mep, threshold_mv)
-    alone_share = float((alone_mv > threshold_mv).mean()) if alone else float("nan")
-    return CountStudy(counts, effective_window(counts, segments="peak"), threshold_mv, alone_share)

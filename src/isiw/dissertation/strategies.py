@@ -30,11 +30,7 @@ class EvenStart(Checked):
 
     Args:
         initial: how many evenly spaced ISIs to begin with, both ends of the range among them.
-        acquisition: what chooses the next ISI, one of `isiw.acquisition.registry.ACQUISITIONS`; the text does not
-            define its own.
-
-    Raises:
-        InvalidValueError: fewer than two initial ISIs, or an unknown acquisition function.
+        acquisition: what chooses the next ISI, one of `isiw.acquisition.registry.ACQUISITIONS`; the text has none.
     """
 
     initial: Annotated[int, partial(whole, least=2)] = 7
@@ -77,9 +73,6 @@ class Settling(Checked):
         stop_edges: and of which edges: "both" (the text), or "either" (the pseudo-code).
         max_trials: stop after this many stimuli, the initial ones among them; mistrials count, control trials do not.
             By default 98 more than the initial ones, which are 99 iterations (4.3).
-
-    Raises:
-        InvalidValueError: an invalid number, or an unknown value of the edges.
     """
 
     stop_variance_ms2: Positive = 50.0

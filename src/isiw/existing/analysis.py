@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from isiw.design import DesignSpace, require_space
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import Answer, DeviceInfo
+from isiw.devices.protocol import DeviceInfo
 from isiw.errors import InvalidValueError, LogError
 from isiw.estimate import WindowEstimate
 from isiw.existing.delivered import Delivered
@@ -136,8 +136,7 @@ def analyse(
 
     Args:
         isi_ms: the ISI of each trial [ms], in the order of delivery, shape (n,); NaN is TMS alone.
-        mep_mv: peak-to-peak amplitude of its MEP [mV], shape (n,); 0 is below the detection limit, NaN a trial that was
-            lost.
+        mep_mv: peak-to-peak amplitude of its MEP [mV], shape (n,); 0 is below the detection limit, NaN a lost trial.
         space: the ISIs at which a window is sought; trials at others teach, too.
         strategy: the strategy that estimates, one of `isiw.list_strategies()`.
         seed: seed of all randomness.
@@ -230,25 +229,22 @@ def _header(delivered: Delivered, strategy: Strategy, config: Mapping[str, Any])
 def _history(delivered: Delivered, strategy: Strategy, header: Header) -> Iterator[Record]:
     """The trials, with findings, and the estimates after them."""
     trials = delivered.trials
-    told = [trial.index for trial in trials if trial.told]
-    logged = {told[int(place)] for place in np.linspace(0, len(told) - 1, MOST_ESTIMATES).round()} if told else set()
+    learnt = [trial.index for trial in trials if trial.told]
+    places = np.linspace(0, len(learnt) - 1, MOST_ESTIMATES).round() if learnt else ()
+    logged = {learnt[int(place)] for place in places}
     watch = Watch(header.space, header.signals, _NEVER, header.detection_limit_mv)
     for trial in trials:
         if trial.index in delivered.blocks:
             yield Event(kind="note", trial=trial.index, text=f"Block {delivered.blocks[trial.index]} begins.")
         yield trial
         strategy.learn_all([trial], same_level=True)
-        watch = watch.after(trial, _answer(delivered, trial))
+        times_ms = trial.t_valve_ms, trial.t_tms_ms, trial.t_hit_ms
+        channels = delivered.sweeps.get(trial.index)
+        answer = Measurement(trial.mep_mv or 0.0, trial.isi_ms) if channels is None else Sweep(channels, *times_ms)
+        watch = watch.after(trial, answer)
         if (doubt := watch.doubts.new) is not None and trial.told:
             yield Event(kind="doubt", finding=doubt.kind, trial=trial.index, text=f"{doubt}")
         if strategy.trouble is not None and trial.told:
             yield Event(kind="fit", trial=trial.index, text=strategy.trouble)
         if trial.index in logged or trial.index == trials[-1].index:
             yield estimate_record(strategy, trial.index, _END, None)
-
-
-def _answer(delivered: Delivered, trial: Trial) -> Answer:
-    """The answer that a device would have given."""
-    if trial.index in delivered.sweeps:
-        return Sweep(delivered.sweeps[trial.index], trial.t_valve_ms, trial.t_tms_ms, trial.t_hit_ms)
-    return Measurement(trial.mep_mv or 0.0, trial.isi_ms)

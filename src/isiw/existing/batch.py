@@ -14,7 +14,7 @@ from isiw.config.run import RunConfig
 from isiw.design import DesignSpace
 from isiw.errors import ConfigError, InvalidValueError, LogError
 from isiw.existing.analysis import Analysis, analysed
-from isiw.existing.delivered import Delivered, told_people
+from isiw.existing.delivered import Delivered, codes_of
 from isiw.existing.layout import Layout
 from isiw.existing.reading import read_people
 from isiw.log.durable import log_exists
@@ -36,40 +36,20 @@ class Person(NamedTuple):
 
 @dataclass(frozen=True)
 class Way:
-    """Settings by which trials are read and analysed.
-
-    Args:
-        layout: how the files are laid out.
-        space: the ISIs at which a window is sought; by default the range of those that were delivered.
-        strategy: the strategy that estimates.
-        seed: seed of all randomness.
-        settings: settings of the strategy.
-        subject: the code of a person who has none in the file.
-        visit: what is noted about the visits.
-        simulated: true if nobody was stimulated: the person is simulated.
-    """
+    """Settings by which trials are read and analysed."""
 
     layout: Layout = field(default_factory=Layout)
-    space: DesignSpace | None = None
+    space: DesignSpace | None = None  # the range of the ISIs that were delivered
     strategy: str = "default"
     seed: int = 0
     settings: Mapping[str, Any] = field(default_factory=dict)
-    subject: str = ""
+    subject: str = ""  # of a person who has no code in the file
     visit: Visit = field(default_factory=Visit)
     simulated: bool = False
 
 
 def way_of(config: RunConfig, layout: Layout, *, simulated: bool = False) -> Way:
-    """The settings of a configuration by which trials are analysed: space, strategy, seed and visit.
-
-    Args:
-        config: the configuration.
-        layout: how the files are laid out.
-        simulated: true if nobody was stimulated: the person is simulated.
-
-    Raises:
-        ConfigError: a prior, or earlier logs, which an analysis does not learn from.
-    """
+    """Space, strategy, seed and visit of a configuration, by which trials are analysed."""
     if config.prior is not None or config.after:
         raise ConfigError(
             "an analysis says what the trials themselves tell, and learns from no prior and no earlier session",
@@ -91,23 +71,12 @@ def way_of(config: RunConfig, layout: Layout, *, simulated: bool = False) -> Way
 def read_files(
     sources: Sequence[str | Path], way: Way, output: str | Path | None = None, only: str | None = None
 ) -> list[Person]:
-    """The people of some files; nothing is analysed or written.
-
-    Args:
-        sources: the files.
-        way: how to read them.
-        output: a log (.mcap) for one person, or a folder for a log of each; None for none.
-        only: the code of the one person who is wanted.
-
-    Raises:
-        InvalidValueError: as for `read_people`, or not one person for one log.
-        LogError: a log of something else in the place of one that would be written.
-    """
+    """The people of some files, and where their logs go: one log (.mcap), or a folder for a log of each."""
     people = [person for source in sources for person in _read(Path(source), way)]
     if only is not None:
         everybody, people = [delivered for delivered, _ in people], [one for one in people if one[0].subject == only]
         if not people:
-            raise InvalidValueError("no person has this code", got=only, expected=told_people(everybody))
+            raise InvalidValueError("no person has this code", got=only, expected=codes_of(everybody))
     paths = _paths([delivered for delivered, _ in people], output)
     found = [Person(delivered, path, made_of) for (delivered, made_of), path in zip(people, paths, strict=True)]
     for person in found:
@@ -153,11 +122,13 @@ def _paths(people: Sequence[Delivered], output: str | Path | None) -> list[Path 
         if len(people) > 1:
             raise InvalidValueError(
                 f"there are trials of {len(people)} people or days, and a log is of one",
-                got=told_people(people),
+                got=codes_of(people),
                 remedy="Name a folder with --output, or one of them with --only CODE.",
             )
         return [Path(output)]
-    stems = [_stem(one) for one in people]
+    codes = [re.sub(r"[^\w.-]+", "_", one.subject).strip("._") or "unnamed" for one in people]
+    days = [f"_day{one.visit.day}" if one.visit.day else "" for one in people]
+    stems = list(map(str.__add__, codes, days))
     twice = sorted({stem for stem in stems if stems.count(stem) > 1})
     if twice:
         raise InvalidValueError(
@@ -168,11 +139,6 @@ def _paths(people: Sequence[Delivered], output: str | Path | None) -> list[Path 
     return [Path(output) / f"{stem}.mcap" for stem in stems]
 
 
-def _stem(one: Delivered) -> str:
-    stem = re.sub(r"[^\w.-]+", "_", one.subject).strip("._") or "unnamed"
-    return f"{stem}_day{one.visit.day}" if one.visit.day else stem
-
-
 def is_there(person: Person) -> bool:
     """True if the log of a person is there already, of the same file, read and analysed in the same way."""
     if person.log is None or not log_exists(person.log):
@@ -181,17 +147,7 @@ def is_there(person: Person) -> bool:
 
 
 def analyse_person(person: Person, way: Way) -> Analysis:
-    """Analyse one person, and write their log if it has a place.
-
-    Args:
-        person: as `read_files` has found them.
-        way: how to analyse them.
-
-    Raises:
-        InvalidValueError: ISIs that are all the same.
-        LogError: the log cannot be written.
-        StrategyError: an unknown strategy or setting.
-    """
+    """Analyse one person, and write their log if it has a place."""
     delivered = person.delivered
     strategy = make_strategy(way.strategy, way.space or delivered.space(), way.seed, **way.settings)
     analysis = analysed(delivered, strategy, {ANALYSED_KEY: dict(person.made_of)})

@@ -6,13 +6,14 @@ import math
 import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Final
 
 from isiw.design import MOST_ISIS, DesignSpace
 from isiw.errors import InvalidValueError, LogError
 from isiw.existing.layout import ISI_UNITS_MS
 from isiw.findings import AMPLITUDE_MV, Kind
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.reader import read_session
 from isiw.log.schema import MOST_TRIALS
 from isiw.signals.limits import EMG_UNITS_MV, SignalLimits, implausible_scale
 from isiw.text.sanitize import counted
@@ -147,8 +148,11 @@ class Delivered:
         )
 
 
-def of_record(record: SessionRecord) -> Delivered:
-    """The trials of a log, as they count after what an operator said about them."""
+def read_log(path: str | Path) -> Delivered:
+    """The trials of a log, as they count after an operator's verdicts."""
+    record = read_session(path)
+    if record.losses:
+        raise LogError("the log is damaged, so that trials may be missing", got=str(path), remedy=f"{record.losses[0]}")
     header = record.header
     sweeps: dict[int, dict[str, Channel]] = {}
     for (number, name), channel in record.waveforms.items():
@@ -172,15 +176,7 @@ def renumbered(trials: Sequence[Trial]) -> TrialTable:
     return TrialTable(tuple(replace(trial, index=number) for number, trial in enumerate(trials)))
 
 
-def read_log(path: object) -> Delivered:
-    """The trials of a log at a path."""
-    record = read_session(str(path))
-    if record.losses:
-        raise LogError("the log is damaged, so that trials may be missing", got=str(path), remedy=f"{record.losses[0]}")
-    return of_record(record)
-
-
-def told_people(people: Sequence[Delivered]) -> str:
+def codes_of(people: Sequence[Delivered]) -> str:
     """People by their codes, in words, for a message."""
     names = [f"{one.subject or 'unnamed'}{f' day {one.visit.day}' if one.visit.day else ''}" for one in people]
     more = f" and {counted(len(names) - 5, 'more', 'more')}" if len(names) > 5 else ""

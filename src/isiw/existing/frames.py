@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import importlib
 import io
 import warnings
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
@@ -18,6 +17,7 @@ from isiw.existing.layout import COLUMNS, UNIT_WORDS, Layout, letters
 from isiw.existing.tables import is_missing
 from isiw.files import opened
 from isiw.lazy import pd, scipy
+from isiw.text.named_code import library
 
 TEXTS: Final = {".csv", ".tsv", ".txt", ".dat", ".tab"}
 WORKBOOKS: Final = {".xlsx", ".xlsm"}
@@ -120,8 +120,11 @@ def _table(rows: Rows, layout: Layout) -> pd.DataFrame:
     """Rows as a table: below the names, or below those that are stated."""
     if not rows and not layout.names:
         raise InvalidValueError("the file is empty, and no table that can be read", remedy="Is it the right one?")
-    names, body = ([*layout.names], rows) if layout.names else (_names(rows[0]), rows[1:])
-    units = [_unit_of(cell) for cell in body[0]] if body and not layout.names else []
+    head = layout.names or ["" if is_missing(cell) else str(cell).strip() for cell in rows[0]]
+    names, body = [*head], rows if layout.names else rows[1:]
+    below = body[0] if body and not layout.names else ()
+    words = [cell.strip().strip("[]()").casefold() if isinstance(cell, str) else "" for cell in below]
+    units = [UNIT_WORDS.get(word) for word in words]
     if any(units) and all(unit or is_missing(cell) for unit, cell in zip(units, body[0], strict=True)):
         names = [f"{name} ({unit})" if unit else name for name, unit in zip(names, units, strict=False)]
         body = body[1:]
@@ -130,14 +133,6 @@ def _table(rows: Rows, layout: Layout) -> pd.DataFrame:
     if all(len(row) == len(names) + 1 and str(row[0]) == str(n) for n, row in enumerate(body, 1)):
         body = [row[1:] for row in body]  # R numbers its rows without naming the column of these numbers
     return pd.DataFrame([_cells(row, names, number) for number, row in enumerate(body, 1)], columns=names)
-
-
-def _names(cells: Sequence[Any]) -> list[str]:
-    return ["" if is_missing(cell) else str(cell).strip() for cell in cells]
-
-
-def _unit_of(cell: Any) -> str | None:
-    return UNIT_WORDS.get(cell.strip().strip("[]()").casefold()) if isinstance(cell, str) else None
 
 
 def _cells(row: Sequence[Any], names: Sequence[str], number: int) -> list[Any]:
@@ -184,7 +179,7 @@ def _split(lines: Sequence[str], separator: str) -> Iterator[list[str]]:
 
 def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
     """The sheet that is named, or the only one with trials, or the first."""
-    extra("openpyxl")
+    library("openpyxl", "import")
     if not content.startswith(b"PK"):
         raise InvalidValueError(
             "this is no workbook that can be read, or one with a password",
@@ -246,11 +241,3 @@ def _of_vectors(arrays: Mapping[str, Any]) -> pd.DataFrame:
             remedy="Save vectors: save('P01.mat', 'isi_ms', 'mep_mv', '-v7').",
         )
     return pd.DataFrame({name: vector for name, vector in vectors.items() if len(vector) == longest})
-
-
-def extra(name: str) -> Any:
-    """A library of the extra `import`."""
-    try:
-        return importlib.import_module(name)
-    except ModuleNotFoundError as error:
-        raise ConfigError(f"{name} is not installed", remedy='Install it with: pip install "isiw[import]"') from error

@@ -81,9 +81,6 @@ class Layout(Checked):
         pulse_at_ms: of sweeps in MATLAB, how long after their first sample the pulse comes [ms].
         longest_isi_ms: the longest ISI of a recording; a pulse that comes later after a tap is TMS alone [ms].
         mep_window_ms: where the MEP of a recording is sought [ms after the pulse]; by default as in a session.
-
-    Raises:
-        InvalidValueError: an unknown reference, column, marker, channel or unit, or a number that is not positive.
     """
 
     reference: Reference | None = None
@@ -132,15 +129,7 @@ def read_layout(path: str | Path) -> Layout:
 
 
 def pairs_of(option: str, texts: Sequence[str]) -> dict[str, str]:
-    """The values of an option KEY=NAME, of each time that it is given.
-
-    Args:
-        option: what it is called.
-        texts: what was given.
-
-    Raises:
-        InvalidValueError: no KEY=NAME.
-    """
+    """The values of an option KEY=NAME, of each time that it is given."""
     parts = [text.partition("=") for text in texts]
     for text, (key, sign, name) in zip(texts, parts, strict=True):
         if not (key and sign and name):

@@ -28,7 +28,8 @@ def people_of(frame: pd.DataFrame, layout: Layout, source: str, name: str = "") 
     """The people of a table, in the order in which they come first; who has no code is called as the file is."""
     reference = required_reference(layout, source)
     columns = Columns.found(frame, layout, source)
-    rows = [row for row in range(columns.rows) if not _is_empty(columns, row)]
+    isi, mep = columns.of["isi"], columns.of["mep"]
+    rows = [n for n in range(columns.rows) if mep.number(n) is not None or isi.text(n) or columns.text("asked", n)]
     if not rows:
         raise InvalidValueError(f"{source} has no trials", remedy="Are the right columns named?")
     subjects = [columns.text("subject", row) for row in rows]
@@ -41,10 +42,6 @@ def people_of(frame: pd.DataFrame, layout: Layout, source: str, name: str = "") 
     visits = [(own, subject, day) for subject, theirs in people.items() for day, own in _days(columns, theirs).items()]
     visits.sort(key=lambda visit: visit[0][0])
     return [_person(columns, own, layout, reference, source, (subject, day), name) for own, subject, day in visits]
-
-
-def _is_empty(columns: Columns, row: int) -> bool:
-    return columns.number("mep", row) is None and not columns.of["isi"].text(row) and not columns.text("asked", row)
 
 
 def _days(columns: Columns, rows: Sequence[int]) -> dict[int | None, list[int]]:
@@ -193,7 +190,6 @@ def _require_ascending(columns: Columns, rows: Sequence[int], source: str) -> No
 
 
 def _created(columns: Columns, row: int) -> str:
-    """When a person's first trial was, if the file says so."""
     column = columns.of.get("date")
     if column is None or not column.text(row):
         return ""

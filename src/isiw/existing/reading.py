@@ -1,7 +1,4 @@
-"""Whatever a lab has its trials in, a table, a recording, a log or a data frame in memory, as the people in it.
-
-A recording may also be columns of a text file, or sweeps in arrays of MATLAB: a layout says what each of them holds.
-"""
+"""Tables, recordings, logs and data frames of a lab, as the people whose trials they hold."""
 
 from __future__ import annotations
 
@@ -154,7 +151,6 @@ def _of_columns(frame: pd.DataFrame, layout: Layout, subject: str, source: str) 
 
 
 def _numbers(frame: pd.DataFrame, name: str, layout: Layout, source: str) -> FloatArray:
-    """A column of numbers."""
     cells = frame[name]
     few = {name: Column(name, cells.iloc[:1000].tolist(), of=source)}
     if not pd.api.types.is_numeric_dtype(cells) and with_decimals(few, layout.decimal)[name].decimal == ",":

@@ -14,13 +14,14 @@ import numpy as np
 
 from isiw.errors import InvalidValueError
 from isiw.existing.delivered import Delivered, renumbered
-from isiw.existing.frames import extra, reading
+from isiw.existing.frames import reading
 from isiw.existing.layout import Layout
 from isiw.existing.people import anywhere, required_reference
 from isiw.existing.tables import isis_of
 from isiw.lazy import pd
 from isiw.signals.judgement import judge
 from isiw.signals.limits import EMG_UNITS_MV, SignalLimits
+from isiw.text.named_code import library
 from isiw.trials import Channel, Stimulus, Sweep, Trial
 from isiw.types import FloatArray, Reference
 
@@ -54,7 +55,7 @@ class Recording:
 
 def read_recording(path: Path, layout: Layout, subject: str) -> Delivered:
     """The trials of a recording of one person."""
-    mne, is_epochs = extra("mne"), re.search(r"epo\.fif(\.gz)?$", path.name)
+    mne, is_epochs = library("mne", "import"), re.search(r"epo\.fif(\.gz)?$", path.name)
     read = mne.read_epochs if is_epochs else partial(mne.io.read_raw, preload=True)
     remedy = "Are all of its files in one folder, and is it continuous?"
     with reading(path, "the recording cannot be read", remedy):
@@ -175,8 +176,7 @@ def _factor_mv(raw: Any, name: str, layout: Layout, source: str) -> float:
 
 
 def _annotated(raw: Any) -> pd.DataFrame:
-    """The annotations of a recording, or the events on its trigger channel."""
-    mne = extra("mne")
+    mne = library("mne", "import")
     rows = [
         {
             "name": str(each["description"]),

@@ -36,21 +36,13 @@ SHARED: Final = (
 
 @dataclass(frozen=True, eq=False)
 class StrategyRun:
-    """A strategy that was answered by recorded trials.
-
-    Args:
-        strategy: its name.
-        seed: the seed of the strategy and of the draws.
-        windows: what it reported after each trial.
-        far_ms: how far each answer was from the ISI that was asked [ms].
-        stopped: after how many trials it would have stopped; None if it did not.
-    """
+    """A strategy that was answered by recorded trials."""
 
     strategy: str
-    seed: int
-    windows: tuple[Window | None, ...]
-    far_ms: tuple[float, ...]
-    stopped: int | None
+    seed: int  # also of the draws
+    windows: tuple[Window | None, ...]  # after each trial
+    far_ms: tuple[float, ...]  # between each answer's ISI and the one that was asked
+    stopped: int | None  # after how many trials it would have stopped
 
 
 @dataclass(frozen=True, eq=False)

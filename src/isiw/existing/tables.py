@@ -83,13 +83,11 @@ class Column:
         else:
             value = float(cell) if isinstance(cell, Real) and not isinstance(cell, bool) else math.nan
         if not math.isfinite(value):
-            raise self.refused(row, "is no number", self._remedy(cell))
+            usual = "Correct it, leave the cell empty, or name another column: --column KEY=NAME."
+            is_comma = isinstance(cell, str) and "," in cell and self.decimal != ","
+            remedy = "If the comma is a decimal sign, say --decimal ," if is_comma else usual
+            raise self.refused(row, "is no number", remedy)
         return value if factor == 1.0 else value * factor
-
-    def _remedy(self, cell: Any) -> str:
-        if isinstance(cell, str) and "," in cell and self.decimal != ",":
-            return "If the comma is a decimal sign, say --decimal ,"
-        return "Correct it, leave the cell empty, or name another column: --column KEY=NAME."
 
     def flag(self, row: int) -> bool | None:
         """True if the cell of a row says yes; None if it is empty."""

@@ -116,7 +116,6 @@ def _write_run(stem: Path, run: Run, onsets_s: Mapping[int, float], part: Part) 
 
 
 def _task(first: StimulusWords) -> dict[str, Any]:
-    """The task of a session."""
     given = f"{first.given[0].upper()}{first.given[1:]}"
     return {
         "TaskName": TASK,
@@ -161,7 +160,12 @@ def _write_heads(folder: Path, parts: Sequence[Part], lacking: Iterable[str]) ->
             "GeneratedBy": [{"Name": "isiw", "Version": isiw.__version__}],
         },
     )
-    write_output(folder / "README", _readme(parts, lacking).encode())
+    simulated = sum(part.record.header.device.simulated for part in parts)
+    missing = [f"{part}: {loss}" for part in parts for loss in log_losses(part.record)]
+    said = "\n".join(f"- {one_line(each)}" for each in [*missing, *lacking] or ["nothing"])
+    given = stimulus_of(parts).given
+    text = _README.format(sessions=len(parts), simulated=simulated, given=given, lacking=said)
+    write_output(folder / "README", text.encode())
 
 
 def _write_behaviour(folder: Path, parts: Sequence[Part]) -> None:
@@ -175,14 +179,6 @@ def _write_behaviour(folder: Path, parts: Sequence[Part]) -> None:
 
 def _behaviour(first: StimulusWords) -> dict[str, Any]:
     return _task(first) | _described({"trial": ("", "its number"), **trial_columns(first)})
-
-
-def _readme(parts: Sequence[Part], lacking: Iterable[str]) -> str:
-    simulated = sum(part.record.header.device.simulated for part in parts)
-    missing = [f"{part}: {loss}" for part in parts for loss in log_losses(part.record)]
-    said = "\n".join(f"- {one_line(each)}" for each in [*missing, *lacking] or ["nothing"])
-    given = stimulus_of(parts).given
-    return _README.format(sessions=len(parts), simulated=simulated, given=given, lacking=said)
 
 
 def _name(part: Part) -> str:

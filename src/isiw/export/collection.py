@@ -93,10 +93,7 @@ def _changed(record: SessionRecord, person: _Person) -> SessionRecord:
 
 
 def once_each(records: Sequence[SessionRecord]) -> tuple[list[SessionRecord], list[str]]:
-    """Each session once, from the log that tells of most of it, and a sentence for each log that is left out.
-
-    Copies that went on differently are kept: with other stimuli, or, if nothing is lost, with other verdicts.
-    """
+    """Each session once, from its fullest log, and a sentence for each log left out; copies that differ later stay."""
     kept: list[SessionRecord] = []
     left_out = []
     for record in sorted(records, key=_told, reverse=True):
@@ -111,12 +108,7 @@ def once_each(records: Sequence[SessionRecord]) -> tuple[list[SessionRecord], li
 
 @dataclass(frozen=True, eq=False)
 class _Copy:
-    """A log beside another one that says the same at its beginning.
-
-    Args:
-        record: what the log tells.
-        fuller: what the other one tells, which is no less.
-    """
+    """A log beside a fuller one, or one as full, that says the same at its beginning."""
 
     record: SessionRecord
     fuller: SessionRecord
@@ -131,14 +123,9 @@ class _Copy:
         """True if the fuller log stands for it."""
         if not self.alone:
             return True
-        has_lost = _lacks(self.record) or _lacks(self.fuller)
-        return _of_same_stimuli(self.record, self.fuller) and (has_lost or not self._has_verdicts_alone)
-
-    @property
-    def _has_verdicts_alone(self) -> bool:
-        """True if an operator said something about its trials that the fuller log does not know of."""
-        known = self.fuller.events
-        return any(event.kind in VERDICTS and event not in known for event in self.record.events)
+        has_lost, known = _lacks(self.record) or _lacks(self.fuller), self.fuller.events
+        has_verdicts_alone = any(event.kind in VERDICTS and event not in known for event in self.record.events)
+        return _of_same_stimuli(self.record, self.fuller) and (has_lost or not has_verdicts_alone)
 
     @property
     def is_gone_on_from(self) -> bool:
@@ -159,11 +146,11 @@ def _told(record: SessionRecord) -> tuple[int | bool, ...]:
     """The amount that a log tells of a session, the weightiest part first; a whole and closed one before its like."""
     outcomes = len(record.table) - len(_unknown(record))
     verdicts = sum(event.kind in VERDICTS for event in record.events)
-    believed = {estimate.trial for estimate in record.estimates}
+    estimated = {estimate.trial for estimate in record.estimates}
     return (
         outcomes,
         verdicts,
-        len(record.waveforms) + len(believed),
+        len(record.waveforms) + len(estimated),
         len(record.history),
         not _lacks(record),
         record.finished,
@@ -210,13 +197,7 @@ def _names(one: SessionRecord, other: SessionRecord) -> tuple[str, str]:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """One session of an export.
-
-    Args:
-        subject: the person's code.
-        session: the number of the person's session, such as "01".
-        record: what the log says.
-    """
+    """One session of an export: the person's code, and its number of the person's sessions, such as "01"."""
 
     subject: str
     session: str
@@ -241,7 +222,9 @@ def read_logs(source: str | Path) -> tuple[list[SessionRecord], list[str]]:
         return [read_session(source)], []
     records: dict[str, SessionRecord] = {}
     left_out = []
-    for file in _files_of(Path(source)):
+    files = (file for file in Path(source).rglob("*.mcap*") if file.is_file())
+    logs = (file for file in files if file.suffix in {".mcap", ".part"} or kept_for(file) is not None)
+    for file in sorted(logs):
         try:
             record = read_salvaged(salvage_file(file))
         except LogError as error:
@@ -257,17 +240,8 @@ def read_logs(source: str | Path) -> tuple[list[SessionRecord], list[str]]:
     return kept, left_out + copies
 
 
-def _files_of(folder: Path) -> list[Path]:
-    """Its logs: finished ones, unfinished ones, and what was kept of damaged ones."""
-    files = (file for file in folder.rglob("*.mcap*") if file.is_file())
-    return sorted(file for file in files if file.suffix in {".mcap", ".part"} or kept_for(file) is not None)
-
-
 def numbered(records: Iterable[SessionRecord]) -> list[Part]:
-    """Sessions with their person's code and their number, in the order in which they were begun.
-
-    People without a code cannot be told apart, so each of their sessions is taken for another person's.
-    """
+    """Sessions with person and number, as they were begun; each without a code is taken for another person's."""
     sessions: Counter[str] = Counter()
     unnamed = (f"unnamed{number}" for number in itertools.count(1))
     parts = []

@@ -1,8 +1,6 @@
-"""The sweeps of a session as BIDS has EMG: one behind the other in a BDF file, with what was when in each.
+"""The sweeps of a session as BIDS has EMG: end to end in a BDF file ("epoched"), with what was when in each.
 
-Sweeps are separate stretches with seconds between them. They are written as BIDS calls "epoched": end to end, so that
-nothing is made up for the time between, and the events' onsets are times in the file. Sweeps of different channels,
-rates or lengths are different runs.
+Nothing is made up for the seconds between them. Sweeps of different channels, rates or lengths are different runs.
 """
 
 from __future__ import annotations
@@ -16,8 +14,8 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from isiw.errors import ConfigError
 from isiw.log.reader import SessionRecord
+from isiw.text.named_code import library
 from isiw.text.stimuli import TAP, StimulusWords, meanings
 from isiw.trials import Channel, Stimulus, Trial
 from isiw.types import FloatArray
@@ -65,21 +63,13 @@ class Layout(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """Sweeps of one layout.
-
-    Args:
-        layout: rate [Hz], samples of a sweep, and names and units of the channels.
-        trials: whose sweeps they are.
-        starts_ms: the first sample of each, on the sweep's own clock [ms].
-        values: the samples of each channel, the sweeps end to end, shape (trials · samples,) each.
-        first: what the conditioning stimulus is called.
-    """
+    """Sweeps of one layout, end to end: (trials · samples,) for each channel."""
 
     layout: Layout
     trials: tuple[Trial, ...]
-    starts_ms: tuple[float, ...]
+    starts_ms: tuple[float, ...]  # the first sample of each, on the sweep's own clock
     values: tuple[FloatArray, ...]
-    first: StimulusWords = TAP
+    first: StimulusWords = TAP  # what the conditioning stimulus is called
 
     @property
     def sweep_s(self) -> float:
@@ -156,7 +146,6 @@ def runs(record: SessionRecord) -> tuple[list[Run], list[str]]:
 
 
 def _lost(record: SessionRecord, number: int) -> Trial:
-    """The trial whose record is lost."""
     commanded = {intent.trial: (intent.isi_ms, intent.tap_alone) for intent in record.intents}
     return Trial.unknown(Stimulus(number, *commanded.get(number, (None, False))))
 
@@ -203,10 +192,7 @@ def _sentences(left_out: Mapping[tuple[str, bool], Sequence[int]]) -> list[str]:
 
 def bdf(run: Run) -> bytes:
     """A BDF file of the sweeps, end to end; the last sample is repeated if the last record needs filling."""
-    try:
-        import edfio  # noqa: PLC0415 - an extra
-    except ImportError as error:
-        raise ConfigError("EMG-BIDS needs edfio", remedy='Install it: pip install "isiw[bids]".') from error
+    edfio = library("edfio", "bids")
     samples = _record_samples(run.layout.rate_hz, run.layout.samples) or run.layout.samples
     duration_s = round(samples / run.layout.rate_hz, 6)
     labels, filled = _labels(run.layout), [np.pad(x, (0, -len(x) % samples), mode="edge") for x in run.values]
@@ -226,10 +212,7 @@ def _signal(kind: Callable[..., BdfSignal], values: FloatArray, rate_hz: float, 
 
 
 def _record_samples(rate_hz: float, sweep: int) -> int | None:
-    """The number of samples in a record of the file: a sweep's, or few; its duration must be written in eight digits.
-
-    None if no duration that can be written holds a whole number of samples.
-    """
+    """Samples in a record of the file, whose duration must be written in eight digits; None if that cannot be."""
     rate = Fraction(rate_hz).limit_denominator(1000)
     if abs(float(rate) - rate_hz) > 1e-9 * rate_hz:
         return None

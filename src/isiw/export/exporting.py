@@ -80,8 +80,7 @@ def export_logs(source: str | Path, folder: str | Path, to: str = "csv", *, pseu
         source: the log or the folder.
         folder: a new folder.
         to: the format, one of `FORMATS`.
-        pseudonymise: whether people's codes and dates are replaced, and free texts left out; docs/export.md says what
-            exactly.
+        pseudonymise: replace people's codes and dates, and leave free texts out, as docs/export.md says.
 
     Raises:
         InvalidValueError: an unknown format, a folder with something in it, or people who could not be told apart.

@@ -78,7 +78,9 @@ def write_tables(parts: Sequence[Part], folder: Path, suffix: str) -> None:
     first = stimulus_of(parts)
     contents = {"sessions": session_columns(first), "trials": {"trial": ("", "its number"), **trial_columns(first)},
                 "events": EVENT_COLUMNS}  # fmt: skip
-    tables = {"sessions": _sessions(parts), "trials": all_trials(parts), "events": _events(parts)}
+    facts = [part.whose | session_facts(part.record) for part in parts]
+    sessions = pd.DataFrame(facts, columns=[*_WHOSE, *contents["sessions"]]).astype({"day": "Int64"})
+    tables = {"sessions": sessions, "trials": all_trials(parts), "events": _events(parts)}
     meanings = [
         (table, name, unit, meaning)
         for table, columns in contents.items()
@@ -109,11 +111,6 @@ def all_trials(parts: Sequence[Part]) -> pd.DataFrame:
     frames = [part.record.trials.rename_axis("trial").reset_index().assign(**part.whose) for part in parts]
     table = pd.concat(frames, ignore_index=True).astype(dict.fromkeys(_WHOSE, object))
     return table[[*_WHOSE, *(name for name in table.columns if name not in _WHOSE)]]
-
-
-def _sessions(parts: Sequence[Part]) -> pd.DataFrame:
-    rows = [part.whose | session_facts(part.record) for part in parts]
-    return pd.DataFrame(rows, columns=[*_WHOSE, *session_columns(stimulus_of(parts))]).astype({"day": "Int64"})
 
 
 def _events(parts: Iterable[Part]) -> pd.DataFrame:

@@ -35,21 +35,13 @@ EXCLUDED_AT = 0.9
 
 @dataclass(frozen=True, eq=False)
 class Runs:
-    """Sampled windows as runs of ISIs next to each other, sample by sample.
+    """Sampled windows as runs of ISIs next to each other, sample by sample."""
 
-    Args:
-        sample: which sample each run is of, ascending, shape (r,).
-        first: index of its first ISI, shape (r,).
-        behind: index behind its last, shape (r,).
-        samples: how many samples there are.
-        points: how many ISIs.
-    """
-
-    sample: IntArray
-    first: IntArray
-    behind: IntArray
+    sample: IntArray  # which sample each run is of, ascending, (r,)
+    first: IntArray  # index of its first ISI, (r,)
+    behind: IntArray  # index behind its last, (r,)
     samples: int
-    points: int
+    points: int  # how many ISIs
 
     @classmethod
     def of_masks(cls, masks: Tensor) -> Runs:
@@ -135,15 +127,10 @@ def profile_grid(space: DesignSpace) -> Tensor:
 
 
 class SampledProfiles(NamedTuple):
-    """Sampled profiles of one person.
+    """Sampled profiles of one person."""
 
-    Args:
-        mep_mv: expected MEP at the ISIs of `profile_grid` [mV], shape (s, t).
-        baseline_mv: expected MEP without a tap [mV], shape (s,).
-    """
-
-    mep_mv: Tensor
-    baseline_mv: Tensor
+    mep_mv: Tensor  # expected at the ISIs of `profile_grid`, (s, t)
+    baseline_mv: Tensor  # expected without a tap, (s,)
 
     @property
     def excess_mv(self) -> Tensor:

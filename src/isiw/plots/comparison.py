@@ -71,7 +71,12 @@ def prior_figure(table: pd.DataFrame) -> Figure:
     figure = Figure(figsize=(2.8 * _COLUMNS, 0.5 + 1.9 * lines), layout="constrained")
     panels = list(figure.subplots(lines, _COLUMNS, squeeze=False).flat)
     for axes, (name, curve) in zip(panels, groups, strict=False):
-        _draw_quantity(axes, curve)
+        axes.fill_between(curve["value"], curve["built_in"], color=FAINT, alpha=0.4, lw=0, label="built-in")
+        axes.plot(curve["value"], curve["lab"], color=BLUE, lw=1.5, label="this lab")
+        if curve["logarithmic"].iloc[0]:
+            axes.set_xscale("log")
+        axes.set(ylim=(0, None), yticks=[])
+        tidied(axes)
         axes.set_title(str(name), fontsize=9, loc="left", color=INK)
     for axes in panels[len(groups) :]:
         axes.set_visible(False)
@@ -79,12 +84,3 @@ def prior_figure(table: pd.DataFrame) -> Figure:
         *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize=8, frameon=False
     )
     return figure
-
-
-def _draw_quantity(axes: Axes, curve: pd.DataFrame) -> None:
-    axes.fill_between(curve["value"], curve["built_in"], color=FAINT, alpha=0.4, lw=0, label="built-in")
-    axes.plot(curve["value"], curve["lab"], color=BLUE, lw=1.5, label="this lab")
-    if curve["logarithmic"].iloc[0]:
-        axes.set_xscale("log")
-    axes.set(ylim=(0, None), yticks=[])
-    tidied(axes)

@@ -1,7 +1,4 @@
-"""The picture of a session: profile with band, trials, window with intervals, and how the edges developed.
-
-Everything is drawn with matplotlib's object interface, so no display is needed and no global state is touched.
-"""
+"""The picture of a session: profile with band, trials, window with intervals, and how the edges developed."""
 
 from __future__ import annotations
 

@@ -107,10 +107,7 @@ def _name_f1_axes(axes: Axes) -> None:
 
 
 def draw_curve(axes: Axes, curve: pd.DataFrame, name: str, colour: str, marker: str = "o") -> None:
-    """The mean F1 of a strategy by trial with its 95 % band, and a dotted line at what it has before any trial.
-
-    A method without a belief is drawn from where it reports a window for anybody.
-    """
+    """Mean F1 by trial with its 95 % band, drawn from a method's first answer on, and dotted what it has before."""
     curve = _from_first_estimate(curve)
     axes.fill_between(curve["trial"], *_band(curve), color=colour, alpha=0.15, lw=0)
     axes.plot(curve["trial"], curve["f1"], color=colour, marker=marker, ms=4, lw=1.5, label=name)

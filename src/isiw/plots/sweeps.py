@@ -26,8 +26,6 @@ AT_REST_ROWS = 0.25
 
 
 class _Trace(NamedTuple):
-    """The EMG of a trial around its pulse."""
-
     trial: Trial
     times_ms: FloatArray
     emg_mv: FloatArray
@@ -42,10 +40,15 @@ def sweeps_figure(record: SessionRecord) -> Figure | None:
         return None
     figure = Figure(figsize=(7.2, 1.6 + min(7.4, 0.26 * len(traces))), layout="constrained")
     axes = figure.subplots()
-    largest_mv = _largest_mv(traces, record.header.signals.mep_window_ms)
-    axes.axvspan(*record.header.signals.mep_window_ms, color=GREEN, alpha=0.13, lw=0, label="MEP window")
+    first_ms, last_ms = record.header.signals.mep_window_ms
+    deflections = (np.abs(t.emg_mv[(t.times_ms >= first_ms) & (t.times_ms <= last_ms)]) for t in traces)
+    largest_mv = max([1e-3, *(float(size_mv.max(initial=0.0)) for size_mv in deflections)])
+    axes.axvspan(first_ms, last_ms, color=GREEN, alpha=0.13, lw=0, label="MEP window")
     axes.axvline(0, color=FAINT, lw=0.8, label="TMS pulse")
-    inside, rows_per_mv = _inside(record, traces), _rows_of_largest(traces) / largest_mv
+    isis_ms = [np.nan if trace.trial.isi_ms is None else trace.trial.isi_ms for trace in traces]
+    window = None if record.found is None else record.found.window
+    inside = np.zeros(len(traces), dtype=bool) if window is None else window.mask(isis_ms)
+    rows_per_mv = _rows_of_largest(traces) / largest_mv
     _draw_traces(axes, traces, inside, rows_per_mv, BLUE, "EMG, ISI inside the window")
     _draw_traces(axes, traces, ~inside, rows_per_mv, INK, "EMG, other trials")
     _draw_hits(axes, traces, record.header.stimulus.mark)
@@ -64,19 +67,6 @@ def _trace(trial: Trial, emg: Channel | None) -> _Trace | None:
         return None
     emg_mv = emg.values[near] * EMG_UNITS_MV[emg.unit]
     return _Trace(trial, times_ms[near], emg_mv - np.median(emg_mv))  # an amplifier's offset is no deflection
-
-
-def _largest_mv(traces: Sequence[_Trace], span_ms: tuple[float, float]) -> float:
-    """The largest deflection in the MEP window, in either direction."""
-    found = (t.emg_mv[(t.times_ms >= span_ms[0]) & (t.times_ms <= span_ms[1])] for t in traces)
-    return max([1e-3, *(float(np.abs(emg_mv).max(initial=0.0)) for emg_mv in found)])
-
-
-def _inside(record: SessionRecord, traces: Sequence[_Trace]) -> BoolArray:
-    """Which traces lie in the window that was found."""
-    window = None if record.found is None else record.found.window
-    isis = [np.nan if trace.trial.isi_ms is None else trace.trial.isi_ms for trace in traces]
-    return np.zeros(len(traces), dtype=bool) if window is None else window.mask(isis)
 
 
 def _rows_of_largest(traces: Sequence[_Trace]) -> float:

@@ -1,24 +1,5 @@
 """Priors learnt from earlier sessions: of a lab's own people, and of the same person another day."""
 
-from isiw.priors.days import DayToDay, after, moved, recalled
-from isiw.priors.differing import Difference, differences
-from isiw.priors.file import check_lab_output, load, read_lab_prior, write_lab_prior
-from isiw.priors.lab import LabPrior, LearntSession, compared, densities, learn
+import lazy_loader
 
-__all__ = [
-    "DayToDay",
-    "Difference",
-    "LabPrior",
-    "LearntSession",
-    "after",
-    "check_lab_output",
-    "compared",
-    "densities",
-    "differences",
-    "learn",
-    "load",
-    "moved",
-    "read_lab_prior",
-    "recalled",
-    "write_lab_prior",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

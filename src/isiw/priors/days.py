@@ -1,9 +1,8 @@
 """The same person another day: that day's posterior, widened by what changes from day to day.
 
-The window may have moved as a whole a little, or be anyone's (dissertation, appendix B). Electrodes lie elsewhere and
-thresholds change. The posterior is handed on as mixtures of normal laws, which are fitted to its particles.
-
-A logged session is recalled by having the particle model learn its trials once more.
+The window may have moved a little, or be anyone's (dissertation, appendix B), and electrodes and thresholds change.
+The next prior is mixtures of normal laws, fitted to the particles of a model that learns the session's trials once
+more.
 """
 
 from __future__ import annotations
@@ -36,18 +35,7 @@ TOLD_LOSSES: Final = 3
 
 
 def recalled(record: SessionRecord, prior: Prior, *, particles: int = 1000) -> ParticlePosterior:
-    """The posterior after a logged session; the hit delay is what its rig stated, or else what the prior says.
-
-    Args:
-        record: the session.
-        prior: the prior before it.
-        particles: how many particles.
-
-    Raises:
-        LogError: it has no accepted trial, or none with an MEP.
-        InvalidValueError: the prior's places count from another event than the session's ISIs, or are of a rig with
-            another hit delay.
-    """
+    """The posterior after a logged session; the hit delay is what its rig stated, or else what the prior says."""
     require_meps(record)
     model = ParticleModel(_of_rig(prior, record), particles=particles)
     if (limit_mv := record.header.detection_limit_mv) is not None:
@@ -94,10 +82,7 @@ def stated_hit_delay_ms(record: SessionRecord) -> tuple[float, float] | None:
 
 
 def too_far_apart_ms(records: Sequence[SessionRecord]) -> tuple[float, float] | None:
-    """The least and the largest stated hit delay [ms] if they are further apart than one rig's; else None.
-
-    From the valve command, the same window is as much later as a rig's taps are. Of ISIs from the impact it is None.
-    """
+    """The least and the largest stated hit delay [ms] if they are not of one rig; None of ISIs from the impact."""
     stated_ms = [stated_hit_delay_ms(record) for record in records if record.header.space.reference == "valve"]
     means_ms = [mean_ms for mean_ms, _ in filter(None, stated_ms)]
     if not means_ms or max(means_ms) - min(means_ms) <= MOST_APART_MS:
@@ -137,9 +122,6 @@ class DayToDay(Checked):
         x50_sd_pct: SD of the change of the input without a tap [% RMT].
         floor_log_sd: SD of the change of the EMG floor, natural log.
         p_other: probability that, beyond these changes, the rest of a person is anyone's.
-
-    Raises:
-        InvalidValueError: an invalid probability or SD.
     """
 
     p_stays: Annotated[float, partial(share, least=0, below=1)] = 0.7
@@ -199,9 +181,8 @@ def moved(first: SessionRecord, second: SessionRecord, law: DayToDay | None = No
 
     Raises:
         LogError: a session without an accepted trial.
-        InvalidValueError: sessions of different people, the same twice, or the later one first; sessions that count
-            ISIs from different events, or are of rigs with different hit delays, muscles or intensities, or one in
-            which there is probably no window.
+        InvalidValueError: sessions of different people, events, hit delays, muscles or intensities, the same twice, the
+            later one first, or one in which there is probably no window.
     """
     _require_days_of_one_person((first, second))
     earlier = recalled(first, Prior())

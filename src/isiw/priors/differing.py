@@ -37,11 +37,9 @@ class Difference:
         first: the session that it is compared to.
         second: the other one.
         same_person: whether both have the same person's code.
-        starts_later: probability that the second window starts later, given a window in each; .5 if nothing is
-            known, None if nothing can be said.
+        starts_later: probability that the second window starts later, given both; None if nothing can be said.
         ends_later: the same of its end.
-        moved: of the same person, how probable it is that the window moved, beyond the usual shift from day to day;
-            None if it cannot be said.
+        moved: probability that the same person's window moved by more than the usual shift; None if nobody can say.
         obstacle: why something cannot be said, or says less than it seems to.
     """
 

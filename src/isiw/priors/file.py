@@ -33,15 +33,7 @@ def write_lab_prior(lab: LabPrior, path: str | Path, *, overwrite: bool = False)
 
 
 def check_lab_output(path: str | Path, *, overwrite: bool = False) -> None:
-    """Check that `write_lab_prior` may write a file; for whoever has long work to do before.
-
-    Args:
-        path: where to.
-        overwrite: whether to replace a lab's prior that is there.
-
-    Raises:
-        InvalidValueError: there is a file that is not to be replaced, or is something else than a lab's prior.
-    """
+    """Check that `write_lab_prior` may write a file; for whoever has long work to do before."""
     check_output(path, overwrite=overwrite)
     kept: dict[str, Any] = {}
     with suppress(ConfigError):

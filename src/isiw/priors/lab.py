@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Final, NamedTuple, TypeVar
+from typing import Annotated, Any, Final, TypeVar
 
 import numpy as np
 
@@ -65,21 +65,13 @@ _EACH_KIND: Final = "Learn a prior from each kind of session."
 
 @dataclass(frozen=True)
 class LearntSession(Checked):
-    """A session that was learnt from.
+    """A session that was learnt from."""
 
-    Args:
-        sha256: hash of its log's bytes.
-        subject: the person's identifier in it.
-        trials: how many accepted trials it has.
-        simulated: whether its device was a simulated one.
-        muscle: whose EMG was recorded, as the session notes it.
-    """
-
-    sha256: str
+    sha256: str  # of its log's bytes
     subject: str
     trials: Annotated[int, partial(whole, least=1, most=MOST_OF_A_KIND)]
     simulated: bool = False
-    muscle: str = ""
+    muscle: str = ""  # as the session notes it
 
 
 @dataclass(frozen=True)
@@ -132,11 +124,7 @@ class LabPrior(Checked):
         return next((session.muscle for session in self.sessions if session.muscle), "")
 
     def joined(self, usual: Prior | None = None) -> Prior:
-        """A prior in which the lab's laws stand beside those of people in general.
-
-        Args:
-            usual: the prior of people in general; by default the built-in one.
-        """
+        """A prior in which the lab's laws stand beside those of people in general, by default the built-in ones."""
         usual = usual or Prior()
         own = usual.profile if self.place is None else usual.profile.after(self.place.conditioning)
         profile = replace(own, p_window=self.p_window, shapes=self.shapes, places=_given(self.place))
@@ -175,9 +163,8 @@ def learn(
         on_done: called after each session.
 
     Raises:
-        LogError: no list, no log in it, one that cannot be read or has no MEP, the same log or person
-            twice, or sessions that count ISIs from different events, or are of rigs with different hit delays or of
-            different conditioning stimuli, muscles or intensities, or of which some are simulated and others are not.
+        LogError: no list, no log in it, one that cannot be read or has no MEP, the same log or person twice, or
+            sessions of different events, hit delays, conditioning stimuli, muscles or intensities, or some simulated.
         DamagedLogError: a log is damaged.
         InvalidValueError: a seed that is no whole number from 0 on.
     """
@@ -290,25 +277,21 @@ DRAWN: Final = 20_000
 POINTS: Final = 120
 
 
-class _Quantity(NamedTuple):
-    latent: str
-    logarithmic: bool = True
-
-
-QUANTITIES: Final = {
-    "start [ms]": _Quantity("start_ms", logarithmic=False),
-    "width [ms]": _Quantity("log_width_ms"),
-    "EMG floor [mV]": _Quantity("log_floor_mv"),
-    "SD of the log floor": _Quantity("log_floor_sd"),
-    "largest MEP / floor": _Quantity("log_ceiling"),
-    "slope [1 / % RMT]": _Quantity("log_slope"),
-    "noise on the input": _Quantity("log_input_sd"),
-    "noise on the output": _Quantity("log_sigma_y"),
-    "boost [% RMT]": _Quantity("log_boost"),
-    "input at rest [% RMT]": _Quantity("rest", logarithmic=False),
-    "gain / floor": _Quantity("log_gain"),
-    "CV": _Quantity("log_cv"),
+QUANTITIES: Final[Mapping[str, tuple[str, bool]]] = {
+    "start [ms]": ("start_ms", False),
+    "width [ms]": ("log_width_ms", True),
+    "EMG floor [mV]": ("log_floor_mv", True),
+    "SD of the log floor": ("log_floor_sd", True),
+    "largest MEP / floor": ("log_ceiling", True),
+    "slope [1 / % RMT]": ("log_slope", True),
+    "noise on the input": ("log_input_sd", True),
+    "noise on the output": ("log_sigma_y", True),
+    "boost [% RMT]": ("log_boost", True),
+    "input at rest [% RMT]": ("rest", False),
+    "gain / floor": ("log_gain", True),
+    "CV": ("log_cv", True),
 }
+"""The latent that each is, and if that is a logarithm."""
 
 
 def compared(lab: LabPrior) -> pd.DataFrame:
@@ -330,7 +313,7 @@ def densities(lab: LabPrior) -> pd.DataFrame:
         of the logarithm if it is.
     """
     usual, own = _drawn(lab)
-    return pd.concat([_density(name, quantity, usual, own) for name, quantity in QUANTITIES.items()], ignore_index=True)
+    return pd.concat([_density(name, usual, own) for name in QUANTITIES], ignore_index=True)
 
 
 def _drawn(lab: LabPrior) -> list[dict[str, FloatArray]]:
@@ -350,8 +333,9 @@ def _range(values: FloatArray, *, log: bool) -> list[float]:
     return shown
 
 
-def _density(name: str, quantity: _Quantity, usual: dict[str, FloatArray], own: dict[str, FloatArray]) -> pd.DataFrame:
-    both = [usual[quantity.latent], own[quantity.latent]]
+def _density(name: str, usual: dict[str, FloatArray], own: dict[str, FloatArray]) -> pd.DataFrame:
+    latent, logarithmic = QUANTITIES[name]
+    both = [usual[latent], own[latent]]
     low, high = np.quantile(np.concatenate(both), [0.002, 0.998])
     edges = np.linspace(low, high, POINTS + 1)
     middle = 0.5 * (edges[1:] + edges[:-1])
@@ -359,5 +343,5 @@ def _density(name: str, quantity: _Quantity, usual: dict[str, FloatArray], own: 
         whose: np.histogram(values, edges)[0] / (len(values) * np.diff(edges))
         for whose, values in zip(("built_in", "lab"), both, strict=True)
     }
-    shown = np.exp(middle) if quantity.logarithmic else middle
-    return pd.DataFrame({"quantity": name, "value": shown, "logarithmic": quantity.logarithmic, **columns})
+    shown = np.exp(middle) if logarithmic else middle
+    return pd.DataFrame({"quantity": name, "value": shown, "logarithmic": logarithmic, **columns})

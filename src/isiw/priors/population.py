@@ -1,9 +1,8 @@
 """A hierarchical law of a lab's people, learnt from the posterior particles of their sessions.
 
-A person's likelihood under a law is the mean over their particles of the law's density over that of the prior that
-the particles were drawn with, so that no session is run again for it. In each block of latents a person is one of the
-lab's, of whom the law is normal, or comes from that prior like anyone: an odd one does not bend the law. Gibbs sampling
-draws laws, memberships and particles in turn; what is kept is the next person's law, wider the fewer people there are.
+A person's likelihood under a law is the mean over their particles of its density over that of their prior, so that no
+session is run again. In each block of latents a person is of the lab's normal law, or an outsider of that prior, who
+does not bend it. Gibbs sampling gives the next person's law, wider the fewer people there are.
 """
 
 from __future__ import annotations
@@ -105,31 +104,19 @@ KINDS_WEIGHT: Final = 1.0
 
 
 class LatentBlock(NamedTuple):
-    """One block of latents of the people's particles.
+    """One block of latents of the people's particles."""
 
-    Args:
-        values: the latents, shape (n, i, d).
-        log_density: under the prior that the particles were drawn with, shape (n, i).
-        used: whether they mean anything to the particle, shape (n, i).
-    """
-
-    values: FloatArray
-    log_density: FloatArray
-    used: BoolArray
+    values: FloatArray  # (n, i, d)
+    log_density: FloatArray  # under the prior that the particles were drawn with, (n, i)
+    used: BoolArray  # they mean anything to the particle, (n, i)
 
 
 class HyperPrior(NamedTuple):
-    """The prior of a block's law, fields of shape (d,).
-
-    Args:
-        mean: where the law's mean is expected.
-        mean_sd: SD of the same from lab to lab.
-        sd: the usual SD over its people.
-    """
+    """The prior of a block's law, fields of shape (d,)."""
 
     mean: FloatArray
-    mean_sd: FloatArray
-    sd: FloatArray
+    mean_sd: FloatArray  # from lab to lab
+    sd: FloatArray  # the usual one over a lab's people
 
 
 @dataclass(frozen=True, eq=False)

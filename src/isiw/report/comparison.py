@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from isiw import sentences
 from isiw.estimate import Edge, Estimate
@@ -36,17 +35,16 @@ def comparison_table(records: Sequence[SessionRecord]) -> str:
 
 def comparison_rows(records: Sequence[SessionRecord]) -> list[tuple[str, ...]]:
     """The cells of that table, a row a session; empty if nothing is known."""
-    return [_row(number, record) for number, record in enumerate(records, start=1)]
-
-
-def _row(number: int, record: SessionRecord) -> tuple[str, ...]:
-    header, last = record.header, record.found
-    begun, told = header.created[:16].replace("T", " "), len(record.table.told)
-    who = (str(number), one_line(header.subject) or "unnamed", begun, str(told))
-    if last is None:
-        return (*who, "–", sentences.TOO_LITTLE, "", "")
-    chance = "–" if last.probability is None else f"{last.probability:.2f}"
-    return (*who, chance, sentences.in_short(last), *(_cell(last, edge) for edge in (last.start, last.end)))
+    rows: list[tuple[str, ...]] = []
+    for number, record in enumerate(records, start=1):
+        begun, last = record.header.created[:16].replace("T", " "), record.found
+        who = (str(number), one_line(record.header.subject) or "unnamed", begun, str(len(record.table.told)))
+        chance = "–" if last is None or last.probability is None else f"{last.probability:.2f}"
+        if last is None:
+            rows.append((*who, chance, sentences.TOO_LITTLE, "", ""))
+        else:
+            rows.append((*who, chance, sentences.in_short(last), _cell(last, last.start), _cell(last, last.end)))
+    return rows
 
 
 def _cell(estimate: Estimate, edge: Edge) -> str:
@@ -94,8 +92,7 @@ def save_comparison(
 
     Raises:
         ConfigError: jinja2 is not installed.
-        InvalidValueError: ISIs that count from different events, a path that is none of a page, or a file that is not
-            to be replaced.
+        InvalidValueError: ISIs from different events, a path that is none of a page, or a file not to be replaced.
     """
     return write_page(path, lambda: comparison_page(records, differences), overwrite=overwrite)
 
@@ -109,16 +106,15 @@ def comparison_page(records: Sequence[SessionRecord], differences: Sequence[Diff
         picture=inline_svg(comparison_figure(records, names), "comparison"),
         headings=HEADINGS,
         rows=comparison_rows(records),
-        sessions=[_session(record) for record in records],
+        sessions=[
+            {
+                "subject": record.header.subject or "an unnamed subject",
+                "log": record.path.name,
+                "findings": [*finding_sentences(record), *([sentences.JUDGED_SINCE] if record.is_judged_since else [])],
+                "counts": counts_sentence(record),
+                "facts": first_facts(record),
+            }
+            for record in records
+        ],
         losses=[f"{record.path.name}: {loss}" for record in records for loss in (*record.told_unread, *record.losses)],
     )
-
-
-def _session(record: SessionRecord) -> dict[str, Any]:
-    return {
-        "subject": record.header.subject or "an unnamed subject",
-        "log": record.path.name,
-        "findings": [*finding_sentences(record), *([sentences.JUDGED_SINCE] if record.is_judged_since else [])],
-        "counts": counts_sentence(record),
-        "facts": first_facts(record),
-    }

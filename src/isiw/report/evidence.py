@@ -104,7 +104,6 @@ def _tied(values: ArrayLike) -> FloatArray:
 
 
 def _beyond(standard_errors: float) -> float:
-    """The probability that a normal variable is larger."""
     return statistics.NormalDist().cdf(-standard_errors)
 
 

@@ -1,31 +1,26 @@
 """The report of a session: one page that needs no network, no server, and for reading it no JavaScript.
 
-What comes from a log is text in a page, whatever it holds.
-
-The pictures that are read and printed are drawn by `isiw.plots`; what is moved and clicked is drawn by plotly in the
-browser, from the numbers of `isiw.report.drawn`.
+What comes from a log is text in it. `isiw.plots` draws the pictures; plotly what is clicked, from `isiw.report.drawn`.
 """
 
 from __future__ import annotations
 
 import base64
 import hashlib
-import importlib
 from collections.abc import Callable, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any, Final
 
-from isiw.errors import ConfigError, InvalidValueError
+from isiw.errors import InvalidValueError
 from isiw.files import check_output, write_output
 from isiw.log.reader import SessionRecord, require_records
 from isiw.plots.session import session_figure
 from isiw.plots.style import inline_svg
 from isiw.plots.sweeps import sweeps_figure
 from isiw.plots.timeline import course_figure, timeline_figure
-from isiw.report.answers import answers
+from isiw.report.answers import answers, method_answers
 from isiw.report.drawn import drawn
-from isiw.report.methods import method_answers
 from isiw.report.tables import (
     counted_rows,
     event_rows,
@@ -38,6 +33,7 @@ from isiw.report.tables import (
 from isiw.report.words import finding_sentences, fit_sentence
 from isiw.sentences import JUDGED_SINCE
 from isiw.text import plain
+from isiw.text.named_code import library
 from isiw.window import Window
 
 _ASSETS: Final = resources.files("isiw.report") / "assets"
@@ -57,8 +53,7 @@ def save_report(
 
     Raises:
         ConfigError: plotly or jinja2 is not installed.
-        InvalidValueError: no record of a session, a path that is none of a page, or there is a file that is not to be
-            replaced.
+        InvalidValueError: no record of a session, a path that is none of a page, or a file not to be replaced.
     """
     return write_page(path, lambda: report_page(record, truth=truth), overwrite=overwrite)
 
@@ -75,12 +70,11 @@ def report_page(record: SessionRecord, *, truth: Window | None = None) -> str:
         InvalidValueError: no record of a session.
     """
     require_records((record,))
-    scripts = [library("plotly.offline").get_plotlyjs(), asset("draw.js"), asset("page.js")]
+    scripts = [library("plotly.offline", "report").get_plotlyjs(), asset("draw.js"), asset("page.js")]
     return rendered("page.html", scripts, pictures=_pictures(record, truth), **_contents(record))
 
 
 def _contents(record: SessionRecord) -> dict[str, Any]:
-    """The contents of the page, before it is laid out."""
     return {
         "subject": record.header.subject or "an unnamed subject",
         "states": _states(record),
@@ -135,7 +129,7 @@ def write_page(path: str | Path, page: Callable[[], str], *, overwrite: bool = F
 
 def rendered(template: str, scripts: Sequence[str] = (), **contents: Any) -> str:
     """A page; its policy lets no script run but these, and nothing be fetched."""
-    jinja2 = library("jinja2")
+    jinja2 = library("jinja2", "report")
     environment = jinja2.Environment(
         loader=jinja2.FunctionLoader(asset),
         autoescape=True,
@@ -158,14 +152,3 @@ def rendered(template: str, scripts: Sequence[str] = (), **contents: Any) -> str
 def asset(name: str) -> str:
     """A file of `assets`."""
     return (_ASSETS / name).read_text(encoding="utf-8")
-
-
-def library(name: str) -> Any:
-    """A library of the extra `report`."""
-    try:
-        return importlib.import_module(name)
-    except ModuleNotFoundError as error:
-        missing = name.partition(".")[0]
-        raise ConfigError(
-            f"{missing} is not installed", remedy='Install it with: pip install "isiw[report]"'
-        ) from error

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 
 from isiw.devices.limits import Limits
 from isiw.findings import Kind
-from isiw.log.headers import Header
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Event, Intent
 from isiw.sentences import asked, outcome
@@ -50,12 +49,18 @@ def first_facts(record: SessionRecord) -> list[Fact]:
 def further_facts(record: SessionRecord) -> list[Fact]:
     """The rest of what the log's header says: visit, ISIs, judgement, protocol."""
     header = record.header
-    groups = {
+    deadline_s = header.ask_deadline_s
+    loop = {
+        "protocol": header.protocol,
+        "deadline of a delivery": f"{header.timeout_s:g} s",
+        "deadline of a choice": "none" if deadline_s is None else f"{deadline_s:g} s",
+    }
+    groups: dict[str, Any] = {
         "visit": header.visit,
         "ISIs": header.space.told(header.stimulus),
         "tolerance": f"{header.space.tolerance_ms:g} ms",
         "judgement of a sweep": header.signals,
-        **({} if header.imported else _loop(header)),
+        **({} if header.imported else loop),
         "log": f"{record.path.name}, schema {header.schema_version}",
     }
     told = {name: value if isinstance(value, str) else _fields(value) for name, value in groups.items()}
@@ -65,15 +70,6 @@ def further_facts(record: SessionRecord) -> list[Fact]:
         "deadline of a choice": "ask_deadline_s",
     }
     return [Fact(name, _read(record, parts.get(name, name), value)) for name, value in told.items() if value]
-
-
-def _loop(header: Header) -> dict[str, Any]:
-    """The settings of the session's loop; an imported log had none."""
-    return {
-        "protocol": header.protocol,
-        "deadline of a delivery": f"{header.timeout_s:g} s",
-        "deadline of a choice": "none" if header.ask_deadline_s is None else f"{header.ask_deadline_s:g} s",
-    }
 
 
 def settings_facts(record: SessionRecord) -> list[Fact]:
@@ -181,7 +177,6 @@ def trial_row(trial: Trial, first: StimulusWords = TAP, measured: Measures | Non
 
 
 def _shape(measured: Measures | None) -> str:
-    """The measures of an MEP beside its amplitude."""
     if measured is None or math.isnan(measured.mep_onset_ms):
         return "–"
     silent_ms = measured.silent_period_ms

@@ -102,12 +102,18 @@ def fit_sentence(record: SessionRecord) -> str:
     return sentences.fit(len(troubled), len(record.table))
 
 
+def _lacks(record: SessionRecord, setting: str) -> bool:
+    """True if the strategy could have used a setting, and did not have it."""
+    recipe = record.header.strategy
+    if setting in recipe.settings or recipe.name not in list_strategies():
+        return False
+    return bool(known_settings(recipe.name, {setting: True}))
+
+
 def _unstated_hit_delay(record: SessionRecord) -> str:
     """That stimuli went into what the rig states, or could have stated, if the strategy could have used it."""
-    header, recipe = record.header, record.header.strategy
-    if header.space.reference != "valve" or "hit_delay_ms" in recipe.settings or not record.rests_on_data:
-        return ""
-    if recipe.name not in list_strategies() or not known_settings(recipe.name, {"hit_delay_ms": True}):
+    header = record.header
+    if header.space.reference != "valve" or not record.rests_on_data or not _lacks(record, "hit_delay_ms"):
         return ""
     if (stated_ms := header.device.hit_delay_ms) is not None:
         call = f"make_strategy(..., hit_delay_ms=({stated_ms[0]:g}, {stated_ms[1]:g}))"
@@ -121,10 +127,8 @@ def _unstated_hit_delay(record: SessionRecord) -> str:
 
 def _unstated_intensity(record: SessionRecord) -> str:
     """That the strategy did not know of the intensity that the visit states, where it could have."""
-    recipe, stated_pct = record.header.strategy, record.header.visit.intensity_pct_rmt
-    if stated_pct is None or "intensity_pct_rmt" in recipe.settings or recipe.name not in list_strategies():
-        return ""
-    if not known_settings(recipe.name, {"intensity_pct_rmt": stated_pct}):
+    stated_pct = record.header.visit.intensity_pct_rmt
+    if stated_pct is None or not _lacks(record, "intensity_pct_rmt"):
         return ""
     call = f"make_strategy(..., intensity_pct_rmt={stated_pct:g})"
     return f"The strategy does not know the intensity, and assumes about 90 % of RMT. Next time: {call}."

@@ -4,37 +4,6 @@
 it once more, and `summarise` says what it came to.
 """
 
-from isiw.studies.execution import DaskCluster, Failure, Processes
-from isiw.studies.plan import Study, StudyStrategy, Unit, load_study, run_unit
-from isiw.studies.players import Player
-from isiw.studies.running import Replay, conduct, paired_sessions, replay, run_study, unit_of_row
-from isiw.studies.sessions import SimulatedSession, play, simulate
-from isiw.studies.store import Store, begin_store, open_store
-from isiw.studies.summary import differences, means_table, summarise
+import lazy_loader
 
-__all__ = [
-    "DaskCluster",
-    "Failure",
-    "Player",
-    "Processes",
-    "Replay",
-    "SimulatedSession",
-    "Store",
-    "Study",
-    "StudyStrategy",
-    "Unit",
-    "begin_store",
-    "conduct",
-    "differences",
-    "load_study",
-    "means_table",
-    "open_store",
-    "paired_sessions",
-    "play",
-    "replay",
-    "run_study",
-    "run_unit",
-    "simulate",
-    "summarise",
-    "unit_of_row",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,14 +1,13 @@
-"""Where the work of a study is done: here, in local processes, or on a Dask cluster, behind one interface.
+"""Executors of a study's work: here, in local processes, or on a Dask cluster.
 
-An executor maps a function over items and gives each result as it is finished. What raises, and what takes its process
-down with it again and again, comes back as a `Failure` among the results: nothing ends the others.
+Each result comes when it is finished. What raises, or takes its process down again and again, is a `Failure` among
+them.
 """
 
 from __future__ import annotations
 
 import asyncio
 import ctypes
-import importlib
 import os
 import signal
 import threading
@@ -21,13 +20,14 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
 from itertools import islice
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from loky import ProcessPoolExecutor
 
 from isiw.checks import Checked, Count
 from isiw.errors import StudyError
 from isiw.lazy import torch
+from isiw.text.named_code import library
 
 
 @contextmanager
@@ -178,16 +178,17 @@ class DaskCluster:
         self, run: Callable[[_Item], _Result], items: Sequence[_Item]
     ) -> Generator[tuple[_Item, _Result | Failure], None, None]:
         """See `Executor`."""
-        dask = _distributed()
+        dask = library("distributed", "dask")
         with ExitStack() as stack:
             address = self.scheduler if isinstance(self.scheduler, str) else None
             client = self.scheduler if address is None else stack.enter_context(_client(dask, address))
-            running, held, suspects = dask.as_completed(loop=client.loop), dict[str, _HandedOut[_Item]](), list[_Item]()
+            running, suspects = dask.as_completed(loop=client.loop), list[_Item]()
+            held: dict[str, tuple[_Item, Any, int]] = {}  # items, their futures, and how often they were lost
             stack.callback(_cancel, client, held)
 
             def hand_out(item: _Item, losses: int = 0) -> None:
                 future = client.submit(_attempt_alone, run, item, pure=False)
-                held[future.key] = _HandedOut(item, future, losses)
+                held[future.key] = (item, future, losses)
                 running.add(future)
 
             for item in items:
@@ -196,7 +197,7 @@ class DaskCluster:
                 item, _, losses = held.pop(future.key)
                 if future.status == "error" and isinstance(future.exception(), dask.KilledWorker):
                     suspects.append(item)
-                elif not isinstance(result := _result_of(future, client), _Lost):
+                elif (result := _result_of(future, client)) is not _LOST:
                     yield item, result
                 elif losses + 1 < self.attempts:
                     hand_out(item, losses + 1)
@@ -207,26 +208,11 @@ class DaskCluster:
                 held.pop((future := next(running)).key)
                 result = _result_of(future, client)
                 lost = Failure("Its result was lost on the cluster.")
-                yield item, lost if isinstance(result, _Lost) else result
+                yield item, lost if result is _LOST else result
 
 
-class _HandedOut(NamedTuple, Generic[_Item]):
-    """An item that a Dask cluster works on."""
-
-    item: _Item
-    future: Any
-    losses: int
-
-
-class _Lost:
-    """A result that went down with the worker, or the cluster, that held it."""
-
-
-def _distributed() -> Any:
-    try:
-        return importlib.import_module("distributed")
-    except ModuleNotFoundError as error:
-        raise StudyError("Dask is not installed", remedy='Install it with: pip install "isiw[dask]"') from error
+_LOST = object()
+"""A result that went down with the worker, or the cluster, that held it."""
 
 
 def _client(dask: Any, address: str) -> Any:
@@ -238,9 +224,9 @@ def _client(dask: Any, address: str) -> Any:
         ) from error
 
 
-def _cancel(client: Any, held: Mapping[str, _HandedOut[Any]]) -> None:
+def _cancel(client: Any, held: Mapping[str, tuple[Any, Any, int]]) -> None:
     if client.status == "running":
-        client.cancel([each.future for each in held.values()])
+        client.cancel([future for _, future, _ in held.values()])
 
 
 def _result_of(future: Any, client: Any) -> Any:
@@ -251,7 +237,7 @@ def _result_of(future: Any, client: Any) -> Any:
     except (asyncio.CancelledError, CancelledError):
         if client.status != "running":  # nothing more will come
             raise StudyError("the Dask scheduler was lost", remedy="Run again: what is finished is kept.") from None
-        return _Lost()
+        return _LOST
 
 
 def _attempt(run: Callable[[_Item], _Result], item: _Item) -> _Result | Failure:
@@ -263,10 +249,7 @@ def _attempt(run: Callable[[_Item], _Result], item: _Item) -> _Result | Failure:
 
 
 def _serve(parent: int) -> None:
-    """Make this worker end with its parent, which runs the study, and not before it.
-
-    Nobody would fetch what it computes once the parent has died; a terminal's Ctrl-C is the parent's to obey.
-    """
+    """End this worker with its parent, who alone fetches what it computes, and not before, at a terminal's Ctrl-C."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def watch() -> None:

@@ -26,9 +26,8 @@ from isiw.errors import ConfigError, InvalidValueError
 from isiw.lazy import pd, torch
 from isiw.strategy.catalogue import settings_for
 from isiw.strategy.settings.common import settings_values
-from isiw.studies.batch import simulate_batch
 from isiw.studies.players import OWN, OwnCode
-from isiw.studies.sessions import OWN_STRATEGY, SimulatedSession, Stopping, require_cohorts, simulate
+from isiw.studies.sessions import OWN_STRATEGY, SimulatedSession, Stopping, require_cohorts, simulate, simulate_batch
 from isiw.text.toml_files import checked, read_toml
 
 _MOST_SEED: Final = 2**62
@@ -151,13 +150,11 @@ class Study(Checked):
         batch: how many people side by side.
         device: torch device of the batched engine, for the models that have one.
         amplitude: factor on all amplitudes of the people.
-        hit_delay: whether strategies that can use it get the hit delay as the rig states it (`"stated"`), or
-            nothing (`"unstated"`).
+        hit_delay: strategies that can use it get the hit delay as the rig states it (`"stated"`), or `"unstated"`.
         intensity: the same of the intensity, as the visit states it.
 
     Raises:
-        InvalidValueError: an invalid number or choice, a label given twice, or anything but names of cohorts and
-            strategies.
+        InvalidValueError: an invalid number or choice, a label given twice, or no name of a cohort or strategy.
     """
 
     strategies: tuple[StudyStrategy, ...]
@@ -276,7 +273,6 @@ def begun_study(values: Mapping[str, Any], source: str) -> Study:
 
 
 def _several(values: Any) -> tuple[Any, ...]:
-    """Several values, or one."""
     return tuple(values) if isinstance(values, Iterable) and not isinstance(values, str) else (values,)
 
 

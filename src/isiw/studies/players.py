@@ -1,7 +1,7 @@
-"""Who proposes ISIs in simulated sessions, to one person or to some side by side: strategies, and code of one's own.
+"""Players, which propose ISIs in simulated sessions: strategies, and code of one's own.
 
-One's own strategy, model or acquisition function is named as `module:function` in the operator's STUDY.toml. The
-folder of a study keeps only the checksum of that code, so that a folder from somebody else names nothing to import.
+The folder of a study keeps only the checksum of that code, so that a folder from somebody else names nothing to
+import.
 """
 
 from __future__ import annotations
@@ -79,65 +79,39 @@ class Crowd(Protocol):
 
 
 def alone(player: Player) -> Crowd:
-    """A player as a crowd of one; a strategy keeps its stopping rule, and says which asks and fits failed."""
-    return _StrategyAlone(player) if isinstance(player, Strategy) else _PlayerAlone(player)
+    """A player as a crowd of one."""
+    return _Alone(player)
 
 
 @dataclass(frozen=True)
-class _StrategyAlone:
-    """A strategy as a crowd of one."""
-
-    strategy: Strategy
-
-    @property
-    def stopping(self) -> StoppingRule:
-        return self.strategy.stopping
-
-    def ask(self) -> list[Choice]:
-        isi_ms = self.strategy.ask()
-        return [Choice(isi_ms, self.strategy.fallback_reason)]
-
-    def tell(self, responses: Sequence[Response]) -> None:
-        (told,) = responses
-        self.strategy.learn(told.isi_ms, told.mep_mv, isi_sd_ms=told.isi_sd_ms)
-
-    def count_mistrial(self, person: int, lost: Choice) -> Choice:
-        del person, lost
-        self.strategy.count_mistrial()
-        return self.ask()[0]
-
-    def estimate(self, person: int) -> Reported:
-        del person
-        return self.strategy.estimate()
-
-    def decision(self, person: int) -> StopDecision:
-        del person
-        return self.strategy.decision()
-
-    def trouble(self) -> bool:
-        return self.strategy.trouble is not None
-
-
-@dataclass(frozen=True)
-class _PlayerAlone:
-    """Any other player as a crowd of one: it has no stopping rule, and no fit that could fail."""
+class _Alone:
+    """A player as a crowd of one; a strategy has a stopping rule, and says which asks and fits failed."""
 
     player: Player
 
     @property
-    def stopping(self) -> None:
-        return None
+    def _strategy(self) -> Strategy | None:
+        return self.player if isinstance(self.player, Strategy) else None
+
+    @property
+    def stopping(self) -> StoppingRule | None:
+        return None if self._strategy is None else self._strategy.stopping
 
     def ask(self) -> list[Choice]:
-        return [Choice(self.player.ask())]
+        isi_ms = self.player.ask()
+        return [Choice(isi_ms, None if self._strategy is None else self._strategy.fallback_reason)]
 
     def tell(self, responses: Sequence[Response]) -> None:
-        (told,) = responses
-        self.player.tell(told.isi_ms, told.mep_mv, isi_sd_ms=told.isi_sd_ms)
+        (response,) = responses
+        learn = self.player.tell if self._strategy is None else self._strategy.learn
+        learn(response.isi_ms, response.mep_mv, isi_sd_ms=response.isi_sd_ms)
 
     def count_mistrial(self, person: int, lost: Choice) -> Choice:
         del person
-        return lost
+        if self._strategy is None:
+            return lost
+        self._strategy.count_mistrial()
+        return self.ask()[0]
 
     def estimate(self, person: int) -> Reported:
         del person
@@ -145,25 +119,19 @@ class _PlayerAlone:
 
     def decision(self, person: int) -> StopDecision:
         del person
-        return StopKind.OWN.go_on("The player has no stopping rule.")
+        return StopKind.OWN.go_on("There is no stopping rule.") if self._strategy is None else self._strategy.decision()
 
     def trouble(self) -> bool:
-        return False
+        return self._strategy is not None and self._strategy.trouble is not None
 
 
 @dataclass(frozen=True)
 class OwnCode:
-    """Code of a user's own that makes a strategy.
-
-    Args:
-        reference: where it is, as `module:function`; empty if only its checksum is known, as from a study's folder.
-        folder: where the module is looked for first; None for the installed packages.
-        checksum: the CRC-32 of the module's file, or of all of its package's.
-    """
+    """Code of a user's own that makes a strategy: a `module:function`, empty if only the checksum is known."""
 
     reference: str
-    folder: Path | None
-    checksum: str
+    folder: Path | None  # where the module is looked for first; None for the installed packages
+    checksum: str  # CRC-32 of the module's file, or of all of its package's
 
     @classmethod
     def named(cls, reference: str, folder: Path | None) -> OwnCode:

@@ -37,12 +37,15 @@ def conduct(
 
     Raises:
         InvalidValueError: something else than an executor.
-        StudyError: the folder is another study's or was begun with other code, is being run by another process, or
-            cannot be written, or the executor is lost.
+        StudyError: a folder of another study, of other code, in use, or not writable, or a lost executor.
     """
     if executor is not None and not callable(getattr(executor, "results", None)):
         raise InvalidValueError("no executor", got=executor, expected="Processes(workers), or a DaskCluster")
-    _require_code(study)
+    if unnamed := [each.label for each in study.strategies if each.own is not None and not each.own.reference]:
+        raise StudyError(
+            f"{', '.join(unnamed)}: code of your own, which the folder of a study does not name",
+            remedy="Run the STUDY.toml that names it, with --out and this folder.",
+        )
     store, run = begin_store(study, folder), partial(_run_with, code_checksum())
     with store.locked():
         if left := store.left(retry=retry):
@@ -53,15 +56,6 @@ def conduct(
                 store.keep(unit, result)
                 on_done(unit, result)
     return store
-
-
-def _require_code(study: Study) -> None:
-    """Raise if a strategy is code of one's own that the study does not name, as that of a folder."""
-    if unnamed := [each.label for each in study.strategies if each.own is not None and not each.own.reference]:
-        raise StudyError(
-            f"{', '.join(unnamed)}: code of your own, which the folder of a study does not name",
-            remedy="Run the STUDY.toml that names it, with --out and this folder.",
-        )
 
 
 def _run_with(code: str, unit: Unit) -> pd.DataFrame:
@@ -112,29 +106,16 @@ def replay(store: Store, key: str, person: int | None = None) -> Replay:
     if not len(kept):
         raise StudyError("the person is not in the unit", got=person)
     kept, again = kept.reset_index(drop=True), again.reset_index(drop=True)
-    columns = [name for name in kept.columns if name not in TIMES]
-    return Replay(kept, again, tuple(name for name in columns if not _same(kept, again, name)))
+    same = (kept == again) | (kept.isna() & again.isna())
+    return Replay(kept, again, tuple(name for name in kept.columns if name not in TIMES and not same[name].all()))
 
 
 def unit_of_row(store: Store, row: int) -> tuple[str, int]:
-    """The unit and the person of a row of a study.
-
-    Args:
-        store: the study.
-        row: its number in `store.rows()`.
-
-    Raises:
-        StudyError: there is no such row.
-    """
+    """The unit and the person of a row of `store.rows()`, by its number."""
     rows = store.rows()
     if not 0 <= row < len(rows):
         raise StudyError("the study has no such row", got=row, expected=f"0 to {len(rows) - 1}")
     return str(rows["unit"].iloc[row]), int(rows["person"].iloc[row])
-
-
-def _same(kept: pd.DataFrame, again: pd.DataFrame, name: str) -> bool:
-    same = (kept[name] == again[name]) | (kept[name].isna() & again[name].isna())
-    return bool(same.all())
 
 
 def run_study(

@@ -8,19 +8,23 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, is_dataclass, replace
 from typing import Any, Literal, TypeAlias
 
+from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.checks import Checked, Count, Natural, Positive, whole
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, StudyError
 from isiw.estimate import WindowEstimate
-from isiw.lazy import pd
+from isiw.lazy import pd, torch
 from isiw.metrics import covers, f1
+from isiw.models.protocol import Observation, Posterior, ReportsTrouble, Tensor
 from isiw.signals import wrong_isi
 from isiw.strategy.catalogue import known_settings, make_strategy
-from isiw.strategy.choice import Choice
-from isiw.strategy.stopping import stimuli_left
+from isiw.strategy.choice import Choice, instead_of_lost
+from isiw.strategy.course import Method
+from isiw.strategy.stopping import StopDecision, stimuli_left
+from isiw.strategy.strategy import Strategy
 from isiw.studies.execution import one_torch_thread
 from isiw.studies.players import Crowd, OwnCode, Player, Reported, alone
 from isiw.subjects.cohorts import COHORTS, person_of
@@ -65,14 +69,12 @@ class SimulatedSession(Checked):
         space: the design space.
         settings: settings of the strategy, as (name, value) pairs.
         label: what the strategy is called in the table; by default its name.
-        stopping: whether the strategy's stopping rule is `"ignored"`, or it is `"noted"` when it fires, or `"ends"` the
-            session.
+        stopping: the strategy's stopping rule is `"ignored"`, or `"noted"` when it fires, or `"ends"` the session.
         amplitude: factor on all of the person's amplitudes, as of another rig or muscle.
         own: code of one's own that makes the strategy; None for a named one.
 
     Raises:
-        InvalidValueError: no trial, an invalid person, seed or amplitude, no mark or one beyond the trials, or an
-            unknown cohort or value of stopping.
+        InvalidValueError: no trial, no mark or one beyond the trials, or an invalid number, cohort or choice.
     """
 
     strategy: str
@@ -107,10 +109,7 @@ class SimulatedSession(Checked):
         return replace(usual, scale=self.amplitude * usual.scale)
 
     def as_the_rig_states(self) -> SimulatedSession:
-        """The same with what the person's rig states as a setting of the strategy, if it can use it.
-
-        It states its hit delay, if ISIs count from the valve command, and its conditioning stimulus.
-        """
+        """The same with hit delay (from the valve) and stimulus as the rig states them, if the strategy has a use."""
         subject = self.subject()
         delay_ms = subject.stated_hit_delay_ms if self.space.reference == "valve" else None
         stimulus = None if subject.conditioning == "tap" else subject.conditioning
@@ -199,10 +198,7 @@ class _Participant:
         return self.session.stopping == "ends" and not math.isnan(self.stop["stop_trial"])
 
     def respond(self, trial: int, choice: Choice) -> Response:
-        """Deliver the pair, and if its ISI makes it a mistrial what is asked instead, until one can be learnt.
-
-        The first delivery of a trial has the same noise with every strategy; what comes instead has noise of its own.
-        """
+        """Deliver pairs until one is learnt; the first has the same noise with every strategy, others their own."""
         space, respond = self.session.space, self.responder.respond
         for _ in range(_MOST_DELIVERIES):
             response = respond(choice.isi_ms, space.reference)
@@ -283,3 +279,89 @@ def _judged(estimate: Reported, truth: Window | None, space: DesignSpace) -> dic
         "start_covered": math.nan if covered is None else float(covered[0]),
         "end_covered": math.nan if covered is None else float(covered[1]),
     }
+
+
+def simulate_batch(sessions: Sequence[SimulatedSession], device: str = "cpu") -> pd.DataFrame:
+    """Run sessions side by side on a CPU or a GPU, by the rules of single ones; only the models' draws differ."""
+    with one_torch_thread():
+        return examine(sessions, _Batch(sessions, device))
+
+
+class _Batch:
+    """A strategy with b people; the counterpart of `Strategy`, without TMS alone and without deadlines."""
+
+    def __init__(self, sessions: Sequence[SimulatedSession], device: str) -> None:
+        if len({(session.strategy, repr(session.settings)) for session in sessions}) > 1:
+            raise StudyError(
+                "the people of a batch have strategies with different settings",
+                remedy="Run them in batches of their own.",
+            )
+        players = [_strategy(session.player()) for session in sessions]
+        first = players[0]
+        model: Any = first.model
+        if is_dataclass(first.model) and hasattr(first.model, "device"):
+            model = replace(first.model, device=device)
+        acquisition, all_of_them = first.acquisition, [player.acquisition for player in players]
+        if any(each != acquisition for each in all_of_them):
+            acquisition = _EachTheirOwn(all_of_them)
+        method = Method(first.space, model, acquisition, first.stopping, first.initial_ms, first.cost)
+        self.stopping = first.stopping
+        self.course = method.begin(first.seed, len(players))
+        self.mistrials, self.lost = [0] * len(players), [0] * len(players)
+
+    def ask(self) -> Sequence[Choice]:
+        return self.course.choices
+
+    def tell(self, responses: Sequence[Response]) -> None:
+        isis_ms = [self.course.method.space.check_realised(r.isi_ms) for r in responses if r.isi_ms is not None]
+        meps_mv, sds_ms = [r.mep_mv for r in responses], [r.isi_sd_ms for r in responses]
+        self.course = self.course.after(Observation.of(isis_ms, meps_mv, sds_ms))
+        self.lost = [0] * len(responses)
+
+    def count_mistrial(self, person: int, lost: Choice) -> Choice:
+        self.mistrials[person] += 1
+        self.lost[person] += 1
+        delivered = self.course.told + self.mistrials[person]
+        other = instead_of_lost(self.course.method.space, self.lost[person], delivered)
+        if other is None or self.course.plans_ahead:
+            return lost
+        self.lost[person] = 0
+        return other
+
+    def estimate(self, person: int) -> WindowEstimate:
+        return self.course.estimate(person)
+
+    def decision(self, person: int) -> StopDecision:
+        return self.course.decision(person, self.mistrials[person])
+
+    def trouble(self) -> bool | None:
+        """Whose fit failed is not known; only whether any did."""
+        posterior = self.course.posterior
+        failed = isinstance(posterior, ReportsTrouble) and posterior.trouble is not None
+        return None if failed and self.course.people > 1 else failed
+
+
+def _strategy(player: Player) -> Strategy:
+    if not isinstance(player, Strategy):
+        raise StudyError(
+            "only a model with an acquisition function examines people side by side",
+            got=type(player).__name__,
+            expected="an isiw.Strategy",
+            remedy='Use engine = "single".',
+        )
+    return player
+
+
+@dataclass(frozen=True)
+class _EachTheirOwn:
+    """Acquisition functions that draw: one a person, with a seed of their own."""
+
+    functions: Sequence[AcquisitionFunction]
+
+    @property
+    def needs(self) -> tuple[type, ...]:
+        return self.functions[0].needs
+
+    def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
+        scores = (score(posterior, isi_ms).expand(len(self.functions), -1) for score in self.functions)
+        return torch.stack([of_all[person] for person, of_all in enumerate(scores)])

@@ -4,10 +4,8 @@
     parts/KEY.CHECKSUM.parquet   the rows of a unit
     errors/KEY.CHECKSUM.parquet  what became of a unit that failed, one row a person
 
-Each file is written beside its place, synced, and renamed into it by the process that runs the study, so that a file
-is whole or not there; its name holds the CRC-32 of its bytes, which tells whether it was damaged later. A part holds
-the checksum of its study, so that no other study takes its rows for its own. One process at a time runs a study: while
-it does, it has `study.toml` locked, and it begins by removing what is left over of writes that were cut off.
+Files are renamed into their place once they are whole. The CRC-32 in a name tells whether one was damaged later, and
+the checksum in a part whose study it is of. One process at a time runs a study, and has `study.toml` locked.
 """
 
 from __future__ import annotations
@@ -89,11 +87,7 @@ class Store:
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Within, this process alone runs the study.
-
-        Raises:
-            StudyError: another one does.
-        """
+        """Within, this process alone runs the study; a StudyError if another one does."""
         with _disk_errors(self.folder), (self.folder / "study.toml").open("r+b") as file:
             if not claim(file):
                 raise StudyError(
@@ -117,22 +111,14 @@ class Store:
         return _table(failed, _KEYS[:3], self._state)
 
     def unit(self, key: str) -> Unit:
-        """The unit of a key.
-
-        Raises:
-            StudyError: there is none.
-        """
+        """The unit of a key; a StudyError if there is none."""
         for unit in self.study.units():
             if unit.key == key:
                 return unit
         raise StudyError("the study has no such unit", got=key, remedy="The rows have their units in the column unit.")
 
     def require_same_code(self) -> None:
-        """Raise if other code would go on than began: its rows do not belong in one table.
-
-        Raises:
-            StudyError: isiw was changed since, though its version was not.
-        """
+        """Raise StudyError if isiw was changed since, but not its version: new rows do not belong to the others."""
         began_with = read_toml(self.folder / "study.toml").get("versions", {}).get("code")
         if began_with not in {None, code_checksum()}:
             raise StudyError(
@@ -154,15 +140,7 @@ class Store:
 
 
 def begin_store(study: Study, folder: str | Path) -> Store:
-    """The folder of a study, made if it is missing, continued if it is there.
-
-    Args:
-        study: the study.
-        folder: where its results are.
-
-    Raises:
-        StudyError: the folder is another study's, was made with another version of isiw, or cannot be written.
-    """
+    """The folder of a study, made if it is missing, continued if it is there."""
     store = Store(study, Path(folder))
     if (store.folder / "study.toml").exists():
         return _same(store, open_store(folder))

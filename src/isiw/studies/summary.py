@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
 
 from isiw.errors import InvalidValueError, did_you_mean
 from isiw.lazy import pd, scipy
+from isiw.studies.sessions import TIMES
 from isiw.types import FloatArray
 
 _GROUP: Final = ["cohort", "strategy", "trial"]
@@ -67,27 +68,13 @@ def _means(rows: pd.DataFrame) -> pd.DataFrame:
     groups = rows.assign(**at_end, called_none=~rows["reported_window"].astype(bool)).groupby(_GROUP)
     people, f1, se = groups.size(), groups["f1"].mean(), groups["f1"].sem()
     reach = se * scipy.stats.t.ppf(0.5 + LEVEL / 2, people - 1)
-    return pd.DataFrame(
-        {
-            "people": people,
-            "f1": f1,
-            "f1_se": se,
-            "f1_low": (f1 - reach).clip(lower=0.0),
-            "f1_high": (f1 + reach).clip(upper=1.0),
-            "start_coverage": groups["start_covered"].mean(),
-            "end_coverage": groups["end_covered"].mean(),
-            "sure_and_wrong": groups["sure_and_wrong"].mean(),
-            "called_none": groups["called_none"].mean(),
-            "delivered": groups["delivered"].mean(),
-            "stop_trial": groups["stop_trial"].mean(),
-            "stop_f1": groups["stop_f1"].mean(),
-            "end_delivered": groups["end_delivered"].mean(),
-            "end_f1": groups["end_f1"].mean(),
-            "converged": groups["converged"].mean(),
-            "ask_ms": groups["ask_ms"].median(),
-            "tell_ms": groups["tell_ms"].median(),
-        }
-    ).reset_index()
+    band = {"f1_low": (f1 - reach).clip(lower=0.0), "f1_high": (f1 + reach).clip(upper=1.0)}
+    columns = {"start_coverage": ("start_covered", "mean"), "end_coverage": ("end_covered", "mean")}
+    stops = ("stop_trial", "stop_f1", "end_delivered", "end_f1")
+    means = ("sure_and_wrong", "called_none", "delivered", *stops, "converged")
+    columns |= {name: (name, "mean") for name in means} | {name: (name, "median") for name in TIMES}
+    table = pd.DataFrame({"people": people, "f1": f1, "f1_se": se, **band})
+    return table.join(groups.agg(**columns)).reset_index()
 
 
 def differences(rows: pd.DataFrame, reference: str | None = None) -> pd.DataFrame:
@@ -162,8 +149,8 @@ def means_table(summary: pd.DataFrame, compared: pd.DataFrame | None = None) -> 
     """
     lines = list[str]()
     for cohort, means in summary[summary["people"] > 0].groupby("cohort"):
-        people = sorted(means["people"].unique())
-        lines.append(f"{cohort}: mean F1 [95 % interval]; {_counted(people)}")
+        fewest, most = means["people"].min(), means["people"].max()
+        lines.append(f"{cohort}: mean F1 [95 % interval]; {fewest if fewest == most else f'{fewest}–{most}'} people")
         lines += _block(means, "f1", "f1_low", "f1_high", ".2f")
         of_cohort = None if compared is None else compared[compared["cohort"] == cohort]
         if of_cohort is not None and len(of_cohort):
@@ -172,10 +159,6 @@ def means_table(summary: pd.DataFrame, compared: pd.DataFrame | None = None) -> 
             lines += _block(of_cohort, "difference", "low", "high", "+.2f")
         lines.append("")
     return "\n".join(lines).rstrip()
-
-
-def _counted(people: Sequence[int]) -> str:
-    return f"{people[0]} people" if people[0] == people[-1] else f"{people[0]}–{people[-1]} people"
 
 
 def _block(table: pd.DataFrame, mean: str, low: str, high: str, form: str) -> Iterator[str]:

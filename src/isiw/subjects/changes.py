@@ -1,7 +1,7 @@
 """Influences on an MEP besides the ISI and chance: changes during a session, the tap's own response, coarse amplitudes.
 
-A coil that is re-seated, a gain, or another intensity changes all evoked amplitudes at once; habituation and plasticity
-change the enhancement; and the tap itself may evoke a response in the muscle that is recorded [Kim2020, 2.2, Fig. 3.7].
+Coil, gain or intensity change all that is evoked; habituation and plasticity change the enhancement; and a tap may
+evoke a response of its own in the muscle that is recorded [Kim2020, 2.2, Fig. 3.7].
 """
 
 from __future__ import annotations
@@ -56,11 +56,7 @@ class Change(Checked):
         log_gain: change of everything that is evoked, natural log.
         intensity_pct_rmt: change of the intensity [% RMT]; of a person with a recruitment curve.
         shift_ms: by how much the window moves [ms].
-        half_life: after so many trials the enhancement is half of what it was, from the first trial on; None if it
-            stays.
-
-    Raises:
-        InvalidValueError: a number that is not finite, trials in the wrong order, or a half-life that is not positive.
+        half_life: after so many trials the enhancement is half of what it was at first; None if it stays.
     """
 
     first: Count = 1
@@ -124,11 +120,7 @@ def _burst(phase_ms: FloatArray, duration_ms: float) -> FloatArray:
     return np.where(inside, envelope * wave, 0.0)
 
 
-def _mep_course() -> FloatArray:
-    """An MEP of peak-to-peak amplitude 1 at `_AFTER_PULSE_MS`: two lobes."""
-    share = (_AFTER_PULSE_MS - _MEP_CENTRE_MS) / _MEP_LOBE_MS
-    course = -share * np.exp(0.5 * (1.0 - share**2))
-    return np.asarray(course / np.ptp(course))
-
-
-_MEP: Final = _mep_course()
+_LOBES: Final = (_AFTER_PULSE_MS - _MEP_CENTRE_MS) / _MEP_LOBE_MS
+_COURSE: Final = -_LOBES * np.exp(0.5 * (1.0 - _LOBES**2))
+_MEP: Final = _COURSE / np.ptp(_COURSE)
+"""An MEP of peak-to-peak amplitude 1 at `_AFTER_PULSE_MS`."""

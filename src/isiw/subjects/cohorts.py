@@ -35,16 +35,7 @@ X50_SD_PCT: Final = 3.0
 
 
 def another_day(person: SimulatedSubject, stranger: SimulatedSubject, rng: np.random.Generator) -> SimulatedSubject:
-    """The same person another day (dissertation, appendix B: the window can move a lot).
-
-    Args:
-        person: with a profile of one peak and a recruitment curve.
-        stranger: whose window the person has if it was drawn again.
-        rng: source of randomness.
-
-    Raises:
-        TypeError: another kind of profile or response.
-    """
+    """The same person another day, with a stranger's window if it was drawn again (dissertation, appendix B)."""
     if not (isinstance(person.profile, PeakProfile) and isinstance(person.response, RecruitmentResponse)):
         raise TypeError(person)
     stays = rng.random() < P_STAYS
@@ -74,17 +65,9 @@ def _step(rng: np.random.Generator, subject: SimulatedSubject) -> SimulatedSubje
     return replace(subject, change=Change(trial, trial, log_gain=_sign(rng) * log_factor))
 
 
-def _ramp(rng: np.random.Generator, subject: SimulatedSubject) -> SimulatedSubject:
-    return replace(subject, change=Change(1, 60, log_gain=_sign(rng) * float(np.log(rng.uniform(2, 5)))))
-
-
 def _retuned(rng: np.random.Generator, subject: SimulatedSubject) -> SimulatedSubject:
     trial, change_pct = int(rng.integers(5, 31)), float(rng.uniform(6, 14))
     return replace(subject, change=Change(trial, trial, intensity_pct_rmt=_sign(rng) * change_pct))
-
-
-def _fading(rng: np.random.Generator, subject: SimulatedSubject) -> SimulatedSubject:
-    return replace(subject, change=Change(half_life=float(rng.uniform(15, 60))))
 
 
 def _moving(rng: np.random.Generator, subject: SimulatedSubject) -> SimulatedSubject:
@@ -98,19 +81,17 @@ def _tap_response(rng: np.random.Generator, subject: SimulatedSubject) -> Simula
     return replace(subject, tap_response=TapResponse(start_ms, duration_ms, median_mv, float(rng.uniform(0.2, 0.9))))
 
 
-def _coarse(rng: np.random.Generator, subject: SimulatedSubject) -> SimulatedSubject:
-    return replace(subject, amplitude_step_mv=float(rng.choice(COARSE_STEPS_MV)))
-
-
 CHANGED: Final[Mapping[str, _Changed]] = MappingProxyType(
     {
         "step": _step,
-        "ramp": _ramp,
+        "ramp": lambda rng, one: replace(
+            one, change=Change(1, 60, log_gain=_sign(rng) * float(np.log(rng.uniform(2, 5))))
+        ),
         "retuned": _retuned,
-        "fading": _fading,
+        "fading": lambda rng, one: replace(one, change=Change(half_life=float(rng.uniform(15, 60)))),
         "moving": _moving,
         "tap-response": _tap_response,
-        "coarse": _coarse,
+        "coarse": lambda rng, one: replace(one, amplitude_step_mv=float(rng.choice(COARSE_STEPS_MV))),
     }
 )
 """The change that makes a usual person one of a cohort in whose sessions something else than the ISI moves an MEP, or
@@ -151,10 +132,7 @@ def _gain(rng: np.random.Generator) -> GainResponse:
 
 @dataclass(frozen=True)
 class _CohortLaw:
-    """Who has a recruitment curve: pairs are the ends of a uniform law, or median and log SD of a log-normal one.
-
-    The first of those who are drawn by the usual law are the cohort `recruitment`.
-    """
+    """People with recruitment curves: ends of uniform laws, or medians and log SDs. The usual law is `recruitment`."""
 
     start_ms: _Pair = (5, 110)
     width_ms: _Pair = (100, 0.42)
@@ -345,15 +323,14 @@ def cohort(name: str, n: int, seed: int) -> list[SimulatedSubject]:
 
     Args:
         name: one of `COHORTS`.
-        n: how many people. `kim11` and `kim11-measured` have eleven, and cycle: their sessions differ in trial noise
-            only. Of `another-day` every two, from the first on, are one person on two days.
-        seed: seed of the people, and of the lab in a cohort of one lab; 0–999 are for development, reported figures use
-            10,000 and above.
+        n: how many people. `kim11` and `kim11-measured` have eleven, and cycle with other trial noise. Of
+            `another-day` every two, from the first on, are one person on two days.
+        seed: seed of people, or of a cohort's lab; 0–999 are for development, reported figures use 10,000 and above.
 
     Raises:
         InvalidValueError: an unknown name, or a negative number.
     """
-    choice("the cohort", name, COHORTS)
+    choice("the cohort", name, COHORTS)  # also of nobody
     n, seed = whole("n", n, least=0), whole("seed", seed, least=0)
     return [person_of(name, number, seed) for number in range(n)]
 

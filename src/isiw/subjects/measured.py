@@ -22,9 +22,10 @@ People under TMS above the motor threshold have laws of their own: a tap may dep
 from __future__ import annotations
 
 import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Final, NamedTuple, TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -51,22 +52,12 @@ MAX_BOOST_PCT_RMT: Final = 60.0
 
 @dataclass(frozen=True)
 class MeasuredPerson(Checked):
-    """Figures of the text about one of its subjects.
+    """Figures of the text about one of its subjects."""
 
-    Args:
-        width_ms: width of the measured window (Table 4.1) [ms].
-        threshold_mv: amplitude from which an MEP counts as a response (4.1.1) [mV].
-        peak_mv: mean MEP at the best ISI, EMG floor included [mV].
-        peak_error_mv: by how much it may be misread [mV]; None if no figure shows it.
-
-    Raises:
-        InvalidValueError: an invalid number.
-    """
-
-    width_ms: Positive
-    threshold_mv: Positive
-    peak_mv: Number
-    peak_error_mv: Positive | None = None
+    width_ms: Positive  # of the measured window (Table 4.1)
+    threshold_mv: Positive  # from which an MEP counts as a response (4.1.1)
+    peak_mv: Number  # mean MEP at the best ISI, EMG floor included
+    peak_error_mv: Positive | None = None  # by how much it may be misread; None if no figure shows it
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -94,24 +85,13 @@ class MeasuredPerson(Checked):
         return replace(curve, boost_pct_rmt=float(scipy.optimize.brentq(too_much_mv, 0.0, MAX_BOOST_PCT_RMT)))
 
     def subject(self, start_ms: float, hit_delay_ms: float, hit_delay_sd_ms: float) -> SimulatedSubject:
-        """A simulated person with this measured window.
-
-        Args:
-            start_ms: where the window starts [ms from the impact].
-            hit_delay_ms: mean hit delay [ms].
-            hit_delay_sd_ms: its SD from trial to trial [ms].
-        """
+        """A simulated person with this measured window, from its start after the impact."""
         response = self.response()
         profile = self.profile(start_ms, response.boost_pct_rmt)
         return SimulatedSubject(profile, response, hit_delay_ms, hit_delay_sd_ms)
 
     def profile(self, start_ms: float, boost_pct_rmt: float) -> PeakProfile:
-        """The profile whose shift is at least 10 % RMT inside the window.
-
-        Args:
-            start_ms: where the window starts [ms from the impact].
-            boost_pct_rmt: shift at the best ISI [% RMT].
-        """
+        """The profile whose shift is at least 10 % RMT inside the window, given that at the best ISI."""
         level = (BASELINE_PCT_RMT - PAIRED_PCT_RMT) / boost_pct_rmt  # facilitation at the window's ends
         span_ms = (self.width_ms + STEP_MS) / float(np.sqrt(-0.5 * np.log(level)))
         return PeakProfile(start_ms + 0.5 * (self.width_ms - span_ms), span_ms)
@@ -181,49 +161,26 @@ def _segments(rng: np.random.Generator) -> tuple[PeakProfile, PeakProfile]:
 _Pair: TypeAlias = tuple[float, float]
 
 
-class _Centre(NamedTuple):
-    """Between which values a lab's mean start and mean hit delay lie [ms]."""
-
-    start_ms: _Pair
-    hit_delay_ms: _Pair
-
-
-LABS: Final = MappingProxyType(
-    {
-        "lab": _Centre((35, 80), (174, 186)),
-        "lab-late": _Centre((115, 165), (174, 186)),
-        "lab-rig": _Centre((35, 80), (20, 300)),
-    }
+LABS: Final[Mapping[str, tuple[_Pair, _Pair]]] = MappingProxyType(
+    {"lab": ((35, 80), (174, 186)), "lab-late": ((115, 165), (174, 186)), "lab-rig": ((35, 80), (20, 300))}
 )
 """Cohorts of one lab each, drawn from the seed: about the people of `recruitment`, about those of `late`, and those of
-`recruitment` with a rig of any hit delay."""
+`recruitment` with a rig of any hit delay; between which values mean start and mean hit delay lie [ms]."""
 
 
 @dataclass(frozen=True)
 class Lab:
-    """The law of a lab's people: mean and SD over people, or the median and the SD of the natural logarithm.
+    """The law of a lab's people: mean and SD over people, or the median and the SD of the natural logarithm."""
 
-    Args:
-        start_ms: mean and SD of the window's start from the impact [ms].
-        width_ms: median and log SD of its width [ms], clipped to 40–230.
-        hit_delay_ms: mean and SD of a person's mean hit delay [ms].
-        amplitude_mv: median and log SD of the largest MEP [mV].
-        boost_pct_rmt: median and log SD of the shift of the input at the best ISI [% RMT].
-        sigma_x_pct_rmt: median and log SD of the noise on the input [% RMT].
-        sigma_y: median and log SD of the noise on the output, natural log.
-        floor_mv: median and log SD of the EMG floor [mV].
-        floor_log_sd: median and log SD of the floor's log SD over trials.
-    """
-
-    start_ms: _Pair
-    width_ms: _Pair
-    hit_delay_ms: _Pair
-    amplitude_mv: _Pair
-    boost_pct_rmt: _Pair
-    sigma_x_pct_rmt: _Pair
-    sigma_y: _Pair
+    start_ms: _Pair  # from the impact: mean and SD
+    width_ms: _Pair  # clipped to 40–230
+    hit_delay_ms: _Pair  # mean and SD
+    amplitude_mv: _Pair  # of the largest MEP
+    boost_pct_rmt: _Pair  # of the input at the best ISI
+    sigma_x_pct_rmt: _Pair  # noise on the input
+    sigma_y: _Pair  # noise on the output, natural log
     floor_mv: _Pair
-    floor_log_sd: _Pair
+    floor_log_sd: _Pair  # over trials
 
     def subject(self, rng: np.random.Generator) -> SimulatedSubject:
         """One of its people."""
@@ -245,25 +202,17 @@ class Lab:
 
 
 def lab(name: str, seed: int) -> Lab:
-    """The law of the lab that a seed stands for.
-
-    Args:
-        name: one of `LABS`.
-        seed: seed of the lab; 0–999 are for work.
-
-    Raises:
-        InvalidValueError: an unknown name, or a negative seed.
-    """
-    centre = LABS[choice("the lab", name, LABS)]
+    """The law of the lab, one of `LABS`, that a seed stands for; 0–999 are for work."""
+    start_ms, hit_delay_ms = LABS[choice("the lab", name, LABS)]
     rng = np.random.default_rng([zlib.crc32(b"law of a lab"), zlib.crc32(name.encode()), whole("seed", seed, least=0)])
 
     def about(median: float, log_sd: float, spread: _Pair) -> _Pair:
         return log_normal(rng, median, log_sd), float(rng.uniform(*spread))
 
     return Lab(
-        start_ms=(float(rng.uniform(*centre.start_ms)), float(rng.uniform(10, 25))),
+        start_ms=(float(rng.uniform(*start_ms)), float(rng.uniform(10, 25))),
         width_ms=about(100.0, 0.2, (0.15, 0.35)),
-        hit_delay_ms=(float(rng.uniform(*centre.hit_delay_ms)), 6.0),
+        hit_delay_ms=(float(rng.uniform(*hit_delay_ms)), 6.0),
         amplitude_mv=about(0.16, 0.3, (0.2, 0.4)),
         boost_pct_rmt=about(11.0, 0.2, (0.15, 0.35)),
         sigma_x_pct_rmt=about(7.0, 0.15, (0.1, 0.2)),

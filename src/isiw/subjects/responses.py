@@ -1,16 +1,13 @@
 """From the ISI to facilitation, and from facilitation to the MEP: profiles, two kinds of people, and their noise.
 
-A profile is a value that maps ISIs counted from the impact to facilitation in 0–1. The families are those that have
-been seen or argued for: a Gaussian [Kim2020, 4.2], skewed and flat-topped ones (8.1, appendix B), and two peaks
-(electrical conditioning has two facilitation windows). Above the motor threshold a tap may depress the MEP too, and
-facilitation is negative there (8.1.3).
+A profile maps ISIs counted from the impact to facilitation in 0–1: a Gaussian [Kim2020, 4.2], skewed and flat-topped
+ones (8.1, appendix B), and two peaks. Above the motor threshold a tap may depress the MEP too: facilitation is
+negative (8.1.3).
 
-`GainResponse` multiplies: the MEP grows in proportion to the facilitation, with noise of a constant CV. It is the kind
-of noise that most methods assume. `RecruitmentResponse` is how MEPs near threshold behave: facilitation and noise both
-shift the input of a steep recruitment curve, so responses go missing, are skewed, and vary less as they grow
-(the model of [Goetz2014; Goetz2019], with parameters fitted to open single-trial data).
-
-Both add an EMG floor: the peak-to-peak amplitude that a sweep has without any response.
+`GainResponse` multiplies, with noise of a constant CV, as most methods assume. In `RecruitmentResponse` facilitation
+and noise shift the input of a steep recruitment curve, so that responses go missing, are skewed, and vary less as they
+grow (the model of [Goetz2014; Goetz2019], fitted to open single-trial data). Both add an EMG floor, which every sweep
+has.
 """
 
 from __future__ import annotations
@@ -69,9 +66,6 @@ class TwoPeakProfile(Checked):
         width_ms: width of the span [ms].
         first: height of the first peak.
         second: height of the second peak; the higher of the two has 1.
-
-    Raises:
-        InvalidValueError: an invalid span or height.
     """
 
     start_ms: Number

@@ -1,7 +1,6 @@
 """One simulated person, the truth about them, and how they answer stimuli.
 
-A `SimulatedSubject` never changes; `begin` gives a `Responder` that holds what has a memory within a session (drift,
-start-up, serial correlation, plasticity).
+A `SimulatedSubject` never changes; a `Responder` holds what has a memory within a session.
 """
 
 from __future__ import annotations
@@ -43,9 +42,6 @@ class Drift(Checked):
         persistence: AR(1) coefficient from trial to trial.
         innovation_sd: SD of each step, natural log.
         startup: what the first trials have on top, natural log.
-
-    Raises:
-        InvalidValueError: a coefficient outside -1 to 1, a negative SD, or a start-up that is not finite.
     """
 
     persistence: Annotated[float, partial(number, least=-1, most=1)] = 0.97
@@ -87,19 +83,16 @@ class SimulatedSubject(Checked):
         isi_jitter_ms: SD of the realised about the commanded ISI, beside the hit delay's [ms].
         jitter_told: whether the jittered ISI is reported, or the commanded one with its SD.
         scale: factor on every amplitude.
-        stated_hit_delay_ms: mean and SD of the hit delay that the rig states, if it knows itself [ms]; by default
-            the tapping robot's, over people.
+        stated_hit_delay_ms: mean and SD over people of the hit delay that the rig states [ms]; by default the robot's.
         stated_intensity_pct_rmt: intensity of the pulse as the visit states it [% RMT]; None if it does not.
         conditioning: what is given to them first, a tap or an electrical pulse.
-        plasticity: how the pairs that are delivered change the gain; None if they do not. The true window and
-            profile are those before the first pair.
+        plasticity: how pairs change the gain; None if they do not. The true window is that before the first pair.
         change: what else changes during a session; None if nothing does.
         tap_response: what the tap alone evokes in the muscle; None if it evokes nothing.
         amplitude_step_mv: step to which amplitudes are rounded [mV]; 0 if they are not.
 
     Raises:
-        InvalidValueError: an invalid number or choice, or a depressed segment or another intensity, but a response that
-            has no recruitment curve.
+        InvalidValueError: an invalid number or choice, or no recruitment curve to depress or to give other intensities.
     """
 
     profile: Profile
@@ -177,11 +170,7 @@ class SimulatedSubject(Checked):
         return window_from_excess(space.grid_ms, self.baseline_mv - self.expected_mep_mv(space), self.baseline_mv)
 
     def begin(self, seed: int) -> Responder:
-        """A session with this person, its trial noise from this seed.
-
-        Raises:
-            InvalidValueError: a seed that is negative or no whole number.
-        """
+        """A session with this person, its trial noise from this seed, a whole number from 0 on."""
         return Responder(self, seed)
 
 
@@ -190,10 +179,7 @@ class Responder:
 
     Args:
         subject: the person.
-        seed: seed of the session's trial noise.
-
-    Raises:
-        InvalidValueError: a seed that is negative or no whole number.
+        seed: seed of the session's trial noise, a whole number from 0 on.
     """
 
     def __init__(self, subject: SimulatedSubject, seed: int) -> None:

@@ -1,7 +1,6 @@
 """Simulated people for whom the intensity and the place of the coil are varied, before any window is sought.
 
-Their recruitment curves are those of the cohorts. The curve is moved along the intensity so that half of the MEPs
-exceed 50 µV at the person's resting motor threshold, which is its definition [Rossini2015].
+A cohort's recruitment curve is moved so that half of the MEPs exceed 50 µV at the motor threshold [Rossini2015].
 """
 
 from __future__ import annotations
@@ -41,44 +40,23 @@ _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
 
 @dataclass(frozen=True)
 class HotSpot(Checked):
-    """Where the coil acts most, and how its effect falls off: as a Gaussian of the distance.
+    """The place at which the coil acts most [mm]; its effect falls off as a Gaussian of the distance."""
 
-    Args:
-        x_mm: its place from the middle of the searched area [mm].
-        y_mm: the same, across [mm].
-        spread_mm: at this distance the intensity acts like 61 % of it [mm].
-    """
-
-    x_mm: Number = 0.0
+    x_mm: Number = 0.0  # from the middle of the searched area
     y_mm: Number = 0.0
-    spread_mm: Positive = 28.0
+    spread_mm: Positive = 28.0  # at this distance the intensity acts like 61 % of it
 
     def effect(self, x_mm: float, y_mm: float) -> float:
-        """The share of the intensity that acts with the coil at a place.
-
-        Args:
-            x_mm: the coil's place [mm].
-            y_mm: the same, across [mm].
-        """
+        """The share of the intensity that acts with the coil at a place."""
         return math.exp(-0.5 * ((x_mm - self.x_mm) ** 2 + (y_mm - self.y_mm) ** 2) / self.spread_mm**2)
 
 
 @dataclass(frozen=True)
 class StimulatedPerson(Checked):
-    """One simulated person, by intensity.
+    """One simulated person, by intensity; `x50_pct_rmt` is put at what 100 % of RMT asks for."""
 
-    Args:
-        rmt_pct_mso: resting motor threshold at the hot spot [% of the maximum stimulator output].
-        response: the recruitment curve by intensity in % RMT; `x50_pct_rmt` is put where 100 % is the threshold.
-        input_correlation: lag-1 correlation of the input noise.
-        hot_spot: where the coil acts most.
-
-    Raises:
-        InvalidValueError: a threshold that is not positive, or an MEP that never exceeds the criterion.
-    """
-
-    rmt_pct_mso: Positive
-    response: RecruitmentResponse
+    rmt_pct_mso: Positive  # at the hot spot
+    response: RecruitmentResponse  # by intensity in % RMT
     input_correlation: Annotated[float, partial(number, least=0, below=1)] = 0.0
     hot_spot: HotSpot = HotSpot()
 
@@ -90,7 +68,9 @@ class StimulatedPerson(Checked):
                 got=self.response.amplitude_mv,
                 expected=f"an amplitude_mv of at least {SMALLEST_AMPLITUDE_MV:g}",
             )
-        object.__setattr__(self, "response", replace(self.response, x50_pct_rmt=_x50(self.response)))
+        needed, sigma_x = _criterion_drive(self.response), self.response.sigma_x_pct_rmt
+        drive = scipy.optimize.brentq(lambda above: _exceeding(above, needed, sigma_x) - 0.5, -200.0, 200.0)
+        object.__setattr__(self, "response", replace(self.response, x50_pct_rmt=100.0 - float(drive)))
 
     def response_probability(self, intensity_pct_mso: float) -> float:
         """Probability of an MEP above 50 µV at the hot spot, by intensity [% MSO]."""
@@ -116,20 +96,8 @@ def _exceeding(drive: float, needed: FloatArray, sigma_x: float) -> float:
     return float(_WEIGHTS @ probability @ _WEIGHTS)
 
 
-def _x50(response: RecruitmentResponse) -> float:
-    """Where the half-maximal MEP is [% RMT], if half of the MEPs exceed 50 µV at 100 %."""
-    needed, sigma_x = _criterion_drive(response), response.sigma_x_pct_rmt
-    drive = scipy.optimize.brentq(lambda above: _exceeding(above, needed, sigma_x) - 0.5, -200.0, 200.0)
-    return 100.0 - float(drive)
-
-
 class StimulatedResponder:
-    """A simulated person who answers stimuli; it holds what has a memory.
-
-    Args:
-        person: who answers.
-        seed: of the noise of the trials.
-    """
+    """A simulated person who answers stimuli; it holds what has a memory."""
 
     def __init__(self, person: StimulatedPerson, seed: int) -> None:
         self.person = person
@@ -137,16 +105,7 @@ class StimulatedResponder:
         self._input_z = float(self._rng.standard_normal())
 
     def respond(self, intensity_pct_mso: float, x_mm: float | None = None, y_mm: float | None = None) -> float:
-        """Peak-to-peak amplitude of the MEP of one pulse [mV].
-
-        Args:
-            intensity_pct_mso: of the pulse [% MSO].
-            x_mm: the coil's place [mm]; None is the hot spot.
-            y_mm: the same, across [mm].
-
-        Raises:
-            InvalidValueError: an intensity that is not positive.
-        """
+        """Peak-to-peak amplitude of the MEP of one pulse [mV], at the hot spot if no place is given."""
         intensity = number("intensity_pct_mso", intensity_pct_mso, above=0)
         person, rng = self.person, self._rng
         spot, floor = person.hot_spot, person.response.floor
@@ -161,15 +120,7 @@ class StimulatedResponder:
 def threshold_cohort(name: str, n: int, seed: int) -> list[StimulatedPerson]:
     """The first n people with thresholds of 30–80 % MSO and the recruitment curves of a cohort.
 
-    The curves are those of the cohorts, with a largest MEP of at least 80 µV.
-
-    Args:
-        name: one of `THRESHOLD_COHORTS`.
-        n: how many.
-        seed: of the people; 0–999 are for development, reported figures use 10,000 and above.
-
-    Raises:
-        InvalidValueError: an unknown name, or a negative number.
+    The largest MEP is at least 80 µV. Seeds of 0–999 are for development; reported figures use 10,000 and above.
     """
     choice("the cohort", name, THRESHOLD_COHORTS)
     subjects = cohort(name, whole("n", n, least=0), seed)

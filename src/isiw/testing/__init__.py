@@ -3,8 +3,6 @@
 Run them from your own tests, and `check_device` for hardware with the coil on a phantom.
 """
 
-from __future__ import annotations
-
 from isiw.testing.devices import check_device
 from isiw.testing.suites import check_acquisition, check_model, check_strategy
 

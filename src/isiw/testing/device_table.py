@@ -49,15 +49,17 @@ class DeviceTable:
 
 def device_table(info: DeviceInfo, deliveries: Sequence[Delivery], limits: SignalLimits) -> DeviceTable:
     """The table of a check."""
-    trials = [delivery.trial for delivery in deliveries]
+    trials, late_ms = [delivery.trial for delivery in deliveries], edges_ms(deliveries)
+    meps_uv = [1e3 * trial.mep_mv for trial in trials if trial.mep_mv is not None]
+    artefact = f"steepest edge of the EMG {np.median(late_ms):+.1f} ms from the pulse" if late_ms else "none seen"
     return DeviceTable(
         (
             ("background EMG", _background(trials, limits)),
             ("impact found", _impacts(deliveries)),
             ("realised minus wanted ISI", _isi_errors(trials)),
             ("MEP window", _windows(deliveries, limits)),
-            ("amplitudes in it", _amplitudes(trials)),
-            ("pulse artefact", _artefacts(deliveries)),
+            ("amplitudes in it", f"{min(meps_uv):.3g} to {max(meps_uv):.3g} µV" if meps_uv else "none"),
+            ("pulse artefact", artefact),
             ("units", ", ".join(f"{name} in {unit}" for name, unit in info.channels.items()) or "MEP in mV"),
             ("time per trial", f"{max(delivery.took_s for delivery in deliveries):.2g} s at most"),
             ("judged", ", ".join(f"{trial.reason or 'accepted'}" for trial in trials)),
@@ -113,11 +115,6 @@ def _span_ms(sweep: Sweep, pulse_ms: float | None) -> tuple[float, float] | None
     return emg.t0_ms - pulse_ms, emg.t0_ms + 1000 * (emg.values.size - 1) / emg.rate_hz - pulse_ms
 
 
-def _amplitudes(trials: Sequence[Trial]) -> str:
-    meps_mv = [trial.mep_mv for trial in trials if trial.mep_mv is not None]
-    return f"{1e3 * min(meps_mv):.3g} to {1e3 * max(meps_mv):.3g} µV" if meps_mv else "none"
-
-
 def wrong_hit_delay(deliveries: Sequence[Delivery]) -> str | None:
     """That all pulses are off by what the rig assumes of the hit, and by how much; None if they are not."""
     trials = [delivery.trial for delivery in deliveries]
@@ -160,11 +157,6 @@ def _held_since_ms(emg: Channel, edge_ms: float) -> float:
     moved = np.flatnonzero(emg.values[:edge] != emg.values[edge])
     first = int(moved[-1]) + 1 if moved.size else 0
     return emg.t0_ms + 1000 * first / emg.rate_hz
-
-
-def _artefacts(deliveries: Sequence[Delivery]) -> str:
-    late_ms = edges_ms(deliveries)
-    return f"steepest edge of the EMG {np.median(late_ms):+.1f} ms from the pulse" if late_ms else "none seen"
 
 
 FACTOR: Final = 3.0

@@ -67,13 +67,9 @@ def check_device(
         signals: what a session's sweeps must keep.
         say: takes what is said to whoever watches.
 
-    Returns:
-        The table.
-
     Raises:
-        AssertionError: a promise is broken, a session would reject a trial, or a real device shows an MEP although a
-            phantom has no muscle, or the artefact of its pulse at another time than it reports; the message says which,
-            and why.
+        AssertionError: a promise is broken, a session would reject a trial, or a real device shows an MEP of a phantom,
+            or the artefact of its pulse at another time than it reports; the message says which, and why.
         DeviceError: the device failed, is not ready, or is driven by a session.
         LimitExceededError: the limits do not allow a stimulus; it was not delivered.
         InvalidValueError: an inter-trial interval that is negative or not finite.

@@ -20,19 +20,13 @@ from isiw.trials import Stimulus
 
 @dataclass(frozen=True)
 class CheckPace:
-    """The pace of the deliveries of a check.
-
-    Args:
-        timeout_s: how long one delivery may take [s].
-        iti_s: how long to wait before each delivery at least [s]; the limits may ask for longer waits.
-        given_s: when each delivery ended, by the clock [s], of all devices of the check.
-    """
+    """The pace of the deliveries of a check; the limits may ask for longer waits."""
 
     timeout_s: float
     iti_s: float
     limits: Limits
     clock: Clock
-    given_s: list[float] = field(default_factory=list)
+    given_s: list[float] = field(default_factory=list)  # when each delivery ended, of all devices of the check
 
 
 class Guarded:
@@ -73,10 +67,7 @@ class Guarded:
         self._rig.stage()
 
     def deliver(self, stimulus: Stimulus) -> tuple[Answer, float]:
-        """Deliver a stimulus when pace and limits allow it, and say how long the device took [s].
-
-        As in a session, one that the device refuses before firing is tried again.
-        """
+        """Deliver a stimulus, as a session tries again what is refused before firing, and say how long it took [s]."""
         for backoff_s in Safeguards().backoffs_s:
             try:
                 return self._tried(stimulus)

@@ -119,7 +119,8 @@ def check_model(
     require(make() == model, "a model is settings: two made alike are equal")
     usual = usual_trials(space)
     _check_learning(model, space, usual)
-    _check_determinism(make, space, usual)
+    once, again = (_after(make(), space, usual) for _ in range(2))
+    require(same_estimates(once.estimate(), again.estimate()), "the same seed and trials give the same posterior")
     for what, trials in trials_that_break_things(space).items():
         posterior = _after(model, space, trials)
         check_estimate(posterior.estimate(), space, f"after: {what}")
@@ -134,8 +135,8 @@ def _observation(isi_ms: float | None, mep_mv: float, people: int = 1) -> Observ
     return Observation.of([isi_ms] * people, [mep_mv] * people)
 
 
-def _after(model: ResponseModel, space: DesignSpace, trials: Trials, *, seed: int = 1, people: int = 1) -> Posterior:
-    posterior = model.begin(space, seed, people)
+def _after(model: ResponseModel, space: DesignSpace, trials: Trials, people: int = 1) -> Posterior:
+    posterior = model.begin(space, 1, people)
     for isi_ms, mep_mv in trials:
         posterior = model.update(posterior, _observation(isi_ms, mep_mv, people))
     return posterior
@@ -149,12 +150,6 @@ def _check_learning(model: ResponseModel, space: DesignSpace, trials: Trials) ->
     after = model.update(before, _observation(*trials[0]))
     require(after.trials == 1 and before.trials == 0, "update makes a posterior that has learnt from one trial more")
     require(same_estimates(before.estimate(), estimate), "a posterior never changes")
-
-
-def _check_determinism(make: Callable[[], ResponseModel], space: DesignSpace, trials: Trials) -> None:
-    once, again = (_after(make(), space, trials) for _ in range(2))
-    same = same_estimates(once.estimate(), again.estimate())
-    require(same, "the same seed and trials give the same posterior")
 
 
 def _check_people(model: ResponseModel, space: DesignSpace, trials: Trials, people: int) -> None:
@@ -256,7 +251,10 @@ def check_strategy(make: Callable[[], Strategy], *, trials: int = 12) -> None:
         _check_telling(make(), told, f"after: {what}")
     _check_replay(make, usual_trials(make().space)[:trials])
     _check_mistrials(make)
-    _check_deadline(make())
+    strategy = make()
+    isi_ms = strategy.ask(deadline_s=0.0)
+    require(isi_ms in strategy.space.grid_ms, "ask answers an ISI on the grid although its deadline has passed")
+    require(strategy.ask() == isi_ms, "what a deadline was answered with stays until the next tell")
 
 
 def _check_asking(strategy: Strategy) -> None:
@@ -326,12 +324,6 @@ def _check_mistrials(make: Callable[[], Strategy]) -> None:
     strategy.count_mistrial()
     require(strategy.ask() == other.ask(), "a mistrial does not change what is asked")
     require(same_estimates(strategy.estimate(), other.estimate()), "a mistrial does not change the estimate")
-
-
-def _check_deadline(strategy: Strategy) -> None:
-    isi_ms = strategy.ask(deadline_s=0.0)
-    require(isi_ms in strategy.space.grid_ms, "ask answers an ISI on the grid although its deadline has passed")
-    require(strategy.ask() == isi_ms, "what a deadline was answered with stays until the next tell")
 
 
 def check_acquisition(acquisition: AcquisitionFunction, posterior: Posterior, space: DesignSpace) -> None:

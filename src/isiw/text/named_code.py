@@ -1,4 +1,4 @@
-"""Code that an operator's own configuration names as `module:function`; what is read from a log never gets here."""
+"""Code that is imported when it is needed: what an operator's own configuration names, never a log, and extras."""
 
 from __future__ import annotations
 
@@ -35,6 +35,15 @@ def _meant(module_name: str, name: str, folder: Path | None) -> str:
     if module is not None:
         return did_you_mean(name, vars(module))
     return did_you_mean(module_name, () if folder is None else (file.stem for file in folder.glob("*.py")))
+
+
+def library(name: str, extra: str) -> Any:
+    """A library of one of isiw's extras, imported."""
+    try:
+        return importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        what, remedy = f"{name.partition('.')[0]} is not installed", f'Install it with: pip install "isiw[{extra}]"'
+        raise ConfigError(what, remedy=remedy) from error
 
 
 def require_fitting(make: Callable[..., object], settings: Mapping[str, Any], key: str) -> None:

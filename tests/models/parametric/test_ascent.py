@@ -1,6 +1,6 @@
 import torch
 
-from isiw.models.parametric.ascent import find_modes
+from isiw.models.parametric.importance import find_modes
 from isiw.models.protocol import Tensor
 
 FAR = torch.tensor([[3.0, 0.0, 0.0], [-3.0, 0.5, 0.0]], dtype=torch.double)

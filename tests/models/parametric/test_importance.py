@@ -5,8 +5,15 @@ import pytest
 import torch
 from scipy.stats import multivariate_normal, multivariate_t
 
-from isiw.models.parametric.ascent import Modes
-from isiw.models.parametric.importance import T_DEGREES, Effort, Proposal, WeightedDraws, importance_sample, worth
+from isiw.models.parametric.importance import (
+    T_DEGREES,
+    Effort,
+    Modes,
+    Proposal,
+    WeightedDraws,
+    importance_sample,
+    worth,
+)
 from isiw.models.protocol import Tensor
 from isiw.types import ArrayLike
 

@@ -1,6 +1,7 @@
 """The Pyro program, and that the fast density is nothing else."""
 
 import math
+from dataclasses import replace
 
 import pyro
 import pytest
@@ -66,7 +67,7 @@ def test_an_uncertain_isi_is_integrated_out() -> None:
 
 
 def test_without_a_window_the_isi_does_not_matter() -> None:
-    model = program("gamma").without_window()
+    model = replace(program("gamma"), present=False)
     elsewhere = History(TRIALS.isi_ms + 100.0, *TRIALS.columns[1:])
     some = latents(model)
     here, there = (model.log_density(some, trials) for trials in (TRIALS, elsewhere))

@@ -2,10 +2,10 @@ from .producers import LightSearch as LightSearch
 from .producers import Producer as Producer
 from .producers import produce as produce
 from .producers import search_light as search_light
-from .record import ProductionRecord as ProductionRecord
-from .record import read_productions as read_productions
 from .task import SESSIONS as SESSIONS
 from .task import Block as Block
+from .task import ProductionRecord as ProductionRecord
+from .task import read_productions as read_productions
 from .task import resume_task as resume_task
 from .task import run_task as run_task
 from .task import score_pct as score_pct

@@ -98,7 +98,11 @@ def produce(block: Block, people: int, seed: int, producer: Producer | None = No
     law = producer or Producer()
     person = np.random.default_rng(seed).standard_normal(people)
     rng = np.random.default_rng([seed, block.mode, round(block.target_ms), round(block.scale_pct)])
-    state, produced_ms = _begun(law, block, person), np.empty((people, block.trials))
+    if block.mode in {3, 4}:
+        begun_ms, search_ms = block.target_ms + law.offset_ms + law.offset_sd_ms * person, 0.0
+    else:
+        begun_ms, search_ms = block.target_ms + law.start_sd_ms * person, law.search_ms
+    state, produced_ms = _State(begun_ms, np.full_like(person, search_ms)), np.empty((people, block.trials))
     for trial in range(block.trials):
         aim_ms, produced_ms[:, trial] = _tried(law, state, rng)
         state = _learnt(law, block, state, aim_ms, produced_ms[:, trial], rng.random(people))
@@ -110,13 +114,6 @@ class _State(NamedTuple):
 
     memory_ms: FloatArray
     search_ms: FloatArray
-
-
-def _begun(law: Producer, block: Block, person: FloatArray) -> _State:
-    """The state before the first trial, from a standard normal number a person."""
-    if block.mode in {3, 4}:
-        return _State(block.target_ms + law.offset_ms + law.offset_sd_ms * person, np.zeros_like(person))
-    return _State(block.target_ms + law.start_sd_ms * person, np.full_like(person, law.search_ms))
 
 
 def _tried(law: Producer, state: _State, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:

@@ -1,22 +1,39 @@
-"""The task at a terminal: its blocks, the two keys that a person presses, and the feedback once a trial is durable."""
+"""The task at a terminal: its blocks, two keys that a person presses, feedback once a trial is durable, and the log."""
 
 from __future__ import annotations
 
+import itertools
 import math
 import queue
 import sys
 import time
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from isiw.checks import choice, number
-from isiw.dissertation.interval.record import ProductionRecord, begin_log, continue_log, read_productions
-from isiw.errors import DeviceError
-from isiw.log.headers import LONGEST_MS, MODES, Block, Production
-from isiw.log.schema import Event
+import isiw
+from isiw.checks import choice, number, text, whole
+from isiw.errors import DeviceError, InvalidValueError
+from isiw.lazy import pd
+from isiw.log.headers import (
+    LONGEST_MS,
+    MODES,
+    PRODUCTION_VERSION,
+    SCHEMA_VERSION,
+    Block,
+    Header,
+    Production,
+    ProductionHeader,
+    ThresholdHeader,
+)
+from isiw.log.kinds import LogKind, kind_of, of_another_kind
+from isiw.log.records import Records
+from isiw.log.salvage import Salvage, salvage
+from isiw.log.schema import Event, now
 from isiw.log.writer import LogWriter
 from isiw.session.terminal import Keys, Screen, somebody_there
 from isiw.text.sanitize import counted
@@ -49,6 +66,118 @@ QUIT: Final = "q"
 _GLANCE_S = 0.2
 
 
+NEAR_MS = 20.0
+"""Half of the 40 ms in which an interval counts as effective [Kim2020, 6.3.1]."""
+
+
+@dataclass(frozen=True, eq=False)
+class ProductionRecord:
+    """A task as its log tells it.
+
+    Args:
+        path: the file that was read.
+        header: who, when, and which blocks.
+        productions: the produced intervals, in the order in which they were logged.
+        events: resumptions, and presses that do not count.
+        losses: what could not be read, a sentence each.
+    """
+
+    path: Path
+    header: ProductionHeader
+    productions: tuple[Production, ...] = field(repr=False)
+    events: tuple[Event, ...] = field(repr=False, default=())
+    losses: tuple[str, ...] = ()
+
+    @cached_property
+    def left(self) -> tuple[tuple[int, int], ...]:
+        """Trials that are not in the log yet, as the trial's and its block's number."""
+        blocks = [block for block, of in enumerate(self.header.blocks) for _ in range(of.trials)]
+        next_trial = max((production.trial for production in self.productions), default=-1) + 1
+        return tuple(itertools.islice(enumerate(blocks), next_trial, None))
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """A row a block that was begun.
+
+        Columns mode, target_ms, scale_pct, n, mean_ms, sd_ms (of the n trials; 0 for one), and near, the share within
+        20 ms of the target.
+        """
+        rows: list[dict[str, float]] = []
+        for index, block in enumerate(self.header.blocks):
+            times_ms = np.array([each.produced_ms for each in self.productions if each.block == index])
+            if times_ms.size:
+                rows.append(
+                    {
+                        "mode": block.mode,
+                        "target_ms": block.target_ms,
+                        "scale_pct": block.scale_pct,
+                        "n": len(times_ms),
+                        "mean_ms": float(times_ms.mean()),
+                        "sd_ms": float(times_ms.std()),
+                        "near": float(np.mean(np.abs(times_ms - block.target_ms) <= NEAR_MS)),
+                    }
+                )
+        return pd.DataFrame(rows)
+
+
+def begin_log(
+    path: str | Path, blocks: tuple[Block, ...], subject: str, seed: int
+) -> tuple[ProductionRecord, LogWriter]:
+    """A task that begins, and its open log."""
+    if not blocks:
+        raise InvalidValueError("a task needs at least one block", remedy="Take those of isiw.interval.session_blocks.")
+    header = ProductionHeader(
+        isiw_version=isiw.__version__,
+        created=now().isoformat(timespec="seconds"),
+        subject=text("subject", subject),
+        seed=whole("seed", seed, least=0),
+        blocks=blocks,
+    )
+    return ProductionRecord(Path(path), header, ()), LogWriter.create(path, header)
+
+
+def continue_log(path: str | Path) -> tuple[ProductionRecord, LogWriter]:
+    """A task that was interrupted, and its log, open again."""
+    found = salvage(path)
+    record = _record_of(found)
+    if not record.left:
+        raise InvalidValueError(
+            "this task is complete",
+            got=str(record.path),
+            remedy=f"Look at it with: {LogKind.PRODUCTION.shown_by(record.path)}",
+        )
+    log = LogWriter.continuing(path, found, record.header)
+    log.append(Event(kind="resume", trial=None, text=f"Resumed before trial {record.left[0][0]}."))
+    return record, log
+
+
+def read_productions(path: str | Path) -> ProductionRecord:
+    """Read the log of a task, finished or not, whole or damaged; `losses` says what is missing.
+
+    Args:
+        path: the log, with or without `.part`.
+
+    Raises:
+        LogError: no such file, not a log, or one of something else, or from a newer version.
+        DamagedLogError: a log of which not even the header can be read.
+    """
+    return _record_of(salvage(path))
+
+
+def _record_of(found: Salvage) -> ProductionRecord:
+    records = Records.of(found)
+    if any(message.topic == "/header" for message in found.messages):
+        kind = kind_of(records.header_of((Header, ThresholdHeader), SCHEMA_VERSION))
+        raise of_another_kind(found.path, kind, LogKind.PRODUCTION)
+    return ProductionRecord(
+        found.path,
+        records.header_of((ProductionHeader,), PRODUCTION_VERSION),
+        tuple(record for record in records.history if isinstance(record, Production)),
+        tuple(record for record in records.history if isinstance(record, Event)),
+        records.told_losses,
+    )
+
+
 class Presses:
     """Turns key presses into intervals; the thread that reads the keys presses, another one waits."""
 
@@ -65,8 +194,8 @@ class Presses:
             self.left = True
         elif self.resting:
             self._begun_s = None
-        elif key.lower() == START:
-            self._begin(now_s)
+        elif key.lower() == START and (self._begun_s is None or 1000.0 * (now_s - self._begun_s) > LONGEST_MS):
+            self._begun_s = now_s
         elif key.lower() == END and self._begun_s is not None:
             self._intervals.put(1000.0 * (now_s - self._begun_s))
             self._begun_s = None
@@ -83,10 +212,6 @@ class Presses:
             except queue.Empty:
                 continue
         return None
-
-    def _begin(self, now_s: float) -> None:
-        if self._begun_s is None or 1000.0 * (now_s - self._begun_s) > LONGEST_MS:
-            self._begun_s = now_s
 
 
 def session_blocks(session: int, modes: Iterable[int] = (), trials: int = 200) -> tuple[Block, ...]:
@@ -171,9 +296,6 @@ def resume_task(path: str | Path, *, rest_s: float = REST_S) -> ProductionRecord
         path: the log, with or without `.part`.
         rest_s: between blocks [s].
 
-    Returns:
-        What is in the log.
-
     Raises:
         DeviceError: nobody is at a terminal, or its keys cannot be timed.
         InvalidValueError: the task is complete, or a negative rest.
@@ -242,7 +364,7 @@ def _one_trial(
             log.require_in_place()
             screen.say(f"{trial + 1:4d}  {feedback(block, production)}")
             return True
-        text = f"An interval of {produced_ms:.0f} ms does not count; press again."
-        log.append(Event(kind="note", trial=trial, text=text))
-        screen.say(text)
+        said = f"An interval of {produced_ms:.0f} ms does not count; press again."
+        log.append(Event(kind="note", trial=trial, text=said))
+        screen.say(said)
     return False

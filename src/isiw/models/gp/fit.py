@@ -1,10 +1,8 @@
 """Hyperparameters of the Gaussian process, and how well each of a few of them explains the trials.
 
-The transformed MEP is a constant, a Gaussian process of the ISI, and Gaussian noise; trials of TMS alone are constant
-and noise. Two hypotheses share that prior: the process has an amplitude, or it has none and the tap changes nothing.
-Their hyperparameters lie on a grid of equal steps in prior SDs, weighted by prior times marginal likelihood
-[Rasmussen2006, equation 2.30]. So the probability that there is a profile at all is a ratio of marginal likelihoods, in
-which a process that could explain anything pays for it.
+The transformed MEP is a constant, a Gaussian process of the ISI, and Gaussian noise; trials of TMS alone lack the
+process. With an amplitude or without one, hyperparameters lie on a grid of equal steps in prior SDs, weighted by prior
+times marginal likelihood [Rasmussen2006, equation 2.30], in which a process that could explain anything pays for it.
 
 A second Gaussian process describes the log variance by ISI [Kersting2007]. It is fitted to squared leave-one-out
 residuals by Newton's method on their Gaussian likelihood, which is concave in the log variance.
@@ -58,15 +56,10 @@ TINY = 1e-300
 
 @dataclass(frozen=True, eq=False)
 class NoiseProfile:
-    """Relative noise variance by ISI; its logarithm has mean 0 over the trials.
+    """Relative noise variance by ISI; its logarithm has mean 0 over the trials."""
 
-    Args:
-        isi_ms: ISIs that it was learnt at [ms], shape (n,).
-        pull: by how much each of them raises the log variance, shape (n,).
-    """
-
-    isi_ms: Tensor
-    pull: Tensor
+    isi_ms: Tensor  # where it was learnt, (n,)
+    pull: Tensor  # by how much each of them raises the log variance, (n,)
 
     def log_variance(self, isi_ms: Tensor) -> Tensor:
         """Relative log variance at some ISIs [ms], same shape (t,)."""
@@ -89,10 +82,7 @@ def _covariance(one: Tensor, other: Tensor) -> Tensor:
 
 
 def leave_one_out(covariance: Tensor, residuals: Tensor) -> Tensor:
-    """Distance of each value from what all others predict, in SDs of that prediction, shape (n,).
-
-    [Rasmussen2006, equations 5.10–5.12]
-    """
+    """Distance of each value from what all others predict [SD], (n,) [Rasmussen2006, equations 5.10–5.12]."""
     inverse = torch.cholesky_inverse(torch.linalg.cholesky(covariance))
     return (inverse @ residuals) / inverse.diagonal().sqrt()
 
@@ -143,21 +133,14 @@ class Trials(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A few processes, and how believable each is.
-
-    Args:
-        processes: the hyperparameters, shape (q,).
-        log_prior: what each one's log marginal likelihood is added to, shape (q,).
-        noise: how the noise depends on the ISI.
-        trouble: what went wrong, and what stands in for it.
-    """
+    """A few processes, and how believable each is."""
 
     prior: HyperparameterPrior
     kernel: KernelName
     scale: Standardisation
     told: PersonTrials
-    processes: Hyperparameters
-    log_prior: Tensor
+    processes: Hyperparameters  # (q,)
+    log_prior: Tensor  # added to each one's log marginal likelihood, (q,)
     noise: NoiseProfile = field(default_factory=equal_noise)
     trouble: str | None = None
 

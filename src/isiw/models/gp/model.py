@@ -1,7 +1,6 @@
 """A Gaussian process on the transformed MEP, fitted again after each trial, and windows from its sample paths.
 
-Whatever the profile's form, it needs to be smooth only. The price is trials: the process does not know that there is
-one window with flat ends.
+A profile need be smooth only. The price is trials: the process does not know that there is one window with flat ends.
 """
 
 from __future__ import annotations

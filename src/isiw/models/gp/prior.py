@@ -25,17 +25,11 @@ LEAST_NOISE = 0.01
 
 
 class Hyperparameters(NamedTuple):
-    """Of q processes, amplitudes and noise in standardised units, shape (q,).
-
-    Args:
-        length_ms: over which the profile varies [ms].
-        amplitude: SD of the profile; 0 if a tap changes nothing.
-        noise: SD of a trial about the profile, where the relative noise variance is 1.
-    """
+    """Of q processes, amplitudes and noise in standardised units, shape (q,)."""
 
     length_ms: Tensor
-    amplitude: Tensor
-    noise: Tensor
+    amplitude: Tensor  # SD of the profile; 0 if a tap changes nothing
+    noise: Tensor  # SD of a trial about it, if the relative noise variance is 1
 
     def picked(self, picks: Tensor) -> Hyperparameters:
         """Some of them."""
@@ -203,17 +197,10 @@ USUAL_SPREAD: dict[Transform, float] = {"log": 1.0, "sqrt": 0.5, "none": 1.0}
 
 @dataclass(frozen=True)
 class Standardisation:
-    """Standardisation of transformed amplitudes.
-
-    Args:
-        transform: what amplitudes are transformed by.
-        least_mv: amplitudes below are taken for this [mV], so that 0 has a logarithm.
-        centre: transformed amplitude that becomes 0.
-        unit: difference of transformed amplitudes that becomes 1.
-    """
+    """Standardisation of transformed amplitudes, by the centre that becomes 0 and the difference that becomes 1."""
 
     transform: Transform
-    least_mv: float
+    least_mv: float  # smaller amplitudes are taken for it, so that 0 has a logarithm
     centre: float
     unit: float
 
@@ -237,10 +224,7 @@ def transformed(mep_mv: FloatArray, transform: Transform, least_mv: float) -> Fl
 
 
 def scale_of(mep_mv: FloatArray, transform: Transform, least_mv: float) -> Standardisation:
-    """The scale on which amplitudes have mean 0 and SD 1, as if one more of them had had the usual spread.
-
-    That one keeps amplitudes apart that are few, or all equal.
-    """
+    """The scale of mean 0 and SD 1, as if one more amplitude had the usual spread, which keeps equal ones apart."""
     values = transformed(mep_mv if len(mep_mv) else np.array([USUAL_MEP_MV]), transform, least_mv)
     centre = float(values.mean())
     usual = USUAL_SPREAD[transform] * (1.0 if transform == "log" else centre)

@@ -39,21 +39,13 @@ OUTCOMES = 32
 
 
 class Paths(NamedTuple):
-    """Sample paths of one person, on the scale of transformed amplitudes.
+    """Sample paths of one person, on the scale of transformed amplitudes, at the paths' grid (s, m) or (s,)."""
 
-    Args:
-        level: mean of the transformed MEP on the paths' grid, shape (s, m).
-        noise_sd: SD of a trial about it, shape (s, m).
-        alone: mean of the transformed MEP of TMS alone, shape (s,); NaN if there was none.
-        alone_sd: SD of a trial about it, shape (s,).
-        present: whether the tap changes anything, shape (s,).
-    """
-
-    level: Tensor
-    noise_sd: Tensor
-    alone: Tensor
+    level: Tensor  # mean of the transformed MEP
+    noise_sd: Tensor  # SD of a trial about it
+    alone: Tensor  # mean of TMS alone; NaN if there was none
     alone_sd: Tensor
-    present: Tensor
+    present: Tensor  # the tap changes something
 
 
 def draw_paths(fit: Fit, isi_ms: Tensor, size: int, rng: np.random.Generator) -> Paths:
@@ -108,18 +100,12 @@ def _constants(fit: Fit, noise: Tensor, z: Tensor) -> Tensor:
 
 @dataclass(frozen=True, eq=False)
 class ProfileSample:
-    """Equally weighted paths of b people, and what they say about profile, window and the next MEP.
+    """Equally weighted paths of b people, (b, s, ...), and what they say about profile, window and the next MEP."""
 
-    Args:
-        isi_ms: ISIs of the paths' grid [ms], evenly spaced, shape (m,); what lies between is interpolated.
-        paths: the paths, fields of shape (b, s, ...).
-        floor: what the least-excess rule is applied above.
-    """
-
-    isi_ms: Tensor
+    isi_ms: Tensor  # of the paths' grid, evenly spaced, (m,)
     paths: Paths
     transform: Transform
-    floor: FloorKind
+    floor: FloorKind  # above which the least-excess rule is applied
 
     @cached_property
     def _expected_mv(self) -> Tensor:

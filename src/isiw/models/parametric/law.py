@@ -1,10 +1,8 @@
 """The scatter of MEPs around their expectation in the parametric window model: densities, intervals, and draws.
 
-An MEP is the EMG floor plus what is evoked. Its mean and variance are the sums of theirs; so the CV falls or rises with
-the level as the one or the other dominates. It is gamma- or log-normally distributed. With noise on the input, what is
-evoked is a saturating (probit) function of an input that fluctuates from trial to trial, worked out on a few nodes; the
-mixture of the nodes is the model, not an approximation of it. A few trials are outliers, log-normal around a multiple
-of the floor.
+An MEP is the EMG floor plus what is evoked, whose means and variances add, gamma- or log-normally distributed. With
+noise on the input, what is evoked is a probit function of a fluctuating input on a few nodes, whose mixture is the
+model itself. A few trials are outliers, log-normal around a multiple of the floor.
 """
 
 from __future__ import annotations
@@ -53,15 +51,12 @@ def _components(unknowns: Unknowns, level: Tensor, likelihood: Likelihood) -> _C
         saturation_mv, input_sd = u.saturation_mv.unsqueeze(-1), u.input_sd.unsqueeze(-1)
         share = (evoked_mv / saturation_mv).clamp(1e-9, 1.0 - 1e-9)
         drive = torch.sqrt(1.0 + input_sd.square()) * torch.special.ndtri(share)
-        evoked_mv = saturation_mv * _probit(drive + input_sd * _nodes(level)[0])
+        x = drive + input_sd * _nodes(level)[0]
+        # The normal distribution function, faster than torch's own, which differs only if it is nearly 0.
+        evoked_mv = saturation_mv * (0.5 + 0.5 * torch.erf(x * math.sqrt(0.5)))
     mean_mv = evoked_mv + u.floor_mv.unsqueeze(-1)
     variance = (evoked_mv * u.evoked_cv.unsqueeze(-1)).square() + (u.floor_mv * u.floor_cv).square().unsqueeze(-1)
     return _Components(mean_mv, variance / mean_mv.square())
-
-
-def _probit(x: Tensor) -> Tensor:
-    """The normal distribution function, faster than torch's own, which differs only where it is nearly 0."""
-    return 0.5 + 0.5 * torch.erf(x * math.sqrt(0.5))
 
 
 def _mixed(log_terms: Tensor, likelihood: Likelihood) -> Tensor:
@@ -102,10 +97,11 @@ def log_likelihood(unknowns: Unknowns, level: Tensor, log_mep: Tensor, likelihoo
     parts = _components(unknowns, level, likelihood)
     at = torch.where(known, low, 0.0)
     inside = _mixed(_log_density(parts, at.unsqueeze(-1), likelihood), likelihood)
-    outside = _log_outlier_density(unknowns, at)
+    outside = -0.5 * _outlier_z(unknowns, at).square() - math.log(OUTLIER_LOG_SD) - _LOG_SQRT_2PI
     if not bool(known.all()):
         inside = torch.where(known, inside, _log_between(parts, low, high, likelihood))
-        outside = torch.where(known, outside, _log_outlier_between(unknowns, low, high))
+        below_high, below_low = (torch.special.ndtr(_outlier_z(unknowns, end)) for end in (high, low))
+        outside = torch.where(known, outside, torch.log((below_high - below_low).clamp_min(1e-300)))
     p_outlier = unknowns.p_outlier.unsqueeze(-1)
     return torch.logaddexp(inside + torch.log1p(-p_outlier), outside + torch.log(p_outlier))
 
@@ -120,15 +116,6 @@ def _log_between(parts: _Components, low: Tensor, high: Tensor, likelihood: Like
 
 def _outlier_z(unknowns: Unknowns, log_mep: Tensor) -> Tensor:
     return (log_mep - torch.log(OUTLIER_FLOORS * unknowns.floor_mv).unsqueeze(-1)) / OUTLIER_LOG_SD
-
-
-def _log_outlier_density(unknowns: Unknowns, log_mep: Tensor) -> Tensor:
-    return -0.5 * _outlier_z(unknowns, log_mep).square() - math.log(OUTLIER_LOG_SD) - _LOG_SQRT_2PI
-
-
-def _log_outlier_between(unknowns: Unknowns, low: Tensor, high: Tensor) -> Tensor:
-    below = (torch.special.ndtr(_outlier_z(unknowns, end)) for end in (high, low))
-    return torch.log((next(below) - next(below)).clamp_min(1e-300))
 
 
 def draw_log_mep(

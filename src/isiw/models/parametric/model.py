@@ -1,8 +1,7 @@
 """The parametric window model: a Gaussian window on a floor, with noise that depends on the level, as a Pyro program.
 
-Its posterior is sampled again after every trial, and depends on the seed and on which trials there were, not on their
-order. Whether there is a window is one more unknown: with and without are two models, weighed by their evidence. The
-floor is an unknown too, so the least-excess rule is always applied to what is above the baseline.
+Its posterior is sampled again after every trial, whatever their order. With and without a window are two models,
+weighed by their evidence. The floor is unknown, so that the least-excess rule is applied above the baseline.
 """
 
 from __future__ import annotations
@@ -37,16 +36,12 @@ class ParametricModel(Checked):
     Args:
         prior: the prior over people.
         likelihood: how MEPs scatter: "gamma", "log-normal", or "input-noise" (a noisy input of a saturating curve).
-        method: "fast" samples by importance around all modes; "nuts" takes the draws with a window from Pyro's
-            no-U-turn sampler instead, which needs minutes and is for reference.
+        method: "fast" samples by importance around all modes; "nuts", for reference, by Pyro's no-U-turn sampler.
         samples: equally weighted samples that represent a posterior.
         effort: how much work a sample with a window is worth.
         chains: how long the no-U-turn sampler runs.
         detection_limit_mv: an amplitude of 0 lies below this [mV].
         response_threshold_mv: a response that was seen lies above this [mV].
-
-    Raises:
-        InvalidValueError: an unknown likelihood or method, or an invalid number.
     """
 
     prior: WindowPrior = field(default_factory=WindowPrior)
@@ -139,18 +134,12 @@ def _sorted(history: History, person: int) -> History:
 
 @dataclass(frozen=True, eq=False)
 class WindowSample:
-    """Equally weighted samples, and what they say about the next MEP and about the window.
-
-    Args:
-        unknowns: fields of shape (b, s).
-        present: whether there is any excess, shape (b, s).
-        space: in whose range a window is looked for.
-    """
+    """Equally weighted samples (b, s), and what they say about the next MEP and about the window."""
 
     unknowns: Unknowns
-    present: Tensor
+    present: Tensor  # there is any excess
     likelihood: Likelihood
-    space: DesignSpace
+    space: DesignSpace  # in whose range a window is sought
 
     def levels(self, isi_ms: Tensor) -> Tensor:
         """Share of the largest excess at some ISIs, of shape (t,) or (b, 1 or s, t), shape (b, s, t)."""

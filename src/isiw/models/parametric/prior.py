@@ -1,8 +1,4 @@
-"""The unknowns of the parametric window model, and their prior.
-
-All unknowns are made from standard normal latents, so that the prior is the same simple thing for every likelihood and
-the latents have no bounds.
-"""
+"""The unknowns of the parametric window model, and their prior, made from standard normal latents without bounds."""
 
 from __future__ import annotations
 
@@ -37,30 +33,18 @@ class Unknowns(NamedTuple):
     """The unknowns of m people; all fields have the shape (m,).
 
     The expected MEP is `baseline_mv + amplitude_mv * exp(-0.5 ((isi - centre) / sd)^2)`, whatever the likelihood.
-
-    Args:
-        start_ms: start of the window: two SDs before the centre [ms].
-        width_ms: its width: four SDs [ms].
-        floor_mv: expected EMG floor [mV].
-        floor_cv: its CV from trial to trial.
-        baseline_mv: expected MEP without a tap [mV]: the floor, and what TMS alone evokes.
-        amplitude_mv: expected excess over the baseline at the centre [mV].
-        evoked_cv: CV of what is evoked, given the noise on the input.
-        saturation_mv: the largest evoked MEP [mV] (input noise only).
-        input_sd: SD of the noise on the input, in probits (input noise only).
-        p_outlier: probability that a trial has nothing to do with the ISI.
     """
 
-    start_ms: Tensor
-    width_ms: Tensor
+    start_ms: Tensor  # two SDs before the centre
+    width_ms: Tensor  # four SDs
     floor_mv: Tensor
-    floor_cv: Tensor
-    baseline_mv: Tensor
-    amplitude_mv: Tensor
-    evoked_cv: Tensor
-    saturation_mv: Tensor
-    input_sd: Tensor
-    p_outlier: Tensor
+    floor_cv: Tensor  # from trial to trial
+    baseline_mv: Tensor  # without a tap: the floor, and what TMS alone evokes
+    amplitude_mv: Tensor  # excess over the baseline at the centre
+    evoked_cv: Tensor  # given the noise on the input
+    saturation_mv: Tensor  # the largest evoked MEP (input noise only)
+    input_sd: Tensor  # in probits (input noise only)
+    p_outlier: Tensor  # that a trial has nothing to do with the ISI
 
 
 _Evoked = tuple[Tensor, Tensor, Tensor, Tensor, Tensor]

@@ -11,8 +11,7 @@ from isiw.checks import Checked, Count, number
 from isiw.design import DesignSpace
 from isiw.lazy import pyro, torch
 from isiw.models import parametric
-from isiw.models.parametric.ascent import Modes
-from isiw.models.parametric.importance import Effort, Proposal, WeightedDraws, importance_sample, worth
+from isiw.models.parametric.importance import Effort, Modes, Proposal, WeightedDraws, importance_sample, worth
 from isiw.models.parametric.prior import Likelihood, Unknowns, WindowPrior, latent_names
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
@@ -35,10 +34,6 @@ class WindowProgram:
     def latents(self) -> int:
         """Number of latents."""
         return len(latent_names(self.likelihood))
-
-    def without_window(self) -> WindowProgram:
-        """The model of the same person, given that there is no window."""
-        return replace(self, present=False)
 
     def __call__(self, trials: History) -> Unknowns:
         """Run the program."""
@@ -139,7 +134,7 @@ def sample_person(
     """Draw from the posterior of one person."""
     everywhere = Proposal.prior(program.latents)
     log_density = partial(program.log_density, trials=trials)
-    log_density_without = partial(program.without_window().log_density, trials=trials)
+    log_density_without = partial(replace(program, present=False).log_density, trials=trials)
     without = importance_sample(log_density_without, everywhere, generator, WITHOUT_WINDOW)
     # Without a window its place and size are as in the prior, and the floor is already known: good scouts.
     with_ = importance_sample(log_density, Proposal.at(without.modes), generator, effort)
@@ -182,10 +177,7 @@ def _flattened(drawn: WeightedDraws, log_share: float, which: str) -> tuple[Weig
 def _by_nuts(
     program: WindowProgram, trials: History, modes: Modes, size: int, chains: Chains, generator: torch.Generator
 ) -> tuple[Tensor, str | None]:
-    """Draws of a chain of NUTS from each mode that matters, and a sentence if they disagree about the window.
-
-    Chains that do not mix say nothing about the modes' shares, so each counts by its mode's evidence.
-    """
+    """Draws by NUTS from each mode, by its evidence, as chains may not mix, and a sentence if they disagree."""
     shares = torch.softmax(modes.log_evidence, dim=0)
     shares = shares[shares >= chains.least_share]
     length = max(chains.least, size // len(shares))
