@@ -5,7 +5,8 @@ The same seed leads to other draws with each, so that a log states which it was.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Generic, Literal, Protocol, TypeAlias
 
 import numpy as np
@@ -61,7 +62,7 @@ def engine_for(name: EngineName, target: TabledTarget[L], device: str = "cpu") -
     """The engine that is wanted, where it can be had; else torch."""
     if name == "torch" or not AVAILABLE or device != "cpu":
         return TorchEngine(target)
-    return Compiled(target, target.tables())
+    return Compiled(target)
 
 
 @dataclass(frozen=True)
@@ -99,11 +100,14 @@ class Compiled(Generic[L]):
 
     Args:
         target: whose posterior particles move under.
-        tables: what the kernels know of it.
     """
 
     target: TabledTarget[L]
-    tables: Tables = field(repr=False)
+
+    @cached_property
+    def tables(self) -> Tables:
+        """What the kernels know of the target."""
+        return self.target.tables()
 
     def meaning(self, latents: L, trials: int) -> tuple[Person, FloatArray]:
         """What particles mean; see `Engine`."""

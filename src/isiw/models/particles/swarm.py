@@ -188,5 +188,6 @@ class Swarm(Generic[L]):
 
 def taken(values: Tensor, picks: Tensor) -> Tensor:
     """Some of the particles, in any order and as often as picked, shape (b, s, ...)."""
-    index = picks.unsqueeze(-1).expand(-1, -1, values.shape[-1]) if values.dim() > picks.dim() else picks
-    return torch.gather(values, 1, index)
+    first = values.shape[1] * torch.arange(len(values), device=picks.device).unsqueeze(-1)
+    rows = values.flatten(0, 1).index_select(0, (first + picks).flatten())
+    return rows.view(*picks.shape, *values.shape[2:])

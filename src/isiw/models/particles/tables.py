@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from isiw.compiled import first_of
 from isiw.lazy import torch
 from isiw.models.particles.kernels import predictions as compiled
@@ -54,7 +56,9 @@ class FacilitationTables:
     def at(self, table: Tensor, level: Tensor) -> Tensor:
         """What lies between the rows of a table."""
         if self.records is not None:
-            return torch.from_numpy(compiled.rows_between(self.records, table.numpy(), level.numpy()))
+            found = np.empty((*level.shape, table.shape[-1]), dtype=np.float32)
+            compiled.rows_between(self.records, table.numpy(), level.numpy(), found)
+            return torch.from_numpy(found)
         if self._depth is None:
             return interpolated(table, level)
         # `interpolated` has its rows at the squares of equal steps.
@@ -75,8 +79,10 @@ class FacilitationTables:
         log_mep = low.unsqueeze(-1) + middle * (high - low).unsqueeze(-1)
         if self.records is not None:
             with first_of("predictions"):
-                cells = log_mep.numpy(), width.numpy()
-                return torch.from_numpy(compiled.outcome_tables(self.records, self.rows.numpy(), order, *cells))
+                rows, cells = self.rows.numpy(), (log_mep.numpy(), width.numpy())
+                table = np.empty((*rows.shape, OUTCOMES), dtype=np.float32)
+                compiled.outcome_tables(self.records, rows, order, *cells, table)
+            return torch.from_numpy(table)
         gain = log_gain(response, torch.full_like(response.drift, order).unsqueeze(-1)).squeeze(-1)
         response = response._replace(log_ratio=response.log_ratio + gain)
         others = (self.rows, log_mep.unsqueeze(-2))

@@ -7,9 +7,9 @@ its own fields keys in its place; what a rig or a lab knows, `KNOWN`, has short 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, fields, is_dataclass, replace
-from functools import partial
+from functools import cache, partial
 from numbers import Integral
 from typing import Annotated, Any, Final, Protocol, TypeAlias, get_args, get_origin, get_type_hints
 
@@ -166,17 +166,21 @@ def _setting_at(owner: Any, path: tuple[str, ...]) -> Setting | None:
         owner = getattr(owner, name, None)
     if owner is None or not hasattr(owner, path[-1]):
         return None
-    return Setting(path, type(owner), get_type_hints(type(owner))[path[-1]], getattr(owner, path[-1]))
+    return Setting(path, type(owner), _hints(type(owner))[path[-1]], getattr(owner, path[-1]))
 
 
 def _settings_of(part: Any, path: tuple[str, ...]) -> Iterator[Setting]:
-    kinds = get_type_hints(type(part))
+    kinds = _hints(type(part))
     for f in fields(part):
         value = getattr(part, f.name)
         if f.metadata.get("spread"):
             yield from _settings_of(value, (*path, f.name))
         else:
             yield Setting((*path, f.name), type(part), kinds[f.name], value)
+
+
+_hints: Final[Callable[[type], dict[str, Any]]] = cache(get_type_hints)
+"""The types of a class's fields, worked out once."""
 
 
 def settings_values(settings: Settings) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from isiw.compiled import LANES, bell, exp, inlined, kernel, larger, log, loop, per, per_root, smaller, total
+from isiw.compiled import LANES, bell, exp, inlined, kernel, larger, log, loop, per, per_root, smaller, total, writer
 from isiw.models.particles.kernels.likelihood import (
     NODE_WEIGHTS,
     NODES_AT,
@@ -168,12 +168,11 @@ def _outcomes(particle: Any, levels: Any, gain: Any, lines: Any, nodes: Any, tab
 
 
 @kernel
-def outcome_tables(particles: Any, levels: Any, order: int, log_mep: Any, width: Any) -> Any:
-    """Probability of each outcome of the next trial at some facilitations, shape (b, s, l, y)."""
+def outcome_tables(particles: Any, levels: Any, order: int, log_mep: Any, width: Any, table: Any) -> None:
+    """Write the probability of each outcome of the next trial at some facilitations, shape (b, s, l, y)."""
     people, size, rows = levels.shape
     outcomes = log_mep.shape[1]
     padded = (larger(outcomes, rows) + LANES - 1) // LANES * LANES
-    table = np.empty((people, size, rows, outcomes), dtype=np.float32)
     lines, nodes = np.zeros((6, padded), dtype=np.float32), np.empty((2, NODES, padded), dtype=np.float32)
     lines[1, :outcomes] = width
     startle, relaxed = gain_of(order)
@@ -183,7 +182,6 @@ def outcome_tables(particles: Any, levels: Any, order: int, log_mep: Any, width:
             particle = particles[person, i]
             gain = particle[DRIFT] * relaxed + particle[STARTLED] * startle
             _outcomes(particle, levels[person, i], gain, lines, nodes, table[person, i])
-    return table
 
 
 @inlined
@@ -203,16 +201,13 @@ def _between_rows(table: Any, level: Any, depth: Any, found: Any) -> None:
             blend[y] = first[y] + above * (second[y] - first[y])
 
 
-@kernel
-def rows_between(particles: Any, table: Any, levels: Any) -> Any:
-    """What lies between the rows of a table, shape (b, s, t, y)."""
-    people, size, count = levels.shape
-    found = np.empty((people, size, count, table.shape[3]), dtype=np.float32)
-    for person in range(people):
-        for i in range(size):
+@writer
+def rows_between(particles: Any, table: Any, levels: Any, found: Any) -> None:
+    """Write what lies between the rows of a table, shape (b, s, t, y)."""
+    for person in range(levels.shape[0]):
+        for i in range(levels.shape[1]):
             depth = particles[person, i, DEPTH]
             _between_rows(table[person, i], levels[person, i], depth, found[person, i])
-    return found
 
 
 @kernel
