@@ -138,7 +138,9 @@ def honesty(before: Path, now: Path) -> pd.DataFrame:
         rows[f"false_sure_{which}"] = (both[f"probability_{which}"] >= 0.9).astype(float).mask(there)
     factor = both["bayes_factor_now" if "bayes_factor_now" in both else "bayes_factor"]  # which earlier versions lack
     unclear = both["reported_window_now"].astype(bool) & (factor < window.LEAST_FACTOR)
-    rows["undecided_now"] = (unclear & (both["probability_now"] < window.SURE)).astype(float)
+    undecided = unclear & (both["probability_now"] < window.SURE)
+    rows["undecided_now"] = undecided.astype(float)
+    rows["false_stated_now"] = (both["reported_window_now"].astype(bool) & ~undecided).astype(float).mask(there)
     groups = pd.DataFrame(rows).groupby([both["cohort"], both["trial"]])
     table = groups.mean().assign(people=groups["people"].sum())
     for name in ("f1_more", "f1_more_with_window"):

@@ -2,7 +2,9 @@
 
 `run` keeps two tables a cohort: the rows of `before_and_now run` on the same people, and what was named after each
 trial. `report` compares that with a CUSUM that knows the person's law, the size and the direction of the step, and
-whose threshold no more than 3 % of the sessions without a step reach. Reported people come from seed 200,000 on.
+whose threshold no more than 3 % of the sessions without a step reach. `bound` says how often the trials of a session
+could name its step to anyone who knows its trial, but neither the person nor the size. Reported people come from seed
+200,000 on.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ import typer
 from benchmarks.before_and_now import LATER, MARKS, honesty, study_of
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
+from isiw.models.protocol import Observation
 from isiw.studies import summary
 from isiw.studies.sessions import SimulatedSession, _Batch, examine
 from isiw.subjects.responses import RecruitmentResponse
@@ -218,6 +221,47 @@ def _in_time(stepped: pd.DataFrame, sessions: int) -> pd.DataFrame:
     return pd.DataFrame(
         [{"steps": name, "n": len(part)} | dict(part[columns].astype(float).mean()) for name, part in groups]
     )
+
+
+@app.command()
+def bound(
+    folder: Annotated[Path, typer.Argument(help="Folder of the tables.")],
+    people: Annotated[int, typer.Option(help="So many of the people with a step.")] = 40,
+    particles: Annotated[int, typer.Option(help="Particles of each of the two posteriors.")] = 3000,
+    sweeps: Annotated[int, typer.Option(help="Sweeps of moves after each trial.")] = 6,
+) -> None:
+    """Compare the evidence of a step of unknown size at the right trial with that of none, after `WITHIN` trials."""
+    torch.set_num_threads(1)
+    named, factors = pd.read_parquet(folder / "named" / "step.parquet"), list[float]()
+    for (seed, person), session in named.groupby(["seed", "person"]):
+        simulated = SimulatedSession("default", "step", int(person), int(seed), 60, (60,)).as_the_rig_states()
+        change = simulated.subject().change
+        if change is None or abs(change.log_gain) < np.log(LEAST_FACTOR) or len(factors) == people:
+            continue
+        trials = session[session["trial"] < change.first + WITHIN]
+        factors.append(log_factor(simulated, trials, change.first - 1, particles, sweeps))
+        print(f"person {person}: × {np.exp(change.log_gain):.2f} at trial {change.first}: ln BF {factors[-1]:+.2f}")
+    print(
+        f"{command_of('steps')}; {made_with('torch', 'scipy')}; seed {named['seed'].iloc[0]:,}, {len(factors)} people"
+    )
+    for prior in (0.1, 0.2, 0.5):
+        share = np.mean(np.array(factors) + np.log(prior / (1.0 - prior)) >= 0)
+        print(f"expected at that trial with probability {prior:g}, a step is likelier than none for {share:.2f}")
+
+
+def log_factor(session: SimulatedSession, trials: pd.DataFrame, after: int, particles: int, sweeps: int) -> float:
+    """Log Bayes factor of a step of unknown size after so many trials, against no change at all."""
+    model = session.player().model
+    still = replace(model.prior.changes, level=1e-6, intensity=1e-6, enhancement=1e-6, scale=1e-6)
+    evidence = []
+    for changes in (still, replace(still, level=0.999, noted=(after,), noted_share=0.999)):
+        moves = replace(model.moves, sweeps=sweeps, max_trial_sweeps=120 * sweeps)
+        one = replace(model, particles=particles, moves=moves, prior=replace(model.prior, changes=changes))
+        posterior = one.begin(session.space, session.seed + session.person)
+        for isi_ms, mep_mv in zip(trials["isi_ms"], trials["mep_mv"], strict=True):
+            posterior = one.update(posterior, Observation.of([isi_ms], [mep_mv]))
+        evidence.append(float(posterior.swarm.evidence[0]))
+    return evidence[1] - evidence[0]
 
 
 def _without(named: pd.DataFrame) -> pd.DataFrame:

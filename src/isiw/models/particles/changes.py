@@ -60,10 +60,10 @@ class ChangePrior(Checked):
         noted_share: probability that a change that was noted is one of the amplitudes.
     """
 
-    level: Share = 0.05
-    intensity: Share = 0.03
-    enhancement: Share = 0.04
-    scale: Share = 0.03
+    level: Share = 0.08
+    intensity: Share = 0.07
+    enhancement: Share = 0.06
+    scale: Share = 0.05
     trial: Scale = Scale(20.0, 1.1)
     size_sd: Positive = 1.0
     noted: tuple[int, ...] = ()

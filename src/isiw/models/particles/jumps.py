@@ -33,13 +33,13 @@ from isiw.models.particles.prior import Person, Prior
 from isiw.models.protocol import Tensor
 
 JUMPS: Final = {
-    "form": 0.12,
-    "noise": 0.22,
-    "window": 0.27,
-    "place": 0.09,
-    "response": 0.06,
-    "change": 0.12,
-    "time or window": 0.12,
+    "form": 0.09,
+    "noise": 0.17,
+    "window": 0.22,
+    "place": 0.07,
+    "response": 0.05,
+    "change": 0.30,
+    "time or window": 0.10,
 }
 """Shares of the jumps. They draw again: the profile's kind and form; the noise's kind and all that belongs to it;
 whether there is a window, and all of it; where and how wide it is; what belongs to the noise's kind; what changes in
