@@ -7,7 +7,7 @@ import ipaddress
 import secrets
 import socket
 import ssl
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from functools import partial
@@ -46,7 +46,8 @@ def described(app: FastAPI) -> dict[str, Any]:
     """The description of an application's routes."""
     if app.openapi_schema is None:
         document = get_openapi(title=app.title, version=app.version, description=_ABOUT, routes=app.routes)
-        bodies = dict(_bodies())
+        dependencies = [(r, d.call) for r in router.routes if isinstance(r, APIRoute) for d in r.dependant.dependencies]
+        bodies = {route.path: body.kind for route, body in dependencies if isinstance(body, BodyOf)}
         _, definitions = models_json_schema(
             [(kind, "validation") for kind in bodies.values()], ref_template="#/components/schemas/{model}"
         )
@@ -63,14 +64,6 @@ def described(app: FastAPI) -> dict[str, Any]:
                 content[JSON] = {"schema": {"anyOf": [usual, error]} if usual else error}
         app.openapi_schema = document
     return app.openapi_schema
-
-
-def _bodies() -> Iterator[tuple[str, type[BaseModel]]]:
-    """The kind of body that each route reads, by its path."""
-    for route in (each for each in router.routes if isinstance(each, APIRoute)):
-        for dependency in route.dependant.dependencies:
-            if isinstance(dependency.call, BodyOf):
-                yield route.path, dependency.call.kind
 
 
 def _body(kind: type[BaseModel]) -> dict[str, Any]:

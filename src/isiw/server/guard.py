@@ -345,16 +345,14 @@ class Connection(H11Protocol):
         app, others = self._routes, self._others
         is_new = self not in others.known and others.rules.shows_token(Headers(scope=scope))
         if is_new and not others.lets_in(self, scope["path"]):
-            app = _too_many(others.rules.most_known, as_200=wants_200(scope["query_string"].decode("latin-1")))
+            refusal = Refusal(
+                503, "Overloaded", "too many connections with the token are open", retry_s=1.0,
+                expected=f"at most {others.rules.most_known}",
+                remedy="Close those that are not needed, or send all requests over one. Nothing was done.",
+            )  # fmt: skip
+            as_200 = wants_200(scope["query_string"].decode("latin-1"))
+            app = answered(refusal, as_200=as_200, headers={"Connection": "close"})
         await app(scope, receive, _in_pieces(send if self.cycle.keep_alive else _closing(send)))
-
-
-def _too_many(most: int, *, as_200: bool) -> ASGIApp:
-    refusal = Refusal(
-        503, "Overloaded", "too many connections with the token are open", expected=f"at most {most}", retry_s=1.0,
-        remedy="Close those that are not needed, or send all requests over one. Nothing was done.",
-    )  # fmt: skip
-    return answered(refusal, as_200=as_200, headers={"Connection": "close"})
 
 
 def _closing(send: Send) -> Send:

@@ -68,7 +68,7 @@ class Method:
 
 @dataclass(frozen=True, eq=False)
 class Estimates:
-    """The estimates of b people after so many pairs, each made once, and only if somebody asks."""
+    """The estimates of b people after so many pairs, each made once if somebody asks; then no posterior is kept."""
 
     posterior: Posterior | None
     pairs: int
@@ -83,11 +83,6 @@ class Estimates:
             before = self.first.estimate(person).probability if self.first is not None and knows else None
             self.made[person] = estimate.noting(pairs=self.pairs, beforehand=before)
         return self.made[person]
-
-    def looked_back_on(self, people: int) -> Estimates:
-        """The same, without a posterior once the estimates of all people are made."""
-        done = self.posterior is None or len(self.made) < people
-        return self if done else replace(self, posterior=None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +125,7 @@ class Course:
             posterior=self.method.model.update(self.posterior, observation),
             told=self.told + 1,
             alone=self.alone + alone,
-            earlier=tuple(each.looked_back_on(self.people) for each in self.past),
+            earlier=tuple(replace(e, posterior=None) if len(e.made) == self.people else e for e in self.past),
             paired=not alone,
         )
 
@@ -307,10 +302,6 @@ class Outcomes:
     def after_tap(self, isi_ms: float, mep_mv: float) -> Outcomes:
         """The same after one more tap alone."""
         return replace(self, taps=(*self.taps, (isi_ms, mep_mv)))
-
-    def after_change(self) -> Outcomes:
-        """The same after something changed that may bear on all pulses from here on."""
-        return replace(self, changes=(*self.changes, len(self.pulses)))
 
     @cached_property
     def step_mv(self) -> float:

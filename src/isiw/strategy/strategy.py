@@ -349,7 +349,8 @@ class Strategy:
         A model that reckons with changes takes one for likely between the last trial and the next, and what is asked
         next is chosen again; to other models it means nothing.
         """
-        self._course, self._outcomes = self._course.noting_change(), self._outcomes.after_change()
+        changes = (*self._outcomes.changes, len(self._outcomes.pulses))
+        self._course, self._outcomes = self._course.noting_change(), replace(self._outcomes, changes=changes)
         self._asked = self._asked.again()
 
     def count_mistrial(self) -> None:
