@@ -122,7 +122,7 @@ def lacking(pairs: int | None, *, silent: bool) -> Finding | None:
 
 
 @dataclass(frozen=True)
-class Scale:
+class UnitScale:
     """A quantity's possible values, its usual one, and the unit and factor that smaller and larger ones were in."""
 
     least: float = 0.0
@@ -145,28 +145,28 @@ class Scale:
         return min(possible, key=lambda unit: abs(math.log(possible[unit] / self.usual)), default=None)
 
 
-AMPLITUDE_MV: Final = Scale(2e-4, 30.0, ("V", 1000), ("µV", 1000))
+AMPLITUDE_MV: Final = UnitScale(2e-4, 30.0, ("V", 1000), ("µV", 1000))
 """Of an MEP: the noise of the electrodes alone has more than the least, and no muscle gives more than the most."""
 
-REST_UV: Final = Scale(0.05, 400.0, usual=2.0)
+REST_UV: Final = UnitScale(0.05, 400.0, usual=2.0)
 """RMS of EMG before the pulse: no amplifier is so quiet, and no muscle so loud, at rest or at work."""
 
-BACKGROUND_LIMIT_UV: Final = Scale(0.2, too_small=("mV", 1000))
+BACKGROUND_LIMIT_UV: Final = UnitScale(0.2, too_small=("mV", 1000))
 """The most EMG at rest that somebody allows; no amplifier is so quiet as the least."""
 
-WINDOW_END_MS: Final = Scale(1.0, too_small=("seconds", 1000))
-DELAY_MS: Final = Scale(1.0, too_small=("seconds", 1000))
+WINDOW_END_MS: Final = UnitScale(1.0, too_small=("seconds", 1000))
+DELAY_MS: Final = UnitScale(1.0, too_small=("seconds", 1000))
 """No MEP has ended so soon after the pulse; and no hammer hits, nor does a shock travel so fast."""
 
-RATE_HZ: Final = Scale(500.0, too_small=("kHz", 1000))
+RATE_HZ: Final = UnitScale(500.0, too_small=("kHz", 1000))
 """Below this nothing of a surface MEP or an impact is seen; recordings use 3–10 kHz."""
 
-INTERVAL_S: Final = Scale(most=1000.0, too_large=("ms", 1000))
+INTERVAL_S: Final = UnitScale(most=1000.0, too_large=("ms", 1000))
 """More than anybody waits between two stimuli."""
 
-SHARE: Final = Scale(most=1.0, too_large=("%", 100))
-INTENSITY_PCT: Final = Scale(3.0, too_small=("parts of 1", 100))
+SHARE: Final = UnitScale(most=1.0, too_large=("%", 100))
+INTENSITY_PCT: Final = UnitScale(3.0, too_small=("parts of 1", 100))
 """Nobody stimulates with so low an intensity; 1.2 is meant as 120 %."""
 
-STOP_WIDTH_MS: Final = Scale(1.0, too_small=("s", 1000))
+STOP_WIDTH_MS: Final = UnitScale(1.0, too_small=("s", 1000))
 """No interval of an edge is as narrow as the least; a width of 0.005 and less is meant to stop nothing."""

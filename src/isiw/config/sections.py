@@ -18,7 +18,7 @@ from isiw.devices.robot.tapper import Tapper, TapperSettings, preset
 from isiw.devices.robot.vane.actuator import Vane
 from isiw.devices.robot.vane.tapper import WAIT_MS, RotatingTapper
 from isiw.errors import ConfigError
-from isiw.findings import INTENSITY_PCT, STOP_WIDTH_MS, Scale
+from isiw.findings import INTENSITY_PCT, STOP_WIDTH_MS, UnitScale
 from isiw.strategy.catalogue import list_strategies, settings_for
 from isiw.subjects.cohorts import COHORTS, person_of
 from isiw.subjects.subject import SimulatedSubject
@@ -26,7 +26,7 @@ from isiw.text.toml_files import checked
 from isiw.types import Reference
 from isiw.visit import Visit
 
-_SCALES: Final[Mapping[tuple[str, ...], Scale]] = {
+_SCALES: Final[Mapping[tuple[str, ...], UnitScale]] = {
     ("visit", "intensity_pct_rmt"): INTENSITY_PCT,
     ("visit", "intensity_pct_mso"): INTENSITY_PCT,
     ("strategy", "settings", "stop_width_ms"): STOP_WIDTH_MS,

@@ -1,4 +1,4 @@
-"""What is answered, and what is refused: each a JSON object, whose `ok` says whether it was done."""
+"""Answers and refusals: each a JSON object, whose `ok` says whether it was done."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ class OkAnswer(_Answer):
 
 
 class Error(_Answer):
-    """What is wrong, and the way out."""
+    """The fault, and the way out."""
 
     type: str = Field(description="What kind of error, for software.")
     status: int = Field(description="The HTTP status, also if the answer has another one by errors=200.")
@@ -118,14 +118,14 @@ class ErrorAnswer(_Answer):
 
 
 class DecisionAnswer(OkAnswer):
-    """Whether to stop now, and why."""
+    """The decision to stop now or not, and why."""
 
     stop: bool
     reason: str
 
 
 class SessionAnswer(OkAnswer):
-    """How a session stands."""
+    """The state of a session."""
 
     id: str
     open: bool = Field(description="Whether it is open; otherwise it has to be resumed.")
@@ -153,7 +153,7 @@ class SessionsAnswer(OkAnswer):
 
 
 class AskAnswer(OkAnswer):
-    """What to deliver next. It is on disk as about to be delivered."""
+    """The next stimuli. They are on disk as about to be delivered."""
 
     trial: int = Field(description="Its number, for tell or mistrial.")
     isi_ms: float = Field(description="The ISI to deliver [ms].")
@@ -161,7 +161,7 @@ class AskAnswer(OkAnswer):
 
 
 class TrialAnswer(OkAnswer):
-    """What was recorded of a trial, and whether to stop after it; told again, the same."""
+    """The record of a trial, and the decision after it; told again, the same."""
 
     trial: int
     status: Status

@@ -1,4 +1,4 @@
-"""What a client may send: each call's fields, from JSON or from a form."""
+"""Requests of clients: each call's fields, from JSON or from a form."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ class AskRequest(_Request):
 
 
 class TellRequest(_Request):
-    """What came of a trial."""
+    """The outcome of a trial."""
 
     trial: TrialNumber = Field(description="Its number, as ask has answered it.")
     isi_ms: float | None = Field(
@@ -200,7 +200,7 @@ def _value(text: str) -> Any:
 
 
 def _refused(kind: type[BaseModel], error: ErrorDetails) -> Refusal:
-    """What is wrong with a body, by the name of its field."""
+    """The refusal of a body, by the name of its field."""
     field = ".".join(map(str, error["loc"])) or None
     own = error.get("ctx", {}).get("error")
     if isinstance(own, IsiwError):

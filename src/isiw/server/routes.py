@@ -93,7 +93,7 @@ def create(folder: Folder, body: Annotated[CreateRequest, Depends(BodyOf(CreateR
 
 @router.get("/sessions/{id}", responses=_errors(404, 409), response_model=SessionAnswer)
 def stands(folder: Folder, name: Name) -> Response:
-    """How a session stands."""
+    """The state of a session."""
     return _json(folder.stands(name))
 
 
@@ -117,7 +117,7 @@ async def ask(folder: Folder, name: Name, body: Annotated[AskRequest, Depends(Bo
 
 @router.post("/sessions/{id}/tell", responses=_errors(400, 404, 409, 415, 429), response_model=TrialAnswer)
 def tell(folder: Folder, name: Name, body: Annotated[TellRequest, Depends(BodyOf(TellRequest))]) -> Response:
-    """What came of a trial. Safe to repeat."""
+    """The outcome of a trial. Safe to repeat."""
     with folder.driving(name) as session:
         return _json(session.tell(body))
 
@@ -177,7 +177,7 @@ def estimate(folder: Folder, name: Name) -> Response:
 
 @router.get("/sessions/{id}/decision", responses=_errors(404, 409), response_model=DecisionAnswer)
 def decision(folder: Folder, name: Name) -> Response:
-    """Whether to stop, and why."""
+    """The decision to stop or not, and why."""
     stands = folder.stands(name)
     return _json(DecisionAnswer(stop=stands.stop, reason=stands.reason))
 
