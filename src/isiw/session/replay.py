@@ -1,4 +1,4 @@
-"""Replaying a log: its strategy is made again, and told everything that the log holds."""
+"""Replaying a log: its strategy is made again, and learns everything that the log holds."""
 
 from __future__ import annotations
 
@@ -51,10 +51,10 @@ def replay(
     verify: bool = True,
     replayed: Callable[[int], None] = lambda _: None,
 ) -> Replayed:
-    """Tell a strategy everything that a log holds, in the order in which it was told then.
+    """Let a strategy learn everything that a log holds, in the order in which it was learnt then.
 
     What an operator said about a trial holds from then on; asks before it are compared as they were made. Of a long
-    session the first and the last asks are compared: the last ones depend on all that was told before.
+    session the first and the last asks are compared: the last ones depend on all that was learnt before.
     """
     if strategy.space != record.header.space:
         raise StrategyError(
@@ -63,7 +63,7 @@ def replay(
             expected=str(record.header.space),
             remedy="Make it with space=isiw.read_session(LOG).header.space.",
         )
-    told: list[Trial] = []
+    learned: list[Trial] = []
     changes: list[int] = []
     differing: list[int] = []
     first = record.header.asks_from
@@ -72,12 +72,12 @@ def replay(
     judged = False
     for entry in record.history:
         if judged and isinstance(entry, Intent | Trial):
-            strategy, judged = relearned(strategy, told, changes), False
+            strategy, judged = relearned(strategy, learned, changes), False
         if isinstance(entry, Intent):
             # Behind a lost trial the strategy knew more than the log does.
             comparable = (
                 entry.isi_ms is not None
-                and entry.trial == len(told)
+                and entry.trial == len(learned)
                 and entry.trial >= first
                 and entry.trial not in by_fallback
             )
@@ -87,17 +87,17 @@ def replay(
                 differing.append(entry.trial)
         elif isinstance(entry, Trial):
             learn(strategy, entry)
-            told.append(entry)
-            replayed(len(told))
+            learned.append(entry)
+            replayed(len(learned))
         elif isinstance(entry, Event) and entry.kind in {*VERDICTS, "change"}:
-            # In the order of telling, in which a trial that was lost stands behind later ones.
-            told, changes = [under(trial, entry) for trial in told], [*changes, *changed_after([entry])]
+            # In the order of learning, in which a trial that was lost stands behind later ones.
+            learned, changes = [under(trial, entry) for trial in learned], [*changes, *changed_after([entry])]
             judged = True
-    strategy = relearned(strategy, told, changes) if judged else strategy
+    strategy = relearned(strategy, learned, changes) if judged else strategy
     unknown = record.unknown_trials
     for trial in unknown:
         learn(strategy, trial)
-    table = TrialTable(tuple(sorted((*told, *unknown), key=lambda trial: trial.index)))
+    table = TrialTable(tuple(sorted((*learned, *unknown), key=lambda trial: trial.index)))
     return Replayed(strategy, table, unknown, tuple(differing), len(table) if differing or not verify else first)
 
 
@@ -177,16 +177,16 @@ def taken_up(
     record = _with_lost_pulses(record, lost_pulses)
     header = record.header
     strategy = knowing_earlier(strategy, header) if strategy else strategy_of(header)
-    told = replay(record, strategy, verify=verify, replayed=replayed)
-    if told.differing:
-        warn(_differing_text(told, header), OtherVersionsWarning)
-    return told.strategy, Earlier(
+    found = replay(record, strategy, verify=verify, replayed=replayed)
+    if found.differing:
+        warn(_differing_text(found, header), OtherVersionsWarning)
+    return found.strategy, Earlier(
         partial(LogWriter.continuing, salvaged.path, salvaged, header),
-        told.trials,
+        found.trials,
         record.events,
-        {"created": header.created, "asks_from": told.asks_from},
-        (*told.unknown, _resumption(record, told, limits)),
-        lambda: [*(known_s := pulses_s(salvaged)), *[0.0] * (len(told.trials) - len(known_s))],  # 0 s ago if not known
+        {"created": header.created, "asks_from": found.asks_from},
+        (*found.unknown, _resumption(record, found, limits)),
+        lambda: [*(known_s := pulses_s(salvaged)), *[0.0] * (len(found.trials) - len(known_s))],  # 0 s ago if not known
         partial(_taps, record),
     )
 
