@@ -41,9 +41,9 @@ def library(name: str, extra: str) -> Any:
     """A library of one of isiw's extras, imported."""
     try:
         return importlib.import_module(name)
-    except ModuleNotFoundError as error:
+    except (ImportError, RuntimeError) as error:  # the latter if a shared library that it wraps is missing
         what, remedy = f"{name.partition('.')[0]} is not installed", f'Install it with: pip install "isiw[{extra}]"'
-        raise ConfigError(what, remedy=remedy) from error
+        raise ConfigError(what, got=f"{error}", remedy=remedy) from error
 
 
 def require_fitting(make: Callable[..., object], settings: Mapping[str, Any], key: str) -> None:

@@ -5,7 +5,6 @@ The hardware times the ISI: a marker may take tens of milliseconds, which is far
 
 from __future__ import annotations
 
-import importlib
 import json
 import math
 import threading
@@ -18,7 +17,8 @@ from isiw.checks import from_table, number, text
 from isiw.devices.protocol import DeviceInfo
 from isiw.devices.transports.exchange import LONGEST_REPLY, Exchange, Reply, Request, Verb, described, sweep_of
 from isiw.devices.transports.lsl_samples import LATE_S, LslChannel, SampleStream
-from isiw.errors import ConfigError, DeviceError, DeviceTimeoutError, InvalidValueError, NotDelivered
+from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, NotDelivered
+from isiw.text.named_code import library
 from isiw.text.toml_files import read_json
 from isiw.trials import Channel, Stimulus, Sweep
 
@@ -169,7 +169,7 @@ class LslDevice:
         stage_timeout_s: float = 20.0,
         stop_timeout_s: float = 4.0,
     ) -> None:
-        self._lsl = _pylsl()
+        self._lsl = library("pylsl", "lsl")
         self._channels = {name: from_table(LslChannel, each, f"channels.{name}") for name, each in channels.items()}
         units = {name: channel.unit for name, channel in self._channels.items()}
         self._info = described(
@@ -317,10 +317,3 @@ def _rates_hz(channels: Mapping[str, LslChannel]) -> dict[str, float]:
         if rates_hz.setdefault(channel.stream, channel.rate_hz) != channel.rate_hz:
             raise InvalidValueError(f"the stream {channel.stream} has two rates", got=channel.rate_hz)
     return rates_hz
-
-
-def _pylsl() -> Any:
-    try:
-        return importlib.import_module("pylsl")
-    except (ImportError, RuntimeError) as error:  # the latter if liblsl itself is missing
-        raise ConfigError("pylsl is not installed", got=f"{error}", remedy='pip install "isiw[lsl]"') from error
