@@ -152,37 +152,22 @@ class ChangePrior(Checked):
 
 
 class Changed(NamedTuple):
-    """What has changed after some trials, fields (b, p, n).
+    """What has changed after some trials, fields (b, p, n); logarithms are natural."""
 
-    Args:
-        log_gain: by how much everything evoked is larger, natural log.
-        shift_pct_rmt: by how much the pulse is stronger [% RMT].
-        enhancement: the share of the enhancement that there is.
-        log_scale: by how much all amplitudes are larger, natural log.
-    """
-
-    log_gain: Tensor
-    shift_pct_rmt: Tensor
-    enhancement: Tensor
-    log_scale: Tensor
+    log_gain: Tensor  # of everything evoked
+    shift_pct_rmt: Tensor  # by how much the pulse is stronger
+    enhancement: Tensor  # the share of the enhancement that there is
+    log_scale: Tensor  # of all amplitudes
 
 
 class Change(NamedTuple):
-    """What changes in a session, fields (b, p).
+    """What changes in a session, fields (b, p); logarithms are natural."""
 
-    Args:
-        after: how many trials come before it.
-        log_gain: by how much everything evoked is larger from then on, natural log.
-        shift_pct_rmt: by how much the pulse is stronger from then on [% RMT].
-        fading: by how many halves the enhancement fades from trial to trial; negative where it grows.
-        log_scale: by how much all amplitudes are larger from then on, the EMG floor's among them, natural log.
-    """
-
-    after: Tensor
-    log_gain: Tensor
-    shift_pct_rmt: Tensor
-    fading: Tensor
-    log_scale: Tensor
+    after: Tensor  # how many trials come before it
+    log_gain: Tensor  # of everything evoked from then on
+    shift_pct_rmt: Tensor  # by how much the pulse is stronger from then on
+    fading: Tensor  # by how many halves the enhancement fades from trial to trial; negative where it grows
+    log_scale: Tensor  # of all amplitudes from then on, the EMG floor's among them
 
     @classmethod
     def of(cls, kind: Tensor, log_after: Tensor, size: Tensor, curved: Tensor) -> Change:

@@ -67,11 +67,7 @@ def engine_for(name: EngineName, target: TabledTarget[L], device: str = "cpu") -
 
 @dataclass(frozen=True)
 class TorchEngine(Generic[L]):
-    """Torch, on any device: what the kernels are tested against.
-
-    Args:
-        target: whose posterior particles move under.
-    """
+    """Torch, on any device: what the kernels are tested against."""
 
     target: Target[L]
 
@@ -96,11 +92,7 @@ class TorchEngine(Generic[L]):
 
 @dataclass(frozen=True)
 class Compiled(Generic[L]):
-    """Compiled loops on one processor.
-
-    Args:
-        target: whose posterior particles move under.
-    """
+    """Compiled loops on one processor."""
 
     target: TabledTarget[L]
 

@@ -73,12 +73,7 @@ _RENEWED: Final = {
 
 @dataclass(frozen=True)
 class WindowTarget:
-    """People with a window or none; see `isiw.models.particles.moves.Target`.
-
-    Args:
-        prior: the prior.
-        space: the design space.
-    """
+    """People with a window or none; see `isiw.models.particles.moves.Target`."""
 
     prior: Prior
     space: DesignSpace

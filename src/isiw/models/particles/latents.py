@@ -77,21 +77,13 @@ def _used_by_change(device: torch.device) -> Tensor:
 
 
 class Latents(NamedTuple):
-    """Particles of b people.
+    """Particles of b people."""
 
-    Args:
-        values: of the latents, in the order of `LATENTS`, shape (b, p, d).
-        shape: one of `ShapeKind`, shape (b, p).
-        noise: one of `NoiseKind`, shape (b, p).
-        present: whether there is any facilitation, shape (b, p).
-        change: one of `ChangeKind`, shape (b, p).
-    """
-
-    values: Tensor
-    shape: Tensor
-    noise: Tensor
-    present: Tensor
-    change: Tensor
+    values: Tensor  # in the order of `LATENTS`, (b, p, d)
+    shape: Tensor  # one of `ShapeKind`, (b, p)
+    noise: Tensor  # one of `NoiseKind`, (b, p)
+    present: Tensor  # there is any facilitation, (b, p)
+    change: Tensor  # one of `ChangeKind`, (b, p)
 
     def remade(self, fields: Iterable[Tensor]) -> Latents:
         """Particles with other fields, in the same order."""

@@ -14,17 +14,11 @@ from isiw.models.protocol import Tensor
 
 @dataclass(frozen=True, eq=False)
 class Mixture:
-    """A mixture of normal components with independent latents.
+    """A mixture of normal components with independent latents."""
 
-    Args:
-        shares: of the components, summing to 1, shape (k,).
-        means: of the latents in each, shape (k, d).
-        sds: their SDs, shape (k, d).
-    """
-
-    shares: Tensor
-    means: Tensor
-    sds: Tensor
+    shares: Tensor  # of the components, summing to 1, (k,)
+    means: Tensor  # of the latents in each, (k, d)
+    sds: Tensor  # likewise, (k, d)
 
     @classmethod
     def of(cls, components: list[tuple[float, list[tuple[float, float]]]], device: torch.device | str) -> Mixture:

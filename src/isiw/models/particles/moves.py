@@ -86,19 +86,12 @@ class Target(Protocol[L]):
 
 
 class Moved(NamedTuple, Generic[L]):
-    """Particles after sweeps of moves.
+    """Particles after sweeps of moves."""
 
-    Args:
-        latents: the particles, fields of shape (b, p).
-        log_likelihood: of the history under each of them, shape (b, p).
-        shifts: share of the shifts that were accepted, shape (b,); NaN where there were none.
-        jumps: share of the jumps that were accepted, shape (b,); NaN where there were none.
-    """
-
-    latents: L
-    log_likelihood: Tensor
-    shifts: Tensor
-    jumps: Tensor
+    latents: L  # fields of shape (b, p)
+    log_likelihood: Tensor  # of the history under each of them, (b, p)
+    shifts: Tensor  # share that was accepted, (b,); NaN where there were none
+    jumps: Tensor  # likewise
 
 
 class _Weighed(NamedTuple, Generic[L]):
@@ -115,13 +108,7 @@ class _Weighed(NamedTuple, Generic[L]):
 
 @dataclass(frozen=True)
 class Mover(Generic[L]):
-    """Moves particles under the posterior of a history.
-
-    Args:
-        target: whose posterior.
-        history: the trials so far.
-        generator: source of randomness.
-    """
+    """Moves particles under the posterior of a history."""
 
     target: Target[L]
     history: History

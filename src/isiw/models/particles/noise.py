@@ -67,40 +67,22 @@ def recruits(kind: Tensor) -> Tensor:
 
 
 class Response(NamedTuple):
-    """Response parameters of many particles; all fields have the particles' shape (..., p).
+    """Response parameters of many particles; fields have the particles' shape (..., p), logarithms are natural."""
 
-    Args:
-        kind: one of `NoiseKind`; what is of recruitment curves here is of rectified ones too.
-        log_floor: natural log of the median EMG floor [mV].
-        floor_log_sd: SD of the floor from trial to trial, natural log.
-        log_ratio: natural log of the largest evoked MEP over the floor (recruitment), or of the expected evoked MEP at
-            the best ISI, if there is one, over the floor (others).
-        spread: SD of the input noise in logits (recruitment), or the CV.
-        output_log_sd: SD of the output noise, natural log (recruitment).
-        boost: shift of the drive at the best ISI, in logits (recruitment).
-        rest: drive without a tap, in logits (recruitment).
-        onset: the sigmoid at the threshold (rectified); 0 where there is none.
-        max_probability: probability of a response at the best ISI (missing responses, all or none).
-        rest_probability: probability of a response without a tap (all or none).
-        drift: by how much the log of evoked MEPs will have changed after many trials.
-        startup: how strongly the first trials startle; 1 is `STARTUP`.
-        slope: of the drive by intensity, in logits per % RMT (recruitment).
-    """
-
-    kind: Tensor
-    log_floor: Tensor
-    floor_log_sd: Tensor
-    log_ratio: Tensor
-    spread: Tensor
-    output_log_sd: Tensor
-    boost: Tensor
-    rest: Tensor
-    onset: Tensor
-    max_probability: Tensor
-    rest_probability: Tensor
-    drift: Tensor
-    startup: Tensor
-    slope: Tensor
+    kind: Tensor  # one of `NoiseKind`; what is of recruitment curves here is of rectified ones too
+    log_floor: Tensor  # of the median EMG floor [mV]
+    floor_log_sd: Tensor  # from trial to trial
+    log_ratio: Tensor  # of the largest evoked MEP (recruitment), or of the expected one at the best ISI, over the floor
+    spread: Tensor  # SD of the input noise in logits (recruitment), or the CV
+    output_log_sd: Tensor  # SD of the output noise (recruitment)
+    boost: Tensor  # shift of the drive at the best ISI, in logits (recruitment)
+    rest: Tensor  # drive without a tap, in logits (recruitment)
+    onset: Tensor  # the sigmoid at the threshold (rectified); 0 where there is none
+    max_probability: Tensor  # of a response at the best ISI (missing responses, all or none)
+    rest_probability: Tensor  # of a response without a tap (all or none)
+    drift: Tensor  # by how much the log of evoked MEPs will have changed after many trials
+    startup: Tensor  # how strongly the first trials startle; 1 is `STARTUP`
+    slope: Tensor  # of the drive by intensity, in logits per % RMT (recruitment)
 
     def changed(self, changed: Changed) -> Response:
         """The response after what has changed, fields of the particles' shape."""
@@ -229,18 +211,11 @@ def evoked_mean(response: Response, level: Tensor) -> Tensor:
 
 
 class Around(NamedTuple):
-    """What bears on trials besides their facilitation; neutral numbers, or tensors that broadcast to (..., p, n).
+    """What bears on trials besides their facilitation; neutral numbers, or tensors that broadcast to (..., p, n)."""
 
-    Args:
-        gain: by how much evoked MEPs are larger, natural log.
-        shift_pct_rmt: by how much the pulse is stronger [% RMT].
-        known_mv: a part of the amplitude that is not the pulse's [mV].
-        known_sd_mv: its SD [mV].
-    """
-
-    gain: Tensor | float = 0.0
-    shift_pct_rmt: Tensor | float = 0.0
-    known_mv: Tensor | float = 0.0
+    gain: Tensor | float = 0.0  # by how much evoked MEPs are larger, natural log
+    shift_pct_rmt: Tensor | float = 0.0  # by how much the pulse is stronger
+    known_mv: Tensor | float = 0.0  # a part of the amplitude that is not the pulse's
     known_sd_mv: Tensor | float = 0.0
 
     def in_floors(self, response: Response) -> tuple[Tensor, Tensor]:

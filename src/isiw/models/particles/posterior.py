@@ -40,15 +40,7 @@ M = TypeVar("M", bound=_Model)
 
 @dataclass(frozen=True, eq=False)
 class SwarmPosterior(ABC, Generic[M, L]):
-    """The posterior of b people.
-
-    Args:
-        model: the model's settings.
-        space: the design space.
-        seed: seed of all randomness.
-        swarm: the particles.
-        engine: what computes with them.
-    """
+    """The posterior of b people."""
 
     model: M
     space: DesignSpace

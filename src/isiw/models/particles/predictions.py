@@ -22,19 +22,12 @@ FINE_MS = 1.0
 
 @dataclass(frozen=True, eq=False)
 class PersonSample:
-    """What equally weighted particles say about the next MEP and about the window.
+    """What equally weighted particles say about the next MEP and about the window."""
 
-    Args:
-        person: the particles, fields of shape (b, s).
-        space: the design space, in whose range a window is looked for.
-        order: how many trials came before the next one.
-        records: the same particles as kernels have them; None where torch computes.
-    """
-
-    person: Person
-    space: DesignSpace
-    order: int = 0
-    records: FloatArray | None = None
+    person: Person  # fields of shape (b, s)
+    space: DesignSpace  # in whose range a window is looked for
+    order: int = 0  # how many trials came before the next one
+    records: FloatArray | None = None  # the particles as kernels have them; None where torch computes
 
     @cached_property
     def _tables(self) -> FacilitationTables:

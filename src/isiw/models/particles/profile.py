@@ -122,17 +122,11 @@ LEAST_KEPT: Final = 1e-6
 
 
 class JointPlaces(NamedTuple):
-    """Windows whose start and width depend on each other.
+    """Windows whose start and width depend on each other."""
 
-    Args:
-        share: their probability.
-        mixture: of start and log width.
-        drawn: the same, to draw from.
-    """
-
-    share: float
-    mixture: Mixture
-    drawn: JointMixture
+    share: float  # their probability
+    mixture: Mixture  # of start and log width
+    drawn: JointMixture  # the same, to draw from
 
 
 @dataclass(frozen=True)

@@ -31,20 +31,12 @@ class ShapeKind(IntEnum):
 
 
 class Shape(NamedTuple):
-    """Profiles of many particles; all fields have the particles' shape (..., p).
+    """Profiles of many particles; all fields have the particles' shape (..., p)."""
 
-    Args:
-        kind: the family, one of `ShapeKind`.
-        start_ms: where the rising flank has exp(-2) of the peak [ms].
-        width_ms: width of the span [ms].
-        form: what the family leaves open, in -1..1: position of the peak, flatness, or which of two peaks is lower and
-            by how much, in one window up to `TOGETHER` and in two beyond.
-    """
-
-    kind: Tensor
-    start_ms: Tensor
-    width_ms: Tensor
-    form: Tensor
+    kind: Tensor  # one of `ShapeKind`
+    start_ms: Tensor  # where the rising flank has exp(-2) of the peak
+    width_ms: Tensor  # of the span
+    form: Tensor  # in -1..1: position of the peak, flatness, or the lower of two peaks, in one window up to `TOGETHER`
 
 
 def facilitation(shape: Shape, isi_ms: Tensor) -> Tensor:

@@ -29,19 +29,12 @@ LEAST_DISTINCT = 0.4
 
 
 class Health(NamedTuple):
-    """How b people's particles took a trial; fields of shape (b,).
+    """How b people's particles took a trial; fields of shape (b,)."""
 
-    Args:
-        ess: effective sample size before resampling, as a share of the particles.
-        shifts: share of the shifts by differences of other particles that were accepted; NaN where there were none.
-        jumps: share of the jumps to other kinds that were accepted; NaN where there were none.
-        distinct: share of the particles that differ from each other.
-    """
-
-    ess: Tensor
-    shifts: Tensor
-    jumps: Tensor
-    distinct: Tensor
+    ess: Tensor  # effective sample size before resampling, as a share of the particles
+    shifts: Tensor  # share of the shifts that were accepted; NaN where there were none
+    jumps: Tensor  # likewise of the jumps to other kinds
+    distinct: Tensor  # share of the particles that differ from each other
 
 
 def ess_share(log_weights: Tensor) -> Tensor:
@@ -95,23 +88,14 @@ class Moving(Checked):
 
 @dataclass(frozen=True, eq=False)
 class Swarm(Generic[L]):
-    """Weighted particles of b people.
+    """Weighted particles of b people."""
 
-    Args:
-        latents: the particles, fields of shape (b, p).
-        log_weights: their normalised log weights, shape (b, p).
-        log_likelihood: of the history under each of them, shape (b, p).
-        evidence: log marginal likelihood of the history [nat], shape (b,).
-        history: the trials so far.
-        health: how the particles took the last trial; None before the first.
-    """
-
-    latents: L
-    log_weights: Tensor
-    log_likelihood: Tensor
-    evidence: Tensor
+    latents: L  # fields of shape (b, p)
+    log_weights: Tensor  # normalised, (b, p)
+    log_likelihood: Tensor  # of the history under each of them, (b, p)
+    evidence: Tensor  # log marginal likelihood of the history [nat], (b,)
     history: History
-    health: Health | None = None
+    health: Health | None = None  # after the last trial; None before the first
 
     @classmethod
     def of(cls, latents: L) -> Swarm[L]:

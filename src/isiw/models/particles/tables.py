@@ -20,15 +20,10 @@ from isiw.types import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class FacilitationTables:
-    """What equally weighted particles respond with, by facilitation.
+    """What equally weighted particles respond with, by facilitation."""
 
-    Args:
-        person: the particles, fields of shape (b, s).
-        records: the same particles as kernels have them; None where torch computes.
-    """
-
-    person: Person
-    records: FloatArray | None = None
+    person: Person  # fields of shape (b, s)
+    records: FloatArray | None = None  # the particles as kernels have them; None where torch computes
 
     @cached_property
     def _depth(self) -> Tensor | None:

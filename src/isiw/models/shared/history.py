@@ -19,42 +19,25 @@ _LEAST_MV: Final = 1e-3
 
 
 class Circumstances(NamedTuple):
-    """Known influences on the amplitude of a trial besides its ISI; neutral by default.
+    """Known influences on the amplitude of a trial besides its ISI; neutral by default."""
 
-    Args:
-        known_mv: a part of the amplitude that is not the pulse's, such as the tap's own response [mV].
-        known_sd_mv: its SD [mV].
-        log_offset: by how much evoked MEPs are larger than usual, natural log.
-        shift_pct_rmt: by how much the pulse is stronger than usual [% RMT].
-        enhancement: the share of its usual enhancement that the conditioning stimulus has.
-    """
-
-    known_mv: float = 0.0
+    known_mv: float = 0.0  # a part of the amplitude that is not the pulse's, such as the tap's own response
     known_sd_mv: float = 0.0
-    log_offset: float = 0.0
-    shift_pct_rmt: float = 0.0
-    enhancement: float = 1.0
+    log_offset: float = 0.0  # by how much evoked MEPs are larger than usual, natural log
+    shift_pct_rmt: float = 0.0  # by how much the pulse is stronger than usual
+    enhancement: float = 1.0  # the share of its usual enhancement that the conditioning stimulus has
 
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """The trials so far; amplitudes are intervals of log mV, which are points if the amplitude is known.
+    """The trials so far; amplitudes are intervals of log mV, which are points if the amplitude is known."""
 
-    Args:
-        isi_ms: realised ISIs [ms]; NaN is TMS alone, shape (b, n).
-        isi_sd_ms: their SDs [ms], shape (b, n).
-        log_mep: lower end of the log MEP, shape (b, n).
-        log_mep_high: upper end, shape (b, n).
-        order: how many trials came before each, shape (b, n).
-        circumstances: the fields of `Circumstances`, shape (b, n, 5); None if all are neutral.
-    """
-
-    isi_ms: Tensor
-    isi_sd_ms: Tensor
-    log_mep: Tensor
-    log_mep_high: Tensor
-    order: Tensor
-    circumstances: Tensor | None = None
+    isi_ms: Tensor  # realised; NaN is TMS alone, (b, n)
+    isi_sd_ms: Tensor  # (b, n)
+    log_mep: Tensor  # lower end, (b, n)
+    log_mep_high: Tensor  # upper end, (b, n)
+    order: Tensor  # how many trials came before each, (b, n)
+    circumstances: Tensor | None = None  # the fields of `Circumstances`, (b, n, 5); None if all are neutral
 
     @classmethod
     def empty(cls, people: int, device: torch.device) -> History:

@@ -63,65 +63,34 @@ _ALL_OR_NONE, _RECTIFIED, _RECRUITMENT = NoiseKind.ALL_OR_NONE, NoiseKind.RECTIF
 
 
 class Tables(NamedTuple):
-    """What kernels know of a model's prior and of its moves.
+    """What kernels know of a model's prior and of its moves."""
 
-    Args:
-        at: where the latent of each of `MEANINGS` is; d where the model has none, shape (m,).
-        spreads: usual SD of each latent, shape (d,).
-        first: the first latent of each block, shape (k,).
-        size: how many latents it has, shape (k,).
-        components: of how many components its mixture is, shape (k,); 0 for a start, -1 for start and width that may be
-            those of a place.
-        log_shares: of the components, less the logs of their SDs, shape (k, c).
-        below: sums of the shares of earlier components, from the second on, shape (k, c).
-        means: of the latents in each component, shape (c, d).
-        sds: their SDs, shape (c, d).
-        per_sds: 1 / SD, as dividers are slow, shape (c, d).
-        start_ms: knots of the density of a start [ms], evenly spaced, shape (s,).
-        density: at the knots, shape (s,).
-        quantiles: probability of an earlier start, at the knots, shape (s,).
-        places: log of the share, less the logs of the SDs, then mean and SD of the start and of the log width in each
-            place that earlier sessions lead to expect, shape (l, 5).
-        place_share: probability of all places.
-        place_below: given that, sums of the shares of earlier places, shape (l,).
-        apart: whether enhancement and depression may not overlap.
-        states: weights of the kinds (k,) in the number of a particle's state.
-        shifted: which latents a difference moves, by state and part, shape (states, parts, d).
-        parts: sums of the probabilities of earlier parts, shape (parts - 1,).
-        jumps: sums of the probabilities of earlier jumps, shape (jumps - 1,).
-        redrawn: which latents each jump draws again, shape (jumps, d).
-        renewed: which kinds each jump draws again, shape (jumps, k).
-        of_profile: whether a jump concerns nothing but a profile, which without facilitation means nothing, (jumps,).
-        kinds: sums of the probabilities of earlier values of each kind, shape (k, v - 1).
-        changed: the block of the latent that says when something changes; that of its size is the next.
-    """
-
-    at: IntArray
-    spreads: FloatArray
-    first: IntArray
-    size: IntArray
-    components: IntArray
-    log_shares: FloatArray
-    below: FloatArray
-    means: FloatArray
-    sds: FloatArray
-    per_sds: FloatArray
-    start_ms: FloatArray
-    density: FloatArray
-    quantiles: FloatArray
-    places: FloatArray
-    place_share: float
-    place_below: FloatArray
-    apart: bool
-    states: IntArray
-    shifted: Any
-    parts: FloatArray
-    jumps: FloatArray
-    redrawn: Any
-    renewed: Any
-    of_profile: Any
-    kinds: FloatArray
-    changed: int
+    at: IntArray  # of the latent of each of `MEANINGS`; d where the model has none, (m,)
+    spreads: FloatArray  # usual SD of each latent, (d,)
+    first: IntArray  # latent of each block, (k,)
+    size: IntArray  # how many latents it has, (k,)
+    components: IntArray  # of its mixture, (k,); 0 for a start, -1 for start and width that may be those of a place
+    log_shares: FloatArray  # of the components, less the logs of their SDs, (k, c)
+    below: FloatArray  # sums of the shares of earlier components, from the second on, (k, c)
+    means: FloatArray  # of the latents in each component, (c, d)
+    sds: FloatArray  # likewise, (c, d)
+    per_sds: FloatArray  # 1 / SD, as dividers are slow, (c, d)
+    start_ms: FloatArray  # knots of the density of a start, evenly spaced, (s,)
+    density: FloatArray  # at the knots, (s,)
+    quantiles: FloatArray  # probability of an earlier start, at the knots, (s,)
+    places: FloatArray  # log share less the logs of the SDs, mean and SD of the start, then of the log width, (l, 5)
+    place_share: float  # probability of all places
+    place_below: FloatArray  # given that, sums of the shares of earlier places, (l,)
+    apart: bool  # enhancement and depression may not overlap
+    states: IntArray  # weights of the kinds in the number of a particle's state, (k,)
+    shifted: Any  # which latents a difference moves, by state and part, (states, parts, d)
+    parts: FloatArray  # sums of the probabilities of earlier parts, (parts - 1,)
+    jumps: FloatArray  # likewise of earlier jumps, (jumps - 1,)
+    redrawn: Any  # which latents each jump draws again, (jumps, d)
+    renewed: Any  # which kinds each jump draws again, (jumps, k)
+    of_profile: Any  # the jump concerns nothing but a profile, which without facilitation means nothing, (jumps,)
+    kinds: FloatArray  # sums of the probabilities of earlier values of each kind, (k, v - 1)
+    changed: int  # block of the latent that says when something changes; that of its size is the next
 
 
 @loop

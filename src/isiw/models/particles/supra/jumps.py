@@ -50,12 +50,7 @@ _AS_THE_DEFAULT: Final = tuple("log_shift" if n == "log_boost" else n for n in (
 
 @dataclass(frozen=True)
 class SupraTarget:
-    """People with an enhanced segment, a depressed one, both or none; see `isiw.models.particles.moves.Target`.
-
-    Args:
-        prior: the prior.
-        space: the design space.
-    """
+    """People with an enhanced segment, a depressed one, both or none; see `isiw.models.particles.moves.Target`."""
 
     prior: SupraPrior
     space: DesignSpace

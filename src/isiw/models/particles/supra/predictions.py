@@ -20,19 +20,12 @@ MOST_RANGE_POINTS = 241
 
 @dataclass(frozen=True, eq=False)
 class SupraSample:
-    """What equally weighted particles say about the next MEP and about both kinds of segment.
+    """What equally weighted particles say about the next MEP and about both kinds of segment."""
 
-    Args:
-        person: the particles, with a depression, fields of shape (b, s).
-        space: the design space, in whose range segments are looked for.
-        order: how many trials came before the next one.
-        records: the same particles as kernels have them; None where torch computes.
-    """
-
-    person: Person
-    space: DesignSpace
-    order: int = 0
-    records: FloatArray | None = None
+    person: Person  # with a depression, fields of shape (b, s)
+    space: DesignSpace  # in whose range segments are looked for
+    order: int = 0  # how many trials came before the next one
+    records: FloatArray | None = None  # the particles as kernels have them; None where torch computes
 
     @cached_property
     def _tables(self) -> FacilitationTables:

@@ -59,17 +59,11 @@ REDRAWS: Final = 20
 
 
 class SupraLatents(NamedTuple):
-    """Particles of b people.
+    """Particles of b people."""
 
-    Args:
-        values: of the latents, in the order of `LATENTS`, shape (b, p, d).
-        enhanced: whether there is any enhancement, shape (b, p).
-        depressed: whether there is any depression, shape (b, p).
-    """
-
-    values: Tensor
-    enhanced: Tensor
-    depressed: Tensor
+    values: Tensor  # in the order of `LATENTS`, (b, p, d)
+    enhanced: Tensor  # there is any enhancement, (b, p)
+    depressed: Tensor  # there is any depression, (b, p)
 
     def remade(self, fields: Iterable[Tensor]) -> SupraLatents:
         """Particles with other fields, in the same order."""
