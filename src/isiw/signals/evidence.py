@@ -13,8 +13,8 @@ from typing import Final, NamedTuple, TypeAlias
 
 from isiw.findings import ENOUGH_PAIRS, Finding, Kind, Severity
 from isiw.lazy import scipy
-from isiw.signals.disturbance import Disturbance
 from isiw.signals.limits import SignalLimits
+from isiw.signals.mep import Disturbance
 from isiw.trials import RESPONSE_MV, Measurement, Sweep, Trial
 
 SMALL_MV, LARGE_MV = 8e-4, 4.0

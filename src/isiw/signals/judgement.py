@@ -15,7 +15,6 @@ from isiw.checks import MOST_MEP_MV, choice
 from isiw.design import DesignSpace
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.findings import MISTRIALS, Kind
-from isiw.signals.disturbance import TAP_MS, at_rest, disturbance
 from isiw.signals.impact import impact_time
 from isiw.signals.limits import (
     ACCELERATION_UNITS,
@@ -27,7 +26,7 @@ from isiw.signals.limits import (
     require_agreement,
     tap_with_tms_alone,
 )
-from isiw.signals.mep import TAP_SPAN_MS, background_rms, mep_amplitudes
+from isiw.signals.mep import TAP_MS, TAP_SPAN_MS, at_rest, disturbance, known_background_rms, mep_amplitudes
 from isiw.signals.waveforms import is_blanked, is_recording, is_saturated
 from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial
 from isiw.types import FloatArray
@@ -252,8 +251,7 @@ def _background_uv(emg_mv: FloatArray, emg: Channel, timed: Trial) -> float | No
     pulse, hit = _on_channel(timed.t_tms_ms, emg), _on_channel(timed.t_hit_ms, emg)
     untouched = np.fmin(pulse, _on_channel(timed.t_valve_ms, emg)) if math.isnan(hit) else pulse
     for end, tap, lasts_ms in ((float(untouched), hit, TAP_MS), (pulse, hit, TAP_SPAN_MS), (pulse, math.nan, 0.0)):
-        try:
-            return float(1000 * background_rms(emg_mv, emg.rate_hz, end, tap, tap_ms=lasts_ms)[0])
-        except InvalidValueError as error:
-            _reason(error)
+        rms_mv = known_background_rms(emg_mv, emg.rate_hz, end, tap, tap_ms=lasts_ms)
+        if rms_mv is not None:
+            return float(1000 * rms_mv[0])
     return None

@@ -13,9 +13,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.signals.disturbance import at_rest, disturbance
 from isiw.signals.limits import EMG_UNITS_MV, SignalLimits
-from isiw.signals.mep import ONSET_SD, SURE_SD, SURE_SHARE, mep_onset
+from isiw.signals.mep import ONSET_SD, SURE_SD, SURE_SHARE, at_rest, disturbance, mep_onset
 from isiw.signals.tap import TapResponses, hit_of
 from isiw.signals.waveforms import level_and_noise, samples
 from isiw.trials import Channel, Trial

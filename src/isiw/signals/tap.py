@@ -18,9 +18,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from isiw.signals.disturbance import TAP_MS, at_rest, disturbance
 from isiw.signals.limits import EMG_UNITS_MV
-from isiw.signals.mep import EARLIEST_ONSET_MS, MEP_WINDOW_MS
+from isiw.signals.mep import EARLIEST_ONSET_MS, MEP_WINDOW_MS, TAP_MS, at_rest, disturbance
 from isiw.signals.waveforms import PULSE_GUARD_MS, samples
 from isiw.trials import Sweep, Trial, TrialTable
 from isiw.types import BoolArray, FloatArray
