@@ -204,18 +204,6 @@ _ROOT_HALF, _FAR = np.float32(0.70710678), np.float32(9.0)
 
 
 @inlined
-def larger(a: Any, b: Any) -> Any:
-    """The larger of two numbers; Numba would compile `max` again wherever it is called."""
-    return max(a, b)
-
-
-@inlined
-def smaller(a: Any, b: Any) -> Any:
-    """The smaller of two numbers, likewise."""
-    return min(a, b)
-
-
-@inlined
 def _exp2(x: Any) -> Any:
     """Power of 2, in single precision, within ±126."""
     shifted = x + _WHOLE  # whose last bits are the whole number next to it
@@ -227,7 +215,7 @@ def _exp2(x: Any) -> Any:
 @inlined
 def exp2(x: Any) -> Any:
     """Power of 2, in single precision; beyond ±126 as at ±126."""
-    return _exp2(smaller(larger(x, -_MOST), _MOST))
+    return _exp2(min(max(x, -_MOST), _MOST))
 
 
 @inlined
@@ -239,13 +227,13 @@ def exp(x: Any) -> Any:
 @inlined
 def bell(z: Any) -> Any:
     """exp(-z² / 2), in single precision; what is as good as 0 stays a normal number, which is much faster."""
-    return _exp2(larger(_BELL * z * z, _LEAST_BELL))
+    return _exp2(max(_BELL * z * z, _LEAST_BELL))
 
 
 @inlined
 def log(x: Any) -> Any:
     """Natural logarithm of a positive number, in single precision."""
-    bits = _bits_of(larger(x, _TINY))
+    bits = _bits_of(max(x, _TINY))
     exponent = np.int32((bits - _SQRT_HALF) >> 23)
     m = _float_of(np.int32(bits - (exponent << 23))) - _ONE  # from √½ to √2, less 1
     tail = _L5 + m * (_L4 + m * (_L3 + m * (_L2 + m * (_L1 + m * _L0))))
@@ -275,7 +263,7 @@ def per_root(x: Any) -> Any:
 @inlined
 def ndtr(x: Any) -> Any:
     """Probability that a standard normal variable is below x, in single precision (relative error 2e-7)."""
-    z = smaller(abs(x), _FAR) * _ROOT_HALF
+    z = min(abs(x), _FAR) * _ROOT_HALF
     t = _ONE / (_ONE + _HALF * z)
     tail = _N4 + t * (_N5 + t * (_N6 + t * (_N7 + t * (_N8 + t * _N9))))
     beyond = _HALF * t * exp(_N0 - z * z + t * (_N1 + t * (_N2 + t * (_N3 + t * tail))))

@@ -15,7 +15,7 @@ import numpy as np
 from isiw.acquisition.protocol import ForeseesWindows
 from isiw.acquisition.twostep import expected_variance_reduction
 from isiw.checks import Checked, can, whole
-from isiw.compiled import AVAILABLE, first_of, kernel, larger, log, loop, total
+from isiw.compiled import AVAILABLE, first_of, kernel, log, loop, total
 from isiw.lazy import torch
 from isiw.models.protocol import (
     CountsPairs,
@@ -54,13 +54,13 @@ def _entropies(mass: Any, mean: Any, room: Any, found: Any) -> None:
         for t in range(candidates):
             given, of_all = mass[s, t], mean[t]
             for y in range(outcomes):
-                room[y] = given[y] * log(larger(given[y], _TINY))
+                room[y] = given[y] * log(max(given[y], _TINY))
             for y in range(outcomes):
                 of_all[y] += share * given[y]
             found[t] += share * total(room, outcomes)
     for t in range(candidates):
         for y in range(outcomes):
-            room[y] = mean[t, y] * log(larger(mean[t, y], _TINY))
+            room[y] = mean[t, y] * log(max(mean[t, y], _TINY))
         found[t] -= total(room, outcomes)
 
 
@@ -135,7 +135,7 @@ def _reduction(mass: Any, t: int, at: Any, rises: Any, counts: Any, mean: Any, s
             apart = summed[y] - expected * all_of[y]
             reduced[y] += apart * apart
     for y in range(outcomes):
-        reduced[y] /= larger(all_of[y], _LEAST)
+        reduced[y] /= max(all_of[y], _LEAST)
     return total(reduced, outcomes) / _f(mass.shape[0])
 
 

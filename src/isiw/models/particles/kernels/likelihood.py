@@ -15,14 +15,12 @@ from isiw.compiled import (
     exp,
     exp2,
     inlined,
-    larger,
     log,
     loop,
     ndtr,
     part,
     per,
     per_root,
-    smaller,
     total,
     writer,
 )
@@ -143,20 +141,20 @@ def facilitations(particle: Any, isi_ms: Any, level: Any, count: int) -> None:
             power = exp(_f(0.75) * (form + _ONE))
             for i in range(count):
                 offset = isi_ms[i] - peak
-                offset = larger(offset * rise, offset * fall)
-                square = exp(power * log(smaller(larger(offset * offset, _f(1e-12)), _f(1e6))))
-                level[i] = exp2(_SQUARED * smaller(square, _FURTHEST))
+                offset = max(offset * rise, offset * fall)
+                square = exp(power * log(min(max(offset * offset, _f(1e-12)), _f(1e6))))
+                level[i] = exp2(_SQUARED * min(square, _FURTHEST))
         else:
             for i in range(count):
                 offset = isi_ms[i] - peak
-                offset = larger(offset * rise, offset * fall)
-                level[i] = exp2(_SQUARED * smaller(offset * offset, _FURTHEST))
+                offset = max(offset * rise, offset * fall)
+                level[i] = exp2(_SQUARED * min(offset * offset, _FURTHEST))
     if particle[DEPTH] > _NIL:
         per_flank, depth = _TWO / particle[LOW_WIDTH], particle[DEPTH]
         middle = particle[LOW_START] + _HALF * particle[LOW_WIDTH]
         for i in range(count):
             offset = (isi_ms[i] - middle) * per_flank
-            level[i] -= depth * exp2(_SQUARED * smaller(offset * offset, _FURTHEST))
+            level[i] -= depth * exp2(_SQUARED * min(offset * offset, _FURTHEST))
 
 
 @loop
@@ -171,8 +169,8 @@ def curve_of(particle: Any, spread: Any, between: Any, room: Any) -> None:
     nodes = len(spread)  # not a constant to the compiler, which would unroll these loops instead of making vectors
     for q in range(nodes):
         root = _ONE - width * width / _f(9.0) + NODES_AT[q] * width / _f(3.0)
-        slope = _BETWEEN * width / larger(root, _STEEPEST)
-        spread[q] = _f(3.0) * log(larger(root, _f(0.02)))
+        slope = _BETWEEN * width / max(root, _STEEPEST)
+        spread[q] = _f(3.0) * log(max(root, _f(0.02)))
         between[q] = slope * slope
     for q in range(nodes):
         room[q] = NODE_WEIGHTS[q] * exp(spread[q] + _HALF * between[q])
@@ -250,7 +248,7 @@ def _inputs(particle: Any, trials: Any, count: int, node: Any, work: Any) -> Non
             responds[i] = least + (most - least) * level[i]
     else:
         for i in range(count):
-            drive[i] = log(larger(level[i], _LEAST_SIZE))
+            drive[i] = log(max(level[i], _LEAST_SIZE))
             responds[i] = most * math.sqrt(level[i]) if kind == _MISSING else _ONE
 
 
@@ -279,7 +277,7 @@ def _node_above(at: Any, between: Any, weight: Any, of_trial: Any) -> Any:
     sigmoid = per(_ONE + exp(-(drive + at)))
     steep, over = sigmoid * (_ONE - sigmoid), sigmoid - start
     variance = steep * steep * between
-    reach = larger(over * over + _CORNER * variance, _LEAST_REACH)
+    reach = max(over * over + _CORNER * variance, _LEAST_REACH)
     share = (math.sqrt(reach) + over) * (_HALF / (_ONE - start)) * scale
     return weight * _normal(share, variance / reach + output, of_trial)
 
@@ -339,9 +337,9 @@ def _inside(particle: Any, trials: Any, count: int, curve: Any, work: Any, likel
     start = particle[ONSET]
     rectified, rescaled = start > _NIL, _HALF / (_ONE - start)
     for i in range(count):  # a power of 40 stands in for infinity
-        low[i] = larger(told_low[i], -_EVER) - floor
+        low[i] = max(told_low[i], -_EVER) - floor
     for i in range(count):
-        high[i] = smaller(told_high[i], _EVER) - floor
+        high[i] = min(told_high[i], _EVER) - floor
         evoked[i] = _NIL
     _step(trials, count, particle[CHANGED], -particle[STEP_SCALE], low)
     _step(trials, count, particle[CHANGED], -particle[STEP_SCALE], high)
@@ -352,7 +350,7 @@ def _inside(particle: Any, trials: Any, count: int, curve: Any, work: Any, likel
             flat = _ONE - sigmoid
             variance = sigmoid * flat * (sigmoid * flat) * between
             over = sigmoid - start
-            reach = larger(over * over + _CORNER * variance, _LEAST_REACH)
+            reach = max(over * over + _CORNER * variance, _LEAST_REACH)
             share = scale[i] * ((math.sqrt(reach) + over) * rescaled if rectified else sigmoid)
             varied = share * share * ((variance / reach if rectified else flat * flat * between) + output)
             total = _ONE + share + known[i]
@@ -361,10 +359,10 @@ def _inside(particle: Any, trials: Any, count: int, curve: Any, work: Any, likel
     for i in range(count):
         still, mean = (_ONE + known[i]) / math.sqrt(floor_variance + varies[i]), log(_ONE + known[i])
         silent = _between((low[i] - mean) * still, (high[i] - mean) * still)
-        first = smaller(larger((low[i] - _OUT_LOW) * _OUT_DENSITY, _NIL), _ONE)
-        outlier = smaller(larger((high[i] - _OUT_LOW) * _OUT_DENSITY, _NIL), _ONE) - first
+        first = min(max((low[i] - _OUT_LOW) * _OUT_DENSITY, _NIL), _ONE)
+        outlier = min(max((high[i] - _OUT_LOW) * _OUT_DENSITY, _NIL), _ONE) - first
         mixed = responds[i] * evoked[i] + (_ONE - responds[i]) * silent
-        likelihood[i] = larger(_IN * mixed + _OUT * outlier, _LEAST_MASS)
+        likelihood[i] = max(_IN * mixed + _OUT * outlier, _LEAST_MASS)
 
 
 @part

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from isiw.compiled import kernel, larger, loop, part, smaller, writer
+from isiw.compiled import kernel, loop, part, writer
 from isiw.models.particles.changes import ChangeKind
 from isiw.models.particles.kernels.draws import blur, normal, uniform
 from isiw.models.particles.kernels.likelihood import history_likelihood
@@ -43,7 +43,7 @@ UNKNOWN: Final = _f(1e30)
 @loop
 def _step_at(after: float, steps: Any) -> float:
     """The step of the amplitudes at the trial before which a change comes."""
-    return float(steps[int(smaller(math.ceil(after), len(steps) - 1.0))])
+    return float(steps[int(min(math.ceil(after), len(steps) - 1.0))])
 
 
 @loop
@@ -58,7 +58,7 @@ def _log_change(law: Any, of: Any, z: Any) -> Any:
 @loop
 def _favour(law: Any, of: Any, none: float, z: Any, kind: int, steps: Any) -> float:
     """Log of the prior of a change, or of none, by how `_other_change` proposes it."""
-    span = larger(1.0, len(steps) - 1.0)
+    span = max(1.0, len(steps) - 1.0)
     if kind == 0:
         return math.log(2.0 * none)
     after, recent = math.exp(z[of[0]]), 0.0
@@ -74,7 +74,7 @@ def _favour(law: Any, of: Any, none: float, z: Any, kind: int, steps: Any) -> fl
 @loop
 def _moved_change(law: Any, of: Any, edges: Any, steps: Any, dice: Any, z: Any, kinds: Any) -> float:
     """Move a change a little, or to another trial; the log ratio of prior to proposal. See `WindowTarget`."""
-    (when, size, _), span, none = of, larger(1.0, len(steps) - 1.0), edges[0]
+    (when, size, _), span, none = of, max(1.0, len(steps) - 1.0), edges[0]
     of_when, of_size = _log_change(law, of, z)
     before, after = of_when + of_size - z[when], math.exp(z[when])
     if uniform(dice) < 0.5:
@@ -94,14 +94,14 @@ def _moved_change(law: Any, of: Any, edges: Any, steps: Any, dice: Any, z: Any, 
 @loop
 def _other_change(law: Any, of: Any, below: Any, edges: Any, steps: Any, dice: Any, z: Any, kinds: Any) -> float:
     """Let a particle have another change, or none; the log ratio of prior to proposal. See `WindowTarget`."""
-    (when, size, changed), (_, means, sds), span, none = of, law, larger(1.0, len(steps) - 1.0), edges[0]
+    (when, size, changed), (_, means, sds), span, none = of, law, max(1.0, len(steps) - 1.0), edges[0]
     before = _favour(law, of, none, z, kinds[4], steps)
     for number in range(2):
         latent, component = of[number], which(uniform(dice), below[changed + number])
         z[latent] = means[component, latent] + sds[component, latent] * normal(dice)
     kinds[4] = 0 if uniform(dice) < 0.5 else which(none + (_ONE - none) * uniform(dice), edges)
     if kinds[4] and uniform(dice) < RECENT:
-        after = larger(span * uniform(dice), 1e-3)
+        after = max(span * uniform(dice), 1e-3)
         z[when] = _f(math.log(after))
         if uniform(dice) < OF_STEPS:
             z[size] = _f(_step_at(after, steps)) + _f(STEP_SD) * normal(dice)
@@ -138,8 +138,8 @@ def _jump(tables: Any, steps: Any, dice: Any, z: Any, kinds: Any, scratch: Any) 
 def _shift(tables: Any, theirs: Any, dice: Any, moves: Any, densities: Any, scratch: Any) -> float:
     """Add a scaled difference of two of the others to the latents that move; log of the ratio of prior densities."""
     others, z, found, ratio = theirs.shape[0], scratch[1], scratch[5], 0.0
-    one = theirs[smaller(int(uniform(dice) * _f(others)), others - 1)]
-    other = theirs[smaller(int(uniform(dice) * _f(others)), others - 1)]
+    one = theirs[min(int(uniform(dice) * _f(others)), others - 1)]
+    other = theirs[min(int(uniform(dice) * _f(others)), others - 1)]
     scale = _ONE if uniform(dice) < _f(0.1) else _f(0.15) + _f(0.7) * uniform(dice)
     for latent in range(len(moves)):
         if moves[latent]:
@@ -206,7 +206,7 @@ def _move(tables: Any, state: Any, i: int, theirs: Any, trials: Any, dice: Any, 
         after = _f(history_likelihood(particle, records, sizes, room))
     sort = 2 if jumps else 0
     counts[sort] += 1
-    if math.log(larger(uniform(dice), _LEAST)) < after - before + ratio:
+    if math.log(max(uniform(dice), _LEAST)) < after - before + ratio:
         counts[sort + 1] += 1
         log_likelihood[i] = after
         for latent in range(values.shape[1]):
@@ -273,7 +273,7 @@ def log_usual(tables: Any, values: Any, kinds: Any, parts: Any, found: Any) -> N
         for i in range(values.shape[1]):
             change = kinds[person, i, 4]
             share = (edges[change] if change < len(edges) else _ONE) - (edges[change - 1] if change else _NIL)
-            found[person, i] = math.log(larger(share, _LEAST))
+            found[person, i] = math.log(max(share, _LEAST))
             for block in range(len(tables.first)):
                 if _weighed(tables, block, kinds[person, i]):
                     found[person, i] += log_block(values[person, i], block, tables, parts)

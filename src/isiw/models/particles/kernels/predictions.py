@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from isiw.compiled import LANES, bell, exp, inlined, kernel, larger, log, loop, per, per_root, smaller, total, writer
+from isiw.compiled import LANES, bell, exp, inlined, kernel, log, loop, per, per_root, total, writer
 from isiw.models.particles.kernels.likelihood import (
     NODE_WEIGHTS,
     NODES_AT,
@@ -88,14 +88,14 @@ def _evoked(particle: Any, levels: Any, means: Any) -> None:
             at, weight = rest + particle[SPREAD] * NODES_AT[q] * _PER_NODE, NODE_WEIGHTS[q]
             for row in range(count):
                 share = per(_ONE + exp(-(at + boost * levels[row])))
-                means[row] += weight * larger(share - start, _NIL)
+                means[row] += weight * max(share - start, _NIL)
         ratio *= exp(_HALF * particle[OUTPUT_SD] * particle[OUTPUT_SD]) / (_ONE - start)
     else:
         whole = particle[NOISE] == _ALL_OR_NONE
         for row in range(count):
             means[row] = _ONE if whole else levels[row]
     for row in range(count):
-        means[row] *= ratio * _responds(particle, larger(levels[row], _NIL))
+        means[row] *= ratio * _responds(particle, max(levels[row], _NIL))
 
 
 @kernel
@@ -119,7 +119,7 @@ def _components(particle: Any, drive: Any, scale: Any, at: Any, between: Any, me
         flat = _ONE - share
         variance = share * flat * (share * flat) * between
         over = share - start
-        reach = larger(over * over + _CORNER * variance, _LEAST_REACH)
+        reach = max(over * over + _CORNER * variance, _LEAST_REACH)
         size = scale * ((math.sqrt(reach) + over) * rescaled if rectified else share)
         varied = (variance / reach if rectified else flat * flat * between) + output
         inverse_sd[row] = (_ONE + size) * per_root(size * size * varied + floor_variance)
@@ -146,11 +146,11 @@ def _outcomes(particle: Any, levels: Any, gain: Any, lines: Any, nodes: Any, tab
         if curved:
             drive[row] = rest + boost * levels[row]
         else:
-            drive[row] = _NIL if whole else log(larger(levels[row], _LEAST_SIZE))
+            drive[row] = _NIL if whole else log(max(levels[row], _LEAST_SIZE))
     for q in range(NODES):
         _components(particle, drive, scale, spread[q], between[q], mean[q], inverse_sd[q])
     for row in range(rows):
-        responds, at, per = _responds(particle, larger(levels[row], _NIL)), mean[:, row], inverse_sd[:, row]
+        responds, at, per = _responds(particle, max(levels[row], _NIL)), mean[:, row], inverse_sd[:, row]
         for y in range(count):
             over = relative[y] - floor
             # All nodes in one pass, as for the likelihood.
@@ -172,7 +172,7 @@ def outcome_tables(particles: Any, levels: Any, order: int, log_mep: Any, width:
     """Write the probability of each outcome of the next trial at some facilitations, shape (b, s, l, y)."""
     people, size, rows = levels.shape
     outcomes = log_mep.shape[1]
-    padded = (larger(outcomes, rows) + LANES - 1) // LANES * LANES
+    padded = (max(outcomes, rows) + LANES - 1) // LANES * LANES
     lines, nodes = np.zeros((6, padded), dtype=np.float32), np.empty((2, NODES, padded), dtype=np.float32)
     lines[1, :outcomes] = width
     startle, relaxed = gain_of(order)
@@ -187,15 +187,15 @@ def outcome_tables(particles: Any, levels: Any, order: int, log_mep: Any, width:
 @inlined
 def position_of(level: Any, depth: Any, rows: int) -> Any:
     """Where a facilitation lies among the rows of a table."""
-    share = (level + depth) / (_ONE + depth) if depth > _NIL else math.sqrt(smaller(larger(level, _NIL), _ONE))
-    return smaller(larger(share, _NIL), _ONE) * _f(rows - 1)
+    share = (level + depth) / (_ONE + depth) if depth > _NIL else math.sqrt(min(max(level, _NIL), _ONE))
+    return min(max(share, _NIL), _ONE) * _f(rows - 1)
 
 
 @loop
 def _between_rows(table: Any, level: Any, depth: Any, found: Any) -> None:
     for t in range(len(level)):
         position = position_of(level[t], depth, table.shape[0])
-        row = smaller(int(position), table.shape[0] - 2)
+        row = min(int(position), table.shape[0] - 2)
         above, first, second, blend = position - _f(row), table[row], table[row + 1], found[t]
         for y in range(table.shape[1]):
             blend[y] = first[y] + above * (second[y] - first[y])

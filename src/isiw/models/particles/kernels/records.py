@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from isiw.compiled import LANES, exp, exp2, kernel, larger, log, loop
+from isiw.compiled import LANES, exp, exp2, kernel, log, loop
 from isiw.lazy import torch
 from isiw.models.particles.changes import GROWN_AFTER, Change
 from isiw.models.particles.noise import PERSISTENCE, STARTUP, NoiseKind, Response
@@ -97,7 +97,7 @@ def gain_of(order: Any) -> Any:
 @loop
 def enhancement_after(fading: Any, order: Any) -> Any:
     """The share of the enhancement that there is after so many trials; see `Change.at`."""
-    age = order if fading > _NIL else larger(_GROWN_AFTER - order, _NIL)
+    age = order if fading > _NIL else max(_GROWN_AFTER - order, _NIL)
     return exp2(-abs(fading) * age)
 
 

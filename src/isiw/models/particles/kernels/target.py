@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from isiw.compiled import exp, larger, log, loop, part, smaller
+from isiw.compiled import exp, log, loop, part
 from isiw.models.particles.changes import FADING as FADING_RATE
 from isiw.models.particles.changes import INTENSITY_PCT, ChangeKind
 from isiw.models.particles.kernels.draws import normal, uniform
@@ -112,7 +112,7 @@ def meant(z: Any, kinds: Any, at: Any, particle: Any) -> None:
         particle[OUTPUT_SD], particle[SLOPE] = exp(z[at[first + 3]]), slope
         particle[BOOST], particle[REST] = slope * exp(z[at[first + 4]]), slope * z[at[first + 5]]
         if rectified:
-            onset = smaller(exp(z[at[26]]), _MOST_ONSET)
+            onset = min(exp(z[at[26]]), _MOST_ONSET)
             particle[ONSET] = onset
             particle[REST] += log(onset) - log(_ONE - onset)
     else:
@@ -144,9 +144,9 @@ def _start_density(x: Any, start_ms: Any, density: Any) -> Any:
     if not start_ms[0] <= x <= start_ms[last]:
         return _NIL
     place = (x - start_ms[0]) * (_f(last) / (start_ms[last] - start_ms[0]))
-    left = smaller(int(place), last - 1)
+    left = min(int(place), last - 1)
     share = place - _f(left)
-    return larger(density[left] + share * (density[left + 1] - density[left]), _LEAST_DENSITY)
+    return max(density[left] + share * (density[left + 1] - density[left]), _LEAST_DENSITY)
 
 
 @loop
@@ -159,8 +159,8 @@ def _start_at(quantile: Any, start_ms: Any, quantiles: Any) -> Any:
             low = middle
         else:
             high = middle
-    share = (quantile - quantiles[low]) / larger(quantiles[high] - quantiles[low], _LEAST_RUN)
-    return start_ms[low] + smaller(larger(share, _NIL), _ONE) * (start_ms[high] - start_ms[low])
+    share = (quantile - quantiles[low]) / max(quantiles[high] - quantiles[low], _LEAST_RUN)
+    return start_ms[low] + min(max(share, _NIL), _ONE) * (start_ms[high] - start_ms[low])
 
 
 @loop
@@ -168,7 +168,7 @@ def _log_sum(parts: Any, count: int) -> Any:
     """Log of the sum of the exponentials of the first parts."""
     most = parts[0]
     for k in range(1, count):
-        most = larger(most, parts[k])
+        most = max(most, parts[k])
     summed = _NIL
     for k in range(count):
         summed += exp(parts[k] - most)
@@ -181,7 +181,7 @@ def log_line(x: Any, log_shares: Any, means: Any, sds: Any) -> Any:
     most, summed = _NEVER, _NIL
     for k in range(len(means)):
         distance = (x - means[k]) / sds[k]
-        most = larger(most, log_shares[k] - _HALF * distance * distance)
+        most = max(most, log_shares[k] - _HALF * distance * distance)
     for k in range(len(means)):
         distance = (x - means[k]) / sds[k]
         summed += exp(log_shares[k] - _HALF * distance * distance - most)
@@ -198,7 +198,7 @@ def log_block(z: Any, block: int, tables: Any, parts: Any) -> Any:
         anywhere = _NEVER if density == _NIL else log(density)
         first, size = first + 1, 1 if components < 0 else 0
         places = len(tables.places) if components < 0 else 0
-    count = larger(components, -components)
+    count = max(components, -components)
     for k in range(count):
         squares = _NIL
         for latent in range(first, first + size):

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from isiw.compiled import exp, kernel, larger, log, loop, smaller
+from isiw.compiled import exp, kernel, log, loop
 from isiw.models.particles.kernels.likelihood import facilitations
 from isiw.models.particles.kernels.predictions import position_of
 from isiw.models.particles.kernels.records import FLOOR_SD, FORM, LOG_FLOOR, PRESENT, SHAPE, START, WIDTH
@@ -37,14 +37,14 @@ def _highest(particle: Any, isi_ms: Any, fine: Any, room: Any) -> Any:
         count = len(at)
         at[0], at[1], at[2] = _peak_at(particle), _FIRST_PEAK, _SECOND_PEAK
         for i in range(count):
-            at[i] = smaller(larger(particle[START] + at[i] * particle[WIDTH], low), high)
+            at[i] = min(max(particle[START] + at[i] * particle[WIDTH], low), high)
         facilitations(particle, at, room[0], count)
     else:
         facilitations(particle, isi_ms, room[0], count)
     most = _NIL
     for i in range(count):
-        most = larger(most, room[0, i])
-    return smaller(most, _ONE) if fine else most
+        most = max(most, room[0, i])
+    return min(most, _ONE) if fine else most
 
 
 @loop
@@ -53,16 +53,16 @@ def _edge_level(particle: Any, evoked: Any, highest: Any) -> Any:
     rows = len(evoked)
     floor_mv = exp(particle[LOG_FLOOR])
     position = position_of(highest, _NIL, rows)
-    row = smaller(int(position), rows - 2)
+    row = min(int(position), rows - 2)
     peak_mv = floor_mv * (evoked[row] + (position - _f(row)) * (evoked[row + 1] - evoked[row]) - evoked[0])
     baseline_mv = floor_mv * (evoked[0] + exp(_HALF * particle[FLOOR_SD] * particle[FLOOR_SD]))
-    if particle[PRESENT] == _NIL or peak_mv < larger(_ENOUGH * baseline_mv, _ENOUGH_MV):
+    if particle[PRESENT] == _NIL or peak_mv < max(_ENOUGH * baseline_mv, _ENOUGH_MV):
         return _NOWHERE
     least_mv, right = _EDGE * peak_mv, 1
     while right < rows - 1 and floor_mv * (evoked[right] - evoked[0]) < least_mv:
         right += 1
     low_mv, high_mv = floor_mv * (evoked[right - 1] - evoked[0]), floor_mv * (evoked[right] - evoked[0])
-    place = (_f(right - 1) + (least_mv - low_mv) / larger(high_mv - low_mv, _LEAST_REACH)) / _f(rows - 1)
+    place = (_f(right - 1) + (least_mv - low_mv) / max(high_mv - low_mv, _LEAST_REACH)) / _f(rows - 1)
     return place * place
 
 
@@ -70,7 +70,7 @@ def _edge_level(particle: Any, evoked: Any, highest: Any) -> Any:
 def edge_levels(particles: Any, evoked: Any, isi_ms: Any, fine: bool) -> Any:  # noqa: FBT001 - kernels know no keywords
     """Facilitation at each window's edge, shape (b, s); 2 where there is no window."""
     people, size = particles.shape[:2]
-    found, room = np.empty((people, size), dtype=np.float32), np.empty((2, larger(3, len(isi_ms))), dtype=np.float32)
+    found, room = np.empty((people, size), dtype=np.float32), np.empty((2, max(3, len(isi_ms))), dtype=np.float32)
     for person in range(people):
         for i in range(size):
             highest = _highest(particles[person, i], isi_ms, fine, room)
@@ -105,14 +105,14 @@ def _runs(particle: Any, level: Any, isi_ms: Any, room: Any, runs: Any) -> None:
         for t in range(len(isi_ms)):
             if (room[t] >= level) != inside:
                 inside = not inside
-                runs[smaller(place, 3)] = t
+                runs[min(place, 3)] = t
                 place += 1
         if inside:
-            runs[smaller(place, 3)] = len(isi_ms)
+            runs[min(place, 3)] = len(isi_ms)
         return
     away = math.sqrt(-_HALF * log(level))
     if particle[SHAPE] == _PLATEAU:
-        away = exp(log(larger(away, _LEAST_REACH)) * exp(_f(-0.75) * (particle[FORM] + _ONE)))
+        away = exp(log(max(away, _LEAST_REACH)) * exp(_f(-0.75) * (particle[FORM] + _ONE)))
     peak_at, away_ms = _peak_at(particle), away * particle[WIDTH]
     peak_ms = particle[START] + peak_at * particle[WIDTH]
     first = _before(isi_ms, peak_ms - peak_at * away_ms)
