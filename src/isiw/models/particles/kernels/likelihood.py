@@ -24,76 +24,26 @@ from isiw.compiled import (
     total,
     writer,
 )
-from isiw.models.particles.kernels.records import (
-    BOOST,
-    CHANGED,
-    DEPTH,
-    DRIFT,
-    FACTOR,
-    FADING,
-    FLOOR_SD,
-    FORM,
-    HIGH,
-    ISI,
-    ISI_SD,
-    KNOWN,
-    KNOWN_SD,
-    LEAST,
-    LOG_FLOOR,
-    LOG_RATIO,
-    LOW,
-    LOW_START,
-    LOW_WIDTH,
-    MOST,
-    NOISE,
-    NUMBER,
-    OFFSET,
-    ONSET,
-    OUTPUT_SD,
-    PIECE,
-    PRESENT,
-    REAL,
-    RELAXED,
-    REST,
-    SHAPE,
-    SHIFT,
-    SLOPE,
-    SPREAD,
-    START,
-    STARTLE,
-    STARTLED,
-    STEP,
-    STEP_DRIVE,
-    STEP_SCALE,
-    WIDTH,
-    enhancement_after,
-)
-from isiw.models.particles.noise import (
-    BETWEEN_NODES,
-    CORNER,
-    FAR_BELOW,
-    NODE_REACH,
-    NODES,
-    ON_NODES,
-    OUTLIER_LOG_RANGE,
-    OUTLIER_PROBABILITY,
-    STEEPEST_ROOT,
-    NoiseKind,
-)
+from isiw.models.particles import noise
+from isiw.models.particles.kernels import records as field
+from isiw.models.particles.kernels.records import enhancement_after
+from isiw.models.particles.noise import NODES, NoiseKind
 from isiw.models.particles.shapes import APART_SD, PEAK_SD, PEAKS_AT, TOGETHER, ShapeKind
 from isiw.models.shared.tables import ISI_NODES
 
-ROOM: Final = 14, PIECE
+ROOM: Final = 14, field.PIECE
 """Rows of numbers that the likelihood of a history needs in between; the last three are of the nodes."""
 
 _f = np.float32
 _NIL, _HALF, _ONE, _TWO = _f(0.0), _f(0.5), _f(1.0), _f(2.0)
-NODES_AT: Final = np.linspace(-NODE_REACH * ON_NODES, NODE_REACH * ON_NODES, NODES).astype(np.float32)
-_DENSITY: Final = np.exp(-0.5 * (NODES_AT.astype(np.float64) / ON_NODES) ** 2)
+_REACH: Final = noise.NODE_REACH * noise.ON_NODES
+NODES_AT: Final = np.linspace(-_REACH, _REACH, NODES).astype(np.float32)
+_DENSITY: Final = np.exp(-0.5 * (NODES_AT.astype(np.float64) / noise.ON_NODES) ** 2)
 NODE_WEIGHTS: Final = (_DENSITY / _DENSITY.sum()).astype(np.float32)
 _SHIFTS: Final = np.array([shift for shift, _ in ISI_NODES], dtype=np.float32)
 _SHARES: Final = np.array([weight for _, weight in ISI_NODES], dtype=np.float32)
-_BETWEEN, _FAR, _CORNER, _STEEPEST = _f(BETWEEN_NODES), _f(FAR_BELOW), _f(CORNER), _f(STEEPEST_ROOT)
+_BETWEEN, _FAR = _f(noise.BETWEEN_NODES), _f(noise.FAR_BELOW)
+_CORNER, _STEEPEST = _f(noise.CORNER), _f(noise.STEEPEST_ROOT)
 _PLATEAU, _SKEWED, _TWO_PEAK = (_f(kind) for kind in (ShapeKind.PLATEAU, ShapeKind.SKEWED, ShapeKind.TWO_PEAK))
 _MISSING, _ALL_OR_NONE = _f(NoiseKind.MISSING), _f(NoiseKind.ALL_OR_NONE)
 _RECRUITMENT, _RECTIFIED = _f(NoiseKind.RECRUITMENT), _f(NoiseKind.RECTIFIED)
@@ -103,24 +53,24 @@ _SQUARED = _f(-2.0 / math.log(2.0))
 _FURTHEST = _f(34.0)  # squares of the distance from the peak, in flanks: behind it facilitation is below 1e-29
 _LEAST_SIZE, _LEAST_REACH, _LEAST_MASS = _f(1e-9), _f(1e-12), _f(1e-9)
 _ROOT = _f(1.0 / math.sqrt(2.0 * math.pi))
-_OUT_LOW, _OUT_HIGH = _f(OUTLIER_LOG_RANGE[0]), _f(OUTLIER_LOG_RANGE[1])
-_OUT_DENSITY = _f(1.0 / (OUTLIER_LOG_RANGE[1] - OUTLIER_LOG_RANGE[0]))
-_OUT, _IN = _f(OUTLIER_PROBABILITY), _f(1.0 - OUTLIER_PROBABILITY)
+_OUT_LOW, _OUT_HIGH = _f(noise.OUTLIER_LOG_RANGE[0]), _f(noise.OUTLIER_LOG_RANGE[1])
+_OUT_DENSITY = _f(1.0 / (noise.OUTLIER_LOG_RANGE[1] - noise.OUTLIER_LOG_RANGE[0]))
+_OUT, _IN = _f(noise.OUTLIER_PROBABILITY), _f(1.0 - noise.OUTLIER_PROBABILITY)
 _TINY, _EVER = _f(1e-6), _f(40.0)
 
 
 @loop
 def is_curved(particle: Any) -> Any:
     """Whether a particle has a recruitment curve, with a threshold or without."""
-    return particle[NOISE] == _RECRUITMENT or particle[NOISE] == _RECTIFIED
+    return particle[field.NOISE] == _RECRUITMENT or particle[field.NOISE] == _RECTIFIED
 
 
 @loop
 def facilitations(particle: Any, isi_ms: Any, level: Any, count: int) -> None:
     """Write the facilitation of a particle at some ISIs, in 0–1; negative where the tap depresses."""
-    kind, form = particle[SHAPE], particle[FORM]
-    start, width = particle[START], particle[WIDTH]
-    if particle[PRESENT] == _NIL:
+    kind, form = particle[field.SHAPE], particle[field.FORM]
+    start, width = particle[field.START], particle[field.WIDTH]
+    if particle[field.PRESENT] == _NIL:
         for i in range(count):
             level[i] = _NIL
     elif kind == _TWO_PEAK:
@@ -149,9 +99,9 @@ def facilitations(particle: Any, isi_ms: Any, level: Any, count: int) -> None:
                 offset = isi_ms[i] - peak
                 offset = max(offset * rise, offset * fall)
                 level[i] = exp2(_SQUARED * min(offset * offset, _FURTHEST))
-    if particle[DEPTH] > _NIL:
-        per_flank, depth = _TWO / particle[LOW_WIDTH], particle[DEPTH]
-        middle = particle[LOW_START] + _HALF * particle[LOW_WIDTH]
+    if particle[field.DEPTH] > _NIL:
+        per_flank, depth = _TWO / particle[field.LOW_WIDTH], particle[field.DEPTH]
+        middle = particle[field.LOW_START] + _HALF * particle[field.LOW_WIDTH]
         for i in range(count):
             offset = (isi_ms[i] - middle) * per_flank
             level[i] -= depth * exp2(_SQUARED * min(offset * offset, _FURTHEST))
@@ -160,7 +110,7 @@ def facilitations(particle: Any, isi_ms: Any, level: Any, count: int) -> None:
 @loop
 def curve_of(particle: Any, spread: Any, between: Any, room: Any) -> None:
     """Write the noise on a particle's input at each node, and the variance of what lies between; see `noise._curve`."""
-    width = particle[SPREAD]
+    width = particle[field.SPREAD]
     if is_curved(particle):
         for q in range(NODES):
             spread[q] = width * NODES_AT[q]
@@ -183,7 +133,7 @@ def curve_of(particle: Any, spread: Any, between: Any, room: Any) -> None:
 def _step(trials: Any, count: int, after: Any, size: Any, added_to: Any) -> None:
     """Add a step to the trials that come after it."""
     if size != _NIL:
-        number = trials[NUMBER]
+        number = trials[field.NUMBER]
         for i in range(count):
             added_to[i] += size if number[i] >= after else _NIL
 
@@ -191,9 +141,9 @@ def _step(trials: Any, count: int, after: Any, size: Any, added_to: Any) -> None
 @loop
 def _fade(particle: Any, trials: Any, count: int, level: Any) -> None:
     """Let the facilitation fade or grow from trial to trial."""
-    fading = particle[FADING]
+    fading = particle[field.FADING]
     if fading != _NIL:
-        number = trials[NUMBER]
+        number = trials[field.NUMBER]
         for i in range(count):
             level[i] *= enhancement_after(fading, number[i])
 
@@ -202,22 +152,22 @@ def _fade(particle: Any, trials: Any, count: int, level: Any) -> None:
 def _gains(particle: Any, trials: Any, count: int, work: Any) -> None:
     """Write the scale of each trial, and the known part of its amplitude; arguments as for `_inputs`."""
     scale, known, varies = work[2], work[4], work[5]
-    startle, relaxed, offset = trials[STARTLE], trials[RELAXED], trials[OFFSET]
-    told, told_sd = trials[KNOWN], trials[KNOWN_SD]
-    log_scale = particle[LOG_RATIO] + (_NIL if is_curved(particle) else _FAR)
-    drift, startled, per_floor = particle[DRIFT], particle[STARTLED], exp(-particle[LOG_FLOOR])
+    startle, relaxed, offset = trials[field.STARTLE], trials[field.RELAXED], trials[field.OFFSET]
+    told, told_sd = trials[field.KNOWN], trials[field.KNOWN_SD]
+    log_scale = particle[field.LOG_RATIO] + (_NIL if is_curved(particle) else _FAR)
+    drift, startled, per_floor = particle[field.DRIFT], particle[field.STARTLED], exp(-particle[field.LOG_FLOOR])
     # Few arrays a loop, or the compiler gives up on proving that they do not overlap.
     for i in range(count):
         scale[i] = log_scale + drift * relaxed[i] + startled * startle[i] + offset[i]
-    _step(trials, count, particle[CHANGED], particle[STEP], scale)
+    _step(trials, count, particle[field.CHANGED], particle[field.STEP], scale)
     for i in range(count):
         scale[i] = exp(scale[i])
     for i in range(count):
         known[i] = told[i] * per_floor
     for i in range(count):
         varies[i] = told_sd[i] * per_floor * (told_sd[i] * per_floor)
-    if particle[STEP_SCALE] != _NIL:
-        number, after, per_step = trials[NUMBER], particle[CHANGED], exp(-particle[STEP_SCALE])
+    if particle[field.STEP_SCALE] != _NIL:
+        number, after, per_step = trials[field.NUMBER], particle[field.CHANGED], exp(-particle[field.STEP_SCALE])
         for i in range(count):
             known[i] *= per_step if number[i] >= after else _ONE
         for i in range(count):
@@ -228,7 +178,7 @@ def _gains(particle: Any, trials: Any, count: int, work: Any) -> None:
 def _inputs(particle: Any, trials: Any, count: int, node: Any, work: Any) -> None:
     """Write what the nodes of each trial have in common: drive, scale, and the probability of a response."""
     level, drive, responds = work[0], work[1], work[3]
-    isi, isi_sd, factor, shift = trials[ISI], trials[ISI_SD], trials[FACTOR], trials[SHIFT]
+    isi, isi_sd, factor, shift = trials[field.ISI], trials[field.ISI_SD], trials[field.FACTOR], trials[field.SHIFT]
     for i in range(count):
         drive[i] = isi[i] + node * isi_sd[i]
     facilitations(particle, drive, level, count)
@@ -236,12 +186,12 @@ def _inputs(particle: Any, trials: Any, count: int, node: Any, work: Any) -> Non
         level[i] *= factor[i]
         responds[i] = _ONE
     _fade(particle, trials, count, level)
-    most, least, kind = particle[MOST], particle[LEAST], particle[NOISE]
+    most, least, kind = particle[field.MOST], particle[field.LEAST], particle[field.NOISE]
     if is_curved(particle):
-        rest, boost, slope = particle[REST], particle[BOOST], particle[SLOPE]
+        rest, boost, slope = particle[field.REST], particle[field.BOOST], particle[field.SLOPE]
         for i in range(count):
             drive[i] = rest + boost * level[i] + slope * shift[i]
-        _step(trials, count, particle[CHANGED], particle[STEP_DRIVE], drive)
+        _step(trials, count, particle[field.CHANGED], particle[field.STEP_DRIVE], drive)
     elif kind == _ALL_OR_NONE:
         for i in range(count):
             drive[i] = _NIL
@@ -287,12 +237,12 @@ def _density(particle: Any, trials: Any, count: int, curve: Any, work: Any, like
     """Write the density of each trial's log MEP, shape (n,)."""
     drive, scale, responds, known, varies = work[1], work[2], work[3], work[4], work[5]
     relative, evoked = work[6], work[7]
-    low, floor = trials[LOW], particle[LOG_FLOOR]
-    floor_variance, start = particle[FLOOR_SD] * particle[FLOOR_SD], particle[ONSET]
-    output = particle[OUTPUT_SD] * particle[OUTPUT_SD] if is_curved(particle) else _NIL
+    low, floor = trials[field.LOW], particle[field.LOG_FLOOR]
+    floor_variance, start = particle[field.FLOOR_SD] * particle[field.FLOOR_SD], particle[field.ONSET]
+    output = particle[field.OUTPUT_SD] * particle[field.OUTPUT_SD] if is_curved(particle) else _NIL
     for i in range(count):
         relative[i] = low[i] - floor
-    _step(trials, count, particle[CHANGED], -particle[STEP_SCALE], relative)
+    _step(trials, count, particle[field.CHANGED], -particle[field.STEP_SCALE], relative)
     # All nodes in one pass: what one waits for another works out meanwhile, and no sums go through memory.
     at, between, w = curve[0], curve[1], NODE_WEIGHTS
     if start > _NIL:
@@ -331,18 +281,18 @@ def _inside(particle: Any, trials: Any, count: int, curve: Any, work: Any, likel
     """Write the probability that each trial's log MEP is between its ends; arguments as for `_density`."""
     drive, scale, responds, known, varies = work[1], work[2], work[3], work[4], work[5]
     low, high, evoked = work[6], work[7], work[8]
-    told_low, told_high, floor = trials[LOW], trials[HIGH], particle[LOG_FLOOR]
-    floor_variance = particle[FLOOR_SD] * particle[FLOOR_SD]
-    output = particle[OUTPUT_SD] * particle[OUTPUT_SD] if is_curved(particle) else _NIL
-    start = particle[ONSET]
+    told_low, told_high, floor = trials[field.LOW], trials[field.HIGH], particle[field.LOG_FLOOR]
+    floor_variance = particle[field.FLOOR_SD] * particle[field.FLOOR_SD]
+    output = particle[field.OUTPUT_SD] * particle[field.OUTPUT_SD] if is_curved(particle) else _NIL
+    start = particle[field.ONSET]
     rectified, rescaled = start > _NIL, _HALF / (_ONE - start)
     for i in range(count):  # a power of 40 stands in for infinity
         low[i] = max(told_low[i], -_EVER) - floor
     for i in range(count):
         high[i] = min(told_high[i], _EVER) - floor
         evoked[i] = _NIL
-    _step(trials, count, particle[CHANGED], -particle[STEP_SCALE], low)
-    _step(trials, count, particle[CHANGED], -particle[STEP_SCALE], high)
+    _step(trials, count, particle[field.CHANGED], -particle[field.STEP_SCALE], low)
+    _step(trials, count, particle[field.CHANGED], -particle[field.STEP_SCALE], high)
     for q in range(NODES):
         at, between, weight = curve[0, q], curve[1, q], NODE_WEIGHTS[q]
         for i in range(count):
@@ -368,7 +318,7 @@ def _inside(particle: Any, trials: Any, count: int, curve: Any, work: Any, likel
 @part
 def _total(particle: Any, trials: Any, count: int, censored: Any, curve: Any, work: Any) -> float:
     """Log likelihood of a piece of the trials of one sort."""
-    real, isi_sd, likelihood, summed = trials[REAL], trials[ISI_SD], work[9], work[10]
+    real, isi_sd, likelihood, summed = trials[field.REAL], trials[field.ISI_SD], work[9], work[10]
     uncertain = False
     for i in range(count):
         uncertain |= isi_sd[i] > _NIL

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from isiw.compiled import LANES, bell, exp, inlined, kernel, log, loop, per, per_root, total, writer
+from isiw.models.particles import noise
+from isiw.models.particles.kernels import records as field
 from isiw.models.particles.kernels.likelihood import (
     NODE_WEIGHTS,
     NODES_AT,
@@ -15,42 +17,18 @@ from isiw.models.particles.kernels.likelihood import (
     facilitations,
     is_curved,
 )
-from isiw.models.particles.kernels.records import (
-    BOOST,
-    DEPTH,
-    DRIFT,
-    FLOOR_SD,
-    LEAST,
-    LOG_FLOOR,
-    LOG_RATIO,
-    MOST,
-    NOISE,
-    ONSET,
-    OUTPUT_SD,
-    REST,
-    SPREAD,
-    STARTLED,
-    gain_of,
-)
-from isiw.models.particles.noise import (
-    CORNER,
-    FAR_BELOW,
-    NODES,
-    ON_NODES,
-    OUTLIER_LOG_RANGE,
-    OUTLIER_PROBABILITY,
-    NoiseKind,
-)
+from isiw.models.particles.kernels.records import gain_of
+from isiw.models.particles.noise import NODES, NoiseKind
 
 _f = np.float32
 _NIL, _HALF, _ONE = _f(0.0), _f(0.5), _f(1.0)
-_PER_NODE, _FAR, _CORNER = _f(1.0 / ON_NODES), _f(FAR_BELOW), _f(CORNER)
+_PER_NODE, _FAR, _CORNER = _f(1.0 / noise.ON_NODES), _f(noise.FAR_BELOW), _f(noise.CORNER)
 _MISSING, _ALL_OR_NONE = _f(NoiseKind.MISSING), _f(NoiseKind.ALL_OR_NONE)
 _LEAST_SIZE, _LEAST_REACH, _TINY = _f(1e-9), _f(1e-12), _f(1e-6)
 _ROOT = _f(1.0 / math.sqrt(2.0 * math.pi))
-_OUT_LOW, _OUT_HIGH = _f(OUTLIER_LOG_RANGE[0]), _f(OUTLIER_LOG_RANGE[1])
-_OUT_DENSITY = _f(1.0 / (OUTLIER_LOG_RANGE[1] - OUTLIER_LOG_RANGE[0]))
-_OUT, _IN = _f(OUTLIER_PROBABILITY), _f(1.0 - OUTLIER_PROBABILITY)
+_OUT_LOW, _OUT_HIGH = _f(noise.OUTLIER_LOG_RANGE[0]), _f(noise.OUTLIER_LOG_RANGE[1])
+_OUT_DENSITY = _f(1.0 / (noise.OUTLIER_LOG_RANGE[1] - noise.OUTLIER_LOG_RANGE[0]))
+_OUT, _IN = _f(noise.OUTLIER_PROBABILITY), _f(1.0 - noise.OUTLIER_PROBABILITY)
 
 
 @kernel
@@ -60,7 +38,7 @@ def table_rows(particles: Any, rows: int) -> Any:
     levels = np.empty((people, size, rows), dtype=np.float32)
     for person in range(people):
         for i in range(size):
-            depth = particles[person, i, DEPTH]
+            depth = particles[person, i, field.DEPTH]
             for row in range(rows):
                 share = _f(row) / _f(rows - 1)
                 levels[person, i, row] = share * (_ONE + depth) - depth if depth > _NIL else share * share
@@ -70,7 +48,7 @@ def table_rows(particles: Any, rows: int) -> Any:
 @loop
 def _responds(particle: Any, level: Any) -> Any:
     """Probability of a response at a facilitation."""
-    kind, most, least = particle[NOISE], particle[MOST], particle[LEAST]
+    kind, most, least = particle[field.NOISE], particle[field.MOST], particle[field.LEAST]
     if kind == _MISSING:
         return most * math.sqrt(level)
     return least + (most - least) * level if kind == _ALL_OR_NONE else _ONE
@@ -79,19 +57,19 @@ def _responds(particle: Any, level: Any) -> Any:
 @loop
 def _evoked(particle: Any, levels: Any, means: Any) -> None:
     """Write the expected MEP above the floor at some facilitations, in floors; see `noise.evoked_mean`."""
-    count, ratio = len(levels), exp(particle[LOG_RATIO])
+    count, ratio = len(levels), exp(particle[field.LOG_RATIO])
     for row in range(count):
         means[row] = _NIL
     if is_curved(particle):
-        rest, boost, start = particle[REST], particle[BOOST], particle[ONSET]
+        rest, boost, start = particle[field.REST], particle[field.BOOST], particle[field.ONSET]
         for q in range(NODES):
-            at, weight = rest + particle[SPREAD] * NODES_AT[q] * _PER_NODE, NODE_WEIGHTS[q]
+            at, weight = rest + particle[field.SPREAD] * NODES_AT[q] * _PER_NODE, NODE_WEIGHTS[q]
             for row in range(count):
                 share = per(_ONE + exp(-(at + boost * levels[row])))
                 means[row] += weight * max(share - start, _NIL)
-        ratio *= exp(_HALF * particle[OUTPUT_SD] * particle[OUTPUT_SD]) / (_ONE - start)
+        ratio *= exp(_HALF * particle[field.OUTPUT_SD] * particle[field.OUTPUT_SD]) / (_ONE - start)
     else:
-        whole = particle[NOISE] == _ALL_OR_NONE
+        whole = particle[field.NOISE] == _ALL_OR_NONE
         for row in range(count):
             means[row] = _ONE if whole else levels[row]
     for row in range(count):
@@ -111,8 +89,8 @@ def evoked_means(particles: Any, levels: Any) -> Any:
 @loop
 def _components(particle: Any, drive: Any, scale: Any, at: Any, between: Any, mean: Any, inverse_sd: Any) -> None:
     """Write mean and inverse SD of the log MEP over the floor at one node, by the drive; see `noise._components`."""
-    curved, start, floor_sd = is_curved(particle), particle[ONSET], particle[FLOOR_SD]
-    output = particle[OUTPUT_SD] * particle[OUTPUT_SD] if curved else _NIL
+    curved, start, floor_sd = is_curved(particle), particle[field.ONSET], particle[field.FLOOR_SD]
+    output = particle[field.OUTPUT_SD] * particle[field.OUTPUT_SD] if curved else _NIL
     floor_variance, rescaled, rectified = floor_sd * floor_sd, _HALF / (_ONE - start), start > _NIL
     for row in range(len(drive)):
         share = per(_ONE + exp(-(drive[row] + at)))
@@ -139,9 +117,9 @@ def _outcomes(particle: Any, levels: Any, gain: Any, lines: Any, nodes: Any, tab
     mean, inverse_sd, w = nodes[0], nodes[1], NODE_WEIGHTS
     rows, count = len(levels), lines.shape[1]
     curve_of(particle, spread[:NODES], between[:NODES], cell)
-    curved, per_sd, floor = is_curved(particle), _ONE / particle[FLOOR_SD], particle[LOG_FLOOR]
-    scale = exp(particle[LOG_RATIO] + gain + (_NIL if curved else _FAR))
-    rest, boost, whole = particle[REST], particle[BOOST], particle[NOISE] == _ALL_OR_NONE
+    curved, per_sd, floor = is_curved(particle), _ONE / particle[field.FLOOR_SD], particle[field.LOG_FLOOR]
+    scale = exp(particle[field.LOG_RATIO] + gain + (_NIL if curved else _FAR))
+    rest, boost, whole = particle[field.REST], particle[field.BOOST], particle[field.NOISE] == _ALL_OR_NONE
     for row in range(rows):
         if curved:
             drive[row] = rest + boost * levels[row]
@@ -180,7 +158,7 @@ def outcome_tables(particles: Any, levels: Any, order: int, log_mep: Any, width:
         lines[0, :outcomes] = log_mep[person]
         for i in range(size):
             particle = particles[person, i]
-            gain = particle[DRIFT] * relaxed + particle[STARTLED] * startle
+            gain = particle[field.DRIFT] * relaxed + particle[field.STARTLED] * startle
             _outcomes(particle, levels[person, i], gain, lines, nodes, table[person, i])
 
 
@@ -206,7 +184,7 @@ def rows_between(particles: Any, table: Any, levels: Any, found: Any) -> None:
     """Write what lies between the rows of a table, shape (b, s, t, y)."""
     for person in range(levels.shape[0]):
         for i in range(levels.shape[1]):
-            depth = particles[person, i, DEPTH]
+            depth = particles[person, i, field.DEPTH]
             _between_rows(table[person, i], levels[person, i], depth, found[person, i])
 
 

@@ -11,38 +11,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from isiw.compiled import exp, log, loop, part
-from isiw.models.particles.changes import FADING as FADING_RATE
-from isiw.models.particles.changes import INTENSITY_PCT, ChangeKind
+from isiw.models.particles.changes import FADING, INTENSITY_PCT, ChangeKind
+from isiw.models.particles.kernels import records as field
 from isiw.models.particles.kernels.draws import normal, uniform
-from isiw.models.particles.kernels.records import (
-    BOOST,
-    CHANGED,
-    DEPTH,
-    DRIFT,
-    FADING,
-    FLOOR_SD,
-    FORM,
-    LEAST,
-    LOG_FLOOR,
-    LOG_RATIO,
-    LOW_START,
-    LOW_WIDTH,
-    MOST,
-    NOISE,
-    ONSET,
-    OUTPUT_SD,
-    PRESENT,
-    REST,
-    SHAPE,
-    SLOPE,
-    SPREAD,
-    START,
-    STARTLED,
-    STEP,
-    STEP_DRIVE,
-    STEP_SCALE,
-    WIDTH,
-)
 from isiw.models.particles.noise import NoiseKind
 from isiw.models.particles.prior import MOST_ONSET
 from isiw.types import FloatArray, IntArray
@@ -58,7 +29,7 @@ _NIL, _HALF, _ONE, _TWO = _f(0.0), _f(0.5), _f(1.0), _f(2.0)
 _ROOT_HALF, _LEAST_RUN, _LEAST_DENSITY, _NEVER = _f(math.sqrt(0.5)), _f(1e-12), _f(1e-30), _f(-1e30)
 _MOST_ONSET, _INFINITE = _f(MOST_ONSET), _f(math.inf)
 _INTENSITY, _ENHANCEMENT, _SCALE = ChangeKind.INTENSITY, ChangeKind.ENHANCEMENT, ChangeKind.SCALE
-_INTENSITY_PCT, _FADING = _f(INTENSITY_PCT), _f(FADING_RATE)
+_INTENSITY_PCT, _FADING = _f(INTENSITY_PCT), _f(FADING)
 _ALL_OR_NONE, _RECTIFIED, _RECRUITMENT = NoiseKind.ALL_OR_NONE, NoiseKind.RECTIFIED, NoiseKind.RECRUITMENT
 
 
@@ -97,44 +68,44 @@ class Tables(NamedTuple):
 def meant(z: Any, kinds: Any, at: Any, particle: Any) -> None:
     """Write what latents mean, as `Prior.person` says."""
     shape, noise, present, depressed = kinds[0], kinds[1], kinds[2], kinds[3]
-    particle[SHAPE], particle[NOISE], particle[PRESENT] = _f(shape), _f(noise), _f(present)
-    particle[START], particle[WIDTH] = z[at[0]], exp(z[at[1]])
-    particle[FORM] = _f(math.erf(z[at[2]] * _ROOT_HALF)) if shape else _NIL
-    particle[LOG_FLOOR], particle[FLOOR_SD] = z[at[3]], exp(z[at[4]])
-    particle[DRIFT], particle[STARTLED] = z[at[5]], z[at[6]]
+    particle[field.SHAPE], particle[field.NOISE], particle[field.PRESENT] = _f(shape), _f(noise), _f(present)
+    particle[field.START], particle[field.WIDTH] = z[at[0]], exp(z[at[1]])
+    particle[field.FORM] = _f(math.erf(z[at[2]] * _ROOT_HALF)) if shape else _NIL
+    particle[field.LOG_FLOOR], particle[field.FLOOR_SD] = z[at[3]], exp(z[at[4]])
+    particle[field.DRIFT], particle[field.STARTLED] = z[at[5]], z[at[6]]
     switches, rectified = noise == _ALL_OR_NONE, noise == _RECTIFIED
-    particle[MOST], particle[LEAST] = _ONE, _NIL
-    particle[ONSET], particle[BOOST], particle[REST], particle[SLOPE] = _NIL, _NIL, _NIL, _NIL
+    particle[field.MOST], particle[field.LEAST] = _ONE, _NIL
+    particle[field.ONSET], particle[field.BOOST], particle[field.REST], particle[field.SLOPE] = _NIL, _NIL, _NIL, _NIL
     if rectified or noise == _RECRUITMENT:
         first = 20 if rectified else 14
         slope = exp(z[at[first + 1]])
-        particle[LOG_RATIO], particle[SPREAD] = z[at[first]], exp(z[at[first + 2]])
-        particle[OUTPUT_SD], particle[SLOPE] = exp(z[at[first + 3]]), slope
-        particle[BOOST], particle[REST] = slope * exp(z[at[first + 4]]), slope * z[at[first + 5]]
+        particle[field.LOG_RATIO], particle[field.SPREAD] = z[at[first]], exp(z[at[first + 2]])
+        particle[field.OUTPUT_SD], particle[field.SLOPE] = exp(z[at[first + 3]]), slope
+        particle[field.BOOST], particle[field.REST] = slope * exp(z[at[first + 4]]), slope * z[at[first + 5]]
         if rectified:
             onset = min(exp(z[at[26]]), _MOST_ONSET)
-            particle[ONSET] = onset
-            particle[REST] += log(onset) - log(_ONE - onset)
+            particle[field.ONSET] = onset
+            particle[field.REST] += log(onset) - log(_ONE - onset)
     else:
-        particle[LOG_RATIO] = z[at[12 if switches else 7]]
-        particle[SPREAD], particle[OUTPUT_SD] = exp(z[at[13 if switches else 8]]), _ONE
-        particle[MOST] = _ONE / (_ONE + exp(-z[at[10 if switches else 9]]))
-        particle[LEAST] = _ONE / (_ONE + exp(-z[at[11]]))
-    particle[LOW_START], particle[LOW_WIDTH], particle[DEPTH] = _NIL, _ONE, _NIL
+        particle[field.LOG_RATIO] = z[at[12 if switches else 7]]
+        particle[field.SPREAD], particle[field.OUTPUT_SD] = exp(z[at[13 if switches else 8]]), _ONE
+        particle[field.MOST] = _ONE / (_ONE + exp(-z[at[10 if switches else 9]]))
+        particle[field.LEAST] = _ONE / (_ONE + exp(-z[at[11]]))
+    particle[field.LOW_START], particle[field.LOW_WIDTH], particle[field.DEPTH] = _NIL, _ONE, _NIL
     if depressed:
-        particle[LOW_START], particle[LOW_WIDTH] = z[at[29]], exp(z[at[30]])
-        particle[DEPTH] = exp(z[at[31]] - z[at[18]])
+        particle[field.LOW_START], particle[field.LOW_WIDTH] = z[at[29]], exp(z[at[30]])
+        particle[field.DEPTH] = exp(z[at[31]] - z[at[18]])
     change, size = kinds[4], z[at[28]]
-    particle[CHANGED], particle[STEP], particle[STEP_DRIVE] = exp(z[at[27]]), _NIL, _NIL
-    particle[FADING], particle[STEP_SCALE] = _NIL, _NIL
+    particle[field.CHANGED], particle[field.STEP], particle[field.STEP_DRIVE] = exp(z[at[27]]), _NIL, _NIL
+    particle[field.FADING], particle[field.STEP_SCALE] = _NIL, _NIL
     if change == _ENHANCEMENT:
-        particle[FADING] = _FADING * size
+        particle[field.FADING] = _FADING * size
     elif change == _SCALE:
-        particle[STEP_SCALE] = size
-    elif change == _INTENSITY and particle[SLOPE] > _NIL:
-        particle[STEP_DRIVE] = particle[SLOPE] * _INTENSITY_PCT * size
+        particle[field.STEP_SCALE] = size
+    elif change == _INTENSITY and particle[field.SLOPE] > _NIL:
+        particle[field.STEP_DRIVE] = particle[field.SLOPE] * _INTENSITY_PCT * size
     elif change:
-        particle[STEP] = size
+        particle[field.STEP] = size
 
 
 @loop
