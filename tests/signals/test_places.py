@@ -13,8 +13,8 @@ from isiw.devices.recorded import RecordedPerson, load_recordings
 from isiw.devices.simulated import Simulation
 from isiw.findings import Finding, Kind
 from isiw.signals import SignalLimits, judge
-from isiw.signals.evidence import Evidence, Told
 from isiw.signals.places import told_by
+from isiw.signals.rig import Evidence, Told
 from isiw.signals.watch import findings
 from isiw.subjects.cohorts import cohort
 from isiw.trials import Channel, Stimulus, Sweep

@@ -21,9 +21,8 @@ from isiw.session.assembly import Earlier
 from isiw.session.examination import examination_of
 from isiw.session.judging import Judging
 from isiw.session.sink import Sink
-from isiw.signals.evidence import Evidence, told_of
 from isiw.signals.limits import isi_far, require_plausible
-from isiw.signals.rig import remedy_for
+from isiw.signals.rig import Evidence, remedy_for, told_of
 from isiw.signals.watch import Doubts, findings
 from isiw.strategy.course import Outcome
 from isiw.strategy.stopping import StopDecision

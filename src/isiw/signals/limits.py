@@ -1,7 +1,7 @@
 """What a sweep must satisfy to be accepted, and whether a trial's amplitude, ISI and times can be true.
 
 The bounds leave room for every muscle: the EMG at rest has 2 to 30 µV peak-to-peak, the largest compound action
-potentials some 25 mV. What is only odd is a doubt (`isiw.signals.evidence`).
+potentials some 25 mV. What is only odd is a doubt (`isiw.signals.watch`).
 """
 
 from __future__ import annotations

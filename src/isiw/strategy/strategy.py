@@ -13,9 +13,9 @@ from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError
 from isiw.estimate import WindowEstimate
 from isiw.findings import NO_MEP
 from isiw.models.protocol import Posterior, PredictsMeps, ReportsTrouble, ResponseModel
-from isiw.signals.evidence import Evidence, Told, is_silent
 from isiw.signals.limits import isi_far, require_plausible
-from isiw.signals.watch import Doubts, findings
+from isiw.signals.rig import Evidence, Told
+from isiw.signals.watch import Doubts, findings, is_silent
 from isiw.strategy.choice import Asked, Choice, Cost, instead_of_lost
 from isiw.strategy.course import Details, Method, Outcome, Outcomes
 from isiw.strategy.settings.common import Recipe

@@ -19,8 +19,7 @@ from isiw.findings import Kind
 from isiw.log.schema import waveform_topic
 from isiw.session.rig import own_reference
 from isiw.signals import SignalLimits, judge, judge_measurement
-from isiw.signals.evidence import Evidence, Told
-from isiw.signals.rig import too_early_by_chance
+from isiw.signals.rig import Evidence, Told, too_early_by_chance
 from isiw.signals.watch import findings
 from isiw.testing.device_table import (
     OF_TIMING,
