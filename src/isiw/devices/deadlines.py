@@ -130,9 +130,8 @@ _abandoned = _GivenUp()
 class PunctualDevice:
     """A device whose verbs end in time, or are given up and followed by `stop` from outside.
 
-    All verbs run in one thread of their own, one after the other. A verb that is given up may still be busy; when it
-    ends, the device is disarmed once more, in case it armed it, and until then nobody arms the device. `stop` is tried
-    several times, from another thread if the device's own is busy.
+    All verbs run in one thread, one after the other. One that is given up may still be busy: when it ends, the device
+    is disarmed once more, in case it armed it, and until then nobody arms the device.
     """
 
     def __init__(

@@ -26,10 +26,8 @@ def require_real_time(info: DeviceInfo, clock: Clock) -> None:
 class LimitedDevice:
     """A device that refuses what exceeds its limits, before anything is delivered. Safe to use from several threads.
 
-    A delivery that fails counts like any other, because nobody knows whether the pulse left; only what was refused
-    before firing does not. The inter-trial interval runs from the moment the last attempt ended. The first delivery
-    waits a whole interval, too: nobody knows what came before. Nothing loosens once the device is made: it keeps a copy
-    of its limits, and an intensity that is reported at `stage` may not change any more.
+    A delivery that fails counts like any other, because nobody knows whether the pulse left, and the first one waits a
+    whole interval, because nobody knows what came before. Nothing loosens once the device is made.
     """
 
     def __init__(

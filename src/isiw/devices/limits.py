@@ -187,16 +187,11 @@ class Limits(Checked):
         if not times_s:
             return since_s + self.iti_s
         earliest = [max(since_s, times_s[-1]) + self.iti_s]
-        if self.max_block_pulses is not None and self._block_pulses(times_s) >= self.max_block_pulses:
-            earliest.append(times_s[-1] + self.rest_s)
+        if self.max_block_pulses is not None:
+            last = times_s[-self.max_block_pulses :]
+            is_block = all(after - before < self.rest_s for before, after in pairwise(last))
+            if is_block and len(last) == self.max_block_pulses:
+                earliest.append(times_s[-1] + self.rest_s)
         if self.max_period_pulses is not None and len(times_s) >= self.max_period_pulses:
             earliest.append(times_s[-self.max_period_pulses] + self.period_s)
         return max(earliest)
-
-    def _block_pulses(self, times_s: Sequence[float]) -> int:
-        """The number of stimuli since the last rest, counted no further than matters."""
-        last = times_s[-(self.max_block_pulses or 0) :]
-        rests = [
-            number for number, (before, after) in enumerate(pairwise(last), start=1) if after - before >= self.rest_s
-        ]
-        return len(last) - max(rests, default=0)

@@ -1,7 +1,6 @@
 """Simulated people in recorded EMG [UEF2023]: semi-synthetic sweeps, for tests of the whole chain.
 
-The sweep is a recorded one without an MEP, plus a recorded MEP that is scaled so that the sum has the person's
-amplitude from 15 to 35 ms: noise, offset, artefact and waveform are real. The recordings are not part of the package.
+A recorded MEP is scaled so that its sum with a sweep without one has the person's amplitude from 15 to 35 ms.
 """
 
 from __future__ import annotations

@@ -80,9 +80,7 @@ class SimulatedDevice:
         """Disarm."""
         self._staged = False
 
-    def unstage(self) -> None:
-        """Disarm."""
-        self._staged = False
+    unstage = stop
 
 
 class SimulatedPerson:

@@ -1,8 +1,4 @@
-"""The events of a tap in its waveforms, by the dissertation's rules [Kim2020, 3.3.1, Table 3.1].
-
-Every rule is a hysteresis about the level at rest: a high threshold confirms that something happened, the last crossing
-of a low one says when. Both are multiples of the noise that each sweep has before the valve command.
-"""
+"""The events of a tap in its waveforms, by hysteresis about the level at rest [Kim2020, 3.3.1, Table 3.1]."""
 
 from __future__ import annotations
 
@@ -71,19 +67,13 @@ def detect_events(
     """
     waves = as_waveforms(acceleration, rate_hz, "acceleration")
     hit = impact_times(waves, rate_hz, valve_ms)
-    nowhere = np.full(len(waves), math.nan)
     descent, away = _descent_and_away(waves, rate_hz, hit, valve_ms)
-    return TapEvents(
-        fill_ms=nowhere
-        if pressure is None
-        else first_rise(_like(pressure, waves, rate_hz, "pressure"), rate_hz, valve_ms),
-        descent_ms=descent,
-        hit_ms=hit,
-        away_ms=away,
-        memg_ms=nowhere
-        if emg is None
-        else tap_artefact_times(_like(emg, waves, rate_hz, "EMG"), rate_hz, hit, valve_ms=valve_ms, t_tms_ms=t_tms_ms),
-    )
+    fill = memg = np.full(len(waves), math.nan)
+    if pressure is not None:
+        fill = first_rise(_like(pressure, waves, rate_hz, "pressure"), rate_hz, valve_ms)
+    if emg is not None:
+        memg = _in_emg(_like(emg, waves, rate_hz, "EMG"), rate_hz, hit, valve_ms, per_waveform(t_tms_ms, waves))
+    return TapEvents(fill, descent, hit, away, memg)
 
 
 def sweep_events(sweep: Sweep) -> TapEvents:
@@ -173,25 +163,14 @@ def _descent_and_away(
     return descent * 1000 / rate_hz, away * 1000 / rate_hz
 
 
-def tap_artefact_times(
-    emg: ArrayLike,
-    rate_hz: float,
-    hit_ms: ArrayLike,
-    *,
-    valve_ms: float = VALVE_MS,
-    t_tms_ms: ArrayLike | None = None,
-) -> FloatArray:
-    """When the tap shows in the EMG [ms from the first sample], NaN where it does not, shape (n,).
-
-    What begins 10 to 50 ms after the pulse may be the MEP and is not taken for the tap.
-    """
-    waves = as_waveforms(emg, rate_hz, "EMG")
+def _in_emg(waves: FloatArray, rate_hz: float, hit_ms: FloatArray, valve_ms: float, pulse_ms: FloatArray) -> FloatArray:
+    """When the tap shows in the EMG [ms], NaN if never; what begins 10 to 50 ms after the pulse may be the MEP."""
     level, noise = rest_level(waves, round(valve_ms * rate_hz / 1000), rate_hz)
     deviation = np.abs(waves - level)
     times = np.arange(waves.shape[-1]) * 1000 / rate_hz
-    since_pulse = times - per_waveform(t_tms_ms, waves)[:, None]
+    since_pulse = times - pulse_ms[:, None]
     deviation[(since_pulse >= ARTEFACT_SPAN_MS[0]) & (since_pulse <= ARTEFACT_SPAN_MS[1])] = 0.0
-    since_hit = times - per_waveform(hit_ms, waves)[:, None]
+    since_hit = times - hit_ms[:, None]
     sought = (since_hit >= ARTEFACT_SEARCH_MS[0]) & (since_hit <= ARTEFACT_SEARCH_MS[1])
     sought &= ~((since_pulse >= EARLIEST_ONSET_MS) & (since_pulse <= LATEST_MEP_MS))
     shown = first_true(sought & (deviation > HYSTERESIS_SD * noise))

@@ -1,9 +1,7 @@
-"""The impact of the hammer in its acceleration.
+"""The impact of the hammer in its acceleration [Kim2020, 3.3.1, 5.2.2].
 
-The rule is that of [Kim2020, 3.3.1, 5.2.2]: the first time that the acceleration, after the hammer has begun to move,
-falls through its level at rest, with a hysteresis band about that level. The band comes from each sweep's own noise.
-Two conditions tell an impact from any other fall, and both follow from momentum: what the hammer gained on its way of
-some 50 ms it loses within a few, so the fall is steep, and the deceleration exceeds the acceleration before it.
+The first time that the acceleration falls through its level at rest, with a band of the sweep's own noise about it;
+and, by momentum, the fall is steep, and the deceleration exceeds the acceleration before it.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """The judgement of a trial: from its sweep to an amplitude at a realised ISI, or to the reason why there is none.
 
-What goes wrong in one trial is a mistrial, with a reason from the closed list of `MISTRIALS`. What is wrong with
-every trial, an unknown unit or a rate that measures nothing, is an error: repeating the trial would not help.
+What is wrong with every trial, such as an unknown unit, is an error: repeating the trial would not help.
 """
 
 from __future__ import annotations
@@ -45,11 +44,8 @@ def judge(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLi
         InvalidValueError: an unknown unit, or a sampling rate too low to measure anything.
     """
     limits = limits or SignalLimits()
-    return _judge_tap(sweep, stimulus, limits) if stimulus.tap_alone else _judge_pulse(sweep, stimulus, space, limits)
-
-
-def _judge_pulse(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits) -> Trial:
-    """A pair of stimuli, or TMS alone."""
+    if stimulus.tap_alone:
+        return _judge_tap(sweep, stimulus, limits)
     timed = _judge_timing(sweep, stimulus, space, limits)
     if timed.reason is not Kind.OUTCOME_UNKNOWN:
         return timed
@@ -243,10 +239,9 @@ def _on_channel(time_ms: float | None, channel: Channel) -> float:
 
 
 def _background_uv(emg_mv: FloatArray, emg: Channel, timed: Trial) -> float | None:
-    """RMS of the EMG at rest, where possible of EMG that the tap cannot have touched; None where there is too little.
+    """RMS of the EMG at rest, if possible of EMG that the tap cannot have touched; None if there is too little.
 
-    After the valve command the tap may be anywhere if the impact is unknown. A short sweep may hold nothing but the
-    tap's reflexes, or nothing else, and then all of its EMG before the pulse is judged.
+    A short sweep may hold nothing but the tap's reflexes, or nothing else: then all of its EMG before the pulse counts.
     """
     pulse, hit = _on_channel(timed.t_tms_ms, emg), _on_channel(timed.t_hit_ms, emg)
     untouched = np.fmin(pulse, _on_channel(timed.t_valve_ms, emg)) if math.isnan(hit) else pulse

@@ -1,8 +1,4 @@
-"""What a sweep must satisfy to be accepted, and whether a trial's amplitude, ISI and times can be true.
-
-The bounds leave room for every muscle: the EMG at rest has 2 to 30 µV peak-to-peak, the largest compound action
-potentials some 25 mV. What is only odd is a doubt (`isiw.signals.watch`).
-"""
+"""What a sweep must satisfy to be accepted, and whether its amplitude, ISI and times can be true, of any muscle."""
 
 from __future__ import annotations
 
@@ -130,10 +126,7 @@ def _implausible(why: str, remedy: str) -> Finding:
 
 
 def implausible_scale(meps_mv: Sequence[float]) -> Finding | None:
-    """Why amplitudes of single pulses to a muscle at rest cannot be in mV, and the likely slip; None where they can.
-
-    Once one of them is as large as EMG at rest the scale is right; 0, below the detection limit, says nothing about it.
-    """
+    """Why amplitudes at rest cannot be in mV, and the likely slip; None if one is as large as EMG at rest."""
     largest_mv = max(meps_mv, default=0.0)
     if not 0 < largest_mv < AT_REST_MV:
         return None

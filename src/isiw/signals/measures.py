@@ -1,8 +1,7 @@
 """Measures of an MEP beside its amplitude: onset, duration, area and, in a contracted muscle, the silent period.
 
-Duration and area are from onset to end, the area that of the rectified EMG [Jackson2019]. The end is found as the onset
-is, from the other side. The silent period is counted from the pulse, until the moving SD of the EMG is back at its
-mean from before the pulse [Summers2020].
+Duration and area are from onset to end, the area that of the rectified EMG [Jackson2019]; the silent period is from the
+pulse until the moving SD of the EMG is back at its mean from before [Summers2020].
 """
 
 from __future__ import annotations
@@ -75,10 +74,7 @@ def _end_ms(emg_mv: FloatArray, since_ms: FloatArray, onset_ms: float) -> float:
 
 
 def _silent_ms(emg_mv: FloatArray, since_ms: FloatArray, rate_hz: float, end_ms: float | None) -> float:
-    """Until when after the pulse a contracted muscle is silent [ms]; NaN if it is not, or not until the sweep ends.
-
-    The EMG is back with the first sample of the first stretch whose SD is.
-    """
+    """Until when after the pulse a contracted muscle is silent [ms], by the first stretch whose SD is back, or NaN."""
     length = samples(MOVING_MS, rate_hz)
     if end_ms is None or length < 2 or emg_mv.size < length:
         return math.nan

@@ -1,10 +1,8 @@
 """The MEP in an EMG sweep: amplitude, onset latency, presence; and the EMG before the pulse, with its hum and drift.
 
-Amplitude: the largest minus the smallest value in a window after the pulse [Kim2020, 5.2.3], whatever the offset.
-Onset: from the first sample that is surely part of the MEP, back to where the deviation from rest last rose out of the
-noise. Both thresholds are relative to the sweep's own amplitude and noise.
-
-Mains hum and a drifting baseline are in the EMG at rest already, are fitted there, and go on below the MEP.
+The amplitude is peak to peak in a window after the pulse [Kim2020, 5.2.3]. The onset is where the deviation from rest
+last rose out of the noise before the first sample that is surely of the MEP. Hum and drift are fitted to the EMG at
+rest, and go on below the MEP.
 """
 
 from __future__ import annotations

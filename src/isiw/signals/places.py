@@ -1,14 +1,13 @@
 """Responses of the EMG outside the MEP window: the time of the pulse is wrong, or the window does not fit the muscle.
 
-A response is what stands clearly out of the EMG at rest where neither pulse nor tap leave their artefacts. One alone
-says little. Where several in a row come equally long after the pulse, at ISIs that differ, and none within the window,
-they are taken for the MEP.
+Several in a row, equally long after the pulse at ISIs that differ, and none within the window, are taken for the MEP.
 """
 
 from __future__ import annotations
 
+import math
 import statistics
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import takewhile
 
@@ -209,14 +208,10 @@ def _only_falls(sweep: Sweep, trial: Trial, window_ms: tuple[float, float], rest
     return bool((steps <= 0).all() and np.ptp(emg_mv[within] - fitted(share)) <= OF_REST * rest_uv / 1000)
 
 
-def _since_the_last_mep(told: Sequence[Told]) -> Iterator[Told]:
-    """The trials since the last one with an MEP in the window, the latest first; of others nobody knows."""
-    return takewhile(lambda one: not (one.rest_uv and one.stands_out), reversed(told))
-
-
 def _last_alike(told: Sequence[Told]) -> list[tuple[float | None, Response]]:
-    """The last responses and their ISIs, back to the first that comes at another time after the pulse."""
-    found = [(one.isi_ms, one.outside) for one in _since_the_last_mep(told) if one.outside is not None]
+    """The last responses since an MEP in the window, and their ISIs, back to one at another time after the pulse."""
+    since = takewhile(lambda one: not (one.rest_uv and one.stands_out), reversed(told))
+    found = [(one.isi_ms, one.outside) for one in since if one.outside is not None]
     return list(takewhile(lambda one: abs(one[1].at_ms - found[0][1].at_ms) <= ALIKE_MS, found))
 
 
@@ -241,18 +236,11 @@ def _since_pulse(sweep: Sweep, trial: Trial) -> tuple[FloatArray, FloatArray, Bo
     """The EMG about its level at rest [mV], its times [ms after the pulse], and which samples may show the tap."""
     emg = sweep.channels["emg"]
     times_ms = emg.t0_ms + np.arange(emg.values.size) * 1000 / emg.rate_hz
-    since_ms, tap = times_ms - (trial.t_tms_ms or 0.0), _of_tap(times_ms, trial)
+    since_ms, span_ms = times_ms - (trial.t_tms_ms or 0.0), tap_span_ms(trial) or (math.inf, math.inf)
+    tap = (times_ms >= span_ms[0]) & (times_ms <= span_ms[1])
     at_rest = (since_ms < -1.0) & ~tap
     level = np.median(emg.values[at_rest] if at_rest.any() else emg.values)
     return EMG_UNITS_MV[emg.unit] * (emg.values - level), since_ms, tap
-
-
-def _of_tap(times_ms: FloatArray, trial: Trial) -> BoolArray:
-    """Which samples may show the tap."""
-    span_ms = tap_span_ms(trial)
-    if span_ms is None:
-        return np.zeros(times_ms.shape, dtype=bool)
-    return (times_ms >= span_ms[0]) & (times_ms <= span_ms[1])
 
 
 def _is_tail(emg_mv: FloatArray, before: BoolArray, artefact: BoolArray) -> bool:

@@ -1,7 +1,6 @@
-"""What is known after each trial, which all checks look at, and what one trial says is likely wrong with a rig.
+"""What is known after each trial, and what one trial says is likely wrong with a rig.
 
-A judgement says why a trial does not count; these findings say why that is likely so. Nobody is accused without a sign:
-where a sweep shows none, the reason of the mistrial stands for itself.
+Nobody is accused without a sign: if a sweep shows none, the reason of the mistrial stands for itself.
 """
 
 from __future__ import annotations
@@ -37,29 +36,17 @@ class Response(NamedTuple):
 
 @dataclass(frozen=True)
 class Told:
-    """A trial that counts, as the checks of several trials look at it.
+    """A trial that counts, as the checks of several trials look at it."""
 
-    Args:
-        mep_mv: its amplitude [mV]; 0 is below the detection limit.
-        isi_ms: its ISI [ms]; None for TMS alone.
-        rest_uv: EMG before the pulse [µV RMS]; None where not known.
-        outside: the largest clear response outside the MEP window; None where there is none, or no sweep.
-        cut_ms: from when to when the EMG responds [ms after the pulse], if it is larger behind the window than within.
-        disturbance: the mains hum and the drift that were subtracted; None if there is none.
-        is_tail: whether what is in the window is the end of a larger artefact before it.
-        only_falls: whether what is in the window only falls, as a slow decay does and no MEP.
-        repeats: whether its EMG is that of the trial before, sample by sample.
-    """
-
-    mep_mv: float
-    isi_ms: float | None = None
-    rest_uv: float | None = None
-    outside: Response | None = None
-    cut_ms: tuple[float, float] | None = None
-    disturbance: Disturbance | None = None
-    is_tail: bool = False
-    only_falls: bool = False
-    repeats: bool = False
+    mep_mv: float  # 0 is below the detection limit
+    isi_ms: float | None = None  # None for TMS alone
+    rest_uv: float | None = None  # RMS before the pulse
+    outside: Response | None = None  # the largest clear one outside the MEP window
+    cut_ms: tuple[float, float] | None = None  # of the response after the pulse, if it is larger behind the window
+    disturbance: Disturbance | None = None  # which was subtracted
+    is_tail: bool = False  # the window holds the end of a larger artefact before it
+    only_falls: bool = False  # the EMG in the window only falls, as a slow decay does and no MEP
+    repeats: bool = False  # its EMG is that of the trial before, sample by sample
 
     @property
     def stands_out(self) -> bool:
@@ -77,20 +64,12 @@ _USUAL_LIMITS: Final = SignalLimits()
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What is known after a trial; what is not known is None or empty.
-
-    Args:
-        trial: the last trial, as it was judged.
-        answer: what the device answered.
-        limits: what it was judged by.
-        told: the trials that count so far, in order.
-        detection_limit_mv: what an amplitude of 0 is known to be below [mV]; None where nobody has said.
-    """
+    """What is known after a trial; what is not known is None or empty."""
 
     trial: Trial | None = None
     answer: Sweep | Measurement | None = None
     limits: SignalLimits = _USUAL_LIMITS
-    told: Sequence[Told] = ()
+    told: Sequence[Told] = ()  # the trials that count so far
     detection_limit_mv: float | None = None
 
 
@@ -262,7 +241,9 @@ def stray_edge(sweep: Sweep, trial: Trial) -> Finding | None:
     tap_ms = tap_span_ms(trial)
     if steepest_ms is None or (tap_ms is not None and tap_ms[0] <= steepest_ms <= tap_ms[1]):
         return None
-    steep, is_fast = _steep_samples(emg), emg.rate_hz >= LEAST_RATE_HZ
+    steps = np.abs(np.diff(emg.values))
+    steep = int(np.ptp(np.flatnonzero(steps > 0.3 * steps.max()))) + 1  # all flanks of an MEP, if it is one
+    is_fast = emg.rate_hz >= LEAST_RATE_HZ
     may_be_evoked = steepest_ms <= trial.t_tms_ms + BLANKED_MS or not is_fast or steep > samples(SHARP_MS, emg.rate_hz)
     if evoked_ms[0] <= steepest_ms <= evoked_ms[1] and may_be_evoked:
         return None
@@ -292,13 +273,6 @@ def steepest_edge(emg: Channel) -> float | None:
     if usual == 0 or steps.max() <= CLEAR * usual or (steps > 0.5 * steps.max()).mean() >= 0.01:
         return None
     return emg.t0_ms + 1000 * float(steps.argmax()) / emg.rate_hz
-
-
-def _steep_samples(emg: Channel) -> int:
-    """For how many samples the EMG is steep: all flanks of an MEP, if it is one."""
-    steps = np.abs(np.diff(emg.values))
-    steep = np.flatnonzero(steps > 0.3 * steps.max())
-    return int(steep[-1] - steep[0] + 1)
 
 
 def wrong_level(trial: Trial, evidence: Evidence) -> Finding | None:

@@ -1,7 +1,6 @@
-"""The impact of the hammer as it happens: samples of its acceleration go in, the impact comes out.
+"""The impact of the hammer as it happens, by the rule of `isiw.signals.impact`: samples go in, the impact comes out.
 
-The rule is that of `isiw.signals.impact`, but nothing is waited for that is not needed: an impact is called at the
-first sample whose deceleration exceeds the acceleration before the fall, which is at most 5 ms after it.
+It is called at the first sample whose deceleration exceeds the acceleration before the fall, at most 5 ms after it.
 """
 
 from __future__ import annotations

@@ -1,11 +1,8 @@
-"""The tap's own response in the EMG: its course, learnt from the EMG that shows it alone, and amplitudes without it.
+"""The tap's own response in the EMG: its course, learnt from EMG that shows it alone, and amplitudes without it.
 
-What a tap evokes comes at its own times after the hit. The EMG before the pulse of a pair shows what the tap alone does
-until then, a tap alone shows all of it. Where the MEP window of a trial meets these times, the mean course is
-subtracted, and as far as the sweeps so far say that sizes outside the window tell those within it, the course of the
-size that the trial shows outside. How much is left of the response then is known from how far each course is from what
-the others say of it, never from the trial's own amplitude. An electrical first pulse has an artefact and an M-wave, and
-the same holds.
+What a tap evokes comes at its own times after the hit. Where an MEP window meets these, the mean course is subtracted,
+and as far as sizes outside the window tell those within it, the course of the size that the trial shows outside. How
+much is left is known from how far each course is from what the others say, never from the trial's own amplitude.
 """
 
 from __future__ import annotations
@@ -81,43 +78,31 @@ class _Shown(NamedTuple):
 
 
 class _MepWindow(NamedTuple):
-    """A trial's MEP window: its EMG, its times after the hit, when responses end, and how many sweeps it rests on.
-
-    And the trial's EMG at `GRID_MS`, and which of it can show neither an MEP nor the pulse's artefact.
-    """
+    """A trial's MEP window: its EMG, its times after the hit, and the sweep that it is in."""
 
     emg_mv: FloatArray
     since_hit_ms: FloatArray
-    over_ms: float
-    course_mv: FloatArray
-    is_outside: BoolArray
-    told_by: int = 0
+    over_ms: float  # when responses end after the hit
+    course_mv: FloatArray  # the sweep's EMG at `GRID_MS`
+    is_outside: BoolArray  # which of it can show neither an MEP nor the pulse's artefact
+    told_by: int = 0  # on how many sweeps its amplitude rests
 
 
 class _Subtracted(NamedTuple):
-    """What is subtracted from a trial's MEP window, and from those of the sweeps that show it, if others say it.
-
-    With the relative variance of the response's size that is left, as a share of its mean.
-    """
+    """What is subtracted from a trial's MEP window, and from those of the sweeps that show it, if others say it."""
 
     course_mv: FloatArray
     others_mv: FloatArray
-    variance: float
+    variance: float  # what is left of the response's size, relative to its mean
 
 
 @dataclass(frozen=True, eq=False)
 class TapResponses:
-    """What the sweeps of a session show of the tap alone, and the MEP windows of its trials.
-
-    Args:
-        mep_window_ms: where the MEP is sought [ms after the pulse].
-        shown: what each sweep shows.
-        windows: the MEP windows, by the trial's number.
-    """
+    """What the sweeps of a session show of the tap alone, and the MEP windows of its trials."""
 
     mep_window_ms: tuple[float, float] = MEP_WINDOW_MS
     shown: tuple[_Shown, ...] = ()
-    windows: Mapping[int, _MepWindow] = field(default_factory=dict)
+    windows: Mapping[int, _MepWindow] = field(default_factory=dict)  # by the trial's number
 
     def after(self, trial: Trial, sweep: Sweep) -> TapResponses:
         """The same after one more trial; of TMS alone, and of a trial that was lost, nothing is learnt."""
@@ -199,7 +184,7 @@ class TapResponses:
     def shown_from_ms(self, window: Window | None, trials: TrialTable) -> float | None:
         """From which ISI on a pair would show the response at all trials within a window; None if it is known there.
 
-        Sweeps that begin too late, or have no rest, never show it: after a few tries nothing more is asked for it.
+        Sweeps that begin too late, or have no rest, never show it: it is tried a few times only.
         """
         unknown_ms = [
             trial.isi_ms
@@ -280,8 +265,7 @@ def _subtracted(
 ) -> _Subtracted:
     """What is subtracted: the mean course, moved towards that of the size which is shown outside the window.
 
-    By how much is fitted to the sweeps that show both, as if some more had been seen in which the response's size
-    varied as usual and was the same outside as within.
+    By how much is fitted to the sweeps that show both, and to a few usual ones besides.
     """
     within, count = waves[:, meets], len(waves)
     mean, sizes = within.mean(axis=0), _sizes(within)

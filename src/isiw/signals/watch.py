@@ -116,10 +116,7 @@ def is_silent(meps_mv: Sequence[float], detection_limit_mv: float | None = None)
 
 
 def stopped_after(isis_ms: Sequence[float | None], answered: Sequence[bool]) -> int | None:
-    """After how many pulses there was no answer any more; None where chance may explain those without one.
-
-    Only pulses between ISIs that were answered count: what lies beyond may never have been answered.
-    """
+    """After how many pulses there was no answer any more, at ISIs between answered ones; None if that may be chance."""
     first = max((index + 1 for index, yes in enumerate(answered) if yes), default=0)
     with_answer = [isi_ms for isi_ms, yes in zip(isis_ms, answered, strict=True) if yes]
     pairs_ms = [isi_ms for isi_ms in with_answer if isi_ms is not None]
@@ -224,11 +221,7 @@ class Doubts:
 
 @dataclass(frozen=True)
 class Watch:
-    """What was found in the trials so far, and what speaks for a pause.
-
-    `paused_for` are the kinds that a person has seen in a pause: of trials that count, the same is said once. `pause`
-    is why to pause now, if at all; trials that `told` something are kept with what their sweeps show.
-    """
+    """What was found in the trials so far, and what speaks for a pause."""
 
     space: DesignSpace
     signals: SignalLimits
@@ -237,11 +230,11 @@ class Watch:
     in_a_row: int = 0  # trials that were rejected, or show a faulty rig
     early_ms: float | None = None
     early: int = 0  # pulses in a row, at this ISI, that came before the impact by chance
-    told: tuple[Told, ...] = ()
+    told: tuple[Told, ...] = ()  # the trials that count, with what their sweeps show
     emg: FloatArray | None = field(default=None, compare=False, repr=False)
     doubts: Doubts = field(default_factory=Doubts)
-    paused_for: frozenset[Kind] = frozenset()
-    pause: Finding | None = None
+    paused_for: frozenset[Kind] = frozenset()  # what a person has seen: of trials that count, it is said once
+    pause: Finding | None = None  # why to pause now, if at all
 
     def resumed(self, trials: TrialTable, paused_for: Iterable[Kind]) -> Watch:
         """The same after earlier trials; whoever resumes the session has seen their doubts and its pauses."""

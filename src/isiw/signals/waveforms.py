@@ -1,8 +1,4 @@
-"""Waveforms: checked, their level and noise at rest, crossings to a fraction of a sample, and saturation.
-
-What detectors need works on many sweeps at once, one a row, shape (n, w). An amplifier runs into its limits, or
-blanks the pulse's artefact and more.
-"""
+"""Waveforms, one a row: checked, their level and noise at rest, crossings to a fraction of a sample, and saturation."""
 
 from __future__ import annotations
 

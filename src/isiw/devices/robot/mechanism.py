@@ -2,10 +2,8 @@
 
     valve ── line delay ──▶ chamber fills ──▶ static friction breaks ──▶ descent ──▶ contact ⇄ flight ──▶ rest
 
-The chamber's pressure approaches the supply's exponentially. The hammer breaks away at a pressure that static friction
-sets, and is then driven by the pressure above the kinetic friction. On contact the tendon is a damped spring. Each
-person's mean event times are the dissertation's (Table 3.2); from them follow the break-away pressure, the travel and
-the stiffness, and these vary from tap to tap. Times are in ms from the valve command unless a name says otherwise.
+The pressure approaches the supply's exponentially; on contact the tendon is a damped spring. Break-away pressure,
+travel and stiffness follow from the dissertation's event times (Table 3.2). Times are in ms from the valve command.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Requests to the software that drives the hardware, and its answers, whatever carries them.
 
-Request and answer have a number and the token of the device object, so that no answer to anything else is taken; the
-newest request replaces all before it. Nothing counts as armed, delivered or disarmed without an answer that says so.
+Both have a number and the device object's token; the newest request replaces all before it. Nothing counts as armed,
+delivered or disarmed without an answer that says so.
 """
 
 from __future__ import annotations
@@ -127,23 +127,10 @@ class Carrier(Protocol):
     """Takes requests to the other software, and brings its answers."""
 
     def send(self, request: Request) -> None:
-        """Send a request.
-
-        Raises:
-            NotDelivered: nobody can have seen it.
-            DeviceError: it cannot be sent.
-        """
+        """Send a request; NotDelivered if nobody can have seen it, another DeviceError if it cannot be sent."""
 
     def reply(self, request: Request, wait_s: float) -> Reply | None:
-        """The answer to a request; None if there is none yet.
-
-        Args:
-            request: the request.
-            wait_s: the longest to wait for it [s].
-
-        Raises:
-            DeviceError: an answer that cannot be read, or a connection that is lost.
-        """
+        """The answer to a request, for which it waits so long [s] at most; None if there is none yet."""
 
     def silence(self, request: Request) -> DeviceError:
         """The error to raise if no answer came in time."""

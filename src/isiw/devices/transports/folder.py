@@ -98,7 +98,7 @@ class FolderDevice:
         rate_hz = reply.number("rate_hz")
         if rate_hz != self._rate_hz:
             raise reply.broken("another sampling rate", got=rate_hz, expected=f"{self._rate_hz:g} Hz")
-        path = self._folder.waveforms_of(reply)
+        path = self._folder.waveforms_for(reply.text("token"), reply.whole("number"))
         values = _waveforms(path, len(self._info.channels))
         if len(values) != (samples := reply.whole("samples")):
             raise reply.broken("the waveforms are not whole", got=len(values), expected=f"{samples} samples")
@@ -163,7 +163,7 @@ class _Folder:
         """Put a request in the place of the one before."""
         values: dict[str, object] = {**request.values(), "answer": self._answer(request).name}
         if self._waveforms and request.verb is Verb.DELIVER:
-            values["waveforms"] = self._waveforms_for(request.token, request.number).name
+            values["waveforms"] = self.waveforms_for(request.token, request.number).name
         lines = [f"{key}={value}\n" for key, value in values.items()]
         try:
             _remove(self._answer(request))  # no answer can be there before its request
@@ -231,10 +231,7 @@ class _Folder:
             remedy=f"Does the software run that reads {REQUEST} there?",
         )
 
-    def waveforms_of(self, reply: Reply) -> Path:
-        return self._waveforms_for(reply.text("token"), reply.whole("number"))
-
-    def _waveforms_for(self, token: str, number: int) -> Path:
+    def waveforms_for(self, token: str, number: int) -> Path:
         return self._place / f"waveforms-{token}-{number}.txt"
 
     def _answer(self, request: Request) -> Path:

@@ -60,8 +60,7 @@ class LineSettings(Checked):
 class Line:
     """Commands and answers over one connection. Everything that fails is a `DeviceError`.
 
-    An answer differs from what came late by its sequence number. If an instrument has none, what has come before a
-    command is thrown away, and a connection whose last answer is missing is not `trusted` any more.
+    Without sequence numbers, a connection whose last answer is missing is not `trusted` any more.
     """
 
     def __init__(self, connection: ByteConnection, settings: LineSettings, refusal: str) -> None:

@@ -1,7 +1,6 @@
 """A stream of samples of the Lab Streaming Layer: what is kept of it, and the sweep that is cut out by timestamps.
 
-The timestamps are the sender's, plus liblsl's clock correction. liblsl's own smoothing (`proc_dejitter`) would take 30
-to 120 s to settle, hide the step that shows dropped samples, and remove the sender's timestamps.
+They are the sender's, plus liblsl's clock correction: its own smoothing (`proc_dejitter`) would hide dropped samples.
 """
 
 from __future__ import annotations

@@ -233,11 +233,7 @@ class Performance:
 def performance(
     vanes: Sequence[Vane], *, period_s: float = 1.0, periods: int = 10, step_ms: float = 0.1
 ) -> Performance:
-    """Range and delay of actuators that are commanded to and fro.
-
-    The text's "square wave excitation of 1 sec duration" is taken as one with a period of 1 s: a rotation there and
-    back within the second that its 7.1 allows for a full cycle.
-    """
+    """Range and delay of actuators that are commanded to and fro, there and back in each period (7.1)."""
     period_s, periods = number("period_s", period_s, above=0), whole("periods", periods, least=1)
     sample_ms = step_ms * max(1, round(2.0 / step_ms))
     done = rotate(vanes, duration_s=period_s * periods, half_wave_s=period_s / 2, step_ms=step_ms, sample_ms=sample_ms)
