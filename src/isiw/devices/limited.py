@@ -48,6 +48,7 @@ class LimitedDevice:
         self._limits = Limits(**dataclasses.asdict(limits))
         self._delivered = delivered
         self._pacing = Pacing(self._limits, clock, earlier_s)
+        self.wait_s, self.ahead_s = self._pacing.wait_s, self._pacing.ahead_s
         self._staged = False
         self._one_at_a_time = threading.Lock()
 
@@ -60,14 +61,6 @@ class LimitedDevice:
     def pulses_left(self) -> int:
         """The number of deliveries that are still allowed."""
         return max(0, self._limits.max_pulses - self._delivered)
-
-    def wait_s(self, interval_s: float = 0.0) -> float:
-        """The time until the interval, the rest and the period allow the next delivery [s]."""
-        return self._pacing.wait_s(interval_s)
-
-    def ahead_s(self, intervals_s: Sequence[float]) -> float:
-        """The time that the next stimuli take at these intervals, or as the limits allow [s]."""
-        return self._pacing.ahead_s(intervals_s)
 
     def check(self, stimulus: Stimulus) -> None:
         """Raise if this stimulus must not be delivered now."""

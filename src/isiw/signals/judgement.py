@@ -72,7 +72,11 @@ def _judge_emg(emg: Channel, timed: Trial, limits: SignalLimits) -> Trial:
         return _mistrial(timed, Kind.TOO_LITTLE_REST)
     if is_blanked(emg_mv, emg.rate_hz, pulse, span_ms):
         return _mistrial(timed, Kind.MISSING_CHANNEL)
-    measured = _measured(timed, mep_mv)
+    if mep_mv == 0 or implausible_amplitude(mep_mv) is not None:  # in a sweep even EMG at rest has more than 0
+        told_mv = mep_mv if mep_mv <= MOST_MEP_MV else None  # as where a sample is missing and the converter says so
+        measured = _mistrial(replace(timed, mep_mv=told_mv), Kind.IMPLAUSIBLE)
+    else:
+        measured = replace(timed, status=Status.ACCEPTED, reason=None, mep_mv=mep_mv)
     return _mistrial(measured, Kind.BACKGROUND_ACTIVITY) if _is_tense(measured, limits) else measured
 
 
@@ -102,14 +106,6 @@ def _judge_tap(sweep: Sweep, stimulus: Stimulus, limits: SignalLimits) -> Trial:
     if wrong is None and _is_tense(judged, limits):
         wrong = Kind.BACKGROUND_ACTIVITY
     return _mistrial(judged, wrong) if wrong else replace(judged, status=Status.ACCEPTED, reason=None)
-
-
-def _measured(timed: Trial, mep_mv: float) -> Trial:
-    """The trial with its amplitude [mV]; in a sweep even EMG at rest has more than 0."""
-    if mep_mv == 0 or implausible_amplitude(mep_mv) is not None:
-        told_mv = mep_mv if mep_mv <= MOST_MEP_MV else None  # as where a sample is missing and the converter says so
-        return _mistrial(replace(timed, mep_mv=told_mv), Kind.IMPLAUSIBLE)
-    return replace(timed, status=Status.ACCEPTED, reason=None, mep_mv=mep_mv)
 
 
 def judge_measurement(

@@ -44,7 +44,16 @@ class SignalLimits(Checked):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _check_window(self.mep_window_ms)
+        name, window_ms, such_as = "SignalLimits.mep_window_ms", self.mep_window_ms, f"such as {MEP_WINDOW_MS}"
+        if not isinstance(window_ms, Sequence) or len(window_ms) != 2:
+            raise InvalidValueError(f"{name} must be its first and its last ms", got=window_ms, expected=such_as)
+        if (slip := WINDOW_END_MS.slip(ascending(name, window_ms, least=0)[1])) is not None:
+            raise InvalidValueError(
+                f"{name} ends before any MEP begins",
+                got=window_ms,
+                expected=f"ms after the pulse, {such_as}",
+                remedy=slip,
+            )
         if (slip := BACKGROUND_LIMIT_UV.slip(self.background_uv)) is not None:
             raise InvalidValueError(
                 "SignalLimits.background_uv is less than any amplifier's noise",
@@ -77,21 +86,6 @@ class SignalLimits(Checked):
     def tolerance_ms(self, space: DesignSpace) -> float:
         """Largest difference between a realised ISI and the commanded one [ms]."""
         return min(space.tolerance_ms, self.isi_tolerance_ms or math.inf)
-
-
-def _check_window(window_ms: tuple[float, float]) -> None:
-    """Raise where this is no span of time after the pulse in which an MEP may be."""
-    name, such_as = "SignalLimits.mep_window_ms", f"such as {MEP_WINDOW_MS}"
-    if not isinstance(window_ms, Sequence) or len(window_ms) != 2:
-        raise InvalidValueError(f"{name} must be its first and its last ms", got=window_ms, expected=such_as)
-    _, last_ms = ascending(name, window_ms, least=0)
-    if (slip := WINDOW_END_MS.slip(last_ms)) is not None:
-        raise InvalidValueError(
-            f"{name} ends before any MEP begins",
-            got=window_ms,
-            expected=f"ms after the pulse, {such_as}",
-            remedy=slip,
-        )
 
 
 EMG_UNITS_MV: Mapping[str, float] = MappingProxyType({"V": 1e3, "mV": 1.0, "uV": 1e-3, "µV": 1e-3, "μV": 1e-3})

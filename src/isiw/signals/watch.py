@@ -49,7 +49,7 @@ def _doubt(kind: Kind, text: str, remedy: str) -> Finding:
 
 def equal(evidence: Evidence) -> Finding | None:
     """Amplitudes that are one like the other."""
-    meps_mv = _meps_mv(evidence.told)
+    meps_mv = [one.mep_mv for one in evidence.told]
     last = meps_mv[-EQUAL_IN_A_ROW:]
     if len(last) == EQUAL_IN_A_ROW and len(set(last)) == 1 and last[0] > 0:
         text = f"The last {EQUAL_IN_A_ROW} amplitudes are exactly equal ({last[0]:g} mV)"
@@ -65,7 +65,7 @@ def equal(evidence: Evidence) -> Finding | None:
 
 def silent(evidence: Evidence) -> Finding | None:
     """No MEP from the start on."""
-    meps_mv = _meps_mv(evidence.told)
+    meps_mv = [one.mep_mv for one in evidence.told]
     if len(meps_mv) < SILENT_FROM_THE_START or not is_silent(meps_mv, evidence.detection_limit_mv):
         return None
     text = f"None of the first {len(meps_mv)} pulses evoked an MEP: every amplitude is 0"
@@ -131,10 +131,6 @@ def stopped_after(isis_ms: Sequence[float | None], answered: Sequence[bool]) -> 
         scipy.special.betaln(hits + 1, misses + silent + 1) - scipy.special.betaln(hits + 1, misses + 1)
     )
     return first if by_chance < STOPPED_BY_CHANCE else None
-
-
-def _meps_mv(told: Sequence[Told]) -> list[float]:
-    return [one.mep_mv for one in told]
 
 
 def _seen_mv(told: Sequence[Told]) -> list[float]:
@@ -257,16 +253,12 @@ class Watch:
             learned = replace(before, in_a_row=0, pause=None)
         else:
             count = self.in_a_row + 1
-            pause = _pause(found, count) if count >= self.max_in_a_row else None
-            learned = replace(before, in_a_row=count, pause=pause)
+            trials = "the last trial" if count == 1 else f"{count} trials in a row, in the last one"
+            pause = replace(found, severity=Severity.PAUSE, text=f"Something was wrong in {trials}: {found.text}")
+            learned = replace(before, in_a_row=count, pause=pause if count >= self.max_in_a_row else None)
         if trial.commanded_isi_ms is not None:  # a control trial says nothing about an ISI
             learned = replace(learned, early_ms=None, early=0)
         return _after_told(learned, trial, answer)
-
-
-def _pause(found: Finding, count: int) -> Finding:
-    trials = "the last trial" if count == 1 else f"{count} trials in a row, in the last one"
-    return replace(found, severity=Severity.PAUSE, text=f"Something was wrong in {trials}: {found.text}")
 
 
 def _after_told(watch: Watch, trial: Trial, answer: Sweep | Measurement) -> Watch:

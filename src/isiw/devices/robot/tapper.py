@@ -166,7 +166,10 @@ class Tapper:
         rng = np.random.default_rng([self._seed, stimulus.trial])
         taps = draw_taps(self.geometry, 1, rng)
         if stimulus.isi_ms is None and not stimulus.tap_alone:
-            return self._pulse_alone(taps, rng)
+            nothing, times = taps.none(), self._times_ms(ALONE_MS)
+            channels = self._channels(times, nothing, rng)
+            channels["emg"] = self._emg(times, nothing, ALONE_MS, rng)
+            return Sweep(channels, t_tms_ms=VALVE_MS + ALONE_MS)
         return self._tap(taps, stimulus.isi_ms, rng)
 
     def _after_impact_ms(self, isi_ms: float) -> float:
@@ -183,12 +186,6 @@ class Tapper:
                 expected=f"at least {DETECTION_LATENCY_MS:g} ms",
                 remedy="Start the design space later, or use the open-loop trigger.",
             )
-
-    def _pulse_alone(self, taps: Taps, rng: np.random.Generator) -> Sweep:
-        nothing, times = taps.none(), self._times_ms(ALONE_MS)
-        channels = self._channels(times, nothing, rng)
-        channels["emg"] = self._emg(times, nothing, ALONE_MS, rng)
-        return Sweep(channels, t_tms_ms=VALVE_MS + ALONE_MS)
 
     def _tap(self, taps: Taps, isi_ms: float | None, rng: np.random.Generator) -> Sweep:
         """A tap, and unless it comes alone, a pulse."""
@@ -220,11 +217,8 @@ class Tapper:
         )
 
     def _channels(self, times_ms: FloatArray, taps: Taps, rng: np.random.Generator) -> dict[str, Channel]:
-        waves = record_robot(times_ms, taps, rng)
-        return {name: self._channel(name, wave[0]) for name, wave in waves.items() if self._has.get(name, True)}
-
-    def _channel(self, name: str, values: FloatArray) -> Channel:
-        return Channel(values, self.settings.rate_hz, UNITS[name])
+        waves = {name: wave[0] for name, wave in record_robot(times_ms, taps, rng).items() if self._has.get(name, True)}
+        return {name: Channel(wave, self.settings.rate_hz, UNITS[name]) for name, wave in waves.items()}
 
     def _measured_hit_ms(self, channels: Mapping[str, Channel]) -> float | None:
         """The impact that the accelerometer shows [ms after the valve command]."""
@@ -246,4 +240,4 @@ class Tapper:
             pulse_ms=np.array([math.nan if pulse_ms is None else pulse_ms]),
             evoked_mv=np.array([evoked_mv]),
         )
-        return self._channel("emg", wave[0])
+        return Channel(wave[0], self.settings.rate_hz, UNITS["emg"])

@@ -105,8 +105,15 @@ class LineDevice:
             self._connect(era, end_s)
             self._prepare(era, stimulus, end_s)
         said = self._ask(era, command, stimulus, end_s=end_s)
-        with _outcome_unknown():
+        try:
             return self._outcome(era, stimulus, said, end_s)
+        except Exception as error:
+            if isinstance(error, DeviceError) and not isinstance(error, NotDelivered | LimitExceededError):
+                raise
+            raise DeviceError(
+                "the command to fire was sent, so the stimulus may have been given; its outcome is not known: "
+                f"{error_text(error)}"
+            ) from error
 
     def stop(self) -> None:
         """Disarm: over the connection that there is, or over a fresh one if that one fails."""
@@ -189,8 +196,10 @@ class LineDevice:
 
     def _connect(self, era: object, end_s: float) -> None:
         """See to it that there is a connection that can be trusted, while nothing is in flight."""
-        if self._stands():
-            return
+        with self._busy, suppress(DeviceError):
+            if self._line is not None and self._line.trusted:
+                self._line.drain()  # it fails if the connection broke while nothing was in flight
+                return
         self._close()
         line = self._opened(end_s, lambda: self._since_stop is not era)
         with self._busy:
@@ -199,14 +208,6 @@ class LineDevice:
                 return
         line.close()
         raise NotDelivered(f"{self._info.name} was stopped", remedy="Call stage() first.")
-
-    def _stands(self) -> bool:
-        """True if the connection that there is can be trusted, and did not break while nothing was in flight."""
-        with self._busy, suppress(DeviceError):
-            if self._line is not None and self._line.trusted:
-                self._line.drain()
-                return True
-        return False
 
     def _opened(self, end_s: float = math.inf, given_up: Callable[[], bool] = lambda: False) -> Line:
         """A fresh connection over which the instrument has confirmed that it is disarmed."""
@@ -268,17 +269,3 @@ def _nothing_given() -> Iterator[None]:
         raise
     except IsiwError as error:
         raise NotDelivered(f"nothing was given: {error}") from error
-
-
-@contextmanager
-def _outcome_unknown() -> Iterator[None]:
-    """Within, the command to fire has been sent: whatever fails, the pulse may have been given."""
-    try:
-        yield
-    except Exception as error:
-        if isinstance(error, DeviceError) and not isinstance(error, NotDelivered | LimitExceededError):
-            raise
-        raise DeviceError(
-            "the command to fire was sent, so the stimulus may have been given; its outcome is not known: "
-            f"{error_text(error)}"
-        ) from error

@@ -12,6 +12,7 @@ import re
 import socket
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
+from functools import partial
 from string import Formatter
 from typing import Any, Final, Protocol
 from urllib.parse import urlsplit
@@ -321,19 +322,13 @@ def _plain(value: float) -> float:
     return int(rounded) if rounded == int(rounded) else rounded
 
 
-def isi_ms_of(said: Mapping[str, str]) -> float | None:
-    """The ISI that an answer says [ms]; None if it says none."""
-    return _value(said, _MS)
-
-
-def mep_mv_of(said: Mapping[str, str]) -> float | None:
-    """The MEP that an answer says [mV]; None if it says none."""
-    return _value(said, _MV)
-
-
 def _value(said: Mapping[str, str], units: Mapping[str, float]) -> float | None:
+    """The ISI [ms] or the MEP [mV] that an answer says; None if it says none."""
     values = ((number_of(said, name), unit) for name, unit in units.items())
     return next((value * unit for value, unit in values if value is not None), None)
+
+
+isi_ms_of, mep_mv_of = partial(_value, units=_MS), partial(_value, units=_MV)
 
 
 def number_of(said: Mapping[str, str], name: str) -> float | None:

@@ -36,16 +36,11 @@ class Markers:
     def __init__(self, lsl: Any, name: str, echo: str) -> None:
         self._lsl, self._name, self.echo = lsl, name, echo
         self._outlet: Any = None
-        self._inlet: Any = None
+        self.inlet: Any = None
         self._pulling = threading.Lock()
         self._replies: dict[int, Reply] = {}
         self._newest: Request | None = None
         self._others = 0
-
-    @property
-    def connected(self) -> bool:
-        """True if there is somebody to ask."""
-        return self._inlet is not None
 
     def open(self) -> None:
         """Offer the markers; they are offered as long as the device lives, so that whoever listens may stay."""
@@ -58,7 +53,7 @@ class Markers:
     def listen(self, inlet: Any) -> None:
         """Take the echoes from here."""
         with self._pulling:
-            self._inlet = inlet
+            self.inlet = inlet
 
     def await_listener(self, timeout_s: float) -> None:
         """Wait until somebody listens, since markers are lost that nobody listens to."""
@@ -72,7 +67,7 @@ class Markers:
     def correction_s(self, timeout_s: float) -> float:
         """The correction of the times of an echo to the local clock [s]."""
         try:
-            return float(self._inlet.time_correction(timeout_s))
+            return float(self.inlet.time_correction(timeout_s))
         except (self._lsl.util.TimeoutError, self._lsl.util.LostError) as error:
             raise DeviceError(f"the clock of {self.echo} is not known", got=str(error)) from error
 
@@ -107,7 +102,7 @@ class Markers:
 
     def _pull(self, wait_s: float) -> None:
         try:
-            sample, _ = self._inlet.pull_sample(wait_s)
+            sample, _ = self.inlet.pull_sample(wait_s)
         except self._lsl.util.LostError as error:
             raise DeviceError(f"the stream {self.echo} is lost", got=str(error)) from error
         except UnicodeDecodeError as error:
@@ -209,7 +204,7 @@ class LslDevice:
 
     def stop(self) -> None:
         """Have it disarm, and wait for its answer; without a connection nothing is sent."""
-        if self._markers.connected:
+        if self._markers.inlet is not None:
             self._exchange.disarm()
 
     def unstage(self) -> None:

@@ -65,25 +65,15 @@ class Rotor(Checked):
 
 @dataclass(frozen=True)
 class Load(Checked):
-    """The load of the rotor. The text has the forearm as a cylinder of 0.9 kg and 40 mm that turns about its own axis.
+    """The load of the rotor; in the text the forearm is a cylinder of 0.9 kg and 40 mm that turns about its axis."""
 
-    Args:
-        payload_n: weight of the added load, G_load [N].
-        arm_n: weight of the forearm that hangs off the axis, G_arm [N].
-        shaft_n: weight of the shaft that holds the arm, G_shaft [N].
-        arm_mm: from the axis to the centre of forearm and load, l [mm].
-        shaft_mm: from the axis to the centre of the shaft, l_eq [mm].
-        arm_kg_m2: inertia of the forearm, I_arm [kg m²].
-        shaft_kg_m2: inertia of the shaft, I_shaft [kg m²].
-    """
-
-    payload_n: NonNegative = 5.0
-    arm_n: NonNegative = 5.0
-    shaft_n: NonNegative = 2.0
-    arm_mm: NonNegative = 60.0
-    shaft_mm: NonNegative = 25.0
-    arm_kg_m2: Positive = 7.2e-4
-    shaft_kg_m2: Positive = 3.3e-4
+    payload_n: NonNegative = 5.0  # weight of the added load, G_load
+    arm_n: NonNegative = 5.0  # weight of the forearm that hangs off the axis, G_arm
+    shaft_n: NonNegative = 2.0  # weight of the shaft that holds the arm, G_shaft
+    arm_mm: NonNegative = 60.0  # from the axis to the centre of forearm and load, l
+    shaft_mm: NonNegative = 25.0  # from the axis to the centre of the shaft, l_eq
+    arm_kg_m2: Positive = 7.2e-4  # inertia of the forearm, I_arm
+    shaft_kg_m2: Positive = 3.3e-4  # inertia of the shaft, I_shaft
 
     @property
     def inertia_kg_m2(self) -> float:
@@ -99,23 +89,14 @@ class Load(Checked):
 
 @dataclass(frozen=True)
 class Supply(Checked):
-    """The air: a reservoir, a valve with two outlets, and from each a line to one of the chambers.
+    """The air: a reservoir, a small five-port valve [CKD2020], and from each of its outlets a line to one chamber."""
 
-    Args:
-        reservoir_bar: absolute pressure of the reservoir [bar].
-        valve_l_s_bar: sonic conductance of the valve, C_0 [l/(s bar)]; by default a small five-port valve's [CKD2020].
-        fitting_l_s_bar: sonic conductance of the fitting, C_f, with what the line's friction takes away [l/(s bar)].
-        critical_ratio: pressure ratio below which either flow is choked, C_r; by default that of the same valve.
-        line_m: length of a line [m].
-        bore_mm: its inner diameter [mm].
-    """
-
-    reservoir_bar: Number = 4.0
-    valve_l_s_bar: Positive = 0.99
-    fitting_l_s_bar: Positive = 0.75
-    critical_ratio: Annotated[float, partial(number, least=0, below=1)] = 0.2
+    reservoir_bar: Number = 4.0  # absolute
+    valve_l_s_bar: Positive = 0.99  # sonic conductance of the valve, C_0
+    fitting_l_s_bar: Positive = 0.75  # that of the fitting, C_f, less what the line's friction takes away
+    critical_ratio: Annotated[float, partial(number, least=0, below=1)] = 0.2  # C_r: below it either flow is choked
     line_m: Positive = 7.5
-    bore_mm: Positive = 6.0
+    bore_mm: Positive = 6.0  # of a line, inside
 
     def __post_init__(self) -> None:
         super().__post_init__()
