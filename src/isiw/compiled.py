@@ -72,10 +72,7 @@ def inlined(function: F) -> F:
 
 
 def part(function: F) -> F:
-    """As `loop`, for long functions that are compiled as a part of those that call them, and not on their own.
-
-    With many arrays a call is dear, and whatever is compiled on its own is optimised again in all that call it.
-    """
+    """As `loop`, for long functions of many arrays, whose calls would be dear: compiled within those that call them."""
     return _compiled(function, _SAFE, _nrt=False, inline="always")
 
 
@@ -112,10 +109,7 @@ def _compiled(function: F, fastmath: set[str], **more: bool | str) -> F:
 
 @contextmanager
 def first_of(family: str) -> Generator[None, None, None]:
-    """Let one process at a time compile kernels when they are first called; the others load what it has compiled.
-
-    The first that is compiled for long is said on standard error.
-    """
+    """Let one process at a time compile kernels at first call, saying so if it is long; others load them."""
     if family in _CALLED or not AVAILABLE:
         yield
         return

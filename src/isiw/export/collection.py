@@ -43,9 +43,7 @@ def pseudonymised(
 ) -> tuple[list[SessionRecord], dict[str, str]]:
     """The sessions with other codes and dates, and which code stands for whom.
 
-    People are numbered in a random order. All dates of a person move by one random number of days: the days between
-    visits and the time of day stay. Operators, notes and all other texts of events, the configuration, the device's
-    address and the log's path are left out. A session without a code is another person's.
+    The days between a person's visits and the time of day stay; a session without a code is another person's.
     """
     draws = draws or secrets.SystemRandom()
     names = [record.header.subject or f"unnamed session {number}" for number, record in enumerate(records)]
@@ -213,11 +211,7 @@ class Part:
 
 
 def read_logs(source: str | Path) -> tuple[list[SessionRecord], list[str]]:
-    """The sessions of a log or of a folder with logs, and a sentence for each log that is left out.
-
-    Copies of a log, such as those in an earlier export, count once, and so does one that was copied before its end, or
-    was damaged: of a session that is there several times the log counts that tells of most.
-    """
+    """The sessions of a log or a folder of logs, each by the log that tells most, and a sentence for each left out."""
     if not Path(source).is_dir():
         return [read_session(source)], []
     records: dict[str, SessionRecord] = {}

@@ -88,7 +88,11 @@ class Sessions:
                 session.give_up()
                 return session.stands()
         with self._opened_as(name):
-            return self._resume(name, read_session(self._existing(name)), lost_pulses)
+            path, doubts = self._existing(name), list[str]()
+            record = read_session(path)
+            strategy = strategy_of(record.header)
+            recorder = open_session(strategy, path, resume=True, lost_pulses=lost_pulses, on_doubt=doubts.append)
+            return self._take(DrivenSession(name, record.header.subject, recorder, doubts, record))
 
     def close(self, name: str) -> SessionAnswer:
         """Close a session, if it is open; one that was open when its server was killed is resumed first."""
@@ -169,12 +173,6 @@ class Sessions:
             on_doubt=doubts.append,
         )
         return self._take(DrivenSession(request.id, request.visit.subject, recorder, doubts))
-
-    def _resume(self, name: str, record: SessionRecord, lost_pulses: int | None) -> SessionAnswer:
-        header, doubts = record.header, list[str]()
-        path, strategy = self._existing(name), strategy_of(header)
-        recorder = open_session(strategy, path, resume=True, lost_pulses=lost_pulses, on_doubt=doubts.append)
-        return self._take(DrivenSession(name, header.subject, recorder, doubts, record))
 
     def _take(self, session: DrivenSession) -> SessionAnswer:
         try:

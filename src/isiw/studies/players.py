@@ -140,12 +140,7 @@ class OwnCode:
         return cls(reference, folder, _checksum(reference.partition(":")[0]))
 
     def player(self, space: DesignSpace, seed: int, settings: Mapping[str, Any]) -> Player:
-        """The strategy before its first trial.
-
-        The function gets the settings, and `space` and `seed` if it has parameters of these names. It returns a
-        strategy or anything else with ask, tell and estimate; or a model or an acquisition function, which takes the
-        place of the default's.
-        """
+        """The strategy before its first trial; `space` and `seed` are given to a function with such parameters."""
         if not self.reference:
             raise StudyError(
                 "this strategy is code of your own, which the folder of a study does not name",

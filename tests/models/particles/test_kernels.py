@@ -19,7 +19,7 @@ from isiw.models.particles.kernels.likelihood import ROOM
 from isiw.models.particles.kernels.moves import SCRATCH, UNKNOWN, sweeps
 from isiw.models.particles.kernels.records import columns_of, people_of, trial_records
 from isiw.models.particles.likelihood import total_log_likelihood
-from isiw.models.particles.moves import steps_of
+from isiw.models.particles.moves import remade, steps_of
 from isiw.models.particles.noise import NoiseKind, Response
 from isiw.models.particles.places import Place
 from isiw.models.particles.predictions import PersonSample
@@ -185,7 +185,7 @@ def test_people_of_a_batch_have_the_likelihood_that_each_has_alone() -> None:
     for person in range(3):
         one = slice(person, person + 1)
         alone = History(*(column[one] for column in told.columns))
-        part = latents.remade(field[one] for field in latents)
+        part = remade(latents, (field[one] for field in latents))
         assert torch.equal(engine.log_likelihood(part, alone), together[one])
 
 

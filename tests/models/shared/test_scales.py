@@ -9,20 +9,17 @@ from typing import Any, cast
 import pytest
 import torch
 
+from isiw.checks import Checked
 from isiw.errors import InvalidValueError
-from isiw.models.shared.scales import Scale, check_scales
+from isiw.models.shared.scales import AnyScale, PositiveScale, Scale
 
 Z = torch.linspace(-3, 3, 61)
 
 
 @dataclass(frozen=True)
-class Believed:
-    width: Scale = Scale(100.0, 0.4, 0.02)
-    rest: Scale = Scale(-4.5, 0.4)
-
-    def __post_init__(self) -> None:
-        check_scales(self, "width")
-        check_scales(self, "rest", positive=False)
+class Believed(Checked):
+    width: PositiveScale = Scale(100.0, 0.4, 0.02)
+    rest: AnyScale = Scale(-4.5, 0.4)
 
 
 def test_the_median_is_that_of_the_quantity_and_the_sd_that_of_its_logarithm() -> None:

@@ -175,8 +175,7 @@ class GaussianProcessPosterior(OfAmplitudes):
     def log_evidence(self) -> Tensor:
         """Log marginal likelihood of the trials, as a density of log amplitudes [nat]; see `HasEvidence`.
 
-        It is that of equal noise also if the noise depends on the ISI, and of a process whose mean and scale come
-        from the same trials (empirical Bayes): it compares these processes with each other, not with other models.
+        It compares these processes, under equal noise and empirical Bayes, with each other only, not with other models.
         """
         return torch.tensor([f.log_evidence for f in self.fits], dtype=torch.float32)
 

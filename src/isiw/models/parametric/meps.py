@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
@@ -13,7 +12,7 @@ from isiw.lazy import torch
 from isiw.models.parametric.law import draw_log_mep, levels, log_likelihood
 from isiw.models.parametric.prior import Likelihood, Unknowns
 from isiw.models.protocol import Tensor
-from isiw.models.shared.tables import ISI_NODES
+from isiw.models.shared.tables import averaged_over_isi
 
 
 class MepLaw(TorchDistribution):
@@ -43,16 +42,11 @@ class MepLaw(TorchDistribution):
         if not self.present:
             nowhere = torch.zeros_like(self.unknowns.start_ms).unsqueeze(-1)
             return log_likelihood(self.unknowns, nowhere, value, self.likelihood)
-        if not bool((self.isi_sd_ms > 0).any()):
-            return self._log_prob_at(self.isi_ms, value)
-        nodes = [
-            self._log_prob_at(self.isi_ms + shift * self.isi_sd_ms, value) + math.log(weight)
-            for shift, weight in ISI_NODES
-        ]
-        return torch.logsumexp(torch.stack(nodes), dim=0)
 
-    def _log_prob_at(self, isi_ms: Tensor, value: Tensor) -> Tensor:
-        return log_likelihood(self.unknowns, levels(self.unknowns, isi_ms), value, self.likelihood)
+        def at(isi_ms: Tensor) -> Tensor:
+            return log_likelihood(self.unknowns, levels(self.unknowns, isi_ms), value, self.likelihood)
+
+        return averaged_over_isi(at, self.isi_ms, self.isi_sd_ms)
 
     def sample(self, sample_shape: Sequence[int] = ()) -> Tensor:
         """Log MEPs as points, shape (..., m, n, 2)."""

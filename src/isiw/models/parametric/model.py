@@ -185,24 +185,16 @@ class WindowSample:
 
 @dataclass(frozen=True, eq=False)
 class ParametricPosterior:
-    """The posterior of b people.
-
-    Args:
-        history: the trials so far, in order.
-        latents: equally weighted samples, shape (b, s, d).
-        present: whether there is any excess, shape (b, s).
-        evidence: log marginal likelihood of the trials [nat], shape (b,).
-        trouble: what went wrong with the last fit and what stands in for it; None if nothing did.
-    """
+    """The posterior of b people."""
 
     model: ParametricModel
     space: DesignSpace
     seed: int
-    history: History
-    latents: Tensor
-    present: Tensor
-    evidence: Tensor
-    trouble: str | None
+    history: History  # the trials so far, in order
+    latents: Tensor  # equally weighted samples, (b, s, d)
+    present: Tensor  # there is any excess, (b, s)
+    evidence: Tensor  # log marginal likelihood of the trials [nat], (b,)
+    trouble: str | None  # with the last fit, and what stands in for it
 
     @property
     def trials(self) -> int:

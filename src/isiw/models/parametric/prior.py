@@ -30,10 +30,7 @@ def latent_names(likelihood: Likelihood) -> tuple[str, ...]:
 
 
 class Unknowns(NamedTuple):
-    """The unknowns of m people; all fields have the shape (m,).
-
-    The expected MEP is `baseline_mv + amplitude_mv * exp(-0.5 ((isi - centre) / sd)^2)`, whatever the likelihood.
-    """
+    """Of m people, (m,); the expected MEP is `baseline_mv + amplitude_mv * exp(-0.5 ((isi - centre) / sd)^2)`."""
 
     start_ms: Tensor  # two SDs before the centre
     width_ms: Tensor  # four SDs

@@ -19,7 +19,7 @@ from isiw.errors import InvalidValueError
 from isiw.lazy import torch
 from isiw.models.particles.mixture import Mixture
 from isiw.models.protocol import Tensor
-from isiw.models.shared.scales import Scale, check_scales
+from isiw.models.shared.scales import PositiveLaw, Scale
 
 INTENSITY_PCT: Final = 9.0
 """By how much the intensity changes, where it does, at a size of 1 [% RMT]."""
@@ -64,14 +64,13 @@ class ChangePrior(Checked):
     intensity: Share = 0.07
     enhancement: Share = 0.06
     scale: Share = 0.05
-    trial: Scale = Scale(20.0, 1.1)
+    trial: PositiveLaw = Scale(20.0, 1.1)
     size_sd: Positive = 1.0
     noted: tuple[int, ...] = ()
     noted_share: Share = 0.5
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_scales(self, "trial", tailed=False)
         if self._usual[0] <= 0:
             raise InvalidValueError(
                 "there must be room for no change at all", got=self._usual[1:], expected="less than 1"
@@ -116,8 +115,8 @@ class ChangePrior(Checked):
             for share, trials in zip(shares, reversed(self.noted), strict=True)
         ]
         return {
-            "changed": Mixture.of([(share, [law]) for share, law in laws], "cpu"),
-            "change": Mixture.of([(1.0, [(0.0, self.size_sd)])], "cpu"),
+            "changed": Mixture.of([(share, [law]) for share, law in laws]),
+            "change": Mixture.of([(1.0, [(0.0, self.size_sd)])]),
         }
 
     def noting(self, trials: int) -> ChangePrior:
@@ -125,11 +124,7 @@ class ChangePrior(Checked):
         return replace(self, noted=(*self.noted, trials))
 
     def as_usual(self, kept: float) -> ChangePrior:
-        """The same with less probability of changes that nobody noted.
-
-        Args:
-            kept: the part of it that they keep.
-        """
+        """The same with a part of the probability of changes that nobody noted."""
         level, intensity, enhancement, scale = (kept * share for share in self._usual[1:])
         return replace(self, level=level, intensity=intensity, enhancement=enhancement, scale=scale)
 

@@ -106,7 +106,7 @@ class WindowTarget:
             "kinds": (
                 astuple(profile.shapes),
                 astuple(self.prior.noise),
-                _no_and_yes(profile.p_window),
+                (1.0 - profile.p_window, profile.p_window),
                 (1.0,),
                 self.prior.changes.shares,
             ),
@@ -164,11 +164,7 @@ class WindowTarget:
     def _changed(
         self, latents: Latents, fresh: Latents, which: Tensor, generator: torch.Generator, steps: Tensor
     ) -> tuple[Latents, Tensor]:
-        """Let some particles (n,) have another change, or none; most often one between the trials so far.
-
-        Half of those that have one keep it, and move it a little, or to another trial. The log ratio is that of prior
-        to proposal.
-        """
+        """Let some particles (n,) have another change, or none; half keep theirs, and move it a little or far."""
         like, trials, shares = latents.values[:, 0], max(1, steps.shape[-1] - 1), self.prior.changes.shares
         uniform = torch.rand((7, *like.shape), generator=generator, dtype=like.dtype, device=like.device)
         normal = torch.randn((2, *like.shape), generator=generator, dtype=like.dtype, device=like.device)
@@ -219,10 +215,6 @@ def _step_at(log_after: Tensor, steps: Tensor) -> Tensor:
     """The step of the amplitudes (n, trials + 1) at the trial before which a change comes, shape (n,)."""
     after = log_after.exp().ceil().clamp_max(steps.shape[-1] - 1).long()
     return steps.gather(-1, after.unsqueeze(-1)).squeeze(-1)
-
-
-def _no_and_yes(probability: float) -> tuple[float, float]:
-    return 1.0 - probability, probability
 
 
 @cache

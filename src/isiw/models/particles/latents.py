@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from functools import cache
 from typing import Final, NamedTuple
 
@@ -84,7 +83,3 @@ class Latents(NamedTuple):
     noise: Tensor  # one of `NoiseKind`, (b, p)
     present: Tensor  # there is any facilitation, (b, p)
     change: Tensor  # one of `ChangeKind`, (b, p)
-
-    def remade(self, fields: Iterable[Tensor]) -> Latents:
-        """Particles with other fields, in the same order."""
-        return Latents(*fields)

@@ -10,16 +10,19 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, Final, TypeVar
 
 from isiw.checks import Checked, Positive, Share, require_sum_of_one
-from isiw.models.shared.scales import Scale, check_scales
+from isiw.models.shared.scales import AnyLaw, PositiveLaw, Scale
 
 L = TypeVar("L", bound=Any)
 """A law with a share."""
 
 
-def check_shares(shares: object) -> None:
-    """Check that the fields of a dataclass are probabilities that sum to 1."""
-    values = [getattr(shares, f.name) for f in fields(shares)]  # type: ignore[arg-type] # a dataclass
-    require_sum_of_one(f"the probabilities of {type(shares).__name__}", values)
+class Shares(Checked):
+    """Fields of a dataclass that are probabilities, and sum to 1."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        values = [getattr(self, f.name) for f in fields(self)]  # type: ignore[arg-type] # a dataclass
+        require_sum_of_one(f"the probabilities of {type(self).__name__}", values)
 
 
 def check_laws(owner: object, *names: str) -> None:
@@ -36,7 +39,7 @@ def with_less_of_others(laws: tuple[L, ...], kept: float) -> tuple[L, ...]:
 
 
 @dataclass(frozen=True)
-class NoiseShares(Checked):
+class NoiseShares(Shares):
     """Probabilities of the kinds of noise, in the order of `NoiseKind`.
 
     Args:
@@ -53,10 +56,6 @@ class NoiseShares(Checked):
     all_or_none: Share = 0.08
     rectified: Share = 0.02
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_shares(self)
-
 
 @dataclass(frozen=True)
 class Intensity(Checked):
@@ -68,11 +67,7 @@ class Intensity(Checked):
     """
 
     share: Share
-    pct_rmt: Scale
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_scales(self, "pct_rmt", positive=False, tailed=False)
+    pct_rmt: AnyLaw
 
 
 @dataclass(frozen=True)
@@ -93,18 +88,13 @@ class Muscle(Checked):
 
     name: str
     share: Share
-    ratio: Scale
-    slope_per_pct: Scale
-    input_sd: Scale
-    sigma_y: Scale
-    boost_pct: Scale
-    rest_pct: Scale
+    ratio: PositiveLaw
+    slope_per_pct: PositiveLaw
+    input_sd: PositiveLaw
+    sigma_y: PositiveLaw
+    boost_pct: PositiveLaw
+    rest_pct: AnyLaw
     at_pct_rmt: Positive | None = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_scales(self, "ratio", "slope_per_pct", "input_sd", "sigma_y", "boost_pct", tailed=False)
-        check_scales(self, "rest_pct", positive=False, tailed=False)
 
 
 FOREARM: Final = Muscle(
@@ -162,20 +152,14 @@ class RectifiedPrior(Checked):
         onset: the logistic curve at the threshold, as a share of its largest value.
     """
 
-    ratio: Scale = Scale(200.0, 1.2)
-    slope_per_pct: Scale = Scale(0.10, 0.35)
-    input_sd: Scale = Scale(0.7, 0.4)
-    sigma_y: Scale = Scale(0.2, 0.6)
-    boost_pct: Scale = Scale(18.0, 0.5)
-    rest_pct: Scale = Scale(-6.0, 5.0)
-    onset: Scale = Scale(0.1, 0.5)
+    ratio: PositiveLaw = Scale(200.0, 1.2)
+    slope_per_pct: PositiveLaw = Scale(0.10, 0.35)
+    input_sd: PositiveLaw = Scale(0.7, 0.4)
+    sigma_y: PositiveLaw = Scale(0.2, 0.6)
+    boost_pct: PositiveLaw = Scale(18.0, 0.5)
+    rest_pct: AnyLaw = Scale(-6.0, 5.0)
+    onset: PositiveLaw = Scale(0.1, 0.5)
     at_pct_rmt: Positive | None = 90.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        positive = ("ratio", "slope_per_pct", "input_sd", "sigma_y", "boost_pct", "onset")
-        check_scales(self, *positive, tailed=False)
-        check_scales(self, "rest_pct", positive=False, tailed=False)
 
 
 @dataclass(frozen=True)
@@ -189,16 +173,12 @@ class Gain(Checked):
     """
 
     share: Share
-    ratio: Scale
-    cv: Scale
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_scales(self, "ratio", "cv", tailed=False)
+    ratio: PositiveLaw
+    cv: PositiveLaw
 
 
 @dataclass(frozen=True)
-class SwitchPrior:
+class SwitchPrior(Checked):
     """Of how often responses come that may be missing or are all or none, in logits, and of the size of the latter.
 
     Args:
@@ -210,16 +190,16 @@ class SwitchPrior:
         sizes: of responses that are all or none, a forearm's or a hand's; their ratio is that of the mean response.
     """
 
-    reliability: Scale = Scale(0.2, 0.7)
-    switched_on: Scale = Scale(1.2, 0.9)
-    switched_off: Scale = Scale(-3.3, 1.0)
+    reliability: AnyLaw = Scale(0.2, 0.7)
+    switched_on: AnyLaw = Scale(1.2, 0.9)
+    switched_off: AnyLaw = Scale(-3.3, 1.0)
     sizes: tuple[Gain, ...] = (
         Gain(0.6, Scale(8.0, 0.8), Scale(0.62, 0.3)),
         Gain(0.4, Scale(60.0, 0.9), Scale(0.62, 0.45)),
     )
 
     def __post_init__(self) -> None:
-        check_scales(self, "reliability", "switched_on", "switched_off", positive=False, tailed=False)
+        super().__post_init__()
         check_laws(self, "sizes")
 
 
@@ -234,12 +214,8 @@ class Floor(Checked):
     """
 
     share: Share
-    median_mv: Scale
-    log_sd: Scale
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_scales(self, "median_mv", "log_sd", tailed=False)
+    median_mv: PositiveLaw
+    log_sd: PositiveLaw
 
 
 @dataclass(frozen=True)
@@ -256,8 +232,4 @@ class SessionPrior(Checked):
     drift_sd: Positive = 0.3
     far_drift_sd: Positive = 1.2
     far_drift_share: Share = 0.1
-    startup: Scale = Scale(0.5, 0.5)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_scales(self, "startup", positive=False, tailed=False)
+    startup: AnyLaw = Scale(0.5, 0.5)

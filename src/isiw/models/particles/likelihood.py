@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
+from functools import partial
 
 from isiw.lazy import torch
 from isiw.models.particles.noise import NODES, Response, log_gain, log_likelihood
@@ -11,7 +11,7 @@ from isiw.models.particles.prior import Person
 from isiw.models.particles.shapes import facilitation
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
-from isiw.models.shared.tables import ISI_NODES
+from isiw.models.shared.tables import averaged_over_isi
 
 CHUNK_ELEMENTS = 1 << 20
 """On a CPU the likelihood is worked through in pieces of this many nodes: few calls, and bounded memory."""
@@ -27,17 +27,8 @@ def levels(person: Person, isi_ms: Tensor) -> Tensor:
 
 
 def total_log_likelihood(person: Person, history: History) -> Tensor:
-    """Log likelihood of a history under each particle, shape (b, p).
-
-    An ISI that is known with an SD only is integrated out on three Gauss-Hermite nodes.
-    """
-    if not bool((history.isi_sd_ms > 0).any()):
-        return _by_trial(person, history, history.isi_ms).sum(-1)
-    nodes = [
-        _by_trial(person, history, history.isi_ms + shift * history.isi_sd_ms) + math.log(weight)
-        for shift, weight in ISI_NODES
-    ]
-    return torch.logsumexp(torch.stack(nodes), dim=0).sum(-1)
+    """Log likelihood of a history under each particle, shape (b, p)."""
+    return averaged_over_isi(partial(_by_trial, person, history), history.isi_ms, history.isi_sd_ms).sum(-1)
 
 
 def _by_trial(person: Person, history: History, isi_ms: Tensor) -> Tensor:

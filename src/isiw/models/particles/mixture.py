@@ -21,10 +21,10 @@ class Mixture:
     sds: Tensor  # likewise, (k, d)
 
     @classmethod
-    def of(cls, components: list[tuple[float, list[tuple[float, float]]]], device: torch.device | str) -> Mixture:
+    def of(cls, components: list[tuple[float, list[tuple[float, float]]]]) -> Mixture:
         """A mixture of components."""
-        shares = torch.tensor([share for share, _ in components], dtype=torch.float32, device=device)
-        laws = torch.tensor([latents for _, latents in components], dtype=torch.float32, device=device)
+        shares = torch.tensor([share for share, _ in components], dtype=torch.float32)
+        laws = torch.tensor([latents for _, latents in components], dtype=torch.float32)
         return cls(shares / shares.sum(), laws[..., 0], laws[..., 1])
 
     def log_parts(self, x: Tensor) -> Tensor:

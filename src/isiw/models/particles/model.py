@@ -111,18 +111,9 @@ class ParticleModel(Checked):
 
 @dataclass(frozen=True, eq=False)
 class ParticlePosterior(SwarmPosterior[ParticleModel, Latents]):
-    """The posterior of b people.
+    """The posterior of b people."""
 
-    Args:
-        model: the model's settings.
-        space: the design space.
-        seed: seed of all randomness.
-        swarm: the particles.
-        engine: what computes with them.
-        usual: the same under the prior that ISIs are chosen with.
-    """
-
-    usual: Engine[Latents]
+    usual: Engine[Latents]  # under the prior that ISIs are chosen with
 
     @cached_property
     def as_usual(self) -> ParticlePosterior:

@@ -6,7 +6,7 @@ some of their kinds and the latents that go with them are drawn anew from the pr
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Generic, NamedTuple, Protocol, Self, TypeVar
@@ -49,13 +49,16 @@ class Fields(Protocol):
     def __iter__(self) -> Iterator[Tensor]:
         """All fields."""
 
-    def remade(self, fields: Iterable[Tensor]) -> Self:
-        """Particles with other fields, in the same order."""
-
     def _replace(self, *, values: Tensor) -> Self: ...
 
 
 L = TypeVar("L", bound=Fields)
+
+
+def remade(latents: L, fields: Iterable[Tensor]) -> L:
+    """Particles with other fields, in the same order."""
+    made: Callable[..., L] = type(latents)
+    return made(*fields)
 
 
 class Target(Protocol[L]):
@@ -102,7 +105,7 @@ class _Weighed(NamedTuple, Generic[L]):
     log_prior: Tensor
 
     def part(self, which: slice) -> _Weighed[L]:
-        latents = self.latents.remade(field[:, which] for field in self.latents)
+        latents = remade(self.latents, (field[:, which] for field in self.latents))
         return _Weighed(latents, self.log_likelihood[:, which], self.log_prior[:, which])
 
 
@@ -130,7 +133,7 @@ class Mover(Generic[L]):
         for _ in range(number):
             first = self._step(first, second.latents, counts)
             second = self._step(second, first.latents, counts)
-        both = latents.remade(torch.cat(halves, dim=1) for halves in zip(first.latents, second.latents, strict=True))
+        both = remade(latents, (torch.cat(halves, dim=1) for halves in zip(first.latents, second.latents, strict=True)))
         shifts, shifted, jumps, jumped = counts
         log_likelihood = torch.cat((first.log_likelihood, second.log_likelihood), dim=1)
         return Moved(both, log_likelihood, shifted / shifts, jumped / jumps)
@@ -140,9 +143,9 @@ class Mover(Generic[L]):
         where = jumps.nonzero(as_tuple=True)
         shifted = self._shift(mine.latents, theirs)
         jumped, favour = self.target.jumped(
-            mine.latents.remade(field[where] for field in mine.latents), self.generator, self.steps[where[0]]
+            remade(mine.latents, (field[where] for field in mine.latents)), self.generator, self.steps[where[0]]
         )
-        proposal = shifted.remade(a.index_put(where, b) for a, b in zip(shifted, jumped, strict=True))
+        proposal = remade(shifted, (a.index_put(where, b) for a, b in zip(shifted, jumped, strict=True)))
         log_likelihood = total_log_likelihood(self.target.person(proposal), self.history)
         log_prior = self.target.log_prior(proposal)
         # A jump draws from the prior, so that its density cancels, where what it leads to is possible at all.
@@ -151,30 +154,25 @@ class Mover(Generic[L]):
         accept = torch.log(self._uniform(log_prior)) < log_likelihood - mine.log_likelihood + prior_ratio
         counts += torch.stack([~jumps, accept & ~jumps, jumps, accept & jumps]).sum(-1)
         return _Weighed(
-            mine.latents.remade(_choose(accept, a, b) for a, b in zip(proposal, mine.latents, strict=True)),
+            remade(mine.latents, (_choose(accept, a, b) for a, b in zip(proposal, mine.latents, strict=True))),
             torch.where(accept, log_likelihood, mine.log_likelihood),
             torch.where(accept, log_prior, mine.log_prior),
         )
 
     def _shift(self, mine: L, theirs: L) -> L:
         """Add a scaled difference of two of the others."""
-        people, size, _ = mine.values.shape
-        like = mine.values[..., 0]
-        who = torch.arange(people, device=like.device).unsqueeze(-1)
-        first, second = (theirs.values[who, self._pick(people, size, theirs.values.shape[1])] for _ in range(2))
+        like, dice, device = mine.values[..., 0], self.generator, self.generator.device
+        who = torch.arange(len(like), device=like.device).unsqueeze(-1)
+        picks = (torch.randint(theirs.values.shape[1], like.shape, generator=dice, device=device) for _ in range(2))
+        first, second = (theirs.values[who, pick] for pick in picks)
         moves = self.target.shifted(mine, drawn(PART_PROBABILITY, self._uniform(like)))
         scale = torch.where(self._uniform(like) < 0.1, 1.0, 0.15 + 0.7 * self._uniform(like))
-        blur = BLUR * self.target.spreads.to(mine.values) * self._normal(mine.values)
+        normal = torch.randn(mine.values.shape, generator=dice, dtype=like.dtype, device=device)
+        blur = BLUR * self.target.spreads.to(mine.values) * normal
         return mine._replace(values=mine.values + moves * (scale.unsqueeze(-1) * (first - second) + blur))
 
     def _uniform(self, like: Tensor) -> Tensor:
         return torch.rand(like.shape, generator=self.generator, dtype=like.dtype, device=like.device)
-
-    def _normal(self, like: Tensor) -> Tensor:
-        return torch.randn(like.shape, generator=self.generator, dtype=like.dtype, device=like.device)
-
-    def _pick(self, people: int, size: int, of: int) -> Tensor:
-        return torch.randint(of, (people, size), generator=self.generator, device=self.generator.device)
 
 
 def steps_of(history: History) -> Tensor:

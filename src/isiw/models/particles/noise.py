@@ -133,10 +133,7 @@ def _over_nodes(values: Tensor, axis: int = -2) -> Tensor:
 
 
 def _log_gamma_nodes(cv: Tensor) -> tuple[Tensor, Tensor]:
-    """Nodes of the log of gamma noise with mean 1, and its slope there, shapes (..., p, q).
-
-    The quantiles are Wilson and Hilferty's, shifted so that the mean is 1.
-    """
+    """Nodes of the log of gamma noise (Wilson and Hilferty's) with mean 1, and its slope there, shapes (..., p, q)."""
     cv = cv.unsqueeze(-1)
     root = 1.0 - cv.square() / 9.0 + _nodes(cv) * cv / 3.0
     log_quantiles, slope = 3.0 * torch.log(root.clamp_min(0.02)), cv / root.clamp_min(STEEPEST_ROOT)
@@ -145,15 +142,12 @@ def _log_gamma_nodes(cv: Tensor) -> tuple[Tensor, Tensor]:
 
 
 class _Curve(NamedTuple):
-    """The nodes' view of a response: evoked/floor at node q is scale * sigmoid(drive + spread_q).
-
-    Its log varies by `output` whatever the drive, and by `between` where the sigmoid is steepest.
-    """
+    """The nodes' view of a response: evoked/floor at node q is scale * sigmoid(drive + spread_q)."""
 
     scale: Tensor  # (..., p, 1 or t)
     spread: Tensor  # (..., p, q)
-    between: Tensor  # variance, (..., p, q)
-    output: Tensor  # variance, (..., p, 1)
+    between: Tensor  # variance of its log where the sigmoid is steepest, (..., p, q)
+    output: Tensor  # variance of its log whatever the drive, (..., p, 1)
 
 
 def _curve(response: Response, gain: Tensor | float = 0.0) -> _Curve:
@@ -283,10 +277,7 @@ def _mix(response: Response, level: Tensor, log_relative: Tensor, evoked: Tensor
 def log_likelihood(
     response: Response, level: Tensor, log_mep: Tensor, log_mep_high: Tensor, *bearing: Tensor | float
 ) -> Tensor:
-    """Log likelihood of MEPs, trial by trial: a density of the log MEP, or the probability of an interval.
-
-    What else bears on the trials are the fields of `Around`, in order.
-    """
+    """Log likelihood of MEPs, trial by trial: a density, or the probability of an interval; see `Around`."""
     around = Around(*bearing)
     low, high = (end - response.log_floor.unsqueeze(-1) for end in (log_mep, log_mep_high))
     mean, inverse_sd = _components(response, level, around)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from isiw.checks import Checked, Share, mean_and_sd
-from isiw.models.shared.scales import Scale, check_scales
+from isiw.checks import Checked, MeanAndSd, Share
+from isiw.models.shared.scales import AnyLaw, PositiveLaw
 from isiw.types import Conditioning, Reference
 
 MOST_APART_MS = 10.0
@@ -26,18 +26,11 @@ class Place(Checked):
     """
 
     share: Share
-    start_ms: Scale
-    width_ms: Scale
+    start_ms: AnyLaw
+    width_ms: PositiveLaw
     reference: Reference = "valve"
-    hit_delay_ms: tuple[float, float] | None = None
+    hit_delay_ms: MeanAndSd | None = None
     conditioning: Conditioning = "tap"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_scales(self, "start_ms", positive=False, tailed=False)
-        check_scales(self, "width_ms", tailed=False)
-        if self.hit_delay_ms is not None:
-            object.__setattr__(self, "hit_delay_ms", mean_and_sd("Place.hit_delay_ms", self.hit_delay_ms))
 
     def is_of_rig(self, hit_delay_ms: tuple[float, float] | None) -> bool:
         """Whether it can be of a rig: from the valve command, starts are as late as its taps."""

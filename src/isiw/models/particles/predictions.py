@@ -5,33 +5,22 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from isiw.design import DesignSpace
 from isiw.lazy import torch
 from isiw.models.particles.kernels import windows as compiled
-from isiw.models.particles.prior import Person
 from isiw.models.particles.shapes import facilitation, highest_facilitation, reaches
-from isiw.models.particles.tables import FacilitationTables, cell_ends, log_ends
+from isiw.models.particles.tables import TabledSample, cell_ends, log_ends
 from isiw.models.protocol import Tensor
 from isiw.models.shared.tables import LEVELS, OUTCOMES, interpolated
 from isiw.models.windows import Runs, least_excess_mv
-from isiw.types import FloatArray, IntArray
+from isiw.types import IntArray
 
 FINE_MS = 1.0
 """Between the points of such a grid facilitation hardly changes."""
 
 
 @dataclass(frozen=True, eq=False)
-class PersonSample:
+class PersonSample(TabledSample):
     """What equally weighted particles say about the next MEP and about the window."""
-
-    person: Person  # fields of shape (b, s)
-    space: DesignSpace  # in whose range a window is looked for
-    order: int = 0  # how many trials came before the next one
-    records: FloatArray | None = None  # the particles as kernels have them; None where torch computes
-
-    @cached_property
-    def _tables(self) -> FacilitationTables:
-        return FacilitationTables(self.person, self.records)
 
     @property
     def _evoked(self) -> Tensor:
@@ -81,29 +70,9 @@ class PersonSample:
         edges: IntArray = compiled.window_runs(self.records, self.edge_level.numpy(), isi_ms.contiguous().numpy())
         return edges
 
-    def expected_mep_mv(self, isi_ms: Tensor) -> Tensor:
-        """Expected MEP [mV], shape (b, s, t)."""
-        tables = self._tables
-        return self._with_floor_mv(tables.at(self._evoked.unsqueeze(-1), tables.levels(isi_ms)).squeeze(-1))
-
     def baselines_mv(self) -> Tensor:
         """Expected MEP without a tap [mV], shape (b, s)."""
         return self._with_floor_mv(self._evoked[..., :1]).squeeze(-1)
-
-    def _with_floor_mv(self, evoked: Tensor) -> Tensor:
-        """From an expected MEP above the floor, in floors, to mV, shape (b, s, ...)."""
-        response = self.person.response
-        rest = torch.exp(0.5 * response.floor_log_sd.square()).unsqueeze(-1)
-        return response.log_floor.exp().unsqueeze(-1) * (evoked + rest)
-
-    @cached_property
-    def _outcome_table(self) -> Tensor:
-        """Probability of each outcome of the next trial at the tables' levels, shape (b, s, l, y)."""
-        return self._tables.outcomes(self.order)
-
-    def outcome_mass(self, isi_ms: Tensor) -> Tensor:
-        """Predictive distribution of the next MEP under each particle, shape (b, s, t, y)."""
-        return self._tables.at(self._outcome_table, self._tables.levels(isi_ms))
 
     def mep_quantiles_mv(self, isi_ms: Tensor, shares: Tensor) -> Tensor:
         """Quantiles of the next MEP [mV], shape (b, t, q)."""

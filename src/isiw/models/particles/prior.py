@@ -62,16 +62,13 @@ class Depression(NamedTuple):
 
 
 class Person(NamedTuple):
-    """What the latents mean: a profile, a response, and whether there is any facilitation; fields (b, p).
-
-    A depression is there only where it is looked for, and a change where particles are not as of one trial.
-    """
+    """What the latents mean: a profile, a response, and whether there is any facilitation; fields (b, p)."""
 
     shape: Shape
     response: Response
     present: Tensor
-    depression: Depression | None = None
-    change: Change | None = None
+    depression: Depression | None = None  # there only where it is looked for
+    change: Change | None = None  # there where particles are not as of one trial
 
     def after(self, trials: int) -> Person:
         """The person as they are after so many trials, without any further change."""
@@ -135,20 +132,20 @@ class Prior(Checked):
         switch, session = self.switch, self.session
         often = [switch.switched_on.law, switch.switched_off.law]
         return {
-            "width": _mixture([(w.share, [w.width_ms.log_law]) for w in self.profile.widths]),
-            "form": _mixture([(1.0, [(0.0, 1.0)])]),
-            "floor": _mixture([(f.share, [f.median_mv.log_law, f.log_sd.log_law]) for f in self.floors]),
-            "session": _mixture(
+            "width": Mixture.of([(w.share, [w.width_ms.log_law]) for w in self.profile.widths]),
+            "form": Mixture.of([(1.0, [(0.0, 1.0)])]),
+            "floor": Mixture.of([(f.share, [f.median_mv.log_law, f.log_sd.log_law]) for f in self.floors]),
+            "session": Mixture.of(
                 [
                     (1.0 - session.far_drift_share, [(0.0, session.drift_sd), session.startup.law]),
                     (session.far_drift_share, [(0.0, session.far_drift_sd), session.startup.law]),
                 ]
             ),
-            "gain": _mixture([(g.share, _of_gain(g)) for g in self.gains]),
-            "reliability": _mixture([(1.0, [switch.reliability.law])]),
-            "switch": _mixture([(size.share, [*often, *_of_gain(size)]) for size in switch.sizes]),
-            "recruitment": _mixture([(share, _of_curve(m, rest)) for m, share, rest in self._possible_curves]),
-            "rectified": _mixture(
+            "gain": Mixture.of([(g.share, _of_gain(g)) for g in self.gains]),
+            "reliability": Mixture.of([(1.0, [switch.reliability.law])]),
+            "switch": Mixture.of([(size.share, [*often, *_of_gain(size)]) for size in switch.sizes]),
+            "recruitment": Mixture.of([(share, _of_curve(m, rest)) for m, share, rest in self._possible_curves]),
+            "rectified": Mixture.of(
                 [
                     (share, [*_of_curve(self.rectified, rest), self.rectified.onset.log_law])
                     for share, rest in self._rests(self.rectified)
@@ -219,11 +216,7 @@ class Prior(Checked):
         return JointMixture([mixture for name, mixture in self.mixtures.items() if name != "width"])
 
     def as_usual(self, kept: float) -> Prior:
-        """The same with less probability of unusual starts, widths and intensities, far drifts and changes.
-
-        Args:
-            kept: the part of their probability that they keep.
-        """
+        """The same with a part of the probability of unusual starts, widths and intensities, far drifts and changes."""
         far = kept * self.session.far_drift_share
         return replace(
             self,
@@ -330,7 +323,7 @@ class Prior(Checked):
     def person(self, latents: Latents) -> Person:
         """What particles mean."""
         z = dict(zip(LATENTS, latents.values.unbind(-1), strict=True))
-        shape = Shape(latents.shape, z["start_ms"], z["log_width_ms"].exp(), _even(z["form"]))
+        shape = Shape(latents.shape, z["start_ms"], z["log_width_ms"].exp(), 2.0 * torch.special.ndtr(z["form"]) - 1.0)
         return Person(shape, self._response(z, latents.noise), latents.present, change=self.change(latents))
 
     def _response(self, z: dict[str, Tensor], noise: Tensor) -> Response:
@@ -363,13 +356,3 @@ def _of_gain(law: Gain) -> list[tuple[float, float]]:
 def _of_curve(law: Muscle | RectifiedPrior, rest_pct: Scale) -> list[tuple[float, float]]:
     scales = (law.ratio, law.slope_per_pct, law.input_sd, law.sigma_y, law.boost_pct)
     return [*(scale.log_law for scale in scales), rest_pct.law]
-
-
-def _mixture(components: list[tuple[float, list[tuple[float, float]]]]) -> Mixture:
-    return Mixture.of(components, "cpu")
-
-
-def _even(z: Tensor) -> Tensor:
-    """Uniform in -1..1."""
-    even: Tensor = 2.0 * torch.special.ndtr(z) - 1.0
-    return even

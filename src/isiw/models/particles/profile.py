@@ -15,17 +15,17 @@ from typing import Final, NamedTuple
 from isiw.checks import Checked, Share
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.models.particles.laws import check_laws, check_shares, with_less_of_others
+from isiw.models.particles.laws import Shares, check_laws, with_less_of_others
 from isiw.models.particles.mixture import JointMixture, Mixture
 from isiw.models.particles.places import Place
-from isiw.models.shared.scales import Scale, check_scales
+from isiw.models.shared.scales import AnyLaw, PositiveLaw, Scale
 from isiw.models.shared.start import TAP_SPANS, Span, StartPrior
 from isiw.text.stimuli import STIMULI
 from isiw.types import Conditioning
 
 
 @dataclass(frozen=True)
-class ShapeShares(Checked):
+class ShapeShares(Shares):
     """Probabilities of the families of profiles, in the order of `ShapeKind`.
 
     Most profiles pass a normality test (dissertation, 4.2: 8 of 11), the others are described in its outlook (8.1).
@@ -42,10 +42,6 @@ class ShapeShares(Checked):
     plateau: Share = 0.08
     two_peak: Share = 0.12
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_shares(self)
-
 
 @dataclass(frozen=True)
 class Width(Checked):
@@ -57,11 +53,7 @@ class Width(Checked):
     """
 
     share: Share
-    width_ms: Scale
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_scales(self, "width_ms", tailed=False)
+    width_ms: PositiveLaw
 
 
 @dataclass(frozen=True)
@@ -75,13 +67,8 @@ class Early(Checked):
     """
 
     share: Share
-    start_ms: Scale
-    width_ms: Scale
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_scales(self, "start_ms", positive=False, tailed=False)
-        check_scales(self, "width_ms", tailed=False)
+    start_ms: AnyLaw
+    width_ms: PositiveLaw
 
 
 class _Windows(NamedTuple):
@@ -256,5 +243,5 @@ def _joint(profile: ProfilePrior, space: DesignSpace) -> JointPlaces | None:
     laws += [(place.share, [place.start_ms.law, place.width_ms.log_law]) for place in profile.places]
     if not laws:
         return None
-    mixture = Mixture.of(laws, "cpu")
+    mixture = Mixture.of(laws)
     return JointPlaces(math.fsum(share for share, _ in laws), mixture, JointMixture([mixture]))

@@ -13,7 +13,7 @@ from typing import Generic, NamedTuple
 from isiw.checks import Checked, Natural, Share
 from isiw.lazy import torch
 from isiw.models.particles.engine import Engine
-from isiw.models.particles.moves import L
+from isiw.models.particles.moves import L, remade
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
 from isiw.models.shared.tables import systematic
@@ -144,13 +144,13 @@ class Swarm(Generic[L]):
     def of_person(self, person: int) -> Swarm[L]:
         """The particles of one person."""
         one = slice(person, person + 1)
-        latents = self.latents.remade(field[one] for field in self.latents)
+        latents = remade(self.latents, (field[one] for field in self.latents))
         return replace(self, latents=latents, log_weights=self.log_weights[one])
 
     def picked(self, size: int) -> L:
         """Equally weighted particles that represent the same posterior, fields of shape (b, s)."""
         picks = systematic(self.log_weights, size)
-        return self.latents.remade(taken(field, picks) for field in self.latents)
+        return remade(self.latents, (taken(field, picks) for field in self.latents))
 
     def _resampled(self, worn: Tensor, generator: torch.Generator) -> Swarm[L]:
         """Resample those people whose effective sample size has fallen (b,); nobody else notices."""
@@ -164,7 +164,7 @@ class Swarm(Generic[L]):
         picks = torch.where(worn, systematic(self.log_weights, size)[:, shuffled], kept)
         return replace(
             self,
-            latents=self.latents.remade(taken(field, picks) for field in self.latents),
+            latents=remade(self.latents, (taken(field, picks) for field in self.latents)),
             log_weights=torch.where(worn, -math.log(size), self.log_weights),
             log_likelihood=taken(self.log_likelihood, picks),
         )

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from isiw.compiled import first_of
+from isiw.design import DesignSpace
 from isiw.lazy import torch
 from isiw.models.particles.kernels import predictions as compiled
 from isiw.models.particles.likelihood import in_pieces, levels
@@ -16,6 +17,43 @@ from isiw.models.particles.prior import Person
 from isiw.models.protocol import Tensor
 from isiw.models.shared.tables import LEVELS, OUTCOMES, interpolated, table_levels
 from isiw.types import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class TabledSample:
+    """What equally weighted particles say about the next MEP."""
+
+    person: Person  # fields of shape (b, s)
+    space: DesignSpace  # in whose range windows are looked for
+    order: int = 0  # how many trials came before the next one
+    records: FloatArray | None = None  # the particles as kernels have them; None where torch computes
+
+    @cached_property
+    def _tables(self) -> FacilitationTables:
+        return FacilitationTables(self.person, self.records)
+
+    def expected_mep_mv(self, isi_ms: Tensor) -> Tensor:
+        """Expected MEP [mV], shape (b, s, t)."""
+        return self._mean_mv(self._tables.levels(isi_ms))
+
+    def _mean_mv(self, level: Tensor) -> Tensor:
+        """Expected MEP [mV] by facilitation (b, s, t), of the same shape."""
+        return self._with_floor_mv(self._tables.at(self._tables.evoked.unsqueeze(-1), level).squeeze(-1))
+
+    def _with_floor_mv(self, evoked: Tensor) -> Tensor:
+        """From an expected MEP above the floor, in floors, to mV, shape (b, s, ...)."""
+        response = self.person.response
+        rest = torch.exp(0.5 * response.floor_log_sd.square()).unsqueeze(-1)
+        return response.log_floor.exp().unsqueeze(-1) * (evoked + rest)
+
+    @cached_property
+    def _outcome_table(self) -> Tensor:
+        """Probability of each outcome of the next trial at the tables' levels, shape (b, s, l, y)."""
+        return self._tables.outcomes(self.order)
+
+    def outcome_mass(self, isi_ms: Tensor) -> Tensor:
+        """Predictive distribution of the next MEP under each particle, shape (b, s, t, y)."""
+        return self._tables.at(self._outcome_table, self._tables.levels(isi_ms))
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,8 +137,5 @@ def _quantile(values: Tensor, share: float) -> Tensor:
 
 
 def cell_ends(device: torch.device) -> Tensor:
-    """Ends of the cells of the log MEP, from 0 to 1; narrow where MEPs are as small as the floor, which varies little.
-
-    Shape (y + 1,).
-    """
+    """Ends of the cells of the log MEP, from 0 to 1, (y + 1,); narrow where MEPs are as small as the floor."""
     return torch.linspace(0.0, 1.0, OUTCOMES + 1, dtype=torch.float32, device=device).pow(1.5)

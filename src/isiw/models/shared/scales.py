@@ -18,17 +18,11 @@ _MOST_LOG_SD: Final = 5.0
 
 
 class Scale(NamedTuple):
-    """A latent z stands for the median plus SD z + tail z³, of the logarithm if the quantity is positive.
-
-    Args:
-        median: the quantity's median.
-        sd: its SD, or that of its natural logarithm.
-        tail: cubic tail. The SD is that of the people who were measured; the tail reaches those whom nobody measured.
-    """
+    """A latent z stands for the median plus SD z + tail z³, of the logarithm if the quantity is positive."""
 
     median: float
-    sd: float
-    tail: float = 0.0
+    sd: float  # of the people who were measured; of the natural logarithm of a positive quantity
+    tail: float = 0.0  # the cubic tail, which reaches those whom nobody measured
 
     @property
     def law(self) -> tuple[float, float]:
@@ -67,13 +61,8 @@ def scale(what: str, given: object, *, positive: bool = True, tailed: bool = Tru
 
 PositiveScale: TypeAlias = Annotated[Scale, scale]
 AnyScale: TypeAlias = Annotated[Scale, partial(scale, positive=False)]
-
-
-def check_scales(owner: object, *names: str, positive: bool = True, tailed: bool = True) -> None:
-    """Check fields of a frozen dataclass that are scales, and make scales of tuples and lists."""
-    for name in names:
-        what = f"{type(owner).__name__}.{name}"
-        object.__setattr__(owner, name, scale(what, getattr(owner, name), positive=positive, tailed=tailed))
+PositiveLaw: TypeAlias = Annotated[Scale, partial(scale, tailed=False)]
+AnyLaw: TypeAlias = Annotated[Scale, partial(scale, positive=False, tailed=False)]
 
 
 def _is_scale(value: tuple[object, ...], *, positive: bool) -> bool:

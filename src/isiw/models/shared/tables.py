@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
@@ -12,6 +13,15 @@ from isiw.models.protocol import Tensor
 
 ISI_NODES = ((-math.sqrt(3.0), 1 / 6), (0.0, 2 / 3), (math.sqrt(3.0), 1 / 6))
 """Gauss–Hermite nodes [SD] and weights of an ISI that is known with an SD only."""
+
+
+def averaged_over_isi(log_density: Callable[[Tensor], Tensor], isi_ms: Tensor, isi_sd_ms: Tensor) -> Tensor:
+    """Log of a density by ISI; one that is known with an SD only is integrated out."""
+    if not bool((isi_sd_ms > 0).any()):
+        return log_density(isi_ms)
+    nodes = [log_density(isi_ms + shift * isi_sd_ms) + math.log(weight) for shift, weight in ISI_NODES]
+    return torch.logsumexp(torch.stack(nodes), dim=0)
+
 
 LEVELS = 24
 """Facilitations at which responses are worked out; what lies between is interpolated."""

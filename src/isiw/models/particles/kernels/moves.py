@@ -222,11 +222,8 @@ def _move(tables: Any, state: Any, i: int, theirs: Any, trials: Any, dice: Any, 
 
 @writer
 def sweeps(number: int, tables: Any, history: Any, steps: Any, state: Any, dice: Any, rooms: Any, counts: Any) -> None:
-    """Move every particle some times, in place, one half by differences within the other.
-
-    The state are latents, kinds, log likelihoods and log densities of the blocks, and room for the kinds of one.
-    """
-    values, kinds, log_likelihood, densities, chosen = state
+    """Move every particle some times, in place, one half by differences within the other."""
+    values, kinds, log_likelihood, densities, chosen = state  # densities of the blocks, and room for one's kinds
     records, sizes = history
     half = values.shape[1] // 2
     for person in range(values.shape[0]):
@@ -264,10 +261,7 @@ def _weighed(tables: Any, block: int, kinds: Any) -> Any:
 
 @writer
 def log_usual(tables: Any, values: Any, kinds: Any, parts: Any, found: Any) -> None:
-    """Write the log prior density of what ISIs are chosen with another law of, but for a constant, shape (b, p).
-
-    Start and width of particles with a window, the recruitment curve, the drift, and what changes.
-    """
+    """Write the log prior density of what ISIs are chosen with another law of, but for a constant, shape (b, p)."""
     edges = tables.kinds[4]
     for person in range(values.shape[0]):
         for i in range(values.shape[1]):

@@ -122,10 +122,7 @@ def settle(particle: Any, order: Any) -> None:
 
 @kernel
 def trial_records(columns: Any) -> Any:
-    """The trials of each person in pieces, those whose amplitude is known and those that are censored.
-
-    Records of shape (b, 2, pieces, TRIAL, PIECE), and how many trials each piece has, in whole lanes but for a few.
-    """
+    """Trials, known and censored, as (b, 2, pieces, TRIAL, PIECE), and how many a piece has, in lanes but for a few."""
     people, trials = columns.shape[:2]
     pieces = (trials + PIECE - 1) // PIECE
     records = np.zeros((people, 2, pieces, TRIAL, PIECE), dtype=np.float32)

@@ -62,15 +62,7 @@ class SupraModel(Checked):
 
 @dataclass(frozen=True, eq=False)
 class SupraPosterior(SwarmPosterior[SupraModel, SupraLatents]):
-    """The posterior of b people.
-
-    Args:
-        model: the model's settings.
-        space: the design space.
-        seed: seed of all randomness.
-        swarm: the particles.
-        engine: what computes with them.
-    """
+    """The posterior of b people."""
 
     @cached_property
     def sample(self) -> SupraSample:

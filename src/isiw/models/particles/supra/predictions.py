@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from isiw.design import DesignSpace
 from isiw.lazy import torch
-from isiw.models.particles.prior import Person
-from isiw.models.particles.tables import FacilitationTables
+from isiw.models.particles.tables import TabledSample
 from isiw.models.protocol import Tensor
 from isiw.models.windows import least_excess_mv
-from isiw.types import FloatArray
 from isiw.window import LEAST_DEPRESSED_MV
 
 MOST_RANGE_POINTS = 241
@@ -19,28 +16,8 @@ MOST_RANGE_POINTS = 241
 
 
 @dataclass(frozen=True, eq=False)
-class SupraSample:
-    """What equally weighted particles say about the next MEP and about both kinds of segment."""
-
-    person: Person  # with a depression, fields of shape (b, s)
-    space: DesignSpace  # in whose range segments are looked for
-    order: int = 0  # how many trials came before the next one
-    records: FloatArray | None = None  # the particles as kernels have them; None where torch computes
-
-    @cached_property
-    def _tables(self) -> FacilitationTables:
-        return FacilitationTables(self.person, self.records)
-
-    def _mean_mv(self, level: Tensor) -> Tensor:
-        """Expected MEP [mV] by facilitation (b, s, t), of the same shape."""
-        response = self.person.response
-        floors = self._tables.at(self._tables.evoked.unsqueeze(-1), level).squeeze(-1)
-        rest = torch.exp(0.5 * response.floor_log_sd.square()).unsqueeze(-1)
-        return response.log_floor.exp().unsqueeze(-1) * (floors + rest)
-
-    def expected_mep_mv(self, isi_ms: Tensor) -> Tensor:
-        """Expected MEP [mV], shape (b, s, t)."""
-        return self._mean_mv(self._tables.levels(isi_ms))
+class SupraSample(TabledSample):
+    """What equally weighted particles with a depression say about the next MEP and about both kinds of segment."""
 
     @cached_property
     def _baseline_mv(self) -> Tensor:
@@ -72,11 +49,3 @@ class SupraSample:
 
     def _masks(self, excess_mv: Tensor, largest_mv: Tensor) -> Tensor:
         return (excess_mv >= least_excess_mv(largest_mv, self._baseline_mv)).to(excess_mv.dtype)
-
-    @cached_property
-    def _outcome_table(self) -> Tensor:
-        return self._tables.outcomes(self.order)
-
-    def outcome_mass(self, isi_ms: Tensor) -> Tensor:
-        """Predictive distribution of the next MEP under each particle, shape (b, s, t, y)."""
-        return self._tables.at(self._outcome_table, self._tables.levels(isi_ms))

@@ -8,7 +8,6 @@ One segment ends before the other starts, also where only one is there or none, 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final, NamedTuple
@@ -23,7 +22,7 @@ from isiw.models.particles.prior import Depression, Person
 from isiw.models.particles.profile import Width
 from isiw.models.particles.shapes import Shape, ShapeKind
 from isiw.models.protocol import Tensor
-from isiw.models.shared.scales import Scale, check_scales
+from isiw.models.shared.scales import AnyLaw, PositiveLaw, Scale
 from isiw.models.shared.start import Span, StartPrior
 
 LATENTS: Final = (
@@ -65,10 +64,6 @@ class SupraLatents(NamedTuple):
     enhanced: Tensor  # there is any enhancement, (b, p)
     depressed: Tensor  # there is any depression, (b, p)
 
-    def remade(self, fields: Iterable[Tensor]) -> SupraLatents:
-        """Particles with other fields, in the same order."""
-        return SupraLatents(*fields)
-
 
 @dataclass(frozen=True)
 class Segment(Checked):
@@ -82,12 +77,11 @@ class Segment(Checked):
 
     probability: Share
     widths: tuple[Width, ...]
-    shift_pct: Scale
+    shift_pct: PositiveLaw
 
     def __post_init__(self) -> None:
         super().__post_init__()
         check_laws(self, "widths")
-        check_scales(self, "shift_pct", tailed=False)
 
 
 @dataclass(frozen=True)
@@ -104,16 +98,11 @@ class Curve(Checked):
     """
 
     share: Share
-    ratio: Scale
-    slope_per_pct: Scale
-    input_sd: Scale
-    sigma_y: Scale
-    rest_pct: Scale
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_scales(self, "ratio", "slope_per_pct", "input_sd", "sigma_y", tailed=False)
-        check_scales(self, "rest_pct", positive=False, tailed=False)
+    ratio: PositiveLaw
+    slope_per_pct: PositiveLaw
+    input_sd: PositiveLaw
+    sigma_y: PositiveLaw
+    rest_pct: AnyLaw
 
 
 _START: Final = StartPrior(spans=(Span(0.85, 0.0, 95.0, 5.0), Span(0.15, -30.0, 260.0, 20.0)), p_anywhere=0.02)
@@ -156,9 +145,9 @@ class SupraPrior:
         session = [(0.0, self.session.drift_sd), (startup.median, startup.sd)]
         return (
             *(mixture for segment in (self.enhanced, self.depressed) for mixture in _of_segment(segment)),
-            Mixture.of([(f.share, [f.median_mv.log_law, f.log_sd.log_law]) for f in self.floors], "cpu"),
-            Mixture.of([(1.0, session)], "cpu"),
-            Mixture.of([(c.share, _of_curve(c)) for c in self.curves], "cpu"),
+            Mixture.of([(f.share, [f.median_mv.log_law, f.log_sd.log_law]) for f in self.floors]),
+            Mixture.of([(1.0, session)]),
+            Mixture.of([(c.share, _of_curve(c)) for c in self.curves]),
         )
 
     @cached_property
@@ -212,8 +201,8 @@ def _apart(values: Tensor) -> Tensor:
 
 
 def _of_segment(segment: Segment) -> tuple[Mixture, Mixture]:
-    widths = Mixture.of([(width.share, [width.width_ms.log_law]) for width in segment.widths], "cpu")
-    return widths, Mixture.of([(1.0, [segment.shift_pct.log_law])], "cpu")
+    widths = Mixture.of([(width.share, [width.width_ms.log_law]) for width in segment.widths])
+    return widths, Mixture.of([(1.0, [segment.shift_pct.log_law])])
 
 
 def _of_curve(curve: Curve) -> list[tuple[float, float]]:
