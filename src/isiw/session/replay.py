@@ -66,23 +66,14 @@ def replay(
     learned: list[Trial] = []
     changes: list[int] = []
     differing: list[int] = []
-    first = record.header.asks_from
-    by_fallback = {event.trial for event in record.events if event.kind == "fallback"}
-    last = max((intent.trial for intent in record.intents), default=0)
-    judged = False
+    first, compared, judged = record.header.asks_from, _compared(record) if verify else frozenset(), False
     for entry in record.history:
         if judged and isinstance(entry, Intent | Trial):
             strategy, judged = relearned(strategy, learned, changes), False
         if isinstance(entry, Intent):
             # Behind a lost trial the strategy knew more than the log does.
-            comparable = (
-                entry.isi_ms is not None
-                and entry.trial == len(learned)
-                and entry.trial >= first
-                and entry.trial not in by_fallback
-            )
-            near_an_end = min(entry.trial - first, last - entry.trial) < _COMPARED_AT_EACH_END
-            if verify and comparable and near_an_end and (asked_ms := strategy.ask()) != entry.isi_ms:
+            comparable = entry.isi_ms is not None and entry.trial == len(learned) and entry.trial in compared
+            if comparable and (asked_ms := strategy.ask()) != entry.isi_ms:
                 _require_other_versions(entry, asked_ms, record.header)
                 differing.append(entry.trial)
         elif isinstance(entry, Trial):
@@ -99,6 +90,15 @@ def replay(
         learn(strategy, trial)
     table = TrialTable(tuple(sorted((*learned, *unknown), key=lambda trial: trial.index)))
     return Replayed(strategy, table, unknown, tuple(differing), len(table) if differing or not verify else first)
+
+
+def _compared(record: SessionRecord) -> frozenset[int]:
+    """The first and the last trials whose asks are compared; a fallback was no ask of the strategy."""
+    first = record.header.asks_from
+    last = max((intent.trial for intent in record.intents), default=0)
+    of_each_end = range(first, first + _COMPARED_AT_EACH_END), range(last - _COMPARED_AT_EACH_END + 1, last + 1)
+    near_an_end = {number for numbers in of_each_end for number in numbers if number >= first}
+    return frozenset(near_an_end) - {event.trial for event in record.events if event.kind == "fallback"}
 
 
 def strategy_of(header: Header) -> Strategy:

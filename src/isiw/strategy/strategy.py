@@ -229,12 +229,10 @@ class Strategy:
         Args:
             isi_ms: the realised ISI on the space's reference [ms]; None for TMS alone, which uses up no budget.
             mep_mv: peak-to-peak amplitude [mV]; 0 is left-censored at the detection limit.
-            response: whether a response was seen, instead of an amplitude; for a strategy of its own, as sessions log
-                amplitudes.
+            response: whether a response was seen, instead of an amplitude; sessions log amplitudes alone.
             isi_sd_ms: SD of the realised ISI [ms], at most 50; 0 if it was measured.
             mep_sd_mv: SD of the amplitude, as of the mean of several [mV]; 0 if it was measured once.
-            mep_interval_mv: the interval that the amplitude lies in, instead of an amplitude [mV]; its end may be
-                infinite.
+            mep_interval_mv: the ends between which the amplitude lies, instead of it [mV]; the upper may be infinite.
             pulse: whether the magnetic pulse was given. Without it, this is a tap alone, which uses up no budget:
                 `mep_mv` is the amplitude of what the MEP window would hold at `isi_ms`, and what the tap itself adds to
                 amplitudes near this ISI is learnt.
