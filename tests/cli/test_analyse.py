@@ -104,7 +104,8 @@ def test_what_is_missing_or_ambiguous_is_asked_for_and_nothing_is_written(
 def test_a_session_is_run_with_earlier_trials(isiw: Command, people: Path) -> None:
     made = ("--reference", "impact", "--config", "few.toml", "--simulated", "--only", "A", "-o", "A.mcap")
     assert isiw("analyse", people, *made).exit_code == 0
-    Path("run.toml").write_text(f'[space]\nhigh_ms = 100.0\nreference = "impact"\n{CONFIG}max_trials = 2\n')
+    never = "stop_width_ms = 0.001\nstop_expected_f1 = 1.0\n"  # or so few particles may be sure of a window at once
+    Path("run.toml").write_text(f'[space]\nhigh_ms = 100.0\nreference = "impact"\n{CONFIG}{never}max_trials = 2\n')
     result = isiw("run", "run.toml", "--earlier", "A.mcap", "--log", "next.mcap")
     assert result.exit_code == 0, result.output
     record = library.read_session("next.mcap")
