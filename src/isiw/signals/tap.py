@@ -273,8 +273,10 @@ def _subtracted(
     parts, weights = shows * sizes[:, None] * waves, shows * sizes[:, None] ** 2
     one = parts.sum(axis=0) / np.maximum(weights.sum(axis=0), LEAST_WEIGHT)
     seen = window.is_outside & (shows.sum(axis=0) >= LEAST_SHOWN) & (np.abs(one) > clear_mv)
+    # A sweep says its size if it shows half as much of the response as the one that shows most.
     power = (seen & shows) @ one**2
     both = power > 0.5 * power.max()
+    # How many independent pieces of EMG say the size: with one alone, the error of its fit is unknown.
     pieces = float(seen @ one**2) ** 2 / max(float(seen @ one**4), TINY) * STEP_MS / TOGETHER_MS
     if pieces <= 1 or both.sum() < LEAST_BOTH:
         return _Subtracted(mean, others, _variance(sizes - 1))
@@ -283,6 +285,7 @@ def _subtracted(
     own = float(_sizes_shown(window.course_mv, one, seen))
     apart = seen * (one * (window.course_mv - own * one)) ** 2
     error = float(apart.sum() / (seen @ one**2) ** 2) * TOGETHER_MS / STEP_MS * pieces / (pieces - 1)
+    # A ridge regression of sizes within on sizes outside, whose prior is that both are the same.
     usual, known = USUAL_COUNTS * USUAL_VARIANCE, both.sum() + USUAL_COUNTS
     products = usual + float((sizes - 1) @ (outside - 1))
     share = float(np.clip(products / (usual + ((outside - 1) ** 2).sum() + known * error), 0.0, 1.0))

@@ -243,7 +243,8 @@ def _density(particle: Any, trials: Any, count: int, curve: Any, work: Any, like
     for i in range(count):
         relative[i] = low[i] - floor
     _step(trials, count, particle[field.CHANGED], -particle[field.STEP_SCALE], relative)
-    # All nodes in one pass: what one waits for another works out meanwhile, and no sums go through memory.
+    # All nodes in one pass, written out: what one waits for another works out meanwhile, and no sums go through memory.
+    # There are as many terms as `NODES`; `_inside` has the same as a loop.
     at, between, w = curve[0], curve[1], NODE_WEIGHTS
     if start > _NIL:
         for i in range(count):
