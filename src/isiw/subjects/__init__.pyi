@@ -16,3 +16,8 @@ from .subject import Drift as Drift
 from .subject import Responder as Responder
 from .subject import Response as Response
 from .subject import SimulatedSubject as SimulatedSubject
+from .thresholds import THRESHOLD_COHORTS as THRESHOLD_COHORTS
+from .thresholds import HotSpot as HotSpot
+from .thresholds import StimulatedPerson as StimulatedPerson
+from .thresholds import StimulatedResponder as StimulatedResponder
+from .thresholds import threshold_cohort as threshold_cohort

@@ -47,7 +47,12 @@ class HotSpot(Checked):
     spread_mm: Positive = 28.0  # at this distance the intensity acts like 61 % of it
 
     def effect(self, x_mm: float, y_mm: float) -> float:
-        """The share of the intensity that acts with the coil at a place."""
+        """The share of the intensity that acts with the coil at a place.
+
+        Args:
+            x_mm: the coil's place [mm].
+            y_mm: the same, across [mm].
+        """
         return math.exp(-0.5 * ((x_mm - self.x_mm) ** 2 + (y_mm - self.y_mm) ** 2) / self.spread_mm**2)
 
 
@@ -105,7 +110,16 @@ class StimulatedResponder:
         self._input_z = float(self._rng.standard_normal())
 
     def respond(self, intensity_pct_mso: float, x_mm: float | None = None, y_mm: float | None = None) -> float:
-        """Peak-to-peak amplitude of the MEP of one pulse [mV], at the hot spot if no place is given."""
+        """Peak-to-peak amplitude of the MEP of one pulse [mV].
+
+        Args:
+            intensity_pct_mso: of the pulse [% MSO].
+            x_mm: the coil's place [mm]; None is the hot spot.
+            y_mm: the same, across [mm].
+
+        Raises:
+            InvalidValueError: an intensity that is not positive.
+        """
         intensity = number("intensity_pct_mso", intensity_pct_mso, above=0)
         person, rng = self.person, self._rng
         spot, floor = person.hot_spot, person.response.floor
@@ -120,7 +134,15 @@ class StimulatedResponder:
 def threshold_cohort(name: str, n: int, seed: int) -> list[StimulatedPerson]:
     """The first n people with thresholds of 30–80 % MSO and the recruitment curves of a cohort.
 
-    The largest MEP is at least 80 µV. Seeds of 0–999 are for development; reported figures use 10,000 and above.
+    The curves are those of the cohorts, with a largest MEP of at least 80 µV.
+
+    Args:
+        name: one of `THRESHOLD_COHORTS`.
+        n: how many.
+        seed: of the people; 0–999 are for development, reported figures use 10,000 and above.
+
+    Raises:
+        InvalidValueError: an unknown name, or a negative number.
     """
     choice("the cohort", name, THRESHOLD_COHORTS)
     subjects = cohort(name, whole("n", n, least=0), seed)
