@@ -27,7 +27,7 @@ from benchmarks.tables import write_tables
 from benchmarks.zero_trials import fixed_windows
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.metrics import trials_to_criterion
-from isiw.plots.study import study_figure
+from isiw.plots.comparison import study_figure
 from isiw.plots.style import save_figure
 from isiw.studies import (
     Processes,

@@ -21,7 +21,7 @@ from matplotlib.figure import Figure
 
 from benchmarks.quick import understood
 from benchmarks.reduction.look import NAMES
-from isiw.plots.study import draw_curve
+from isiw.plots.comparison import draw_curve
 from isiw.plots.style import INK, explain, save_figure, strategy_colours, tidied
 
 ROOT = Path(__file__).parents[1]

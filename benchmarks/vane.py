@@ -25,8 +25,7 @@ from benchmarks.quick import understood
 from benchmarks.tables import write_tables
 from benchmarks.vane_claims import FULL, claims_of
 from isiw import Rotor, Vane, repeatability
-from isiw.devices.robot.vane.actuator import Load, Supply
-from isiw.devices.robot.vane.rotation import Performance, performance, rotate
+from isiw.devices.robot.vane.rotation import Load, Performance, Supply, performance, rotate
 from isiw.plots.style import BLUE, FAINT, ORANGE, save_figure, tidied
 from isiw.types import FloatArray
 

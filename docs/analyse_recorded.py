@@ -15,7 +15,7 @@ import mne
 import numpy as np
 
 import isiw
-from isiw.devices.recorded import load_recordings
+from isiw.devices.simulated import load_recordings
 from isiw.existing import Layout, read_people
 
 ROOT = Path(__file__).parents[1]

@@ -28,13 +28,13 @@ from .devices.protocol import CallbackDevice as CallbackDevice
 from .devices.protocol import Device as Device
 from .devices.protocol import DeviceInfo as DeviceInfo
 from .devices.protocol import Readiness as Readiness
-from .devices.recorded import RecordedPerson as RecordedPerson
 from .devices.robot.tapper import Tapper as Tapper
 from .devices.robot.tapper import TapperSettings as TapperSettings
-from .devices.robot.vane.actuator import Rotor as Rotor
-from .devices.robot.vane.actuator import Vane as Vane
+from .devices.robot.vane.rotation import Rotor as Rotor
+from .devices.robot.vane.rotation import Vane as Vane
 from .devices.robot.vane.tapper import RotatingTapper as RotatingTapper
 from .devices.simulated import DryRun as DryRun
+from .devices.simulated import RecordedPerson as RecordedPerson
 from .devices.simulated import RecordedTrials as RecordedTrials
 from .devices.simulated import SimulatedDevice as SimulatedDevice
 from .devices.simulated import SimulatedPerson as SimulatedPerson

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from benchmarks.vane import filled_bar
 
-from isiw.devices.robot.vane.actuator import Supply
+from isiw.devices.robot.vane.rotation import Supply
 
 RESULTS = json.loads((Path(__file__).parents[2] / "benchmarks" / "results" / "vane.json").read_text("utf-8"))
 FIGURES = {"Table 7.1", *(f"Fig. 7.{number}" for number in (*range(1, 9), "9a", "9b", "10a", "10b", "11a", "11b"))}

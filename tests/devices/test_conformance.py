@@ -21,9 +21,8 @@ from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.limited import LimitedDevice
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import CallbackDevice, DeviceInfo, Readiness
-from isiw.devices.recorded import RecordedPerson, Recordings
 from isiw.devices.robot.tapper import Tapper, TapperSettings
-from isiw.devices.simulated import RecordedTrials, SimulatedDevice, SimulatedPerson
+from isiw.devices.simulated import RecordedPerson, RecordedTrials, Recordings, SimulatedDevice, SimulatedPerson
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, LimitExceededError, NotDelivered
 from isiw.session.rig import exclusive
 from isiw.subjects.cohorts import cohort

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from isiw.design import DesignSpace
-from isiw.devices.recorded import RecordedPerson, Recordings, load_recordings
-from isiw.devices.simulated import SimulatedDevice
+from isiw.devices.simulated import RecordedPerson, Recordings, SimulatedDevice, load_recordings
 from isiw.errors import DeviceError
 from isiw.signals.judgement import judge
 from isiw.subjects.subject import Response

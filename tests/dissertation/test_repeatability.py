@@ -8,7 +8,7 @@ import pytest
 
 from isiw.design import DesignSpace
 from isiw.devices.robot.tapper import Tapper, TapperSettings
-from isiw.devices.robot.vane.actuator import Vane
+from isiw.devices.robot.vane.rotation import Vane
 from isiw.devices.robot.vane.tapper import draw_strokes
 from isiw.devices.simulated import SimulatedDevice
 from isiw.dissertation.repeatability import (

@@ -11,7 +11,7 @@ import pytest
 from matplotlib.axes import Axes
 
 from isiw.errors import InvalidValueError
-from isiw.plots.study import study_figure
+from isiw.plots.comparison import study_figure
 from isiw.plots.style import STRATEGY_COLOURS, save_figure
 
 OF_A_BELIEF = {"start_coverage": 0.9, "end_coverage": 0.8, "called_none": 0.0}

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from isiw.design import DesignSpace
-from isiw.devices.recorded import RecordedPerson, load_recordings
-from isiw.devices.simulated import Simulation
+from isiw.devices.simulated import RecordedPerson, Simulation, load_recordings
 from isiw.findings import Finding, Kind
 from isiw.signals import SignalLimits, judge
 from isiw.signals.places import told_by

@@ -15,7 +15,7 @@ from isiw.design import DesignSpace, missing_reference
 from isiw.devices.limits import USUAL_ITI_S
 from isiw.devices.robot.mechanism import LINE_DELAY_MS, EventTime, Geometry, SensorNoise
 from isiw.devices.robot.tapper import Tapper, TapperSettings, preset
-from isiw.devices.robot.vane.actuator import Vane
+from isiw.devices.robot.vane.rotation import Vane
 from isiw.devices.robot.vane.tapper import WAIT_MS, RotatingTapper
 from isiw.errors import ConfigError
 from isiw.findings import INTENSITY_PCT, STOP_WIDTH_MS, UnitScale

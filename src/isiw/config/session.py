@@ -14,8 +14,7 @@ from isiw.config.run import RunConfig, limits_for
 from isiw.config.sections import RobotConfig, SimulatedConfig, SubjectConfig, robot_for
 from isiw.design import DesignSpace
 from isiw.devices.protocol import Device, DeviceInfo
-from isiw.devices.recorded import RecordedPerson, load_recordings
-from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
+from isiw.devices.simulated import RecordedPerson, SimulatedDevice, SimulatedPerson, load_recordings
 from isiw.errors import ConfigError, StrategyError
 from isiw.files import write_output
 from isiw.log.durable import log_exists

@@ -16,7 +16,7 @@ import numpy as np
 from isiw.checks import number, whole
 from isiw.devices.robot.mechanism import Geometry, draw_taps
 from isiw.devices.robot.tapper import preset
-from isiw.devices.robot.vane.actuator import Vane
+from isiw.devices.robot.vane.rotation import Vane
 from isiw.devices.robot.vane.tapper import RATE_HZ, draw_strokes, record_strokes
 from isiw.devices.robot.waveforms import record_emg, record_robot, sample_times_ms
 from isiw.errors import InvalidValueError

@@ -16,7 +16,7 @@ from isiw.errors import InvalidValueError
 from isiw.existing.analysis import analysed
 from isiw.existing.delivered import Delivered
 from isiw.metrics import f1
-from isiw.plots.study import replay_figure
+from isiw.plots.comparison import replay_figure
 from isiw.plots.style import save_figure
 from isiw.strategy.catalogue import make_strategy
 from isiw.trials import Trial

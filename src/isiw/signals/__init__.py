@@ -1,7 +1,7 @@
 """From waveforms to numbers: impact, MEP, background, and the judgement of a trial."""
 
 from isiw.signals.events import TapEvents, detect_events, load_cell_times, sweep_events
-from isiw.signals.impact import impact_time, impact_times
+from isiw.signals.impact import Impact, ImpactDetector, impact_time, impact_times
 from isiw.signals.judgement import judge, judge_measurement, wrong_isi
 from isiw.signals.limits import SignalLimits
 from isiw.signals.mep import (
@@ -13,7 +13,6 @@ from isiw.signals.mep import (
     mep_onsets,
     mep_present,
 )
-from isiw.signals.stream import Impact, ImpactDetector
 from isiw.signals.waveforms import is_saturated
 
 __all__ = [

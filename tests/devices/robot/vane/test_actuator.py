@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from isiw.devices.robot.vane.actuator import Load, Rotor, Supply
+from isiw.devices.robot.vane.rotation import Load, Rotor, Supply
 from isiw.errors import InvalidValueError
 
 

@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from isiw.devices.robot.vane.actuator import Load, Rotor, Vane
-from isiw.devices.robot.vane.rotation import Performance, performance
+from isiw.devices.robot.vane.rotation import Load, Performance, Rotor, Vane, performance
 from isiw.errors import InvalidValueError
 
 HEIGHTS_MM = (7.5, 10, 12.5, 15, 17.5, 20, 25, 30, 37.5)

@@ -9,8 +9,7 @@ import pytest
 from benchmarks.vane import filled_bar
 from scipy.integrate import cumulative_trapezoid
 
-from isiw.devices.robot.vane.actuator import Load, Rotor, Supply, Vane
-from isiw.devices.robot.vane.rotation import Rotations, orifice_flow, rotate
+from isiw.devices.robot.vane.rotation import Load, Rotations, Rotor, Supply, Vane, orifice_flow, rotate
 from isiw.errors import InvalidValueError
 
 VANE = Vane(Rotor(15, 150))

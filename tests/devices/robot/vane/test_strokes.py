@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from isiw.devices.robot.vane.actuator import Vane
+from isiw.devices.robot.vane.rotation import Vane
 from isiw.devices.robot.vane.tapper import UNITS, draw_strokes, record_strokes
 
 MODULE = "isiw.devices.robot.vane.tapper"

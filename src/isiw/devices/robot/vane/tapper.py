@@ -15,8 +15,7 @@ import numpy as np
 from isiw.checks import MOST_DELAY_MS, number, whole
 from isiw.devices.protocol import DeviceInfo
 from isiw.devices.robot.tapper import Tapper
-from isiw.devices.robot.vane.actuator import ATMOSPHERE_BAR, PA_PER_BAR, Vane
-from isiw.devices.robot.vane.rotation import Rotations, rotate
+from isiw.devices.robot.vane.rotation import ATMOSPHERE_BAR, PA_PER_BAR, Rotations, Vane, rotate
 from isiw.signals.impact import VALVE_MS, impact_time
 from isiw.signals.mep import MEP_WINDOWS_MS
 from isiw.trials import Channel, Stimulus, Sweep
