@@ -107,24 +107,17 @@ class _Worker:
             call.run()
 
 
-class _GivenUp:
-    """Verbs of any session that were given up and may still be busy: each may yet arm its device, or fire."""
+_abandoned: list[tuple[Device, _Call[Any]]] = []
+"""Verbs of any session that were given up and may still be busy: each may yet arm its device, or fire."""
 
-    def __init__(self) -> None:
-        self._calls: list[tuple[Device, _Call[Any]]] = []  # few, if any; a device need not be hashable
-        self._lock = threading.Lock()
-
-    def add(self, device: Device, call: _Call[Any]) -> None:
-        with self._lock:
-            self._calls.append((device, call))
-
-    def busy(self, device: Device) -> list[_Call[Any]]:
-        with self._lock:
-            self._calls = [(whose, call) for whose, call in self._calls if not call.ended]
-            return [call for whose, call in self._calls if whose is device]
+_looking = threading.Lock()
 
 
-_abandoned = _GivenUp()
+def _abandoned_of(device: Device) -> list[_Call[Any]]:
+    """The calls of a device that were given up and are still busy; a device need not be hashable."""
+    with _looking:
+        _abandoned[:] = [(whose, call) for whose, call in _abandoned if not call.ended]
+        return [call for whose, call in _abandoned if whose is device]
 
 
 class PunctualDevice:
@@ -161,10 +154,10 @@ class PunctualDevice:
 
     def stage(self) -> None:
         """Get ready and arm."""
-        for call in _abandoned.busy(self._device):
+        for call in _abandoned_of(self._device):
             call.wait(call.age_s + self._deadlines.stop_s)
         with self._stopping:  # else a `stop` that comes meanwhile would take the device for disarmed
-            if _abandoned.busy(self._device):
+            if _abandoned_of(self._device):
                 raise DeviceError(
                     "the device was not armed: an earlier call, for which isiw no longer waits, is still running and "
                     "could still fire",
@@ -224,7 +217,7 @@ class PunctualDevice:
 
     @property
     def _idle(self) -> bool:
-        return not _abandoned.busy(self._device) and (self._worker is None or self._worker.idle)
+        return not _abandoned_of(self._device) and (self._worker is None or self._worker.idle)
 
     def unstage(self) -> None:
         """Let go of what `stage` took."""
@@ -272,7 +265,9 @@ class PunctualDevice:
     def _give_up(self) -> None:
         """Leave the thread to the verb it is busy with; when that ends it disarms the device once more, and ends."""
         if self._worker is not None:
-            _abandoned.add(self._device, self._worker.begin(self._stop_late))
+            late = self._worker.begin(self._stop_late)
+            with _looking:
+                _abandoned.append((self._device, late))
         self.release_thread()
 
     def _stop_late(self) -> None:

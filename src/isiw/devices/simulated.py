@@ -174,15 +174,8 @@ class RecordedTrials:
             )
         trial = min(fitting, key=lambda candidate: abs((candidate.wanted_isi_ms or 0.0) - (asked_ms or 0.0)))
         self._left.remove(trial)
-        return Measurement(
-            trial.mep_mv or 0.0,
-            trial.isi_ms,
-            trial.isi_sd_ms,
-            trial.background_rms_uv,
-            trial.t_valve_ms,
-            trial.t_hit_ms,
-            trial.t_tms_ms,
-        )
+        told = {field.name: getattr(trial, field.name) for field in dataclasses.fields(Measurement)}
+        return Measurement(**told | {"mep_mv": trial.mep_mv or 0.0})
 
 
 PATTERN = "uef_*_ECR_epochs_uV_3kHz.csv.gz"
@@ -292,23 +285,15 @@ class RecordedPerson:
 
     def answer(self, stimulus: Stimulus) -> Sweep:
         """The sweep that follows the next pair of stimuli; its clock is zero at the pulse, or at a tap alone."""
-        rng = np.random.default_rng([self._seed, stimulus.trial])
-        if stimulus.tap_alone:
-            by_valve = self.info.reference == "valve"
-            return Sweep(
-                {"emg": self._emg(0.0, rng)}, t_valve_ms=0.0 if by_valve else None, t_hit_ms=None if by_valve else 0.0
-            )
-        outcome = self._respond(stimulus.isi_ms)
-        emg = self._emg(outcome.mep_mv, rng)
-        first_ms = None if outcome.isi_ms is None else -outcome.isi_ms
+        recordings, rng = self._recordings, np.random.default_rng([self._seed, stimulus.trial])
+        alone = Measurement(0.0, 0.0) if stimulus.tap_alone else None
+        outcome = alone or self._respond(stimulus.isi_ms)
+        emg_mv = recordings.sweep_mv(outcome.mep_mv, rng)
+        first_ms = None if outcome.isi_ms is None else 0.0 - outcome.isi_ms
         return Sweep(
-            {"emg": emg},
+            {"emg": Channel(emg_mv, recordings.rate_hz, "mV", t0_ms=float(recordings.time_ms[0]))},
             t_valve_ms=first_ms if self.info.reference == "valve" else None,
-            t_tms_ms=0.0,
+            t_tms_ms=None if alone else 0.0,
             t_hit_ms=first_ms if self.info.reference == "impact" else None,
             isi_sd_ms=outcome.isi_sd_ms,
         )
-
-    def _emg(self, mep_mv: float, rng: np.random.Generator) -> Channel:
-        emg_mv = self._recordings.sweep_mv(mep_mv, rng)
-        return Channel(emg_mv, self._recordings.rate_hz, "mV", t0_ms=float(self._recordings.time_ms[0]))

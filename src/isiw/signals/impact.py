@@ -70,7 +70,9 @@ def impact_times(acceleration: ArrayLike, rate_hz: float, after_ms: float = VALV
     level, noise = rest_level(waves, valve, rate_hz)
     above_rest = waves - level
     band = HYSTERESIS_SD * noise[:, 0]
-    rows, falls = _falls(above_rest, band, valve)
+    low = above_rest[:, valve:] < -band[:, None]
+    rows, columns = np.nonzero(low[:, 1:] & ~low[:, :-1])
+    falls = columns + valve + 1  # the first samples below the band
     steps = round(FALL_MS * rate_hz / 1000)
     fall = _samples(above_rest, rows, falls, -steps, 1)
     motion = _samples(above_rest, rows, falls, -steps - round(MOTION_MS * rate_hz / 1000), -steps).mean(axis=-1)
@@ -81,13 +83,6 @@ def impact_times(acceleration: ArrayLike, rate_hz: float, after_ms: float = VALV
     chosen = np.flatnonzero(impact)[first]
     times[hit_rows] = (falls[chosen] - steps + last_fall(fall[chosen])) * 1000 / rate_hz
     return times
-
-
-def _falls(above_rest: FloatArray, band: FloatArray, start: int) -> tuple[IntArray, IntArray]:
-    """Rows and columns of all samples that are the first below the hysteresis band."""
-    low = above_rest[:, start:] < -band[:, None]
-    rows, columns = np.nonzero(low[:, 1:] & ~low[:, :-1])
-    return rows, columns + start + 1
 
 
 def _samples(waves: FloatArray, rows: IntArray, columns: IntArray, start: int, stop: int) -> FloatArray:
@@ -128,54 +123,42 @@ class _Fall(NamedTuple):
     last: int
 
 
-class _Window(NamedTuple):
-    """Samples above the level at rest: some that are known already, then the new ones."""
-
-    above_rest: FloatArray
-    begin: int
-    new: int
-
-    @property
-    def end(self) -> int:
-        return self.begin + len(self.above_rest)
-
-
 class _Search:
     """Looks for one impact after a valve command."""
 
     def __init__(self, rate_hz: float, valve: int, rest: FloatArray) -> None:
         level, noise = rest_level(rest[None], len(rest), rate_hz)
-        self.level, self._band = float(level[0, 0]), HYSTERESIS_SD * float(noise[0, 0])
+        self._level, self._band = float(level[0, 0]), HYSTERESIS_SD * float(noise[0, 0])
         self._valve, self._rate_hz = valve, rate_hz
         self._fall, self._motion, self._latency = (
             round(ms * rate_hz / 1000) for ms in (FALL_MS, MOTION_MS, DETECTION_LATENCY_MS)
         )
         self._pending: list[_Fall] = []
 
-    def found(self, window: _Window) -> Impact | None:
-        """The impact, if it shows in the new samples."""
-        self._pending += self._falls(window)
+    def found(self, samples: FloatArray, begin: int, new: int) -> Impact | None:
+        """The impact, if it shows in samples that begin with some that are known already, from the first new one on."""
+        above_rest = samples - self._level
+        self._pending += self._falls(above_rest, begin, new)
         calls = []
         for fall in self._pending:
-            since = max(fall.sample, window.new)
-            new = window.above_rest[since - window.begin : fall.last + 1 - window.begin]
-            enough = np.flatnonzero(new < -fall.least_deceleration)
+            since = max(fall.sample, new)
+            shown = above_rest[since - begin : fall.last + 1 - begin]
+            enough = np.flatnonzero(shown < -fall.least_deceleration)
             calls += [(since + int(enough[0]), fall)] if enough.size else []
-        self._pending = [fall for fall in self._pending if fall.last >= window.end]
+        self._pending = [fall for fall in self._pending if fall.last >= begin + len(samples)]
         if not calls:
             return None
         known, fall = min(calls)
         return Impact(*((sample - self._valve) * 1000 / self._rate_hz for sample in (fall.crossing, known)))
 
-    def _falls(self, window: _Window) -> Iterator[_Fall]:
+    def _falls(self, above: FloatArray, begin: int, new: int) -> Iterator[_Fall]:
         """The falls among the new samples behind which the hammer had begun to move."""
-        above, first = window.above_rest, max(window.new, self._valve + 1) - window.begin
-        low = above < -self._band
+        low, first = above < -self._band, max(new, self._valve + 1) - begin
         for sample in np.flatnonzero(low[first:] & ~low[first - 1 : -1]) + first:
             fall = above[sample - self._fall : sample + 1]
             motion = float(above[sample - self._fall - self._motion : sample - self._fall].mean())
             if fall.max() > self._band and motion > self._band:
-                number = window.begin + int(sample)
+                number = begin + int(sample)
                 crossing = number - self._fall + float(last_fall(fall[None])[0])
                 last = min(number + self._latency - 1, math.floor(crossing + self._latency))
                 yield _Fall(number, crossing, motion, last)
@@ -234,7 +217,7 @@ class ImpactDetector:
         window_begin, self._kept = begin - len(self._kept), known[-self._keep :]
         if self._search is None:
             return None
-        found = self._search.found(_Window(known - self._search.level, window_begin, begin))
+        found = self._search.found(known, window_begin, begin)
         self._search = None if found else self._search
         return found
 

@@ -195,7 +195,10 @@ class Tapper:
         predicted_ms = self.hit_delay_ms
         times = self._times_ms(ALONE_MS if after_impact_ms is None else predicted_ms + after_impact_ms)
         channels = self._channels(times, taps, rng)
-        measured_ms = self._measured_hit_ms(channels)
+        measured_ms = None  # the impact that the accelerometer shows [ms after the valve command]
+        if self.settings.accelerometer:
+            hit_ms = impact_time(channels["acceleration"].values, self.settings.rate_hz, VALVE_MS)
+            measured_ms = None if hit_ms is None else hit_ms - VALVE_MS
         start_ms = predicted_ms if self.settings.trigger == "open-loop" else measured_ms
         pulse_ms = None if start_ms is None or after_impact_ms is None else start_ms + after_impact_ms
         channels["emg"] = self._emg(times, taps, pulse_ms, rng)
@@ -219,13 +222,6 @@ class Tapper:
     def _channels(self, times_ms: FloatArray, taps: Taps, rng: np.random.Generator) -> dict[str, Channel]:
         waves = {name: wave[0] for name, wave in record_robot(times_ms, taps, rng).items() if self._has.get(name, True)}
         return {name: Channel(wave, self.settings.rate_hz, UNITS[name]) for name, wave in waves.items()}
-
-    def _measured_hit_ms(self, channels: Mapping[str, Channel]) -> float | None:
-        """The impact that the accelerometer shows [ms after the valve command]."""
-        if not self.settings.accelerometer:
-            return None
-        hit_ms = impact_time(channels["acceleration"].values, self.settings.rate_hz, VALVE_MS)
-        return None if hit_ms is None else hit_ms - VALVE_MS
 
     def _emg(self, times_ms: FloatArray, taps: Taps, pulse_ms: float | None, rng: np.random.Generator) -> Channel:
         hit_ms = float(taps.hit_ms[0])

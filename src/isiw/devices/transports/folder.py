@@ -192,18 +192,15 @@ class _Folder:
             raise
 
     def reply(self, request: Request, wait_s: float) -> Reply | None:
-        """The answer to a request, if it is there and whole."""
-        until_s = time.monotonic() + wait_s
-        while True:
-            path = self._answer(request)
-            text = _text(path, LONGEST_REPLY)
-            if text is not None and (reply := _parsed(text, path.name)) is not None:
-                self._require_own(reply, request)
-                _remove(path)
-                return reply
-            if (left_s := until_s - time.monotonic()) <= 0:
-                return None
-            time.sleep(min(self._poll_s, left_s))
+        """The answer to a request, if it is there and whole; else None, after a moment."""
+        path = self._answer(request)
+        text = _text(path, LONGEST_REPLY)
+        if text is None or (reply := _parsed(text, path.name)) is None:
+            time.sleep(min(self._poll_s, wait_s))
+            return None
+        self._require_own(reply, request)
+        _remove(path)
+        return reply
 
     @staticmethod
     def _require_own(reply: Reply, request: Request) -> None:

@@ -20,7 +20,7 @@ from isiw.checks import (
     Positive,
     choice,
 )
-from isiw.devices.transports.line_table import ByteConnection, LineExchange, command_values
+from isiw.devices.transports.line_table import Connection, LineExchange, command_values
 from isiw.errors import DeviceError, DeviceTimeoutError
 from isiw.text.sanitize import read_whole
 
@@ -63,7 +63,7 @@ class Line:
     Without sequence numbers, a connection whose last answer is missing is not `trusted` any more.
     """
 
-    def __init__(self, connection: ByteConnection, settings: LineSettings, refusal: str) -> None:
+    def __init__(self, connection: Connection, settings: LineSettings, refusal: str) -> None:
         self._connection, self._settings, self._refusal = connection, settings, refusal
         self._incoming = _Lines()
         self.trusted = True

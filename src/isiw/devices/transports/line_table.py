@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from functools import partial
 from string import Formatter
-from typing import Any, Final, Protocol
+from typing import Any, Final, TypeAlias
 from urllib.parse import urlsplit
 
 from isiw.checks import Checked, Positive, Text, from_table, number
@@ -33,20 +33,7 @@ _STATE = frozenset({"coil_c", "intensity_pct_mso"})
 _NONE: frozenset[str] = frozenset()
 
 
-class ByteConnection(Protocol):
-    """Bytes to and from an instrument; whatever fails is an OSError."""
-
-    def send(self, data: bytes) -> None:
-        """Send all of it, or fail within the time that the connection was opened with."""
-
-    def receive(self, *, wait: bool = True) -> bytes:
-        """The bytes that have come, a few thousand at most; none if nothing came within 50 ms."""
-
-    def close(self) -> None:
-        """Close it; calling it again is harmless."""
-
-
-def open_connection(address: str, baud: int, timeout_s: float) -> ByteConnection:
+def open_connection(address: str, baud: int, timeout_s: float) -> Connection:
     """Open a connection."""
     return _Tcp(address, timeout_s) if address.startswith(_TCP) else _Serial(address, baud, timeout_s)
 
@@ -71,6 +58,8 @@ def _host_and_port(address: str) -> tuple[str | None, int | None]:
 
 
 class _Tcp:
+    """Bytes to and from an instrument; whatever fails is an OSError."""
+
     def __init__(self, address: str, timeout_s: float) -> None:
         host, port = _host_and_port(address)
         self._timeout_s = timeout_s
@@ -78,10 +67,12 @@ class _Tcp:
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def send(self, data: bytes) -> None:
+        """Send all of it, or fail within the time that the connection was opened with."""
         self._socket.settimeout(self._timeout_s)
         self._socket.sendall(data)
 
     def receive(self, *, wait: bool = True) -> bytes:
+        """The bytes that have come, a few thousand at most; none if nothing came within 50 ms."""
         self._socket.settimeout(_GLANCE_S if wait else 0.0)
         try:
             data = self._socket.recv(_MOST_BYTES)
@@ -92,11 +83,12 @@ class _Tcp:
         return data
 
     def close(self) -> None:
+        """Close it; calling it again is harmless."""
         self._socket.close()
 
 
 class _Serial:
-    """A serial port; no other program can open it meanwhile."""
+    """The same over a serial port, which no other program can open meanwhile."""
 
     def __init__(self, address: str, baud: int, timeout_s: float) -> None:
         try:
@@ -129,6 +121,9 @@ class _Serial:
 
     def close(self) -> None:
         self._port.close()
+
+
+Connection: TypeAlias = _Tcp | _Serial
 
 
 @dataclass(frozen=True)

@@ -80,15 +80,13 @@ class Markers:
         self._outlet.push_sample([json.dumps(request.values())])
 
     def reply(self, request: Request, wait_s: float) -> Reply | None:
-        """The echo of a request; several threads may wait for one each."""
-        end_s = time.monotonic() + wait_s
-        while (reply := self._replies.pop(request.number, None)) is None and (left_s := end_s - time.monotonic()) >= 0:
-            if self._pulling.acquire(timeout=_GLANCE_S):
-                try:
-                    self._pull(min(_GLANCE_S, left_s))
-                finally:
-                    self._pulling.release()
-        return reply
+        """The echo of a request, or None after a moment; several threads may wait for one each."""
+        if request.number not in self._replies and self._pulling.acquire(timeout=_GLANCE_S):
+            try:
+                self._pull(min(_GLANCE_S, wait_s))
+            finally:
+                self._pulling.release()
+        return self._replies.pop(request.number, None)
 
     def silence(self, request: Request) -> DeviceError:
         """The error to raise if no echo came in time."""

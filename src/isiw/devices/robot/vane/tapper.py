@@ -105,22 +105,17 @@ class RotatingTapper:
 
     def answer(self, stimulus: Stimulus) -> Sweep:
         """Tap, pulse, turn the wrist, and record; it fails as the tapping robot does."""
-        sweep = self.tapper.answer(stimulus)
-        return replace(sweep, channels={**sweep.channels, **self._rotation(stimulus.trial, self._start_ms(sweep))})
-
-    def _start_ms(self, sweep: Sweep) -> float | None:
-        """When the actuator's valve opens [ms on the sweep's clock]; None if there was no tap to turn after."""
+        sweep, rng = self.tapper.answer(stimulus), np.random.default_rng([self._seed, stimulus.trial])
         hit_ms, acceleration = sweep.t_hit_ms, sweep.channels.get("acceleration")
         if sweep.t_valve_ms is not None and acceleration is not None:
             hit_ms = impact_time(acceleration.values, acceleration.rate_hz, VALVE_MS)
-        return None if hit_ms is None else max(hit_ms, sweep.t_tms_ms or hit_ms) + self.wait_ms
-
-    def _rotation(self, trial: int, start_ms: float | None) -> dict[str, Channel]:
-        rng = np.random.default_rng([self._seed, trial])
-        rest_ms = STILL_MS if start_ms is None else start_ms
-        waves = record_strokes(_strokes(self.vane, self._seed).one(trial % STROKES), rng, rest_ms=rest_ms)
-        kept = round(STILL_MS * RATE_HZ / 1000) if start_ms is None else None
-        return {name: Channel(wave[0, :kept], RATE_HZ, UNITS[name]) for name, wave in waves.items()}
+        if hit_ms is None:  # there was no tap to turn after, and the wrist is still
+            rest_ms, kept = STILL_MS, round(STILL_MS * RATE_HZ / 1000)
+        else:
+            rest_ms, kept = max(hit_ms, sweep.t_tms_ms or hit_ms) + self.wait_ms, None
+        waves = record_strokes(_strokes(self.vane, self._seed).one(stimulus.trial % STROKES), rng, rest_ms=rest_ms)
+        turned = {name: Channel(wave[0, :kept], RATE_HZ, UNITS[name]) for name, wave in waves.items()}
+        return replace(sweep, channels={**sweep.channels, **turned})
 
 
 @lru_cache(maxsize=8)
