@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -67,7 +68,7 @@ def truth_of(record: SessionRecord) -> Truth:
     try:
         run = run_of_log(record)
         if run.device is not None:
-            person = person_under(run.device, run.subject, run.seed)
+            person, _ = person_under(run.device, run.subject, run.seed)
         else:
             person = person_of(run.subject.cohort, run.subject.number, run.seed)
     except (ConfigError, InvalidValueError) as error:
@@ -195,7 +196,10 @@ def _said(value: object) -> object:
 
 def after_error(session: Session, config: Path | None, error: BaseException | None, *, delivered: bool) -> list[str]:
     """The lines that say how to continue after an error; the command comes last."""
-    if _is_over(session.log_path):
+    decision = None
+    with suppress(IsiwError):
+        decision = read_session(session.log_path).decision
+    if decision is not None and decision.stop:  # so that nothing is missing in the log
         seen = command("show", session.log_path)
         return [f"The session is over, and its log is complete. See what was found with: {seen}"]
     limited = config is not None and isinstance(error, LimitExceededError)
@@ -203,15 +207,6 @@ def after_error(session: Session, config: Path | None, error: BaseException | No
     way_on = f"{safe}; resume with: {continued_by(session.log_path, session.header, config, changed=limited)}"
     limits = f"The limits are under [limits] in {config}; they are read again when the session is resumed."
     return [limits, way_on] if limited else [way_on]
-
-
-def _is_over(log: Path) -> bool:
-    """True if the log's last decision was to stop, so that nothing is missing in it."""
-    try:
-        decision = read_session(log).decision
-    except IsiwError:
-        return False
-    return decision is not None and decision.stop
 
 
 def after_end(session: Session, config: Path | None, *, delivered: bool) -> str | None:

@@ -279,7 +279,7 @@ class _RotatingTapperKeys(_TapperKeys):
 
 def robot_for(robot: RobotConfig, seed: int, simulated: SimulatedConfig, space: DesignSpace) -> Tapper | RotatingTapper:
     """The robot that taps a simulated person."""
-    person, geometry = _under(robot, simulated, seed)
+    person, geometry = person_under(robot, simulated, seed)
     hit_ms, sd_ms = person.stated_hit_delay_ms
     values = {"reference": space.reference, "expected_hit_ms": hit_ms, "expected_hit_sd_ms": sd_ms} | robot.settings
     kind = _RotatingTapperKeys if robot.kind == "rotating-tapper" else _TapperKeys
@@ -291,12 +291,8 @@ def robot_for(robot: RobotConfig, seed: int, simulated: SimulatedConfig, space: 
     return RotatingTapper(tapper, settings.vane, wait_ms=settings.wait_ms, seed=seed)
 
 
-def person_under(robot: RobotConfig, simulated: SimulatedConfig, seed: int) -> SimulatedSubject:
-    """The person, whose hit delay is that of the wrist under the robot, and varies by the robot alone."""
-    return _under(robot, simulated, seed)[0]
-
-
-def _under(robot: RobotConfig, simulated: SimulatedConfig, seed: int) -> tuple[SimulatedSubject, Geometry]:
+def person_under(robot: RobotConfig, simulated: SimulatedConfig, seed: int) -> tuple[SimulatedSubject, Geometry]:
+    """The person and the wrist under the robot, which has the person's hit delay; that varies by the robot alone."""
     person = person_of(simulated.cohort, simulated.number, seed)
     if simulated.kind != "simulated" or person.conditioning != "tap":
         raise ConfigError(

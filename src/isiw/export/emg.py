@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -19,9 +19,6 @@ from isiw.text.named_code import library
 from isiw.text.stimuli import TAP, StimulusWords, meanings
 from isiw.trials import Channel, Stimulus, Trial
 from isiw.types import FloatArray
-
-if TYPE_CHECKING:
-    from edfio import BdfSignal
 
 EMG: Final = "emg"
 """The channel whose sweeps are exported, with whatever was recorded along with it."""
@@ -132,6 +129,7 @@ def _facts(trial: Trial, first: StimulusWords) -> dict[str, Any]:
 def runs(record: SessionRecord) -> tuple[list[Run], list[str]]:
     """The sweeps of a session by their layout, and a sentence for what is not among them."""
     trials = {trial.index: trial for trial in record.table}
+    commanded = {intent.trial: (intent.isi_ms, intent.tap_alone) for intent in record.intents}
     of_layout: dict[Layout, list[tuple[Trial, Mapping[str, Channel]]]] = {}
     left_out: dict[tuple[str, bool], list[int]] = {}
     for number in sorted({number for number, _ in record.waveforms}):
@@ -140,14 +138,9 @@ def runs(record: SessionRecord) -> tuple[list[Run], list[str]]:
         for name in others:
             left_out.setdefault((name, EMG in sweep), []).append(number)
         if channels:
-            trial = trials.get(number) or _lost(record, number)
+            trial = trials.get(number) or Trial.unknown(Stimulus(number, *commanded.get(number, (None, False))))
             of_layout.setdefault(_layout(channels), []).append((trial, channels))
     return [_run(layout, sweeps, record.header.stimulus) for layout, sweeps in of_layout.items()], _sentences(left_out)
-
-
-def _lost(record: SessionRecord, number: int) -> Trial:
-    commanded = {intent.trial: (intent.isi_ms, intent.tap_alone) for intent in record.intents}
-    return Trial.unknown(Stimulus(number, *commanded.get(number, (None, False))))
 
 
 def _side_by_side(sweep: Mapping[str, Channel]) -> tuple[dict[str, Channel], list[str]]:
@@ -196,19 +189,17 @@ def bdf(run: Run) -> bytes:
     samples = _record_samples(run.layout.rate_hz, run.layout.samples) or run.layout.samples
     duration_s = round(samples / run.layout.rate_hz, 6)
     labels, filled = _labels(run.layout), [np.pad(x, (0, -len(x) % samples), mode="edge") for x in run.values]
-    signals = [
-        _signal(edfio.BdfSignal, values, samples / duration_s, label, unit)
-        for values, label, (_, unit) in zip(filled, labels, run.layout.channels, strict=True)
-    ]
+    signals = []
+    for values, label, (_, unit) in zip(filled, labels, run.layout.channels, strict=True):
+        low, high = float(values.min()), float(values.max())
+        span = None if low < high else (low - 1.0, high + 1.0)
+        signal = edfio.BdfSignal(
+            values, samples / duration_s, label=label, physical_dimension=_unit(unit), physical_range=span
+        )
+        signals.append(signal)
     file = io.BytesIO()
     edfio.Bdf(signals, data_record_duration=duration_s).write(file)
     return file.getvalue()
-
-
-def _signal(kind: Callable[..., BdfSignal], values: FloatArray, rate_hz: float, label: str, unit: str) -> BdfSignal:
-    low, high = float(values.min()), float(values.max())
-    range_ = None if low < high else (low - 1.0, high + 1.0)
-    return kind(values, rate_hz, label=label, physical_dimension=_unit(unit), physical_range=range_)
 
 
 def _record_samples(rate_hz: float, sweep: int) -> int | None:

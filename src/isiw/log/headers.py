@@ -38,7 +38,7 @@ from isiw.signals.limits import SignalLimits
 from isiw.strategy.threshold.pulses import IntensityRange
 from isiw.text.stimuli import STIMULI, StimulusWords
 from isiw.trials import Trial
-from isiw.types import Conditioning, Reference
+from isiw.types import Conditioning
 from isiw.visit import Visit, VisitProtocol
 
 PRODUCTION_VERSION: Final = 1
@@ -255,7 +255,10 @@ _STAND_INS: Final[Mapping[str, Callable[[Mapping[str, Any]], object]]] = {
     "seed": lambda _: 0,
     "strategy": lambda values: {"name": _name(values.get("strategy")), "seed": 0},
     "limits": lambda values: Limits.of_space(_SPACE.validate_python(values.get("space"))),
-    "device": lambda values: DeviceInfo("not known", _reference(values)),
+    "device": lambda values: DeviceInfo(
+        "not known",
+        "impact" if kind_tag(values) == "threshold" else _SPACE.validate_python(values.get("space")).reference,
+    ),
     "signals": lambda _: SignalLimits(),
 }
 """Stand-ins for parts that cannot be read and have no default; without any other such part there is no header."""
@@ -276,10 +279,6 @@ def header_in_parts(values: Any) -> tuple[AnyHeader, dict[str, str]]:
             unread[part] = first_fault(error)
             stand_in = {} if has_default else {part: _STAND_INS[part](values)}
             values = {key: value for key, value in values.items() if key != part} | stand_in
-
-
-def _reference(values: Mapping[str, Any]) -> Reference:
-    return "impact" if kind_tag(values) == "threshold" else _SPACE.validate_python(values.get("space")).reference
 
 
 def _name(strategy: Any) -> str:

@@ -154,7 +154,11 @@ class Records:
         header = self.header
         if not isinstance(header, kinds) or (self.losses and CONFIGURATION in self.salvaged.attachments):
             # what is lost may have been the last header
-            header, self.unread = _header_from_attachment(self.salvaged)
+            try:
+                text = self.salvaged.attachments.get(CONFIGURATION, b"").decode()
+                header, self.unread = header_in_parts(parsed(text))
+            except (ValueError, RecursionError) as error:
+                raise _lost_header(self.salvaged) from error
         if not isinstance(header, kinds):
             raise _lost_header(self.salvaged)
         if header.schema_version > newest:
@@ -238,14 +242,6 @@ def _standing(history: Sequence[Record]) -> dict[int, Intent]:
         elif isinstance(entry, Event) and entry.kind == "refused" and entry.trial is not None:
             intents.pop(entry.trial, None)
     return intents
-
-
-def _header_from_attachment(salvaged: Salvage) -> tuple[AnyHeader, dict[str, str]]:
-    text = salvaged.attachments.get(CONFIGURATION, b"")
-    try:
-        return header_in_parts(parsed(text.decode()))
-    except (ValueError, RecursionError) as error:
-        raise _lost_header(salvaged) from error
 
 
 def _lost_header(salvaged: Salvage) -> DamagedLogError:

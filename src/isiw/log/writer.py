@@ -210,7 +210,10 @@ class LogWriter:
             return
         copy = self._file.rescued(self.path)
         held = f"What the session still held of it is in {copy}."
-        if (records := self._memory.completing(found_in(copy))) is not None:
+        found: list[Message] = []
+        with suppress(LogError):  # of a file that is no log any more
+            found = salvage_file(copy).messages
+        if (records := self._memory.completing(found)) is not None:
             self._write_from_memory(copy, records, displacement)
             held = f"{held} {_FROM_MEMORY}"
         raise LogError(f"the log is no longer as it was written: {displacement}", got=str(self._file.path), remedy=held)
@@ -280,18 +283,12 @@ def _way_on(existing: Path) -> str:
         found = salvage_file(existing)
     except LogError:
         return "Choose another path; this is not a log that can be continued."
-    header = _header_of(found)
-    if header is None:
-        return "Choose another path; nothing of this log can be continued."
-    return f"Choose another path, or continue it: {continued_by(log_of(existing), header)}"
-
-
-def _header_of(found: Salvage) -> AnyHeader | None:
     for message in reversed(found.messages):
         if message.topic in {"/header", "/production_header"}:
             with suppress(ValueError):
-                return cast("AnyHeader", decode(message.topic, message.data))
-    return None
+                header = cast("AnyHeader", decode(message.topic, message.data))
+                return f"Choose another path, or continue it: {continued_by(log_of(existing), header)}"
+    return "Choose another path; nothing of this log can be continued."
 
 
 def _require_unchanged(source: IO[bytes], salvage: Salvage) -> None:
@@ -359,11 +356,3 @@ class Memory:
             return None
         records = {message.sequence: message for message in found} | self._messages
         return [records[number] for number in sorted(records)]
-
-
-def found_in(file: Path) -> list[Message]:
-    """The records that can still be read in a file; none if it is no log any more."""
-    try:
-        return salvage_file(file).messages
-    except LogError:
-        return []

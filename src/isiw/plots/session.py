@@ -129,8 +129,10 @@ def _draw_trials(axes: Axes, record: SessionRecord) -> None:
     """Where they happened; at the lower edge where no MEP was measured, at the ISI asked where none was realised."""
     alone_ms = _alone_ms(record)
     for kind, style in _STYLES.items():
-        trials = [(trial, place_ms) for trial in record.table
-                  if _kind(trial) == kind and (place_ms := _place_ms(trial, alone_ms)) is not None]  # fmt: skip
+        of_kind = [
+            t for t in record.table if kind == ("mistrial" if t.reason else "excluded" if t.excluded else "trial")
+        ]
+        trials = [(trial, ms) for trial in of_kind if (ms := _place_ms(trial, alone_ms)) is not None]
         seen = [(place_ms, trial.mep_mv) for trial, place_ms in trials if trial.mep_mv is not None]
         if seen:
             places_ms, meps_mv = zip(*seen, strict=True)
@@ -139,10 +141,6 @@ def _draw_trials(axes: Axes, record: SessionRecord) -> None:
         if lost:
             axes.plot(lost, [0.02] * len(lost), label=None if seen else kind, zorder=3, ls="",
                       transform=axes.get_xaxis_transform(), **style)  # fmt: skip
-
-
-def _kind(trial: Trial) -> str:
-    return "mistrial" if trial.reason is not None else "excluded" if trial.excluded else "trial"
 
 
 def _place_ms(trial: Trial, alone_ms: float) -> float | None:

@@ -52,7 +52,7 @@ def sweeps_figure(record: SessionRecord) -> Figure | None:
     _draw_traces(axes, traces, inside, rows_per_mv, BLUE, "EMG, ISI inside the window")
     _draw_traces(axes, traces, ~inside, rows_per_mv, INK, "EMG, other trials")
     _draw_hits(axes, traces, record.header.stimulus.mark)
-    _draw_scale(axes, (len(traces) - 1) / 2, _round_mv(largest_mv), rows_per_mv)
+    _draw_scale(axes, (len(traces) - 1) / 2, largest_mv, rows_per_mv)
     _finish(axes, traces)
     figure.legend(loc="outside upper left", ncols=3, fontsize=7.5, frameon=False)
     return figure
@@ -103,7 +103,10 @@ def _draw_hits(axes: Axes, traces: Sequence[_Trace], label: str) -> None:
         axes.plot(*zip(*near, strict=True), "|", ms=size, mew=1.6, color=ORANGE, label=label)
 
 
-def _draw_scale(axes: Axes, middle: float, bar_mv: float, rows_per_mv: float) -> None:
+def _draw_scale(axes: Axes, middle: float, largest_mv: float, rows_per_mv: float) -> None:
+    """A bar of the largest of 1, 2, 5, 10 … mV that is no larger than the largest deflection."""
+    power = 10.0 ** math.floor(math.log10(largest_mv))
+    bar_mv = max(power * step for step in (1, 2, 5) if power * step <= largest_mv)
     half = rows_per_mv * bar_mv / 2
     axes.plot((AFTER_MS - 3,) * 2, (middle - half, middle + half), color=INK, lw=2, solid_capstyle="butt")
     axes.text(AFTER_MS - 4.5, middle, f"{1e3 * bar_mv:g} µV", ha="right", va="center", fontsize=8, color=INK)
@@ -117,9 +120,3 @@ def _finish(axes: Axes, traces: Sequence[_Trace]) -> None:
     room = _rows_of_largest(traces)
     axes.set(xlim=(-BEFORE_MS, AFTER_MS), ylim=(-room, len(traces) - 1 + room))
     axes.set(xlabel="time after the TMS pulse [ms]", ylabel="ISI [ms]")
-
-
-def _round_mv(size_mv: float) -> float:
-    """The largest of 1, 2, 5, 10 … that is no larger."""
-    power = 10.0 ** math.floor(math.log10(size_mv))
-    return max(power * step for step in (1, 2, 5) if power * step <= size_mv)

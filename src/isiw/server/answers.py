@@ -63,11 +63,13 @@ def failed(error: BaseException) -> Refusal:
 
 def answered(refusal: Refusal, *, as_200: bool = False, headers: Mapping[str, str] | None = None) -> Response:
     """The answer to a request that is refused."""
+    text = repr(refusal.got)
+    got = plain(text if len(text) <= _LONGEST_VALUE else f"{text[:_LONGEST_VALUE]}…")
     error = Error(
         type=refusal.kind,
         status=refusal.status,
         message=plain(str(refusal)),
-        got=None if refusal.got is None else plain(_shortened(refusal.got)),
+        got=None if refusal.got is None else got,
         expected=refusal.expected,
         remedy=refusal.remedy,
         field=refusal.field,
@@ -80,11 +82,6 @@ def answered(refusal: Refusal, *, as_200: bool = False, headers: Mapping[str, st
         {**(headers or {}), **retry},
         "application/json",
     )
-
-
-def _shortened(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= _LONGEST_VALUE else f"{text[:_LONGEST_VALUE]}…"
 
 
 class _Answer(BaseModel):

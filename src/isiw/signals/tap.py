@@ -168,7 +168,9 @@ class TapResponses:
                 continue
             windows[trial.index] = window._replace(told_by=left.shown)
             again = self.measured(trial)
-            if trial.counts and _differs(trial, again):
+            pairs = ((trial.mep_mv or 0.0, again.mep_mv or 0.0), (trial.tap_mv or 0.0, again.tap_mv or 0.0))
+            differs = any(abs(new - old) > max(SAME_MV, SAME_SHARE * max(new, old)) for old, new in pairs)
+            if trial.counts and differs:
                 found.append(again)
         return replace(self, windows=windows), found
 
@@ -327,11 +329,6 @@ def hit_of(trial: Trial) -> float | None:
     if trial.t_hit_ms is None and trial.t_valve_ms is not None:
         return trial.t_valve_ms + HIT_DELAY_MS
     return trial.t_hit_ms
-
-
-def _differs(before: Trial, after: Trial) -> bool:
-    pairs = ((before.mep_mv or 0.0, after.mep_mv or 0.0), (before.tap_mv or 0.0, after.tap_mv or 0.0))
-    return any(abs(new - old) > max(SAME_MV, SAME_SHARE * max(new, old)) for old, new in pairs)
 
 
 def meets_response(isi_ms: float, reference: str, mep_window_ms: tuple[float, float] = MEP_WINDOW_MS) -> bool:

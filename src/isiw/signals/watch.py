@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import math
 import statistics
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final, TypeAlias
+from typing import Final
 
 from isiw.design import DesignSpace
 from isiw.findings import ENOUGH_PAIRS, Finding, Kind, Severity
@@ -143,53 +143,38 @@ def _zeros_are_usual(detection_limit_mv: float | None) -> bool:
     return detection_limit_mv is not None and detection_limit_mv >= MANY_BELOW_MV
 
 
-Check: TypeAlias = Callable[[Evidence], Finding | None]
-"""Looks for one kind of finding; None where it finds nothing, or lacks what it needs."""
+OF_SWEEP: Final = (rig.unusable_emg, rig.wrong_acceleration, rig.no_origin, rig.double_pulse, rig.stray_edge)
+"""Checks of the last trial and its sweep, the surest first: the first finding explains the others."""
 
+OF_TRIAL: Final = (rig.wrong_level, rig.lost_trial)
+"""Checks of the last trial, be there a sweep or not."""
 
-def of_sweep(find: Callable[[Sweep, Trial], Finding | None]) -> Check:
-    """A check that needs the last trial and its sweep."""
-    return lambda e: find(e.answer, e.trial) if e.trial is not None and isinstance(e.answer, Sweep) else None
-
-
-def of_trial(find: Callable[[Trial, Evidence], Finding | None]) -> Check:
-    """A check that needs the last trial, be there a sweep or not."""
-    return lambda e: None if e.trial is None else find(e.trial, e)
-
-
-def of_told(find: Check) -> Check:
-    """A check that needs the trials that count so far."""
-    return lambda e: find(e) if e.told else None
-
-
-CHECKS: Final[tuple[Check, ...]] = (
-    of_sweep(rig.unusable_emg),
-    of_sweep(rig.wrong_acceleration),
-    of_sweep(rig.no_origin),
-    of_sweep(rig.double_pulse),
-    of_sweep(rig.stray_edge),
-    of_trial(rig.wrong_level),
-    of_trial(rig.lost_trial),
-    of_told(places.repeated),
-    of_told(equal),
-    of_told(silent),
-    of_told(stopped),
-    of_told(small),
-    of_told(large),
-    of_told(places.hum),
-    of_told(places.drift),
-    of_told(places.misplaced),
-    of_told(places.cut_off),
-    of_told(places.artefact),
-    of_told(places.decay),
+OF_TOLD: Final = (
+    places.repeated,
+    equal,
+    silent,
+    stopped,
+    small,
+    large,
+    places.hum,
+    places.drift,
+    places.misplaced,
+    places.cut_off,
+    places.artefact,
+    places.decay,
 )
-"""The surest first: of one trial, the first finding explains the others."""
+"""Checks of the trials that count so far."""
 
 
 def findings(evidence: Evidence) -> Iterator[Finding]:
-    """What is found in some evidence, in the order of the list."""
-    found = (check(evidence) for check in CHECKS)
-    return (finding for finding in found if finding is not None)
+    """What is found in some evidence, in the order of the checks."""
+    trial, answer = evidence.trial, evidence.answer
+    if trial is not None and isinstance(answer, Sweep):
+        yield from filter(None, (find(answer, trial) for find in OF_SWEEP))
+    if trial is not None:
+        yield from filter(None, (find(trial, evidence) for find in OF_TRIAL))
+    if evidence.told:
+        yield from filter(None, (find(evidence) for find in OF_TOLD))
 
 
 EARLY_IN_A_ROW: Final = 9

@@ -5,13 +5,14 @@ from __future__ import annotations
 import time
 import tracemalloc
 from contextlib import suppress
+from typing import cast
 
 import hypothesis
 import pytest
 from hypothesis import strategies as st
 
 from isiw.devices.transports.line_exchange import Line, LineSettings
-from isiw.devices.transports.line_table import LineExchange
+from isiw.devices.transports.line_table import Connection, LineExchange
 from isiw.errors import DeviceError, DeviceTimeoutError
 
 ASKED = LineExchange("{sequence} GET", r"(?P<sequence>\d+) ISI (?P<isi_ms>\S+)")
@@ -44,7 +45,7 @@ class Scripted:
 
 def line(script: bytes, *, endless: bool = False, refusal: str = "", line_end: str = "\n") -> tuple[Line, Scripted]:
     connection = Scripted(script, endless=endless)
-    return Line(connection, LineSettings(line_end=line_end), refusal), connection
+    return Line(cast("Connection", connection), LineSettings(line_end=line_end), refusal), connection
 
 
 @pytest.mark.parametrize("end", [b"\n", b"\r", b"\r\n"])
