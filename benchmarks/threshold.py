@@ -8,7 +8,7 @@ Every person has a resting motor threshold of 30-80 % MSO and the recruitment cu
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated
@@ -19,8 +19,8 @@ import typer
 
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
-from isiw.strategy.threshold import IntensityRange, ThresholdSearch, make_threshold_search
-from isiw.strategy.threshold.hotspot import BayesHotSpot, CoilPulse, WalkedHotSpot
+from isiw.strategy.threshold import IntensityRange, Pulse, ThresholdEstimate, ThresholdSearch, make_threshold_search
+from isiw.strategy.threshold.hotspot import BayesHotSpot
 from isiw.subjects.thresholds import THRESHOLD_COHORTS, StimulatedPerson, threshold_cohort
 from isiw.trials import RESPONSE_MV
 
@@ -110,6 +110,35 @@ def threshold_row(cohort: str, way: Way, n: int, seed: int) -> dict[str, object]
     }
 
 
+@dataclass(frozen=True)
+class WalkedHotSpot:
+    """The classical way: `repeats` pulses at every place of a grid; the largest mean MEP is the hot spot."""
+
+    repeats: int
+    step_mm: float = 10.0
+
+    @property
+    def pulses(self) -> int:
+        """Number of pulses that it takes."""
+        return self.repeats * len(BayesHotSpot(step_mm=self.step_mm).places_mm)
+
+    def place_mm(self, pulses: Sequence[Pulse]) -> tuple[float, float]:
+        """The next place of the coil [mm]."""
+        places = BayesHotSpot(step_mm=self.step_mm).places_mm
+        x_mm, y_mm = places[len(pulses) // self.repeats % len(places)].tolist()
+        return x_mm, y_mm
+
+    def estimate(self, pulses: Sequence[Pulse], _: IntensityRange) -> ThresholdEstimate:
+        """The place with the largest mean MEP, if any pulse evoked one."""
+        if not any(pulse.responded for pulse in pulses):
+            return ThresholdEstimate(None, reason="No pulse evoked an MEP.")
+        by_place: dict[tuple[float, float], list[float]] = {}
+        for pulse in pulses:
+            by_place.setdefault(pulse.place_mm or (0.0, 0.0), []).append(pulse.mep_mv or 0.0)
+        best = max(by_place, key=lambda place: float(np.mean(by_place[place])))
+        return ThresholdEstimate(None, hot_spot_mm=best)
+
+
 def spot_errors(method: BayesHotSpot | WalkedHotSpot, person: StimulatedPerson, pulses: int, seed: int) -> float:
     """The distance of the hot spot that was found from the true one [mm]; NaN where no pulse was answered.
 
@@ -120,14 +149,12 @@ def spot_errors(method: BayesHotSpot | WalkedHotSpot, person: StimulatedPerson, 
         seed: of the intensity and the noise.
     """
     intensity = float(min(100.0, person.rmt_pct_mso * np.random.default_rng(seed).uniform(*ABOVE_THRESHOLD)))
-    responder, told = person.begin(seed), list[CoilPulse]()
+    responder, told = person.begin(seed), list[Pulse]()
     for _ in range(pulses):
-        x_mm, y_mm = method.ask(told)
-        told.append(CoilPulse(x_mm, y_mm, responder.respond(intensity, x_mm, y_mm)))
-    if all(pulse.mep_mv <= RESPONSE_MV for pulse in told):
-        return float("nan")
-    found = method.estimate(told)
-    return float(np.hypot(found.x_mm - person.hot_spot.x_mm, found.y_mm - person.hot_spot.y_mm))
+        place_mm = method.place_mm(told)
+        told.append(Pulse(intensity, responder.respond(intensity, *place_mm), place_mm=place_mm))
+    found_mm = method.estimate(told, SPACE).hot_spot_mm or (float("nan"), float("nan"))
+    return float(np.hypot(found_mm[0] - person.hot_spot.x_mm, found_mm[1] - person.hot_spot.y_mm))
 
 
 def spot_rows(cohort: str, n: int, seed: int) -> Iterable[dict[str, object]]:

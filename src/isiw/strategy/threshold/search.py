@@ -11,7 +11,7 @@ from isiw.errors import InvalidValueError
 from isiw.signals.limits import implausible_scale, require_amplitude
 from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.strategy.threshold.bayes import BayesThreshold, FiveOfTen, MaximumLikelihood
-from isiw.strategy.threshold.hotspot import HotSpotSearch
+from isiw.strategy.threshold.hotspot import BayesHotSpot
 from isiw.strategy.threshold.pulses import (
     HasPulseBudget,
     IntensityRange,
@@ -55,7 +55,7 @@ def make_threshold_search(name: str, space: IntensityRange, **settings: Any) -> 
         ConfigError: a setting that the method does not have, or an invalid one.
         InvalidValueError: an unknown name.
     """
-    methods: Mapping[str, type[Any]] = {**METHODS, HOT_SPOT: HotSpotSearch}
+    methods: Mapping[str, type[Any]] = {**METHODS, HOT_SPOT: BayesHotSpot}
     choice("the method", name, methods)
     return ThresholdSearch(name, checked(methods[name], settings, f"the settings of {name}"), space)
 
