@@ -14,7 +14,7 @@ import threading
 import time
 import traceback
 from collections import Counter
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, closing, contextmanager, suppress
@@ -184,7 +184,11 @@ class DaskCluster:
             client = self.scheduler if address is None else stack.enter_context(_client(dask, address))
             running, suspects = dask.as_completed(loop=client.loop), list[_Item]()
             held: dict[str, tuple[_Item, Any, int]] = {}  # items, their futures, and how often they were lost
-            stack.callback(_cancel, client, held)
+
+            @stack.callback
+            def cancel() -> None:
+                if client.status == "running":
+                    client.cancel([future for _, future, _ in held.values()])
 
             def hand_out(item: _Item, losses: int = 0) -> None:
                 future = client.submit(_attempt_alone, run, item, pure=False)
@@ -222,11 +226,6 @@ def _client(dask: Any, address: str) -> Any:
         raise StudyError(
             "the Dask scheduler cannot be reached", got=address, remedy="Check its address, and that it is running."
         ) from error
-
-
-def _cancel(client: Any, held: Mapping[str, tuple[Any, Any, int]]) -> None:
-    if client.status == "running":
-        client.cancel([future for _, future, _ in held.values()])
 
 
 def _result_of(future: Any, client: Any) -> Any:

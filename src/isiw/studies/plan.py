@@ -320,10 +320,9 @@ def _strategy_values(strategy: Any, source: str, folder: Path | None) -> Any:
 def study_values(study: Study) -> dict[str, Any]:
     """A study as TOML values, for its folder: code of one's own by its checksum alone."""
     values = {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(study).items()}
-    values["strategies"] = [_kept(strategy) for strategy in values["strategies"]]
+    values["strategies"] = [
+        {"name": OWN if one["code"] else one["name"], "settings": one["settings"], "label": one["label"]}
+        | ({"code": one["code"]} if one["code"] else {})
+        for one in values["strategies"]
+    ]
     return values
-
-
-def _kept(strategy: Mapping[str, Any]) -> dict[str, Any]:
-    named = {key: strategy[key] for key in ("name", "settings", "label")}
-    return {**named, "name": OWN, "code": strategy["code"]} if strategy["code"] else named

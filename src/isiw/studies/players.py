@@ -52,40 +52,9 @@ class Player(Protocol):
         """The estimate of the window now."""
 
 
-class Crowd(Protocol):
-    """The source of ISIs for some people side by side."""
-
-    @property
-    def stopping(self) -> StoppingRule | None:
-        """The rule that says when to stop with each; None if there is none."""
-
-    def ask(self) -> Sequence[Choice]:
-        """Each person's next ISI."""
-
-    def tell(self, responses: Sequence[Response]) -> None:
-        """Learn from one trial of each person."""
-
-    def count_mistrial(self, person: int, lost: Choice) -> Choice:
-        """Count a pair of stimuli that was delivered in vain, and say what is asked of the person instead."""
-
-    def estimate(self, person: int) -> Reported:
-        """The estimate of a person's window."""
-
-    def decision(self, person: int) -> StopDecision:
-        """The decision to stop with a person or not; asked only if there is a rule."""
-
-    def trouble(self) -> bool | None:
-        """True if the last fit failed; None if it cannot be said for each person."""
-
-
-def alone(player: Player) -> Crowd:
-    """A player as a crowd of one."""
-    return _Alone(player)
-
-
 @dataclass(frozen=True)
-class _Alone:
-    """A player as a crowd of one; a strategy has a stopping rule, and says which asks and fits failed."""
+class Alone:
+    """A player with one person; a strategy has a stopping rule, and says which asks and fits failed."""
 
     player: Player
 
@@ -95,18 +64,22 @@ class _Alone:
 
     @property
     def stopping(self) -> StoppingRule | None:
+        """The rule that says when to stop; None if there is none."""
         return None if self._strategy is None else self._strategy.stopping
 
     def ask(self) -> list[Choice]:
+        """The person's next ISI."""
         isi_ms = self.player.ask()
         return [Choice(isi_ms, None if self._strategy is None else self._strategy.fallback_reason)]
 
     def tell(self, responses: Sequence[Response]) -> None:
+        """Learn from one trial."""
         (response,) = responses
         learn = self.player.tell if self._strategy is None else self._strategy.learn
         learn(response.isi_ms, response.mep_mv, isi_sd_ms=response.isi_sd_ms)
 
     def count_mistrial(self, person: int, lost: Choice) -> Choice:
+        """Count a pair of stimuli that was delivered in vain, and say what is asked instead."""
         del person
         if self._strategy is None:
             return lost
@@ -114,14 +87,17 @@ class _Alone:
         return self.ask()[0]
 
     def estimate(self, person: int) -> Reported:
+        """The estimate of the person's window."""
         del person
         return self.player.estimate()
 
     def decision(self, person: int) -> StopDecision:
+        """The decision to stop or not."""
         del person
         return StopKind.OWN.go_on("There is no stopping rule.") if self._strategy is None else self._strategy.decision()
 
     def trouble(self) -> bool:
+        """True if the last fit failed."""
         return self._strategy is not None and self._strategy.trouble is not None
 
 

@@ -26,7 +26,7 @@ from isiw.strategy.course import Method
 from isiw.strategy.stopping import StopDecision, stimuli_left
 from isiw.strategy.strategy import Strategy
 from isiw.studies.execution import one_torch_thread
-from isiw.studies.players import Crowd, OwnCode, Player, Reported, alone
+from isiw.studies.players import Alone, OwnCode, Player, Reported
 from isiw.subjects.cohorts import COHORTS, person_of
 from isiw.subjects.subject import Response, SimulatedSubject
 from isiw.window import Window, bayes_factor
@@ -146,10 +146,10 @@ def play(session: SimulatedSession, player: Player) -> pd.DataFrame:
         session: the session.
         player: what proposes ISIs in it.
     """
-    return examine([session], alone(player))
+    return examine([session], Alone(player))
 
 
-def examine(sessions: Sequence[SimulatedSession], crowd: Crowd) -> pd.DataFrame:
+def examine(sessions: Sequence[SimulatedSession], crowd: Alone | _Batch) -> pd.DataFrame:
     """Run sessions of equally many trials side by side."""
     people = [_Participant(session, number, crowd) for number, session in enumerate(sessions)]
     for person in people:
@@ -173,7 +173,7 @@ def examine(sessions: Sequence[SimulatedSession], crowd: Crowd) -> pd.DataFrame:
 class _Participant:
     """One person in a running session, and what is noted about it."""
 
-    def __init__(self, session: SimulatedSession, number: int, crowd: Crowd) -> None:
+    def __init__(self, session: SimulatedSession, number: int, crowd: Alone | _Batch) -> None:
         subject = session.subject()
         self.session, self.number, self.crowd = session, number, crowd
         self.still = subject.window(session.space) if subject.change is None else None
@@ -288,7 +288,7 @@ def simulate_batch(sessions: Sequence[SimulatedSession], device: str = "cpu") ->
 
 
 class _Batch:
-    """A strategy with b people; the counterpart of `Strategy`, without TMS alone and without deadlines."""
+    """A strategy with b people, as `Alone` is with one: without TMS alone and without deadlines."""
 
     def __init__(self, sessions: Sequence[SimulatedSession], device: str) -> None:
         if len({(session.strategy, repr(session.settings)) for session in sessions}) > 1:
