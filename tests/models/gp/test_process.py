@@ -8,7 +8,7 @@ import torch
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Matern
 
-from isiw.models.gp.prior import KernelName, Process, correlations, regression
+from isiw.models.gp.prior import Hyperparameters, KernelName, correlations, regression
 
 RNG = np.random.default_rng(3)
 ISIS_MS = RNG.uniform(0, 500, 40)
@@ -17,9 +17,14 @@ GRID_MS = np.linspace(-10, 510, 261)
 LENGTH_MS, AMPLITUDE, NOISE = 45.0, 1.3, 0.5
 
 
-def process(*, lengths_ms: tuple[float, ...] = (LENGTH_MS,)) -> Process:
-    columns = (torch.full((len(lengths_ms),), value, dtype=torch.float64) for value in (AMPLITUDE, 0.0, 1.0, NOISE**2))
-    return Process(torch.tensor(lengths_ms, dtype=torch.float64), *columns)
+def process(
+    *, lengths_ms: tuple[float, ...] = (LENGTH_MS,)
+) -> tuple[Hyperparameters, tuple[torch.Tensor, torch.Tensor]]:
+    """Processes about a constant of mean 0 and variance 1."""
+    amplitude, noise, mean, variance = (
+        torch.full((len(lengths_ms),), value, dtype=torch.float64) for value in (AMPLITUDE, NOISE, 0.0, 1.0)
+    )
+    return Hyperparameters(torch.tensor(lengths_ms, dtype=torch.float64), amplitude, noise), (mean, variance)
 
 
 def reference(kernel: KernelName, relative_variance: np.ndarray) -> GaussianProcessRegressor:
@@ -36,7 +41,7 @@ def test_mean_and_sd_are_those_of_scikit_learn(kernel: KernelName, ratio: float)
     mean, sd = reference(kernel, relative).predict(GRID_MS[:, None], return_std=True)
     data = (torch.as_tensor(x) for x in (ISIS_MS, VALUES, relative))
     with torch.no_grad():
-        posterior = regression(kernel, process(), *data).posterior(torch.as_tensor(GRID_MS)[:, None])
+        posterior = regression(kernel, *process(), *data).posterior(torch.as_tensor(GRID_MS)[:, None])
     np.testing.assert_allclose(posterior.mean[0, :, 0], mean, rtol=0, atol=1e-6)
     np.testing.assert_allclose(posterior.variance[0, :, 0].sqrt(), sd, rtol=0, atol=1e-6)
 
@@ -45,15 +50,15 @@ def test_processes_in_one_batch_do_not_see_each_other() -> None:
     grid = torch.as_tensor(GRID_MS)[:, None]
     data = [torch.as_tensor(x) for x in (ISIS_MS, VALUES, np.ones(40))]
     with torch.no_grad():
-        alone = regression("rbf", process(), *data).posterior(grid).mean[0]
-        beside = regression("rbf", process(lengths_ms=(20.0, LENGTH_MS, 90.0)), *data).posterior(grid).mean[1]
+        alone = regression("rbf", *process(), *data).posterior(grid).mean[0]
+        beside = regression("rbf", *process(lengths_ms=(20.0, LENGTH_MS, 90.0)), *data).posterior(grid).mean[1]
     torch.testing.assert_close(beside, alone, rtol=0, atol=1e-10)
 
 
 def test_without_trials_the_process_is_its_prior() -> None:
     nothing = torch.empty(0, dtype=torch.float64)
     with torch.no_grad():
-        posterior = regression("rbf", process(), nothing, nothing, nothing).posterior(torch.tensor([[100.0]]).double())
+        posterior = regression("rbf", *process(), nothing, nothing, nothing).posterior(torch.tensor([[100.0]]).double())
     assert posterior.mean.item() == 0.0
     assert posterior.variance.item() == pytest.approx(AMPLITUDE**2 + 1.0)
 

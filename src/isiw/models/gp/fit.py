@@ -24,7 +24,6 @@ from isiw.models.gp.prior import (
     HyperparameterPrior,
     Hyperparameters,
     KernelName,
-    Process,
     Standardisation,
     correlations,
     regression,
@@ -214,10 +213,9 @@ class Fit:
     def regression(self, picks: Tensor) -> botorch.models.SingleTaskGP:
         """Some of the processes as BoTorch models, from ISIs [ms] to standardised MEPs."""
         chosen, trials = self.processes.picked(picks), self.trials
-        level, level_variance = self.level(chosen.noise)
-        process = Process(chosen.length_ms, chosen.amplitude, level, level_variance, chosen.noise.square())
         relative_variance = self.noise.log_variance(trials.isi_ms).exp()
-        return regression(self.kernel, process, trials.isi_ms, trials.values, relative_variance)
+        level = self.level(chosen.noise)
+        return regression(self.kernel, chosen, level, trials.isi_ms, trials.values, relative_variance)
 
 
 def fit(

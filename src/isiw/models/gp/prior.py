@@ -124,16 +124,6 @@ class FixedProcess(Checked):
 KernelName: TypeAlias = Literal["rbf", "matern"]
 
 
-class Process(NamedTuple):
-    """Processes about an uncertain constant, whose mean is the level; fields of shape (...)."""
-
-    length_ms: Tensor
-    amplitude: Tensor
-    level: Tensor
-    level_variance: Tensor
-    noise_variance: Tensor
-
-
 def correlations(kernel: KernelName, length_ms: Tensor, isi_ms: Tensor) -> Tensor:
     """Correlation of a profile's values at some ISIs."""
     matrices: Tensor = _kernel(kernel, length_ms)(isi_ms.unsqueeze(-1)).to_dense().detach()
@@ -141,21 +131,26 @@ def correlations(kernel: KernelName, length_ms: Tensor, isi_ms: Tensor) -> Tenso
 
 
 def regression(
-    kernel: KernelName, process: Process, isi_ms: Tensor, values: Tensor, relative_variance: Tensor
+    kernel: KernelName,
+    process: Hyperparameters,
+    level: tuple[Tensor, Tensor],
+    isi_ms: Tensor,
+    values: Tensor,
+    relative_variance: Tensor,
 ) -> botorch.models.SingleTaskGP:
-    """Processes given some trials, as a BoTorch model whose batch shape is theirs."""
+    """Processes about constants of a mean and a variance, given trials, as a BoTorch model of their batch shape."""
+    mean, level_variance = level
     inputs = isi_ms.unsqueeze(-1).expand(*process.length_ms.shape, -1, 1)
-    variance = process.noise_variance[..., None, None] * relative_variance.unsqueeze(-1)
+    noise_variance = process.noise.square()
+    variance = noise_variance[..., None, None] * relative_variance.unsqueeze(-1)
     return botorch.models.SingleTaskGP(
         inputs,
         values.unsqueeze(-1).expand_as(inputs),
         variance if len(values) else None,
         # Without a trial, BoTorch cannot take the next one's noise from theirs.
-        likelihood=None if len(values) else _likelihood(process.noise_variance),
-        mean_module=gpytorch.means.ConstantMean(batch_shape=process.level.shape)
-        .double()
-        .initialize(constant=process.level),
-        covar_module=_covariance(kernel, process),
+        likelihood=None if len(values) else _likelihood(noise_variance),
+        mean_module=gpytorch.means.ConstantMean(batch_shape=mean.shape).double().initialize(constant=mean),
+        covar_module=_covariance(kernel, process, level_variance),
         outcome_transform=None,
     )
 
@@ -170,13 +165,11 @@ def _kernel(name: KernelName, length_ms: Tensor) -> gpytorch.kernels.Kernel:
     return kernel.double().initialize(lengthscale=length_ms[..., None, None])
 
 
-def _covariance(kernel: KernelName, process: Process) -> gpytorch.kernels.Kernel:
+def _covariance(kernel: KernelName, process: Hyperparameters, level_variance: Tensor) -> gpytorch.kernels.Kernel:
     shape = process.amplitude.shape
     profile = gpytorch.kernels.ScaleKernel(_kernel(kernel, process.length_ms), batch_shape=shape).double()
     constant = gpytorch.kernels.ConstantKernel(batch_shape=shape).double()
-    return profile.initialize(outputscale=process.amplitude.square()) + constant.initialize(
-        constant=process.level_variance
-    )
+    return profile.initialize(outputscale=process.amplitude.square()) + constant.initialize(constant=level_variance)
 
 
 def _likelihood(noise_variance: Tensor) -> gpytorch.likelihoods.GaussianLikelihood:
