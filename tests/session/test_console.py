@@ -196,11 +196,11 @@ def test_a_rest_is_counted_down_by_the_second_and_a_short_wait_is_not(capsys: py
     console = OperatorConsole(Operated(trial(0)))
     with shown(console, capsys) as lines:
         for left_s in (8.0, 7.0):
-            console.count_down(left_s, "Next stimulus")
-        console.counted_down()
+            console.waiting(left_s, "Next stimulus")
+        console.waiting(None, "")
         for left_s in (63.2, 63.0, 62.0, 9.0):
-            console.count_down(left_s, "Rest after 12 trials")
-        console.counted_down()
+            console.waiting(left_s, "Rest after 12 trials")
+        console.waiting(None, "")
         console.screen.say("next")
     said = [part.replace("\x1b[K", "") for part in "\n".join(lines).replace("\r", "\n").splitlines()]
     rest = "Rest after 12 trials"

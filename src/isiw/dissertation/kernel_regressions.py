@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cache, partial
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
@@ -103,10 +103,8 @@ class GaussianProcessRegression(Checked):
         return process, math.exp(0.5 * found.x[-1]), None if found.success else gave_up
 
 
-@cache
-def _blas() -> ThreadpoolController:
-    """Of the libraries that are loaded now; looking for them takes longer than a fit."""
-    return ThreadpoolController()
+_blas: Final = cache(ThreadpoolController)
+"""The controller of the libraries that are loaded at its first call; looking for them takes longer than a fit."""
 
 
 def _cost(process: Any, theta: FloatArray) -> tuple[float, FloatArray]:

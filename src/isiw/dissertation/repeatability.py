@@ -268,7 +268,10 @@ def timing_report(study: TimingStudy) -> str:
             f"{isi:7g} {_figure(mean):>14} {_figure(sd):>12} {n:6.0f} {mistrials:8.0f}"
             for isi, n, mean, sd, mistrials in errors.itertuples()
         ]
-        lines += ["", f"{_pooled(study)} Mistrials: {study.mistrials}."]
+        pooled = f"Pooled SD of the ISI error: {study.pooled_sd_ms:.2f} ms."
+        unknown = "No ISI has two accepted trials, so the SD of its error is not known."
+        known = unknown if np.isnan(study.pooled_sd_ms) else pooled
+        lines += ["", f"{known} Mistrials: {study.mistrials}."]
     hit_delay = hit_delay_ms(study)
     if hit_delay is not None:
         mean_ms, sd_ms = hit_delay
@@ -283,12 +286,6 @@ def timing_report(study: TimingStudy) -> str:
 
 def _figure(value_ms: float) -> str:
     return "–" if np.isnan(value_ms) else f"{value_ms:.2f}"
-
-
-def _pooled(study: TimingStudy) -> str:
-    if np.isnan(study.pooled_sd_ms):
-        return "No ISI has two accepted trials, so the SD of its error is not known."
-    return f"Pooled SD of the ISI error: {study.pooled_sd_ms:.2f} ms."
 
 
 def _tap(geometry: Geometry, pulse_ms: FloatArray, rate_hz: float, rng: np.random.Generator) -> TapEvents:

@@ -6,7 +6,7 @@ import csv
 import io
 import warnings
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -23,7 +23,6 @@ TEXTS: Final = {".csv", ".tsv", ".txt", ".dat", ".tab"}
 WORKBOOKS: Final = {".xlsx", ".xlsm"}
 SUFFIXES: Final = TEXTS | WORKBOOKS | {".parquet", ".mat"}
 
-_ENCODINGS: Final = ("utf-8-sig", "cp1252", "latin-1")
 _LINES: Final = 100
 """Within so many lines the columns' names are sought."""
 
@@ -156,12 +155,10 @@ def _decoded(content: bytes) -> str:
     for first, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):  # the same without a mark of the order of its bytes
         if content[first:_HEAD:2] and not any(content[first:_HEAD:2]):
             return content.decode(encoding)
-    for encoding in _ENCODINGS[:-1]:
-        try:
+    for encoding in ("utf-8-sig", "cp1252"):
+        with suppress(UnicodeDecodeError):
             return content.decode(encoding)
-        except UnicodeDecodeError:
-            continue
-    return content.decode(_ENCODINGS[-1])
+    return content.decode("latin-1")
 
 
 def _separator(line: str) -> str:

@@ -21,7 +21,7 @@ from isiw.lazy import sklearn, torch
 from isiw.log.reader import SessionRecord, require_records
 from isiw.models.particles import ParticleModel, ParticlePosterior
 from isiw.models.particles.latents import LATENTS, Latents, used_by
-from isiw.models.particles.places import MOST_APART_MS, Place
+from isiw.models.particles.places import MOST_APART_MS
 from isiw.models.particles.prior import Prior
 from isiw.models.protocol import Tensor
 from isiw.priors.population import Component, beside, columns, floor, gain, mixed, mixed_shares, muscle, place
@@ -245,11 +245,13 @@ def _another_day(posterior: ParticlePosterior, law: DayToDay) -> Prior:
     latents = posterior.swarm.picked(posterior.model.particles)
     p_window = float(latents.present.double().mean())
     shapes, kinds = usual.profile.shapes, usual.noise
+    start, stimulus, reference = usual.profile.start, usual.profile.stimulus, posterior.space.reference
+    own_place = partial(place, reference=reference, hit_delay_ms=start.hit_delay_ms, conditioning=stimulus)
     profile = replace(
         usual.profile,
         p_window=mixed(p_window, usual.profile.p_window, law.p_other),
         shapes=mixed_shares(_shares(latents.shape[latents.present], len(fields(shapes))), shapes, law.p_other),
-        places=beside(usual.profile.places, _places(latents, law, posterior)),
+        places=beside(usual.profile.places, _laws(latents, "place", own_place, law)),
     )
     return replace(
         usual,
@@ -268,16 +270,10 @@ def _shares(kinds: Tensor, of: int) -> list[float]:
     return shares
 
 
-def _places(latents: Latents, law: DayToDay, posterior: ParticlePosterior) -> tuple[Place, ...]:
-    profile = posterior.model.prior.profile
-    rig = posterior.space.reference, profile.start.hit_delay_ms, profile.stimulus
-    return tuple(place(law.p_stays * share, mean, sd, *rig) for share, mean, sd in _normals(latents, "place", law))
-
-
 def _laws(
     latents: Latents, name: str, component: Callable[[float, FloatArray, FloatArray], Component], law: DayToDay
 ) -> tuple[Component, ...]:
-    keeps = 1.0 - law.p_other
+    keeps = law.p_stays if name == "place" else 1.0 - law.p_other
     return tuple(component(keeps * share, mean, sd) for share, mean, sd in _normals(latents, name, law))
 
 

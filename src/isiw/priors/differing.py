@@ -14,17 +14,6 @@ from isiw.models.particles.prior import Prior
 from isiw.priors.days import moved, recalled, too_far_apart_ms
 from isiw.types import FloatArray
 
-_OTHER_RIG = (
-    "The sessions were run on rigs with different hit delays, {:g} and {:g} ms, so their windows, which count from the "
-    "valve command, cannot be compared"
-)
-
-_OTHER_STIMULUS = "The sessions have different conditioning stimuli, so windows cannot be compared"
-
-_UNLIKE = "The sessions are of {}, which may be the reason of a difference"
-
-_APART = "The ranges of ISIs, {:g}–{:g} and {:g}–{:g} ms, have nothing in common, so windows cannot be compared"
-
 _Session: TypeAlias = tuple[SessionRecord, FloatArray | None]
 """A session, and samples of its window's edges [ms]."""
 
@@ -90,24 +79,33 @@ def _difference(first: _Session, second: _Session) -> Difference:
     same = bool(one.header.subject) and one.header.subject == other.header.subject
     if one_ms is None or other_ms is None:
         which = " and ".join(record.path.name for record, edges_ms in (first, second) if edges_ms is None)
-        return Difference(
-            one, other, same, obstacle=f"There is probably no window, or too little was measured: {which}"
-        )
-    if one.header.conditioning != other.header.conditioning:
-        return Difference(one, other, same, obstacle=_OTHER_STIMULUS)
-    if (apart_ms := too_far_apart_ms((one, other))) is not None:
-        return Difference(one, other, same, obstacle=_OTHER_RIG.format(*apart_ms))
+        nothing = f"There is probably no window, or too little was measured: {which}"
+        return Difference(one, other, same, obstacle=nothing)
+    if (incomparable := _incomparable(one, other)) is not None:
+        return Difference(one, other, same, obstacle=f"{incomparable} cannot be compared")
+    unlike = one.header.visit.unlike(other.header.visit)
+    reason = "" if unlike is None else f"The sessions are of {unlike}, which may be the reason of a difference"
+    probability, obstacle = _moved(one, other) if same else (None, reason)
     spaces = one.header.space, other.header.space
     low_ms, high_ms = max(space.low_ms for space in spaces), min(space.high_ms for space in spaces)
-    if low_ms >= high_ms:
-        ranges_ms = [edge_ms for space in spaces for edge_ms in (space.low_ms, space.high_ms)]
-        return Difference(one, other, same, obstacle=_APART.format(*ranges_ms))
-    unlike = one.header.visit.unlike(other.header.visit)
-    probability, obstacle = _moved(one, other) if same else (None, "" if unlike is None else _UNLIKE.format(unlike))
     # An edge beyond one session's range may lie within the other's: they are compared where both looked.
     seen_ms = one_ms.clip(low_ms, high_ms), other_ms.clip(low_ms, high_ms)
     starts, ends = (_later(*(edges_ms[:, edge] for edges_ms in seen_ms)) for edge in (0, 1))
     return Difference(one, other, same, starts, ends, probability, obstacle)
+
+
+def _incomparable(one: SessionRecord, other: SessionRecord) -> str | None:
+    """The windows of two sessions, and why they cannot be compared; None if they can."""
+    if one.header.conditioning != other.header.conditioning:
+        return "The sessions have different conditioning stimuli, so windows"
+    if (apart_ms := too_far_apart_ms((one, other))) is not None:
+        delays = f"The sessions were run on rigs with different hit delays, {apart_ms[0]:g} and {apart_ms[1]:g} ms"
+        return f"{delays}, so their windows, which count from the valve command,"
+    first, second = one.header.space, other.header.space
+    if first.low_ms < second.high_ms and second.low_ms < first.high_ms:
+        return None
+    ranges = f"{first.low_ms:g}–{first.high_ms:g} and {second.low_ms:g}–{second.high_ms:g} ms"
+    return f"The ranges of ISIs, {ranges}, have nothing in common, so windows"
 
 
 def _moved(first: SessionRecord, second: SessionRecord) -> tuple[float | None, str]:

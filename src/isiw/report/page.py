@@ -71,11 +71,8 @@ def report_page(record: SessionRecord, *, truth: Window | None = None) -> str:
     """
     require_records((record,))
     scripts = [library("plotly.offline", "report").get_plotlyjs(), asset("draw.js"), asset("page.js")]
-    return rendered("page.html", scripts, pictures=_pictures(record, truth), **_contents(record))
-
-
-def _contents(record: SessionRecord) -> dict[str, Any]:
-    return {
+    contents = {
+        "pictures": _pictures(record, truth),
         "subject": record.header.subject or "an unnamed subject",
         "states": _states(record),
         "losses": (*record.told_unread, *record.losses),
@@ -93,6 +90,7 @@ def _contents(record: SessionRecord) -> dict[str, Any]:
         "drawn": drawn(record),
         "log": record.path.name,
     }
+    return rendered("page.html", scripts, **contents)
 
 
 def _states(record: SessionRecord) -> list[str]:

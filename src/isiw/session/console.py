@@ -198,19 +198,15 @@ class OperatorConsole:
             self.screen.say("First finish the note with Enter, or drop it with Esc.")
         return self.asking.wait(lambda: self._left_alone)
 
-    def count_down(self, left_s: float, text: str) -> None:
-        """Show how long a wait still lasts, where it is worth it."""
-        left = round(left_s)
-        if (left_s >= _WORTH_COUNTING_S or self._counted is not None) and left != self._counted:
-            self._counted = left
-            if self._note is None:
-                self.screen.count_down(f"{text}: {left // 60}:{left % 60:02d} left")
-
-    def counted_down(self) -> None:
-        """The wait is over."""
-        if self._counted is not None:
-            self._counted = None
+    def waiting(self, left_s: float | None, text: str) -> None:
+        """Show how long a wait still lasts, where it is worth it; None if it is over."""
+        before, self._counted = self._counted, None if left_s is None else round(left_s)
+        if left_s is None or self._counted is None:
             self.screen.counted_down()
+        elif left_s < _WORTH_COUNTING_S and before is None:
+            self._counted = None
+        elif self._counted != before and self._note is None:
+            self.screen.count_down(f"{text}: {self._counted // 60}:{self._counted % 60:02d} left")
 
     def press(self, key: str) -> None:
         """Do what a key stands for, or take it for the note that is being typed."""
@@ -303,7 +299,5 @@ class Table:
 
     def waiting(self, left_s: float | None, text: str) -> None:
         """Count down until the next stimulus."""
-        if self._console.reads_keys and left_s is not None:
-            self._console.count_down(left_s, text)
-        elif self._console.reads_keys:
-            self._console.counted_down()
+        if self._console.reads_keys:
+            self._console.waiting(left_s, text)

@@ -152,8 +152,6 @@ def play(session: SimulatedSession, player: Player) -> pd.DataFrame:
 def examine(sessions: Sequence[SimulatedSession], crowd: Alone | _Batch) -> pd.DataFrame:
     """Run sessions of equally many trials side by side."""
     people = [_Participant(session, number, crowd) for number, session in enumerate(sessions)]
-    for person in people:
-        person.note_before()
     for trial in range(1, sessions[0].trials + 1):
         began_s = time.perf_counter()
         choices = crowd.ask()
@@ -178,12 +176,12 @@ class _Participant:
         self.session, self.number, self.crowd = session, number, crowd
         self.still = subject.window(session.space) if subject.change is None else None
         self.responder = subject.begin(session.seed + session.person)
-        self.rows: list[dict[str, Any]] = []
         self.mistrials = self.fallbacks = 0
         self.troubles = 0.0
         converged = math.nan if session.stopping == "ignored" else 0.0
         self.stop: dict[str, Any] = {"stop_trial": math.nan, "stop_kind": "", "stop_reason": "", "converged": converged}
         self.stop |= {f"stop_{name}": math.nan for name in _OF_THE_STOP}
+        self.rows = [self._row(0) | dict.fromkeys(TIMES, math.nan)] if 0 in session.marks else []
 
     @property
     def truth(self) -> Window | None:
@@ -221,10 +219,6 @@ class _Participant:
             self._note_stop(trial - 1 + self.mistrials)
             self._note_marks(trial, dict.fromkeys(TIMES, math.nan), reached=False)
         return choice
-
-    def note_before(self) -> None:
-        if 0 in self.session.marks:
-            self.rows.append(self._row(0) | dict.fromkeys(TIMES, math.nan))
 
     def note(self, trial: int, spent_ms: dict[str, float]) -> None:
         if self.ended:

@@ -222,8 +222,11 @@ class Responder:
         mep_mv = self._with_tap_mv(evoked_mv, noise, from_impact_ms) + floor_mv
         if rng.random() < subject.outlier_probability:
             mep_mv = rng.uniform(*OUTLIERS_MV)
+        mep_mv *= subject.scale
+        if step_mv := subject.amplitude_step_mv:
+            mep_mv = step_mv * np.round(mep_mv / step_mv)
         unseen_ms = 0.0 if subject.jitter_told or isi_ms is None else subject.isi_jitter_ms
-        return Response(told_ms, self._displayed_mv(subject.scale * mep_mv), unseen_ms)
+        return Response(told_ms, float(mep_mv), unseen_ms)
 
     def _response(self) -> ResponseCurve:
         """The response at the intensity of this trial."""
@@ -240,10 +243,6 @@ class Responder:
             return evoked_mv
         tap_mv = tap.sample_mv(self._rng) * float(np.exp(noise.log_gain))
         return amplitude_of_both_mv(evoked_mv, tap, tap_mv, from_impact_ms)
-
-    def _displayed_mv(self, mep_mv: float) -> float:
-        step_mv = self.subject.amplitude_step_mv
-        return float(mep_mv if step_mv == 0 else step_mv * np.round(mep_mv / step_mv))
 
     def respond_instead(self, isi_ms: float | None, reference: Reference, *, pulse: bool = True) -> Response:
         """Answer one pair of stimuli that is given because another was lost; see `respond`.

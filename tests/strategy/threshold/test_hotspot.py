@@ -60,6 +60,7 @@ def test_without_an_answer_there_is_no_place_and_at_the_end_another_area_is_advi
 
 
 def test_a_search_of_no_extent_is_refused() -> None:
-    for wrong in (lambda: BayesHotSpot(half_width_mm=0), lambda: BayesHotSpot(step_mm=math.nan)):
-        with pytest.raises(InvalidValueError):
-            wrong()
+    with pytest.raises(InvalidValueError):
+        BayesHotSpot(half_width_mm=0)
+    with pytest.raises(InvalidValueError):
+        BayesHotSpot(step_mm=math.nan)
