@@ -148,6 +148,11 @@ class Delivered:
         )
 
 
+def anywhere(reference: Reference) -> DesignSpace:
+    """A space that any ISI can have come from."""
+    return DesignSpace(-10_000.0, 10_000.0, 10.0, reference=reference)
+
+
 def read_log(path: str | Path) -> Delivered:
     """The trials of a log, as they count after an operator's verdicts."""
     record = read_session(path)

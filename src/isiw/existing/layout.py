@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 from isiw.checks import Checked, Natural, NonNegative, Positive, Text, choice
+from isiw.design import missing_reference
 from isiw.errors import InvalidValueError
 from isiw.signals.limits import EMG_UNITS_MV
 from isiw.text.toml_files import checked, read_toml
@@ -107,6 +108,16 @@ class Layout(Checked):
                 choice(f"what a {what} holds", key, sorted(known))
         for unit in self.units:
             choice("a unit", unit, [*ISI_UNITS_MS, *EMG_UNITS_MV])
+
+    def required_reference(self, source: str) -> Reference:
+        """The event that the ISIs of a file count from, which nobody but the lab knows."""
+        if self.reference is None:
+            raise InvalidValueError(
+                f"the event from which the ISIs of {source} count is not stated",
+                expected=missing_reference().expected,
+                remedy="Say --reference impact or --reference valve.",
+            )
+        return self.reference
 
     def unit_of(self, known: Mapping[str, float]) -> str | None:
         """The unit that is stated, of those of one quantity."""

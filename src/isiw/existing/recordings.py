@@ -13,10 +13,9 @@ from typing import Any, Final
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.existing.delivered import Delivered, renumbered
+from isiw.existing.delivered import Delivered, anywhere, renumbered
 from isiw.existing.frames import reading
 from isiw.existing.layout import Layout
-from isiw.existing.people import anywhere, required_reference
 from isiw.existing.tables import isis_of
 from isiw.lazy import pd
 from isiw.signals.judgement import judge
@@ -69,14 +68,14 @@ def of_raw(
     raw: Any, layout: Layout, subject: str, source: str = "the recording", events: pd.DataFrame | None = None
 ) -> Delivered:
     """The trials of an `mne.io.Raw`; its annotations say when the stimuli came, or a table of events."""
-    reference = required_reference(layout, source)
+    reference = layout.required_reference(source)
     recording = Recording(_channels(raw, layout, source), _annotated(raw) if events is None else events, source)
     return delivered_of(recording, sweeps_of(recording, layout, reference), layout, reference, subject)
 
 
 def of_epochs(epochs: Any, layout: Layout, subject: str, source: str = "the epochs") -> Delivered:
     """The trials of `mne.Epochs` about the pulse, whose metadata have the ISIs."""
-    required_reference(layout, source)
+    layout.required_reference(source)
     if epochs.metadata is None:
         raise InvalidValueError(f"{source} do not hold the ISIs", expected="a column isi_ms in their metadata")
     told = replace(layout, alone="") if layout.alone is None else layout
@@ -92,7 +91,7 @@ def of_sweeps(
     channels: Sequence[Channel], isis_ms: Sequence[float | None], layout: Layout, subject: str, source: str
 ) -> Delivered:
     """The trials of sweeps whose clocks begin at the pulse; one without an ISI is TMS alone."""
-    reference = required_reference(layout, source)
+    reference = layout.required_reference(source)
     begin = "t_hit_ms" if reference == "impact" else "t_valve_ms"
     sweeps: list[Found] = []
     for number, (isi_ms, emg) in enumerate(zip(isis_ms, channels, strict=True)):

@@ -66,15 +66,16 @@ def _same(cell: Any, mark: str) -> bool:
 
 @dataclass(frozen=True)
 class Column:
-    """A column that holds something known: its name and cells as they were read, and the decimal sign of its texts."""
+    """A column that holds something known: its name and cells as they were read, and how its numbers are read."""
 
     name: str
     cells: Sequence[Any]
     decimal: str = "."
     of: str = "the data"
+    factor: float = 1.0  # that turns a number into ms, mV or µV
 
-    def number(self, row: int, factor: float = 1.0) -> float | None:
-        """The number in a row, in other units; None if the cell is empty."""
+    def number(self, row: int) -> float | None:
+        """The number in a row [ms, mV or µV]; None if the cell is empty."""
         cell = self.cells[row]
         if is_missing(cell):
             return None
@@ -87,7 +88,7 @@ class Column:
             is_comma = isinstance(cell, str) and "," in cell and self.decimal != ","
             remedy = "If the comma is a decimal sign, say --decimal ," if is_comma else usual
             raise self.refused(row, "is no number", remedy)
-        return value if factor == 1.0 else value * factor
+        return value if self.factor == 1.0 else value * self.factor
 
     def flag(self, row: int) -> bool | None:
         """True if the cell of a row says yes; None if it is empty."""
@@ -155,13 +156,16 @@ def _doubtful(column: Column) -> str | None:
 
 @dataclass(frozen=True)
 class Columns:
-    """The columns of a table by what they hold, and the factors that turn their numbers into ms, mV or µV."""
+    """The columns of a table by what they hold."""
 
     of: Mapping[str, Column]
-    factors: Mapping[str, float]
     rows: int
     units: tuple[str, str]
-    unused: tuple[str, ...] = ()
+    unused: tuple[str, ...]
+    empty: Column  # in the place of those that there are not
+
+    def __getitem__(self, key: str) -> Column:
+        return self.of.get(key, self.empty)
 
     @classmethod
     def found(cls, frame: pd.DataFrame, layout: Layout, source: str) -> Columns:
@@ -186,23 +190,9 @@ class Columns:
                 factors[key] = ISI_UNITS_MS[_told(columns[key].name, ISI_UNITS_MS) or isi_unit]
         if "background" in columns:
             factors["background"] = 1e3 * EMG_UNITS_MV[_told(columns["background"].name, EMG_UNITS_MV) or "uV"]
+        columns |= {key: replace(columns[key], factor=factor) for key, factor in factors.items()}
         unused = tuple(name for name in names if name not in held.values() and name.strip())
-        return cls(columns, factors, len(frame), (isi_unit, mep_unit), unused)
-
-    def number(self, key: str, row: int) -> float | None:
-        """A number of a row, in ms, mV or µV; None if there is none."""
-        column = self.of.get(key)
-        return None if column is None else column.number(row, self.factors.get(key, 1.0))
-
-    def flag(self, key: str, row: int) -> bool | None:
-        """A yes or no of a row; None if there is none."""
-        column = self.of.get(key)
-        return None if column is None else column.flag(row)
-
-    def text(self, key: str, row: int) -> str:
-        """A text of a row; empty if there is none."""
-        column = self.of.get(key)
-        return "" if column is None else column.text(row)
+        return cls(columns, len(frame), (isi_unit, mep_unit), unused, Column("", [None] * len(frame), of=source))
 
 
 def _named(key: str, names: list[str], layout: Layout, source: str) -> str | None:
@@ -248,9 +238,9 @@ def isis_of(vectors: Mapping[str, Sequence[Any]], layout: Layout, source: str) -
         raise _missing("isi", list(vectors), source)
     cells = list(vectors[name])
     column = with_decimals({"isi": Column(name, cells, of=source)}, layout.decimal)["isi"]
-    factor = ISI_UNITS_MS[required_unit("ISIs", column, layout, ISI_UNITS_MS)]
+    column = replace(column, factor=ISI_UNITS_MS[required_unit("ISIs", column, layout, ISI_UNITS_MS)])
     alone = [says_alone(cell, layout.alone) for cell in cells]
-    isis_ms = [None if alone[row] else column.number(row, factor) for row in range(len(cells))]
+    isis_ms = [None if alone[row] else column.number(row) for row in range(len(cells))]
     if lost := [row for row, isi_ms in enumerate(isis_ms) if isi_ms is None and not alone[row]]:
         raise column.refused(lost[0], "is empty", "If it is TMS alone, say --alone ''.")
     return isis_ms
