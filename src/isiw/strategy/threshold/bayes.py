@@ -44,7 +44,7 @@ class MaximumLikelihood(Checked):
 
     @property
     def budget(self) -> int:
-        """Number of pulses; see `HasPulseBudget`."""
+        """Number of pulses; see `ThresholdMethod`."""
         return self.pulses
 
     def ask(self, pulses: Sequence[Pulse], space: IntensityRange) -> float:
@@ -279,7 +279,7 @@ class BayesThreshold(Checked):
 
     @property
     def budget(self) -> int:
-        """Largest number of pulses; see `HasPulseBudget`."""
+        """Largest number of pulses; see `ThresholdMethod`."""
         return self.max_pulses
 
     def posterior(self, pulses: Sequence[Pulse]) -> FloatArray:

@@ -61,7 +61,7 @@ class BayesHotSpot(Checked):
         return space.high_pct_mso
 
     def place_mm(self, pulses: Sequence[Pulse]) -> tuple[float, float]:
-        """The next place of the coil; see `PlacesCoil`."""
+        """The next place of the coil [mm]."""
         posterior = self.posterior(pulses)
         acting = np.clip(_distances(self, self.places_mm), *_USEFUL_PCT)
         mean = np.einsum("tc,ptc->p", posterior, acting)

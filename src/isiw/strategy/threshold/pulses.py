@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Annotated, Final, Protocol, runtime_checkable
+from typing import Annotated, Final, Protocol
 
 import numpy as np
 
@@ -173,7 +173,10 @@ class ThresholdEstimate:
 
 
 class ThresholdMethod(Protocol):
-    """A way to a threshold: settings that answer from the pulses so far, and remember nothing themselves."""
+    """A way to a threshold: settings that answer from the pulses so far, and remember nothing themselves.
+
+    One that stops after so many pulses, whatever it knows then, says how many by an attribute `budget`.
+    """
 
     def ask(self, pulses: Sequence[Pulse], space: IntensityRange) -> float:
         """The next intensity [% MSO], on the grid.
@@ -198,23 +201,6 @@ class ThresholdMethod(Protocol):
             pulses: the pulses so far, in order.
             space: the intensities that may be asked.
         """
-
-
-@runtime_checkable
-class PlacesCoil(Protocol):
-    """Capability: a method that varies the coil's place instead of the intensity, and learns from amplitudes."""
-
-    def place_mm(self, pulses: Sequence[Pulse]) -> tuple[float, float]:
-        """The next place of the coil [mm], after some pulses in their order."""
-
-
-@runtime_checkable
-class HasPulseBudget(Protocol):
-    """Capability: a method that stops after so many pulses, whatever it knows then."""
-
-    @property
-    def budget(self) -> int:
-        """Number of pulses."""
 
 
 def one_sided(pulses: Sequence[Pulse], space: IntensityRange) -> StopDecision | None:

@@ -13,9 +13,7 @@ from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.strategy.threshold.bayes import BayesThreshold, FiveOfTen, MaximumLikelihood
 from isiw.strategy.threshold.hotspot import BayesHotSpot
 from isiw.strategy.threshold.pulses import (
-    HasPulseBudget,
     IntensityRange,
-    PlacesCoil,
     Pulse,
     ThresholdEstimate,
     ThresholdMethod,
@@ -88,7 +86,7 @@ class ThresholdSearch:
     @property
     def place_mm(self) -> tuple[float, float] | None:
         """The next place of the coil from the middle of the searched area [mm]; None if a threshold is sought."""
-        return self.method.place_mm(self.pulses) if isinstance(self.method, PlacesCoil) else None
+        return self.method.place_mm(self.pulses) if isinstance(self.method, BayesHotSpot) else None
 
     def tell(self, intensity_pct_mso: float, mep_mv: float | None = None, *, response: bool | None = None) -> None:
         """Learn from one pulse.
@@ -144,9 +142,9 @@ class ThresholdSearch:
 
     def _refused(self) -> StopDecision | None:
         """Why the pulses give no number, whatever the method says; None if they may."""
-        if isinstance(self.method, PlacesCoil):
+        if isinstance(self.method, BayesHotSpot):
             return None
-        budget = self.method.budget if isinstance(self.method, HasPulseBudget) else None
+        budget: int | None = getattr(self.method, "budget", None)
         refused = one_sided(self.pulses, self.space) or self._like_hum(budget)
         if refused is None or refused.stop or budget is None or len(self.pulses) < budget:
             return refused
