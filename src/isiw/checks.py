@@ -119,13 +119,8 @@ def mean_and_sd(what: str, value: object) -> tuple[float, float]:
             f"{what} must be a mean and an SD [ms]", got=value, remedy="Give both, such as (183.1, 6.0)."
         )
     mean, sd = (number(what, each, above=0, most=MOST_DELAY_MS) for each in pair)
-    if (slip := DELAY_MS.slip(mean)) is not None:
-        raise InvalidValueError(
-            f"{what} is shorter than any rig's",
-            got=(mean, sd),
-            expected="a mean and an SD in ms, such as (183.1, 6.0)",
-            remedy=slip,
-        )
+    expected = "a mean and an SD in ms, such as (183.1, 6.0)"
+    DELAY_MS.require(f"{what} is shorter than any rig's", mean, expected, got=(mean, sd))
     return mean, sd
 
 

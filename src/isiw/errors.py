@@ -28,7 +28,8 @@ from __future__ import annotations
 import difflib
 import inspect
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 
 class IsiwError(Exception):
@@ -140,6 +141,15 @@ def error_text(error: BaseException) -> str:
         text = "(its message cannot be shown)"
     whole = f"{type(error).__name__}: {text[:_LONGEST_TEXT]}"
     return whole.encode(errors="backslashreplace").decode()
+
+
+@contextmanager
+def os_errors(kind: type[IsiwError], what: str, got: object, remedy: str | None = None) -> Iterator[None]:
+    """Within, an error of the operating system becomes one of isiw's."""
+    try:
+        yield
+    except OSError as error:
+        raise kind(f"{what}: {error.strerror}", got=str(got), remedy=remedy) from error
 
 
 def warn(text: str, category: type[Warning]) -> None:

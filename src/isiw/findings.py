@@ -139,6 +139,11 @@ class UnitScale:
             return f"Is it in {self.too_large[0]}? Divide by {self.too_large[1]:g}."
         return None
 
+    def require(self, what: str, value: float, expected: str, got: object = None) -> None:
+        """Raise if a value is probably in another unit."""
+        if (slip := self.slip(value)) is not None:
+            raise InvalidValueError(what, got=value if got is None else got, expected=expected, remedy=slip)
+
     def likely_unit(self, values: Mapping[str, float]) -> str | None:
         """The unit in which a value would be nearest to the usual one; None if none makes it possible."""
         possible = {unit: value for unit, value in values.items() if self.least <= value <= self.most}

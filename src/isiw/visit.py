@@ -83,13 +83,8 @@ PAIRS_FIRST: Final = 4
 def interval_s(what: str, value: object) -> float:
     """An interval between two stimuli, no longer than anybody waits [s]."""
     plain_s = number(what, value, least=0)
-    if (slip := INTERVAL_S.slip(plain_s)) is not None:
-        raise InvalidValueError(
-            f"{what} is longer than anybody waits between two stimuli",
-            got=value,
-            expected=f"at most {INTERVAL_S.most:g} s",
-            remedy=slip,
-        )
+    too_long = f"{what} is longer than anybody waits between two stimuli"
+    INTERVAL_S.require(too_long, plain_s, f"at most {INTERVAL_S.most:g} s", got=value)
     return plain_s
 
 

@@ -14,7 +14,7 @@ from isiw.design import DesignSpace
 from isiw.devices.simulated import SimulatedDevice
 from isiw.findings import MISTRIALS, Finding, Kind, Severity
 from isiw.signals import judge
-from isiw.signals.rig import remedy_for
+from isiw.signals.rig import REMEDIES
 from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial
 from known import instance
 from wrong_rigs import KINDS, SPACE, WRONG, WrongRig, doubled, rig
@@ -120,7 +120,7 @@ def test_of_a_device_that_measures_by_itself_no_channel_is_accused() -> None:
 
 
 def test_every_reason_of_a_mistrial_has_a_remedy() -> None:
-    assert all(remedy_for(reason).endswith(".") for reason in MISTRIALS)
+    assert all(REMEDIES[reason].endswith(".") for reason in MISTRIALS)
 
 
 def test_a_mistrial_without_a_sign_is_told_by_its_reason_and_figure() -> None:

@@ -14,14 +14,12 @@ from isiw.errors import InvalidValueError
 from isiw.export import emg
 from isiw.export.collection import Part, log_losses, stimulus_of
 from isiw.export.emg import Run
-from isiw.export.tables import session_columns, session_facts, tidy
+from isiw.export.tables import Columns, session_columns, session_facts, tidy
 from isiw.files import write_output
 from isiw.lazy import pd
 from isiw.log.reader import trial_columns
 from isiw.text import one_line
 from isiw.text.stimuli import StimulusWords
-
-Columns = Mapping[str, tuple[str, str]]
 
 BIDS_VERSION: Final = "1.11.0"
 TASK: Final = "pairedstimulation"

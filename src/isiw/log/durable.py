@@ -20,7 +20,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Final, NamedTuple, Self
 
-from isiw.errors import LogError
+from isiw.errors import LogError, os_errors
 from isiw.files import force, new_file, sync_folder, take_free_place
 
 _DAMAGED: Final = ".damaged"
@@ -62,15 +62,6 @@ def kept_for(path: Path) -> Path | None:
     """The log whose damaged file is kept at a path; None if the path's name does not say so."""
     name, damaged, number = path.name.rpartition(_DAMAGED)
     return path.with_name(name) if damaged and name and (number.isdecimal() or not number) else None
-
-
-@contextmanager
-def disk_errors(path: Path, what: str, remedy: str) -> Iterator[None]:
-    """Within, an error of the operating system becomes a LogError."""
-    try:
-        yield
-    except OSError as error:
-        raise LogError(f"{what}: {error.strerror}", got=str(path), remedy=remedy) from error
 
 
 class DurableFile:
@@ -151,7 +142,7 @@ class DurableFile:
             return self._copied(wanted.parent, wanted)
         except (OSError, LogError):
             tried = "Its folder and the one for temporary files were tried."
-            with disk_errors(wanted, "what the session still held of the log cannot be saved", tried):
+            with os_errors(LogError, "what the session still held of the log cannot be saved", wanted, tried):
                 return self._copied(Path(tempfile.gettempdir()), wanted)
 
     def _copied(self, folder: Path, wanted: Path) -> Path:
@@ -252,12 +243,8 @@ def claim(file: IO[bytes]) -> bool:
 
 def lock(file: IO[bytes], path: Path) -> None:
     """Lock an open log until it is closed."""
-    try:
+    with os_errors(LogError, "the log cannot be locked", path, "Choose a folder on a local disk."):
         free = claim(file)
-    except OSError as error:
-        raise LogError(
-            f"the log cannot be locked: {error.strerror}", got=str(path), remedy="Choose a folder on a local disk."
-        ) from error
     if not free:
         raise LogError(
             "the log is being written by a running session, or by another process that resumes it",
@@ -269,18 +256,15 @@ def lock(file: IO[bytes], path: Path) -> None:
 @contextmanager
 def claimed(path: Path) -> Iterator[IO[bytes]]:
     """Within, a log is this process's alone."""
-    try:
-        file = path.open("r+b")  # network disks lock only what is open for writing
-    except FileNotFoundError as error:
-        raise LogError(
-            "the log has changed since it was read: it is not there any more",
-            got=str(path),
-            remedy="Another process may have finished it. Begin again by reading it.",
-        ) from error
-    except OSError as error:
-        raise LogError(
-            f"the log cannot be opened for writing: {error.strerror}", got=str(path), remedy="Check its permissions."
-        ) from error
+    with os_errors(LogError, "the log cannot be opened for writing", path, "Check its permissions."):
+        try:
+            file = path.open("r+b")  # network disks lock only what is open for writing
+        except FileNotFoundError as error:
+            raise LogError(
+                "the log has changed since it was read: it is not there any more",
+                got=str(path),
+                remedy="Another process may have finished it. Begin again by reading it.",
+            ) from error
     with file:
         lock(file, path)
         yield file

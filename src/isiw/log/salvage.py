@@ -9,18 +9,20 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, cast
+from typing import IO, Final, cast
 
 from mcap import records as mcap
 from mcap.exceptions import EndOfFile
 from mcap.stream_reader import CRCValidationError, StreamReader
 
-from isiw.errors import DamagedLogError, LogError
+from isiw.errors import DamagedLogError, LogError, os_errors
 from isiw.files import opened
 from isiw.log.blocks import RECORD_HEAD_BYTES, UNREADABLE, LostBlockError, Unpacking, counted_records, marked
-from isiw.log.durable import Fingerprint, disk_errors, log_of, part_of
+from isiw.log.durable import Fingerprint, log_of, part_of
 from isiw.log.schema import ANNOUNCEMENT, CHANNEL_IDS, Message
 from isiw.text.sanitize import counted
+
+_PERMISSIONS: Final = "Check its permissions and those of its folder."
 
 
 @dataclass
@@ -63,7 +65,7 @@ def salvage(path: str | Path) -> Salvage:
     """
     if not isinstance(path, str | os.PathLike):
         raise LogError("a log is named by its path", got=path, expected="text or a path")
-    with disk_errors(Path(path), "the log cannot be read", "Check its permissions and those of its folder."):
+    with os_errors(LogError, "the log cannot be read", path, _PERMISSIONS):
         current, closed = current_file(path), log_of(Path(path))
         if Path(path) == current or not closed.is_file():
             return salvage_file(current)
@@ -97,10 +99,7 @@ def only_in(found: Salvage, other: Salvage) -> int:
 def salvage_file(path: Path) -> Salvage:
     """Read everything that can be read from one file, whatever else is beside it."""
     found = Salvage(path)
-    with (
-        disk_errors(path, "the log cannot be read", "Check its permissions and those of its folder."),
-        opened(path) as file,
-    ):
+    with os_errors(LogError, "the log cannot be read", path, _PERMISSIONS), opened(path) as file:
         found.fingerprint = Fingerprint.of(file)
         found.size = found.fingerprint.size
         _read_file(file, found)

@@ -10,14 +10,13 @@ from typing import IO, Final, Self, cast
 
 from mcap.writer import Writer
 
-from isiw.errors import LogError
+from isiw.errors import LogError, os_errors
 from isiw.files import in_the_way, is_reserved, sync_folder
 from isiw.log.durable import (
     DurableFile,
     Fingerprint,
     begun,
     claimed,
-    disk_errors,
     keep_damaged,
     log_of,
     part_of,
@@ -74,7 +73,7 @@ class LogWriter:
     def create(cls, path: str | Path, header: AnyHeader) -> Self:
         """Start a new log with its header."""
         target = Path(path)
-        with disk_errors(target, "the log cannot be created", "Make room, or choose another path."):
+        with os_errors(LogError, "the log cannot be created", target, "Make room, or choose another path."):
             _require_free(target)
             with begun(part_of(target)) as file:
                 log = cls(target, file)
@@ -90,7 +89,8 @@ class LogWriter:
     ) -> Self:
         """Continue a salvaged log; the old file stays until the copy is durable, and for good if it is damaged."""
         target = log_of(Path(path))
-        with claimed(salvage.path) as source, disk_errors(target, "the log cannot be continued", "It stays as it was."):
+        in_words = os_errors(LogError, "the log cannot be continued", target, "It stays as it was.")
+        with claimed(salvage.path) as source, in_words:
             _require_unchanged(source, salvage)
             replaces = _own_file(target, salvage)
             _require_unchanged(source, salvage)  # again, for a session that went on with it and ended just now
@@ -188,7 +188,7 @@ class LogWriter:
                 self._file.flush()
                 self._save_if_displaced()
                 complete = f"It is complete, at {self._file.path}."
-                with disk_errors(self._file.path, "the finished log cannot be renamed", complete):
+                with os_errors(LogError, "the finished log cannot be renamed", self._file.path, complete):
                     self._take_its_name()
             finally:
                 self._file.close()

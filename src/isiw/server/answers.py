@@ -172,16 +172,8 @@ class TrialAnswer(OkAnswer):
     @classmethod
     def of(cls, trial: Trial, decision: StopDecision, doubts: list[str]) -> Self:
         """The answer about a trial."""
-        return cls(
-            trial=trial.index,
-            status=trial.status,
-            reason=trial.reason,
-            isi_ms=trial.isi_ms,
-            mep_mv=trial.mep_mv,
-            stop=decision.stop,
-            stop_reason=decision.reason,
-            doubts=doubts,
-        )
+        known = {name: getattr(trial, name) for name in ("status", "reason", "isi_ms", "mep_mv")}
+        return cls(trial=trial.index, **known, stop=decision.stop, stop_reason=decision.reason, doubts=doubts)
 
 
 class TrialRow(BaseModel):

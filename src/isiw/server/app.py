@@ -27,7 +27,7 @@ from starlette.exceptions import HTTPException
 
 import isiw
 from isiw.checks import Checked, Text, whole
-from isiw.errors import ConfigError, IsiwError
+from isiw.errors import ConfigError, IsiwError, os_errors
 from isiw.server.answers import Refusal, answered, as_refusal
 from isiw.server.guard import LOOPBACK, Connections, Guard, Rules, wants_200
 from isiw.server.requests import FORM, JSON, BodyOf
@@ -273,14 +273,9 @@ def settings_of(
 def listening(address: ipaddress.IPv4Address | ipaddress.IPv6Address, port: int) -> socket.socket:
     """A socket that listens."""
     family = socket.AF_INET6 if address.version == 6 else socket.AF_INET
-    try:
+    taken = "Choose another port; 0 takes any that is free."
+    with os_errors(ConfigError, "the server cannot listen", f"{address}, port {port}", taken):
         listener = socket.create_server((str(address), port), family=family, backlog=_WAITING)
-    except OSError as error:
-        raise ConfigError(
-            f"the server cannot listen: {error.strerror}",
-            got=f"{address}, port {port}",
-            remedy="Choose another port; 0 takes any that is free.",
-        ) from error
     listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)  # or each answer waits 40 ms for the one before
     if hasattr(socket, "TCP_DEFER_ACCEPT"):  # Linux: who says nothing waits outside for a while
         listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_DEFER_ACCEPT, _SILENT_S)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import hmac
-import itertools
 import ssl
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -108,8 +107,12 @@ class Guard:
         except Refusal as refusal:  # the rest of the body is not read
             await answered(refusal, as_200=as_200, headers={"Connection": "close"})(scope, receive, send)
             return
-        first: Message = {"type": "http.request", "body": body, "more_body": False}
-        await self._app(scope, _beginning_with(first, receive), send)
+        whole = iter([{"type": "http.request", "body": body, "more_body": False}])
+
+        async def received() -> Message:
+            return next(whole, None) or await receive()
+
+        await self._app(scope, received, send)
 
     def _require_host(self, headers: Headers) -> None:
         host, origin = headers.get("host", ""), headers.get("origin")
@@ -167,16 +170,6 @@ def _hostname(url: str) -> str | None:
         return urlsplit(url).hostname
     except ValueError:
         return None
-
-
-def _beginning_with(first: Message, receive: Receive) -> Receive:
-    """A receiver with one message before all others."""
-    messages = itertools.chain([first], itertools.repeat(None))
-
-    async def received() -> Message:
-        return next(messages) or await receive()
-
-    return received
 
 
 TAKING_S: Final = 30.0

@@ -22,7 +22,7 @@ from isiw.session.examination import examination_of
 from isiw.session.judging import Judging
 from isiw.session.sink import Sink
 from isiw.signals.limits import isi_far, require_plausible
-from isiw.signals.rig import Evidence, remedy_for, told_of
+from isiw.signals.rig import REMEDIES, Evidence, told_of
 from isiw.signals.watch import Doubts, findings
 from isiw.strategy.course import Outcome
 from isiw.strategy.stopping import StopDecision
@@ -201,7 +201,7 @@ class Recorder(Judging):
         lost = len(list(itertools.takewhile(lambda trial: trial.reason is not None, reversed(self.trials.trials))))
         if lost == self._limits.max_consecutive_mistrials:
             mistrials = "1 mistrial" if lost == 1 else f"{lost} mistrials in a row, the last one"
-            self._warn(Finding(known, Severity.DOUBT, f"{mistrials}: {known}", remedy_for(known)))
+            self._warn(Finding(known, Severity.DOUBT, f"{mistrials}: {known}", REMEDIES[known]))
 
     def _judge(self, verdict: Callable[[TrialTable], Event]) -> None:
         with self._lock:

@@ -47,20 +47,12 @@ class SignalLimits(Checked):
         name, window_ms, such_as = "SignalLimits.mep_window_ms", self.mep_window_ms, f"such as {MEP_WINDOW_MS}"
         if not isinstance(window_ms, Sequence) or len(window_ms) != 2:
             raise InvalidValueError(f"{name} must be its first and its last ms", got=window_ms, expected=such_as)
-        if (slip := WINDOW_END_MS.slip(ascending(name, window_ms, least=0)[1])) is not None:
-            raise InvalidValueError(
-                f"{name} ends before any MEP begins",
-                got=window_ms,
-                expected=f"ms after the pulse, {such_as}",
-                remedy=slip,
-            )
-        if (slip := BACKGROUND_LIMIT_UV.slip(self.background_uv)) is not None:
-            raise InvalidValueError(
-                "SignalLimits.background_uv is less than any amplifier's noise",
-                got=self.background_uv,
-                expected="µV RMS, such as 10",
-                remedy=slip,
-            )
+        _, end_ms = ascending(name, window_ms, least=0)
+        WINDOW_END_MS.require(
+            f"{name} ends before any MEP begins", end_ms, f"ms after the pulse, {such_as}", got=window_ms
+        )
+        too_quiet = "SignalLimits.background_uv is less than any amplifier's noise"
+        BACKGROUND_LIMIT_UV.require(too_quiet, self.background_uv, "µV RMS, such as 10")
 
     def require_behind_artefact(self) -> None:
         """Raise where the window would hold the pulse's own artefact.

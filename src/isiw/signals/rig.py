@@ -98,7 +98,7 @@ QUICK_MS, QUICK_SAMPLES = 3.0, 4
 
 CLEAR = 20.0
 
-_REMEDIES: Mapping[Kind, str] = MappingProxyType(
+REMEDIES: Mapping[Kind, str] = MappingProxyType(
     {
         Kind.NO_IMPACT: "Check the air supply, the valve, and the accelerometer on the hammer.",
         Kind.NO_PULSE: "Check that the stimulator is charged and armed, and that its trigger is recorded.",
@@ -119,11 +119,7 @@ _REMEDIES: Mapping[Kind, str] = MappingProxyType(
         Kind.OUTCOME_UNKNOWN: "Check whether the device is connected and answers.",
     }
 )
-
-
-def remedy_for(reason: Kind) -> str:
-    """What to do about a mistrial of this reason."""
-    return _REMEDIES[reason]
+"""What to do about a mistrial of each reason."""
 
 
 def too_early_by_chance(trial: Trial, space: DesignSpace) -> bool:
@@ -309,7 +305,7 @@ def lost_trial(trial: Trial, evidence: Evidence) -> Finding | None:
     amplitude = implausible_amplitude(trial.mep_mv or 0.0)
     if trial.reason is Kind.IMPLAUSIBLE and amplitude is not None:
         return replace(amplitude, severity=Severity.MISTRIAL)
-    return _finding(trial.reason, trial, _explained(trial, evidence), remedy_for(trial.reason))
+    return _finding(trial.reason, trial, _explained(trial, evidence), REMEDIES[trial.reason])
 
 
 def _explained(trial: Trial, evidence: Evidence) -> str:

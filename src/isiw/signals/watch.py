@@ -17,7 +17,7 @@ from isiw.lazy import scipy
 from isiw.signals import places, rig
 from isiw.signals.limits import SignalLimits
 from isiw.signals.places import told_by
-from isiw.signals.rig import Evidence, Told, remedy_for, told_of, too_early_by_chance
+from isiw.signals.rig import REMEDIES, Evidence, Told, told_of, too_early_by_chance
 from isiw.trials import RESPONSE_MV, Measurement, Sweep, Trial, TrialTable
 from isiw.types import FloatArray
 
@@ -267,6 +267,6 @@ def _after_early(watch: Watch, trial: Trial) -> Watch:
     pause = None
     if early >= EARLY_IN_A_ROW:
         text = f"At {trial.commanded_isi_ms:g} ms the pulse came before the impact {early} times in a row"
-        remedy = f"{remedy_for(Kind.TMS_BEFORE_IMPACT)} Or begin the space at a larger ISI."
+        remedy = f"{REMEDIES[Kind.TMS_BEFORE_IMPACT]} Or begin the space at a larger ISI."
         pause = Finding(Kind.EARLY_AT_ONE_ISI, Severity.PAUSE, text, remedy)
     return replace(watch, early_ms=trial.commanded_isi_ms, early=early, pause=pause)

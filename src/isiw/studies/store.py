@@ -13,7 +13,7 @@ from __future__ import annotations
 import platform
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
@@ -23,7 +23,7 @@ import numpy as np
 import tomli_w
 
 import isiw
-from isiw.errors import StudyError
+from isiw.errors import StudyError, os_errors
 from isiw.files import TEMPORARY, opened, put
 from isiw.lazy import pa, parquet, pd, torch
 from isiw.log.durable import claim
@@ -230,17 +230,10 @@ def _error_rows(unit: Unit, failure: Failure) -> pd.DataFrame:
     )
 
 
-@contextmanager
-def _disk_errors(folder: Path) -> Iterator[None]:
+def _disk_errors(folder: Path) -> AbstractContextManager[None]:
     """Within, what the operating system refuses is a StudyError."""
-    try:
-        yield
-    except OSError as error:
-        raise StudyError(
-            f"the study's folder cannot be written: {error.strerror}",
-            got=str(folder),
-            remedy="Check its permissions and make room, then run the study again: all that is finished is kept.",
-        ) from error
+    remedy = "Check its permissions and make room, then run the study again: all that is finished is kept."
+    return os_errors(StudyError, "the study's folder cannot be written", folder, remedy)
 
 
 def _table(paths: Iterable[Path], order: Sequence[str], state: str) -> pd.DataFrame:

@@ -50,13 +50,14 @@ class DeviceTable:
 def device_table(info: DeviceInfo, deliveries: Sequence[Delivery], limits: SignalLimits) -> DeviceTable:
     """The table of a check."""
     trials, late_ms = [delivery.trial for delivery in deliveries], edges_ms(deliveries)
+    errors = [f"{trial.isi_error_ms:+.1f}" for trial in trials if trial.isi_error_ms is not None]
     meps_uv = [1e3 * trial.mep_mv for trial in trials if trial.mep_mv is not None]
     artefact = f"steepest edge of the EMG {np.median(late_ms):+.1f} ms from the pulse" if late_ms else "none seen"
     return DeviceTable(
         (
             ("background EMG", _background(trials, limits)),
             ("impact found", _impacts(deliveries)),
-            ("realised minus wanted ISI", _isi_errors(trials)),
+            ("realised minus wanted ISI", f"{', '.join(errors)} ms" if errors else "not known"),
             ("MEP window", _windows(deliveries, limits)),
             ("amplitudes in it", f"{min(meps_uv):.3g} to {max(meps_uv):.3g} µV" if meps_uv else "none"),
             ("pulse artefact", artefact),
@@ -75,50 +76,30 @@ def _background(trials: Sequence[Trial], limits: SignalLimits) -> str:
 
 
 def _impacts(deliveries: Sequence[Delivery]) -> str:
-    pairs = [delivery for delivery in deliveries if delivery.stimulus.isi_ms is not None]
-    measured = [
-        delivery
-        for delivery in pairs
-        if isinstance(delivery.answer, Sweep)
-        and delivery.answer.t_hit_ms is None
-        and "acceleration" in delivery.answer.channels
-    ]
-    if not measured:
+    sweeps = [(d.answer, d.trial) for d in deliveries if d.stimulus.isi_ms is not None and isinstance(d.answer, Sweep)]
+    sought = [trial for sweep, trial in sweeps if sweep.t_hit_ms is None and "acceleration" in sweep.channels]
+    if not sought:
         return "given by the device, or not needed"
-    return f"{sum(delivery.trial.t_hit_ms is not None for delivery in measured)} of {len(measured)}"
-
-
-def _isi_errors(trials: Sequence[Trial]) -> str:
-    errors = [
-        f"{trial.isi_ms - trial.commanded_isi_ms:+.1f}"
-        for trial in trials
-        if trial.isi_ms is not None and trial.commanded_isi_ms is not None
-    ]
-    return f"{', '.join(errors)} ms" if errors else "not known"
+    return f"{sum(trial.t_hit_ms is not None for trial in sought)} of {len(sought)}"
 
 
 def _windows(deliveries: Sequence[Delivery], limits: SignalLimits) -> str:
-    spans = [_span_ms(d.answer, d.answer.t_tms_ms) for d in deliveries if isinstance(d.answer, Sweep)]
-    about = [span for span in spans if span is not None]
+    sweeps = [delivery.answer for delivery in deliveries if isinstance(delivery.answer, Sweep)]
+    found = ((sweep.channels.get("emg"), sweep.t_tms_ms) for sweep in sweeps)
+    about = [(emg, pulse_ms) for emg, pulse_ms in found if emg is not None and pulse_ms is not None]
     low, high = limits.mep_window_ms
     wanted = f"{low:g} to {high:g} ms after the pulse"
     if not about:
-        return f"{wanted}; the device itself measures the MEP" if not spans else f"{wanted}; not recorded"
-    first, last = max(span[0] for span in about), min(span[1] for span in about)
+        return f"{wanted}; the device itself measures the MEP" if not sweeps else f"{wanted}; not recorded"
+    first = max(emg.t0_ms - pulse_ms for emg, pulse_ms in about)
+    last = min(emg.t0_ms + 1000 * (emg.values.size - 1) / emg.rate_hz - pulse_ms for emg, pulse_ms in about)
     return f"{wanted}; the EMG is recorded from {first:.0f} to {last:.0f} ms"
-
-
-def _span_ms(sweep: Sweep, pulse_ms: float | None) -> tuple[float, float] | None:
-    emg = sweep.channels.get("emg")
-    if emg is None or pulse_ms is None:
-        return None
-    return emg.t0_ms - pulse_ms, emg.t0_ms + 1000 * (emg.values.size - 1) / emg.rate_hz - pulse_ms
 
 
 def wrong_hit_delay(deliveries: Sequence[Delivery]) -> str | None:
     """That all pulses are off by what the rig assumes of the hit, and by how much; None if they are not."""
     trials = [delivery.trial for delivery in deliveries]
-    off_ms = [t.commanded_isi_ms - t.isi_ms for t in trials if t.isi_ms is not None and t.commanded_isi_ms is not None]
+    off_ms = [-trial.isi_error_ms for trial in trials if trial.isi_error_ms is not None]
     if len(off_ms) < 2 or np.ptp(off_ms) > ALIKE_MS or abs(late_ms := float(np.median(off_ms))) <= NEAR_PULSE_MS:
         return None
     change = f"{'add' if late_ms > 0 else 'take off'} {abs(late_ms):.0f} ms"

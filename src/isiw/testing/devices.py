@@ -7,8 +7,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from isiw.checks import number
@@ -76,21 +75,23 @@ def check_device(
         LimitExceededError: the limits do not allow a stimulus; it was not delivered.
         InvalidValueError: an inter-trial interval that is negative or not finite.
     """
-    rules = _Rules(space, signals or SignalLimits())
-    pace_of = partial(_pace, space=space, limits=limits, timeout_s=timeout_s, iti_s=iti_s, clock=clock)
-    table = _checked(make, rules, pace_of, say)
+    rules, least_s = _Rules(space, signals or SignalLimits()), number("iti_s", iti_s, least=0)
+    pace = CheckPace(timeout_s, least_s, limits or Limits.of_space(space, min_iti_s=least_s), clock or MonotonicClock())
+    table = _checked(make, rules, pace, say, virtual=clock is None)
     gc.collect()  # a device that is gone offers no streams, whose listeners would stay away from the next one
     return table
 
 
 def _checked(
-    make: Callable[[], Device], rules: _Rules, pace_of: Callable[[Device], CheckPace], say: Callable[[str], None]
+    make: Callable[[], Device], rules: _Rules, pace: CheckPace, say: Callable[[str], None], *, virtual: bool
 ) -> DeviceTable:
+    """The table of a device; where `virtual`, a simulated one does not really wait."""
     device = make()
     lacking = [verb for verb in _VERBS if not hasattr(device, verb)]
     require(not lacking, f"a device has {', '.join(_VERBS)}", f"{shown(device)} without {', '.join(lacking)}")
     _check_description(device, rules.space)
-    pace = pace_of(device)
+    if virtual and device.describe().simulated:
+        pace = replace(pace, clock=VirtualClock())
     say(_announcement(device, pace))
     deliveries = _check_delivery(device, rules, pace)
     if isinstance(device, HasMemory):
@@ -99,14 +100,6 @@ def _checked(
     say(str(table))
     _require_usable(deliveries, rules, real=not device.describe().simulated)
     return table
-
-
-def _pace(
-    device: Device, *, space: DesignSpace, limits: Limits | None, timeout_s: float, iti_s: float, clock: Clock | None
-) -> CheckPace:
-    clock = clock or (VirtualClock() if device.describe().simulated else MonotonicClock())
-    least_s = number("iti_s", iti_s, least=0)
-    return CheckPace(timeout_s, least_s, limits or Limits.of_space(space, min_iti_s=least_s), clock)
 
 
 def _announcement(device: Device, pace: CheckPace) -> str:

@@ -15,7 +15,7 @@ from typing import Any, Final, TypeVar, cast, get_args, get_type_hints
 from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 from pydantic_core import ErrorDetails
 
-from isiw.errors import ConfigError, IsiwError, did_you_mean
+from isiw.errors import ConfigError, IsiwError, did_you_mean, os_errors
 
 UNKNOWN: Final = {"extra_forbidden", "unexpected_keyword_argument"}
 """Pydantic's types of error for a key that there is not."""
@@ -104,12 +104,12 @@ def _require_moderate(value: object, key: str = "") -> None:
 def read_toml(path: str | Path) -> dict[str, Any]:
     """The values of a TOML file."""
     try:
-        with Path(path).open(encoding="utf-8-sig") as file:  # with the mark that Windows puts first
-            return parsed(file.read(_LARGEST + 1))
-    except OSError as error:
-        raise ConfigError(
-            f"the TOML file cannot be read: {error.strerror}", got=str(path), remedy="Check the path."
-        ) from error
+        with (
+            os_errors(ConfigError, "the TOML file cannot be read", path, "Check the path."),
+            Path(path).open(encoding="utf-8-sig") as file,  # with the mark that Windows puts first
+        ):
+            text = file.read(_LARGEST + 1)
+        return parsed(text)
     except UnicodeDecodeError as error:
         raise ConfigError(
             "this is not a TOML file, or it is not saved as UTF-8",

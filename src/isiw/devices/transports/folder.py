@@ -19,7 +19,7 @@ import numpy as np
 from isiw.checks import number
 from isiw.devices.protocol import Answer, DeviceInfo
 from isiw.devices.transports.exchange import LONGEST_REPLY, Exchange, Reply, Request, Verb, described, sweep_of
-from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError
+from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, os_errors
 from isiw.files import opened, written_beside
 from isiw.trials import Channel, Measurement, Stimulus, Sweep
 from isiw.types import FloatArray
@@ -165,15 +165,10 @@ class _Folder:
         if self._waveforms and request.verb is Verb.DELIVER:
             values["waveforms"] = self.waveforms_for(request.token, request.number).name
         lines = [f"{key}={value}\n" for key, value in values.items()]
-        try:
+        ask = "Is the folder there, and may both sides write to it?"
+        with os_errors(DeviceError, "the request cannot be written", self._place, ask):
             _remove(self._answer(request))  # no answer can be there before its request
             self._put("".join([*lines, f"{_END}\n"]), until_s=time.monotonic() + min(1.0, request.timeout_s))
-        except OSError as error:
-            raise DeviceError(
-                f"the request cannot be written: {error.strerror}",
-                got=str(self._place),
-                remedy="Is the folder there, and may both sides write to it?",
-            ) from error
 
     def _put(self, text: str, until_s: float) -> None:
         beside = written_beside(self._place / REQUEST, text.encode())

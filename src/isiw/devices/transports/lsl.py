@@ -9,7 +9,7 @@ import json
 import math
 import threading
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from functools import partial
 from typing import Any, Final
 
@@ -242,7 +242,14 @@ class LslDevice:
         while True:
             there = self._lsl.resolve_bypred(query, minimum=len(wanted) + 1, timeout=_SEARCH_S)
             if wanted == {info.name() for info in there}:
-                _require_once(there)
+                for name in wanted:
+                    hosts = [info.hostname() for info in there if info.name() == name]
+                    if len(hosts) > 1:
+                        raise DeviceError(
+                            f"the stream {name} is there {len(hosts)} times",
+                            got=f"from {', '.join(hosts)}",
+                            remedy="Close what is left of an earlier run, or give the streams names of their own.",
+                        )
                 return {info.name(): info for info in there}
             if not _left_s(end_s):
                 missing = sorted(wanted - {info.name() for info in there})
@@ -285,19 +292,6 @@ class LslDevice:
 def _left_s(end_s: float) -> float:
     """The time until then, by the monotonic clock [s]; at least 0."""
     return max(0.0, end_s - time.monotonic())
-
-
-def _require_once(there: Iterable[Any]) -> None:
-    hosts: dict[str, list[str]] = {}
-    for info in there:
-        hosts.setdefault(info.name(), []).append(info.hostname())
-    for name, of in hosts.items():
-        if len(of) > 1:
-            raise DeviceError(
-                f"the stream {name} is there {len(of)} times",
-                got=f"from {', '.join(of)}",
-                remedy="Close what is left of an earlier run, or give the streams names of their own.",
-            )
 
 
 def _rates_hz(channels: Mapping[str, LslChannel]) -> dict[str, float]:
