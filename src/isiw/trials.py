@@ -70,6 +70,21 @@ class Stimulus(Checked):
             raise InvalidValueError("a tap alone has no ISI", got=self.isi_ms, expected="None")
 
 
+def _samples(_what: str, values: object) -> FloatArray:
+    try:
+        given = np.asarray(values)
+        samples = None if np.iscomplexobj(given) else given.astype(np.float64, copy=False)
+    except (TypeError, ValueError) as error:
+        raise InvalidValueError(
+            "the samples of a channel are not numbers", got=values, expected="a vector of numbers"
+        ) from error
+    if samples is None:
+        raise InvalidValueError("the samples of a channel are real numbers", got="complex ones")
+    if samples.ndim != 1:
+        raise InvalidValueError("a channel holds one waveform", got=samples.shape, expected="shape (w,)")
+    return samples
+
+
 @dataclass(frozen=True, eq=False)
 class Channel(Checked):
     """One recorded waveform.
@@ -84,29 +99,10 @@ class Channel(Checked):
         InvalidValueError: samples that are not a vector, a rate that is not positive, or a unit that is no text.
     """
 
-    values: FloatArray
+    values: Annotated[FloatArray, _samples]
     rate_hz: Positive
     unit: Text
     t0_ms: Number = 0.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        values = _samples(self.values)
-        if values.ndim != 1:
-            raise InvalidValueError("a channel holds one waveform", got=values.shape, expected="shape (w,)")
-        object.__setattr__(self, "values", values)
-
-
-def _samples(values: object) -> FloatArray:
-    try:
-        samples = np.asarray(values)
-        if np.isrealobj(samples):
-            return samples.astype(np.float64, copy=False)
-    except (TypeError, ValueError) as error:
-        raise InvalidValueError(
-            "the samples of a channel are not numbers", got=values, expected="a vector of numbers"
-        ) from error
-    raise InvalidValueError("the samples of a channel are real numbers", got="complex ones")
 
 
 @dataclass(frozen=True, eq=False)

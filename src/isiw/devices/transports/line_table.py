@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import re
 import socket
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import partial
 from string import Formatter
-from typing import Any, Final, TypeAlias
+from typing import Annotated, Final, TypeAlias
 from urllib.parse import urlsplit
 
 from isiw.checks import Checked, Positive, Text, from_table, number
@@ -190,8 +190,54 @@ class LineExchange(Checked):
         return None if found is None else {name: said for name, said in found.groupdict().items() if said is not None}
 
 
+_FIELDS: Final = {
+    "set": _ISI | {"trial"},
+    "fire": _ISI | {"trial"},
+    "alone": frozenset({"trial"}),
+    "tap_alone": frozenset({"trial"}),
+    "result": frozenset({"trial"}),
+}
+"""What a command may hold besides its sequence number."""
+
+_GROUPS: Final = {
+    "read_back": _ISI,
+    "fire": _ISI | _OUTCOME,
+    "alone": _OUTCOME,
+    "tap_alone": _OUTCOME,
+    "result": _ISI | _OUTCOME,
+    "status": _STATE,
+}
+"""What an answer may say besides its sequence number."""
+
+
+def _command(what: str, value: object) -> LineExchange:
+    """A command of the table, which holds nothing, and whose answer says nothing, that has no meaning there."""
+    name = what.rpartition(".")[2]
+    if not isinstance(value, Mapping | LineExchange):
+        raise InvalidValueError(
+            f"the command {name} must be a table", got=value, expected='{ send = "…", reply = "…" }'
+        )
+    exchange = from_table(LineExchange, value, f"commands.{name}")
+    rules = (
+        ("command", exchange.fields, _FIELDS.get(name, _NONE)),
+        ("answer", exchange.groups, _GROUPS.get(name, _NONE)),
+    )
+    for part, there, known in rules:
+        unknown = there - known - {"sequence"}
+        if unknown:
+            raise InvalidValueError(
+                f"the {part} of {name} has something unknown",
+                got=", ".join(sorted(unknown)),
+                expected=f"among {', '.join(sorted(known | {'sequence'}))}",
+            )
+    return exchange
+
+
+Command: TypeAlias = Annotated[LineExchange, _command]
+
+
 @dataclass(frozen=True)
-class LineCommands:
+class LineCommands(Checked):
     r"""The commands of an instrument, each a `LineExchange` or a table with its arguments.
 
     Args:
@@ -208,36 +254,24 @@ class LineCommands:
             it does not refuse in words. It holds (?P<sequence>\d+) if the answers do.
     """
 
-    disarm: LineExchange
-    set: LineExchange
-    read_back: LineExchange
-    arm: LineExchange
-    fire: LineExchange
-    alone: LineExchange
-    tap_alone: LineExchange | None = None
-    result: LineExchange | None = None
-    status: LineExchange | None = None
+    disarm: Command
+    set: Command
+    read_back: Command
+    arm: Command
+    fire: Command
+    alone: Command
+    tap_alone: Command | None = None
+    result: Command | None = None
+    status: Command | None = None
     refusal: str = ""
 
     def __post_init__(self) -> None:
-        for name, value in list(self._given()):
-            if isinstance(value, Mapping):
-                object.__setattr__(self, name, from_table(LineExchange, value, f"commands.{name}"))
-        for name, exchange in self._given():
-            if not isinstance(exchange, LineExchange):
-                raise InvalidValueError(
-                    f"the command {name} must be a table", got=exchange, expected='{ send = "…", reply = "…" }'
-                )
-            _require_known(name, exchange)
+        super().__post_init__()
         _require_one(_ISI, self.set.fields, "the command set must hold the ISI", "{isi_ms}, {isi_us} or {isi_s}")
         _require_one(_ISI, self.read_back.groups, "the answer to read_back must say the ISI", r"(?P<isi_ms>[\d.]+)")
         told = self.fire.groups | self._result_groups
         _require_one(_ISI, told, "the answer to fire or result must say the realised ISI", r"(?P<isi_ms>[\d.]+)")
         self._require_refusal()
-
-    def _given(self) -> Iterator[tuple[str, Any]]:
-        values = ((field.name, getattr(self, field.name)) for field in fields(self) if field.name != "refusal")
-        return ((name, value) for name, value in values if value is not None)
 
     def _require_refusal(self) -> None:
         try:
@@ -262,42 +296,6 @@ class LineCommands:
     def measuring(self) -> list[bool]:
         """True for each kind of trial whose MEP an answer says."""
         return [bool((each.groups | self._result_groups) & _MEP) for each in self.firing]
-
-
-_FIELDS: Final = {
-    "set": _ISI | {"trial"},
-    "fire": _ISI | {"trial"},
-    "alone": frozenset({"trial"}),
-    "tap_alone": frozenset({"trial"}),
-    "result": frozenset({"trial"}),
-}
-"""What a command may hold besides its sequence number."""
-
-_GROUPS: Final = {
-    "read_back": _ISI,
-    "fire": _ISI | _OUTCOME,
-    "alone": _OUTCOME,
-    "tap_alone": _OUTCOME,
-    "result": _ISI | _OUTCOME,
-    "status": _STATE,
-}
-"""What an answer may say besides its sequence number."""
-
-
-def _require_known(name: str, exchange: LineExchange) -> None:
-    """Raise if a command holds, or its answer says, what has no meaning there."""
-    rules = (
-        ("command", exchange.fields, _FIELDS.get(name, _NONE)),
-        ("answer", exchange.groups, _GROUPS.get(name, _NONE)),
-    )
-    for part, there, known in rules:
-        unknown = there - known - {"sequence"}
-        if unknown:
-            raise InvalidValueError(
-                f"the {part} of {name} has something unknown",
-                got=", ".join(sorted(unknown)),
-                expected=f"among {', '.join(sorted(known | {'sequence'}))}",
-            )
 
 
 def _require_one(names: frozenset[str], there: frozenset[str], what: str, expected: str) -> None:
