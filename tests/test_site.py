@@ -15,7 +15,7 @@ from pydantic import BaseModel
 from typer.main import get_command
 
 import isiw
-from isiw.cli.main import app
+from isiw.cli import app
 from isiw.config.run import RunConfig
 
 OWN = {"isiw.cli", "isiw.text"}

@@ -9,7 +9,7 @@ from typing import Any
 from docs.generate.tables import cell, table
 from typer.main import get_command
 
-from isiw.cli.main import app
+from isiw.cli import app
 
 _CODES = """
 Exit codes: 0 all is well, 1 an error, 2 wrong usage, 3 a damaged log, 4 a device that could not be disarmed, so that

@@ -16,8 +16,7 @@ from matplotlib.figure import Figure
 from isiw.log.reader import SessionRecord
 from isiw.plots.session import session_figure
 from isiw.plots.style import inline_svg
-from isiw.plots.sweeps import sweeps_figure
-from isiw.plots.timeline import course_figure, timeline_figure
+from isiw.plots.timeline import course_figure, sweeps_figure, timeline_figure
 from known import instance, known
 from report.sessions import pulsed, tapped
 

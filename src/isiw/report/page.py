@@ -17,8 +17,7 @@ from isiw.files import check_output, write_output
 from isiw.log.reader import SessionRecord, require_records
 from isiw.plots.session import session_figure
 from isiw.plots.style import inline_svg
-from isiw.plots.sweeps import sweeps_figure
-from isiw.plots.timeline import course_figure, timeline_figure
+from isiw.plots.timeline import course_figure, sweeps_figure, timeline_figure
 from isiw.report.answers import answers, method_answers
 from isiw.report.drawn import drawn
 from isiw.report.tables import (

@@ -193,12 +193,6 @@ class _Folder:
         if text is None or (reply := _parsed(text, path.name)) is None:
             time.sleep(min(self._poll_s, wait_s))
             return None
-        self._require_own(reply, request)
-        _remove(path)
-        return reply
-
-    @staticmethod
-    def _require_own(reply: Reply, request: Request) -> None:
         given = (reply.text("token"), reply.text("number"))
         if given != (request.token, str(request.number)):
             raise reply.broken(
@@ -207,6 +201,8 @@ class _Folder:
                 expected=f"token {request.token}, number {request.number}",
                 remedy="Copy token and number from the request that is being answered.",
             )
+        _remove(path)
+        return reply
 
     def silence(self, request: Request) -> DeviceError:
         path = self._answer(request)
