@@ -17,7 +17,7 @@ from isiw.session.interrupts import Interrupts
 from isiw.session.loop import Session
 from isiw.session.rig import Safeguards
 from isiw.session.sink import SessionUpdate, Sink
-from isiw.session.steps import Asking, Pace
+from isiw.session.steps import Asking, pace_s
 from isiw.trials import Trial
 from isiw.visit import VisitProtocol
 from known import known
@@ -198,11 +198,8 @@ def test_who_fails_in_two_threads_at_once_is_let_go_of_once() -> None:
 
 
 def test_the_pace_is_the_usual_one_whatever_rests_were_between() -> None:
-    pace = Pace()
-    assert pace.usual_s is None
-    for end_s in (0.0, 5.0, 10.0, 600.0, 605.0):
-        pace.passed(end_s)
-    assert pace.usual_s == pytest.approx(5.0)
+    assert pace_s([0.0]) is None
+    assert pace_s([0.0, 5.0, 10.0, 600.0, 605.0]) == pytest.approx(5.0)
 
 
 @pytest.mark.parametrize(

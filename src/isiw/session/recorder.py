@@ -5,8 +5,7 @@ from __future__ import annotations
 import itertools
 import threading
 from collections.abc import Callable
-from contextlib import ExitStack
-from typing import Self
+from typing import Any, Generic, Self, TypeVar
 
 from isiw.checks import number
 from isiw.devices.clock import ROUNDING_S, Clock, Pacing
@@ -18,7 +17,7 @@ from isiw.log.headers import Header
 from isiw.log.schema import Event, Intent
 from isiw.log.writer import LogWriter
 from isiw.session.assembly import Earlier
-from isiw.session.examination import examination_of
+from isiw.session.examination import Examination, examination_of
 from isiw.session.judging import Judging
 from isiw.session.sink import Sink
 from isiw.signals.limits import isi_far, require_plausible
@@ -29,8 +28,51 @@ from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Status, Stimulus, Trial, TrialTable
 
+RecordedT = TypeVar("RecordedT")
 
-class Recorder(Judging):
+
+class Recording(Generic[RecordedT]):
+    """An examination whose loop is somebody else's, and its open log; as a context manager it closes that."""
+
+    _examination: Examination[Any, Any, RecordedT]
+    _pacing: Pacing
+    _asked: object = None
+
+    def __init__(self, log: LogWriter, clock: Clock) -> None:
+        self._log, self._clock, self._sink = log, clock, Sink(log=log)
+
+    def fail(self, error: BaseException) -> None:
+        """Log the error that ended the session, and close the log."""
+        try:
+            if self._sink.is_open:
+                self._examination.log_failure(error)
+                self._log.sync()
+        finally:
+            self.close()
+
+    def close(self) -> None:
+        """Close the log; calling it again is harmless."""
+        self._log.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if error is None:
+            self.close()
+        else:
+            self.fail(error)
+
+    def _conclude(self, trial: RecordedT) -> None:
+        """Put a trial on disk, then learn it, then put on disk what is known."""
+        self._pacing.came()
+        self._examination.came(trial)
+        self._sink.log.sync()
+        self._asked = None
+        self._examination.conclude()
+
+
+class Recorder(Recording[Trial], Judging):
     """A session whose loop is the lab's own; `isiw.open_session` opens one. As a context manager it closes its log.
 
     Args:
@@ -51,12 +93,11 @@ class Recorder(Judging):
         earlier: Earlier | None = None,
         on_doubt: Callable[[str], None] | None = None,
     ) -> None:
-        self._sink, self._log, self._clock, self._on_doubt = Sink(), log, clock, on_doubt
+        super().__init__(log, clock)
+        self._on_doubt = on_doubt
         trials, events, ages_s = (earlier.trials, earlier.events, earlier.ages_s()) if earlier else (None, (), ())
         self._examination = examination_of(strategy, self._sink, trials, events)
         self._limits, self._protocol, self._seed = header.limits, header.protocol, header.seed
-        self._open = ExitStack()
-        self._open.enter_context(self._sink.writing(log))
         self._asked: Stimulus | None = None
         self._lock = threading.RLock()
         self._pacing = Pacing(header.limits, clock, ages_s)
@@ -220,42 +261,12 @@ class Recorder(Judging):
             self._examination.conclude()
             return self.strategy.decision()
 
-    def fail(self, error: BaseException) -> None:
-        """Log the error that ended the session, and close the log."""
-        try:
-            if self._sink.is_open:
-                self._examination.log_failure(error)
-                self._log.sync()
-        finally:
-            self.close()
-
-    def close(self) -> None:
-        """Close the log; calling it again is harmless."""
-        self._open.close()
-        self._log.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        if error is None:
-            self.close()
-        else:
-            self.fail(error)
-
     def _require_asked(self) -> Stimulus:
         if self.asked is None:
             raise InvalidValueError(
                 "no trial is waiting for an outcome", remedy="Call ask() first, then deliver, then tell()."
             )
         return self.asked
-
-    def _conclude(self, trial: Trial) -> None:
-        """Put a trial on disk, then learn it, then put on disk what is known."""
-        self._pacing.came()
-        self._examination.came(trial)
-        self._sink.log.sync()
-        self._examination.conclude()
 
     def _warn(self, doubt: Finding) -> None:
         self._examination.event("doubt", f"{doubt}", finding=doubt.kind, durable=True)

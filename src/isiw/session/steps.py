@@ -7,7 +7,7 @@ import statistics
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Final, NamedTuple
 
 from isiw.devices.protocol import Answer
@@ -155,21 +155,10 @@ def ended(reason: str) -> StopDecision:
     return StopKind.PAUSED.go_on(f"The session was ended before its time: {reason}")
 
 
-class Pace:
-    """The usual time between the last stimuli; a rest or a pause among them does not change it."""
-
-    def __init__(self) -> None:
-        self._ends_s: deque[float] = deque(maxlen=_LAST + 1)
-
-    def passed(self, now_s: float) -> None:
-        """A stimulus was delivered."""
-        self._ends_s.append(now_s)
-
-    @property
-    def usual_s(self) -> float | None:
-        """The usual time from one to the next [s]; None before the second one."""
-        gaps_s = [after - before for before, after in itertools.pairwise(self._ends_s)]
-        return statistics.median(gaps_s) if gaps_s else None
+def pace_s(ends_s: Iterable[float]) -> float | None:
+    """The usual time from one stimulus to the next [s], whatever rests are among them; None before the second one."""
+    gaps_s = [after - before for before, after in itertools.pairwise(ends_s)]
+    return statistics.median(gaps_s) if gaps_s else None
 
 
 class Steps:
@@ -189,7 +178,7 @@ class Steps:
         self._examination, self._rig, self._sink, self._pausing = examination, rig, sink, pausing
         self._watch, self._header, self._backoffs_s = watch, header, backoffs_s
         self._own_response = OwnResponse(examination, header, taps)
-        self._pace, self._freely = Pace(), rig.interrupts.freely
+        self._ends_s, self._freely = deque[float](maxlen=_LAST + 1), rig.interrupts.freely
 
     @property
     def _strategy(self) -> Strategy:
@@ -238,7 +227,7 @@ class Steps:
 
     def _left_s(self, left: int) -> float | None:
         """About how long so many pairs take [s], with the rests and control trials between them."""
-        protocol, seed, usual_s = self._header.protocol, self._header.seed, self._pace.usual_s
+        protocol, seed, usual_s = self._header.protocol, self._header.seed, pace_s(self._ends_s)
         if usual_s is None:
             return None
         intervals_s: list[float] = []
@@ -292,7 +281,7 @@ class Steps:
         if not self._disturbed:
             fallback = None if stimulus.isi_ms is None else self._strategy.fallback_reason
             self._deliver(stimulus, fallback)
-            self._pace.passed(self._rig.clock.now_s())
+            self._ends_s.append(self._rig.clock.now_s())
 
     def _wait(self) -> None:
         """Sleep until limits and protocol allow the next stimulus, or an operator has another wish."""

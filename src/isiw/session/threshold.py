@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 from isiw.checks import number, text, whole
 from isiw.devices.clock import Clock, MonotonicClock, Pacing, VirtualClock
@@ -22,7 +22,7 @@ from isiw.log.schema import Event, Intent, PulseOutcome, ThresholdBelief
 from isiw.log.writer import LogWriter
 from isiw.session.assembly import begun, require_parts
 from isiw.session.examination import Examination
-from isiw.session.sink import Sink
+from isiw.session.recorder import Recording
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.threshold.pulses import Pulse, ThresholdEstimate
 from isiw.strategy.threshold.search import ThresholdSearch, make_threshold_search
@@ -205,7 +205,7 @@ class _ThresholdLearner:
         return ThresholdBelief(trial=trial, estimate=self.search.estimate(), decision=decision)
 
 
-class ThresholdRecorder:
+class ThresholdRecorder(Recording[PulseOutcome]):
     """An open search; `open_threshold` opens one. As a context manager it closes its log.
 
     Args:
@@ -226,8 +226,8 @@ class ThresholdRecorder:
         earlier: Iterable[PulseOutcome] = (),
         ages_s: Sequence[float] = (),
     ) -> None:
-        self.header, self._log, self._clock = header, log, clock
-        table, self._sink = _Pulses(tuple(earlier)), Sink(log=log)
+        super().__init__(log, clock)
+        self.header, table = header, _Pulses(tuple(earlier))
         self._examination: Examination[_ThresholdLearner, _Pulses, PulseOutcome] = Examination(
             _ThresholdLearner(search, len(table)), table, self._sink
         )
@@ -342,20 +342,6 @@ class ThresholdRecorder:
         """The decision to stop now or not, with its reason."""
         return self.search.decision()
 
-    def close(self) -> None:
-        """Close the log; calling it again is harmless."""
-        self._log.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        try:
-            if error is not None and self._sink.is_open:
-                self._examination.log_failure(error)
-        finally:
-            self.close()
-
     def _require_asked(self) -> float:
         if self._asked is None:
             raise InvalidValueError(
@@ -366,11 +352,3 @@ class ThresholdRecorder:
     def _outcome(self, **outcome: Any) -> PulseOutcome:
         intensity = self._require_asked()
         return PulseOutcome(trial=self.given, intensity_pct_mso=intensity, place_mm=self.place_mm, **outcome)
-
-    def _conclude(self, outcome: PulseOutcome) -> None:
-        """Put a pulse on disk, then learn it, then put on disk what is known."""
-        self._examination.came(outcome)
-        self._sink.log.sync()
-        self._asked = None
-        self._pacing.came()
-        self._examination.conclude()
