@@ -14,7 +14,7 @@ import numpy as np
 
 from isiw.errors import ConfigError, InvalidValueError
 from isiw.existing.layout import COLUMNS, UNIT_WORDS, Layout, letters
-from isiw.existing.tables import is_missing
+from isiw.existing.tables import is_missing, require_one
 from isiw.files import opened
 from isiw.lazy import pd, scipy
 from isiw.text.named_code import library
@@ -183,12 +183,8 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
             remedy="Save it as .xlsx without a password, or as CSV.",
         )
     book = pd.ExcelFile(io.BytesIO(content), engine="openpyxl")
-    if layout.sheet is not None and layout.sheet not in book.sheet_names:
-        raise InvalidValueError(
-            "the workbook has no such sheet",
-            got=layout.sheet,
-            expected=f"one of {', '.join(map(str, book.sheet_names))}",
-        )
+    if layout.sheet is not None:
+        require_one("the workbook has no such sheet", layout.sheet, book.sheet_names)
     sheets = {
         str(name): _from_names(book.parse(name, header=None, dtype=object).to_numpy().tolist(), layout)
         for name in ([layout.sheet] if layout.sheet is not None else book.sheet_names)

@@ -12,11 +12,10 @@ import numpy as np
 
 from isiw.checks import MOST_MEP_MV
 from isiw.design import DesignSpace
-from isiw.errors import InvalidValueError, did_you_mean
-from isiw.existing import frames, recordings
+from isiw.errors import InvalidValueError
+from isiw.existing import frames, recordings, tables
 from isiw.existing.delivered import Delivered, anywhere, read_log, renumbered
 from isiw.existing.layout import MARKERS, Layout
-from isiw.existing.tables import Column, Columns, is_missing, isis_of, required_unit, says_alone, with_decimals
 from isiw.files import is_mcap
 from isiw.findings import Kind
 from isiw.lazy import pd
@@ -102,7 +101,7 @@ def _of_matrix(arrays: dict[str, FloatArray], layout: Layout, subject: str, sour
     vectors = {
         name: array.ravel().tolist() for name, array in arrays.items() if max(array.shape, default=0) == array.size
     }
-    isis_ms = isis_of(vectors, layout, source)
+    isis_ms = tables.isis_of(vectors, layout, source)
     name, sweeps = layout.channels["emg"], np.asarray(arrays[layout.channels["emg"]], dtype=np.float64)
     count = len(isis_ms)
     if count not in sweeps.shape:
@@ -111,7 +110,7 @@ def _of_matrix(arrays: dict[str, FloatArray], layout: Layout, subject: str, sour
             got=(sweeps.shape, count),
             remedy="Save one for each.",
         )
-    factor_mv = EMG_UNITS_MV[required_unit("EMG", Column(name, [], of=source), layout, EMG_UNITS_MV)]
+    factor_mv = EMG_UNITS_MV[tables.required_unit("EMG", tables.Column(name, [], of=source), layout, EMG_UNITS_MV)]
     values_mv = factor_mv * (sweeps if sweeps.shape[0] == count else sweeps.T)
     channels = [Channel(each, rate_hz, "mV", -pulse_at_ms) for each in values_mv]
     return recordings.of_sweeps(channels, isis_ms, layout, subject, source)
@@ -122,17 +121,12 @@ def _of_columns(frame: pd.DataFrame, layout: Layout, subject: str, source: str) 
     reference = layout.required_reference(source)
     rate_hz = _required(layout, "rate_hz", f"the sampling rate of {source}")
     for name in layout.channels.values():
-        if name not in frame:
-            remedy = (
-                did_you_mean(name, list(frame)) or "If no line holds their names, write names = [...] into the layout."
-            )
-            raise InvalidValueError(
-                f"{source} has no such column", got=name, expected=f"one of {', '.join(map(str, frame))}", remedy=remedy
-            )
+        remedy = "If no line holds their names, write names = [...] into the layout."
+        tables.require_one(f"{source} has no such column", name, frame, remedy)
     breaks = frame.iloc[:, 0].astype(str).str.endswith("=").to_numpy()
     frame, block = frame[~breaks], np.cumsum(breaks)[~breaks]
     name = layout.channels["emg"]
-    unit = required_unit("EMG", Column(name, [], of=source), layout, EMG_UNITS_MV)
+    unit = tables.required_unit("EMG", tables.Column(name, [], of=source), layout, EMG_UNITS_MV)
     channels = {"emg": Channel(EMG_UNITS_MV[unit] * _numbers(frame, name, layout, source), rate_hz, "mV")}
     if "acceleration" in layout.channels:
         values = _numbers(frame, layout.channels["acceleration"], layout, source)
@@ -143,7 +137,9 @@ def _of_columns(frame: pd.DataFrame, layout: Layout, subject: str, source: str) 
             rows += [(key, at / rate_hz, 0.0) for at in _onsets(_numbers(frame, layout.channels[key], layout, source))]
     if "events" in layout.channels:
         texts = frame[layout.channels["events"]].tolist()
-        rows += [(str(text).lstrip("#* "), at / rate_hz, 0.0) for at, text in enumerate(texts) if not is_missing(text)]
+        rows += [
+            (str(text).lstrip("#* "), at / rate_hz, 0.0) for at, text in enumerate(texts) if not tables.is_missing(text)
+        ]
     if not rows:
         raise InvalidValueError(
             f"no event was found in {source}",
@@ -160,12 +156,12 @@ def _of_columns(frame: pd.DataFrame, layout: Layout, subject: str, source: str) 
 
 def _numbers(frame: pd.DataFrame, name: str, layout: Layout, source: str) -> FloatArray:
     cells = frame[name]
-    few = {name: Column(name, cells.iloc[:1000].tolist(), of=source)}
-    if not pd.api.types.is_numeric_dtype(cells) and with_decimals(few, layout.decimal)[name].decimal == ",":
+    few = {name: tables.Column(name, cells.iloc[:1000].tolist(), of=source)}
+    if not pd.api.types.is_numeric_dtype(cells) and tables.with_decimals(few, layout.decimal)[name].decimal == ",":
         cells = cells.str.replace(",", ".")
     numbers = pd.to_numeric(cells, errors="coerce").to_numpy(dtype=np.float64)
     if (bad := np.flatnonzero(~np.isfinite(numbers))).size:
-        raise Column(name, frame[name].tolist(), of=source).refused(
+        raise tables.Column(name, frame[name].tolist(), of=source).refused(
             int(bad[0]), "is no number", "Do the names stand for the right columns, and are the lines before skipped?"
         )
     return numbers
@@ -181,7 +177,7 @@ def _onsets(values: FloatArray) -> list[int]:
 def people_of(frame: pd.DataFrame, layout: Layout, source: str, name: str = "") -> list[Delivered]:
     """The people of a table, in the order in which they come first; who has no code is called as the file is."""
     reference = layout.required_reference(source)
-    columns = Columns.found(frame, layout, source)
+    columns = tables.Columns.found(frame, layout, source)
     isi, mep = columns["isi"], columns["mep"]
     rows = [n for n in range(columns.rows) if mep.number(n) is not None or isi.text(n) or columns["asked"].text(n)]
     if not rows:
@@ -198,7 +194,7 @@ def people_of(frame: pd.DataFrame, layout: Layout, source: str, name: str = "") 
     return [_person(columns, own, layout, reference, source, (subject, day), name) for own, subject, day in visits]
 
 
-def _days(columns: Columns, rows: Sequence[int]) -> dict[int | None, list[int]]:
+def _days(columns: tables.Columns, rows: Sequence[int]) -> dict[int | None, list[int]]:
     """The rows of each day; days without a number of their own are counted as they come."""
     days: dict[str, list[int]] = {}
     for row in rows:
@@ -212,7 +208,7 @@ def _days(columns: Columns, rows: Sequence[int]) -> dict[int | None, list[int]]:
 
 
 def _person(
-    columns: Columns,
+    columns: tables.Columns,
     rows: Sequence[int],
     layout: Layout,
     reference: Reference,
@@ -238,9 +234,9 @@ def _person(
     )
 
 
-def _trial(columns: Columns, row: int, number: int, layout: Layout, space: DesignSpace) -> Trial:
+def _trial(columns: tables.Columns, row: int, number: int, layout: Layout, space: DesignSpace) -> Trial:
     """One row as a trial: as the file judges it, or else as a session would."""
-    alone = says_alone(columns.of["isi"].cells[row], layout.alone)
+    alone = tables.says_alone(columns.of["isi"].cells[row], layout.alone)
     isi_ms = None if alone else columns["isi"].number(row)
     asked_ms = columns["asked"].number(row) if "asked" in columns.of else isi_ms
     mep_mv, lost = columns["mep"].number(row), _lost(columns, row)
@@ -267,7 +263,7 @@ def _trial(columns: Columns, row: int, number: int, layout: Layout, space: Desig
     return Trial(number, Status.ACCEPTED if lost is None else Status.MISTRIAL, reason=lost, **facts)
 
 
-def _lost(columns: Columns, row: int) -> Kind | None:
+def _lost(columns: tables.Columns, row: int) -> Kind | None:
     """Why the file counts a row as lost; None if it does not."""
     judged = columns["status"].flag(row)
     bad = columns["exclude"].flag(row) and "status" not in columns.of
@@ -276,7 +272,7 @@ def _lost(columns: Columns, row: int) -> Kind | None:
     return Kind.of_mistrial(columns["reason"].text(row))
 
 
-def _require_said(columns: Columns, rows: Sequence[int], layout: Layout, source: str) -> None:
+def _require_said(columns: tables.Columns, rows: Sequence[int], layout: Layout, source: str) -> None:
     """Raise if nobody says what rows without an ISI are."""
     if "asked" in columns.of or layout.alone is not None:
         return
@@ -284,7 +280,7 @@ def _require_said(columns: Columns, rows: Sequence[int], layout: Layout, source:
     empty = [
         row
         for row in rows
-        if not says_alone(isi.cells[row], None) and not says_alone(columns["condition"].text(row), None)
+        if not tables.says_alone(isi.cells[row], None) and not tables.says_alone(columns["condition"].text(row), None)
         and not isi.text(row) and columns["mep"].number(row) is not None
         and _lost(columns, row) is None and not columns["tap_alone"].flag(row)
     ]  # fmt: skip
@@ -297,7 +293,7 @@ def _require_said(columns: Columns, rows: Sequence[int], layout: Layout, source:
         )
 
 
-def _require_ascending(columns: Columns, rows: Sequence[int], source: str) -> None:
+def _require_ascending(columns: tables.Columns, rows: Sequence[int], source: str) -> None:
     """Raise if the rows are not in the order of delivery, on which drift and the start depend."""
     if (order := columns.of.get("order")) is None or "block" in columns.of:
         return
@@ -327,7 +323,7 @@ def _require_ascending(columns: Columns, rows: Sequence[int], source: str) -> No
         )
 
 
-def _created(columns: Columns, row: int) -> str:
+def _created(columns: tables.Columns, row: int) -> str:
     column = columns.of.get("date")
     if column is None or not column.text(row):
         return ""

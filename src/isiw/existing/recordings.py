@@ -16,7 +16,7 @@ from isiw.errors import InvalidValueError
 from isiw.existing.delivered import Delivered, anywhere, renumbered
 from isiw.existing.frames import reading
 from isiw.existing.layout import Layout
-from isiw.existing.tables import isis_of
+from isiw.existing.tables import isis_of, require_one
 from isiw.lazy import pd
 from isiw.signals.judgement import judge
 from isiw.signals.limits import EMG_UNITS_MV, SignalLimits
@@ -142,8 +142,8 @@ def _channels(raw: Any, layout: Layout, source: str) -> dict[str, Channel]:
 def _channel_name(raw: Any, key: str, layout: Layout, source: str) -> str:
     names = list(raw.ch_names)
     stated = layout.channels.get(key)
-    if stated is not None and stated not in names:
-        raise InvalidValueError(f"{source} has no such channel", got=stated, expected=f"one of {', '.join(names)}")
+    if stated is not None:
+        require_one(f"{source} has no such channel", stated, names)
     kinds = dict(zip(names, raw.get_channel_types(), strict=True))
     fitting = (
         [stated]

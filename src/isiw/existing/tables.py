@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from numbers import Real
 from typing import Any, Final
@@ -195,18 +195,20 @@ class Columns:
         return cls(columns, len(frame), (isi_unit, mep_unit), unused, Column("", [None] * len(frame), of=source))
 
 
+def require_one(what: str, stated: str, names: Iterable[object], remedy: str | None = None) -> None:
+    """Raise if a file has nothing of the name that is stated."""
+    known = [str(name) for name in names]
+    if stated not in known:
+        remedy = did_you_mean(stated, known) or remedy
+        raise InvalidValueError(what, got=stated, expected=f"one of {', '.join(known)}", remedy=remedy)
+
+
 def _named(key: str, names: list[str], layout: Layout, source: str) -> str | None:
     """The column that holds something; None if there is none."""
     if (stated := layout.columns.get(key)) is not None:
         if names.count(stated) > 1:
             raise InvalidValueError(f"several columns of {source} have this name", got=stated, remedy="Rename them.")
-        if stated not in names:
-            raise InvalidValueError(
-                f"{source} has no such column",
-                got=stated,
-                expected=f"one of {', '.join(names)}",
-                remedy=did_you_mean(stated, names) or None,
-            )
+        require_one(f"{source} has no such column", stated, names)
         return stated
     taken = set(layout.columns.values())
     for known in COLUMNS[key]:

@@ -57,11 +57,7 @@ def read_lab_prior(path: str | Path) -> LabPrior:
     """
     values = read_toml(path)
     version = values.get("schema_version")
-    if version is not None and (type(version) is not int or version < 1):
-        raise ConfigError(
-            f"{path} cannot be used: schema_version is no version", got=version, expected=f"1 to {SCHEMA_VERSION}"
-        )
-    if version is not None and version > SCHEMA_VERSION:
+    if isinstance(version, int) and version > SCHEMA_VERSION:
         raise ConfigError(
             "the prior was learnt with a newer isiw",
             got=f"schema version {version} in {path}",

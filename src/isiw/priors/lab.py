@@ -102,7 +102,7 @@ class LabPrior(Checked):
     floor: Floor | None = None
     gain: Gain | None = None
     muscle: Muscle | None = None
-    schema_version: int = SCHEMA_VERSION
+    schema_version: Annotated[int, partial(whole, least=1, most=SCHEMA_VERSION)] = SCHEMA_VERSION
     isiw_version: str = isiw.__version__
 
     def __post_init__(self) -> None:
