@@ -191,7 +191,7 @@ def people_of(frame: pd.DataFrame, layout: Layout, source: str, name: str = "") 
         people.setdefault(subject, []).append(row)
     visits = [(own, subject, day) for subject, theirs in people.items() for day, own in _days(columns, theirs).items()]
     visits.sort(key=lambda visit: visit[0][0])
-    return [_person(columns, own, layout, reference, source, (subject, day), name) for own, subject, day in visits]
+    return [_person(columns, own, layout, reference, subject or name, day) for own, subject, day in visits]
 
 
 def _days(columns: tables.Columns, rows: Sequence[int]) -> dict[int | None, list[int]]:
@@ -208,25 +208,18 @@ def _days(columns: tables.Columns, rows: Sequence[int]) -> dict[int | None, list
 
 
 def _person(
-    columns: tables.Columns,
-    rows: Sequence[int],
-    layout: Layout,
-    reference: Reference,
-    source: str,
-    key: tuple[str, int | None],
-    name: str,
+    columns: tables.Columns, rows: Sequence[int], layout: Layout, reference: Reference, subject: str, day: int | None
 ) -> Delivered:
-    subject, day = key
-    _require_ascending(columns, rows, source)
-    _require_said(columns, rows, layout, source)
+    _require_ascending(columns, rows)
+    _require_said(columns, rows, layout)
     trials = [_trial(columns, row, number, layout, anywhere(reference)) for number, row in enumerate(rows)]
     blocks = [columns["block"].text(row) for row in rows]
     return Delivered(
         renumbered(trials),
         reference,
-        subject=subject or name,
+        subject=subject,
         visit=Visit(day=day),
-        source=source,
+        source=columns["isi"].of,
         created=_created(columns, rows[0]),
         units=columns.units,
         unused=columns.unused,
@@ -272,7 +265,7 @@ def _lost(columns: tables.Columns, row: int) -> Kind | None:
     return Kind.of_mistrial(columns["reason"].text(row))
 
 
-def _require_said(columns: tables.Columns, rows: Sequence[int], layout: Layout, source: str) -> None:
+def _require_said(columns: tables.Columns, rows: Sequence[int], layout: Layout) -> None:
     """Raise if nobody says what rows without an ISI are."""
     if "asked" in columns.of or layout.alone is not None:
         return
@@ -286,14 +279,14 @@ def _require_said(columns: tables.Columns, rows: Sequence[int], layout: Layout, 
     ]  # fmt: skip
     if empty:
         raise InvalidValueError(
-            f"{counted(len(empty), 'row has', 'rows have')} an amplitude and no ISI in {source}",
+            f"{counted(len(empty), 'row has', 'rows have')} an amplitude and no ISI in {isi.of}",
             got=f"row {empty[0] + 1}",
             remedy="If these are TMS alone, say --alone with what stands in their place, or --alone '' for an empty "
             "cell; if not, mark them in a column called exclude.",
         )
 
 
-def _require_ascending(columns: tables.Columns, rows: Sequence[int], source: str) -> None:
+def _require_ascending(columns: tables.Columns, rows: Sequence[int]) -> None:
     """Raise if the rows are not in the order of delivery, on which drift and the start depend."""
     if (order := columns.of.get("order")) is None or "block" in columns.of:
         return
@@ -311,12 +304,12 @@ def _require_ascending(columns: tables.Columns, rows: Sequence[int], source: str
     repeated = next((text for text, other in zip(texts[1:], places[1:], strict=False) if places.count(other) > 1), None)
     if places != sorted(places):
         raise InvalidValueError(
-            f"the rows of {source} are not in the order of its column {order.name!r}",
+            f"the rows of {order.of} are not in the order of its column {order.name!r}",
             remedy="Sort them as the trials were delivered, or name the column that says so: --column order=NAME.",
         )
     if all(are_numbers) and repeated is not None:
         raise InvalidValueError(
-            f"a trial has two rows and more in {source}, by its column {order.name!r}",
+            f"a trial has two rows and more in {order.of}, by its column {order.name!r}",
             got=repeated,
             remedy="Leave one row for each trial, such as that of one muscle; or name a column of people or blocks: "
             "--column subject=NAME, --column block=NAME.",
