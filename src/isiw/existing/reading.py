@@ -118,7 +118,6 @@ def _of_matrix(arrays: dict[str, FloatArray], layout: Layout, subject: str, sour
 
 def _of_columns(frame: pd.DataFrame, layout: Layout, subject: str, source: str) -> Delivered:
     """A continuous recording, a row for each sample; blocks, each with lines of its own before it, are sweeps."""
-    reference = layout.required_reference(source)
     rate_hz = _required(layout, "rate_hz", f"the sampling rate of {source}")
     for name in layout.channels.values():
         remedy = "If no line holds their names, write names = [...] into the layout."
@@ -150,8 +149,7 @@ def _of_columns(frame: pd.DataFrame, layout: Layout, subject: str, source: str) 
         ends = np.append(starts[1:], len(block))
         rows += [("sweep", first / rate_hz, (end - first) / rate_hz) for first, end in zip(starts, ends, strict=True)]
     recording = recordings.Recording(channels, pd.DataFrame(rows, columns=["name", "onset", "duration"]), source)
-    sweeps = recordings.sweeps_of(recording, layout, reference)
-    return recordings.delivered_of(recording, sweeps, layout, reference, subject)
+    return recordings.delivered_of(recording, recordings.sweeps_of(recording, layout), layout, subject)
 
 
 def _numbers(frame: pd.DataFrame, name: str, layout: Layout, source: str) -> FloatArray:

@@ -22,7 +22,7 @@ from isiw.signals.judgement import judge
 from isiw.signals.limits import EMG_UNITS_MV, SignalLimits
 from isiw.text.named_code import library
 from isiw.trials import Channel, Stimulus, Sweep, Trial
-from isiw.types import FloatArray, Reference
+from isiw.types import FloatArray
 
 SUFFIXES: Final = {".vhdr", ".edf", ".bdf", ".fif", ".set", ".cnt", ".gdf", ".mff"}
 
@@ -68,9 +68,8 @@ def of_raw(
     raw: Any, layout: Layout, subject: str, source: str = "the recording", events: pd.DataFrame | None = None
 ) -> Delivered:
     """The trials of an `mne.io.Raw`; its annotations say when the stimuli came, or a table of events."""
-    reference = layout.required_reference(source)
     recording = Recording(_channels(raw, layout, source), _annotated(raw) if events is None else events, source)
-    return delivered_of(recording, sweeps_of(recording, layout, reference), layout, reference, subject)
+    return delivered_of(recording, sweeps_of(recording, layout), layout, subject)
 
 
 def of_epochs(epochs: Any, layout: Layout, subject: str, source: str = "the epochs") -> Delivered:
@@ -91,22 +90,20 @@ def of_sweeps(
     channels: Sequence[Channel], isis_ms: Sequence[float | None], layout: Layout, subject: str, source: str
 ) -> Delivered:
     """The trials of sweeps whose clocks begin at the pulse; one without an ISI is TMS alone."""
-    reference = layout.required_reference(source)
-    begin = "t_hit_ms" if reference == "impact" else "t_valve_ms"
+    begin = "t_hit_ms" if layout.required_reference(source) == "impact" else "t_valve_ms"
     sweeps: list[Found] = []
     for number, (isi_ms, emg) in enumerate(zip(isis_ms, channels, strict=True)):
         begins: dict[str, Any] = {begin: None if isi_ms is None else -isi_ms}
         sweeps.append((Stimulus(number, isi_ms), Sweep({"emg": emg}, t_tms_ms=0.0, **begins), {}))
-    return delivered_of(Recording({}, pd.DataFrame(), source), sweeps, layout, reference, subject)
+    return delivered_of(Recording({}, pd.DataFrame(), source), sweeps, layout, subject)
 
 
 Found = tuple[Stimulus, Sweep, Mapping[str, Any]]
 
 
-def delivered_of(
-    recording: Recording, sweeps: Sequence[Found], layout: Layout, reference: Reference, subject: str
-) -> Delivered:
+def delivered_of(recording: Recording, sweeps: Sequence[Found], layout: Layout, subject: str) -> Delivered:
     """The sweeps as trials, judged as in a session."""
+    reference = layout.required_reference(recording.source)
     signals = SignalLimits() if layout.mep_window_ms is None else SignalLimits(mep_window_ms=layout.mep_window_ms)
     trials: list[Trial] = []
     for stimulus, sweep, said in sweeps:
@@ -235,9 +232,9 @@ def _required_markers(recording: Recording, marked: Mapping[str, str], layout: L
     return [name for name in found.values() if name is not None]
 
 
-def sweeps_of(recording: Recording, layout: Layout, reference: Reference) -> list[Found]:
+def sweeps_of(recording: Recording, layout: Layout) -> list[Found]:
     """A stretch of the recording for each pulse, with what came before it."""
-    key = "tap" if reference == "impact" else "valve"
+    key = "tap" if layout.required_reference(recording.source) == "impact" else "valve"
     what = "the tap (its impact) or the electrical pulse" if key == "tap" else "the valve command"
     pulse, origin = _required_markers(recording, {"pulse": "the pulse of TMS", key: what}, layout)
     if origin == pulse:
