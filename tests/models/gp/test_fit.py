@@ -12,11 +12,12 @@ import torch
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel
 
-from isiw.models.gp.fit import Fit, fit, fixed_fit
+from isiw.models.gp.fit import Fit, fit
 from isiw.models.gp.prior import (
     FixedProcess,
     HyperparameterPrior,
     Hyperparameters,
+    ProcessSettings,
     Standardisation,
     Transform,
     scale_of,
@@ -38,7 +39,8 @@ def trials(n: int = 30, seed: int = 0, alone: int = 0) -> PersonTrials:
 
 
 def fitted(told: PersonTrials, **options: Any) -> Fit:
-    return fit(PRIOR, "rbf", scale_of(told.mep_mv, "log", 0.005), told, **options)
+    settings = ProcessSettings("rbf", **{"prior": PRIOR, **options})
+    return fit(settings, scale_of(told.mep_mv, "log", 0.005), told)
 
 
 def test_the_marginal_likelihood_is_that_of_scikit_learn() -> None:
@@ -47,7 +49,7 @@ def test_the_marginal_likelihood_is_that_of_scikit_learn() -> None:
     values = (np.log(told.mep_mv) - FIXED.centre) / FIXED.unit
     kernel = ConstantKernel(FIXED.amplitude**2) * RBF(FIXED.length_ms) + ConstantKernel(1.0)
     reference = GaussianProcessRegressor(kernel, alpha=FIXED.noise**2, optimizer=None).fit(told.isi_ms[:, None], values)
-    got = fixed_fit(PRIOR, "rbf", scale, told, FIXED)
+    got = fit(ProcessSettings("rbf", prior=PRIOR, fixed=FIXED), scale, told)
     log_marginal = (got.log_joint - got.log_prior)[0].item()
     assert log_marginal == pytest.approx(reference.log_marginal_likelihood_value_, abs=1e-6)
 
@@ -60,7 +62,7 @@ def test_trials_of_tms_alone_are_the_constant_and_noise() -> None:
     covariance = torch.ones((11, 11), dtype=torch.float64) + FIXED.noise**2 * torch.eye(11).double()
     covariance[:8, :8] += FIXED.amplitude**2 * torch.exp(-0.5 * steps.square())
     expected = torch.distributions.MultivariateNormal(torch.zeros(11).double(), covariance).log_prob(values)
-    got = fixed_fit(PRIOR, "rbf", scale, told, FIXED)
+    got = fit(ProcessSettings("rbf", prior=PRIOR, fixed=FIXED), scale, told)
     assert (got.log_joint - got.log_prior)[0].item() == pytest.approx(expected.item(), abs=1e-9)
 
 
@@ -71,7 +73,7 @@ def test_the_evidence_is_a_density_of_log_amplitudes(transform: Transform) -> No
     fixed = replace(FIXED, centre=centre, unit=unit)
     scale, log_meps = Standardisation(transform, 1e-6, centre, unit), np.linspace(-7.0, 1.0, 801)
     told = [PersonTrials(np.array([250.0]), np.array([math.exp(x)]), NOBODY) for x in log_meps]
-    densities = np.exp([fixed_fit(PRIOR, "rbf", scale, one, fixed).log_evidence for one in told])
+    densities = np.exp([fit(ProcessSettings("rbf", prior=PRIOR, fixed=fixed), scale, one).log_evidence for one in told])
     assert densities.sum() * (log_meps[1] - log_meps[0]) == pytest.approx(1.0, abs=1e-3)
 
 
@@ -85,7 +87,7 @@ def test_a_profile_is_believed_and_a_flat_one_is_not() -> None:
 
 def test_the_most_likely_process_is_more_likely_than_all_of_the_grid() -> None:
     told = trials()
-    grid, most_likely = fitted(told), fitted(told, max_evaluations=150)
+    grid, most_likely = fitted(told), fitted(told, hyperparameters="map")
     within = grid.processes.picked(torch.tensor([grid.best]))
     zs = [PRIOR.z(x)[0].square().sum() for x in (within, most_likely.processes.picked(torch.tensor([0])))]
     no_noise = torch.zeros(30, dtype=torch.float64)
@@ -97,20 +99,21 @@ def test_the_most_likely_process_is_more_likely_than_all_of_the_grid() -> None:
 
 def test_noise_by_isi_leaves_the_odds_of_a_profile_as_they_are() -> None:
     told = trials()
-    torch.testing.assert_close(fitted(told, noise_by_isi=True).log_totals, fitted(told).log_totals)
+    torch.testing.assert_close(fitted(told, noise="by-isi").log_totals, fitted(told).log_totals)
 
 
 def test_where_nothing_is_impossible_it_stays_so() -> None:
     told = trials()
     certain = replace(PRIOR, p_window=1.0)
-    for options in ({}, {"max_evaluations": 150}, {"noise_by_isi": True}):
-        got = fit(certain, "rbf", scale_of(told.mep_mv, "log", 0.005), told, **options)
+    for options in ({}, {"hyperparameters": "map"}, {"noise": "by-isi"}):
+        got = fitted(told, prior=certain, **options)
         assert got.log_joint[got.processes.amplitude == 0].exp().sum() == 0
 
 
 def test_a_singular_covariance_is_told_and_answered_by_the_medians() -> None:
     told = PersonTrials(np.full(10, 250.0), np.linspace(0.01, 0.1, 10), NOBODY)
-    sound = fixed_fit(PRIOR, "rbf", Standardisation("log", 0.005, FIXED.centre, FIXED.unit), told, FIXED)
+    scale = Standardisation("log", 0.005, FIXED.centre, FIXED.unit)
+    sound = fit(ProcessSettings("rbf", prior=PRIOR, fixed=FIXED), scale, told)
     assert sound.trouble is None
     noiseless = Hyperparameters(*(torch.tensor([value], dtype=torch.float64) for value in (40.0, 1.0, 0.0)))
     singular = replace(sound, processes=noiseless, log_prior=torch.zeros(1)).conditioned(told)
@@ -121,6 +124,6 @@ def test_a_singular_covariance_is_told_and_answered_by_the_medians() -> None:
 
 
 def test_a_search_that_does_not_end_is_told() -> None:
-    got = fitted(trials(), max_evaluations=5)
+    got = fitted(trials(), hyperparameters="map", max_evaluations=5)
     assert "has not ended after 5 evaluations" in known(got.trouble)
     assert torch.isfinite(got.log_joint).all()

@@ -15,8 +15,8 @@ from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, StrategyError
 from isiw.estimate import WindowEstimate
-from isiw.models.gp.model import GaussianProcess, GaussianProcessPosterior, ProcessSettings
-from isiw.models.gp.prior import FixedProcess
+from isiw.models.gp.model import GaussianProcess, GaussianProcessPosterior
+from isiw.models.gp.prior import FixedProcess, ProcessSettings
 from isiw.models.protocol import (
     Conditions,
     HasBotorchModel,

@@ -8,8 +8,8 @@ import torch
 from botorch.posteriors.gpytorch import GPyTorchPosterior
 
 from isiw.design import DesignSpace
-from isiw.models.gp.fit import fixed_fit
-from isiw.models.gp.prior import FixedProcess, HyperparameterPrior, Standardisation
+from isiw.models.gp.fit import fit as fit_of
+from isiw.models.gp.prior import FixedProcess, HyperparameterPrior, ProcessSettings, Standardisation
 from isiw.models.gp.samples import Paths, ProfileSample, draw_paths
 from isiw.models.shared.history import FloorKind, PersonTrials
 from isiw.window import Window, window_from_excess
@@ -112,7 +112,7 @@ def test_drawn_paths_have_the_mean_and_the_covariance_of_the_process() -> None:
     rng = np.random.default_rng(0)
     told = PersonTrials(rng.uniform(0, 320, 12), rng.lognormal(-4, 0.8, 12), np.empty(0))
     prior, scale = HyperparameterPrior(p_window=1.0), Standardisation("log", 0.005, -4.0, 0.7)
-    fit = fixed_fit(prior, "rbf", scale, told, FixedProcess(40.0, 1.1, 0.6, -4.0, 0.7))
+    fit = fit_of(ProcessSettings("rbf", prior=prior, fixed=FixedProcess(40.0, 1.1, 0.6, -4.0, 0.7)), scale, told)
     isi_ms = torch.linspace(0, 320, 9, dtype=torch.float64)
     level = draw_paths(fit, isi_ms, 20_000, rng).level
     with torch.no_grad():
@@ -142,7 +142,8 @@ def test_the_floor_is_drawn_with_its_path_from_what_all_trials_tell(alone: int) 
 
     meps_mv = np.exp(-4.0 + 0.7 * values)
     told, fixed = PersonTrials(isis_ms[:40], meps_mv[:40], meps_mv[40:]), FixedProcess(30.0, 1.1, 0.6, -4.0, 0.7)
-    fit = fixed_fit(HyperparameterPrior(p_window=1.0), "matern", Standardisation("log", 0.005, -4.0, 0.7), told, fixed)
+    settings = ProcessSettings("matern", prior=HyperparameterPrior(p_window=1.0), fixed=fixed)
+    fit = fit_of(settings, Standardisation("log", 0.005, -4.0, 0.7), told)
     paths = draw_paths(fit, torch.as_tensor(isis_ms[n:-1]), 20_000, rng)
     drawn = np.column_stack((paths.level, paths.alone))
     sd = covariance.diagonal() ** 0.5
@@ -155,7 +156,8 @@ def test_constant_paths_have_the_posterior_of_the_constant() -> None:
     rng = np.random.default_rng(0)
     told = PersonTrials(rng.uniform(0, 320, 12), rng.lognormal(-4, 0.3, 12), rng.lognormal(-4, 0.3, 4))
     fixed = FixedProcess(40.0, 1.1, 0.6, -4.5, 0.7)
-    fit = fixed_fit(HyperparameterPrior(p_window=1e-9), "rbf", Standardisation("log", 0.005, -4.5, 0.7), told, fixed)
+    settings = ProcessSettings("rbf", prior=HyperparameterPrior(p_window=1e-9), fixed=fixed)
+    fit = fit_of(settings, Standardisation("log", 0.005, -4.5, 0.7), told)
     paths = draw_paths(fit, PATH_ISIS_MS, 20_000, rng)
     values = (np.log(np.concatenate((told.mep_mv, told.baseline_mv))) + 4.5) / 0.7
     precision = 1 + 16 / 0.36

@@ -20,10 +20,8 @@ import numpy as np
 
 from isiw.lazy import botorch, scipy, torch
 from isiw.models.gp.prior import (
-    FixedProcess,
-    HyperparameterPrior,
     Hyperparameters,
-    KernelName,
+    ProcessSettings,
     Standardisation,
     correlations,
     regression,
@@ -134,8 +132,7 @@ class Trials(NamedTuple):
 class Fit:
     """A few processes, and how believable each is."""
 
-    prior: HyperparameterPrior
-    kernel: KernelName
+    settings: ProcessSettings
     scale: Standardisation
     told: PersonTrials
     processes: Hyperparameters  # (q,)
@@ -186,7 +183,7 @@ class Fit:
         """Of all values, those of TMS alone behind the others, shape (q, n + m, n + m)."""
         trials = self.trials
         lengths, which = torch.unique(processes.length_ms, return_inverse=True)
-        correlation = correlations(self.kernel, lengths, trials.isi_ms)
+        correlation = correlations(self.settings.kernel, lengths, trials.isi_ms)
         padded = torch.nn.functional.pad(correlation[which], (0, len(trials.alone)) * 2)
         shared = LEVEL_SD**2 + processes.amplitude.square()[:, None, None] * padded
         # Where a tap changes nothing, it does not change the noise either.
@@ -215,79 +212,65 @@ class Fit:
         chosen, trials = self.processes.picked(picks), self.trials
         relative_variance = self.noise.log_variance(trials.isi_ms).exp()
         level = self.level(chosen.noise)
-        return regression(self.kernel, chosen, level, trials.isi_ms, trials.values, relative_variance)
+        return regression(self.settings.kernel, chosen, level, trials.isi_ms, trials.values, relative_variance)
 
 
-def fit(
-    prior: HyperparameterPrior,
-    kernel: KernelName,
-    scale: Standardisation,
-    told: PersonTrials,
-    *,
-    max_evaluations: int | None = None,
-    noise_by_isi: bool = False,
-) -> Fit:
-    """Weigh processes by one person's trials."""
-    found = _sound(Fit(prior, kernel, scale, told, *prior.grid()))
+def fit(settings: ProcessSettings, scale: Standardisation, told: PersonTrials) -> Fit:
+    """Weigh processes by one person's trials; of hyperparameters that are not learnt, that one process."""
+    if (fixed := settings.fixed) is not None:
+        columns = torch.tensor([[fixed.length_ms] * 2, [fixed.amplitude, 0.0], [fixed.noise] * 2], dtype=torch.float64)
+        return _sound(Fit(settings, scale, told, Hyperparameters(*columns), settings.prior.log_hypotheses))
+    found = _sound(Fit(settings, scale, told, *settings.prior.grid()))
     if found.trouble:
         return found
-    if noise_by_isi and len(told.isi_ms):
+    if settings.noise == "by-isi" and len(told.isi_ms):
         profile = noise_profile(found.trials.isi_ms, found.surprise)
         found = _with_same_totals(found, replace(found, noise=profile))
-    return found if max_evaluations is None else _most_likely(found, max_evaluations)
-
-
-def fixed_fit(
-    prior: HyperparameterPrior, kernel: KernelName, scale: Standardisation, told: PersonTrials, fixed: FixedProcess
-) -> Fit:
-    """One process of given hyperparameters, and the same without an amplitude."""
-    present = torch.tensor([[fixed.length_ms, fixed.amplitude, fixed.noise]], dtype=torch.float64)
-    both = torch.cat((present, present * torch.tensor([1.0, 0.0, 1.0], dtype=torch.float64)))
-    return _sound(Fit(prior, kernel, scale, told, Hyperparameters(*both.unbind(-1)), prior.log_hypotheses))
+    return found if settings.hyperparameters == "marginalised" else _most_likely(found)
 
 
 def _sound(found: Fit) -> Fit:
     """The fit, or the prior's medians if none of its processes has a likelihood."""
     if bool(found.log_joint.isfinite().any()):
         return found
-    medians = found.prior.at(torch.zeros((2, 3), dtype=torch.float64))
+    medians = found.settings.prior.at(torch.zeros((2, 3), dtype=torch.float64))
     return replace(
         found,
         processes=medians._replace(amplitude=medians.amplitude * torch.tensor([1.0, 0.0], dtype=torch.float64)),
-        log_prior=found.prior.log_hypotheses,
+        log_prior=found.settings.prior.log_hypotheses,
         noise=equal_noise(),
         trouble="The covariance of the trials is singular under all hyperparameters. "
         "The medians of their priors, with the same noise at all ISIs, stand in for them.",
     )
 
 
-def _most_likely(found: Fit, max_evaluations: int) -> Fit:
+def _most_likely(found: Fit) -> Fit:
     """The most likely process in place of all that have an amplitude, and as believable as they are together."""
-    log_variance = found.noise.log_variance(found.trials.isi_ms)
+    prior, log_variance = found.settings.prior, found.noise.log_variance(found.trials.isi_ms)
 
     def loss(z: FloatArray) -> float:
         point = torch.as_tensor(z).unsqueeze(0)
-        return float(0.5 * point.square().sum() - found.log_marginal(found.prior.at(point), log_variance)[0])
+        return float(0.5 * point.square().sum() - found.log_marginal(prior.at(point), log_variance)[0])
 
-    start = found.prior.z(found.processes.picked(torch.tensor([found.best])))[0]
+    start = prior.z(found.processes.picked(torch.tensor([found.best])))[0]
     simplex = start + torch.nn.functional.pad(0.5 * torch.eye(3, dtype=torch.float64), (0, 0, 1, 0))
     options: dict[str, object] = {
         "initial_simplex": simplex.numpy(),
         "xatol": 0.05,
         "fatol": 0.02,
-        "maxfev": max_evaluations,
+        "maxfev": found.settings.max_evaluations,
     }
     result = scipy.optimize.minimize(loss, start.numpy(), method="Nelder-Mead", options=options)  # type: ignore[call-overload]
     trouble = None
     if not result.success:
         trouble = (
-            f"The search for the most likely hyperparameters has not ended after {max_evaluations} evaluations. "
+            f"The search for the most likely hyperparameters has not ended after {options['maxfev']} evaluations. "
             "The best ones that it met stand in for them."
         )
     flat = torch.where(found.processes.amplitude == 0, found.log_joint, -torch.inf).argmax()
-    chosen = (found.prior.at(torch.as_tensor(result.x).unsqueeze(0)), found.processes.picked(flat.unsqueeze(0)))
+    chosen = (prior.at(torch.as_tensor(result.x).unsqueeze(0)), found.processes.picked(flat.unsqueeze(0)))
     processes = Hyperparameters(*(torch.cat(pair) for pair in zip(*chosen, strict=True)))
-    after = replace(found, processes=processes, log_prior=found.prior.log_hypotheses, trouble=trouble)
+    after = replace(found, processes=processes, log_prior=prior.log_hypotheses, trouble=trouble)
     return _with_same_totals(found, after)
 
 

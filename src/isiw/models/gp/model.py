@@ -8,55 +8,23 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated
 
 import numpy as np
 
-from isiw.checks import Checked, Count, Positive, whole
+from isiw.checks import Checked, Positive, whole
 from isiw.design import DesignSpace
-from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
 from isiw.lazy import botorch, torch
-from isiw.models.gp.fit import Fit, fit, fixed_fit
-from isiw.models.gp.prior import FixedProcess, HyperparameterPrior, KernelName, Standardisation, Transform, scale_of
+from isiw.models.gp.fit import Fit, fit
+from isiw.models.gp.prior import ProcessSettings, Standardisation, Transform, scale_of
 from isiw.models.gp.samples import Paths, ProfileSample, draw_paths
 from isiw.models.protocol import Observation, Tensor
 from isiw.models.shared.history import AmplitudeHistory, FloorTreatment, OfAmplitudes, PersonTrials
 from isiw.models.windows import Runs, SampledProfiles, profile_grid, sampled_estimate
 
-NoiseKind: TypeAlias = Literal["equal", "by-isi"]
-
 PATH_STEP_MS = 4.0
 """Paths are drawn at ISIs this far apart at most, and are straight in between; length scales are 10 ms and more."""
-
-
-@dataclass(frozen=True)
-class ProcessSettings(Checked):
-    """The Gaussian process itself.
-
-    Args:
-        kernel: `"rbf"`, the squared exponential, or `"matern"` with smoothness 5/2.
-        noise: `"equal"` at all ISIs, or `"by-isi"`. Whether there is a profile at all is judged under equal noise.
-        hyperparameters: `"marginalised"` over a grid, or `"map"`, the most likely ones.
-        prior: of the hyperparameters.
-        fixed: hyperparameters and scale that are not learnt, for equal noise.
-        max_evaluations: evaluations after which the search for the most likely hyperparameters gives up.
-
-    Raises:
-        InvalidValueError: an unknown choice, or fixed hyperparameters with noise that depends on the ISI.
-    """
-
-    kernel: KernelName = "matern"
-    noise: NoiseKind = "equal"
-    hyperparameters: Literal["marginalised", "map"] = "marginalised"
-    prior: HyperparameterPrior = field(default_factory=HyperparameterPrior)
-    fixed: FixedProcess | None = None
-    max_evaluations: Count = 150
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.fixed is not None and self.noise != "equal":
-            raise InvalidValueError("fixed hyperparameters are of equal noise", got=self.noise, expected="equal")
 
 
 @dataclass(frozen=True)
@@ -91,18 +59,13 @@ class GaussianProcess(Checked):
 
     def fit(self, told: PersonTrials) -> Fit:
         """Fit one person's trials."""
-        told, process = self.seen(told), self.process
-        if process.fixed is not None:
-            scale = Standardisation(self.transform, self.detection_limit_mv, process.fixed.centre, process.fixed.unit)
-            return fixed_fit(process.prior, process.kernel, scale, told, process.fixed)
-        return fit(
-            process.prior,
-            process.kernel,
-            scale_of(np.concatenate((told.mep_mv, told.baseline_mv)), self.transform, self.detection_limit_mv),
-            told,
-            max_evaluations=None if process.hyperparameters == "marginalised" else process.max_evaluations,
-            noise_by_isi=process.noise == "by-isi",
-        )
+        told, fixed = self.seen(told), self.process.fixed
+        if fixed is not None:
+            scale = Standardisation(self.transform, self.detection_limit_mv, fixed.centre, fixed.unit)
+        else:
+            meps_mv = np.concatenate((told.mep_mv, told.baseline_mv))
+            scale = scale_of(meps_mv, self.transform, self.detection_limit_mv)
+        return fit(self.process, scale, told)
 
     def seen(self, told: PersonTrials) -> PersonTrials:
         """Trials as they are fitted: small MEPs are 0 if the floor is `"zeroed"`."""

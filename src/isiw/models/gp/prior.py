@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Annotated, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
-from isiw.checks import Checked, Number, Positive, number
+from isiw.checks import Checked, Count, Number, Positive, number
 from isiw.errors import InvalidValueError
 from isiw.lazy import botorch, gpytorch, torch
 from isiw.models.protocol import Tensor
@@ -122,6 +122,36 @@ class FixedProcess(Checked):
 
 
 KernelName: TypeAlias = Literal["rbf", "matern"]
+NoiseKind: TypeAlias = Literal["equal", "by-isi"]
+
+
+@dataclass(frozen=True)
+class ProcessSettings(Checked):
+    """The Gaussian process itself.
+
+    Args:
+        kernel: `"rbf"`, the squared exponential, or `"matern"` with smoothness 5/2.
+        noise: `"equal"` at all ISIs, or `"by-isi"`. Whether there is a profile at all is judged under equal noise.
+        hyperparameters: `"marginalised"` over a grid, or `"map"`, the most likely ones.
+        prior: of the hyperparameters.
+        fixed: hyperparameters and scale that are not learnt, for equal noise.
+        max_evaluations: evaluations after which the search for the most likely hyperparameters gives up.
+
+    Raises:
+        InvalidValueError: an unknown choice, or fixed hyperparameters with noise that depends on the ISI.
+    """
+
+    kernel: KernelName = "matern"
+    noise: NoiseKind = "equal"
+    hyperparameters: Literal["marginalised", "map"] = "marginalised"
+    prior: HyperparameterPrior = field(default_factory=HyperparameterPrior)
+    fixed: FixedProcess | None = None
+    max_evaluations: Count = 150
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.fixed is not None and self.noise != "equal":
+            raise InvalidValueError("fixed hyperparameters are of equal noise", got=self.noise, expected="equal")
 
 
 def correlations(kernel: KernelName, length_ms: Tensor, isi_ms: Tensor) -> Tensor:
