@@ -74,9 +74,7 @@ class Delivered:
             )
         judged = [trial for trial in self.trials if trial.told or trial.reason is Kind.IMPLAUSIBLE]
         meps_mv = [trial.mep_mv for trial in judged if trial.mep_mv is not None]
-        self._require_not_swapped(isis_ms, meps_mv)
-        self._require_ms(isis_ms)
-        self._require_mv(meps_mv)
+        self._require_units(isis_ms, meps_mv)
 
     @property
     def named(self) -> str:
@@ -110,34 +108,26 @@ class Delivered:
             )
         return DesignSpace(low * step_ms, high * step_ms, step_ms, reference=self.reference)
 
-    def _require_not_swapped(self, isis_ms: Sequence[float], meps_mv: Sequence[float]) -> None:
+    def _require_units(self, isis_ms: Sequence[float], meps_mv: Sequence[float]) -> None:
+        """Raise if ISIs and amplitudes are probably swapped, or in other units than is stated."""
         seen = [mep_mv for mep_mv in meps_mv if mep_mv > 0]
+        longest_ms, usual_mv = max(map(abs, isis_ms)), statistics.median(seen) if seen else 0.0
         repeated = len(set(seen)) <= len(seen) / 2 and len(set(isis_ms)) > len(isis_ms) / 2
-        if len(seen) >= 6 and repeated and statistics.median(seen) > statistics.median(map(abs, isis_ms)):
+        if len(seen) >= 6 and repeated and usual_mv > statistics.median(map(abs, isis_ms)):
             raise InvalidValueError(
                 f"the columns of {self.named} are probably swapped: the amplitudes repeat as ISIs do",
                 got=f"ISIs such as {isis_ms[0]:.4g} and amplitudes such as {seen[0]:.4g} mV",
                 remedy="Name them: --column isi=NAME --column mep=NAME.",
             )
-
-    def _require_ms(self, isis_ms: Sequence[float]) -> None:
-        longest_ms = max(map(abs, isis_ms))
-        if longest_ms == 0 or 1 <= longest_ms <= LONGEST_ISI_MS:
-            return
-        stated = self.units[0]
-        longest = longest_ms / ISI_UNITS_MS[stated]
-        fits = [unit for unit in ("ms", "s", "us") if 1 <= longest * ISI_UNITS_MS[unit] <= LONGEST_ISI_MS]
-        raise self._in_another_unit("ISIs", "isi", f"at most {longest:g} {stated}", stated, fits)
-
-    def _require_mv(self, meps_mv: Sequence[float]) -> None:
-        seen = [mep_mv for mep_mv in meps_mv if mep_mv > 0]
-        usual_mv = statistics.median(seen) if seen else 0.0
-        if implausible_scale(meps_mv) is None and usual_mv <= AMPLITUDE_MV.most:
-            return
-        stated = self.units[1]
-        usual = usual_mv / EMG_UNITS_MV[stated]
-        fits = [unit for unit in ("mV", "uV", "V") if 0.01 <= usual * EMG_UNITS_MV[unit] <= AMPLITUDE_MV.most]
-        raise self._in_another_unit("amplitudes", "mep", f"{usual:.3g} {stated} in the median", stated, fits)
+        of_isis, of_meps = self.units
+        if longest_ms != 0 and not 1 <= longest_ms <= LONGEST_ISI_MS:
+            longest = longest_ms / ISI_UNITS_MS[of_isis]
+            fits = [unit for unit in ("ms", "s", "us") if 1 <= longest * ISI_UNITS_MS[unit] <= LONGEST_ISI_MS]
+            raise self._in_another_unit("ISIs", "isi", f"at most {longest:g} {of_isis}", of_isis, fits)
+        if implausible_scale(meps_mv) is not None or usual_mv > AMPLITUDE_MV.most:
+            usual = usual_mv / EMG_UNITS_MV[of_meps]
+            fits = [unit for unit in ("mV", "uV", "V") if 0.01 <= usual * EMG_UNITS_MV[unit] <= AMPLITUDE_MV.most]
+            raise self._in_another_unit("amplitudes", "mep", f"{usual:.3g} {of_meps} in the median", of_meps, fits)
 
     def _in_another_unit(self, what: str, key: str, got: str, stated: str, fits: Sequence[str]) -> InvalidValueError:
         said = f"If they are in {fits[0]}, say --unit {fits[0]}; if" if fits else "If"
