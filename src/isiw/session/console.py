@@ -57,13 +57,6 @@ def show_progress(row: Sequence[str]) -> None:
     sys.stdout.flush()
 
 
-def show_legend() -> None:
-    """Print what comes before the first row: what the headings mean, and the headings."""
-    legend = " ".join(PROGRESS_LEGEND) if _most() < COLUMNS else "\n".join(PROGRESS_LEGEND)
-    sys.stdout.write(f"{folded(legend)}\n")
-    show_progress(PROGRESS_HEADINGS)
-
-
 def _most() -> int:
     """The most columns of a row: if a terminal is narrower than the table, its last cells are cut off."""
     return columns() if is_terminal(sys.stdout) else COLUMNS
@@ -280,7 +273,9 @@ class Table:
     def __init__(self, console: OperatorConsole, header: Header, faults: deque[str], *, shown: bool) -> None:
         self._console, self._header, self._faults, self._shown = console, header, faults, shown
         if shown:
-            show_legend()
+            between = " " if _most() < COLUMNS else "\n"
+            sys.stdout.write(f"{folded(between.join(PROGRESS_LEGEND))}\n")
+            show_progress(PROGRESS_HEADINGS)
 
     def updated(self, update: SessionUpdate) -> None:
         """Show a trial: in a terminal with a last line that says how the session stands."""

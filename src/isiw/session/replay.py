@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Final, NamedTuple
 
@@ -164,20 +164,17 @@ def versions_text(header: Header) -> str:
 
 
 def taken_up(
-    salvaged: Salvage,
-    record: SessionRecord,
-    strategy: Strategy | None,
-    limits: Limits,
-    lost_pulses: int | None,
-    *,
-    verify: bool = True,
-    replayed: Callable[[int], None] = lambda _: None,
+    salvaged: Salvage, record: SessionRecord, strategy: Strategy | None, limits: Limits, options: Mapping[str, Any]
 ) -> tuple[Strategy, Earlier]:
-    """The strategy that has learnt a log, and where the log ends; it warns if other versions ask something else."""
-    record = _with_lost_pulses(record, lost_pulses)
+    """The strategy that has learnt a log, and where the log ends; it warns if other versions ask something else.
+
+    Of the options of `isiw.resume` it knows `lost_pulses`, `verify` and `replayed`.
+    """
+    record = _with_lost_pulses(record, options.get("lost_pulses"))
     header = record.header
     strategy = knowing_earlier(strategy, header) if strategy else strategy_of(header)
-    found = replay(record, strategy, verify=verify, replayed=replayed)
+    how = {name: options[name] for name in ("verify", "replayed") if name in options}
+    found = replay(record, strategy, **how)
     if found.differing:
         warn(_differing_text(found, header), OtherVersionsWarning)
     return found.strategy, Earlier(

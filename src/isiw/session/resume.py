@@ -114,7 +114,7 @@ def _own_loop_resumed(
     record: SessionRecord,
     strategy: Strategy | None,
     changes: Mapping[str, Any],
-    options: OwnLoopOptions,
+    options: Mapping[str, Any],
 ) -> Recorder:
     """The session of a log, from where it ends, with the fields of its header that are stated otherwise."""
     require_session(record.path, record.header)
@@ -124,7 +124,7 @@ def _own_loop_resumed(
     details = {name: getattr(logged, name) for name in ("subject", "visit", "protocol", "limits", "config")}
     details |= changes
     _require_reported(details["limits"])
-    strategy, earlier = taken_up(salvaged, record, strategy, details["limits"], options.get("lost_pulses"))
+    strategy, earlier = taken_up(salvaged, record, strategy, details["limits"], options)
     header = _header(strategy, **details).model_copy(update=dict(earlier.kept))
     writer = earlier.open_log(header)
     for first in earlier.first_records:
@@ -211,8 +211,7 @@ def _session_resumed(
 ) -> Session | Recorder:
     require_session(record.path, record.header)
     if device is None:
-        own: OwnLoopOptions = {"clock": options.get("clock"), "lost_pulses": options.get("lost_pulses")}
-        return _own_loop_resumed(salvaged, record, strategy, {}, own)
+        return _own_loop_resumed(salvaged, record, strategy, {}, options)
     record.require_read()
     header = record.header
     if (limits := options.get("limits")) is None:
@@ -221,8 +220,7 @@ def _session_resumed(
         limits.require_effect()
     require_as_real(device.describe(), header.device)
     strategy = strategy.restarted() if strategy else None
-    replaying: Any = {name: options[name] for name in ("verify", "replayed") if name in options}
-    strategy, earlier = taken_up(salvaged, record, strategy, limits, options.get("lost_pulses"), **replaying)
+    strategy, earlier = taken_up(salvaged, record, strategy, limits, options)
     if isinstance(device, HasMemory):
         device.resume_after([Stimulus(t.index, t.commanded_isi_ms, t.tap_alone) for t in earlier.trials])
     kept = ("subject", "config", "visit", "protocol", "signals", "timeout_s", "ask_deadline_s")
