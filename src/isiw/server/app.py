@@ -99,39 +99,25 @@ def make_app(folder: str | Path, rules: Rules) -> FastAPI:
 def guarded(app: FastAPI, rules: Rules) -> None:
     """Put an application behind the guard, and answer every error in words."""
     app.add_middleware(Guard, rules=rules)
-    for kind, handler in _HANDLERS.items():
-        app.add_exception_handler(kind, handler)
+    for kind in (RequestValidationError, HTTPException, IsiwError, Exception):
+        app.add_exception_handler(kind, _refused)
 
 
 async def _refused(request: Request, error: Exception) -> Response:
-    return answered(as_refusal(error), as_200=wants_200(request.url.query))
-
-
-async def _invalid(request: Request, error: Exception) -> Response:
-    """A path, query or header that cannot be used."""
-    found: ErrorDetails = error.errors()[0]  # type: ignore[attr-defined] # it is the RequestValidationError
-    *_, field = found["loc"]
-    what, expected = f"{field} cannot be used", expected_instead(found)
-    refusal = Refusal(422, "InvalidValueError", what, got=found["input"], expected=expected, field=str(field))
-    return answered(refusal, as_200=wants_200(request.url.query))
-
-
-async def _unknown(request: Request, error: Exception) -> Response:
-    """No such route, or not by this method."""
-    status, words = error.status_code, error.detail  # type: ignore[attr-defined] # it is the HTTPException
-    refusal = Refusal(
-        status, words.replace(" ", ""), words.lower(), got=f"{request.method} {request.url.path}",
-        remedy="GET /openapi.json lists all calls.",
-    )  # fmt: skip
-    return answered(refusal, as_200=wants_200(request.url.query), headers=error.headers)  # type: ignore[attr-defined]
-
-
-_HANDLERS = {
-    RequestValidationError: _invalid,
-    HTTPException: _unknown,
-    IsiwError: _refused,
-    Exception: _refused,
-}
+    """The answer to a request that failed: also by a route that there is not, or a value in its path or query."""
+    headers, refusal = None, as_refusal(error)
+    if isinstance(error, HTTPException):
+        words, headers = error.detail, error.headers
+        refusal = Refusal(
+            error.status_code, words.replace(" ", ""), words.lower(), got=f"{request.method} {request.url.path}",
+            remedy="GET /openapi.json lists all calls.",
+        )  # fmt: skip
+    elif isinstance(error, RequestValidationError):
+        found: ErrorDetails = error.errors()[0]
+        *_, field = found["loc"]
+        what, expected = f"{field} cannot be used", expected_instead(found)
+        refusal = Refusal(422, "InvalidValueError", what, got=found["input"], expected=expected, field=str(field))
+    return answered(refusal, as_200=wants_200(request.url.query), headers=headers)
 
 
 PORT: Final = 8473

@@ -6,7 +6,7 @@ import asyncio
 import hashlib
 import ipaddress
 import threading
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator
 from functools import cache
 from importlib import resources
 from typing import Annotated, Final, NamedTuple, Self
@@ -81,18 +81,15 @@ def file_of(path: str) -> _File:
     return _File(content, kind, {**_HEADERS, "Cache-Control": "no-cache", "ETag": tag})
 
 
-def _serving(path: str) -> Callable[[Request], Awaitable[Response]]:
-    async def file(request: Request) -> Response:
-        content, kind, headers = file_of(path)
-        if request.headers.get("if-none-match") == headers["ETag"]:
-            return Response(status_code=304, headers=headers)
-        return Response(content, media_type=kind, headers=headers)
-
-    return file
+async def _file(request: Request) -> Response:
+    content, kind, headers = file_of(request.url.path)
+    if request.headers.get("if-none-match") == headers["ETag"]:
+        return Response(status_code=304, headers=headers)
+    return Response(content, media_type=kind, headers=headers)
 
 
 for _path in FILES:
-    router.get(_path)(_serving(_path))
+    router.get(_path)(_file)
 
 
 async def _view(request: Request) -> View:
