@@ -103,9 +103,17 @@ class HasBudget(Protocol):
 
 @dataclass(frozen=True)
 class Budget(Checked):
-    """Stop when `max_trials` stimuli have been delivered; mistrials count."""
+    """Stop when `max_trials` stimuli have been delivered; as the settings of a strategy, it stops by this alone.
+
+    Args:
+        max_trials: stop after this many stimuli; mistrials count, control trials do not.
+    """
 
     max_trials: Count
+
+    def rule(self, initial: int) -> Budget:  # noqa: ARG002 - the budget counts from the first stimulus
+        """The budget used up."""
+        return self
 
     def stimuli_left(self, delivered: int) -> int:
         """Number of stimuli that are left after so many; see `HasBudget`."""

@@ -2,34 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
-from isiw.checks import Checked, Count
 from isiw.models.gp import GaussianProcess
 from isiw.models.parametric import ParametricModel
 from isiw.models.particles import ParticleModel
 from isiw.models.particles.supra import SupraModel
 from isiw.strategy.settings.common import Choosing, Settings, Stopping
-from isiw.strategy.stopping import Budget, StoppingRule
-
-
-@dataclass(frozen=True)
-class SupraStopping(Checked):
-    """When the strategy stops: the rules of the default look at the window alone, and would leave a depression unknown.
-
-    Args:
-        max_trials: stop after this many stimuli; mistrials count, control trials do not.
-    """
-
-    max_trials: Count = 60
-
-    def rule(self, initial: int) -> StoppingRule:  # noqa: ARG002 - the budget counts from the first stimulus
-        """The budget used up."""
-        return Budget(self.max_trials)
-
+from isiw.strategy.stopping import Budget
 
 PARTICLES: Final = Settings(ParticleModel(), Choosing(), Stopping())
-SUPRA: Final = Settings(SupraModel(), Choosing(), SupraStopping())
+# The rules of the default look at the window alone, and would leave a depression unknown.
+SUPRA: Final = Settings(SupraModel(), Choosing(), Budget(60))
 PARAMETRIC: Final = Settings(ParametricModel(), Choosing(), Stopping())
 GAUSSIAN_PROCESS: Final = Settings(GaussianProcess(), Choosing("straddle", initial_trials=5), Stopping())
