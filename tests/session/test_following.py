@@ -125,7 +125,7 @@ def test_a_question_is_answered_with_no_once_the_session_is_to_end(*, answers_fi
     def nobody() -> bool:
         if answers_first:
             asking.answer(goes_on=True)
-        asking.end()
+        asking.over = True
         return False
 
     assert asking.wait(nobody) is False

@@ -27,7 +27,6 @@ from isiw.session.interrupts import INTERRUPTED, STILL_ARMED, Interrupts, end_pr
 from isiw.session.sink import Sink
 from isiw.signals.limits import EMG_UNITS_MV
 from isiw.strategy.strategy import Strategy
-from isiw.trials import Stimulus
 from isiw.types import Reference
 from isiw.visit import VisitProtocol
 
@@ -182,11 +181,6 @@ class Rig:
             self.limited.stop()
         except StillArmedError as error:
             self._end_armed(error)
-
-    def check(self, stimulus: Stimulus) -> None:
-        """Raise if this stimulus must not be delivered now, as `LimitedDevice.check` does."""
-        with self.interrupts.allowed():
-            self.limited.check(stimulus)
 
     def late_answer(self) -> Answer | None:
         """The answer to a delivery after its deadline; None if nothing comes as long as `stop` may take."""

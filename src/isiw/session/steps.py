@@ -58,7 +58,7 @@ class Pausing:
 
     def end(self, reason: str) -> None:
         """Disarm, and end before the next stimulus, whatever is answered to a pause; from any thread."""
-        self._asking.end()
+        self._asking.over = True
         self.now(reason)
 
     def until_decided(self, decide: Callable[[str], bool]) -> str | None:
@@ -99,7 +99,10 @@ _POLL_S: Final = 0.05
 
 
 class Asking:
-    """A question that is answered from another thread: by a key, or a button. No is never taken back."""
+    """A question that is answered from another thread: by a key, or a button. No is never taken back.
+
+    Once it is `over`, this question and all that follow are answered with no.
+    """
 
     def __init__(self) -> None:
         self.asked = self.over = False
@@ -130,10 +133,6 @@ class Asking:
                     remedy="Read why it is paused now, then answer that pause.",
                 )  # fmt: skip
             self._answer = goes_on
-
-    def end(self) -> None:
-        """Let this question and all that follow be answered with no; from any thread."""
-        self.over = True
 
 
 _LAST: Final = 20
@@ -301,7 +300,11 @@ class Steps:
 
     def _deliver(self, stimulus: Stimulus, fallback: str | None) -> None:
         """Deliver a pair of stimuli or a control trial, unless a trial was judged since it was asked for."""
-        self._require_allowed(stimulus)
+        try:
+            self._freely(self._rig.limited.check, stimulus)  # before anything is logged of it
+        except NotDelivered as error:
+            self._examination.log_refusal("limit", error)
+            raise
         if not self._examination.intend(Intent.of(stimulus, self._rig.clock.now_s()), fallback):
             return
         trial: Trial | None = None
@@ -331,14 +334,6 @@ class Steps:
                 self._own_response.correct()
             self._examination.log_faults()
             self._sink.log.sync()
-
-    def _require_allowed(self, stimulus: Stimulus) -> None:
-        """Raise where the limits or the device do not allow a stimulus, before anything is logged of it."""
-        try:
-            self._rig.check(stimulus)
-        except NotDelivered as error:
-            self._examination.log_refusal("limit", error)
-            raise
 
     def _answer(self, stimulus: Stimulus) -> Answer:
         """The answer to a stimulus; its waveforms are logged, also if it comes too late."""
