@@ -95,19 +95,19 @@ class StartPrior(Checked):
 
     def start_ms(self, quantile: Tensor, space: DesignSpace) -> Tensor:
         """Starts in a space [ms] at some quantiles of the prior, same shape."""
-        law = _law(space, self, quantile.dtype, quantile.device)
-        return law.start_ms.at(quantile)
+        _, starts_ms = _law(space, self, quantile.dtype, quantile.device)
+        return starts_ms.at(quantile)
 
     def knots(self, space: DesignSpace) -> tuple[Tensor, Tensor, Tensor]:
         """Evenly spaced starts in a space [ms], the density there, and the probability of earlier ones, (k,) each."""
-        law = _law(space, self, torch.float32, torch.device("cpu"))
-        return law.density.x, law.density.y, law.start_ms.x
+        density, starts_ms = _law(space, self, torch.float32, torch.device("cpu"))
+        return density.x, density.y, starts_ms.x
 
     def log_density(self, start_ms: Tensor, space: DesignSpace) -> Tensor:
         """Log density at some starts, same shape; -inf where no start can be."""
-        law = _law(space, self, start_ms.dtype, start_ms.device)
-        inside = (start_ms >= law.density.x[0]) & (start_ms <= law.density.x[-1])
-        return torch.where(inside, law.density.at(start_ms).clamp_min(1e-30).log(), -torch.inf)
+        density, _ = _law(space, self, start_ms.dtype, start_ms.device)
+        inside = (start_ms >= density.x[0]) & (start_ms <= density.x[-1])
+        return torch.where(inside, density.at(start_ms).clamp_min(1e-30).log(), -torch.inf)
 
     def usual(self, start_ms: Tensor, space: DesignSpace) -> Tensor:
         """Probability that some starts are of the usual span, whatever the rig, same shape."""
@@ -168,15 +168,9 @@ class _Line(NamedTuple):
         return self.y[left] + share.mul_(self.rise[left])
 
 
-class _Starts(NamedTuple):
-    """The density of window starts [ms] by the start, and the start by its quantile."""
-
-    density: _Line
-    start_ms: _Line
-
-
 @lru_cache(maxsize=64)
-def _law(space: DesignSpace, prior: StartPrior, dtype: torch.dtype, device: torch.device) -> _Starts:
+def _law(space: DesignSpace, prior: StartPrior, dtype: torch.dtype, device: torch.device) -> tuple[_Line, _Line]:
+    """The density of window starts by the start [ms], and the start by its quantile."""
     low_ms, high_ms = space.low_ms - BEFORE_MS, space.high_ms
     knots = min(MAX_KNOTS, math.ceil((high_ms - low_ms) / KNOT_MS) + 1)
     knots_ms = torch.linspace(low_ms, high_ms, knots, dtype=torch.float32).double()
@@ -190,4 +184,4 @@ def _law(space: DesignSpace, prior: StartPrior, dtype: torch.dtype, device: torc
     total = below[-1]
     exact = knots_ms, mixed / total, torch.nn.functional.pad(below / total, (1, 0))
     knots_ms, density, below = (values.to(device, dtype) for values in exact)
-    return _Starts(_Line.through(knots_ms, density), _Line.through(below, knots_ms))
+    return (_Line.through(knots_ms, density), _Line.through(below, knots_ms))
