@@ -38,7 +38,6 @@ class ProfileFit:
     name: str
     parameters: float  # the noise among them; of a spline the effective number
     aicc: float  # infinite with too few ISIs
-    bic: float
     rms_mv: float
     gaussians: FloatArray  # amplitude [mV], mean [ms] and SD [ms] of each, (k, 3); negative if it is depressed
     _curve: Callable[[FloatArray], FloatArray] = field(repr=False)
@@ -181,7 +180,6 @@ def _scored(
         name=name,
         parameters=parameters,
         aicc=deviance + 2.0 * parameters + correction,
-        bic=deviance + parameters * math.log(isis),
         rms_mv=math.sqrt(variance),
         gaussians=gaussians,
         _curve=curve,
