@@ -11,8 +11,7 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
-from isiw.dissertation.kernel_regressions import GaussianProcessRegression
-from isiw.dissertation.regression import FittedCurve, RegressionModel
+from isiw.dissertation.regression import FittedCurve, GaussianProcessRegression, RegressionModel
 from isiw.errors import InvalidValueError
 from isiw.models.shared.history import FloorTreatment
 from isiw.testing import check_model

@@ -9,8 +9,7 @@ import pytest
 from sklearn.svm import SVR
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
-from isiw.dissertation.kernel_regressions import SupportVectorRegression
-from isiw.dissertation.regression import FittedCurve, RegressionModel
+from isiw.dissertation.regression import FittedCurve, RegressionModel, SupportVectorRegression
 from isiw.errors import InvalidValueError
 from isiw.testing import check_model
 from known import known

@@ -16,9 +16,8 @@ from isiw.checks import Checked, Count, NonNegative, Positive, whole
 from isiw.design import DesignSpace
 from isiw.dissertation.bootstrap import BootstrapFilter
 from isiw.dissertation.incremental import SweepModel
-from isiw.dissertation.kernel_regressions import GaussianProcessRegression, SupportVectorRegression
 from isiw.dissertation.nonlinear import NonlinearRegression
-from isiw.dissertation.regression import RegressionModel
+from isiw.dissertation.regression import GaussianProcessRegression, RegressionModel, SupportVectorRegression
 from isiw.models.shared.history import FloorTreatment
 from isiw.strategy.settings.common import AcquisitionName, Settings
 from isiw.strategy.stopping import AnyOf, Budget, Progress, StopDecision, StopKind, StoppingRule

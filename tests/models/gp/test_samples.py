@@ -9,8 +9,8 @@ from botorch.posteriors.gpytorch import GPyTorchPosterior
 
 from isiw.design import DesignSpace
 from isiw.models.gp.fit import fit as fit_of
+from isiw.models.gp.model import Paths, ProfileSample, draw_paths
 from isiw.models.gp.prior import FixedProcess, HyperparameterPrior, ProcessSettings, Standardisation
-from isiw.models.gp.samples import Paths, ProfileSample, draw_paths
 from isiw.models.shared.history import FloorKind, PersonTrials
 from isiw.window import Window, window_from_excess
 from known import known

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Annotated
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -17,14 +17,166 @@ from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
 from isiw.lazy import botorch, torch
 from isiw.models.gp.fit import Fit, fit
-from isiw.models.gp.prior import ProcessSettings, Standardisation, Transform, scale_of
-from isiw.models.gp.samples import Paths, ProfileSample, draw_paths
+from isiw.models.gp.prior import ProcessSettings, Standardisation, Transform, expected_mep_mv, scale_of
 from isiw.models.protocol import Observation, Tensor
-from isiw.models.shared.history import AmplitudeHistory, FloorTreatment, OfAmplitudes, PersonTrials
-from isiw.models.windows import Runs, SampledProfiles, profile_grid, sampled_estimate
+from isiw.models.shared.history import AmplitudeHistory, FloorKind, FloorTreatment, OfAmplitudes, PersonTrials
+from isiw.models.shared.tables import systematic
+from isiw.models.windows import Runs, SampledProfiles, least_excess_mv, profile_grid, sampled_estimate
 
 PATH_STEP_MS = 4.0
 """Paths are drawn at ISIs this far apart at most, and are straight in between; length scales are 10 ms and more."""
+
+
+FLOOR_SHARE = 0.15
+"""A path is lowest up to this quantile; of a range of 320 ms, at least 28 % lie outside the widest window."""
+
+FLOOR_RISE = 0.25
+"""Where TMS alone was not told, the floor is the median of what rises from a path's lowest values by no more than this
+share of its height: less would leave out the floor's upper half where paths wander, more would take in the tails of a
+window that is wide for its range."""
+
+SEGMENT_RISE = 0.4
+"""What is inside by the rule but nowhere rises to this share of a path's height is taken for the path's wandering, and
+makes no segment of a window. So a lower second peak is lost."""
+
+PATH_JITTER = 1e-5
+"""Share of a process's variance that is added to the diagonal before paths are drawn, for a stable factor."""
+
+FAR_LENGTHS = 100.0
+"""Further than this from all trials, only the constant of a process is known."""
+
+OUTCOMES = 32
+"""Values of the transformed MEP on which predictive distributions live."""
+
+
+class Paths(NamedTuple):
+    """Sample paths of one person, on the scale of transformed amplitudes, at the paths' grid (s, m) or (s,)."""
+
+    level: Tensor  # mean of the transformed MEP
+    noise_sd: Tensor  # SD of a trial about it
+    alone: Tensor  # mean of TMS alone; NaN if there was none
+    alone_sd: Tensor
+    present: Tensor  # the tap changes something
+
+
+def draw_paths(found: Fit, isi_ms: Tensor, size: int, rng: np.random.Generator) -> Paths:
+    """Draw sample paths, from each process as many as it is believable."""
+    picks = systematic(torch.log_softmax(found.log_joint, 0).unsqueeze(0), size)[0]
+    chosen = found.processes.picked(picks)
+    present = chosen.amplitude > 0
+    # The first of a path's numbers is its constant's, which is drawn last.
+    z = torch.as_tensor(rng.standard_normal((size, len(isi_ms) + 1))).roll(-1, dims=1)
+    drawn = torch.empty_like(z)
+    drawn[present] = _profiles(found, picks[present], isi_ms, z[present])
+    drawn[~present] = _constants(found, chosen.noise[~present], z[~present, -1]).unsqueeze(-1)
+    level, alone = drawn[:, :-1], drawn[:, -1]
+    changed = found.noise.log_variance(isi_ms) * present.unsqueeze(-1)
+    noise_sd = chosen.noise.unsqueeze(-1) * torch.exp(0.5 * changed)
+    unit, centre = found.scale.unit, found.scale.centre
+    return Paths(
+        level=centre + unit * level,
+        noise_sd=unit * noise_sd,
+        alone=centre + unit * alone if len(found.trials.alone) else torch.full_like(alone, torch.nan),
+        alone_sd=unit * chosen.noise,
+        present=present,
+    )
+
+
+def _profiles(found: Fit, picks: Tensor, isi_ms: Tensor, z: Tensor) -> Tensor:
+    """Paths of processes with an amplitude, one for each pick, then their constants, standardised, shape (s, m + 1)."""
+    if not len(picks):
+        return z
+    which, member = torch.unique(picks, return_inverse=True)
+    # Far from all trials a process is its constant, and a deviation that they tell nothing of.
+    far_ms = isi_ms[-1:] + FAR_LENGTHS * found.processes.length_ms[which].amax()
+    with torch.no_grad():
+        posterior: Any = found.regression(which).posterior(torch.cat((isi_ms, far_ms)).unsqueeze(-1))
+        mean, covariance = posterior.mean.squeeze(-1), posterior.distribution.covariance_matrix
+    surplus = torch.full_like(mean[0], PATH_JITTER)
+    # The deviation is taken away again.
+    surplus[-1] -= 1.0
+    variance = found.processes.amplitude[which].square()
+    factor = torch.linalg.cholesky(covariance + torch.diag_embed(torch.outer(variance, surplus)))
+    drawn: Tensor = mean[member] + (factor[member] @ z.unsqueeze(-1)).squeeze(-1)
+    return drawn
+
+
+def _constants(found: Fit, noise: Tensor, z: Tensor) -> Tensor:
+    """Draws of the constant where a tap changes nothing, in standardised units, shape (s,)."""
+    mean, variance = found.level(noise)
+    precision = 1.0 / variance + len(found.trials.values) / noise.square()
+    pull = mean / variance + found.trials.values.sum() / noise.square()
+    return pull / precision + z / precision.sqrt()
+
+
+@dataclass(frozen=True, eq=False)
+class ProfileSample:
+    """Equally weighted paths of b people, (b, s, ...), and what they say about profile, window and the next MEP."""
+
+    isi_ms: Tensor  # of the paths' grid, evenly spaced, (m,)
+    paths: Paths
+    transform: Transform
+    floor: FloorKind  # above which the least-excess rule is applied
+
+    @cached_property
+    def _expected_mv(self) -> Tensor:
+        """Expected MEP on the paths' grid [mV], shape (b, s, m)."""
+        return expected_mep_mv(self.paths.level, self.paths.noise_sd, self.transform)
+
+    @cached_property
+    def floor_mv(self) -> Tensor:
+        """The level above which the rule is applied [mV], shape (b, s): expected MEP of TMS alone, or 0."""
+        if self.floor != "subtracted":
+            return torch.zeros_like(self.paths.alone)
+        told = expected_mep_mv(self.paths.alone, self.paths.alone_sd, self.transform)
+        expected = self._expected_mv
+        low = expected.quantile(FLOOR_SHARE, dim=-1, keepdim=True)
+        lying = expected <= low + FLOOR_RISE * (expected.amax(-1, keepdim=True) - low)
+        guessed = torch.where(lying, expected, torch.nan).nanmedian(dim=-1).values
+        return torch.where(told.isnan(), guessed, told)
+
+    @cached_property
+    def _edge_level_mv(self) -> Tensor:
+        """Expected MEP at the window's edge [mV], shape (b, s, 1); infinite if there is no window."""
+        floor_mv = self.floor_mv
+        peak_mv = self._expected_mv.amax(-1) - floor_mv
+        level_mv = floor_mv + least_excess_mv(peak_mv, floor_mv)
+        return torch.where(self.paths.present, level_mv, torch.inf).unsqueeze(-1)
+
+    @cached_property
+    def _cleared_mv(self) -> Tensor:
+        """Expected MEP on the paths' grid, at the floor where a path merely wanders [mV], shape (b, s, m)."""
+        expected, floor_mv = self._expected_mv, self.floor_mv.unsqueeze(-1)
+        inside = expected >= self._edge_level_mv
+        run = torch.nn.functional.pad(inside[..., 1:] & ~inside[..., :-1], (1, 0)).cumsum(-1)
+        tops = torch.zeros_like(expected).scatter_reduce(-1, run, torch.where(inside, expected, 0.0), "amax")
+        wanders = tops.gather(-1, run) < floor_mv + SEGMENT_RISE * (expected.amax(-1, keepdim=True) - floor_mv)
+        return torch.where(inside & wanders, floor_mv, expected)
+
+    def expected_mep_mv(self, isi_ms: Tensor) -> Tensor:
+        """Expected MEP [mV] at some ISIs [ms] (shape (t,)), shape (b, s, t)."""
+        return self._between(self._expected_mv, isi_ms)
+
+    def window_masks(self, isi_ms: Tensor) -> Tensor:
+        """Sampled windows as 0 or 1, shape (b, s, t)."""
+        return (self._between(self._cleared_mv, isi_ms) >= self._edge_level_mv).to(self.paths.level.dtype)
+
+    def outcome_mass(self, isi_ms: Tensor) -> Tensor:
+        """Predictive distribution of the next transformed MEP under each path, shape (b, s, t, y)."""
+        level, noise_sd = (self._between(x, isi_ms).unsqueeze(-1) for x in (self.paths.level, self.paths.noise_sd))
+        reach = 2.5 * noise_sd
+        low, high = (level - reach).amin((1, 2, 3)), (level + reach).amax((1, 2, 3))
+        share = torch.linspace(0.0, 1.0, OUTCOMES, dtype=level.dtype)
+        outcomes = (low.unsqueeze(-1) + share * (high - low).unsqueeze(-1))[:, None, None, :]
+        return torch.softmax(-0.5 * ((outcomes - level) / noise_sd).square(), dim=-1)
+
+    def _between(self, values: Tensor, isi_ms: Tensor) -> Tensor:
+        """Values on the paths' grid, shape (b, s, m), interpolated at ISIs [ms] of shape (t,)."""
+        step_ms = self.isi_ms[1] - self.isi_ms[0]
+        position = ((isi_ms - self.isi_ms[0]) / step_ms).clamp(0.0, len(self.isi_ms) - 1.0).to(values.dtype)
+        left = position.floor().long().clamp_max(len(self.isi_ms) - 2)
+        share = position - left
+        return values[..., left] * (1.0 - share) + values[..., left + 1] * share
 
 
 @dataclass(frozen=True)
