@@ -6,8 +6,15 @@ import torch
 from scipy.stats import kstest
 
 from isiw.design import VALVE_SPACE
-from isiw.models.parametric.law import draw_log_mep, levels, log_likelihood
-from isiw.models.parametric.prior import Likelihood, Unknowns, WindowPrior, latent_names
+from isiw.models.parametric.law import (
+    Likelihood,
+    Unknowns,
+    WindowPrior,
+    draw_log_mep,
+    latent_names,
+    levels,
+    log_likelihood,
+)
 from isiw.window import EDGE_LEVEL
 from known import known
 

@@ -14,7 +14,7 @@ from isiw.metrics import covers, edge_ranks, f1
 from isiw.models.parametric import ParametricModel, ParametricPosterior
 from isiw.models.parametric import sampling as parametric_sampling
 from isiw.models.parametric.importance import Effort
-from isiw.models.parametric.prior import Likelihood, WindowPrior
+from isiw.models.parametric.law import Likelihood, WindowPrior
 from isiw.models.parametric.sampling import Chains
 from isiw.models.protocol import (
     Conditions,

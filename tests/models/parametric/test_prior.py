@@ -7,7 +7,7 @@ import torch
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.models.parametric.prior import FloorPrior, InputNoisePrior, Likelihood, Unknowns, WindowPrior, latent_names
+from isiw.models.parametric.law import FloorPrior, InputNoisePrior, Likelihood, Unknowns, WindowPrior, latent_names
 from isiw.models.shared.scales import Scale
 
 

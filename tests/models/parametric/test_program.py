@@ -8,8 +8,7 @@ import pytest
 import torch
 
 from isiw.design import VALVE_SPACE
-from isiw.models.parametric.law import levels, log_likelihood
-from isiw.models.parametric.prior import Likelihood, Unknowns, WindowPrior
+from isiw.models.parametric.law import Likelihood, Unknowns, WindowPrior, levels, log_likelihood
 from isiw.models.parametric.sampling import WindowProgram
 from isiw.models.shared.history import History
 from known import known

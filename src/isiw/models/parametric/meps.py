@@ -9,8 +9,7 @@ from pyro.distributions.torch_distribution import TorchDistribution
 from torch.distributions import constraints
 
 from isiw.lazy import torch
-from isiw.models.parametric.law import draw_log_mep, levels, log_likelihood
-from isiw.models.parametric.prior import Likelihood, Unknowns
+from isiw.models.parametric.law import Likelihood, Unknowns, draw_log_mep, levels, log_likelihood
 from isiw.models.protocol import Tensor
 from isiw.models.shared.tables import averaged_over_isi
 

@@ -18,8 +18,7 @@ from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
 from isiw.lazy import torch
 from isiw.models.parametric.importance import Effort
-from isiw.models.parametric.law import draw_log_mep, levels, log_likelihood
-from isiw.models.parametric.prior import Likelihood, Unknowns, WindowPrior
+from isiw.models.parametric.law import Likelihood, Unknowns, WindowPrior, draw_log_mep, levels, log_likelihood
 from isiw.models.parametric.sampling import Chains, WindowProgram, sample_person
 from isiw.models.protocol import Observation, PriorPerson, Tensor
 from isiw.models.shared.history import History, observed, without_known

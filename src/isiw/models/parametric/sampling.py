@@ -12,7 +12,7 @@ from isiw.design import DesignSpace
 from isiw.lazy import pyro, torch
 from isiw.models import parametric
 from isiw.models.parametric.importance import Effort, Modes, Proposal, WeightedDraws, importance_sample, worth
-from isiw.models.parametric.prior import Likelihood, Unknowns, WindowPrior, latent_names
+from isiw.models.parametric.law import Likelihood, Unknowns, WindowPrior, latent_names
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
 from isiw.models.shared.tables import systematic
