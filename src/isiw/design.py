@@ -85,36 +85,26 @@ class DesignSpace(Checked):
                 remedy=f"In seconds? Then low_ms={1e3 * self.low_ms:g}, high_ms={1e3 * self.high_ms:g}.",
             )
         object.__setattr__(self, "isis_ms", tuple(self.isis_ms))
-        if self.isis_ms:
-            self._check_list()
-            return
-        steps = (self.high_ms - self.low_ms) / self.step_ms
+        listed, ends_ms = self.isis_ms, (self.low_ms, self.high_ms, self.step_ms)
+        steps = len(listed) - 1 if listed else (self.high_ms - self.low_ms) / self.step_ms
         if steps >= MOST_ISIS:
             raise InvalidValueError(
                 "the design space has too many ISIs",
-                got=steps,
+                got=len(listed) or steps,
                 expected=f"at most {MOST_ISIS}",
                 remedy="Choose a narrower range, or a larger step_ms.",
+            )
+        if listed and (listed != tuple(sorted(set(listed))) or ends_ms != (listed[0], listed[-1], _widest_ms(listed))):
+            raise InvalidValueError(
+                "the range of a list of ISIs is not that of the list",
+                got=(*ends_ms, listed),
+                remedy="Make it with DesignSpace.of([10, 15, 20], reference=...).",
             )
         if abs(steps - round(steps)) > 1e-6:
             raise InvalidValueError(
                 "the range is not a whole number of steps",
                 got=steps,
                 remedy="Choose high_ms = low_ms + k * step_ms with a whole k.",
-            )
-
-    def _check_list(self) -> None:
-        listed = self.isis_ms
-        if len(listed) > MOST_ISIS:
-            raise InvalidValueError(
-                "the design space has too many ISIs", got=len(listed), expected=f"at most {MOST_ISIS}"
-            )
-        ends_ms = (self.low_ms, self.high_ms, self.step_ms)
-        if tuple(sorted(set(listed))) != listed or ends_ms != (listed[0], listed[-1], _widest_ms(listed)):
-            raise InvalidValueError(
-                "the range of a list of ISIs is not that of the list",
-                got=(*ends_ms, listed),
-                remedy="Make it with DesignSpace.of([10, 15, 20], reference=...).",
             )
 
     def __str__(self) -> str:
