@@ -146,8 +146,12 @@ def _said(what: str, text: str) -> str:
 
 
 def _write_heads(folder: Path, parts: Sequence[Part], lacking: Iterable[str]) -> None:
-    _write_behaviour(folder, parts)
-    _json(folder / "sessions.json", _described(session_columns(stimulus_of(parts))))
+    every = stimulus_of(parts)
+    _json(folder / f"task-{TASK}_beh.json", _behaviour(every))
+    for part in parts:  # of which each says which stimulus it has, if not all have one
+        if (first := part.record.header.stimulus) != every:
+            _json(_home(part, folder) / "beh" / f"{_name(part)}_task-{TASK}_beh.json", _behaviour(first))
+    _json(folder / "sessions.json", _described(session_columns(every)))
     _json(folder / "participants.json", _described(_PEOPLE))
     _json(
         folder / "dataset_description.json",
@@ -161,18 +165,8 @@ def _write_heads(folder: Path, parts: Sequence[Part], lacking: Iterable[str]) ->
     simulated = sum(part.record.header.device.simulated for part in parts)
     missing = [f"{part}: {loss}" for part in parts for loss in log_losses(part.record)]
     said = "\n".join(f"- {one_line(each)}" for each in [*missing, *lacking] or ["nothing"])
-    given = stimulus_of(parts).given
-    text = _README.format(sessions=len(parts), simulated=simulated, given=given, lacking=said)
+    text = _README.format(sessions=len(parts), simulated=simulated, given=every.given, lacking=said)
     write_output(folder / "README", text.encode())
-
-
-def _write_behaviour(folder: Path, parts: Sequence[Part]) -> None:
-    """Write what the tables of trials say; if not all sessions have one stimulus, each says which it has."""
-    every = stimulus_of(parts)
-    _json(folder / f"task-{TASK}_beh.json", _behaviour(every))
-    for part in parts:
-        if (first := part.record.header.stimulus) != every:
-            _json(_home(part, folder) / "beh" / f"{_name(part)}_task-{TASK}_beh.json", _behaviour(first))
 
 
 def _behaviour(first: StimulusWords) -> dict[str, Any]:

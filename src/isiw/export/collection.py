@@ -99,7 +99,7 @@ def once_each(records: Sequence[SessionRecord]) -> tuple[list[SessionRecord], li
         copy = next((each for each in copies if each.is_left_out), None)
         if copy is None:
             kept.append(record)
-        elif not copy.is_gone_on_from:
+        elif copy.alone or copy.fuller.path != part_of(record.path):  # else it is the log's continuation
             left_out.append(str(copy))
     return kept, left_out
 
@@ -118,17 +118,15 @@ class _Copy:
 
     @property
     def is_left_out(self) -> bool:
-        """True if the fuller log stands for it."""
+        """True if the fuller log stands for it, which has all of it, or tells of the same stimuli as far as both do."""
         if not self.alone:
             return True
         has_lost, known = _lacks(self.record) or _lacks(self.fuller), self.fuller.events
         has_verdicts_alone = any(event.kind in VERDICTS and event not in known for event in self.record.events)
-        return _of_same_stimuli(self.record, self.fuller) and (has_lost or not has_verdicts_alone)
-
-    @property
-    def is_gone_on_from(self) -> bool:
-        """True if the fuller log is its continuation, which is beside it until that is closed."""
-        return self.fuller.path == part_of(self.record.path) and not self.alone
+        first, second = stimuli(self.record), stimuli(self.fuller)
+        common = first.keys() & second.keys()
+        same = all(first[trial] == second[trial] for trial in common) and bool(common or not first or not second)
+        return same and (has_lost or not has_verdicts_alone)
 
     def __str__(self) -> str:
         name, fuller = _names(self.record, self.fuller)
@@ -171,13 +169,6 @@ def _is_damaged(record: SessionRecord) -> bool:
 
 def _unknown(record: SessionRecord) -> list[int]:
     return [trial.index for trial in record.table if trial.reason is Kind.OUTCOME_UNKNOWN]
-
-
-def _of_same_stimuli(one: SessionRecord, other: SessionRecord) -> bool:
-    """True if two logs tell of the same stimuli, as far as both tell of them."""
-    first, second = stimuli(one), stimuli(other)
-    common = first.keys() & second.keys()
-    return all(first[trial] == second[trial] for trial in common) and bool(common or not first or not second)
 
 
 def stimuli(record: SessionRecord) -> dict[int, int]:

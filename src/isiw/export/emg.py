@@ -139,7 +139,9 @@ def runs(record: SessionRecord) -> tuple[list[Run], list[str]]:
             left_out.setdefault((name, EMG in sweep), []).append(number)
         if channels:
             trial = trials.get(number) or Trial.unknown(Stimulus(number, *commanded.get(number, (None, False))))
-            of_layout.setdefault(_layout(channels), []).append((trial, channels))
+            emg, ordered = channels[EMG], sorted(channels, key=lambda name: (name != EMG, name))
+            layout = Layout(emg.rate_hz, len(emg.values), tuple((name, channels[name].unit) for name in ordered))
+            of_layout.setdefault(layout, []).append((trial, channels))
     return [_run(layout, sweeps, record.header.stimulus) for layout, sweeps in of_layout.items()], _sentences(left_out)
 
 
@@ -159,12 +161,6 @@ def _fits(channel: Channel, emg: Channel) -> bool:
         bool((np.abs(channel.values) < _LARGEST).all())
         and _record_samples(channel.rate_hz, len(emg.values)) is not None
     )
-
-
-def _layout(channels: Mapping[str, Channel]) -> Layout:
-    emg = channels[EMG]
-    ordered = sorted(channels, key=lambda name: (name != EMG, name))
-    return Layout(emg.rate_hz, len(emg.values), tuple((name, channels[name].unit) for name in ordered))
 
 
 def _run(layout: Layout, sweeps: Sequence[tuple[Trial, Mapping[str, Channel]]], first: StimulusWords) -> Run:
@@ -209,12 +205,11 @@ def _record_samples(rate_hz: float, sweep: int) -> int | None:
         return None
     fewest = rate.numerator // math.gcd(rate.numerator, 10**6 * rate.denominator)
     fewest *= math.ceil(_SHORTEST_RECORD_S * rate_hz / fewest)
-    return next((samples for samples in (sweep, fewest) if _can_be_written(samples / rate)), None)
-
-
-def _can_be_written(duration_s: Fraction) -> bool:
-    text = str(round(float(duration_s), 6))
-    return len(text) <= 8 and "e" not in text and Fraction(text) == duration_s
+    for samples in (sweep, fewest):
+        written_s = str(round(float(samples / rate), 6))
+        if len(written_s) <= 8 and "e" not in written_s and Fraction(written_s) == samples / rate:
+            return samples
+    return None
 
 
 def _unit(unit: str) -> str:

@@ -19,7 +19,6 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.openapi.utils import get_openapi
 from fastapi.routing import APIRoute
-from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 from pydantic_core import ErrorDetails
 from starlette.concurrency import run_in_threadpool
@@ -56,7 +55,10 @@ def described(app: FastAPI) -> dict[str, Any]:
         document["components"]["securitySchemes"] = {"token": {"type": "http", "scheme": "bearer"}}
         document["security"] = [{"token": []}]
         for path, kind in bodies.items():
-            document["paths"][path]["post"]["requestBody"] = _body(kind)
+            schema = {"schema": {"$ref": f"#/components/schemas/{kind.__name__}"}}
+            required = any(field.is_required() for field in kind.model_fields.values())
+            body = {"required": required, "content": {JSON: schema, FORM: schema}}
+            document["paths"][path]["post"]["requestBody"] = body
         for operations in document["paths"].values():
             for operation in operations.values():  # an answer with status 200 may be an error
                 content = operation["responses"]["200"]["content"]
@@ -64,12 +66,6 @@ def described(app: FastAPI) -> dict[str, Any]:
                 content[JSON] = {"schema": {"anyOf": [usual, error]} if usual else error}
         app.openapi_schema = document
     return app.openapi_schema
-
-
-def _body(kind: type[BaseModel]) -> dict[str, Any]:
-    required = any(field.is_required() for field in kind.model_fields.values())
-    schema = {"$ref": f"#/components/schemas/{kind.__name__}"}
-    return {"required": required, "content": {JSON: {"schema": schema}, FORM: {"schema": schema}}}
 
 
 def make_app(folder: str | Path, rules: Rules) -> FastAPI:

@@ -136,25 +136,22 @@ class Guard:
         stated = headers.get("content-length", "0")
         if not stated.isdecimal() or int(stated) > self._rules.most_bytes:
             raise self._too_large()
+        body, more = bytearray(), True
         try:
             async with asyncio.timeout(self._rules.body_s):
-                return await self._received(receive)
+                while more:
+                    message = await receive()
+                    if message["type"] != "http.request":
+                        raise Refusal(400, "Incomplete", "the connection ended before the body did")
+                    body += message.get("body", b"")
+                    if len(body) > self._rules.most_bytes:
+                        raise self._too_large()
+                    more = message.get("more_body", False)
         except TimeoutError as error:
             raise Refusal(
                 408, "TooSlow", "the body did not arrive in time", expected=f"at most {self._rules.body_s:g} s"
             ) from error
-
-    async def _received(self, receive: Receive) -> bytes:
-        body = bytearray()
-        while True:
-            message = await receive()
-            if message["type"] != "http.request":
-                raise Refusal(400, "Incomplete", "the connection ended before the body did")
-            body += message.get("body", b"")
-            if len(body) > self._rules.most_bytes:
-                raise self._too_large()
-            if not message.get("more_body", False):
-                return bytes(body)
+        return bytes(body)
 
     def _too_large(self) -> Refusal:
         return Refusal(413, "TooLarge", "the body is too large", expected=f"at most {self._rules.most_bytes} bytes")

@@ -106,7 +106,10 @@ def resume(folder: Folder, name: Name, body: Annotated[ResumeRequest, Depends(Bo
 @router.post("/sessions/{id}/ask", responses=_errors(400, 404, 409, 415, 429), response_model=AskAnswer)
 async def ask(folder: Folder, name: Name, body: Annotated[AskRequest, Depends(BodyOf(AskRequest))]) -> Response:
     """The next ISI, on disk as about to be delivered. Safe to repeat where it names the trial."""
-    await _patient(await run_in_threadpool(folder.opened, name), body.wait_s)
+    opened, end_s = await run_in_threadpool(folder.opened, name), time.monotonic() + body.wait_s
+    while (wait_s := opened.recorder.wait_s()) > 0:  # without holding a thread
+        opened.require_no_wait(end_s - time.monotonic())
+        await asyncio.sleep(wait_s)
 
     def asked() -> AskAnswer:
         with folder.driving(name) as session:
@@ -238,11 +241,3 @@ async def _followed(session: DrivenSession, last: int) -> AsyncIterator[str]:
         if quiet_s >= QUIET_S:
             quiet_s = 0.0
             yield ": still here\n\n"
-
-
-async def _patient(session: DrivenSession, most_s: float) -> None:
-    """Wait until the next stimulus is allowed, without holding a thread."""
-    end_s = time.monotonic() + most_s
-    while (wait_s := session.recorder.wait_s()) > 0:
-        session.require_no_wait(end_s - time.monotonic())
-        await asyncio.sleep(wait_s)

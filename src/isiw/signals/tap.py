@@ -69,7 +69,10 @@ class Left(NamedTuple):
 
 
 class _Shown(NamedTuple):
-    """The EMG of one sweep after the hit at `GRID_MS`, between which times it shows it, and its size at rest."""
+    """The EMG of one sweep after the hit at `GRID_MS`, between which times it shows it, and its size at rest.
+
+    The size is the mean from peak to peak over the length of the MEP window; NaN if the rest is shorter.
+    """
 
     course_mv: FloatArray
     from_ms: float
@@ -122,7 +125,10 @@ class TapResponses:
         course = np.interp(GRID_MS, times_ms - hit_ms, values)
         if trial.counts:
             until_ms = ends_ms if trial.t_tms_ms is None else trial.t_tms_ms - PULSE_GUARD_MS - hit_ms
-            shown = (*shown, _Shown(course, from_ms, until_ms, self._size_mv(values[rest], emg.rate_hz)))
+            each = samples(self.mep_window_ms[1] - self.mep_window_ms[0], emg.rate_hz) + 1
+            pieces = values[rest][rest.sum() % each :].reshape(-1, each)
+            rest_mv = float(np.ptp(pieces, axis=-1).mean()) if pieces.size else math.nan
+            shown = (*shown, _Shown(course, from_ms, until_ms, rest_mv))
         if trial.mep_mv is not None and trial.t_tms_ms is not None:
             first, last = (trial.t_tms_ms + edge for edge in self.mep_window_ms)
             within = (times_ms >= first - 1e-6) & (times_ms <= last + 1e-6)
@@ -133,12 +139,6 @@ class TapResponses:
             outside &= (from_ms <= GRID_MS) & (ends_ms >= GRID_MS)
             windows[trial.index] = _MepWindow(values[within], times_ms[within] - hit_ms, over_ms, course, outside)
         return replace(self, shown=shown, windows=windows)
-
-    def _size_mv(self, resting_mv: FloatArray, rate_hz: float) -> float:
-        """The mean peak-to-peak size of EMG at rest over the length of the MEP window [mV]; NaN if it is shorter."""
-        first, last = self.mep_window_ms
-        pieces = resting_mv[resting_mv.size % (each := samples(last - first, rate_hz) + 1) :].reshape(-1, each)
-        return float(np.ptp(pieces, axis=-1).mean()) if pieces.size else math.nan
 
     def measured(self, trial: Trial) -> Trial:
         """The trial with its amplitude without the tap's response, as far as that is known; else as it is."""

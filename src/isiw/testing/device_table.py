@@ -14,7 +14,7 @@ from isiw.devices.protocol import Answer, DeviceInfo
 from isiw.findings import Kind
 from isiw.signals.limits import EMG_UNITS_MV, SignalLimits
 from isiw.signals.rig import EVOKED_SPAN_MS, steepest_edge, tap_span_ms
-from isiw.trials import RESPONSE_MV, Channel, Stimulus, Sweep, Trial
+from isiw.trials import RESPONSE_MV, Stimulus, Sweep, Trial
 
 OF_TIMING = frozenset({Kind.TMS_BEFORE_IMPACT, Kind.ISI_OFF})
 """What comes of a hit delay that is not the one that the rig assumes."""
@@ -124,20 +124,15 @@ def _edge_ms(sweep: Sweep, trial: Trial) -> float | None:
     if emg is None or edge_ms is None or trial.t_tms_ms is None:
         return None
     late_ms = edge_ms - trial.t_tms_ms
-    blanked_ms = _held_since_ms(emg, edge_ms) - trial.t_tms_ms  # an amplifier that blanks the pulse lets go after it
+    edge = round((edge_ms - emg.t0_ms) * emg.rate_hz / 1000)
+    moved = np.flatnonzero(emg.values[:edge] != emg.values[edge])
+    held = int(moved[-1]) + 1 if moved.size else 0  # since when; an amplifier that blanks the pulse lets go after it
+    blanked_ms = emg.t0_ms + 1000 * held / emg.rate_hz - trial.t_tms_ms
     if abs(blanked_ms) <= NEAR_PULSE_MS:
         return blanked_ms
     tap_ms = tap_span_ms(trial)
     is_taps = abs(late_ms) > NEAR_PULSE_MS and tap_ms is not None and tap_ms[0] <= edge_ms <= tap_ms[1]
     return None if is_taps else late_ms
-
-
-def _held_since_ms(emg: Channel, edge_ms: float) -> float:
-    """Since when the EMG had had the value that an edge ends [ms on the sweep's clock]."""
-    edge = round((edge_ms - emg.t0_ms) * emg.rate_hz / 1000)
-    moved = np.flatnonzero(emg.values[:edge] != emg.values[edge])
-    first = int(moved[-1]) + 1 if moved.size else 0
-    return emg.t0_ms + 1000 * first / emg.rate_hz
 
 
 FACTOR: Final = 3.0

@@ -134,8 +134,12 @@ def _check_delivery(device: Device, rules: _Rules, pace: CheckPace) -> list[Deli
         with guarded.armed(kept_disarmed=True):
             guarded.require_refusal("before stage()")
         with guarded.armed():
-            deliveries = []
-            for stimulus in _stimuli(device.describe(), rules.space):
+            space, deliveries = rules.space, []
+            between_ms = float(space.grid_ms[(len(space.grid_ms) - 1) // 3])
+            isis_ms = (space.low_ms, None, between_ms, space.high_ms)
+            stimuli = [Stimulus(trial, isi_ms) for trial, isi_ms in enumerate(isis_ms)]
+            stimuli += [Stimulus(4, None, tap_alone=True)] if guarded.info.tap_alone else []
+            for stimulus in stimuli:
                 answer, took_s = guarded.deliver(stimulus)
                 trial = _checked_answer(guarded.info, stimulus, answer, rules)
                 deliveries.append(Delivery(stimulus, answer, trial, took_s))
@@ -149,12 +153,6 @@ def _check_delivery(device: Device, rules: _Rules, pace: CheckPace) -> list[Deli
             guarded.disarm()
             guarded.require_refusal("after being staged again and stopped")
     return deliveries
-
-
-def _stimuli(info: DeviceInfo, space: DesignSpace) -> list[Stimulus]:
-    between_ms = float(space.grid_ms[(len(space.grid_ms) - 1) // 3])
-    stimuli = [Stimulus(trial, isi) for trial, isi in enumerate((space.low_ms, None, between_ms, space.high_ms))]
-    return stimuli + ([Stimulus(4, None, tap_alone=True)] if info.tap_alone else [])
 
 
 def _check_description(device: Device, space: DesignSpace) -> None:

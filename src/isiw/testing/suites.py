@@ -250,7 +250,10 @@ def check_strategy(make: Callable[[], Strategy], *, trials: int = 12) -> None:
     for what, told in trials_that_break_things(make().space, trials).items():
         _check_telling(make(), told, f"after: {what}")
     _check_replay(make, usual_trials(make().space)[:trials])
-    _check_mistrials(make)
+    strategy, other = make(), make()
+    strategy.count_mistrial()
+    require(strategy.ask() == other.ask(), "a mistrial does not change what is asked")
+    require(same_estimates(strategy.estimate(), other.estimate()), "a mistrial does not change the estimate")
     strategy = make()
     isi_ms = strategy.ask(deadline_s=0.0)
     require(isi_ms in strategy.space.grid_ms, "ask answers an ISI on the grid although its deadline has passed")
@@ -317,13 +320,6 @@ def _asks(strategy: Strategy, told: Trials) -> list[float]:
         asked.append(strategy.ask())
         strategy.learn(isi_ms, mep_mv)
     return [*asked, strategy.ask()]
-
-
-def _check_mistrials(make: Callable[[], Strategy]) -> None:
-    strategy, other = make(), make()
-    strategy.count_mistrial()
-    require(strategy.ask() == other.ask(), "a mistrial does not change what is asked")
-    require(same_estimates(strategy.estimate(), other.estimate()), "a mistrial does not change the estimate")
 
 
 def check_acquisition(acquisition: AcquisitionFunction, posterior: Posterior, space: DesignSpace) -> None:

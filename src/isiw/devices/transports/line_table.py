@@ -271,9 +271,6 @@ class LineCommands(Checked):
         _require_one(_ISI, self.read_back.groups, "the answer to read_back must say the ISI", r"(?P<isi_ms>[\d.]+)")
         told = self.fire.groups | self._result_groups
         _require_one(_ISI, told, "the answer to fire or result must say the realised ISI", r"(?P<isi_ms>[\d.]+)")
-        self._require_refusal()
-
-    def _require_refusal(self) -> None:
         try:
             groups = re.compile(self.refusal).groupindex
         except (re.error, TypeError) as error:

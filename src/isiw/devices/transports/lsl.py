@@ -212,8 +212,14 @@ class LslDevice:
         self._streams = {}
 
     def _sweep(self, asked_s: float, end_s: float, reply: Reply) -> Sweep:
-        """The waveforms, with 0 at the pulse."""
-        fired_s = self._fired_s(asked_s, end_s, reply)
+        """The waveforms, with 0 at the pulse, which was after it was asked for, and before now."""
+        fired_s = reply.number("t_fired") + self._markers.correction_s(_left_s(end_s))  # by the local LSL clock
+        if not asked_s - _CLOCKS_S <= fired_s <= self._lsl.local_clock() + _CLOCKS_S:
+            raise reply.broken(
+                "the pulse is not of this trial",
+                got=f"t_fired {fired_s - asked_s:+.3g} s after it was asked for",
+                remedy="t_fired is the time of the pulse by lsl_local_clock of the computer that sends the echo.",
+            )
         span_s = (fired_s - self._before_s, fired_s + self._after_s)
         until_s = min(end_s, time.monotonic() + self._after_s + LATE_S)
         cuts = {name: stream.cut(*span_s, until_s) for name, stream in self._streams.items()}
@@ -223,17 +229,6 @@ class LslDevice:
             t0_ms = 1e3 * (begin_s - fired_s)
             channels[name] = Channel(values[:, channel.column], channel.rate_hz, channel.unit, t0_ms)
         return sweep_of(channels, 0.0, reply)
-
-    def _fired_s(self, asked_s: float, end_s: float, reply: Reply) -> float:
-        """When the pulse was, by the local LSL clock [s]: after it was asked for, and before now."""
-        fired_s = reply.number("t_fired") + self._markers.correction_s(_left_s(end_s))
-        if not asked_s - _CLOCKS_S <= fired_s <= self._lsl.local_clock() + _CLOCKS_S:
-            raise reply.broken(
-                "the pulse is not of this trial",
-                got=f"t_fired {fired_s - asked_s:+.3g} s after it was asked for",
-                remedy="t_fired is the time of the pulse by lsl_local_clock of the computer that sends the echo.",
-            )
-        return fired_s
 
     def _found(self, end_s: float) -> dict[str, Any]:
         """The streams by name, each there once."""
