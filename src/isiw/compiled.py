@@ -228,7 +228,7 @@ def bell(z: Any) -> Any:
 def log(x: Any) -> Any:
     """Natural logarithm of a positive number, in single precision."""
     bits = _bits_of(max(x, _TINY))
-    exponent = np.int32((bits - _SQRT_HALF) >> 23)
+    exponent = np.int32(np.int32(bits - _SQRT_HALF) >> 23)  # or Numba takes twice as many bits
     m = _float_of(np.int32(bits - (exponent << 23))) - _ONE  # from √½ to √2, less 1
     tail = _L5 + m * (_L4 + m * (_L3 + m * (_L2 + m * (_L1 + m * _L0))))
     square = m * m

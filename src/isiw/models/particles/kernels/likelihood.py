@@ -203,33 +203,48 @@ def _inputs(particle: Any, trials: Any, count: int, node: Any, work: Any) -> Non
 
 
 @inlined
-def _normal(share: Any, variance: Any, of_trial: Any) -> Any:
-    """Density of a log MEP by the evoked part of its mean, in floors, and that part's variance, but for a constant."""
-    _, _, known, relative, floor_variance, _, _ = of_trial
-    mean = _ONE + share + known
-    inverse_sd = mean * per_root(share * share * variance + floor_variance)
-    return inverse_sd * bell((log(mean) - relative) * inverse_sd)
+def _sigmoid(drive: Any) -> Any:
+    return per(_ONE + exp(-drive))
 
 
 @inlined
-def _node(at: Any, between: Any, weight: Any, of_trial: Any) -> Any:
-    """The part of the density that one node adds, for a curve without a threshold."""
-    drive, scale, _, _, _, output, _ = of_trial
-    sigmoid = per(_ONE + exp(-(drive + at)))
+def _share(sigmoid: Any, between: Any, scale: Any, start: Any) -> Any:
+    """The evoked part of a mean at a node, in floors, and its relative variance; the curve starts at 0 or a threshold."""
     flat = _ONE - sigmoid
-    return weight * _normal(sigmoid * scale, flat * flat * between + output, of_trial)
-
-
-@inlined
-def _node_above(at: Any, between: Any, weight: Any, of_trial: Any) -> Any:
-    """The part of the density that one node adds, for a curve that starts at a threshold."""
-    drive, scale, _, _, _, output, start = of_trial
-    sigmoid = per(_ONE + exp(-(drive + at)))
-    steep, over = sigmoid * (_ONE - sigmoid), sigmoid - start
+    if start is None:
+        return sigmoid * scale, flat * flat * between
+    steep, over = sigmoid * flat, sigmoid - start
     variance = steep * steep * between
     reach = max(over * over + _CORNER * variance, _LEAST_REACH)
-    share = (math.sqrt(reach) + over) * (_HALF / (_ONE - start)) * scale
-    return weight * _normal(share, variance / reach + output, of_trial)
+    return (math.sqrt(reach) + over) * (_HALF / (_ONE - start)) * scale, variance / reach
+
+
+@inlined
+def _inverse_sd(share: Any, variance: Any, of_trial: Any) -> Any:
+    _, _, known, _, floor_variance, output = of_trial
+    return (_ONE + share + known) * per_root(share * share * (variance + output) + floor_variance)
+
+
+@inlined
+def _normal(share: Any, inverse_sd: Any, of_trial: Any) -> Any:
+    """Density of a log MEP by the evoked part of its mean, in floors, and the inverse of its SD, but for a constant."""
+    _, _, known, relative, _, _ = of_trial
+    return inverse_sd * bell((log(_ONE + share + known) - relative) * inverse_sd)
+
+
+@inlined
+def _four_nodes(q: int, curve: Any, start: Any, of_trial: Any) -> Any:
+    """The part of the density that four nodes add; each step for all of them, as the next waits for its outcome."""
+    drive, scale, _, _, _, _ = of_trial
+    at, between, w = curve[0], curve[1], NODE_WEIGHTS
+    a, b = _sigmoid(drive + at[q]), _sigmoid(drive + at[q + 1])
+    c, d = _sigmoid(drive + at[q + 2]), _sigmoid(drive + at[q + 3])
+    (a, of_a), (b, of_b) = _share(a, between[q], scale, start), _share(b, between[q + 1], scale, start)
+    (c, of_c), (d, of_d) = _share(c, between[q + 2], scale, start), _share(d, between[q + 3], scale, start)
+    of_a, of_b = _inverse_sd(a, of_a, of_trial), _inverse_sd(b, of_b, of_trial)
+    of_c, of_d = _inverse_sd(c, of_c, of_trial), _inverse_sd(d, of_d, of_trial)
+    first = w[q] * _normal(a, of_a, of_trial) + w[q + 1] * _normal(b, of_b, of_trial)
+    return first + (w[q + 2] * _normal(c, of_c, of_trial) + w[q + 3] * _normal(d, of_d, of_trial))
 
 
 @loop
@@ -243,25 +258,15 @@ def _density(particle: Any, trials: Any, count: int, curve: Any, work: Any, like
     for i in range(count):
         relative[i] = low[i] - floor
     _step(trials, count, particle[field.CHANGED], -particle[field.STEP_SCALE], relative)
-    # All nodes in one pass, written out: what one waits for another works out meanwhile, and no sums go through memory.
-    # There are as many terms as `NODES`; `_inside` has the same as a loop.
-    at, between, w = curve[0], curve[1], NODE_WEIGHTS
+    # All nodes in one pass, so that no sums go through memory; `_inside` has the same as a loop over `NODES`.
     if start > _NIL:
         for i in range(count):
-            one = drive[i], scale[i], known[i], relative[i], floor_variance + varies[i], output, start
-            first = _node_above(at[0], between[0], w[0], one) + _node_above(at[1], between[1], w[1], one)
-            second = _node_above(at[2], between[2], w[2], one) + _node_above(at[3], between[3], w[3], one)
-            third = _node_above(at[4], between[4], w[4], one) + _node_above(at[5], between[5], w[5], one)
-            fourth = _node_above(at[6], between[6], w[6], one) + _node_above(at[7], between[7], w[7], one)
-            evoked[i] = first + second + (third + fourth)
+            one = drive[i], scale[i], known[i], relative[i], floor_variance + varies[i], output
+            evoked[i] = _four_nodes(0, curve, start, one) + _four_nodes(4, curve, start, one)
     else:
         for i in range(count):
-            one = drive[i], scale[i], known[i], relative[i], floor_variance + varies[i], output, start
-            first = _node(at[0], between[0], w[0], one) + _node(at[1], between[1], w[1], one)
-            second = _node(at[2], between[2], w[2], one) + _node(at[3], between[3], w[3], one)
-            third = _node(at[4], between[4], w[4], one) + _node(at[5], between[5], w[5], one)
-            fourth = _node(at[6], between[6], w[6], one) + _node(at[7], between[7], w[7], one)
-            evoked[i] = first + second + (third + fourth)
+            one = drive[i], scale[i], known[i], relative[i], floor_variance + varies[i], output
+            evoked[i] = _four_nodes(0, curve, None, one) + _four_nodes(4, curve, None, one)
     for i in range(count):
         still = (_ONE + known[i]) * per_root(floor_variance + varies[i])
         silent = still * bell((log(_ONE + known[i]) - relative[i]) * still)
