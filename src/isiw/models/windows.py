@@ -64,7 +64,9 @@ class Runs:
     @cached_property
     def _leads(self) -> IntArray:
         """The first run of each window, shape (w,)."""
-        return np.flatnonzero(np.diff(self.sample, prepend=-1))
+        others = np.ones(len(self.sample), dtype=bool)
+        np.not_equal(self.sample[1:], self.sample[:-1], out=others[1:])
+        return np.flatnonzero(others)
 
     @cached_property
     def found(self) -> IntArray:

@@ -36,7 +36,7 @@ def people(kind: ChangeKind) -> tuple[Latents, History]:
     """Particles that all have a change of a kind, and trials before it and after it."""
     draws = generator(5)
     latents = TARGET.prior.sample(2, 100, draws, VALVE_SPACE)
-    latents = latents._replace(change=torch.full_like(latents.change, kind))
+    latents = latents.with_kind("change", torch.full_like(latents.change, kind))
     return latents, history(TARGET.person(latents), 30, draws)
 
 

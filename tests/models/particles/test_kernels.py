@@ -2,6 +2,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from operator import itemgetter
 from typing import Any, get_args
 
 import numpy as np
@@ -19,7 +20,7 @@ from isiw.models.particles.kernels.likelihood import ROOM
 from isiw.models.particles.kernels.moves import SCRATCH, UNKNOWN, sweeps
 from isiw.models.particles.kernels.records import columns_of, people_of, trial_records
 from isiw.models.particles.likelihood import total_log_likelihood
-from isiw.models.particles.moves import remade, steps_of
+from isiw.models.particles.moves import steps_of
 from isiw.models.particles.noise import NoiseKind, Response
 from isiw.models.particles.places import Place
 from isiw.models.particles.predictions import PersonSample
@@ -105,14 +106,6 @@ def test_long_histories_are_summed_piece_by_piece() -> None:
 
 
 @pytest.mark.parametrize("name", TARGETS)
-def test_particles_mean_the_same_to_both_engines(name: str) -> None:
-    target = TARGETS[name]
-    latents = target.prior.sample(2, 200, generator(2), target.space)
-    again = target.latents(latents.values, target.kinds(latents))
-    assert all(torch.equal(a, b) for a, b in zip(latents, again, strict=True))
-
-
-@pytest.mark.parametrize("name", TARGETS)
 def test_moves_of_both_engines_are_accepted_as_often_and_lead_to_the_same_posterior(name: str) -> None:
     # Twelve trials, 4,000 particles of the prior weighted by nothing, 30 sweeps: means of what both engines come to
     # differ by less than five standard errors of 200 independent particles.
@@ -185,7 +178,7 @@ def test_people_of_a_batch_have_the_likelihood_that_each_has_alone() -> None:
     for person in range(3):
         one = slice(person, person + 1)
         alone = History(*(column[one] for column in told.columns))
-        part = remade(latents, (field[one] for field in latents))
+        part = latents.each(itemgetter(one))
         assert torch.equal(engine.log_likelihood(part, alone), together[one])
 
 
@@ -217,7 +210,7 @@ KINDS = {kind.name: kind for kind in NoiseKind}
 def of_kind(kind: NoiseKind) -> tuple[Person, History]:
     draws = generator(7)
     latents = Prior().sample(2, 60, draws, VALVE_SPACE)
-    latents = latents._replace(noise=torch.full_like(latents.noise, kind))
+    latents = latents.with_kind("noise", torch.full_like(latents.noise, kind))
     person = Prior().person(latents)
     return person, history(person, 20, draws)
 
@@ -333,13 +326,13 @@ def test_sweeps_one_by_one_lead_where_sweeps_at_once_do(name: str) -> None:
     told = history(target.person(latents), 8, generator(4))
     tables, start = target.tables(), engine_for("compiled", target).log_likelihood(latents, told).numpy()
     for number, calls in ((6, 1), (1, 6)):
-        values, kinds = latents.values.numpy().copy(), target.kinds(latents).numpy().copy()
+        values, kinds = latents.values.numpy().copy(), latents.kinds.numpy().copy()
         log_likelihood, dice = start.copy(), np.full((1, 1), 7, dtype=np.uint64)
         room, scratch, counts = (np.zeros(shape, dtype=np.float32) for shape in (ROOM, SCRATCH, (1, 4)))
         for _ in range(calls):
             densities = np.full((1, 300, len(tables.first)), UNKNOWN)
             state = values, kinds, log_likelihood, densities, np.zeros(5, dtype=int)
-            trials, steps = trial_records(columns_of(told)), steps_of(told).numpy()
+            trials, steps = trial_records(columns_of(told)), steps_of(told)
             sweeps(number, tables, trials, steps, state, dice, (room, scratch), counts)
         found.append((values, kinds, log_likelihood, counts))
     for together, one_by_one in zip(*found, strict=True):

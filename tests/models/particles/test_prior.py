@@ -249,7 +249,7 @@ def test_a_person_unlike_most_is_told_by_the_part_that_is_unusual() -> None:
         shares = prior.unusual(latents._replace(values=changed), VALVE_SPACE)
         assert shares.pop(name) > 0.95
         assert max(shares.values()) < 0.4
-    nobody = latents._replace(present=torch.zeros_like(latents.present))
+    nobody = latents.with_kind("present", torch.zeros_like(latents.present))
     assert list(prior.unusual(nobody, VALVE_SPACE)) == ["the EMG floor"]
 
 

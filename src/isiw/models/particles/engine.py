@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Generic, Literal, Protocol, TypeAlias
+from typing import Literal, Protocol, TypeAlias
 
 import numpy as np
 
@@ -17,8 +17,9 @@ from isiw.models.particles.kernels.likelihood import ROOM, likelihoods
 from isiw.models.particles.kernels.moves import SCRATCH, UNKNOWN, log_usual, records, sweeps
 from isiw.models.particles.kernels.records import columns_of, person_of, trial_records
 from isiw.models.particles.kernels.target import KINDS, Tables
+from isiw.models.particles.latents import Latents
 from isiw.models.particles.likelihood import total_log_likelihood
-from isiw.models.particles.moves import L, Moved, Mover, Target, steps_of
+from isiw.models.particles.moves import Moved, Mover, Target, steps_of
 from isiw.models.particles.prior import Person
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
@@ -27,38 +28,32 @@ from isiw.types import FloatArray, IntArray
 EngineName: TypeAlias = Literal["compiled", "torch"]
 
 
-class Engine(Protocol[L]):
+class Engine(Protocol):
     """What particles are weighed and moved by."""
 
-    def meaning(self, latents: L, trials: int) -> tuple[Person, FloatArray | None]:
+    def meaning(self, latents: Latents, trials: int) -> tuple[Person, FloatArray | None]:
         """What particles mean after so many trials, and the same as kernels have it; None where torch computes."""
 
-    def log_likelihood(self, latents: L, history: History) -> Tensor:
+    def log_likelihood(self, latents: Latents, history: History) -> Tensor:
         """Log likelihood of a history under each particle, shape (b, p)."""
 
-    def log_usual(self, latents: L) -> Tensor:
+    def log_usual(self, latents: Latents) -> Tensor:
         """Log prior density of what ISIs are chosen with another law of, but for a constant, shape (b, p)."""
 
     def sweeps(
-        self, number: int, latents: L, log_likelihood: Tensor, history: History, generator: torch.Generator
-    ) -> Moved[L]:
+        self, number: int, latents: Latents, log_likelihood: Tensor, history: History, generator: torch.Generator
+    ) -> Moved:
         """Move every particle some times under the posterior of a history."""
 
 
-class TabledTarget(Target[L], Protocol):
+class TabledTarget(Target, Protocol):
     """A target that kernels know, too: its prior as tables, and its particles as plain arrays."""
 
     def tables(self) -> Tables:
         """What kernels know of the prior and of what moves may do."""
 
-    def kinds(self, latents: L) -> Tensor:
-        """The kinds of particles, integers of shape (b, p, k)."""
 
-    def latents(self, values: Tensor, kinds: Tensor) -> L:
-        """Particles as the target has them."""
-
-
-def engine_for(name: EngineName, target: TabledTarget[L], device: str = "cpu") -> Engine[L]:
+def engine_for(name: EngineName, target: TabledTarget, device: str = "cpu") -> Engine:
     """The engine that is wanted, where it can be had; else torch."""
     if name == "torch" or not AVAILABLE or device != "cpu":
         return TorchEngine(target)
@@ -66,53 +61,53 @@ def engine_for(name: EngineName, target: TabledTarget[L], device: str = "cpu") -
 
 
 @dataclass(frozen=True)
-class TorchEngine(Generic[L]):
+class TorchEngine:
     """Torch, on any device: what the kernels are tested against."""
 
-    target: Target[L]
+    target: Target
 
-    def meaning(self, latents: L, trials: int) -> tuple[Person, None]:
+    def meaning(self, latents: Latents, trials: int) -> tuple[Person, None]:
         """What particles mean; see `Engine`."""
         return self.target.person(latents).after(trials), None
 
-    def log_likelihood(self, latents: L, history: History) -> Tensor:
+    def log_likelihood(self, latents: Latents, history: History) -> Tensor:
         """Log likelihood of a history under each particle; see `Engine`."""
         return total_log_likelihood(self.target.person(latents), history)
 
-    def log_usual(self, latents: L) -> Tensor:
+    def log_usual(self, latents: Latents) -> Tensor:
         """Log prior density of what ISIs are chosen with another law of; see `Engine`."""
         return self.target.log_usual(latents)
 
     def sweeps(
-        self, number: int, latents: L, log_likelihood: Tensor, history: History, generator: torch.Generator
-    ) -> Moved[L]:
+        self, number: int, latents: Latents, log_likelihood: Tensor, history: History, generator: torch.Generator
+    ) -> Moved:
         """Move every particle some times; see `Engine`."""
         return Mover(self.target, history, generator).sweeps(number, latents, log_likelihood)
 
 
 @dataclass(frozen=True)
-class Compiled(Generic[L]):
+class Compiled:
     """Compiled loops on one processor."""
 
-    target: TabledTarget[L]
+    target: TabledTarget
 
     @cached_property
     def tables(self) -> Tables:
         """What the kernels know of the target."""
         return self.target.tables()
 
-    def meaning(self, latents: L, trials: int) -> tuple[Person, FloatArray]:
+    def meaning(self, latents: Latents, trials: int) -> tuple[Person, FloatArray]:
         """What particles mean; see `Engine`."""
         with first_of("view of particles"):
             particles = records(self.tables, *self._arrays(latents), trials)
         return person_of(particles), particles
 
-    def log_likelihood(self, latents: L, history: History) -> Tensor:
+    def log_likelihood(self, latents: Latents, history: History) -> Tensor:
         """Log likelihood of a history under each particle; see `Engine`."""
         with first_of("view of particles"):
             return log_likelihood_of(records(self.tables, *self._arrays(latents), -1), history)
 
-    def log_usual(self, latents: L) -> Tensor:
+    def log_usual(self, latents: Latents) -> Tensor:
         """Log prior density of what ISIs are chosen with another law of; see `Engine`."""
         found, parts = np.empty(latents.values.shape[:2], dtype=np.float32), np.empty(SCRATCH[1], dtype=np.float32)
         with first_of("prior"):
@@ -120,24 +115,24 @@ class Compiled(Generic[L]):
         return torch.from_numpy(found)
 
     def sweeps(
-        self, number: int, latents: L, log_likelihood: Tensor, history: History, generator: torch.Generator
-    ) -> Moved[L]:
+        self, number: int, latents: Latents, log_likelihood: Tensor, history: History, generator: torch.Generator
+    ) -> Moved:
         """Move every particle some times; see `Engine`."""
         people, particles = log_likelihood.shape
         values, kinds = (array.copy() for array in self._arrays(latents))
         densities = np.full((people, particles, len(self.tables.first)), UNKNOWN)
-        found, steps = log_likelihood.numpy().copy(), steps_of(history).contiguous().numpy()
+        found, steps = log_likelihood.numpy().copy(), steps_of(history)
         dice = torch.randint(2**63 - 1, (people, 1), generator=generator).numpy().view(np.uint64)
         counts, room, scratch = (np.zeros(shape, dtype=np.float32) for shape in ((people, 4), ROOM, SCRATCH))
         with first_of("moves"):
             told, state = trial_records(columns_of(history)), (values, kinds, found, densities, np.zeros(KINDS, int))
             sweeps(number, self.tables, told, steps, state, dice, (room, scratch), counts)
         shifts, shifted, jumps, jumped = torch.from_numpy(counts).T
-        moved = self.target.latents(torch.from_numpy(values), torch.from_numpy(kinds))
+        moved = Latents(torch.from_numpy(values), torch.from_numpy(kinds))
         return Moved(moved, torch.from_numpy(found), shifted / shifts, jumped / jumps)
 
-    def _arrays(self, latents: L) -> tuple[FloatArray, IntArray]:
-        return latents.values.contiguous().numpy(), self.target.kinds(latents).contiguous().numpy()
+    def _arrays(self, latents: Latents) -> tuple[FloatArray, IntArray]:
+        return latents.values.contiguous().numpy(), latents.kinds.contiguous().numpy()
 
 
 def log_likelihood_of(particles: FloatArray, history: History) -> Tensor:

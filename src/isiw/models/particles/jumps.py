@@ -18,6 +18,7 @@ from isiw.models.particles.changes import ChangeKind
 from isiw.models.particles.kernels.building import prior_tables
 from isiw.models.particles.kernels.target import Tables
 from isiw.models.particles.latents import (
+    KINDS,
     LATENTS,
     PLACE_AND_SIZES,
     PROFILE_BLOCKS,
@@ -55,9 +56,6 @@ REDRAWN: Final = {
     "time or window": PROFILE_BLOCKS,
 }
 """The blocks of latents that each jump draws again from the prior; see `_changed` for those of a change."""
-
-KINDS: Final = ("shape", "noise", "present", "depressed", "change")
-"""The kinds of a particle as the kernels have them."""
 
 _RENEWED: Final = {
     "form": {"shape"},
@@ -122,16 +120,6 @@ class WindowTarget:
             moves=moves,
         )
 
-    def kinds(self, latents: Latents) -> Tensor:
-        """The kinds of particles, integers of shape (b, p, k); there is no depression."""
-        present = latents.present.long()
-        kinds = latents.shape, latents.noise, present, torch.zeros_like(present), latents.change
-        return torch.stack(kinds, dim=-1)
-
-    def latents(self, values: Tensor, kinds: Tensor) -> Latents:
-        """Particles from their latents (b, p, d) and kinds (b, p, k)."""
-        return Latents(values, kinds[..., 0], kinds[..., 1], kinds[..., 2].bool(), kinds[..., 4])
-
     def log_prior(self, latents: Latents) -> Tensor:
         """Log prior density of their latents but for a constant, shape (b, p)."""
         return self.prior.log_density(latents.values, self.space)
@@ -152,8 +140,8 @@ class WindowTarget:
         jump = drawn(tuple(JUMPS.values()), uniform)
         form, noise, window, _, _, change, both = (jump == number for number in range(len(JUMPS)))
         window = window | both
-        after = Latents(
-            values=torch.where(_redrawn(jump.device)[jump], fresh.values[0], latents.values),
+        after = Latents.of(
+            torch.where(_redrawn(jump.device)[jump], fresh.values[0], latents.values),
             shape=torch.where(form | window, fresh.shape[0], latents.shape),
             noise=torch.where(noise, fresh.noise[0], latents.noise),
             present=torch.where(window, fresh.present[0], latents.present),
@@ -191,7 +179,7 @@ class WindowTarget:
         )
         values = latents.values.clone()
         values[:, columns] = torch.where(which.unsqueeze(-1), new, old)
-        after_all = latents._replace(values=values, change=torch.where(which, kind, latents.change))
+        after_all = latents._replace(values=values).with_kind("change", torch.where(which, kind, latents.change))
         return after_all, torch.where(which, ratio, 0.0)
 
     def _log_density(self, change: Tensor) -> Tensor:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from typing import Final, NamedTuple
 
@@ -75,11 +76,54 @@ def _used_by_change(device: torch.device) -> Tensor:
     return torch.stack([latents_of(*used.get(kind, ("changed", "change")), device=device) for kind in ChangeKind])
 
 
-class Latents(NamedTuple):
-    """Particles of b people."""
+KINDS: Final = ("shape", "noise", "present", "depressed", "change")
+"""What a particle is of: `ShapeKind`, `NoiseKind`, whether there is an enhancement, a depression, and `ChangeKind`."""
 
-    values: Tensor  # in the order of `LATENTS`, (b, p, d)
-    shape: Tensor  # one of `ShapeKind`, (b, p)
-    noise: Tensor  # one of `NoiseKind`, (b, p)
-    present: Tensor  # there is any facilitation, (b, p)
-    change: Tensor  # one of `ChangeKind`, (b, p)
+
+class Latents(NamedTuple):
+    """Particles of b people, of any model."""
+
+    values: Tensor  # of the model's latents, in their order, (b, p, d)
+    kinds: Tensor  # whole numbers in the order of `KINDS`, (b, p, k)
+
+    @classmethod
+    def of(cls, values: Tensor, **kinds: Tensor | int) -> Latents:
+        """Particles from some of their kinds by name, each (b, p) or the same for all; the others are 0."""
+        like = values[..., 0].long()
+        columns = [torch.as_tensor(kinds.get(name, 0)).to(like).expand_as(like) for name in KINDS]
+        return cls(values, torch.stack(columns, dim=-1))
+
+    def each(self, made: Callable[..., Tensor], *others: Latents) -> Latents:
+        """Values and kinds made in one way of those of these particles, and of others."""
+        return Latents(*(made(*fields) for fields in zip(self, *others, strict=True)))
+
+    def with_kind(self, name: str, kind: Tensor) -> Latents:
+        """The same with one of `KINDS` changed, shape (b, p)."""
+        kinds = self.kinds.clone()
+        kinds[..., KINDS.index(name)] = kind
+        return self._replace(kinds=kinds)
+
+    @property
+    def shape(self) -> Tensor:
+        """Kinds of the profiles, (b, p)."""
+        return self.kinds[..., 0]
+
+    @property
+    def noise(self) -> Tensor:
+        """Kinds of the noise, (b, p)."""
+        return self.kinds[..., 1]
+
+    @property
+    def present(self) -> Tensor:
+        """Which particles have any facilitation, (b, p)."""
+        return self.kinds[..., 2] > 0
+
+    @property
+    def depressed(self) -> Tensor:
+        """Which particles have a depression, (b, p)."""
+        return self.kinds[..., 3] > 0
+
+    @property
+    def change(self) -> Tensor:
+        """What changes in the session, (b, p)."""
+        return self.kinds[..., 4]

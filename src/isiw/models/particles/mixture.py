@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from isiw.lazy import torch
 from isiw.models.protocol import Tensor
+from isiw.types import FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,15 +48,17 @@ class Mixture:
     def component(self, x: Tensor) -> Tensor:
         """The component that most probably explains x (..., d), shape (...)."""
         squares, lines, constants = self._squares
-        return (x.square() @ squares + x @ lines + constants).argmax(-1)
+        latents = x.cpu().numpy()
+        return torch.from_numpy((latents**2 @ squares + latents @ lines + constants).argmax(-1)).to(x.device)
 
     @cached_property
-    def _squares(self) -> tuple[Tensor, Tensor, Tensor]:
+    def _squares(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Factors of x² and of x, each (d, k), and constants (k,), whose sum is the log density of each component."""
         precisions = self.sds.double().square().reciprocal()
         lines, spent = precisions * self.means, (0.5 * precisions * self.means.double().square()).sum(-1)
         constants = self.shares.double().log() - self.sds.double().log().sum(-1) - spent
-        return (-0.5 * precisions).T.float(), lines.T.float(), constants.float()
+        factors = (-0.5 * precisions).T, lines.T, constants
+        return tuple(factor.float().contiguous().numpy() for factor in factors)
 
 
 class JointMixture:

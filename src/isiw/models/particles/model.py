@@ -110,10 +110,10 @@ class ParticleModel(Checked):
 
 
 @dataclass(frozen=True, eq=False)
-class ParticlePosterior(SwarmPosterior[ParticleModel, Latents]):
+class ParticlePosterior(SwarmPosterior[ParticleModel]):
     """The posterior of b people."""
 
-    usual: Engine[Latents]  # under the prior that ISIs are chosen with
+    usual: Engine  # under the prior that ISIs are chosen with
 
     @cached_property
     def as_usual(self) -> ParticlePosterior:
@@ -139,7 +139,7 @@ class ParticlePosterior(SwarmPosterior[ParticleModel, Latents]):
         values = latents.values.clone()
         own = latents_of("changed", "change", device=values.device)
         values[..., own] = torch.where(chosen.unsqueeze(-1), noted, values[..., own])
-        latents = latents._replace(values=values, change=torch.where(chosen, kind, latents.change))
+        latents = latents._replace(values=values).with_kind("change", torch.where(chosen, kind, latents.change))
         swarm = replace(self.swarm, latents=latents).times(
             torch.where(untouched, math.log(share + left), math.log(left))
         )
@@ -189,7 +189,7 @@ class ParticlePosterior(SwarmPosterior[ParticleModel, Latents]):
         )
 
 
-def _engines(model: ParticleModel, space: DesignSpace) -> tuple[Engine[Latents], Engine[Latents]]:
+def _engines(model: ParticleModel, space: DesignSpace) -> tuple[Engine, Engine]:
     """What computes with a model's prior, and with that which ISIs are chosen with."""
     priors = model.prior, model.prior_where_asking
     engine, usual = (engine_for(model.engine, WindowTarget(prior, space), model.device) for prior in priors)

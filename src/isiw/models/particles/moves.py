@@ -6,17 +6,20 @@ some of their kinds and the latents that go with them are drawn anew from the pr
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Generic, NamedTuple, Protocol, Self, TypeVar
+from functools import cached_property, partial
+from typing import NamedTuple, Protocol
+
+import numpy as np
 
 from isiw.lazy import torch
+from isiw.models.particles.latents import Latents
 from isiw.models.particles.likelihood import total_log_likelihood
 from isiw.models.particles.mixture import drawn
 from isiw.models.particles.prior import Person
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
+from isiw.types import FloatArray
 
 JUMP_PROBABILITY = 0.3
 PART_PROBABILITY = (0.25, 0.30, 0.25, 0.20)
@@ -39,48 +42,26 @@ BLUR = 0.02
 """SD of what is added to a difference, as a share of the usual SD of each latent."""
 
 
-class Fields(Protocol):
-    """Particles as a named tuple of tensors of shape (b, p), and of the values of their latents, (b, p, d)."""
-
-    @property
-    def values(self) -> Tensor:
-        """Values of the latents, shape (b, p, d)."""
-
-    def __iter__(self) -> Iterator[Tensor]:
-        """All fields."""
-
-    def _replace(self, *, values: Tensor) -> Self: ...
-
-
-L = TypeVar("L", bound=Fields)
-
-
-def remade(latents: L, fields: Iterable[Tensor]) -> L:
-    """Particles with other fields, in the same order."""
-    made: Callable[..., L] = type(latents)
-    return made(*fields)
-
-
-class Target(Protocol[L]):
+class Target(Protocol):
     """Whose posterior particles move under: a prior over people, and what may be drawn anew at once."""
 
     @property
     def spreads(self) -> Tensor:
         """Usual SD of each latent, shape (d,)."""
 
-    def person(self, latents: L) -> Person:
+    def person(self, latents: Latents) -> Person:
         """What particles mean."""
 
-    def log_prior(self, latents: L) -> Tensor:
+    def log_prior(self, latents: Latents) -> Tensor:
         """Log prior density of their latents but for a constant, shape (b, p)."""
 
-    def log_usual(self, latents: L) -> Tensor:
+    def log_usual(self, latents: Latents) -> Tensor:
         """Log prior density of what ISIs are chosen with another law of, but for a constant, shape (b, p)."""
 
-    def shifted(self, latents: L, part: Tensor) -> Tensor:
+    def shifted(self, latents: Latents, part: Tensor) -> Tensor:
         """Which latents a difference moves: those of a part that mean anything to the particle, shape (b, p, d)."""
 
-    def jumped(self, latents: L, generator: torch.Generator, steps: Tensor) -> tuple[L, Tensor]:
+    def jumped(self, latents: Latents, generator: torch.Generator, steps: Tensor) -> tuple[Latents, Tensor]:
         """Particles some of whose kinds and latents are drawn anew from the prior, or near where the trials so far are.
 
         With them comes the log ratio of prior to proposal, after the jump and before; 0 for draws from the prior. The
@@ -88,41 +69,41 @@ class Target(Protocol[L]):
         """
 
 
-class Moved(NamedTuple, Generic[L]):
+class Moved(NamedTuple):
     """Particles after sweeps of moves."""
 
-    latents: L  # fields of shape (b, p)
+    latents: Latents  # fields of shape (b, p)
     log_likelihood: Tensor  # of the history under each of them, (b, p)
     shifts: Tensor  # share that was accepted, (b,); NaN where there were none
     jumps: Tensor  # likewise
 
 
-class _Weighed(NamedTuple, Generic[L]):
+class _Weighed(NamedTuple):
     """Particles, the log likelihood of the history under each, and their log prior density; all (b, p)."""
 
-    latents: L
+    latents: Latents
     log_likelihood: Tensor
     log_prior: Tensor
 
-    def part(self, which: slice) -> _Weighed[L]:
-        latents = remade(self.latents, (field[:, which] for field in self.latents))
+    def part(self, which: slice) -> _Weighed:
+        latents = self.latents.each(lambda field: field[:, which])
         return _Weighed(latents, self.log_likelihood[:, which], self.log_prior[:, which])
 
 
 @dataclass(frozen=True)
-class Mover(Generic[L]):
+class Mover:
     """Moves particles under the posterior of a history."""
 
-    target: Target[L]
+    target: Target
     history: History
     generator: torch.Generator
 
     @cached_property
     def steps(self) -> Tensor:
         """By how much amplitudes are larger from each trial on; see `steps_of`."""
-        return steps_of(self.history)
+        return torch.from_numpy(steps_of(self.history)).to(self.history.log_mep.device)
 
-    def sweeps(self, number: int, latents: L, log_likelihood: Tensor) -> Moved[L]:
+    def sweeps(self, number: int, latents: Latents, log_likelihood: Tensor) -> Moved:
         """Move every particle some times."""
         if not number:
             return Moved(latents, log_likelihood, *log_likelihood.new_full((2, len(log_likelihood)), torch.nan))
@@ -133,19 +114,18 @@ class Mover(Generic[L]):
         for _ in range(number):
             first = self._step(first, second.latents, counts)
             second = self._step(second, first.latents, counts)
-        both = remade(latents, (torch.cat(halves, dim=1) for halves in zip(first.latents, second.latents, strict=True)))
+        both = first.latents.each(lambda *halves: torch.cat(halves, dim=1), second.latents)
         shifts, shifted, jumps, jumped = counts
         log_likelihood = torch.cat((first.log_likelihood, second.log_likelihood), dim=1)
         return Moved(both, log_likelihood, shifted / shifts, jumped / jumps)
 
-    def _step(self, mine: _Weighed[L], theirs: L, counts: Tensor) -> _Weighed[L]:
+    def _step(self, mine: _Weighed, theirs: Latents, counts: Tensor) -> _Weighed:
         jumps = self._uniform(mine.log_prior) < JUMP_PROBABILITY
         where = jumps.nonzero(as_tuple=True)
         shifted = self._shift(mine.latents, theirs)
-        jumped, favour = self.target.jumped(
-            remade(mine.latents, (field[where] for field in mine.latents)), self.generator, self.steps[where[0]]
-        )
-        proposal = remade(shifted, (a.index_put(where, b) for a, b in zip(shifted, jumped, strict=True)))
+        jumping = mine.latents.each(lambda field: field[where])
+        jumped, favour = self.target.jumped(jumping, self.generator, self.steps[where[0]])
+        proposal = shifted.each(lambda field, after: field.index_put(where, after), jumped)
         log_likelihood = total_log_likelihood(self.target.person(proposal), self.history)
         log_prior = self.target.log_prior(proposal)
         # A jump draws from the prior, so that its density cancels, where what it leads to is possible at all.
@@ -154,12 +134,12 @@ class Mover(Generic[L]):
         accept = torch.log(self._uniform(log_prior)) < log_likelihood - mine.log_likelihood + prior_ratio
         counts += torch.stack([~jumps, accept & ~jumps, jumps, accept & jumps]).sum(-1)
         return _Weighed(
-            remade(mine.latents, (_choose(accept, a, b) for a, b in zip(proposal, mine.latents, strict=True))),
+            proposal.each(partial(torch.where, accept.unsqueeze(-1)), mine.latents),
             torch.where(accept, log_likelihood, mine.log_likelihood),
             torch.where(accept, log_prior, mine.log_prior),
         )
 
-    def _shift(self, mine: L, theirs: L) -> L:
+    def _shift(self, mine: Latents, theirs: Latents) -> Latents:
         """Add a scaled difference of two of the others."""
         like, dice, device = mine.values[..., 0], self.generator, self.generator.device
         who = torch.arange(len(like), device=like.device).unsqueeze(-1)
@@ -175,15 +155,14 @@ class Mover(Generic[L]):
         return torch.rand(like.shape, generator=self.generator, dtype=like.dtype, device=like.device)
 
 
-def steps_of(history: History) -> Tensor:
+def steps_of(history: History) -> FloatArray:
     """By how much the mean log MEP is larger from each trial on than before it, and 0 for all and none, (b, n + 1)."""
-    log_mep = torch.where(history.log_mep.isfinite(), history.log_mep, history.log_mep_high).nan_to_num(0.0, 0.0, 0.0)
-    before = torch.nn.functional.pad(log_mep.cumsum(-1), (1, 0))
-    trials = before.shape[-1] - 1
-    count = torch.arange(trials + 1, device=before.device)
-    steps = (before[:, -1:] - before) / (trials - count).clamp_min(1) - before / count.clamp_min(1)
-    return torch.where((count > 0) & (count < trials), steps, 0.0)
-
-
-def _choose(condition: Tensor, yes: Tensor, no: Tensor) -> Tensor:
-    return torch.where(condition.unsqueeze(-1) if yes.dim() > condition.dim() else condition, yes, no)
+    log_mep, high = history.log_mep.cpu().numpy(), history.log_mep_high.cpu().numpy()
+    log_mep = np.nan_to_num(np.where(np.isfinite(log_mep), log_mep, high), nan=0.0, posinf=0.0, neginf=0.0)
+    people, trials = log_mep.shape
+    before, count = np.zeros((people, trials + 1), dtype=np.float32), np.arange(trials + 1)
+    before[:, 1:] = log_mep.cumsum(-1, dtype=float)
+    later, earlier = (np.maximum(n, 1).astype(np.float32) for n in (trials - count, count))
+    steps: FloatArray = (before[:, -1:] - before) / later - before / earlier
+    steps[:, [0, -1]] = 0.0
+    return steps

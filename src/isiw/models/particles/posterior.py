@@ -10,7 +10,6 @@ from typing import Generic, Protocol, Self, TypeVar
 from isiw.design import DesignSpace
 from isiw.lazy import torch
 from isiw.models.particles.engine import Engine
-from isiw.models.particles.moves import L
 from isiw.models.particles.prior import Person
 from isiw.models.particles.swarm import Swarm
 from isiw.models.protocol import Observation, Tensor
@@ -39,14 +38,14 @@ M = TypeVar("M", bound=_Model)
 
 
 @dataclass(frozen=True, eq=False)
-class SwarmPosterior(ABC, Generic[M, L]):
+class SwarmPosterior(ABC, Generic[M]):
     """The posterior of b people."""
 
     model: M
     space: DesignSpace
     seed: int
-    swarm: Swarm[L]
-    engine: Engine[L]
+    swarm: Swarm
+    engine: Engine
 
     @property
     def person(self) -> Person:

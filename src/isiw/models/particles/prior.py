@@ -178,7 +178,8 @@ class Prior(Checked):
             values = torch.cat([torch.where(known, place, values[..., :2]), values[..., 2:]], dim=-1)
         shape, noise = drawn(astuple(self.profile.shapes), uniform[0]), drawn(astuple(self.noise), uniform[1])
         change = drawn(self.changes.shares, uniform[4])
-        return Latents(values, shape, noise, uniform[2] < self.profile.p_window, change)
+        present = uniform[2] < self.profile.p_window
+        return Latents.of(values, shape=shape, noise=noise, present=present, change=change)
 
     def log_density(self, values: Tensor, space: DesignSpace) -> Tensor:
         """Log density of latents but for a constant, shape (b, p)."""
@@ -280,9 +281,10 @@ class Prior(Checked):
         recruitment = latents.values[..., first : first + len(BLOCKS["recruitment"])]
         muscles = self._muscle_numbers.to(recruitment.device)
         kind = len(_WITHOUT_MUSCLE) + muscles[self.mixtures["recruitment"].component(recruitment)]
-        for number, noise in enumerate(_WITHOUT_MUSCLE):
-            kind = torch.where(latents.noise == noise, number, kind)
-        return kind
+        named = [*_WITHOUT_MUSCLE].index
+        numbers = [named(noise) if noise in _WITHOUT_MUSCLE else -1 for noise in NoiseKind]
+        number = torch.tensor(numbers, device=kind.device)[latents.noise]
+        return torch.where(number < 0, kind, number)
 
     def unusual(self, latents: Latents, space: DesignSpace) -> dict[str, float]:
         """How probable it is that parts of a person are of another law than the usual one, by what they are called."""

@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Generic, NamedTuple
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
 
 from isiw.checks import Checked, Natural, Share
 from isiw.lazy import torch
 from isiw.models.particles.engine import Engine
-from isiw.models.particles.moves import L, remade
+from isiw.models.particles.latents import Latents
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
 from isiw.models.shared.tables import systematic
@@ -45,8 +48,9 @@ def ess_share(log_weights: Tensor) -> Tensor:
 
 def distinct_share(log_likelihood: Tensor) -> Tensor:
     """Share of the particles that differ, shape (b,); equal ones have the same likelihood of the history."""
-    changes = log_likelihood.sort(dim=-1).values.diff(dim=-1) != 0
-    return (1.0 + changes.sum(-1, dtype=torch.float32)) / log_likelihood.shape[-1]
+    ordered = np.sort(log_likelihood.cpu().numpy(), axis=-1)
+    distinct = 1 + np.count_nonzero(ordered[:, 1:] != ordered[:, :-1], axis=-1)
+    return torch.as_tensor(distinct / ordered.shape[-1], dtype=torch.float32)
 
 
 def trouble_of(health: Health) -> str | None:
@@ -87,10 +91,10 @@ class Moving(Checked):
 
 
 @dataclass(frozen=True, eq=False)
-class Swarm(Generic[L]):
+class Swarm:
     """Weighted particles of b people."""
 
-    latents: L  # fields of shape (b, p)
+    latents: Latents  # fields of shape (b, p)
     log_weights: Tensor  # normalised, (b, p)
     log_likelihood: Tensor  # of the history under each of them, (b, p)
     evidence: Tensor  # log marginal likelihood of the history [nat], (b,)
@@ -98,7 +102,7 @@ class Swarm(Generic[L]):
     health: Health | None = None  # after the last trial; None before the first
 
     @classmethod
-    def of(cls, latents: L) -> Swarm[L]:
+    def of(cls, latents: Latents) -> Swarm:
         """Particles of the prior, before the first trial."""
         people, particles = latents.values.shape[:-1]
         nothing = latents.values.new_zeros((people, particles))
@@ -115,11 +119,11 @@ class Swarm(Generic[L]):
         """What is wrong with the particles; see `isiw.models.protocol.ReportsTrouble`."""
         return None if self.health is None else trouble_of(self.health)
 
-    def times(self, log_ratio: Tensor) -> Swarm[L]:
+    def times(self, log_ratio: Tensor) -> Swarm:
         """The same particles under another prior."""
         return replace(self, log_weights=torch.log_softmax(self.log_weights + log_ratio, dim=-1))
 
-    def told(self, trial: History, engine: Engine[L]) -> Swarm[L]:
+    def told(self, trial: History, engine: Engine) -> Swarm:
         """The same particles, weighted by one more trial as well."""
         gain = engine.log_likelihood(self.latents, trial)
         log_weights = self.log_weights + gain
@@ -131,7 +135,7 @@ class Swarm(Generic[L]):
             history=self.history.appended(trial),
         )
 
-    def moved(self, engine: Engine[L], moves: Moving, generator: torch.Generator) -> Swarm[L]:
+    def moved(self, engine: Engine, moves: Moving, generator: torch.Generator) -> Swarm:
         """The particles after the moves that follow a trial, resampled where too few carried the posterior."""
         ess = ess_share(self.log_weights)
         worn = ess < moves.min_ess
@@ -141,18 +145,22 @@ class Swarm(Generic[L]):
         health = Health(ess, moved.shifts, moved.jumps, distinct_share(moved.log_likelihood))
         return replace(fresh, latents=moved.latents, log_likelihood=moved.log_likelihood, health=health)
 
-    def of_person(self, person: int) -> Swarm[L]:
+    def of_person(self, person: int) -> Swarm:
         """The particles of one person."""
         one = slice(person, person + 1)
-        latents = remade(self.latents, (field[one] for field in self.latents))
-        return replace(self, latents=latents, log_weights=self.log_weights[one])
+        return replace(self, latents=self.latents.each(lambda field: field[one]), log_weights=self.log_weights[one])
 
-    def picked(self, size: int) -> L:
+    def picked(self, size: int) -> Latents:
         """Equally weighted particles that represent the same posterior, fields of shape (b, s)."""
-        picks = systematic(self.log_weights, size)
-        return remade(self.latents, (taken(field, picks) for field in self.latents))
+        return self.latents.each(partial(taken, rows=self._first_rows + systematic(self.log_weights, size)))
 
-    def _resampled(self, worn: Tensor, generator: torch.Generator) -> Swarm[L]:
+    @property
+    def _first_rows(self) -> Tensor:
+        """Each person's first particle if those of all people follow each other, shape (b, 1)."""
+        people, particles = self.log_weights.shape
+        return particles * torch.arange(people, device=self.log_weights.device).unsqueeze(-1)
+
+    def _resampled(self, worn: Tensor, generator: torch.Generator) -> Swarm:
         """Resample those people whose effective sample size has fallen (b,); nobody else notices."""
         size = self.log_weights.shape[-1]
         # Systematic picks are ordered; shuffled, both halves of the particles represent the posterior.
@@ -161,17 +169,16 @@ class Swarm(Generic[L]):
             return self
         worn = worn.unsqueeze(-1)
         kept = torch.arange(size, device=shuffled.device)
-        picks = torch.where(worn, systematic(self.log_weights, size)[:, shuffled], kept)
+        rows = self._first_rows + torch.where(worn, systematic(self.log_weights, size)[:, shuffled], kept)
         return replace(
             self,
-            latents=remade(self.latents, (taken(field, picks) for field in self.latents)),
+            latents=self.latents.each(partial(taken, rows=rows)),
             log_weights=torch.where(worn, -math.log(size), self.log_weights),
-            log_likelihood=taken(self.log_likelihood, picks),
+            log_likelihood=taken(self.log_likelihood, rows),
         )
 
 
-def taken(values: Tensor, picks: Tensor) -> Tensor:
-    """Some of the particles, in any order and as often as picked, shape (b, s, ...)."""
-    first = values.shape[1] * torch.arange(len(values), device=picks.device).unsqueeze(-1)
-    rows = values.flatten(0, 1).index_select(0, (first + picks).flatten())
-    return rows.view(*picks.shape, *values.shape[2:])
+def taken(values: Tensor, rows: Tensor) -> Tensor:
+    """Some of the particles (b, p, ...), those of all people following each other, shape (b, s, ...)."""
+    picked = values.flatten(0, 1).index_select(0, rows.flatten())
+    return picked.view(*rows.shape, *values.shape[2:])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -136,6 +136,7 @@ def _quantile(values: Tensor, share: float) -> Tensor:
     return torch.lerp(ordered[:, below], ordered[:, min(below + 1, values.shape[-1] - 1)], place - below)
 
 
+@cache
 def cell_ends(device: torch.device) -> Tensor:
     """Ends of the cells of the log MEP, from 0 to 1, (y + 1,); narrow where MEPs are as small as the floor."""
     return torch.linspace(0.0, 1.0, OUTCOMES + 1, dtype=torch.float32, device=device).pow(1.5)

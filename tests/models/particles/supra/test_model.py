@@ -108,7 +108,7 @@ def test_moves_leave_the_prior_as_it_is(engine: EngineName) -> None:
     for name, ours, theirs in zip(LATENTS, moved.latents.values[0].T, fresh.values[0].T, strict=True):
         apart = abs(ours.mean() - theirs.mean()) / (theirs.std() * math.sqrt(2 / 4000))
         assert apart < 6, name  # particles that move together are fewer than they look
-    for ours, segment in ((moved.latents.enhanced, prior.enhanced), (moved.latents.depressed, prior.depressed)):
+    for ours, segment in ((moved.latents.present, prior.enhanced), (moved.latents.depressed, prior.depressed)):
         assert ours.double().mean().item() == pytest.approx(segment.probability, abs=0.03)
 
 

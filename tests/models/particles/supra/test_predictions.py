@@ -10,11 +10,12 @@ import torch
 
 from isiw.design import DesignSpace
 from isiw.metrics import f1
+from isiw.models.particles.latents import Latents
 from isiw.models.particles.likelihood import levels
 from isiw.models.particles.noise import draw_log_mep
 from isiw.models.particles.prior import Person
 from isiw.models.particles.supra.predictions import SupraSample
-from isiw.models.particles.supra.prior import LATENTS, SupraLatents, SupraPrior
+from isiw.models.particles.supra.prior import LATENTS, SupraPrior
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.responses import OpposedProfile, PeakProfile, RecruitmentResponse
 from isiw.subjects.subject import SimulatedSubject
@@ -48,8 +49,7 @@ def _place(peak: PeakProfile) -> tuple[float, float]:
 
 def believed(subjects: list[SimulatedSubject]) -> Person:
     values = torch.tensor([[latents_of(subject) for subject in subjects]])
-    there = torch.ones(values.shape[:2], dtype=torch.bool)
-    return SupraPrior().person(SupraLatents(values, there, there))
+    return SupraPrior().person(Latents.of(values, present=1, depressed=1))
 
 
 @pytest.fixture(scope="module")

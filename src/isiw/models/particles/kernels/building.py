@@ -62,6 +62,7 @@ def prior_tables(
     made: dict[str, Any] = {
         name: value.numpy() if isinstance(value, torch.Tensor) else value for name, value in moves.items()
     }
+    made |= {"touched": np.add.reduceat(made["shifted"], law["first"], axis=-1)}
     made |= {"changed": int(np.searchsorted(law["first"], where[27]))}
     made |= {"parts": _edges(PART_PROBABILITY, len(PART_PROBABILITY))}
     made |= {"jumps": _edges(moves["jumps"], len(moves["jumps"]))}

@@ -209,7 +209,7 @@ def _sigmoid(drive: Any) -> Any:
 
 @inlined
 def _share(sigmoid: Any, between: Any, scale: Any, start: Any) -> Any:
-    """The evoked part of a mean at a node, in floors, and its relative variance; the curve starts at 0 or a threshold."""
+    """The evoked part of a mean at a node, in floors, and its relative variance; no threshold is None."""
     flat = _ONE - sigmoid
     if start is None:
         return sigmoid * scale, flat * flat * between

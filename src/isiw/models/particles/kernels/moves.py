@@ -135,8 +135,9 @@ def _jump(tables: Any, steps: Any, dice: Any, z: Any, kinds: Any, scratch: Any) 
 
 
 @part
-def _shift(tables: Any, theirs: Any, dice: Any, moves: Any, densities: Any, scratch: Any) -> float:
+def _shift(tables: Any, theirs: Any, dice: Any, moving: Any, densities: Any, scratch: Any) -> float:
     """Add a scaled difference of two of the others to the latents that move; log of the ratio of prior densities."""
+    moves, touched = moving
     others, z, found, ratio = theirs.shape[0], scratch[1], scratch[5], 0.0
     one = theirs[min(int(uniform(dice) * _f(others)), others - 1)]
     other = theirs[min(int(uniform(dice) * _f(others)), others - 1)]
@@ -145,11 +146,8 @@ def _shift(tables: Any, theirs: Any, dice: Any, moves: Any, densities: Any, scra
         if moves[latent]:
             z[latent] += scale * (one[latent] - other[latent]) + _BLUR * tables.spreads[latent] * blur(dice)
     for block in range(len(tables.first)):
-        moved = False
-        for latent in range(tables.first[block], tables.first[block] + tables.size[block]):
-            moved |= moves[latent]
         found[block] = UNKNOWN
-        if moved:
+        if touched[block]:
             for side in range(0 if densities[block] == UNKNOWN else 1, 2):
                 found[block] = log_block(scratch[side], block, tables, scratch[4])
                 if side == 0:
@@ -177,11 +175,12 @@ def _proposed(tables: Any, steps: Any, theirs: Any, own: Any, jumps: Any, dice: 
         jump, ratio = _jump(tables, steps, dice, new, chosen, scratch)
         same = tables.of_profile[jump] and not (kinds[2] or chosen[2])
     else:
-        moves = tables.shifted[state, which(uniform(dice), tables.parts)]
-        for latent in range(len(moves)):
-            same &= not moves[latent]
+        of = which(uniform(dice), tables.parts)
+        touched = tables.touched[state, of]
+        for block in range(len(touched)):
+            same &= not touched[block]
         if not same:
-            ratio = _shift(tables, theirs, dice, moves, densities, scratch)
+            ratio = _shift(tables, theirs, dice, (tables.shifted[state, of], touched), densities, scratch)
     if tables.apart and _overlap(tables.at, new):
         ratio = -math.inf
     return ratio, same

@@ -55,6 +55,7 @@ class Tables(NamedTuple):
     apart: bool  # enhancement and depression may not overlap
     states: IntArray  # weights of the kinds in the number of a particle's state, (k,)
     shifted: Any  # which latents a difference moves, by state and part, (states, parts, d)
+    touched: Any  # which blocks these are of, (states, parts, k)
     parts: FloatArray  # sums of the probabilities of earlier parts, (parts - 1,)
     jumps: FloatArray  # likewise of earlier jumps, (jumps - 1,)
     redrawn: Any  # which latents each jump draws again, (jumps, d)

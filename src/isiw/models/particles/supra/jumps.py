@@ -13,11 +13,11 @@ from isiw.lazy import torch
 from isiw.models.particles.kernels.building import prior_tables
 from isiw.models.particles.kernels.target import Tables
 from isiw.models.particles.latents import LATENTS as DEFAULT_LATENTS
+from isiw.models.particles.latents import Latents
 from isiw.models.particles.mixture import drawn
 from isiw.models.particles.noise import NoiseKind
 from isiw.models.particles.prior import Person
-from isiw.models.particles.shapes import ShapeKind
-from isiw.models.particles.supra.prior import BLOCKS, LATENTS, SupraLatents, SupraPrior
+from isiw.models.particles.supra.prior import BLOCKS, LATENTS, SupraPrior
 from isiw.models.protocol import Tensor
 
 JUMPS: Final = {
@@ -60,7 +60,7 @@ class SupraTarget:
         """Usual SD of each latent, shape (d,)."""
         return self.prior.spreads
 
-    def person(self, latents: SupraLatents) -> Person:
+    def person(self, latents: Latents) -> Person:
         """What particles mean."""
         return self.prior.person(latents)
 
@@ -90,44 +90,35 @@ class SupraTarget:
             self.space, prior.start, prior.mixtures, starts=2, places=None, at=at, spreads=self.spreads, moves=moves
         )
 
-    def kinds(self, latents: SupraLatents) -> Tensor:
-        """The kinds of particles, integers of shape (b, p, k)."""
-        enhanced, depressed = latents.enhanced.long(), latents.depressed.long()
-        shape, noise = (torch.full_like(enhanced, kind) for kind in (ShapeKind.GAUSSIAN, NoiseKind.RECRUITMENT))
-        return torch.stack((shape, noise, enhanced, depressed, torch.zeros_like(enhanced)), dim=-1)
-
-    def latents(self, values: Tensor, kinds: Tensor) -> SupraLatents:
-        """Particles from their latents (b, p, d) and kinds (b, p, k)."""
-        return SupraLatents(values, kinds[..., 2].bool(), kinds[..., 3].bool())
-
-    def log_prior(self, latents: SupraLatents) -> Tensor:
+    def log_prior(self, latents: Latents) -> Tensor:
         """Log prior density of their latents but for a constant, -inf where the segments overlap, shape (b, p)."""
         return self.prior.log_density(latents.values, self.space)
 
-    def log_usual(self, latents: SupraLatents) -> Tensor:
+    def log_usual(self, latents: Latents) -> Tensor:
         """Log prior density of the latents, as ISIs are chosen with the same law, shape (b, p)."""
         return self.log_prior(latents)
 
-    def shifted(self, latents: SupraLatents, part: Tensor) -> Tensor:
+    def shifted(self, latents: Latents, part: Tensor) -> Tensor:
         """Which latents a difference moves, shape (b, p, d)."""
         enhanced, depressed = (_latents(*BLOCKS[name], device=part.device) for name in ("enhanced", "depressed"))
-        used = (~enhanced | latents.enhanced.unsqueeze(-1)) & (~depressed | latents.depressed.unsqueeze(-1))
+        used = (~enhanced | latents.present.unsqueeze(-1)) & (~depressed | latents.depressed.unsqueeze(-1))
         return _shifted(part.device)[part] & used
 
     def jumped(
         self,
-        latents: SupraLatents,
+        latents: Latents,
         generator: torch.Generator,
         steps: Tensor,  # noqa: ARG002 - nothing changes with time
-    ) -> tuple[SupraLatents, Tensor]:
+    ) -> tuple[Latents, Tensor]:
         """Particles (n,) with some latents, and whether their segment is there, drawn again from the prior."""
-        fresh = self.prior.draw(1, len(latents.enhanced), generator, self.space)
-        uniform = torch.rand(latents.enhanced.shape, generator=generator, dtype=torch.float32, device=generator.device)
+        fresh = self.prior.draw(1, len(latents.present), generator, self.space)
+        uniform = torch.rand(latents.present.shape, generator=generator, dtype=torch.float32, device=generator.device)
         jump = drawn(tuple(JUMPS.values()), uniform)
         enhanced, depressed, *_ = (jump == number for number in range(len(JUMPS)))
-        after = SupraLatents(
-            values=torch.where(_redrawn(jump.device)[jump], fresh.values[0], latents.values),
-            enhanced=torch.where(enhanced, fresh.enhanced[0], latents.enhanced),
+        after = Latents.of(
+            torch.where(_redrawn(jump.device)[jump], fresh.values[0], latents.values),
+            noise=NoiseKind.RECRUITMENT,
+            present=torch.where(enhanced, fresh.present[0], latents.present),
             depressed=torch.where(depressed, fresh.depressed[0], latents.depressed),
         )
         return after, torch.zeros_like(latents.values[:, 0])

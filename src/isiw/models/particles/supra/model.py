@@ -18,7 +18,7 @@ from isiw.models.particles.engine import EngineName, engine_for
 from isiw.models.particles.posterior import SwarmPosterior
 from isiw.models.particles.supra.jumps import SupraTarget
 from isiw.models.particles.supra.predictions import SupraSample
-from isiw.models.particles.supra.prior import SupraLatents, SupraPrior
+from isiw.models.particles.supra.prior import SupraPrior
 from isiw.models.particles.swarm import Moving, Swarm
 from isiw.models.protocol import Observation, Tensor
 from isiw.models.shared.tables import step_generator
@@ -61,7 +61,7 @@ class SupraModel(Checked):
 
 
 @dataclass(frozen=True, eq=False)
-class SupraPosterior(SwarmPosterior[SupraModel, SupraLatents]):
+class SupraPosterior(SwarmPosterior[SupraModel]):
     """The posterior of b people."""
 
     @cached_property

@@ -10,11 +10,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Final, NamedTuple
+from typing import Final
 
 from isiw.checks import Checked, Share
 from isiw.design import DesignSpace
 from isiw.lazy import torch
+from isiw.models.particles.latents import Latents
 from isiw.models.particles.laws import Floor, SessionPrior, check_laws
 from isiw.models.particles.mixture import JointMixture, Mixture
 from isiw.models.particles.noise import NoiseKind, Response
@@ -55,14 +56,6 @@ BLOCKS: Final = {
 
 REDRAWS: Final = 20
 """How often segments that overlap are drawn again; next to none do then."""
-
-
-class SupraLatents(NamedTuple):
-    """Particles of b people."""
-
-    values: Tensor  # in the order of `LATENTS`, (b, p, d)
-    enhanced: Tensor  # there is any enhancement, (b, p)
-    depressed: Tensor  # there is any depression, (b, p)
 
 
 @dataclass(frozen=True)
@@ -161,7 +154,7 @@ class SupraPrior:
         starts = torch.full((2,), (first.high_ms - first.low_ms) / math.sqrt(12.0), dtype=torch.float32)
         return torch.cat([starts, *(mixture.sds[0] for mixture in self.mixtures)])
 
-    def sample(self, people: int, particles: int, generator: torch.Generator, space: DesignSpace) -> SupraLatents:
+    def sample(self, people: int, particles: int, generator: torch.Generator, space: DesignSpace) -> Latents:
         """Particles of the prior."""
         latents = self.draw(people, particles, generator, space)
         for _ in range(REDRAWS):
@@ -169,13 +162,14 @@ class SupraPrior:
             latents = latents._replace(values=torch.where(_apart(latents.values).unsqueeze(-1), latents.values, again))
         return latents
 
-    def draw(self, people: int, particles: int, generator: torch.Generator, space: DesignSpace) -> SupraLatents:
+    def draw(self, people: int, particles: int, generator: torch.Generator, space: DesignSpace) -> Latents:
         """Particles of the prior, but for segments that overlap."""
         size = (people, particles)
         uniform = torch.rand((4, *size), generator=generator, dtype=torch.float32, device=generator.device)
         starts_ms = self.start.start_ms(uniform[:2], space).movedim(0, -1)
         values = torch.cat([starts_ms, self._joint.sample(size, generator)], dim=-1)
-        return SupraLatents(values, uniform[2] < self.enhanced.probability, uniform[3] < self.depressed.probability)
+        there = uniform[2] < self.enhanced.probability, uniform[3] < self.depressed.probability
+        return Latents.of(values, noise=NoiseKind.RECRUITMENT, present=there[0], depressed=there[1])
 
     def log_density(self, values: Tensor, space: DesignSpace) -> Tensor:
         """Log density of latents but for a constant, -inf where the segments overlap, shape (b, p)."""
@@ -183,13 +177,13 @@ class SupraPrior:
         density = starts + self._joint.log_density(values[..., 2:])
         return torch.where(_apart(values), density, -torch.inf)
 
-    def person(self, latents: SupraLatents) -> Person:
+    def person(self, latents: Latents) -> Person:
         """What particles mean."""
         z = dict(zip(LATENTS, latents.values.unbind(-1), strict=True))
         enhanced = _bell(z["start_ms"], z["log_width_ms"])
         depressed = _bell(z["depressed_start_ms"], z["depressed_log_width_ms"])
         depth = (z["depressed_log_shift"] - z["log_shift"]).exp()
-        return Person(enhanced, _response(z), latents.enhanced, Depression(depressed, depth, latents.depressed))
+        return Person(enhanced, _response(z), latents.present, Depression(depressed, depth, latents.depressed))
 
 
 def _apart(values: Tensor) -> Tensor:
