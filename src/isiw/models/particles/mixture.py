@@ -57,8 +57,7 @@ class Mixture:
         precisions = self.sds.double().square().reciprocal()
         lines, spent = precisions * self.means, (0.5 * precisions * self.means.double().square()).sum(-1)
         constants = self.shares.double().log() - self.sds.double().log().sum(-1) - spent
-        factors = (-0.5 * precisions).T, lines.T, constants
-        return tuple(factor.float().contiguous().numpy() for factor in factors)
+        return (-0.5 * precisions).T.float().numpy(), lines.T.float().numpy(), constants.float().numpy()
 
 
 class JointMixture:

@@ -7,7 +7,7 @@ some of their kinds and the latents that go with them are drawn anew from the pr
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -134,7 +134,7 @@ class Mover:
         accept = torch.log(self._uniform(log_prior)) < log_likelihood - mine.log_likelihood + prior_ratio
         counts += torch.stack([~jumps, accept & ~jumps, jumps, accept & jumps]).sum(-1)
         return _Weighed(
-            proposal.each(partial(torch.where, accept.unsqueeze(-1)), mine.latents),
+            proposal.each(lambda after, before: torch.where(accept.unsqueeze(-1), after, before), mine.latents),
             torch.where(accept, log_likelihood, mine.log_likelihood),
             torch.where(accept, log_prior, mine.log_prior),
         )
