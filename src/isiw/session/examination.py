@@ -6,10 +6,11 @@ Each step is taken once, even if the next one is interrupted. After a verdict al
 
 from __future__ import annotations
 
+import operator
 import threading
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
-from typing import Any, Final, Generic, NamedTuple, ParamSpec, Protocol, TypeAlias, TypeVar
+from typing import Any, Final, Generic, NamedTuple, Protocol, TypeAlias, TypeVar
 
 from isiw import checks, sentences
 from isiw.change import Change
@@ -28,8 +29,6 @@ from isiw.trials import Sweep, Trial, TrialTable
 from isiw.types import FloatArray
 from isiw.visit import PAIRS_FIRST
 
-P = ParamSpec("P")
-T = TypeVar("T")
 TrialT = TypeVar("TrialT")
 TrialT_contra = TypeVar("TrialT_contra", contravariant=True)
 
@@ -69,10 +68,6 @@ class Known(NamedTuple):
     next_isi_ms: float | None
 
 
-def _directly(call: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-    return call(*args, **kwargs)
-
-
 class Examination(Generic[LearnerT, TableT, TrialT]):
     """The trials so far and what was learnt from them, ahead of which is always the log. Safe in several threads."""
 
@@ -82,7 +77,7 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
         trials: TableT,
         sink: Sink,
         events: Iterable[Event] = (),
-        freely: Callable[..., Any] = _directly,
+        freely: Callable[..., Any] = operator.call,
     ) -> None:
         self.learner, self.trials, self._sink, self._freely = learner, trials, sink, freely
         self.unconcluded: TrialT | None = None
@@ -263,7 +258,7 @@ def examination_of(
     sink: Sink,
     trials: TrialTable | None = None,
     events: Iterable[Event] = (),
-    freely: Callable[..., Any] = _directly,
+    freely: Callable[..., Any] = operator.call,
 ) -> WindowExamination:
     """The examination in which a strategy looks for a window; it has learnt the earlier trials."""
     events = tuple(events)
