@@ -1,39 +1,5 @@
 """Models of a person's responses, each in a module of its own, behind the protocols that are gathered here."""
 
-from __future__ import annotations
+import lazy_loader
 
-from isiw.models.protocol import (
-    Conditions,
-    ExpectsTheUsual,
-    HasBotorchModel,
-    HasEvidence,
-    NotesChanges,
-    Observation,
-    Posterior,
-    PredictsOutcomes,
-    ProposesIsi,
-    ReportsTrouble,
-    ResponseModel,
-    SamplesDepression,
-    SamplesProfiles,
-    SamplesWindows,
-    SimulatesPeople,
-)
-
-__all__ = [
-    "Conditions",
-    "ExpectsTheUsual",
-    "HasBotorchModel",
-    "HasEvidence",
-    "NotesChanges",
-    "Observation",
-    "Posterior",
-    "PredictsOutcomes",
-    "ProposesIsi",
-    "ReportsTrouble",
-    "ResponseModel",
-    "SamplesDepression",
-    "SamplesProfiles",
-    "SamplesWindows",
-    "SimulatesPeople",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

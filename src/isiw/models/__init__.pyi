@@ -1,0 +1,15 @@
+from .protocol import Conditions as Conditions
+from .protocol import ExpectsTheUsual as ExpectsTheUsual
+from .protocol import HasBotorchModel as HasBotorchModel
+from .protocol import HasEvidence as HasEvidence
+from .protocol import NotesChanges as NotesChanges
+from .protocol import Observation as Observation
+from .protocol import Posterior as Posterior
+from .protocol import PredictsOutcomes as PredictsOutcomes
+from .protocol import ProposesIsi as ProposesIsi
+from .protocol import ReportsTrouble as ReportsTrouble
+from .protocol import ResponseModel as ResponseModel
+from .protocol import SamplesDepression as SamplesDepression
+from .protocol import SamplesProfiles as SamplesProfiles
+from .protocol import SamplesWindows as SamplesWindows
+from .protocol import SimulatesPeople as SimulatesPeople

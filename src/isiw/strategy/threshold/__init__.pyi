@@ -1,0 +1,11 @@
+from .bayes import BayesThreshold as BayesThreshold
+from .bayes import FiveOfTen as FiveOfTen
+from .bayes import MaximumLikelihood as MaximumLikelihood
+from .bayes import RecruitmentBelief as RecruitmentBelief
+from .pulses import IntensityRange as IntensityRange
+from .pulses import Pulse as Pulse
+from .pulses import ThresholdEstimate as ThresholdEstimate
+from .pulses import ThresholdMethod as ThresholdMethod
+from .search import ThresholdSearch as ThresholdSearch
+from .search import list_threshold_methods as list_threshold_methods
+from .search import make_threshold_search as make_threshold_search
