@@ -78,7 +78,12 @@ def settings_with_prior(config: RunConfig, device: DeviceInfo) -> dict[str, Any]
             f"the strategy {config.strategy.name} learns nothing from earlier sessions",
             remedy="Leave out the prior and the earlier sessions, or choose another strategy, such as default.",
         )
-    return settings | {"prior": _learned_prior(config, device)}
+    lab = None if config.prior is None else read_lab_prior(config.prior)
+    earlier = [read_session(path) for path in config.after]
+    _require_people(config, earlier, device, [str(config.prior)] if lab is not None and lab.simulated else [])
+    if lab is not None:
+        _require_like(config, Visit(muscle=lab.noted_muscle), config.prior)
+    return settings | {"prior": after(*earlier, prior=None if lab is None else lab.joined())}
 
 
 def learns_from_earlier(name: str) -> bool:
@@ -88,16 +93,6 @@ def learns_from_earlier(name: str) -> bool:
     except StrategyError:  # no prior, or that of another model
         return False
     return True
-
-
-def _learned_prior(config: RunConfig, device: DeviceInfo) -> Prior:
-    """The prior that the lab's people and the person's earlier sessions taught."""
-    lab = None if config.prior is None else read_lab_prior(config.prior)
-    earlier = [read_session(path) for path in config.after]
-    _require_people(config, earlier, device, [str(config.prior)] if lab is not None and lab.simulated else [])
-    if lab is not None:
-        _require_like(config, Visit(muscle=lab.noted_muscle), config.prior)
-    return after(*earlier, prior=None if lab is None else lab.joined())
 
 
 def _require_people(

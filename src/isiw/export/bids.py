@@ -93,7 +93,11 @@ def _write_session(part: Part, folder: Path) -> list[str]:
     onsets_s = {trial: onset.onset_s for trial, onset in part.record.onsets.items()}
     for number, run in enumerate(found, start=1):
         stem = f"{name}_task-{TASK}_run-{number:02d}"
-        _write_run(home / "emg" / stem, run, onsets_s, part)
+        write_output(home / "emg" / f"{stem}_emg.bdf", emg.bdf(run))
+        _json(home / "emg" / f"{stem}_emg.json", _sidecar(run, part))
+        _tsv(home / "emg" / f"{stem}_channels.tsv", pd.DataFrame(run.channels))
+        _tsv(home / "emg" / f"{stem}_events.tsv", pd.DataFrame(run.events(onsets_s)))
+        _json(home / "emg" / f"{stem}_events.json", _described(run.event_columns))
         files.append(f"emg/{stem}_emg.bdf")
     created = pd.to_datetime(part.record.header.created, errors="coerce", utc=True)
     begun = "" if pd.isna(created) else created.strftime("%Y-%m-%dT%H:%M:%SZ")
@@ -103,14 +107,6 @@ def _write_session(part: Part, folder: Path) -> list[str]:
         source = folder / "sourcedata" / f"sub-{_label(part)}" / f"ses-{part.session}" / part.record.path.name
         write_output(source, part.record.path.read_bytes())
     return [f"{part}: {sentence}" for sentence in left_out]
-
-
-def _write_run(stem: Path, run: Run, onsets_s: Mapping[int, float], part: Part) -> None:
-    write_output(Path(f"{stem}_emg.bdf"), emg.bdf(run))
-    _json(Path(f"{stem}_emg.json"), _sidecar(run, part))
-    _tsv(Path(f"{stem}_channels.tsv"), pd.DataFrame(run.channels))
-    _tsv(Path(f"{stem}_events.tsv"), pd.DataFrame(run.events(onsets_s)))
-    _json(Path(f"{stem}_events.json"), _described(run.event_columns))
 
 
 def _task(first: StimulusWords) -> dict[str, Any]:

@@ -81,7 +81,16 @@ def acceptance(trials: TrialTable, number: int, space: DesignSpace) -> Event:
             got=None if trial is None else str(trial.reason),
             remedy=_KEPT,
         )
-    _require_of_a_muscle(trial, trial.mep_mv)
+    if (slip := implausible_amplitude(trial.mep_mv)) is not None:  # whatever a person thinks of the trial
+        raise InvalidValueError(
+            f"trial {number} cannot be accepted: {slip.text}", got=trial.mep_mv, remedy=f"{slip.remedy} {_KEPT}"
+        )
+    if trial.mep_mv == 0 and trial.reason is Kind.IMPLAUSIBLE:
+        raise InvalidValueError(
+            f"trial {number} cannot be accepted: its EMG does not move in the MEP window",
+            got=trial.mep_mv,
+            remedy=f"Is the amplifier on? {_KEPT}",
+        )
     return Event(kind="acceptance", trial=number, text=f"Accepted by the operator all the same: {trial.reason}.")
 
 
@@ -96,21 +105,6 @@ def correction(trials: TrialTable, number: int, why: str, corrected: Correction)
     _require("correct", number, [trial.index for trial in trials], "of this session")
     why = text("the reason of a correction", why)
     return Event(kind="correction", trial=number, text=why, corrected=corrected)
-
-
-def _require_of_a_muscle(trial: Trial, mep_mv: float) -> None:
-    """Raise if the amplitude cannot be an MEP's, whatever a person thinks of the trial."""
-    slip = implausible_amplitude(mep_mv)
-    if slip is not None:
-        raise InvalidValueError(
-            f"trial {trial.index} cannot be accepted: {slip.text}", got=mep_mv, remedy=f"{slip.remedy} {_KEPT}"
-        )
-    if mep_mv == 0 and trial.reason is Kind.IMPLAUSIBLE:
-        raise InvalidValueError(
-            f"trial {trial.index} cannot be accepted: its EMG does not move in the MEP window",
-            got=mep_mv,
-            remedy=f"Is the amplifier on? {_KEPT}",
-        )
 
 
 def _require(verb: str, number: int, possible: list[int], which: str) -> None:

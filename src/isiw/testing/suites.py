@@ -126,7 +126,10 @@ def check_model(
         check_estimate(posterior.estimate(), space, f"after: {what}")
         _check_capabilities(posterior, space, 1, f"after: {what}")
     if people > 1:
-        _check_people(model, space, usual, people)
+        posterior = _after(model, space, usual[:6], people=people)
+        for person in range(people):
+            check_estimate(posterior.estimate(person), space, f"for person {person} of {people}")
+        _check_capabilities(posterior, space, people, f"for {people} people")
     if order_tolerance_ms is not None:
         _check_order(model, space, usual, order_tolerance_ms)
 
@@ -150,13 +153,6 @@ def _check_learning(model: ResponseModel, space: DesignSpace, trials: Trials) ->
     after = model.update(before, _observation(*trials[0]))
     require(after.trials == 1 and before.trials == 0, "update makes a posterior that has learnt from one trial more")
     require(same_estimates(before.estimate(), estimate), "a posterior never changes")
-
-
-def _check_people(model: ResponseModel, space: DesignSpace, trials: Trials, people: int) -> None:
-    posterior = _after(model, space, trials[:6], people=people)
-    for person in range(people):
-        check_estimate(posterior.estimate(person), space, f"for person {person} of {people}")
-    _check_capabilities(posterior, space, people, f"for {people} people")
 
 
 def _check_order(model: ResponseModel, space: DesignSpace, trials: Trials, tolerance_ms: float) -> None:

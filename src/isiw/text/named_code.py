@@ -20,21 +20,16 @@ def named_code(reference: str, folder: Path | None, key: str) -> Any:
         try:
             return getattr(importlib.import_module(module_name), name)
         except (ImportError, AttributeError) as error:
+            module, beside = sys.modules.get(module_name), () if folder is None else folder.glob("*.py")
+            files = (file.stem for file in beside)
+            meant = did_you_mean(module_name, files) if module is None else did_you_mean(name, vars(module))
             where = f"The module is looked for in {folder or 'the installed packages'} first."
             raise ConfigError(
                 f"{key} cannot be imported: {error}",
                 got=reference,
                 expected="module:function, such as mylab.rig:make",
-                remedy=f"{_meant(module_name, name, folder)} {where}".lstrip(),
+                remedy=f"{meant} {where}".lstrip(),
             ) from error
-
-
-def _meant(module_name: str, name: str, folder: Path | None) -> str:
-    """The function, or the module beside the configuration, that was probably meant, as a question."""
-    module = sys.modules.get(module_name)
-    if module is not None:
-        return did_you_mean(name, vars(module))
-    return did_you_mean(module_name, () if folder is None else (file.stem for file in folder.glob("*.py")))
 
 
 def library(name: str, extra: str) -> Any:

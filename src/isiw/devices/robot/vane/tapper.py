@@ -50,17 +50,12 @@ def draw_strokes(vane: Vane, n: int, rng: np.random.Generator) -> Rotations:
     z = rng.standard_normal((2, n))
     friction = np.maximum(1 + FRICTION_CV * z[0], LEAST_SHARE)
     reservoir = np.maximum(1 + RESERVOIR_CV * z[1], LEAST_SHARE)
-    vanes = [_varied(vane, float(one), float(other)) for one, other in zip(friction, reservoir, strict=True)]
+    gauge_bar, vanes = vane.supply.reservoir_bar - ATMOSPHERE_BAR, []
+    for own, pressure in zip(friction.tolist(), reservoir.tolist(), strict=True):
+        rotor = replace(vane.rotor, friction_nm=own * vane.rotor.friction_nm)
+        supply = replace(vane.supply, reservoir_bar=ATMOSPHERE_BAR + pressure * gauge_bar)
+        vanes.append(replace(vane, rotor=rotor, supply=supply))
     return rotate(vanes, duration_s=STROKE_S, half_wave_s=STROKE_S, start_rad=0.0, step_ms=STEP_MS)
-
-
-def _varied(vane: Vane, friction: float, reservoir: float) -> Vane:
-    gauge_bar = vane.supply.reservoir_bar - ATMOSPHERE_BAR
-    return replace(
-        vane,
-        rotor=replace(vane.rotor, friction_nm=friction * vane.rotor.friction_nm),
-        supply=replace(vane.supply, reservoir_bar=ATMOSPHERE_BAR + reservoir * gauge_bar),
-    )
 
 
 def record_strokes(strokes: Rotations, rng: np.random.Generator, rest_ms: float = VALVE_MS) -> dict[str, FloatArray]:
