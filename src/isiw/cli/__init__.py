@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 import isiw
-from isiw.cli import analyse, logs, rig, session, strategies, study, tasks
+from isiw.cli import analyse, logs, session, study, tasks
 from isiw.cli.console import SESSIONS, STUDIES, show
 
 __all__ = ["app"]
@@ -20,11 +20,11 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for commands in (session, rig, tasks, analyse, logs, strategies):
+for commands in (session, tasks, analyse, logs, study):
     app.add_typer(commands.app)
-app.add_typer(strategies.prior, name="prior", rich_help_panel=STUDIES)
-app.add_typer(study.app, name="study", rich_help_panel=STUDIES)
-app.add_typer(rig.new, name="new", rich_help_panel=SESSIONS)
+app.add_typer(study.prior, name="prior", rich_help_panel=STUDIES)
+app.add_typer(study.study, name="study", rich_help_panel=STUDIES)
+app.add_typer(tasks.new, name="new", rich_help_panel=SESSIONS)
 
 
 def _show_version(value: bool) -> None:  # noqa: FBT001 - as typer calls it

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import os
 import signal
 import sys
 import threading
@@ -14,8 +16,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.padding import Padding
-from rich.text import Text
 
 import isiw
 from isiw.text import plain
@@ -23,8 +23,6 @@ from isiw.text.sanitize import counted
 
 if TYPE_CHECKING:
     from isiw.log.reader import SessionRecord
-import itertools
-import os
 
 _SILENT_S = 1.5
 _AGAIN_S = 0.05
@@ -57,12 +55,6 @@ def show_paragraph(text: str) -> None:
     console.print(plain(said + found[:1]), style="bold", markup=False, soft_wrap=not console.is_terminal)
     if found:
         show(f"isiw {way_on}", style="bold")
-
-
-def show_entry(heading: str, text: str) -> None:
-    """Print an entry of a list: its heading, and below it the text, indented and as wide as the terminal."""
-    show(heading, style="bold")
-    Console(highlight=False).print(Padding(Text(text), (0, 0, 0, 4)))
 
 
 @contextmanager
