@@ -1,3 +1,4 @@
+from . import hotspot as hotspot
 from .bayes import BayesThreshold as BayesThreshold
 from .bayes import FiveOfTen as FiveOfTen
 from .bayes import MaximumLikelihood as MaximumLikelihood
