@@ -49,9 +49,7 @@ def read_people(source: str | Path | Any, layout: Layout | None = None, *, subje
         return [read_log(path)]
     if not path.exists():
         raise InvalidValueError("there is no such file", got=str(path), remedy="Check the path.")
-    suffix = (
-        Path(path.name.lower().removesuffix(".gz")).suffix if path.name.endswith(".fif.gz") else path.suffix.lower()
-    )
+    suffix = ".fif" if path.name.endswith(".fif.gz") else path.suffix.lower()
     if suffix in recordings.SUFFIXES:
         return [recordings.read_recording(path, layout, subject or path.stem)]
     if path.is_dir() or suffix not in frames.SUFFIXES:

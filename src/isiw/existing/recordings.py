@@ -141,14 +141,10 @@ def _channel_name(raw: Any, key: str, layout: Layout, source: str) -> str:
     stated = layout.channels.get(key)
     if stated is not None:
         require_one(f"{source} has no such channel", stated, names)
+        return stated
     kinds = dict(zip(names, raw.get_channel_types(), strict=True))
-    fitting = (
-        [stated]
-        if stated is not None
-        else [name for name in names if kinds[name] == key]
-        or [name for name in names if key in name.casefold()]
-        or [name for name in names if kinds[name] not in {"stim", "misc"}]
-    )
+    fitting = [name for name in names if kinds[name] == key] or [name for name in names if key in name.casefold()]
+    fitting = fitting or [name for name in names if kinds[name] not in {"stim", "misc"}]
     if len(fitting) != 1:
         raise InvalidValueError(
             f"several channels of {source}, or none, may hold the EMG",
@@ -173,20 +169,12 @@ def _factor_mv(raw: Any, name: str, layout: Layout, source: str) -> float:
 
 def _annotated(raw: Any) -> pd.DataFrame:
     mne = library("mne", "import")
-    rows = [
-        {
-            "name": str(each["description"]),
-            "onset": float(each["onset"]) - raw.first_time,
-            "duration": float(each["duration"]),
-        }
-        for each in raw.annotations
-    ]
+    said = raw.annotations
+    rows = [(str(one["description"]), float(one["onset"]) - raw.first_time, float(one["duration"])) for one in said]
     if not rows and "stim" in raw.get_channel_types():
         found = mne.find_events(raw, shortest_event=1, verbose="ERROR")
-        rows = [
-            {"name": str(code), "onset": (sample - raw.first_samp) / raw.info["sfreq"], "duration": 0.0}
-            for sample, _, code in found.tolist()
-        ]
+        rate_hz = raw.info["sfreq"]
+        rows = [(str(code), (sample - raw.first_samp) / rate_hz, 0.0) for sample, _, code in found.tolist()]
     return pd.DataFrame(rows, columns=["name", "onset", "duration"])
 
 
@@ -285,9 +273,5 @@ def _cut(
         cut[name] = replace(channel, values=channel.values[first:last])
     start_s = first / rate_hz
     origin_ms = None if origin_s is None else 1e3 * (origin_s - start_s)
-    return Sweep(
-        cut,
-        t_valve_ms=origin_ms if key == "valve" else None,
-        t_tms_ms=1e3 * (pulse_s - start_s),
-        t_hit_ms=origin_ms if key == "tap" else None,
-    )
+    begin: dict[str, Any] = {"t_valve_ms" if key == "valve" else "t_hit_ms": origin_ms}
+    return Sweep(cut, t_tms_ms=1e3 * (pulse_s - start_s), **begin)

@@ -142,11 +142,8 @@ def _known_settings(recipe: StrategyRecipe) -> dict[str, Any]:
 
 def _require_other_versions(intent: Intent, asked_ms: float, header: Header) -> None:
     """Raise if the strategy has no reason to ask something else than it did."""
-    same = (header.schema_version, header.belief_version, header.engine_version) == (
-        SCHEMA_VERSION,
-        BELIEF_VERSION,
-        ENGINE_VERSION,
-    )
+    now = SCHEMA_VERSION, BELIEF_VERSION, ENGINE_VERSION
+    same = (header.schema_version, header.belief_version, header.engine_version) == now
     if same and versions() == {**header.versions, "isiw": header.isiw_version}:
         raise StrategyError(
             f"the strategy does not ask again what was asked in trial {intent.trial}",

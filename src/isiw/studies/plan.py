@@ -187,12 +187,7 @@ class Study(Checked):
             raise InvalidValueError("marks ascend from 0 to the number of trials", got=self.marks)
         require_cohorts(self.cohorts)
         labels = [strategy.label for strategy in self.strategies]
-        if (
-            not labels
-            or not self.cohorts
-            or len(set(labels)) < len(labels)
-            or len(set(self.cohorts)) < len(self.cohorts)
-        ):
+        if not all(names and len(set(names)) == len(names) for names in (labels, self.cohorts)):
             raise InvalidValueError(
                 "a study needs strategies and cohorts, each once",
                 got=(labels, list(self.cohorts)),

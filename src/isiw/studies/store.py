@@ -217,17 +217,8 @@ def _uncoded(values: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _error_rows(unit: Unit, failure: Failure) -> pd.DataFrame:
-    return pd.DataFrame(
-        {
-            "strategy": session.label,
-            "cohort": session.cohort,
-            "person": session.person,
-            "unit": unit.key,
-            "error": failure.error,
-            "details": failure.details,
-        }
-        for session in unit.sessions
-    )
+    people = [(one.label, one.cohort, one.person) for one in unit.sessions]
+    return pd.DataFrame(people, columns=_KEYS[:3]).assign(unit=unit.key, error=failure.error, details=failure.details)
 
 
 def _disk_errors(folder: Path) -> AbstractContextManager[None]:

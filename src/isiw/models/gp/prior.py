@@ -186,13 +186,9 @@ def regression(
 
 
 def _kernel(name: KernelName, length_ms: Tensor) -> gpytorch.kernels.Kernel:
-    shape = length_ms.shape
-    kernel = (
-        gpytorch.kernels.MaternKernel(nu=2.5, batch_shape=shape)
-        if name == "matern"
-        else gpytorch.kernels.RBFKernel(batch_shape=shape)
-    )
-    return kernel.double().initialize(lengthscale=length_ms[..., None, None])
+    # By default GPyTorch's Matérn kernel has a smoothness of 5/2.
+    kind = gpytorch.kernels.MaternKernel if name == "matern" else gpytorch.kernels.RBFKernel
+    return kind(batch_shape=length_ms.shape).double().initialize(lengthscale=length_ms[..., None, None])
 
 
 def _covariance(kernel: KernelName, process: Hyperparameters, level_variance: Tensor) -> gpytorch.kernels.Kernel:

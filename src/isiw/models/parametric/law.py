@@ -113,10 +113,8 @@ class WindowPrior(Checked):
         z = dict(zip(latent_names(likelihood), latents.unbind(-1), strict=True))
         floor_mv = self.floor.mean_mv.log_normal(z["floor"])
         evoked = self._saturating(z, floor_mv) if likelihood == "input-noise" else self._proportional(z, floor_mv)
-        start_ms, width_ms = (
-            self.start.start_ms(torch.special.ndtr(z["start"]), space),
-            self.width_ms.log_normal(z["width"]),
-        )
+        start_ms = self.start.start_ms(torch.special.ndtr(z["start"]), space)
+        width_ms = self.width_ms.log_normal(z["width"])
         floor_cv, p_outlier = self.floor.cv.log_normal(z["floor_cv"]), self.outliers.probability(z["outliers"])
         return Unknowns(start_ms, width_ms, floor_mv, floor_cv, *evoked, p_outlier)
 
