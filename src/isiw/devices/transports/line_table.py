@@ -18,7 +18,8 @@ from typing import Annotated, Final, TypeAlias
 from urllib.parse import urlsplit
 
 from isiw.checks import Checked, Positive, Text, from_table, number
-from isiw.errors import ConfigError, InvalidValueError
+from isiw.errors import InvalidValueError
+from isiw.text.named_code import library
 from isiw.text.sanitize import read_number
 
 _TCP = "socket://"
@@ -91,14 +92,7 @@ class _Serial:
     """The same over a serial port, which no other program can open meanwhile."""
 
     def __init__(self, address: str, baud: int, timeout_s: float) -> None:
-        try:
-            import serial  # noqa: PLC0415 - optional: only who has a serial port needs it
-        except ImportError as error:
-            raise ConfigError(
-                "a serial port needs the package pyserial",
-                got=address,
-                remedy='Install it: pip install "isiw[serial]".',
-            ) from error
+        serial = library("serial", "serial")
         try:
             self._port = serial.serial_for_url(
                 address, baudrate=baud, timeout=_GLANCE_S, write_timeout=timeout_s, exclusive=True
