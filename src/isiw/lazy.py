@@ -52,11 +52,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, eq=False)
 class Later(Generic[T]):
-    """A value that is worked out when it is first looked at.
-
-    Args:
-        work: gives the value.
-    """
+    """A value that its `work` gives when it is first looked at."""
 
     work: Callable[[], T]
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from isiw.devices.robot.waveforms import mep_mv
+from isiw.devices.robot.waveforms import mep_shape
 from isiw.errors import InvalidValueError
 from isiw.signals import (
     background_rms,
@@ -24,9 +24,7 @@ TIME_MS = np.arange(1500) / 5
 def emg_with_mep(amplitude_mv: float, n: int = 1, noise_mv: float = 0.001, seed: int = 0) -> np.ndarray:
     """Sweeps of 300 ms with a pulse at 150 ms."""
     rng = np.random.default_rng(seed)
-    ones = np.ones(n)
-    meps = mep_mv(np.broadcast_to(TIME_MS - 150, (n, 1500)), amplitude_mv * ones, 0 * ones, ones)
-    return meps + noise_mv * rng.standard_normal((n, 1500))
+    return amplitude_mv * mep_shape(TIME_MS - 150) + noise_mv * rng.standard_normal((n, 1500))
 
 
 @pytest.mark.parametrize("amplitude_mv", [0.03, 0.1, 1.0])

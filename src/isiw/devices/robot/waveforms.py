@@ -75,7 +75,9 @@ def record_emg(
     sign, size = rng.choice((-1.0, 1.0), n), rng.uniform(*PULSE_ARTEFACT_MV, n)
     artefacts = artefacts + tms_artefact_mv(since_pulse, sign * size)
     shift, stretch = LATENCY_SD_MS * rng.standard_normal(n), 1 + STRETCH_SD * rng.standard_normal(n)
-    meps = mep_mv(since_pulse, np.ones(n), shift, stretch)
+    first_turn = MEP_TURNS[0][1]
+    since_turn = since_pulse - first_turn - shift[:, None]
+    meps = np.nan_to_num(mep_shape(first_turn + since_turn / stretch[:, None]))
     in_window = (since_pulse >= MEP_WINDOW_MS[0]) & (since_pulse <= MEP_WINDOW_MS[1])
     for sweep in np.flatnonzero(in_window.any(axis=-1)):
         inside = in_window[sweep]
@@ -166,15 +168,6 @@ def tms_artefact_mv(since_pulse_ms: FloatArray, amplitude_mv: FloatArray) -> Flo
 def mep_shape(since_pulse_ms: ArrayLike) -> FloatArray:
     """The mean waveform of a forearm MEP of peak-to-peak amplitude 1; same shape."""
     return _turns(np.asarray(since_pulse_ms, dtype=np.float64)) / _PEAK_TO_PEAK
-
-
-def mep_mv(
-    since_pulse_ms: FloatArray, amplitude_mv: FloatArray, shift_ms: FloatArray, stretch: FloatArray
-) -> FloatArray:
-    """MEPs of given peak-to-peak amplitudes [mV]."""
-    first_turn = MEP_TURNS[0][1]
-    time = first_turn + (since_pulse_ms - first_turn - shift_ms[:, None]) / stretch[:, None]
-    return amplitude_mv[:, None] * np.nan_to_num(mep_shape(time))
 
 
 def _turns(time_ms: FloatArray) -> FloatArray:
