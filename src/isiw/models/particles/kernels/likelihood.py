@@ -233,18 +233,16 @@ def _normal(share: Any, inverse_sd: Any, of_trial: Any) -> Any:
 
 
 @inlined
-def _four_nodes(q: int, curve: Any, start: Any, of_trial: Any) -> Any:
+def _four_nodes(nodes: Any, start: Any, of_trial: Any) -> Any:
     """The part of the density that four nodes add; each step for all of them, as the next waits for its outcome."""
-    drive, scale, _, _, _, _ = of_trial
-    at, between, w = curve[0], curve[1], NODE_WEIGHTS
-    a, b = _sigmoid(drive + at[q]), _sigmoid(drive + at[q + 1])
-    c, d = _sigmoid(drive + at[q + 2]), _sigmoid(drive + at[q + 3])
-    (a, of_a), (b, of_b) = _share(a, between[q], scale, start), _share(b, between[q + 1], scale, start)
-    (c, of_c), (d, of_d) = _share(c, between[q + 2], scale, start), _share(d, between[q + 3], scale, start)
+    (at, between, w), (drive, scale, _, _, _, _) = nodes, of_trial
+    a, b, c, d = _sigmoid(drive + at[0]), _sigmoid(drive + at[1]), _sigmoid(drive + at[2]), _sigmoid(drive + at[3])
+    (a, of_a), (b, of_b) = _share(a, between[0], scale, start), _share(b, between[1], scale, start)
+    (c, of_c), (d, of_d) = _share(c, between[2], scale, start), _share(d, between[3], scale, start)
     of_a, of_b = _inverse_sd(a, of_a, of_trial), _inverse_sd(b, of_b, of_trial)
     of_c, of_d = _inverse_sd(c, of_c, of_trial), _inverse_sd(d, of_d, of_trial)
-    first = w[q] * _normal(a, of_a, of_trial) + w[q + 1] * _normal(b, of_b, of_trial)
-    return first + (w[q + 2] * _normal(c, of_c, of_trial) + w[q + 3] * _normal(d, of_d, of_trial))
+    first = w[0] * _normal(a, of_a, of_trial) + w[1] * _normal(b, of_b, of_trial)
+    return first + (w[2] * _normal(c, of_c, of_trial) + w[3] * _normal(d, of_d, of_trial))
 
 
 @loop
@@ -259,14 +257,20 @@ def _density(particle: Any, trials: Any, count: int, curve: Any, work: Any, like
         relative[i] = low[i] - floor
     _step(trials, count, particle[field.CHANGED], -particle[field.STEP_SCALE], relative)
     # All nodes in one pass, so that no sums go through memory; `_inside` has the same as a loop over `NODES`.
+    first = (
+        curve[0, :4],
+        curve[1, :4],
+        NODE_WEIGHTS[:4],
+    )  # arrays: Numba compiles a function for each number it is given
+    second = curve[0, 4:NODES], curve[1, 4:NODES], NODE_WEIGHTS[4:]
     if start > _NIL:
         for i in range(count):
             one = drive[i], scale[i], known[i], relative[i], floor_variance + varies[i], output
-            evoked[i] = _four_nodes(0, curve, start, one) + _four_nodes(4, curve, start, one)
+            evoked[i] = _four_nodes(first, start, one) + _four_nodes(second, start, one)
     else:
         for i in range(count):
             one = drive[i], scale[i], known[i], relative[i], floor_variance + varies[i], output
-            evoked[i] = _four_nodes(0, curve, None, one) + _four_nodes(4, curve, None, one)
+            evoked[i] = _four_nodes(first, None, one) + _four_nodes(second, None, one)
     for i in range(count):
         still = (_ONE + known[i]) * per_root(floor_variance + varies[i])
         silent = still * bell((log(_ONE + known[i]) - relative[i]) * still)
