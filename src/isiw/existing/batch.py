@@ -72,13 +72,13 @@ def read_files(
     sources: Sequence[str | Path], way: Way, output: str | Path | None = None, only: str | None = None
 ) -> list[Person]:
     """The people of some files, and where their logs go: one log (.mcap), or a folder for a log of each."""
-    people = [person for source in sources for person in _read(Path(source), way)]
-    if only is not None:
-        everybody, people = [delivered for delivered, _ in people], [one for one in people if one[0].subject == only]
-        if not people:
-            raise InvalidValueError("no person has this code", got=only, expected=codes_of(everybody))
-    paths = _paths([delivered for delivered, _ in people], output)
-    found = [Person(delivered, path, made_of) for (delivered, made_of), path in zip(people, paths, strict=True)]
+    everybody = [person for source in sources for person in _read(Path(source), way)]
+    people = [one for one in everybody if only in {None, one.delivered.subject}]
+    if only is not None and not people:
+        codes = codes_of([one.delivered for one in everybody])
+        raise InvalidValueError("no person has this code", got=only, expected=codes)
+    paths = _paths([one.delivered for one in people], output)
+    found = [one._replace(log=path) for one, path in zip(people, paths, strict=True)]
     for person in found:
         if person.log is not None and log_exists(person.log) and not is_there(person):
             raise LogError(
@@ -89,7 +89,7 @@ def read_files(
     return found
 
 
-def _read(source: Path, way: Way) -> Iterator[tuple[Delivered, Mapping[str, Any]]]:
+def _read(source: Path, way: Way) -> Iterator[Person]:
     layout = way.layout
     if layout.reference is None and way.space is not None:
         layout = replace(layout, reference=way.space.reference)
@@ -111,7 +111,7 @@ def _read(source: Path, way: Way) -> Iterator[tuple[Delivered, Mapping[str, Any]
             "simulated": simulated,
         }
         as_logged = json.loads(json.dumps(made_of))  # a log knows no tuples
-        yield replace(delivered, visit=visit, simulated=simulated), as_logged
+        yield Person(replace(delivered, visit=visit, simulated=simulated), None, as_logged)
 
 
 def _paths(people: Sequence[Delivered], output: str | Path | None) -> list[Path | None]:

@@ -131,16 +131,6 @@ class DayToDay(Checked):
     floor_log_sd: Positive = 0.1
     p_other: Share = 0.1
 
-    def added_sd(self) -> dict[str, float]:
-        """Squares by which the variances of latents grow."""
-        return {
-            "start_ms": self.shift_sd_ms,
-            "log_floor_mv": self.floor_log_sd,
-            "log_gain": self.amplitude_log_sd,
-            "log_ceiling": self.amplitude_log_sd,
-            "rest": self.x50_sd_pct,
-        }
-
 
 def after(
     *records: SessionRecord, prior: Prior | None = None, law: DayToDay | None = None, damaged: bool = False
@@ -290,7 +280,13 @@ def _normals(latents: Latents, name: str, law: DayToDay) -> list[_Normal]:
         COMPONENTS[name], covariance_type="diag", reg_covar=0.05, max_iter=1000, random_state=0
     )
     fit.fit((values - centre) / spread)
-    added = law.added_sd()
+    added = {
+        "start_ms": law.shift_sd_ms,
+        "log_floor_mv": law.floor_log_sd,
+        "log_gain": law.amplitude_log_sd,
+        "log_ceiling": law.amplitude_log_sd,
+        "rest": law.x50_sd_pct,
+    }
     grown = np.array([added.get(LATENTS[column], 0.0) for column in own])
     means, sds = centre + spread * fit.means_, np.hypot(spread * np.sqrt(fit.covariances_), grown)
     return list(zip(fit.weights_.tolist(), means, sds, strict=True))

@@ -48,13 +48,13 @@ def exclusive(device: Device, info: DeviceInfo) -> Iterator[None]:
         _driven.discard(id(device))
 
 
-@contextmanager
-def _address_claimed(info: DeviceInfo) -> Iterator[None]:
+def _address_claimed(info: DeviceInfo) -> AbstractContextManager[object]:
+    """The lock of a device's address, which is released behind it."""
     digest = hashlib.sha256(info.address.encode(errors="backslashreplace")).hexdigest()[:16]
     path = Path(tempfile.gettempdir()) / f"isiw-device-{digest}.lock"
     lock = FileLock(path, mode=0o666)  # so that another account of this computer can take it, once it is free
     try:
-        lock.acquire(timeout=0)
+        return lock.acquire(timeout=0)
     except Timeout as error:
         raise _taken(f"{info.name} at {info.address}") from error
     except OSError as error:
@@ -63,10 +63,6 @@ def _address_claimed(info: DeviceInfo) -> Iterator[None]:
             got=str(path),
             remedy="If another account of this computer made it, let that account delete it once no session runs.",
         ) from error
-    try:
-        yield
-    finally:
-        lock.release()
 
 
 def _taken(which: str) -> DeviceError:
