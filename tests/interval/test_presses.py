@@ -67,5 +67,5 @@ def test_who_leaves_is_not_waited_for(clock: Times, how: str) -> None:
 
 def test_a_terminal_that_is_closed_ends_the_waiting(clock: Times) -> None:
     presses = Presses(clock)
-    threading.Timer(0.05, presses.leave).start()
+    threading.Timer(0.05, presses.press, ["q"]).start()
     assert presses.next_ms() is None

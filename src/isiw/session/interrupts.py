@@ -158,8 +158,7 @@ class Interrupts:
         with self.allowed():
             return call(*args, **kwargs)
 
-    def _receive(self, number: int, frame: FrameType | None) -> None:
-        del frame
+    def _receive(self, number: int, _: FrameType | None) -> None:
         self._handled += 1
         with suppress(OSError):
             self._mouth.send(bytes([_HANDLED]))  # behind the signals that this is for: two at once are handled as one

@@ -78,22 +78,19 @@ class Alone:
         learn = self.player.tell if self._strategy is None else self._strategy.learn
         learn(response.isi_ms, response.mep_mv, isi_sd_ms=response.isi_sd_ms)
 
-    def count_mistrial(self, person: int, lost: Choice) -> Choice:
+    def count_mistrial(self, _: int, lost: Choice) -> Choice:
         """Count a pair of stimuli that was delivered in vain, and say what is asked instead."""
-        del person
         if self._strategy is None:
             return lost
         self._strategy.count_mistrial()
         return self.ask()[0]
 
-    def estimate(self, person: int) -> Reported:
+    def estimate(self, _: int) -> Reported:
         """The estimate of the person's window."""
-        del person
         return self.player.estimate()
 
-    def decision(self, person: int) -> StopDecision:
+    def decision(self, _: int) -> StopDecision:
         """The decision to stop or not."""
-        del person
         return StopKind.OWN.go_on("There is no stopping rule.") if self._strategy is None else self._strategy.decision()
 
     def trouble(self) -> bool:

@@ -200,10 +200,6 @@ class Presses:
             self._intervals.put(1000.0 * (now_s - self._begun_s))
             self._begun_s = None
 
-    def leave(self) -> None:
-        """Nobody is there any more."""
-        self.left = True
-
     def next_ms(self) -> float | None:
         """Wait for the next interval [ms]; None if the person leaves instead."""
         while not self.left:
@@ -323,7 +319,7 @@ def _ready(rest_s: float) -> float:
 
 def _conduct(record: ProductionRecord, log: LogWriter, rest_s: float) -> ProductionRecord:
     presses = Presses()
-    with log, Screen() as screen, Keys(presses.press, presses.leave):
+    with log, Screen() as screen, Keys(presses.press, lambda: presses.press(QUIT)):
         screen.say(f"{START} starts an interval, {END} ends it, {QUIT} leaves; the task can be resumed later.")
         block_before: int | None = None
         for trial, index in record.left:
