@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from isiw.design import VALVE_SPACE
-from isiw.errors import InvalidValueError
 from isiw.subjects.cohorts import cohort
-from isiw.subjects.measured import MEASURED_KIM, STEP_MS, WIDTHS_KIM_MS, MeasuredPerson
+from isiw.subjects.measured import MEASURED_KIM, STEP_MS, WIDTHS_KIM_MS
 from isiw.subjects.responses import PeakProfile
 from known import instance
 
@@ -55,8 +54,3 @@ def test_tms_alone_is_silent_and_every_second_one_at_rmt_is_a_response(index: in
 
     assert responses(90.0) <= 0.02
     assert responses(100.0) == pytest.approx(0.5, abs=0.03)
-
-
-def test_a_peak_below_the_threshold_is_refused() -> None:
-    with pytest.raises(InvalidValueError, match="peak_mv"):
-        MeasuredPerson(70, 0.03, 0.02)

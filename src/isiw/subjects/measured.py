@@ -29,7 +29,7 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
-from isiw.checks import Checked, Number, Positive, choice, number, whole
+from isiw.checks import Checked, Number, Positive, choice, whole
 from isiw.lazy import scipy
 from isiw.subjects.responses import EmgFloor, OpposedProfile, PeakProfile, RecruitmentResponse, log_normal
 from isiw.subjects.subject import SimulatedSubject
@@ -58,10 +58,6 @@ class MeasuredPerson(Checked):
     threshold_mv: Positive  # from which an MEP counts as a response (4.1.1)
     peak_mv: Number  # mean MEP at the best ISI, EMG floor included
     peak_error_mv: Positive | None = None  # by how much it may be misread; None if no figure shows it
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        number("MeasuredPerson.peak_mv", self.peak_mv, above=self.threshold_mv)
 
     def response(self) -> RecruitmentResponse:
         """Their recruitment curve: half of the MEPs at RMT are responses, and the best ISI has their peak."""
