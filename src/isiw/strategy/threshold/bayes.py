@@ -59,8 +59,9 @@ class MaximumLikelihood(Checked):
         best = _best(thresholds, log_likelihood)
         return ThresholdEstimate(best, float(likely[0]), float(likely[-1])).within(space)
 
-    def decision(self, pulses: Sequence[Pulse], _: IntensityRange) -> StopDecision:
+    def decision(self, pulses: Sequence[Pulse], space: IntensityRange) -> StopDecision:
         """Stop after a fixed number of pulses."""
+        del space
         reason = f"{len(pulses)} of {self.pulses} pulses are given."
         return StopDecision(len(pulses) >= self.pulses, reason, StopKind.BUDGET)
 
