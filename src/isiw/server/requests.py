@@ -12,7 +12,7 @@ from pydantic_core import ErrorDetails
 
 from isiw.config.sections import LimitsConfig, SpaceConfig, StrategyConfig, VisitConfig, require_together, require_units
 from isiw.errors import IsiwError
-from isiw.log.schema import MOST_TRIALS
+from isiw.log.schema import MOST_TRIALS, TrialNumber
 from isiw.server.answers import Refusal
 from isiw.text.toml_files import (
     UNKNOWN,
@@ -35,7 +35,6 @@ NAME: Final = r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$"
 MOST_FIELDS: Final = 50
 MOST_WAIT_S: Final = 30.0
 
-TrialNumber = Annotated[int, Field(ge=0, lt=MOST_TRIALS)]
 Text = Annotated[str, Field(max_length=10_000)]
 
 _Kind = TypeVar("_Kind", bound=BaseModel)

@@ -17,7 +17,7 @@ from isiw.design import DesignSpace
 from isiw.findings import REST_UV, Finding, Kind, Severity
 from isiw.signals.impact import impact_time
 from isiw.signals.judgement import of_one_length
-from isiw.signals.limits import ARTEFACT_MS, EMG_UNITS_MV, SignalLimits, implausible_amplitude, off_by
+from isiw.signals.limits import ARTEFACT_MS, EMG_UNITS_MV, SignalLimits, implausible_amplitude
 from isiw.signals.mep import MIN_BACKGROUND_MS, Disturbance
 from isiw.signals.waveforms import PULSE_GUARD_MS, is_recording, samples
 from isiw.trials import Channel, Measurement, Sweep, Trial
@@ -124,9 +124,8 @@ REMEDIES: Mapping[Kind, str] = MappingProxyType(
 
 def too_early_by_chance(trial: Trial, space: DesignSpace) -> bool:
     """Whether the pulse came before the impact by no more than the tolerance: no rig is to blame for that."""
-    if trial.reason is not Kind.TMS_BEFORE_IMPACT or trial.isi_ms is None or trial.commanded_isi_ms is None:
-        return False
-    return not off_by(trial.isi_ms, trial.commanded_isi_ms, space)
+    error_ms = trial.isi_error_ms if trial.reason is Kind.TMS_BEFORE_IMPACT else None
+    return error_ms is not None and abs(error_ms) <= space.tolerance_ms
 
 
 def _finding(kind: Kind, trial: Trial, text: str, remedy: str) -> Finding:

@@ -9,7 +9,7 @@ import threading
 from collections.abc import AsyncIterator
 from functools import cache
 from importlib import resources
-from typing import Annotated, Final, NamedTuple, Self
+from typing import Annotated, Final, Self
 
 from fastapi import APIRouter, Depends, FastAPI, Request, Response
 from fastapi.responses import StreamingResponse
@@ -64,21 +64,13 @@ def _asset(room: str, name: str) -> str:
     return (resources.files(room) / "assets" / name).read_text(encoding="utf-8")
 
 
-class _File(NamedTuple):
-    """A file of the page, made once: to read and encode the largest takes as long as a good many updates."""
-
-    content: bytes
-    kind: str
-    headers: dict[str, str]
-
-
 @cache
-def file_of(path: str) -> _File:
-    """A file of the page."""
+def file_of(path: str) -> tuple[bytes, str, dict[str, str]]:
+    """A file of the page, its type and headers; to make the largest takes as long as a good many updates."""
     kind, text = FILES[path]
     content = text().encode()
     tag = f'"{hashlib.sha256(content).hexdigest()}"'
-    return _File(content, kind, {**_HEADERS, "Cache-Control": "no-cache", "ETag": tag})
+    return content, kind, {**_HEADERS, "Cache-Control": "no-cache", "ETag": tag}
 
 
 async def _file(request: Request) -> Response:
