@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any, Protocol, runtime_checkable
 
+import numpy as np
+
 from isiw.design import DesignSpace
 from isiw.errors import StrategyError
 from isiw.lazy import torch
@@ -89,9 +91,9 @@ def require_scores(acquisition: AcquisitionFunction, scores: object, candidates:
 
 def best_candidate(scores: Tensor, cost: Tensor | None = None, first: int = 0) -> Tensor:
     """Index of the best candidate for each person, shape (b,); a score that is not finite loses."""
-    net = scores if cost is None else scores - cost
-    net = torch.where(torch.isfinite(net), net, -torch.inf).roll(-first, dims=-1)
-    return (net.argmax(dim=-1) + first) % scores.shape[-1]
+    net = (scores if cost is None else scores - cost).detach().cpu().numpy()
+    ranked = np.roll(np.where(np.isfinite(net), net, -np.inf), -first, axis=-1)
+    return torch.from_numpy((ranked.argmax(-1) + first) % net.shape[-1])
 
 
 def own_plan(posterior: Posterior, acquisition: AcquisitionFunction) -> list[float]:

@@ -128,6 +128,12 @@ def profile_grid(space: DesignSpace) -> Tensor:
     return torch.tensor(sorted({*space.grid_ms[::every], space.grid_ms[-1]}), dtype=torch.float32)
 
 
+@cache
+def grid_of(space: DesignSpace, device: torch.device) -> Tensor:
+    """The ISIs of the space's grid [ms], likewise."""
+    return torch.tensor(space.grid_ms, dtype=torch.float32, device=device)
+
+
 class SampledProfiles(NamedTuple):
     """Sampled profiles of one person."""
 

@@ -41,6 +41,9 @@ FINEST_MV: Final = 0.001
 BY_CHANCE, LEAST_DIFFERENT = 1e-6, 3
 """A step is found if all amplitudes would be its multiples by chance less often than this; of so many that differ."""
 
+NEAR_A_STEP: Final = 1e-6
+"""An amplitude is a multiple of a step if it is as near to one, in steps."""
+
 NEAR_MS: Final = 10.0
 """Taps alone speak for the ISIs around theirs, with weights of this SD [ms]."""
 
@@ -185,9 +188,12 @@ def found_step_mv(amplitudes_mv: Sequence[float]) -> float:
     if len(set(amplitudes_mv)) < LEAST_DIFFERENT:
         return 0.0
     for step_mv in STEPS_MV:
+        newest = amplitudes_mv[-1] / step_mv
+        if abs(newest - round(newest)) >= NEAR_A_STEP:  # most often, so that no other has to be looked at
+            continue
         by_chance = np.count_nonzero(sizes) * math.log(FINEST_MV / step_mv)
         multiples = sizes / step_mv
-        if by_chance < math.log(BY_CHANCE) and bool((np.abs(multiples - multiples.round()) < 1e-6).all()):
+        if by_chance < math.log(BY_CHANCE) and bool((np.abs(multiples - multiples.round()) < NEAR_A_STEP).all()):
             return step_mv
     return 0.0
 

@@ -21,7 +21,7 @@ from isiw.models.gp.prior import ProcessSettings, Standardisation, Transform, ex
 from isiw.models.protocol import Observation, Tensor
 from isiw.models.shared.history import AmplitudeHistory, FloorKind, FloorTreatment, OfAmplitudes, PersonTrials
 from isiw.models.shared.tables import systematic
-from isiw.models.windows import Runs, SampledProfiles, least_excess_mv, profile_grid, sampled_estimate
+from isiw.models.windows import Runs, SampledProfiles, grid_of, least_excess_mv, profile_grid, sampled_estimate
 
 PATH_STEP_MS = 4.0
 """Paths are drawn at ISIs this far apart at most, and are straight in between; length scales are 10 ms and more."""
@@ -310,7 +310,7 @@ class GaussianProcessPosterior(OfAmplitudes):
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person."""
-        grid = torch.tensor(self.space.grid_ms, dtype=torch.float32)
+        grid = grid_of(self.space, torch.device("cpu"))
 
         def profiles() -> SampledProfiles:
             mep_mv = self.profiles_mv(profile_grid(self.space))

@@ -30,7 +30,7 @@ from isiw.models.particles.prior import Prior
 from isiw.models.particles.swarm import Moving, Swarm
 from isiw.models.protocol import Observation, PriorPerson
 from isiw.models.shared.tables import NOTED, SIMULATED, step_generator
-from isiw.models.windows import EXCLUDED_AT, SampledHypotheses, SampledProfiles, profile_grid, sampled_estimate
+from isiw.models.windows import EXCLUDED_AT, SampledHypotheses, SampledProfiles, grid_of, profile_grid, sampled_estimate
 from isiw.types import ArrayLike, FloatArray
 from isiw.window import Window
 
@@ -103,8 +103,7 @@ class ParticleModel(Checked):
         changed = self.prior.change(latents).at(order)
         gain, level = log_gain(person.response, order) + changed.log_gain, levels(person, isis_ms) * changed.enhancement
         log_mep = draw_log_mep(person.response, level, generator, gain, changed.shift_pct_rmt) + changed.log_scale
-        grid_ms = torch.as_tensor(space.grid_ms.copy(), dtype=torch.float32, device=self.device)
-        mask = PersonSample(person.after(len(order)), space).window_masks(grid_ms)[0, 0]
+        mask = PersonSample(person.after(len(order)), space).window_masks(grid_of(space, order.device))[0, 0]
         window = Window.from_mask(space.grid_ms, mask.cpu().numpy())
         return PriorPerson(window, log_mep[0, 0].double().exp().cpu().numpy())
 
@@ -166,7 +165,6 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
         """The window of one person."""
         one, prior = self.swarm.of_person(person), self.model.prior
         latents = one.picked(self.model.particles)
-        grid_ms = torch.tensor(self.space.grid_ms, dtype=torch.float32, device=self.device)
 
         def profiles() -> SampledProfiles:
             sample = self._sample(one.picked(self.model.thinned))
@@ -175,7 +173,7 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
             )
 
         estimate = sampled_estimate(
-            self._sample(latents).runs(grid_ms),
+            self._sample(latents).runs(grid_of(self.space, self.device)),
             profiles,
             self.space,
             SampledHypotheses(prior.hypothesis(latents)[0], prior.hypotheses),

@@ -67,7 +67,7 @@ class SwarmPosterior(ABC, Generic[M]):
         """Number of trials of each person that it has learnt."""
         return self.swarm.trials
 
-    @property
+    @cached_property
     def pairs(self) -> int:
         """Number of them that were pairs of stimuli; see `CountsPairs`."""
         return int((~self.swarm.history.isi_ms[0].isnan()).sum())

@@ -11,7 +11,7 @@ from isiw.models.particles.shapes import facilitation, highest_facilitation, rea
 from isiw.models.particles.tables import TabledSample, cell_ends, log_ends
 from isiw.models.protocol import Tensor
 from isiw.models.shared.tables import LEVELS, OUTCOMES, interpolated
-from isiw.models.windows import Runs, least_excess_mv
+from isiw.models.windows import Runs, grid_of, least_excess_mv
 from isiw.types import IntArray
 
 FINE_MS = 1.0
@@ -27,9 +27,9 @@ class PersonSample(TabledSample):
         """Expected MEP above the floor at the tables' levels, in floors, shape (b, s, l)."""
         return self._tables.evoked
 
-    @cached_property
+    @property
     def _grid_ms(self) -> Tensor:
-        return torch.tensor(self.space.grid_ms, dtype=torch.float32, device=self.person.present.device)
+        return grid_of(self.space, self.person.present.device)
 
     @cached_property
     def _highest(self) -> Tensor:

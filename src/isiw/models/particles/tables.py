@@ -107,8 +107,7 @@ class FacilitationTables:
         """Probability of each outcome of the next trial in each row, shape (b, s, l, y)."""
         response = self.person.response
         low, high = log_ends(response, self.evoked)
-        ends = cell_ends(low.device)
-        middle, width = 0.5 * (ends[1:] + ends[:-1]), ends.diff()
+        middle, width = _cells(low.device)
         log_mep = low.unsqueeze(-1) + middle * (high - low).unsqueeze(-1)
         if self.records is not None:
             with first_of("predictions"):
@@ -134,6 +133,13 @@ def _quantile(values: Tensor, share: float) -> Tensor:
     place = share * (values.shape[-1] - 1)
     ordered, below = values.sort(dim=-1).values, int(place)
     return torch.lerp(ordered[:, below], ordered[:, min(below + 1, values.shape[-1] - 1)], place - below)
+
+
+@cache
+def _cells(device: torch.device) -> tuple[Tensor, Tensor]:
+    """Middles and widths of the cells, each (y,)."""
+    ends = cell_ends(device)
+    return 0.5 * (ends[1:] + ends[:-1]), ends.diff()
 
 
 @cache

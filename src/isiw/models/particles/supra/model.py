@@ -13,7 +13,6 @@ from typing import Annotated
 from isiw.checks import MOST_OF_A_KIND, Checked, Positive, whole
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
-from isiw.lazy import torch
 from isiw.models.particles.engine import EngineName, engine_for
 from isiw.models.particles.posterior import SwarmPosterior
 from isiw.models.particles.supra.jumps import SupraTarget
@@ -22,7 +21,7 @@ from isiw.models.particles.supra.prior import SupraPrior
 from isiw.models.particles.swarm import Moving, Swarm
 from isiw.models.protocol import Observation, Tensor
 from isiw.models.shared.tables import step_generator
-from isiw.models.windows import Runs, SampledProfiles, best_window, profile_grid, sampled_estimate
+from isiw.models.windows import Runs, SampledProfiles, best_window, grid_of, profile_grid, sampled_estimate
 
 
 @dataclass(frozen=True)
@@ -83,7 +82,7 @@ class SupraPosterior(SwarmPosterior[SupraModel]):
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person, and the segment in which the tap depresses the MEP."""
-        grid = torch.tensor(self.space.grid_ms, dtype=torch.float32)
+        grid = grid_of(self.space, self.device)
 
         def profiles() -> SampledProfiles:
             mep_mv = self.sample.expected_mep_mv(profile_grid(self.space))
