@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Annotated, Final, get_args
+from typing import Annotated, Final, TypeAlias, get_args
 
 import numpy as np
 
@@ -30,6 +30,8 @@ from isiw.subjects.responses import OpposedProfile, Profile, RecruitmentResponse
 from isiw.types import Conditioning, FloatArray, Reference
 from isiw.window import LEAST_DEPRESSED_MV, Window, window_from_excess
 
+_Numbers: TypeAlias = Annotated[tuple[float, ...], lambda what, given: tuple(number(what, each) for each in given)]
+
 OUTLIERS_MV: Final = (0.1, 0.5)
 """Between these an artefact's amplitude is uniform [mV]."""
 
@@ -46,11 +48,7 @@ class Drift(Checked):
 
     persistence: Annotated[float, partial(number, least=-1, most=1)] = 0.97
     innovation_sd: NonNegative = 0.12
-    startup: tuple[float, ...] = (0.29, 0.20)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "startup", tuple(number("Drift.startup", each) for each in self.startup))
+    startup: _Numbers = (0.29, 0.20)
 
 
 @dataclass(frozen=True)
