@@ -52,16 +52,10 @@ def recalled(record: SessionRecord, prior: Prior, *, particles: int = 1000) -> P
 def require_meps(record: SessionRecord) -> None:
     """Check that there is something to learn from a session."""
     record.require_read("seed", "strategy", "device", "visit", "subject")
-    if not record.table.told:
-        raise LogError(
-            "the session has no accepted trial to learn from", got=str(record.path), remedy="Leave this log out."
-        )
-    if record.is_silent:
-        raise LogError(
-            "the session has no MEP to learn from: every amplitude is 0, below the detection limit",
-            got=str(record.path),
-            remedy="Leave this log out.",
-        )
+    silent = "no MEP to learn from: every amplitude is 0, below the detection limit"
+    lacking = silent if record.is_silent else None if record.table.told else "no accepted trial to learn from"
+    if lacking is not None:
+        raise LogError(f"the session has {lacking}", got=str(record.path), remedy="Leave this log out.")
 
 
 def require_whole(record: SessionRecord) -> None:

@@ -20,7 +20,7 @@ from isiw.devices.deadlines import Deadlines, PunctualDevice
 from isiw.devices.limited import LimitedDevice
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Answer, Device, DeviceInfo
-from isiw.errors import DeviceError, StillArmedError, error_text
+from isiw.errors import DeviceError, StillArmedError, error_text, os_errors
 from isiw.log.schema import waveform_topic
 from isiw.models.protocol import profile_of
 from isiw.session.interrupts import INTERRUPTED, STILL_ARMED, Interrupts, end_process
@@ -53,16 +53,12 @@ def _address_claimed(info: DeviceInfo) -> AbstractContextManager[object]:
     digest = hashlib.sha256(info.address.encode(errors="backslashreplace")).hexdigest()[:16]
     path = Path(tempfile.gettempdir()) / f"isiw-device-{digest}.lock"
     lock = FileLock(path, mode=0o666)  # so that another account of this computer can take it, once it is free
-    try:
-        return lock.acquire(timeout=0)
-    except Timeout as error:
-        raise _taken(f"{info.name} at {info.address}") from error
-    except OSError as error:
-        raise DeviceError(
-            f"the device's lock cannot be taken: {error.strerror}",
-            got=str(path),
-            remedy="If another account of this computer made it, let that account delete it once no session runs.",
-        ) from error
+    remedy = "If another account of this computer made it, let that account delete it once no session runs."
+    with os_errors(DeviceError, "the device's lock cannot be taken", path, remedy):
+        try:
+            return lock.acquire(timeout=0)
+        except Timeout as error:
+            raise _taken(f"{info.name} at {info.address}") from error
 
 
 def _taken(which: str) -> DeviceError:
