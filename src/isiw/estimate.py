@@ -99,7 +99,7 @@ class WindowEstimate(Checked):
         time_alone: probability that there is no window, but amplitudes changed with time; None if the model lacks it.
         beforehand: probability of a window before the first trial; None if it is not known.
         tap_may_explain: whether the tap's own response may be what is larger within the window, as nobody knows what
-            the tap alone does there.
+            the tap alone does there, or it evokes as much.
 
     Raises:
         InvalidValueError: a probability outside 0–1, or a window or a depression reported against it.

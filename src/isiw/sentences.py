@@ -122,8 +122,9 @@ def tap_unknown(estimate: Estimate, first: StimulusWords = _EITHER) -> str:
     if not estimate.tap_may_explain:
         return ""
     return (
-        f"The {first.alone} was not measured within this window: its own response, and not the MEP, may be what "
-        "is larger there. In the next session deliver it alone a few times (in a configuration: [protocol] tap_alone)."
+        f"The {first.alone} was not measured within this window, or evokes as much there: its own response, and not "
+        "the MEP, may be what is larger. In the next session deliver it alone more often (in a configuration: "
+        "[protocol] tap_alone)."
     )
 
 

@@ -131,6 +131,17 @@ def test_a_late_window_or_one_at_isis_whose_taps_are_known_has_no_such_sentence(
     assert not known_part.tap_may_explain(Window(10.0, 70.0))
 
 
+def test_a_window_whose_amplitudes_a_few_taps_alone_match_has_that_sentence_too() -> None:
+    taps = ((0.0, 0.01), (30.0, 0.05), (60.0, 0.01))
+    for mep_mv, explained in ((0.1, True), (1.0, False), (0.01, False)):
+        told = Outcomes("impact")
+        for isi_ms, tap_mv in taps:
+            told = told.after_tap(isi_ms, tap_mv)
+        for isi_ms in (20.0, 25.0, 35.0, 40.0):
+            told = told.after(Outcome(isi_ms, mep_mv))
+        assert told.tap_may_explain(Window(15.0, 45.0)) is explained
+
+
 @pytest.mark.parametrize("wrong", [(None, 0.1), (20.0, None), (20.0, -0.1), (math.nan, 0.1)])
 def test_a_tap_alone_needs_an_isi_and_an_amplitude(wrong: Any) -> None:
     one = strategy()

@@ -8,7 +8,7 @@ much is left is known from how far each course is from what the others say, neve
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final, NamedTuple
@@ -329,6 +329,43 @@ def hit_of(trial: Trial) -> float | None:
     if trial.t_hit_ms is None and trial.t_valve_ms is not None:
         return trial.t_valve_ms + HIT_DELAY_MS
     return trial.t_hit_ms
+
+
+NEAR_MS: Final = 10.0
+"""Taps alone speak for the ISIs around theirs, with weights of this SD [ms]."""
+
+LEAST_WEIGHT: Final = 0.1
+USUAL_SHARE, USUAL_COUNTS = 0.7, 2.0
+"""SD of the tap's response from trial to trial as a share of its mean: that is expected, and counts as so many taps."""
+
+
+class TapsAlone(NamedTuple):
+    """The tap's own part of amplitudes near an ISI, as taps alone say whose amplitude was taken there [mV]."""
+
+    mean_mv: float
+    sd_mv: float  # from trial to trial
+    taps: float  # so many say so, by their nearness
+
+    @property
+    def most_mv(self) -> float:
+        """More is hardly the tap's: its mean, which few taps tell badly, and three SDs."""
+        return self.mean_mv + 3.0 * self.sd_mv * math.sqrt(1.0 + 1.0 / self.taps)
+
+
+def taps_near(taps: Sequence[tuple[float, float]], isi_ms: float, least_mv: float) -> TapsAlone | None:
+    """The evidence of taps alone, ISIs [ms] and amplitudes [mV], near an ISI, above the least; None for too few."""
+    if not taps:
+        return None
+    isis_ms, sizes_mv = np.array(taps).T
+    weights = np.exp(-0.5 * ((isis_ms - isi_ms) / NEAR_MS) ** 2)
+    count = float(weights.sum())
+    if count < LEAST_WEIGHT:
+        return None
+    excess = sizes_mv - least_mv
+    mean = float(weights @ excess) / count
+    variance = float(weights @ (excess - mean) ** 2)
+    sd_mv = math.sqrt((variance + USUAL_COUNTS * (USUAL_SHARE * mean) ** 2) / (count + USUAL_COUNTS))
+    return TapsAlone(mean, sd_mv, count)
 
 
 def meets_response(isi_ms: float, reference: str, mep_window_ms: tuple[float, float] = MEP_WINDOW_MS) -> bool:

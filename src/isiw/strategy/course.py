@@ -25,7 +25,7 @@ from isiw.models.protocol import (
     ProposesIsi,
     ResponseModel,
 )
-from isiw.signals.tap import may_be_the_taps, meets_response
+from isiw.signals.tap import may_be_the_taps, meets_response, taps_near
 from isiw.strategy.choice import Choice, Cost, best_choices, evenly_spaced
 from isiw.strategy.stopping import Progress, StopDecision, StoppingRule, looks_back
 from isiw.trials import Trial
@@ -43,13 +43,6 @@ BY_CHANCE, LEAST_DIFFERENT = 1e-6, 3
 
 NEAR_A_STEP: Final = 1e-6
 """An amplitude is a multiple of a step if it is as near to one, in steps."""
-
-NEAR_MS: Final = 10.0
-"""Taps alone speak for the ISIs around theirs, with weights of this SD [ms]."""
-
-LEAST_WEIGHT: Final = 0.1
-USUAL_SHARE, USUAL_COUNTS = 0.7, 2.0
-"""SD of the tap's response from trial to trial as a share of its mean: that is expected, and counts as so many taps."""
 
 
 class Details(TypedDict, total=False):
@@ -70,6 +63,10 @@ def details_of(trial: Trial) -> Details:
         "mep_interval_mv": trial.mep_interval_mv,
         "tap_mv": trial.tap_mv,
     }
+
+
+SEEN_MV: Final = 0.01
+"""An amplitude so much above the smallest shows something [mV]."""
 
 
 @dataclass(frozen=True)
@@ -162,24 +159,30 @@ class Outcomes:
         """Mean and SD of the tap's own part of an amplitude [mV]; None if it is unknown."""
         if outcome.isi_ms is None or outcome.tap_mv is not None:
             return outcome.tap_mv or 0.0, 0.0
-        if not self.taps:
-            return None
-        isis_ms, sizes_mv = np.array(self.taps).T
-        weights = np.exp(-0.5 * ((isis_ms - outcome.isi_ms) / NEAR_MS) ** 2)
-        count = float(weights.sum())
-        if count < LEAST_WEIGHT:
-            return None
-        excess = sizes_mv - min(sizes_mv.min(), *(one.mep_mv for one in self.pulses if one.mep_mv), math.inf)
-        mean = float(weights @ excess) / count
-        variance = float(weights @ (excess - mean) ** 2)
-        return mean, math.sqrt((variance + USUAL_COUNTS * (USUAL_SHARE * mean) ** 2) / (count + USUAL_COUNTS))
+        alone = taps_near(self.taps, outcome.isi_ms, self._least_mv)
+        return None if alone is None else (alone.mean_mv, alone.sd_mv)
+
+    @cached_property
+    def _least_mv(self) -> float:
+        """The smallest amplitude of all, also of taps alone [mV]."""
+        sizes_mv = [mep_mv for _, mep_mv in self.taps] + [one.mep_mv for one in self.pulses if one.mep_mv]
+        return min(sizes_mv, default=0.0)
+
+    def _may_be_the_taps(self, one: Outcome) -> bool:
+        """True if the tap may be all that an amplitude shows: it is not known what it evokes, or it evokes as much."""
+        if one.isi_ms is None or one.tap_mv is not None:
+            return False
+        alone = taps_near(self.taps, one.isi_ms, self._least_mv)
+        if alone is None or one.mep_mv is None:
+            return alone is None
+        return SEEN_MV < one.mep_mv - self._least_mv <= alone.most_mv
 
     def tap_may_explain(self, window: Window | None) -> bool:
-        """True if the tap's own response could be what is larger within a window, since nobody knows it there."""
+        """True if the tap's own response could be what is larger within a window."""
         met = [one for one in self.pulses if one.isi_ms is not None and meets_response(one.isi_ms, self.reference)]
-        known = {one: self._tap_mv(one) is not None for one in met}
-        unknown_ms, known_ms = ([one.isi_ms or 0.0 for one in met if known[one] is yes] for yes in (False, True))
-        return may_be_the_taps(window, unknown_ms, known_ms)
+        sorts = [(one.isi_ms or 0.0, self._may_be_the_taps(one)) for one in met]
+        open_ms, known_ms = ([isi_ms for isi_ms, may_be in sorts if may_be is yes] for yes in (True, False))
+        return may_be_the_taps(window, open_ms, known_ms)
 
 
 def found_step_mv(amplitudes_mv: Sequence[float]) -> float:
