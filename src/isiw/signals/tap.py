@@ -331,11 +331,10 @@ def hit_of(trial: Trial) -> float | None:
     return trial.t_hit_ms
 
 
-NEAR_MS: Final = 10.0
+ALONE_NEAR_MS: Final = 10.0
 """Taps alone speak for the ISIs around theirs, with weights of this SD [ms]."""
 
-LEAST_WEIGHT: Final = 0.1
-USUAL_SHARE, USUAL_COUNTS = 0.7, 2.0
+ALONE_SHARE, ALONE_COUNTS = 0.7, 2.0
 """SD of the tap's response from trial to trial as a share of its mean: that is expected, and counts as so many taps."""
 
 
@@ -357,14 +356,14 @@ def taps_near(taps: Sequence[tuple[float, float]], isi_ms: float, least_mv: floa
     if not taps:
         return None
     isis_ms, sizes_mv = np.array(taps).T
-    weights = np.exp(-0.5 * ((isis_ms - isi_ms) / NEAR_MS) ** 2)
+    weights = np.exp(-0.5 * ((isis_ms - isi_ms) / ALONE_NEAR_MS) ** 2)
     count = float(weights.sum())
     if count < LEAST_WEIGHT:
         return None
     excess = sizes_mv - least_mv
     mean = float(weights @ excess) / count
     variance = float(weights @ (excess - mean) ** 2)
-    sd_mv = math.sqrt((variance + USUAL_COUNTS * (USUAL_SHARE * mean) ** 2) / (count + USUAL_COUNTS))
+    sd_mv = math.sqrt((variance + ALONE_COUNTS * (ALONE_SHARE * mean) ** 2) / (count + ALONE_COUNTS))
     return TapsAlone(mean, sd_mv, count)
 
 
