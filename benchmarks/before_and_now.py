@@ -150,7 +150,8 @@ def honesty(before: Path, now: Path) -> pd.DataFrame:
 
 def _write(table: pd.DataFrame, now: Path, out: Path, how: str) -> None:
     command = command_of("before_and_now")
-    seeds = ", ".join(f"{seed:,}" for seed in pd.read_parquet(next(now.glob("*.parquet")))["seed"].unique())
+    known = {seed for path in now.glob("*.parquet") for seed in pd.read_parquet(path)["seed"]}
+    seeds = ", ".join(f"{seed:,}" for seed in sorted(known))
     lines = [
         f"- command: `{command}`, after `run` with both versions; seed of the people {seeds}",
         f"- {made_with('torch')}",
