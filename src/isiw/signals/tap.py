@@ -353,8 +353,6 @@ class TapsAlone(NamedTuple):
 
 def taps_near(taps: Sequence[tuple[float, float]], isi_ms: float, least_mv: float) -> TapsAlone | None:
     """The evidence of taps alone, ISIs [ms] and amplitudes [mV], near an ISI, above the least; None for too few."""
-    if not taps:
-        return None
     isis_ms, sizes_mv = np.array(taps).T
     weights = np.exp(-0.5 * ((isis_ms - isi_ms) / ALONE_NEAR_MS) ** 2)
     count = float(weights.sum())

@@ -25,7 +25,7 @@ from isiw.models.protocol import (
     ProposesIsi,
     ResponseModel,
 )
-from isiw.signals.tap import may_be_the_taps, meets_response, taps_near
+from isiw.signals.tap import TapsAlone, may_be_the_taps, meets_response, taps_near
 from isiw.strategy.choice import Choice, Cost, best_choices, evenly_spaced
 from isiw.strategy.stopping import Progress, StopDecision, StoppingRule, looks_back
 from isiw.trials import Trial
@@ -159,8 +159,12 @@ class Outcomes:
         """Mean and SD of the tap's own part of an amplitude [mV]; None if it is unknown."""
         if outcome.isi_ms is None or outcome.tap_mv is not None:
             return outcome.tap_mv or 0.0, 0.0
-        alone = taps_near(self.taps, outcome.isi_ms, self._least_mv)
+        alone = self._alone_at(outcome.isi_ms)
         return None if alone is None else (alone.mean_mv, alone.sd_mv)
+
+    def _alone_at(self, isi_ms: float) -> TapsAlone | None:
+        """The evidence of taps alone near an ISI; None if there are too few."""
+        return taps_near(self.taps, isi_ms, self._least_mv) if self.taps else None
 
     @cached_property
     def _least_mv(self) -> float:
@@ -172,7 +176,7 @@ class Outcomes:
         """True if the tap may be all that an amplitude shows: it is not known what it evokes, or it evokes as much."""
         if one.isi_ms is None or one.tap_mv is not None:
             return False
-        alone = taps_near(self.taps, one.isi_ms, self._least_mv)
+        alone = self._alone_at(one.isi_ms)
         if alone is None or one.mep_mv is None:
             return alone is None
         return SEEN_MV < one.mep_mv - self._least_mv <= alone.most_mv

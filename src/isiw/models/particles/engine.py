@@ -46,14 +46,7 @@ class Engine(Protocol):
         """Move every particle some times under the posterior of a history."""
 
 
-class TabledTarget(Target, Protocol):
-    """A target that kernels know, too: its prior as tables, and its particles as plain arrays."""
-
-    def tables(self) -> Tables:
-        """What kernels know of the prior and of what moves may do."""
-
-
-def engine_for(name: EngineName, target: TabledTarget, device: str = "cpu") -> Engine:
+def engine_for(name: EngineName, target: Target, device: str = "cpu") -> Engine:
     """The engine that is wanted, where it can be had; else torch."""
     if name == "torch" or not AVAILABLE or device != "cpu":
         return TorchEngine(target)
@@ -89,7 +82,7 @@ class TorchEngine:
 class Compiled:
     """Compiled loops on one processor."""
 
-    target: TabledTarget
+    target: Target
 
     @cached_property
     def tables(self) -> Tables:

@@ -13,6 +13,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from isiw.lazy import torch
+from isiw.models.particles.kernels.target import Tables
 from isiw.models.particles.latents import Latents
 from isiw.models.particles.likelihood import total_log_likelihood
 from isiw.models.particles.mixture import drawn
@@ -51,6 +52,9 @@ class Target(Protocol):
 
     def person(self, latents: Latents) -> Person:
         """What particles mean."""
+
+    def tables(self) -> Tables:
+        """What kernels know of the prior and of what moves may do."""
 
     def log_prior(self, latents: Latents) -> Tensor:
         """Log prior density of their latents but for a constant, shape (b, p)."""

@@ -257,11 +257,8 @@ def _density(particle: Any, trials: Any, count: int, curve: Any, work: Any, like
         relative[i] = low[i] - floor
     _step(trials, count, particle[field.CHANGED], -particle[field.STEP_SCALE], relative)
     # All nodes in one pass, so that no sums go through memory; `_inside` has the same as a loop over `NODES`.
-    first = (
-        curve[0, :4],
-        curve[1, :4],
-        NODE_WEIGHTS[:4],
-    )  # arrays: Numba compiles a function for each number it is given
+    # The nodes are handed over as parts of arrays: Numba compiles a function anew for each number in a call.
+    first = curve[0, :4], curve[1, :4], NODE_WEIGHTS[:4]
     second = curve[0, 4:NODES], curve[1, 4:NODES], NODE_WEIGHTS[4:]
     if start > _NIL:
         for i in range(count):
