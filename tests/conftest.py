@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import signal
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import hypothesis
 import pytest
-import torch
 
-from isiw.design import DesignSpace
-from scripted import SPACE
+if TYPE_CHECKING:
+    from isiw.design import DesignSpace
 
-torch.set_num_threads(1)  # workers share the cores, and answers are the same again with one thread only
 hypothesis.settings.register_profile("isiw", deadline=None)  # how fast a machine is, is not what is tested
 hypothesis.settings.load_profile("isiw")
 
@@ -23,8 +22,18 @@ if hasattr(signal, "SIGQUIT") and signal.getsignal(signal.SIGQUIT) is signal.SIG
     signal.signal(signal.SIGQUIT, signal.SIG_DFL)
 
 
+@pytest.fixture(scope="session", autouse=True)
+def one_thread() -> None:
+    """Workers share the cores, and answers are the same again with one thread only."""
+    import torch  # noqa: PLC0415 - the process that starts the workers has no use for it, and they wait for that
+
+    torch.set_num_threads(1)
+
+
 @pytest.fixture
 def space() -> DesignSpace:
+    from scripted import SPACE  # noqa: PLC0415 - it imports torch
+
     return SPACE
 
 
