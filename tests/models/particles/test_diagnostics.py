@@ -13,8 +13,9 @@ from isiw.models.particles.swarm import Health, distinct_share, ess_share, troub
 from isiw.subjects.cohorts import cohort
 
 
-def health(*, ess: float = 0.5, shifts: float = 0.3, distinct: float = 0.9) -> Health:
-    return Health(*(torch.tensor([0.5, value]) for value in (ess, shifts, 0.2, distinct)))
+def trouble(*, ess: float = 0.5, shifts: float = 0.3, distinct: float = 0.9) -> str | None:
+    *health, shares = (torch.tensor([0.5, value]) for value in (ess, shifts, 0.2, distinct))
+    return trouble_of(Health(*health), shares)
 
 
 def test_the_effective_sample_size_counts_equal_weights() -> None:
@@ -27,8 +28,8 @@ def test_copies_of_a_particle_count_once() -> None:
 
 
 def test_sound_particles_are_no_trouble() -> None:
-    assert trouble_of(health()) is None
-    assert trouble_of(health(shifts=math.nan)) is None
+    assert trouble() is None
+    assert trouble(shifts=math.nan) is None
 
 
 @pytest.mark.parametrize(
@@ -36,7 +37,7 @@ def test_sound_particles_are_no_trouble() -> None:
     [({"ess": 0.001}, "contradicts"), ({"shifts": 0.001}, "hardly move"), ({"distinct": 0.1}, "too much alike")],
 )
 def test_each_trouble_of_any_person_is_said(bad: dict[str, float], said: str) -> None:
-    assert said in (trouble_of(health(**bad)) or "")
+    assert said in (trouble(**bad) or "")
 
 
 @pytest.mark.filterwarnings("ignore:The last 3 amplitudes are")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -37,7 +37,6 @@ class Health(NamedTuple):
     ess: Tensor  # effective sample size before resampling, as a share of the particles
     shifts: Tensor  # share of the shifts that were accepted; NaN where there were none
     jumps: Tensor  # likewise of the jumps to other kinds
-    distinct: Tensor  # share of the particles that differ from each other
 
 
 def ess_share(log_weights: Tensor) -> Tensor:
@@ -53,9 +52,9 @@ def distinct_share(log_likelihood: Tensor) -> Tensor:
     return torch.as_tensor(distinct / ordered.shape[-1], dtype=torch.float32)
 
 
-def trouble_of(health: Health) -> str | None:
+def trouble_of(health: Health, distinct_share: Tensor) -> str | None:
     """What is wrong with the particles of any of the people, in sentences; None where nothing is."""
-    ess, shifts, distinct = (float(x.nan_to_num(1.0).min()) for x in (health.ess, health.shifts, health.distinct))
+    ess, shifts, distinct = (float(x.nan_to_num(1.0).min()) for x in (health.ess, health.shifts, distinct_share))
     said = []
     if ess < LEAST_ESS:
         said.append(f"The trial contradicts the estimate before it: {ess:.1%} of the particles carry the posterior.")
@@ -114,10 +113,10 @@ class Swarm:
         """Number of trials of each person that it has learnt."""
         return self.history.isi_ms.shape[-1]
 
-    @property
+    @cached_property
     def trouble(self) -> str | None:
         """What is wrong with the particles; see `isiw.models.protocol.ReportsTrouble`."""
-        return None if self.health is None else trouble_of(self.health)
+        return None if self.health is None else trouble_of(self.health, distinct_share(self.log_likelihood))
 
     def times(self, log_ratio: Tensor) -> Swarm:
         """The same particles under another prior."""
@@ -139,10 +138,13 @@ class Swarm:
         """The particles after the moves that follow a trial, resampled where too few carried the posterior."""
         ess = ess_share(self.log_weights)
         worn = ess < moves.min_ess
-        fresh = self._resampled(worn, generator)
-        sweeps = moves.sweeps_after(self.trials, resampled=bool(worn.any()))
+        # Systematic picks are ordered; shuffled, both halves of the particles represent the posterior.
+        shuffled = torch.randperm(self.log_weights.shape[-1], generator=generator, device=generator.device)
+        resampled = bool(worn.any())
+        fresh = self._resampled(worn, shuffled) if resampled else self
+        sweeps = moves.sweeps_after(self.trials, resampled=resampled)
         moved = engine.sweeps(sweeps, fresh.latents, fresh.log_likelihood, self.history, generator)
-        health = Health(ess, moved.shifts, moved.jumps, distinct_share(moved.log_likelihood))
+        health = Health(ess, moved.shifts, moved.jumps)
         return replace(fresh, latents=moved.latents, log_likelihood=moved.log_likelihood, health=health)
 
     def of_person(self, person: int) -> Swarm:
@@ -152,30 +154,30 @@ class Swarm:
 
     def picked(self, size: int) -> Latents:
         """Equally weighted particles that represent the same posterior, fields of shape (b, s)."""
-        return self.latents.each(partial(taken, rows=self._first_rows + systematic(self.log_weights, size)))
+        return self.latents.each(partial(taken, rows=self._rows(systematic(self.log_weights, size))))
 
-    @property
-    def _first_rows(self) -> Tensor:
-        """Each person's first particle if those of all people follow each other, shape (b, 1)."""
+    def _rows(self, picks: Tensor) -> Tensor:
+        """Picks of each person's particles if those of all people follow each other, shape (b, s)."""
         people, particles = self.log_weights.shape
-        return particles * torch.arange(people, device=self.log_weights.device).unsqueeze(-1)
+        return picks + _first_rows(people, particles, picks.device)
 
-    def _resampled(self, worn: Tensor, generator: torch.Generator) -> Swarm:
-        """Resample those people whose effective sample size has fallen (b,); nobody else notices."""
-        size = self.log_weights.shape[-1]
-        # Systematic picks are ordered; shuffled, both halves of the particles represent the posterior.
-        shuffled = torch.randperm(size, generator=generator, device=generator.device)
-        if not bool(worn.any()):
-            return self
-        worn = worn.unsqueeze(-1)
+    def _resampled(self, worn: Tensor, shuffled: Tensor) -> Swarm:
+        """Resample, in this order, those people whose effective sample size has fallen (b,); nobody else notices."""
+        size, worn = len(shuffled), worn.unsqueeze(-1)
         kept = torch.arange(size, device=shuffled.device)
-        rows = self._first_rows + torch.where(worn, systematic(self.log_weights, size)[:, shuffled], kept)
+        rows = self._rows(torch.where(worn, systematic(self.log_weights, size)[:, shuffled], kept))
         return replace(
             self,
             latents=self.latents.each(partial(taken, rows=rows)),
             log_weights=torch.where(worn, -math.log(size), self.log_weights),
             log_likelihood=taken(self.log_likelihood, rows),
         )
+
+
+@cache
+def _first_rows(people: int, particles: int, device: torch.device) -> Tensor:
+    """Each person's first particle, shape (b, 1)."""
+    return particles * torch.arange(people, device=device).unsqueeze(-1)
 
 
 def taken(values: Tensor, rows: Tensor) -> Tensor:

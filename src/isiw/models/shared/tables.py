@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cache
 from typing import Final
 
 import numpy as np
@@ -62,7 +63,12 @@ def step_generator(device: str, seed: int, step: int) -> torch.Generator:
 
 def systematic(log_weights: Tensor, size: int) -> Tensor:
     """Evenly spaced picks of weighted particles, in order."""
-    cumulative = log_weights.double().softmax(-1).cumsum(-1)
-    points = (torch.arange(size, device=log_weights.device, dtype=torch.double) + 0.5) / size
-    picks = torch.searchsorted(cumulative, points.expand(len(cumulative), -1).contiguous())
-    return picks.clamp_max(log_weights.shape[-1] - 1)
+    cumulative = log_weights.softmax(-1, dtype=torch.double).cumsum(-1)
+    points = _evenly_spaced(size, log_weights.device).expand(len(cumulative), -1).contiguous()
+    return torch.searchsorted(cumulative, points).clamp_max_(log_weights.shape[-1] - 1)
+
+
+@cache
+def _evenly_spaced(size: int, device: torch.device) -> Tensor:
+    """So many points between 0 and 1, shape (size,)."""
+    return (torch.arange(size, device=device, dtype=torch.double) + 0.5) / size
