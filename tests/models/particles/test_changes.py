@@ -52,7 +52,7 @@ def test_both_engines_know_the_same_change(kind: ChangeKind) -> None:
 def test_after_a_change_people_are_the_same_to_both_engines(kind: ChangeKind) -> None:
     latents, _ = people(kind)
     ours, theirs = (engine_for(name, TARGET).meaning(latents, 12) for name in ("compiled", "torch"))
-    samples = [PersonSample(person, VALVE_SPACE, 12, records) for person, records in (ours, theirs)]
+    samples = [PersonSample(particles, VALVE_SPACE, 12) for particles in (ours, theirs)]
     isi_ms = torch.tensor([0.0, 180.0, 233.0, 260.0, 300.0])
     masks = [sample.window_masks(isi_ms) for sample in samples]
     torch.testing.assert_close(*(sample.expected_mep_mv(isi_ms) for sample in samples), atol=1e-6, rtol=2e-4)

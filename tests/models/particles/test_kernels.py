@@ -131,9 +131,8 @@ def test_moves_of_both_engines_are_accepted_as_often_and_lead_to_the_same_poster
 def test_a_sample_predicts_what_it_predicts_in_torch(space: DesignSpace) -> None:
     target = WindowTarget(Prior(), space)
     latents = target.prior.sample(2, 300, generator(6), space)
-    engine = engine_for("compiled", target)
-    person, records = engine.meaning(latents, 1)
-    ours, theirs = PersonSample(person, space, 1, records), PersonSample(target.person(latents).after(1), space, 1)
+    meant = engine_for("compiled", target).meaning(latents, 1), target.person(latents).after(1)
+    ours, theirs = (PersonSample(particles, space, 1) for particles in meant)
     grid_ms, few_ms = torch.tensor(space.grid_ms, dtype=torch.float32), torch.tensor([0.0, 180.0, 233.0, 260.0, 300.0])
     torch.testing.assert_close(ours.window_masks(grid_ms), theirs.window_masks(grid_ms))
     torch.testing.assert_close(ours.outcome_mass(few_ms), theirs.outcome_mass(few_ms), atol=2e-5, rtol=0.0)
@@ -147,8 +146,8 @@ def test_a_sample_predicts_what_it_predicts_in_torch(space: DesignSpace) -> None
 def test_a_sample_with_a_depression_predicts_what_it_predicts_in_torch() -> None:
     target = TARGETS["supra"]
     latents = SupraPrior().sample(1, 300, generator(6), target.space)
-    person, records = engine_for("compiled", target).meaning(latents, 3)
-    ours, theirs = (SupraSample(p, target.space, 3, r) for p, r in ((person, records), (target.person(latents), None)))
+    meant = engine_for("compiled", target).meaning(latents, 3), target.person(latents)
+    ours, theirs = (SupraSample(particles, target.space, 3) for particles in meant)
     isi_ms = torch.arange(0.0, 201.0, 4.0)
     torch.testing.assert_close(ours.outcome_mass(isi_ms), theirs.outcome_mass(isi_ms), atol=0.02, rtol=0.0)
     torch.testing.assert_close(ours.expected_mep_mv(isi_ms), theirs.expected_mep_mv(isi_ms), atol=1e-4, rtol=0.02)

@@ -15,7 +15,7 @@ from isiw.compiled import AVAILABLE, first_of
 from isiw.lazy import torch
 from isiw.models.particles.kernels.likelihood import ROOM, likelihoods
 from isiw.models.particles.kernels.moves import SCRATCH, UNKNOWN, log_usual, records, sweeps
-from isiw.models.particles.kernels.records import columns_of, person_of, trial_records
+from isiw.models.particles.kernels.records import columns_of, trial_records
 from isiw.models.particles.kernels.target import KINDS, Tables
 from isiw.models.particles.latents import Latents
 from isiw.models.particles.likelihood import total_log_likelihood
@@ -31,8 +31,8 @@ EngineName: TypeAlias = Literal["compiled", "torch"]
 class Engine(Protocol):
     """What particles are weighed and moved by."""
 
-    def meaning(self, latents: Latents, trials: int) -> tuple[Person, FloatArray | None]:
-        """What particles mean after so many trials, and the same as kernels have it; None where torch computes."""
+    def meaning(self, latents: Latents, trials: int) -> Person | FloatArray:
+        """What particles mean after so many trials, as torch or as kernels have it."""
 
     def log_likelihood(self, latents: Latents, history: History) -> Tensor:
         """Log likelihood of a history under each particle, shape (b, p)."""
@@ -59,9 +59,9 @@ class TorchEngine:
 
     target: Target
 
-    def meaning(self, latents: Latents, trials: int) -> tuple[Person, None]:
+    def meaning(self, latents: Latents, trials: int) -> Person:
         """What particles mean; see `Engine`."""
-        return self.target.person(latents).after(trials), None
+        return self.target.person(latents).after(trials)
 
     def log_likelihood(self, latents: Latents, history: History) -> Tensor:
         """Log likelihood of a history under each particle; see `Engine`."""
@@ -89,11 +89,11 @@ class Compiled:
         """What the kernels know of the target."""
         return self.target.tables()
 
-    def meaning(self, latents: Latents, trials: int) -> tuple[Person, FloatArray]:
-        """What particles mean; see `Engine`."""
+    def meaning(self, latents: Latents, trials: int) -> FloatArray:
+        """Records of particles; see `Engine`."""
         with first_of("view of particles"):
-            particles = records(self.tables, *self._arrays(latents), trials)
-        return person_of(particles), particles
+            particles: FloatArray = records(self.tables, *self._arrays(latents), trials)
+        return particles
 
     def log_likelihood(self, latents: Latents, history: History) -> Tensor:
         """Log likelihood of a history under each particle; see `Engine`."""

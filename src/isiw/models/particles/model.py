@@ -151,8 +151,7 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
         return self._sample(self.swarm.picked(self.model.thinned))
 
     def _sample(self, latents: Latents) -> PersonSample:
-        person, records = self.engine.meaning(latents, self.trials)
-        return PersonSample(person, self.space, self.trials, records)
+        return PersonSample(self.engine.meaning(latents, self.trials), self.space, self.trials)
 
     def prediction_mv(self, level: float, person: int = 0) -> tuple[FloatArray, FloatArray]:
         """Between which amplitudes the next MEP lies; see `PredictsMeps`."""

@@ -10,7 +10,6 @@ from typing import Generic, Protocol, Self, TypeVar
 from isiw.design import DesignSpace
 from isiw.lazy import torch
 from isiw.models.particles.engine import Engine
-from isiw.models.particles.prior import Person
 from isiw.models.particles.swarm import Swarm
 from isiw.models.protocol import Observation, Tensor
 from isiw.models.shared.history import observed
@@ -46,11 +45,6 @@ class SwarmPosterior(ABC, Generic[M]):
     seed: int
     swarm: Swarm
     engine: Engine
-
-    @property
-    def person(self) -> Person:
-        """What the particles mean."""
-        return self.engine.meaning(self.swarm.latents, self.trials)[0]
 
     @cached_property
     @abstractmethod

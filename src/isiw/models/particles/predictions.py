@@ -23,13 +23,8 @@ class PersonSample(TabledSample):
     """What equally weighted particles say about the next MEP and about the window."""
 
     @property
-    def _evoked(self) -> Tensor:
-        """Expected MEP above the floor at the tables' levels, in floors, shape (b, s, l)."""
-        return self._tables.evoked
-
-    @property
     def _grid_ms(self) -> Tensor:
-        return grid_of(self.space, self.person.present.device)
+        return grid_of(self.space, self._evoked.device)
 
     @cached_property
     def _highest(self) -> Tensor:

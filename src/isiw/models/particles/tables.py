@@ -11,6 +11,7 @@ from isiw.compiled import first_of
 from isiw.design import DesignSpace
 from isiw.lazy import torch
 from isiw.models.particles.kernels import predictions as compiled
+from isiw.models.particles.kernels.records import person_of
 from isiw.models.particles.likelihood import in_pieces, levels
 from isiw.models.particles.noise import NODES, Response, evoked_mean, log_gain, outcome_density
 from isiw.models.particles.prior import Person
@@ -23,22 +24,27 @@ from isiw.types import FloatArray
 class TabledSample:
     """What equally weighted particles say about the next MEP."""
 
-    person: Person  # fields of shape (b, s)
+    particles: Person | FloatArray  # what they mean, fields of shape (b, s), or their records as kernels have them
     space: DesignSpace  # in whose range windows are looked for
     order: int = 0  # how many trials came before the next one
-    records: FloatArray | None = None  # the particles as kernels have them; None where torch computes
 
     @cached_property
-    def _tables(self) -> FacilitationTables:
-        return FacilitationTables(self.person, self.records)
+    def person(self) -> Person:
+        """What they mean."""
+        return person_of(self.particles) if isinstance(self.particles, np.ndarray) else self.particles
+
+    @property
+    def records(self) -> FloatArray | None:
+        """The particles as kernels have them; None where torch computes."""
+        return self.particles if isinstance(self.particles, np.ndarray) else None
 
     def expected_mep_mv(self, isi_ms: Tensor) -> Tensor:
         """Expected MEP [mV], shape (b, s, t)."""
-        return self._mean_mv(self._tables.levels(isi_ms))
+        return self._mean_mv(self._levels(isi_ms))
 
     def _mean_mv(self, level: Tensor) -> Tensor:
         """Expected MEP [mV] by facilitation (b, s, t), of the same shape."""
-        return self._with_floor_mv(self._tables.at(self._tables.evoked.unsqueeze(-1), level).squeeze(-1))
+        return self._with_floor_mv(self._at(self._evoked.unsqueeze(-1), level).squeeze(-1))
 
     def _with_floor_mv(self, evoked: Tensor) -> Tensor:
         """From an expected MEP above the floor, in floors, to mV, shape (b, s, ...)."""
@@ -46,22 +52,9 @@ class TabledSample:
         rest = torch.exp(0.5 * response.floor_log_sd.square()).unsqueeze(-1)
         return response.log_floor.exp().unsqueeze(-1) * (evoked + rest)
 
-    @cached_property
-    def _outcome_table(self) -> Tensor:
-        """Probability of each outcome of the next trial at the tables' levels, shape (b, s, l, y)."""
-        return self._tables.outcomes(self.order)
-
     def outcome_mass(self, isi_ms: Tensor) -> Tensor:
         """Predictive distribution of the next MEP under each particle, shape (b, s, t, y)."""
-        return self._tables.at(self._outcome_table, self._tables.levels(isi_ms))
-
-
-@dataclass(frozen=True, eq=False)
-class FacilitationTables:
-    """What equally weighted particles respond with, by facilitation."""
-
-    person: Person  # fields of shape (b, s)
-    records: FloatArray | None = None  # the particles as kernels have them; None where torch computes
+        return self._at(self._outcome_table, self._levels(isi_ms))
 
     @cached_property
     def _depth(self) -> Tensor | None:
@@ -70,7 +63,7 @@ class FacilitationTables:
         return None if low is None else low.depth.unsqueeze(-1)
 
     @cached_property
-    def rows(self) -> Tensor:
+    def _rows(self) -> Tensor:
         """Facilitations of the rows, from the deepest depression to the largest enhancement, shape (b, 1 or s, l)."""
         if self.records is not None:
             return torch.from_numpy(compiled.table_rows(self.records, LEVELS))
@@ -80,13 +73,13 @@ class FacilitationTables:
         return torch.linspace(0.0, 1.0, LEVELS, dtype=torch.float32, device=device) * (1.0 + self._depth) - self._depth
 
     @cached_property
-    def evoked(self) -> Tensor:
+    def _evoked(self) -> Tensor:
         """Expected MEP above the floor in each row, in floors, shape (b, s, l)."""
         if self.records is not None:
-            return torch.from_numpy(compiled.evoked_means(self.records, self.rows.numpy()))
-        return evoked_mean(self.person.response, self.rows)
+            return torch.from_numpy(compiled.evoked_means(self.records, self._rows.numpy()))
+        return evoked_mean(self.person.response, self._rows)
 
-    def at(self, table: Tensor, level: Tensor) -> Tensor:
+    def _at(self, table: Tensor, level: Tensor) -> Tensor:
         """What lies between the rows of a table."""
         if self.records is not None:
             found = np.empty((*level.shape, table.shape[-1]), dtype=np.float32)
@@ -97,27 +90,28 @@ class FacilitationTables:
         # `interpolated` has its rows at the squares of equal steps.
         return interpolated(table, ((level + self._depth) / (1.0 + self._depth)).clamp(0.0, 1.0).square())
 
-    def levels(self, isi_ms: Tensor) -> Tensor:
+    def _levels(self, isi_ms: Tensor) -> Tensor:
         """Facilitation of each particle at some ISIs [ms] (t,), shape (b, s, t)."""
         if self.records is not None:
             return torch.from_numpy(compiled.facilitation_rows(self.records, isi_ms.contiguous().numpy()))
         return levels(self.person, isi_ms.unsqueeze(0))
 
-    def outcomes(self, order: int) -> Tensor:
+    @cached_property
+    def _outcome_table(self) -> Tensor:
         """Probability of each outcome of the next trial in each row, shape (b, s, l, y)."""
         response = self.person.response
-        low, high = log_ends(response, self.evoked)
+        low, high = log_ends(response, self._evoked)
         middle, width = _cells(low.device)
         log_mep = low.unsqueeze(-1) + middle * (high - low).unsqueeze(-1)
         if self.records is not None:
             with first_of("predictions"):
-                rows, cells = self.rows.numpy(), (log_mep.numpy(), width.numpy())
+                rows, cells = self._rows.numpy(), (log_mep.numpy(), width.numpy())
                 table = np.empty((*rows.shape, OUTCOMES), dtype=np.float32)
-                compiled.outcome_tables(self.records, rows, order, *cells, table)
+                compiled.outcome_tables(self.records, rows, self.order, *cells, table)
             return torch.from_numpy(table)
-        gain = log_gain(response, torch.full_like(response.drift, order).unsqueeze(-1)).squeeze(-1)
+        gain = log_gain(response, torch.full_like(response.drift, self.order).unsqueeze(-1)).squeeze(-1)
         response = response._replace(log_ratio=response.log_ratio + gain)
-        others = (self.rows, log_mep.unsqueeze(-2))
+        others = (self._rows, log_mep.unsqueeze(-2))
         mass = in_pieces(outcome_density, response, others, LEVELS * OUTCOMES * NODES) * width
         return mass / mass.sum(-1, keepdim=True)
 

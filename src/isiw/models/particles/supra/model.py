@@ -73,8 +73,7 @@ class SupraPosterior(SwarmPosterior[SupraModel]):
         return self._sample(self.model.particles, 0)
 
     def _sample(self, size: int, order: int) -> SupraSample:
-        person, records = self.engine.meaning(self.swarm.picked(size), self.trials)
-        return SupraSample(person, self.space, order, records)
+        return SupraSample(self.engine.meaning(self.swarm.picked(size), self.trials), self.space, order)
 
     def depressed_masks(self, isi_ms: Tensor) -> Tensor:
         """Sampled depressed segments; see `SamplesDepression`."""
