@@ -259,8 +259,8 @@ def _central(edges_ms: FloatArray, level: float) -> FloatArray:
     """Lower and upper quantile of start and end, shape (2, 2)."""
     tail = (1.0 - level) / 2.0
     # An order statistic never averages a finite edge with an infinite one; of two as near, that of an even index.
-    picks = np.rint((len(edges_ms) - 1) * np.array([tail, 1.0 - tail])).astype(int)
-    central_ms: FloatArray = np.sort(edges_ms, axis=0)[picks]
+    picks = [round((len(edges_ms) - 1) * share) for share in (tail, 1.0 - tail)]
+    central_ms: FloatArray = np.partition(edges_ms, picks, axis=0)[picks]
     return central_ms
 
 

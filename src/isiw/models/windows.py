@@ -108,7 +108,7 @@ def best_window(windows: Runs, grid_ms: FloatArray) -> tuple[Window | None, floa
     below = np.zeros((windows.points + 1, candidates.shape[1]), dtype=np.float32)
     np.cumsum(candidates, axis=0, out=below[1:])
     overlap = windows.summed(below.take(windows.behind, axis=0) - below.take(windows.first, axis=0))
-    expected_f1 = 2.0 * (overlap / (below[-1] + windows.sizes[:, None])).mean(0, dtype=float)
+    expected_f1 = 2.0 * (overlap / (below[-1] + windows.sizes[:, None])).mean(0)
     best = int(expected_f1.argmax())
     return Window.from_mask(grid_ms, candidates[:, best]), float(expected_f1[best])
 
@@ -164,7 +164,8 @@ def sampled_estimate(
     probability = len(windows.found) / windows.samples
     first, last = windows.hulls
     edges = edge_samples(windows, space)
-    start, end = np.sort(edges, axis=0)[(len(edges) - 1) // 2].tolist() if len(edges) else (None, None)
+    middle = (len(edges) - 1) // 2
+    start, end = np.partition(edges, middle, axis=0)[middle].tolist() if len(edges) else (None, None)
     reported, f1 = best_window(windows, space.grid_ms) if probability >= 0.5 else (None, 1.0)
     profiles = cache(profiles)
     return WindowEstimate(

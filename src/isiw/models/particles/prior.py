@@ -270,21 +270,19 @@ class Prior(Checked):
         return (*_WITHOUT_MUSCLE.values(), *names)
 
     @cached_property
-    def _muscle_numbers(self) -> Tensor:
-        """Which muscle each of the possible curves is of, shape (k,)."""
+    def _hypothesis_numbers(self) -> Tensor:
+        """Which of `hypotheses` a particle is of by its kind of noise and its possible curve, shape (kinds, k)."""
         names = [muscle.name for muscle, *_ in self._possible_curves]
-        return torch.tensor([list(dict.fromkeys(names)).index(name) for name in names])
+        curves = [len(_WITHOUT_MUSCLE) + list(dict.fromkeys(names)).index(name) for name in names]
+        others = {noise: [number] * len(curves) for number, noise in enumerate(_WITHOUT_MUSCLE)}
+        return torch.tensor([others.get(noise, curves) for noise in NoiseKind])
 
     def hypothesis(self, latents: Latents) -> Tensor:
         """Which of `hypotheses` each particle belongs to, shape (b, p)."""
         first = LATENTS.index(BLOCKS["recruitment"][0])
         recruitment = latents.values[..., first : first + len(BLOCKS["recruitment"])]
-        muscles = self._muscle_numbers.to(recruitment.device)
-        kind = len(_WITHOUT_MUSCLE) + muscles[self.mixtures["recruitment"].component(recruitment)]
-        named = [*_WITHOUT_MUSCLE].index
-        numbers = [named(noise) if noise in _WITHOUT_MUSCLE else -1 for noise in NoiseKind]
-        number = torch.tensor(numbers, device=kind.device)[latents.noise]
-        return torch.where(number < 0, kind, number)
+        curve = self.mixtures["recruitment"].component(recruitment)
+        return self._hypothesis_numbers.to(curve.device)[latents.noise, curve]
 
     def unusual(self, latents: Latents, space: DesignSpace) -> dict[str, float]:
         """How probable it is that parts of a person are of another law than the usual one, by what they are called."""
