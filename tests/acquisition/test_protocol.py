@@ -1,4 +1,4 @@
-"""From scores to the next ISI: costs and ties."""
+"""From scores to the next ISI: ties, and scores that are none."""
 
 from __future__ import annotations
 
@@ -26,7 +26,3 @@ def test_a_tie_goes_to_the_first_from_where_it_is_told_to_begin(ties: int) -> No
 @pytest.mark.parametrize("first", [0, 2])
 def test_a_score_that_is_not_finite_loses(bad: float, first: int) -> None:
     assert best_candidate(torch.tensor([[bad, -1e30, bad, -5.0]]), first=first).tolist() == [3]
-
-
-def test_a_cost_is_taken_off() -> None:
-    assert best_candidate(torch.tensor([[1.0, 2.0, 3.0]]), torch.tensor([0.0, 0.5, 2.5])).tolist() == [1]

@@ -89,11 +89,12 @@ def require_scores(acquisition: AcquisitionFunction, scores: object, candidates:
     return scores
 
 
-def best_candidate(scores: Tensor, cost: Tensor | None = None, first: int = 0) -> Tensor:
+def best_candidate(scores: Tensor, first: int = 0) -> Tensor:
     """Index of the best candidate for each person, shape (b,); a score that is not finite loses."""
-    net = (scores if cost is None else scores - cost).detach().cpu().numpy()
-    ranked = np.roll(np.where(np.isfinite(net), net, -np.inf), -first, axis=-1)
-    return torch.from_numpy((ranked.argmax(-1) + first) % net.shape[-1])
+    given = scores.detach().cpu().numpy()
+    ranked = np.where(np.isfinite(given), given, -np.inf)
+    from_first = np.concatenate((ranked[..., first:], ranked[..., :first]), axis=-1)
+    return torch.from_numpy((from_first.argmax(-1) + first) % given.shape[-1])
 
 
 def own_plan(posterior: Posterior, acquisition: AcquisitionFunction) -> list[float]:

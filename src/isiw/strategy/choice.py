@@ -60,14 +60,16 @@ def best_choices(
     """The ISI of each person that the acquisition function scores best; an evenly spaced one if it scores none."""
     candidates = candidate_isis(space)
     given = require_scores(acquisition, acquisition(posterior, candidates), len(candidates), people)
-    scores = given.cpu().expand(people, -1)
-    costs = None if cost is None else cost(candidates)
-    best = best_candidate(scores, costs, first=golden_index(told, len(candidates)))
+    scores = given.detach().cpu().expand(people, -1)
+    net = scores if cost is None else scores - cost(candidates)
+    best = best_candidate(net, first=golden_index(told, len(candidates)))
     nothing = f"{type(acquisition).__name__} gives no ISI a finite score: an evenly spaced one instead."
-    scored, net = scores.isfinite().any(-1), scores if costs is None else scores - costs
+    chosen = zip(candidates[best].tolist(), net.gather(-1, best.unsqueeze(-1)).tolist(), net, strict=True)
     return tuple(
-        Choice(space.snap(isi_ms), scores=own) if found else Choice(space.snap(isi_ms), nothing, by="fallback")
-        for isi_ms, found, own in zip(candidates[best].tolist(), scored.tolist(), net, strict=True)
+        Choice(space.snap(isi_ms), scores=own)
+        if math.isfinite(highest)
+        else Choice(space.snap(isi_ms), nothing, by="fallback")
+        for isi_ms, (highest,), own in chosen
     )
 
 
