@@ -240,6 +240,10 @@ class Estimates:
             self.made[person] = estimate.noting(pairs=self.pairs, beforehand=before)
         return self.made[person]
 
+    def without_posterior(self) -> Estimates:
+        """The same where nobody asks for another estimate."""
+        return self if self.posterior is None else replace(self, posterior=None)
+
 
 @dataclass(frozen=True, eq=False)
 class Course:
@@ -281,7 +285,7 @@ class Course:
             posterior=self.method.model.update(self.posterior, observation),
             told=self.told + 1,
             alone=self.alone + alone,
-            earlier=tuple(replace(e, posterior=None) if len(e.made) == self.people else e for e in self.past),
+            earlier=tuple(e.without_posterior() if len(e.made) == self.people else e for e in self.past),
             paired=not alone,
         )
 

@@ -162,11 +162,11 @@ class Mover:
 def steps_of(history: History) -> FloatArray:
     """By how much the mean log MEP is larger from each trial on than before it, and 0 for all and none, (b, n + 1)."""
     log_mep, high = history.log_mep.cpu().numpy(), history.log_mep_high.cpu().numpy()
-    log_mep = np.nan_to_num(np.where(np.isfinite(log_mep), log_mep, high), nan=0.0, posinf=0.0, neginf=0.0)
+    log_mep = np.where(np.isfinite(log_mep), log_mep, np.where(np.isfinite(high), high, 0.0))
     people, trials = log_mep.shape
     before, count = np.zeros((people, trials + 1), dtype=np.float32), np.arange(trials + 1)
     before[:, 1:] = log_mep.cumsum(-1, dtype=float)
     later, earlier = (np.maximum(n, 1).astype(np.float32) for n in (trials - count, count))
     steps: FloatArray = (before[:, -1:] - before) / later - before / earlier
-    steps[:, [0, -1]] = 0.0
+    steps[:, 0] = steps[:, -1] = 0.0
     return steps
