@@ -86,6 +86,8 @@ def test_taps_alone_say_what_of_an_amplitude_is_theirs() -> None:
     near, far = (told.observation(Outcome(isi_ms, 0.3)).known_mv for isi_ms in (25.0, 75.0))
     assert known(near)[0, 0].item() == pytest.approx(0.29, abs=0.03)
     assert 0.05 < known(near)[0, 1].item() < 0.2
+    between = known(told.observation(Outcome(45.0, 0.3)).known_mv)
+    assert 0.1 < known(near)[0, 2].item() < 0.5 < between[0, 2].item()
     assert far is None or far[0, 0].item() < 0.01
     assert told.observation(Outcome(None, 0.3)).known_mv is None
     assert told.observation(Outcome(200.0, 0.3)).known_mv is None

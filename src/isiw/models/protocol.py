@@ -39,7 +39,8 @@ class Observation:
         response: 1 seen, 0 not seen, NaN if the amplitude is given instead, shape (b,).
         mep_high_mv: upper end of the interval that begins at `mep_mv` and holds the amplitude [mV], shape (b,); None
             if all amplitudes are points.
-        known_mv: mean and SD of a part of the amplitude that is not the pulse's [mV], shape (b, 2); None for none.
+        known_mv: mean and SD of a part of the amplitude that is not the pulse's [mV], and the SD of a factor that
+            trials of nearly the same ISI share [natural log], shape (b, 3), or (b, 2) without that; None for none.
     """
 
     isi_ms: Tensor
@@ -57,7 +58,7 @@ class Observation:
         isi_sd_ms: Values | None = None,
         response: Sequence[bool | None] | None = None,
         mep_high_mv: Values | None = None,
-        known_mv: Sequence[tuple[float, float]] | None = None,
+        known_mv: Sequence[tuple[float, ...]] | None = None,
     ) -> Observation:
         """One trial of each person.
 
@@ -67,13 +68,14 @@ class Observation:
             isi_sd_ms: SD of the realised ISI [ms], one a person; by default all were measured.
             response: whether a response was seen, one a person; by default amplitudes are.
             mep_high_mv: if amplitudes are intervals, their upper ends [mV], one a person.
-            known_mv: mean and SD of a part of the amplitude that is not the pulse's [mV], one a person.
+            known_mv: mean and SD of a part of the amplitude that is not the pulse's [mV], and the SD of the factor that
+                trials of nearly the same ISI share, one a person.
         """
         isi, mep = _column(isi_ms), _column(mep_mv)
         seen = torch.full_like(mep, torch.nan) if response is None else _column(response)
         sds = torch.zeros_like(isi) if isi_sd_ms is None else _column(isi_sd_ms)
         high = None if mep_high_mv is None else _column(mep_high_mv)
-        known = None if known_mv is None else torch.tensor(known_mv, dtype=torch.float32).reshape(-1, 2)
+        known = None if known_mv is None else torch.tensor(known_mv, dtype=torch.float32)
         return cls(isi, mep, sds, seen, high, known)
 
 

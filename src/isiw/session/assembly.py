@@ -34,7 +34,7 @@ from isiw.strategy.strategy import Strategy
 from isiw.trials import TrialTable
 from isiw.visit import Visit, VisitProtocol
 
-BELIEF_VERSION: Final = 4
+BELIEF_VERSION: Final = 5
 ENGINE_VERSION: Final = 1
 """Which belief a session learns by, and which engine computes it, for its header."""
 

@@ -350,6 +350,11 @@ class TapsAlone(NamedTuple):
         """More is hardly the tap's: its mean, which few taps tell badly, and three SDs."""
         return self.mean_mv + 3.0 * self.sd_mv * math.sqrt(1.0 + 1.0 / self.taps)
 
+    @property
+    def log_sd(self) -> float:
+        """SD of the mean as so few taps tell it, natural log."""
+        return math.sqrt(math.log1p((self.sd_mv / self.mean_mv) ** 2 / self.taps)) if self.mean_mv > 0 else 0.0
+
 
 def taps_near(taps: Sequence[tuple[float, float]], isi_ms: float, least_mv: float) -> TapsAlone | None:
     """The evidence of taps alone, ISIs [ms] and amplitudes [mV], near an ISI, above the least; None for too few."""

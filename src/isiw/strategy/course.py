@@ -144,7 +144,7 @@ class Outcomes:
             low_mv, high_mv = outcome.mep_interval_mv
         elif self.step_mv and outcome.mep_mv is not None:
             low_mv, high_mv = max(0.0, outcome.mep_mv - self.step_mv / 2), outcome.mep_mv + self.step_mv / 2
-        mean_mv, sd_mv = self._tap_mv(outcome) or (0.0, 0.0)
+        mean_mv, sd_mv, log_sd = self._tap_mv(outcome) or (0.0, 0.0, 0.0)
         sd_mv = math.hypot(sd_mv, outcome.mep_sd_mv)
         return Observation.of(
             [outcome.isi_ms],
@@ -152,15 +152,15 @@ class Outcomes:
             [outcome.isi_sd_ms],
             [outcome.response],
             None if math.isnan(high_mv) else [high_mv],
-            [(mean_mv, sd_mv)] if mean_mv or sd_mv else None,
+            [(mean_mv, sd_mv, log_sd)] if mean_mv or sd_mv else None,
         )
 
-    def _tap_mv(self, outcome: Outcome) -> tuple[float, float] | None:
-        """Mean and SD of the tap's own part of an amplitude [mV]; None if it is unknown."""
+    def _tap_mv(self, outcome: Outcome) -> tuple[float, float, float] | None:
+        """Mean and SD of the tap's own part of an amplitude [mV], and the SD of its log mean; None if it is unknown."""
         if outcome.isi_ms is None or outcome.tap_mv is not None:
-            return outcome.tap_mv or 0.0, 0.0
+            return outcome.tap_mv or 0.0, 0.0, 0.0
         alone = self._alone_at(outcome.isi_ms)
-        return None if alone is None else (alone.mean_mv, alone.sd_mv)
+        return None if alone is None else (alone.mean_mv, alone.sd_mv, alone.log_sd)
 
     def _alone_at(self, isi_ms: float) -> TapsAlone | None:
         """The evidence of taps alone near an ISI; None if there are too few."""

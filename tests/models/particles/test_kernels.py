@@ -1,5 +1,5 @@
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from operator import itemgetter
@@ -258,16 +258,42 @@ def test_half_an_enhancement_is_half_a_boost(kind: NoiseKind) -> None:
     np.testing.assert_allclose(got, log_likelihood(weaker, told), atol=1e-3)
 
 
+@pytest.mark.parametrize("known_log_sd", [0.0, 0.8])
 @pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
-def test_both_engines_know_the_same_circumstances(kind: NoiseKind) -> None:
+def test_both_engines_know_the_same_circumstances(kind: NoiseKind, known_log_sd: float) -> None:
     person, told = of_kind(kind)
     draws = generator(11)
     spread = torch.randn((*told.isi_ms.shape, 5), generator=draws)
-    known_mv = torch.stack((0.05 * spread[..., 0].abs(), 0.01 * spread[..., 1].abs()), dim=-1)
+    log_sd = known_log_sd * torch.rand(spread[..., 0].shape, generator=draws)
+    known_mv = torch.stack((0.05 * spread[..., 0].abs(), 0.01 * spread[..., 1].abs(), log_sd), dim=-1)
     around = torch.cat((known_mv, spread[..., 2:3], 5.0 * spread[..., 3:4], torch.rand(spread[..., :1].shape)), dim=-1)
     told = replace(told, circumstances=around)
     expected = total_log_likelihood(in_double(person), told.to("cpu", torch.double))
     np.testing.assert_allclose(log_likelihood(person, told), expected, atol=1e-3)
+
+
+def test_a_mistaken_known_part_is_paid_for_once_and_not_in_each_trial() -> None:
+    # MEPs of TMS alone that are exp(2) times the known part, at one ISI or at ISIs far from each other.
+    person, _ = of_kind(NoiseKind.MISSING)
+    nobody = person._replace(present=torch.zeros_like(person.present))
+
+    def lost(isi_ms: Sequence[float]) -> tuple[float, float]:
+        column = torch.tensor([isi_ms] * len(person.present))
+        log_mep, order = torch.full_like(column, math.log(0.25)), torch.arange(len(isi_ms)).expand_as(column).float()
+        told = History(column, torch.zeros_like(column), log_mep, log_mep, order)
+        right, wrong, open_to = (
+            np.median(
+                log_likelihood(nobody, with_circumstances(told, known_mv=mv, known_sd_mv=0.2 * mv, known_log_sd=sd))
+            )
+            for mv, sd in ((0.25, 0.0), (0.25 * math.exp(-2.0), 0.0), (0.25 * math.exp(-2.0), 1.0))
+        )
+        return float(right - wrong), float(right - open_to)
+
+    closed, at_one_isi = lost([100.0] * 8)
+    _, at_eight = lost([100.0 + 20.0 * number for number in range(8)])
+    assert 2.0 < at_one_isi < 4.0
+    assert at_eight == pytest.approx(8 * at_one_isi, rel=0.1)
+    assert closed > 1.2 * at_eight
 
 
 def test_a_conditioning_stimulus_without_any_enhancement_is_tms_alone() -> None:

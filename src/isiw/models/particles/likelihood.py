@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import partial
 
@@ -11,7 +12,7 @@ from isiw.models.particles.prior import Person
 from isiw.models.particles.shapes import facilitation
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
-from isiw.models.shared.tables import averaged_over_isi
+from isiw.models.shared.tables import FACTOR_NODES, FIRST_GROUP_MS, GROUPS, ISI_GROUP_MS, averaged_over_isi
 
 CHUNK_ELEMENTS = 1 << 20
 """On a CPU the likelihood is worked through in pieces of this many nodes: few calls, and bounded memory."""
@@ -28,14 +29,27 @@ def levels(person: Person, isi_ms: Tensor) -> Tensor:
 
 def total_log_likelihood(person: Person, history: History) -> Tensor:
     """Log likelihood of a history under each particle, shape (b, p)."""
-    return averaged_over_isi(partial(_by_trial, person, history), history.isi_ms, history.isi_sd_ms).sum(-1)
+    if not history.shares_factor:
+        return _at_factor(person, history, 0.0).sum(-1)
+    place = (history.isi_ms.nan_to_num(0.0) - FIRST_GROUP_MS) / ISI_GROUP_MS
+    of_group = torch.nn.functional.one_hot(place.long().clamp(0, GROUPS - 1), GROUPS).to(history.isi_ms)
+    nodes = [_at_factor(person, history, at) @ of_group + math.log(share) for at, share in FACTOR_NODES]
+    return torch.logsumexp(torch.stack(nodes), dim=0).sum(-1)
 
 
-def _by_trial(person: Person, history: History, isi_ms: Tensor) -> Tensor:
+def _at_factor(person: Person, history: History, factor_at: float) -> Tensor:
+    """Log likelihood of each trial at a node of the factor of known parts, shape (b, p, n)."""
+    return averaged_over_isi(partial(_by_trial, person, history, factor_at), history.isi_ms, history.isi_sd_ms)
+
+
+def _by_trial(person: Person, history: History, factor_at: float, isi_ms: Tensor) -> Tensor:
     """Log likelihood of each trial at some ISIs, shape (b, p, n)."""
     ends = (history.log_mep.unsqueeze(-2), history.log_mep_high.unsqueeze(-2))
     level, gain = levels(person, isi_ms), log_gain(person.response, history.order.unsqueeze(-2))
-    known_mv, sd_mv, offset, shift_pct_rmt, enhancement = history.around.unsqueeze(-3).unbind(-1)
+    known_mv, sd_mv, log_sd, offset, shift_pct_rmt, enhancement = history.around.unsqueeze(-3).unbind(-1)
+    if factor_at:
+        factor = torch.exp(factor_at * log_sd)
+        known_mv, sd_mv = known_mv * factor, sd_mv * factor
     if person.change is not None:
         changed = person.change.at(history.order.unsqueeze(-2))
         offset, shift_pct_rmt = offset + changed.log_gain, shift_pct_rmt + changed.shift_pct_rmt

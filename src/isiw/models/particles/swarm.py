@@ -124,14 +124,18 @@ class Swarm:
 
     def told(self, trial: History, engine: Engine) -> Swarm:
         """The same particles, weighted by one more trial as well."""
-        gain = engine.log_likelihood(self.latents, trial)
+        history = self.history.appended(trial)
+        if history.shares_factor:
+            gain = engine.log_likelihood(self.latents, history) - self.log_likelihood
+        else:
+            gain = engine.log_likelihood(self.latents, trial)
         log_weights = self.log_weights + gain
         return replace(
             self,
             log_weights=torch.log_softmax(log_weights, dim=-1),
             log_likelihood=self.log_likelihood + gain,
             evidence=self.evidence + torch.logsumexp(log_weights, dim=-1),
-            history=self.history.appended(trial),
+            history=history,
         )
 
     def moved(self, engine: Engine, moves: Moving, generator: torch.Generator) -> Swarm:

@@ -22,7 +22,8 @@ class Circumstances(NamedTuple):
     """Known influences on the amplitude of a trial besides its ISI; neutral by default."""
 
     known_mv: float = 0.0  # a part of the amplitude that is not the pulse's, such as the tap's own response
-    known_sd_mv: float = 0.0
+    known_sd_mv: float = 0.0  # from trial to trial
+    known_log_sd: float = 0.0  # of a factor that trials of nearly the same ISI share, natural log
     log_offset: float = 0.0  # by how much evoked MEPs are larger than usual, natural log
     shift_pct_rmt: float = 0.0  # by how much the pulse is stronger than usual
     enhancement: float = 1.0  # the share of its usual enhancement that the conditioning stimulus has
@@ -37,7 +38,7 @@ class History:
     log_mep: Tensor  # lower end, (b, n)
     log_mep_high: Tensor  # upper end, (b, n)
     order: Tensor  # how many trials came before each, (b, n)
-    circumstances: Tensor | None = None  # the fields of `Circumstances`, (b, n, 5); None if all are neutral
+    circumstances: Tensor | None = None  # the fields of `Circumstances`, (b, n, 6); None if all are neutral
 
     @classmethod
     def empty(cls, people: int, device: torch.device) -> History:
@@ -64,10 +65,15 @@ class History:
 
     @property
     def around(self) -> Tensor:
-        """The circumstances of all trials, shape (b, n, 5)."""
+        """The circumstances of all trials, shape (b, n, 6)."""
         if self.circumstances is not None:
             return self.circumstances
         return self.isi_ms.new_tensor(Circumstances()).expand(*self.isi_ms.shape, -1)
+
+    @property
+    def shares_factor(self) -> bool:
+        """True if an unknown factor of known parts makes the trials depend on each other, given a person."""
+        return self.circumstances is not None and bool(self.circumstances[..., 2].any())
 
 
 def observed(observation: Observation, detection_limit_mv: float, response_threshold_mv: float, order: int) -> History:
@@ -86,7 +92,7 @@ def observed(observation: Observation, detection_limit_mv: float, response_thres
     if observation.known_mv is None:
         return trial
     around = trial.around.clone()
-    around[:, 0, :2] = observation.known_mv.to(around)
+    around[:, 0, : observation.known_mv.shape[-1]] = observation.known_mv.to(around)
     return replace(trial, circumstances=around)
 
 

@@ -16,6 +16,15 @@ ISI_NODES = ((-math.sqrt(3.0), 1 / 6), (0.0, 2 / 3), (math.sqrt(3.0), 1 / 6))
 """Gauss–Hermite nodes [SD] and weights of an ISI that is known with an SD only."""
 
 
+_FACTORS_AT = (-2.0, -1.0, 0.0, 1.0, 2.0)
+_DENSITY = tuple(math.exp(-0.5 * at * at) for at in _FACTORS_AT)
+FACTOR_NODES = tuple((at, density / sum(_DENSITY)) for at, density in zip(_FACTORS_AT, _DENSITY, strict=True))
+"""Nodes [SD] and weights of the log of a factor that is known with an SD only."""
+
+ISI_GROUP_MS, FIRST_GROUP_MS, GROUPS = 15.0, -150.0, 64
+"""Trials whose ISIs are in the same stretch of so many ms share one factor: responses hardly change there."""
+
+
 def averaged_over_isi(log_density: Callable[[Tensor], Tensor], isi_ms: Tensor, isi_sd_ms: Tensor) -> Tensor:
     """Log of a density by ISI; one that is known with an SD only is integrated out."""
     if not bool((isi_sd_ms > 0).any()):

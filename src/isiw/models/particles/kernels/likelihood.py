@@ -29,9 +29,9 @@ from isiw.models.particles.kernels import records as field
 from isiw.models.particles.kernels.records import enhancement_after
 from isiw.models.particles.noise import NODES, NoiseKind
 from isiw.models.particles.shapes import APART_SD, PEAK_SD, PEAKS_AT, TOGETHER, ShapeKind
-from isiw.models.shared.tables import ISI_NODES
+from isiw.models.shared.tables import FACTOR_NODES, FIRST_GROUP_MS, GROUPS, ISI_GROUP_MS, ISI_NODES
 
-ROOM: Final = 14, field.PIECE
+ROOM: Final = 14 + len(FACTOR_NODES), field.PIECE
 """Rows of numbers that the likelihood of a history needs in between; the last three are of the nodes."""
 
 _f = np.float32
@@ -57,6 +57,9 @@ _OUT_LOW, _OUT_HIGH = _f(noise.OUTLIER_LOG_RANGE[0]), _f(noise.OUTLIER_LOG_RANGE
 _OUT_DENSITY = _f(1.0 / (noise.OUTLIER_LOG_RANGE[1] - noise.OUTLIER_LOG_RANGE[0]))
 _OUT, _IN = _f(noise.OUTLIER_PROBABILITY), _f(1.0 - noise.OUTLIER_PROBABILITY)
 _TINY, _EVER = _f(1e-6), _f(40.0)
+_FACTORS_AT: Final = np.array([at for at, _ in FACTOR_NODES], dtype=np.float32)
+_FIRST_MS, _GROUP_MS = _f(FIRST_GROUP_MS), _f(ISI_GROUP_MS)
+_FACTOR_SHARES: Final = np.array([share for _, share in FACTOR_NODES])
 
 
 @loop
@@ -149,29 +152,41 @@ def _fade(particle: Any, trials: Any, count: int, level: Any) -> None:
 
 
 @loop
-def _gains(particle: Any, trials: Any, count: int, work: Any) -> None:
-    """Write the scale of each trial, and the known part of its amplitude; arguments as for `_inputs`."""
-    scale, known, varies = work[2], work[4], work[5]
-    startle, relaxed, offset = trials[field.STARTLE], trials[field.RELAXED], trials[field.OFFSET]
-    told, told_sd = trials[field.KNOWN], trials[field.KNOWN_SD]
-    log_scale = particle[field.LOG_RATIO] + (_NIL if is_curved(particle) else _FAR)
-    drift, startled, per_floor = particle[field.DRIFT], particle[field.STARTLED], exp(-particle[field.LOG_FLOOR])
-    # Few arrays a loop, or the compiler gives up on proving that they do not overlap.
-    for i in range(count):
-        scale[i] = log_scale + drift * relaxed[i] + startled * startle[i] + offset[i]
-    _step(trials, count, particle[field.CHANGED], particle[field.STEP], scale)
-    for i in range(count):
-        scale[i] = exp(scale[i])
+def _known(particle: Any, trials: Any, count: int, factor_at: Any, known: Any, varies: Any) -> None:
+    """Write the known part of each trial's amplitude, in floors, and its variance."""
+    told, told_sd, per_floor = trials[field.KNOWN], trials[field.KNOWN_SD], exp(-particle[field.LOG_FLOOR])
     for i in range(count):
         known[i] = told[i] * per_floor
     for i in range(count):
         varies[i] = told_sd[i] * per_floor * (told_sd[i] * per_floor)
+    if factor_at != _NIL:
+        log_sd = trials[field.KNOWN_LOG_SD]
+        for i in range(count):
+            known[i] *= exp(factor_at * log_sd[i])
+        for i in range(count):
+            varies[i] *= exp(_TWO * factor_at * log_sd[i])
     if particle[field.STEP_SCALE] != _NIL:
         number, after, per_step = trials[field.NUMBER], particle[field.CHANGED], exp(-particle[field.STEP_SCALE])
         for i in range(count):
             known[i] *= per_step if number[i] >= after else _ONE
         for i in range(count):
             varies[i] *= per_step * per_step if number[i] >= after else _ONE
+
+
+@loop
+def _gains(particle: Any, trials: Any, count: int, factor_at: Any, work: Any) -> None:
+    """Write the scale of each trial, and the known part of its amplitude; arguments as for `_inputs`."""
+    scale = work[2]
+    startle, relaxed, offset = trials[field.STARTLE], trials[field.RELAXED], trials[field.OFFSET]
+    log_scale = particle[field.LOG_RATIO] + (_NIL if is_curved(particle) else _FAR)
+    drift, startled = particle[field.DRIFT], particle[field.STARTLED]
+    # Few arrays a loop, or the compiler gives up on proving that they do not overlap.
+    for i in range(count):
+        scale[i] = log_scale + drift * relaxed[i] + startled * startle[i] + offset[i]
+    _step(trials, count, particle[field.CHANGED], particle[field.STEP], scale)
+    for i in range(count):
+        scale[i] = exp(scale[i])
+    _known(particle, trials, count, factor_at, work[4], work[5])
 
 
 @loop
@@ -323,14 +338,14 @@ def _inside(particle: Any, trials: Any, count: int, curve: Any, work: Any, likel
 
 
 @part
-def _total(particle: Any, trials: Any, count: int, censored: Any, curve: Any, work: Any) -> float:
-    """Log likelihood of a piece of the trials of one sort."""
+def _by_trial(particle: Any, trials: Any, count: int, censored: Any, factor_at: Any, curve: Any, work: Any) -> None:
+    """Write the log likelihood of each trial of a piece of one sort, at a node of the factor of known parts."""
     real, isi_sd, likelihood, summed = trials[field.REAL], trials[field.ISI_SD], work[9], work[10]
     uncertain = False
     for i in range(count):
         uncertain |= isi_sd[i] > _NIL
         summed[i] = _NIL
-    _gains(particle, trials, count, work)
+    _gains(particle, trials, count, factor_at, work)
     for node in range(3 if uncertain else 1):
         _inputs(particle, trials, count, _SHIFTS[node] if uncertain else _NIL, work)
         if censored:
@@ -342,7 +357,50 @@ def _total(particle: Any, trials: Any, count: int, censored: Any, curve: Any, wo
             summed[i] += share * likelihood[i]
     for i in range(count):
         summed[i] = real[i] * log(summed[i])
-    return float(total(summed, count))
+
+
+@loop
+def group_of(isi_ms: Any) -> int:
+    """The group of trials that an ISI belongs to; see `ISI_GROUP_MS`."""
+    return min(max(int((isi_ms - _FIRST_MS) / _GROUP_MS), 0), GROUPS - 1)
+
+
+@loop
+def _shares_factor(records: Any, sizes: Any) -> bool:
+    """Whether any trial has a known part whose factor is unknown."""
+    unknown = False
+    for sort in range(2):
+        for piece in range(sizes.shape[1]):
+            log_sd = records[sort, piece, field.KNOWN_LOG_SD]
+            for i in range(sizes[sort, piece]):
+                unknown |= log_sd[i] > _NIL
+    return unknown
+
+
+@loop
+def _at_factors(particle: Any, records: Any, sizes: Any, curve: Any, room: Any) -> float:
+    """Log likelihood of a history where trials of nearly the same ISI share an unknown factor of their known part."""
+    groups = room[11 : 11 + len(_FACTORS_AT)]
+    groups[:, :GROUPS] = _NIL
+    for node in range(len(_FACTORS_AT)):
+        for sort in range(2):
+            for piece in range(sizes.shape[1]):
+                trials, count = records[sort, piece], sizes[sort, piece]
+                if count:
+                    _by_trial(particle, trials, count, sort == 1, _FACTORS_AT[node], curve, room)
+                for i in range(count):
+                    groups[node, group_of(trials[field.ISI, i])] += room[10, i]
+    summed = 0.0
+    for group in range(GROUPS):
+        most, least, mixed = -math.inf, math.inf, 0.0
+        for node in range(len(_FACTORS_AT)):
+            most, least = max(most, groups[node, group]), min(least, groups[node, group])
+        if least < most:
+            for node in range(len(_FACTORS_AT)):
+                mixed += _FACTOR_SHARES[node] * math.exp(groups[node, group] - most)
+            most += math.log(mixed)
+        summed += most
+    return summed
 
 
 @loop
@@ -350,11 +408,15 @@ def history_likelihood(particle: Any, records: Any, sizes: Any, room: Any) -> fl
     """Log likelihood of one person's history under a particle; see `trial_records`."""
     curve, nodes = room[ROOM[0] - 3 :], NODES
     curve_of(particle, curve[0, :nodes], curve[1, :nodes], curve[2])
+    if _shares_factor(records, sizes):
+        return _at_factors(particle, records, sizes, curve, room)
     summed = 0.0
     for sort in range(2):
         for piece in range(sizes.shape[1]):
-            if sizes[sort, piece]:
-                summed += _total(particle, records[sort, piece], sizes[sort, piece], sort == 1, curve, room)
+            count = sizes[sort, piece]
+            if count:
+                _by_trial(particle, records[sort, piece], count, sort == 1, _NIL, curve, room)
+                summed += total(room[10], count)
     return summed
 
 

@@ -28,10 +28,10 @@ CHANGED, STEP, STEP_DRIVE, FADING, STEP_SCALE = range(22, 27)
 PARTICLE: Final = 27
 
 # Of a trial, as a history has it.
-ISI, ISI_SD, LOW, HIGH, ORDER, KNOWN, KNOWN_SD, OFFSET, SHIFT, FACTOR = range(10)
+ISI, ISI_SD, LOW, HIGH, ORDER, KNOWN, KNOWN_SD, KNOWN_LOG_SD, OFFSET, SHIFT, FACTOR = range(11)
 # In place of the order: the two parts of the gain; then the order, and whether it is a trial at all.
-STARTLE, RELAXED, REAL, NUMBER = 4, 10, 11, 12
-TRIAL: Final = 13
+STARTLE, RELAXED, REAL, NUMBER = 4, 11, 12, 13
+TRIAL: Final = 14
 PIECE: Final = 128
 FEW: Final = 2
 """So few trials take longer side by side with lanes that are empty than one after the other."""
@@ -136,7 +136,7 @@ def trial_records(columns: Any) -> Any:
                 piece += 1
             i = sizes[person, sort, piece]
             record = records[person, sort, piece]
-            for field in range(10):
+            for field in range(FACTOR + 1):
                 record[field, i] = column[field]
             if np.isnan(column[ISI]):
                 record[ISI, i] = record[FACTOR, i] = _NIL
