@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 from collections.abc import Iterator
+from contextlib import chdir
 from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import Result
+from typer.testing import CliRunner, Result
 
 from cli.conftest import Command
+from isiw.cli import app
 from isiw.config import load_config, session_for
 from isiw.log.reader import read_session
 
@@ -54,13 +57,24 @@ def test_from_nothing_to_a_session_and_on(isiw: Command, tmp_path: Path) -> None
     assert read_session("s.mcap").events[-1].kind == "limit"
 
 
+@pytest.fixture(scope="module")
+def ended(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a session that has reached its limit of three pulses."""
+    folder = tmp_path_factory.mktemp("ended")
+    with chdir(folder):
+        CliRunner().invoke(app, ["new", "rig", "."])
+        changed(folder / "session.toml", "max_trials = 40", "max_trials = 6")
+        changed(folder / "session.toml", "max_pulses = 100", "max_pulses = 3")
+        ran = CliRunner().invoke(app, ["run", "session.toml", "--log", "s.mcap"])
+    sys.modules.pop("rig", None)
+    assert ran.exit_code == 0, ran.output
+    return folder
+
+
 @pytest.fixture
-def begun(isiw: Command, tmp_path: Path) -> Path:
-    """The configuration of a session that has reached its limit of three pulses."""
-    isiw("new", "rig", ".")
-    changed(tmp_path / "session.toml", "max_trials = 40", "max_trials = 6")
-    changed(tmp_path / "session.toml", "max_pulses = 100", "max_pulses = 3")
-    assert isiw("run", "session.toml", "--log", "s.mcap").exit_code == 0
+def begun(ended: Path, tmp_path: Path) -> Path:
+    """The configuration of that session, in a copy of its folder."""
+    shutil.copytree(ended, tmp_path, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
     return tmp_path / "session.toml"
 
 

@@ -36,7 +36,7 @@ def test_three_methods_and_the_form_of_the_profile_are_told_side_by_side() -> No
 
 
 def test_without_tms_alone_the_baseline_is_guessed_and_the_threshold_is_nobodys_own() -> None:
-    _, means, counts, _ = method_answers(analysed(alone=0).record)
+    _, means, counts, _ = method_answers(analysed(alone=0, trials=2).record)
     assert "guessed: the median of all means" in means.answer
     assert "Threshold of a response 50 µV (a usual value" in counts.answer
 

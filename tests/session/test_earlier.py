@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ SPACE = isiw.DesignSpace(0, 200, reference="impact")
 SETTINGS: dict[str, Any] = {"particles": 200, "max_trials": 4}
 
 
+@cache  # trials never change
 def earlier(n: int = 60, factor: float = 1.0) -> tuple[Trial, ...]:
     """Trials of a person with a window of 102–163 ms, some of them outside the narrow space."""
     responder = isiw.subjects.cohort("recruitment", 1, 3)[0].begin(3)

@@ -21,6 +21,7 @@ from isiw.models.protocol import ResponseModel
 from isiw.models.shared.scales import Scale
 from isiw.strategy.catalogue import known_settings, list_strategies, make_strategy, settings_for
 from known import instance, known
+from quick import SEARCHED_LITTLE
 
 NAMES = sorted(list_strategies())
 PARTICLES = [name for name in NAMES if isinstance(settings_for(name).model, ParticleModel)]
@@ -28,7 +29,11 @@ FEW: dict[str, Any] = {"particles": 64}
 
 
 def few(name: str) -> dict[str, Any]:
-    return FEW if isinstance(settings_for(name).model, ParticleModel | SupraModel) else {}
+    """Settings with which a strategy is quick."""
+    model = settings_for(name).model
+    if isinstance(model, ParametricModel):
+        return SEARCHED_LITTLE
+    return FEW if isinstance(model, ParticleModel | SupraModel) else {}
 
 
 def asks(name: str, seed: int, meps_mv: tuple[float, ...] = (0.02, 0.1)) -> list[float]:

@@ -26,6 +26,7 @@ from isiw.testing import check_acquisition, check_model, check_strategy
 from isiw.testing.suites import Trials, trials_that_break_things, usual_trials
 from isiw.types import FloatArray
 from isiw.window import Window
+from quick import SEARCHED_LITTLE
 
 FEW: dict[str, Any] = {"particles": 100}
 NAMES = sorted(list_strategies())
@@ -35,13 +36,10 @@ SLOW_FITS = [pytest.param(name, marks=pytest.mark.slow) if name.startswith(FITTE
 SCORING = sorted(name for name, make in ACQUISITIONS.items() if ProposesIsi not in make(0).needs)
 
 
-EFFORT: dict[str, Any] = {"scouts": 96, "starts": 4, "steps": 8, "draws": 150, "fits": 3, "enough": 100}
-
-
 def settings_of(name: str) -> dict[str, Any]:
     """Settings with which a strategy is quick."""
     if name.startswith("parametric"):
-        return {"samples": 64, "effort": EFFORT}
+        return SEARCHED_LITTLE
     return FEW if name in {"default", "even", "random", "supra-threshold"} or name.startswith("particles") else {}
 
 
