@@ -103,14 +103,17 @@ _LEVELS: Final = np.linspace(0.1, 0.9, 17)
 def best_window(windows: Runs, grid_ms: FloatArray) -> tuple[Window | None, float]:
     """The window of largest expected F1 among the level sets of the posterior's membership, and that F1."""
     membership = windows.membership
-    candidates = membership[:, None] >= _LEVELS * membership.max()
+    somewhere = np.flatnonzero(membership >= _LEVELS[0] * membership.max())
+    low, high = somewhere[0], somewhere[-1] + 1  # outside there is no candidate
+    candidates = membership[low:high, None] >= _LEVELS * membership.max()
     # Candidates are last, so that what a run adds is looked up at once.
-    below = np.zeros((windows.points + 1, candidates.shape[1]), dtype=np.float32)
+    below = np.zeros((len(candidates) + 1, len(_LEVELS)), dtype=np.float32)
     np.cumsum(candidates, axis=0, out=below[1:])
-    overlap = windows.summed(below.take(windows.behind, axis=0) - below.take(windows.first, axis=0))
+    first, behind = (below.take(ends - low, axis=0, mode="clip") for ends in (windows.first, windows.behind))
+    overlap = windows.summed(behind - first)
     expected_f1 = 2.0 * (overlap / (below[-1] + windows.sizes[:, None])).mean(0)
     best = int(expected_f1.argmax())
-    return Window.from_mask(grid_ms, candidates[:, best]), float(expected_f1[best])
+    return Window.from_mask(grid_ms[low:high], candidates[:, best]), float(expected_f1[best])
 
 
 def edge_samples(windows: Runs, space: DesignSpace) -> FloatArray:

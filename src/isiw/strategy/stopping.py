@@ -151,7 +151,7 @@ class CredibleWidth(Checked):
         widths = [0.0 if low == high else high - low for low, high in intervals]
         probability = progress.estimate.probability or 0.0
         start, end = (f"is known to {x:.0f} ms" if math.isfinite(x) else "is still unknown" for x in widths)
-        whatever = "" if progress.estimate.hypotheses is None else ", whichever plausible noise model holds"
+        whatever = "" if progress.estimate.hypothesis_samples is None else ", whichever plausible noise model holds"
         edges = f"its start {start} and its end {end} ({100 * self.level:.0f} % intervals{whatever})"
         if max(widths) > self.width_ms:
             return StopKind.KNOWN.go_on(f"The window is to be known to {self.width_ms:g} ms: {edges}.")

@@ -383,8 +383,9 @@ class Strategy:
 
     def decision(self) -> StopDecision:
         """The decision to stop now or not, with its reason."""
-        decision = self._course.decision(mistrials=self._mistrials, silent=self._is_silent)
-        return StopKind.TOO_LITTLE.go_on(f"{NO_MEP}") if self._is_silent and not decision.stop else decision
+        silent = self._is_silent
+        decision = self._course.decision(mistrials=self._mistrials, silent=silent)
+        return StopKind.TOO_LITTLE.go_on(f"{NO_MEP}") if silent and not decision.stop else decision
 
     @property
     def _is_silent(self) -> bool:

@@ -180,31 +180,27 @@ class Change(NamedTuple):
         age = torch.where(fading > 0, order, (GROWN_AFTER - order).clamp_min(0.0))
         return Changed(gain * there, shift * there, torch.exp2(-fading.abs() * age), scale * there)
 
-    def named(self, drifted: Tensor, trials: int) -> Named:
+    def steps(self, trials: int) -> tuple[Tensor, Tensor]:
+        """Log of what amplitudes are multiplied by, and the shift [% RMT], at the last of so many trials, (b, p)."""
+        there = self.after <= trials - 1
+        return (self.log_gain + self.log_scale) * there, self.shift_pct_rmt * there
+
+    def named(self, trials: int) -> EstimatedChange | None:
         """What changed by the last of so many trials of equally weighted particles (1, p), as far as it matters."""
-        at = torch.tensor([0.0, trials - 1.0, trials], device=self.after.device)
-        gain, shift_pct, enhancement, scale = (field[0] for field in self.at(at))
-        gain, shift_pct = gain[:, 1] + scale[:, 1], shift_pct[:, 1]
-        enhancement = enhancement[:, 2] / enhancement[:, 0]
+        gain, shift_pct = (step[0] for step in self.steps(trials))
+        before, now = self.at(torch.tensor([0.0, trials], device=self.after.device)).enhancement[0].unbind(-1)
+        enhancement = now / before
         levelled, shifted = gain.abs() > MATTERS, shift_pct.abs() > MATTERS * INTENSITY_PCT
         stepped, faded = levelled | shifted, enhancement.log().abs() > MATTERS
-        of_time = stepped | (drifted[0].abs() > MATTERS)
         share = stepped.double().mean().item(), faded.double().mean().item()
         if max(share) < 0.5:
-            return Named(None, of_time)
+            return None
         if share[1] > share[0]:
-            return Named(EstimatedChange("enhancement", share[1], *_interval(enhancement[faded])), of_time)
+            return EstimatedChange("enhancement", share[1], *_interval(enhancement[faded]))
         trial = int(self.after[0, stepped].ceil().median())
         if shifted.sum() > levelled.sum():
-            return Named(EstimatedChange("intensity", share[0], *_interval(shift_pct[shifted]), trial), of_time)
-        return Named(EstimatedChange("amplitudes", share[0], *_interval(gain[levelled].exp()), trial), of_time)
-
-
-class Named(NamedTuple):
-    """What changed in a session, if anything probably did, and in which particles amplitudes change with time (p,)."""
-
-    change: EstimatedChange | None
-    of_time: Tensor
+            return EstimatedChange("intensity", share[0], *_interval(shift_pct[shifted]), trial)
+        return EstimatedChange("amplitudes", share[0], *_interval(gain[levelled].exp()), trial)
 
 
 def _interval(sizes: Tensor) -> tuple[float, float, float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property, partial
+from functools import cached_property, partial
 from typing import Annotated
 
 from isiw.checks import (
@@ -178,11 +178,10 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
             SampledHypotheses(prior.hypothesis(latents)[0], prior.hypotheses),
             lambda: _excluded_shift_pct_rmt(prior, latents),
         )
-        named = cache(partial(prior.changed, latents, self.trials))
         return estimate.noting(
             unusual=Later(lambda: prior.unusual(latents, self.space)),
-            change=Later(lambda: named().change),
-            time_alone=Later(lambda: float((named().of_time & ~latents.present[0]).double().mean())),
+            change=Later(lambda: prior.change(latents).named(self.trials)),
+            time_alone=Later(lambda: float((prior.of_time(latents, self.trials) & ~latents.present).double().mean())),
         )
 
 

@@ -77,5 +77,5 @@ class PersonSample(TabledSample):
         less, more = below.gather(-1, right - 1), below.gather(-1, right)
         ends = cell_ends(below.device)
         place = torch.lerp(ends[right - 1], ends[right], (wanted - less) / (more - less).clamp_min(1e-12))
-        low, high = (end[:, None, None] for end in log_ends(self.person.response, self._evoked))
+        low, high = (end[:, None, None] for end in log_ends(self._log_floor, self._evoked))
         return torch.exp(low + place * (high - low))

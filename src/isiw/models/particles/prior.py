@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 from isiw.checks import Checked, Positive, choice
 from isiw.design import DesignSpace
 from isiw.lazy import torch
-from isiw.models.particles.changes import Change, Changed, ChangeKind, ChangePrior, Named
+from isiw.models.particles.changes import INTENSITY_PCT, MATTERS, Change, Changed, ChangeKind, ChangePrior
 from isiw.models.particles.latents import BLOCKS, LATENTS, RECTIFIED, Latents, latents_of
 from isiw.models.particles.laws import (
     FOREARM,
@@ -298,11 +298,11 @@ class Prior(Checked):
         given["the EMG floor"] = 1.0 - self.mixtures["floor"].usual(floor)
         return {name: float(share.mean()) for name, share in given.items() if share.numel()}
 
-    def changed(self, latents: Latents, trials: int) -> Named:
-        """What changed by the last of so many trials of equally weighted particles of one person (1, p)."""
-        drift = latents.values[..., LATENTS.index("drift")]
-        drifted = drift * (1.0 - PERSISTENCE ** max(0, trials - 1))
-        return self.change(latents).named(drifted, trials)
+    def of_time(self, latents: Latents, trials: int) -> Tensor:
+        """In which particles amplitudes change within so many trials at any ISI, as far as it matters, shape (b, p)."""
+        gain, shift_pct = self.change(latents).steps(trials)
+        drifted = latents.values[..., LATENTS.index("drift")] * (1.0 - PERSISTENCE ** max(0, trials - 1))
+        return (gain.abs() > MATTERS) | (shift_pct.abs() > MATTERS * INTENSITY_PCT) | (drifted.abs() > MATTERS)
 
     def untouched(self, latents: Latents, trials: int) -> Tensor:
         """In which particles nothing has changed any of so many trials, shape (b, p)."""

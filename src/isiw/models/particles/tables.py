@@ -11,9 +11,9 @@ from isiw.compiled import first_of
 from isiw.design import DesignSpace
 from isiw.lazy import torch
 from isiw.models.particles.kernels import predictions as compiled
-from isiw.models.particles.kernels.records import person_of
+from isiw.models.particles.kernels.records import LOG_FLOOR, person_of
 from isiw.models.particles.likelihood import in_pieces, levels
-from isiw.models.particles.noise import NODES, Response, evoked_mean, log_gain, outcome_density
+from isiw.models.particles.noise import NODES, evoked_mean, log_gain, outcome_density
 from isiw.models.particles.prior import Person
 from isiw.models.protocol import Tensor
 from isiw.models.shared.tables import LEVELS, OUTCOMES, interpolated, table_levels
@@ -55,6 +55,13 @@ class TabledSample:
     def outcome_mass(self, isi_ms: Tensor) -> Tensor:
         """Predictive distribution of the next MEP under each particle, shape (b, s, t, y)."""
         return self._at(self._outcome_table, self._levels(isi_ms))
+
+    @property
+    def _log_floor(self) -> Tensor:
+        """Log of the EMG floor [mV], shape (b, s)."""
+        return (
+            self.person.response.log_floor if self.records is None else torch.from_numpy(self.records[..., LOG_FLOOR])
+        )
 
     @cached_property
     def _depth(self) -> Tensor | None:
@@ -99,8 +106,7 @@ class TabledSample:
     @cached_property
     def _outcome_table(self) -> Tensor:
         """Probability of each outcome of the next trial in each row, shape (b, s, l, y)."""
-        response = self.person.response
-        low, high = log_ends(response, self._evoked)
+        low, high = log_ends(self._log_floor, self._evoked)
         middle, width = _cells(low.device)
         log_mep = low.unsqueeze(-1) + middle * (high - low).unsqueeze(-1)
         if self.records is not None:
@@ -109,6 +115,7 @@ class TabledSample:
                 table = np.empty((*rows.shape, OUTCOMES), dtype=np.float32)
                 compiled.outcome_tables(self.records, rows, self.order, *cells, table)
             return torch.from_numpy(table)
+        response = self.person.response
         gain = log_gain(response, torch.full_like(response.drift, self.order).unsqueeze(-1)).squeeze(-1)
         response = response._replace(log_ratio=response.log_ratio + gain)
         others = (self._rows, log_mep.unsqueeze(-2))
@@ -116,10 +123,10 @@ class TabledSample:
         return mass / mass.sum(-1, keepdim=True)
 
 
-def log_ends(response: Response, evoked: Tensor) -> tuple[Tensor, Tensor]:
+def log_ends(log_floor: Tensor, evoked: Tensor) -> tuple[Tensor, Tensor]:
     """Between which log MEPs outcomes lie, each of shape (b,)."""
-    top = response.log_floor + torch.log1p(evoked.amax(-1))
-    return _quantile(response.log_floor, 0.05) - 1.0, _quantile(top, 0.95) + 1.5
+    top = log_floor + torch.log1p(evoked.amax(-1))
+    return _quantile(log_floor, 0.05) - 1.0, _quantile(top, 0.95) + 1.5
 
 
 def _quantile(values: Tensor, share: float) -> Tensor:
