@@ -56,10 +56,10 @@ class Runs:
     @classmethod
     def of_pairs(cls, pairs: IntArray, points: int) -> Runs:
         """The runs of windows given as pairs of indices, shape (s, 2 k): of the first ISI, and behind the last."""
-        both = pairs.reshape(len(pairs), -1, 2)
-        sample, which = np.nonzero(both[..., 0] < both[..., 1])
-        first, behind = both[sample, which].T
-        return cls(sample, first, behind, len(pairs), points)
+        every = pairs.reshape(-1, 2)
+        runs = np.flatnonzero(every[:, 0] < every[:, 1])
+        first, behind = every.take(runs, axis=0).T
+        return cls(runs // (pairs.shape[1] // 2), first, behind, len(pairs), points)
 
     @cached_property
     def _leads(self) -> IntArray:

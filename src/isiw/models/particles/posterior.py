@@ -64,7 +64,7 @@ class SwarmPosterior(ABC, Generic[M]):
     @cached_property
     def pairs(self) -> int:
         """Number of them that were pairs of stimuli; see `CountsPairs`."""
-        return int((~self.swarm.history.isi_ms[0].isnan()).sum())
+        return self.trials - int(self.swarm.history.isi_ms[0].isnan().sum())
 
     @property
     def trouble(self) -> str | None:

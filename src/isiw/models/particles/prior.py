@@ -263,7 +263,7 @@ class Prior(Checked):
             for each in known
         ]
 
-    @property
+    @cached_property
     def hypotheses(self) -> tuple[str, ...]:
         """What the kinds of responses are called: kinds of noise, and muscles."""
         names = dict.fromkeys(f"recruitment curve, {muscle.name}" for muscle in self.possible_muscles)
