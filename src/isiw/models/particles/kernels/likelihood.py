@@ -151,7 +151,7 @@ def _fade(particle: Any, trials: Any, count: int, level: Any) -> None:
             level[i] *= enhancement_after(fading, number[i])
 
 
-@loop
+@part
 def _known(particle: Any, trials: Any, count: int, factor_at: Any, known: Any, varies: Any) -> None:
     """Write the known part of each trial's amplitude, in floors, and its variance."""
     told, told_sd, per_floor = trials[field.KNOWN], trials[field.KNOWN_SD], exp(-particle[field.LOG_FLOOR])
@@ -366,18 +366,6 @@ def group_of(isi_ms: Any) -> int:
 
 
 @loop
-def _shares_factor(records: Any, sizes: Any) -> bool:
-    """Whether any trial has a known part whose factor is unknown."""
-    unknown = False
-    for sort in range(2):
-        for piece in range(sizes.shape[1]):
-            log_sd = records[sort, piece, field.KNOWN_LOG_SD]
-            for i in range(sizes[sort, piece]):
-                unknown |= log_sd[i] > _NIL
-    return unknown
-
-
-@loop
 def _at_factors(particle: Any, records: Any, sizes: Any, curve: Any, room: Any) -> float:
     """Log likelihood of a history where trials of nearly the same ISI share an unknown factor of their known part."""
     groups = room[11 : 11 + len(_FACTORS_AT)]
@@ -408,7 +396,7 @@ def history_likelihood(particle: Any, records: Any, sizes: Any, room: Any) -> fl
     """Log likelihood of one person's history under a particle; see `trial_records`."""
     curve, nodes = room[ROOM[0] - 3 :], NODES
     curve_of(particle, curve[0, :nodes], curve[1, :nodes], curve[2])
-    if _shares_factor(records, sizes):
+    if sizes[field.SHARES, 0]:
         return _at_factors(particle, records, sizes, curve, room)
     summed = 0.0
     for sort in range(2):

@@ -32,6 +32,8 @@ ISI, ISI_SD, LOW, HIGH, ORDER, KNOWN, KNOWN_SD, KNOWN_LOG_SD, OFFSET, SHIFT, FAC
 # In place of the order: the two parts of the gain; then the order, and whether it is a trial at all.
 STARTLE, RELAXED, REAL, NUMBER = 4, 11, 12, 13
 TRIAL: Final = 14
+SHARES: Final = 2
+"""In place of a sort of trials: whether trials share an unknown factor of their known parts."""
 PIECE: Final = 128
 FEW: Final = 2
 """So few trials take longer side by side with lanes that are empty than one after the other."""
@@ -122,11 +124,14 @@ def settle(particle: Any, order: Any) -> None:
 
 @kernel
 def trial_records(columns: Any) -> Any:
-    """Trials, known and censored, as (b, 2, pieces, TRIAL, PIECE), and how many a piece has, in lanes but for a few."""
+    """Trials, known and censored, as (b, 2, pieces, TRIAL, PIECE), and how many a piece has, in lanes but for a few.
+
+    What is beside the sizes of both sorts is `SHARES`.
+    """
     people, trials = columns.shape[:2]
     pieces = (trials + PIECE - 1) // PIECE
     records = np.zeros((people, 2, pieces, TRIAL, PIECE), dtype=np.float32)
-    sizes = np.zeros((people, 2, pieces), dtype=np.int64)
+    sizes = np.zeros((people, 3, pieces), dtype=np.int64)
     for person in range(people):
         for n in range(trials):
             column = columns[person, n]
@@ -143,6 +148,7 @@ def trial_records(columns: Any) -> Any:
             record[NUMBER, i] = column[ORDER]
             record[STARTLE, i], record[RELAXED, i] = gain_of(column[ORDER])
             record[REAL, i] = _ONE
+            sizes[person, SHARES, 0] |= column[KNOWN_LOG_SD] > _NIL
             sizes[person, sort, piece] += 1
         for sort in range(2):
             for piece in range(pieces):
