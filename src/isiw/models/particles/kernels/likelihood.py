@@ -360,24 +360,14 @@ def _by_trial(particle: Any, trials: Any, count: int, censored: Any, factor_at: 
 
 
 @loop
-def group_of(isi_ms: Any) -> int:
+def _group_of(isi_ms: Any) -> int:
     """The group of trials that an ISI belongs to; see `ISI_GROUP_MS`."""
     return min(max(int((isi_ms - _FIRST_MS) / _GROUP_MS), 0), GROUPS - 1)
 
 
 @loop
-def _at_factors(particle: Any, records: Any, sizes: Any, curve: Any, room: Any) -> float:
-    """Log likelihood of a history where trials of nearly the same ISI share an unknown factor of their known part."""
-    groups = room[11 : 11 + len(_FACTORS_AT)]
-    groups[:, :GROUPS] = _NIL
-    for node in range(len(_FACTORS_AT)):
-        for sort in range(2):
-            for piece in range(sizes.shape[1]):
-                trials, count = records[sort, piece], sizes[sort, piece]
-                if count:
-                    _by_trial(particle, trials, count, sort == 1, _FACTORS_AT[node], curve, room)
-                for i in range(count):
-                    groups[node, group_of(trials[field.ISI, i])] += room[10, i]
+def _averaged(groups: Any) -> float:
+    """Log likelihood of a history from that of each group of trials at each node of the factor of known parts."""
     summed = 0.0
     for group in range(GROUPS):
         most, least, mixed = -math.inf, math.inf, 0.0
@@ -394,18 +384,22 @@ def _at_factors(particle: Any, records: Any, sizes: Any, curve: Any, room: Any) 
 @loop
 def history_likelihood(particle: Any, records: Any, sizes: Any, room: Any) -> float:
     """Log likelihood of one person's history under a particle; see `trial_records`."""
-    curve, nodes = room[ROOM[0] - 3 :], NODES
+    curve, nodes, groups = room[ROOM[0] - 3 :], NODES, room[11 : 11 + len(_FACTORS_AT)]
     curve_of(particle, curve[0, :nodes], curve[1, :nodes], curve[2])
-    if sizes[field.SHARES, 0]:
-        return _at_factors(particle, records, sizes, curve, room)
-    summed = 0.0
-    for sort in range(2):
-        for piece in range(sizes.shape[1]):
-            count = sizes[sort, piece]
-            if count:
-                _by_trial(particle, records[sort, piece], count, sort == 1, _NIL, curve, room)
-                summed += total(room[10], count)
-    return summed
+    shares, summed = sizes[field.SHARES, 0], 0.0
+    if shares:
+        groups[:, :GROUPS] = _NIL
+    for node in range(len(_FACTORS_AT) if shares else 1):
+        for sort in range(2):
+            for piece in range(sizes.shape[1]):
+                trials, count = records[sort, piece], sizes[sort, piece]
+                if count:
+                    at = _FACTORS_AT[node] if shares else _NIL
+                    _by_trial(particle, trials, count, sort == 1, at, curve, room)
+                    summed += total(room[10], count)
+                for i in range(count if shares else 0):
+                    groups[node, _group_of(trials[field.ISI, i])] += room[10, i]
+    return _averaged(groups) if shares else summed
 
 
 @writer
