@@ -10,25 +10,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from isiw.compiled import (
-    bell,
-    exp,
-    exp2,
-    inlined,
-    log,
-    loop,
-    ndtr,
-    part,
-    per,
-    per_root,
-    total,
-    writer,
-)
+from isiw.compiled import bell, exp, inlined, log, loop, ndtr, part, per, per_root, total, writer
 from isiw.models.particles import noise
 from isiw.models.particles.kernels import records as field
+from isiw.models.particles.kernels.profile import facilitations
 from isiw.models.particles.kernels.records import enhancement_after
 from isiw.models.particles.noise import NODES, NoiseKind
-from isiw.models.particles.shapes import APART_SD, PEAK_SD, PEAKS_AT, TOGETHER, ShapeKind
 from isiw.models.shared.tables import FACTOR_NODES, FIRST_GROUP_MS, GROUPS, ISI_GROUP_MS, ISI_NODES
 
 ROOM: Final = 14 + len(FACTOR_NODES), field.PIECE
@@ -44,13 +31,8 @@ _SHIFTS: Final = np.array([shift for shift, _ in ISI_NODES], dtype=np.float32)
 _SHARES: Final = np.array([weight for _, weight in ISI_NODES], dtype=np.float32)
 _BETWEEN, _FAR = _f(noise.BETWEEN_NODES), _f(noise.FAR_BELOW)
 _CORNER, _STEEPEST = _f(noise.CORNER), _f(noise.STEEPEST_ROOT)
-_PLATEAU, _SKEWED, _TWO_PEAK = (_f(kind) for kind in (ShapeKind.PLATEAU, ShapeKind.SKEWED, ShapeKind.TWO_PEAK))
 _MISSING, _ALL_OR_NONE = _f(NoiseKind.MISSING), _f(NoiseKind.ALL_OR_NONE)
 _RECRUITMENT, _RECTIFIED = _f(NoiseKind.RECRUITMENT), _f(NoiseKind.RECTIFIED)
-_FIRST_PEAK, _SECOND_PEAK = _f(PEAKS_AT[0]), _f(PEAKS_AT[1])
-_PEAK_SD, _APART_SD, _TOGETHER = _f(PEAK_SD), _f(APART_SD), _f(TOGETHER)
-_SQUARED = _f(-2.0 / math.log(2.0))
-_FURTHEST = _f(34.0)  # squares of the distance from the peak, in flanks: behind it facilitation is below 1e-29
 _LEAST_SIZE, _LEAST_REACH, _LEAST_MASS = _f(1e-9), _f(1e-12), _f(1e-9)
 _ROOT = _f(1.0 / math.sqrt(2.0 * math.pi))
 _OUT_LOW, _OUT_HIGH = _f(noise.OUTLIER_LOG_RANGE[0]), _f(noise.OUTLIER_LOG_RANGE[1])
@@ -66,48 +48,6 @@ _FACTOR_SHARES: Final = np.array([share for _, share in FACTOR_NODES])
 def is_curved(particle: Any) -> Any:
     """Whether a particle has a recruitment curve, with a threshold or without."""
     return particle[field.NOISE] == _RECRUITMENT or particle[field.NOISE] == _RECTIFIED
-
-
-@loop
-def facilitations(particle: Any, isi_ms: Any, level: Any, count: int) -> None:
-    """Write the facilitation of a particle at some ISIs, in 0–1; negative where the tap depresses."""
-    kind, form = particle[field.SHAPE], particle[field.FORM]
-    start, width = particle[field.START], particle[field.WIDTH]
-    if particle[field.PRESENT] == _NIL:
-        for i in range(count):
-            level[i] = _NIL
-    elif kind == _TWO_PEAK:
-        apart = abs(form) > _TOGETHER
-        per_sd = _ONE / (_APART_SD if apart else _PEAK_SD)
-        lower = (abs(form) - _TOGETHER) / (_ONE - _TOGETHER) if apart else abs(form) / _TOGETHER
-        lower = _ONE - _f(0.7) * lower
-        first, second = (lower, _ONE) if form < _NIL else (_ONE, lower)
-        for i in range(count):
-            share = (isi_ms[i] - start) / width
-            a, b = (share - _FIRST_PEAK) * per_sd, (share - _SECOND_PEAK) * per_sd
-            level[i] = first * bell(a) + second * bell(b)
-    else:
-        peak_at = _HALF + _f(0.33) * form if kind == _SKEWED else _HALF
-        rise, fall = -_ONE / (peak_at * width), _ONE / ((_ONE - peak_at) * width)
-        peak = start + peak_at * width
-        if kind == _PLATEAU:
-            power = exp(_f(0.75) * (form + _ONE))
-            for i in range(count):
-                offset = isi_ms[i] - peak
-                offset = max(offset * rise, offset * fall)
-                square = exp(power * log(min(max(offset * offset, _f(1e-12)), _f(1e6))))
-                level[i] = exp2(_SQUARED * min(square, _FURTHEST))
-        else:
-            for i in range(count):
-                offset = isi_ms[i] - peak
-                offset = max(offset * rise, offset * fall)
-                level[i] = exp2(_SQUARED * min(offset * offset, _FURTHEST))
-    if particle[field.DEPTH] > _NIL:
-        per_flank, depth = _TWO / particle[field.LOW_WIDTH], particle[field.DEPTH]
-        middle = particle[field.LOW_START] + _HALF * particle[field.LOW_WIDTH]
-        for i in range(count):
-            offset = (isi_ms[i] - middle) * per_flank
-            level[i] -= depth * exp2(_SQUARED * min(offset * offset, _FURTHEST))
 
 
 @loop

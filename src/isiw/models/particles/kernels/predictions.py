@@ -10,13 +10,8 @@ import numpy as np
 from isiw.compiled import LANES, bell, exp, inlined, kernel, log, loop, per, per_root, total, writer
 from isiw.models.particles import noise
 from isiw.models.particles.kernels import records as field
-from isiw.models.particles.kernels.likelihood import (
-    NODE_WEIGHTS,
-    NODES_AT,
-    curve_of,
-    facilitations,
-    is_curved,
-)
+from isiw.models.particles.kernels.likelihood import NODE_WEIGHTS, NODES_AT, curve_of, is_curved
+from isiw.models.particles.kernels.profile import facilitations
 from isiw.models.particles.kernels.records import gain_of
 from isiw.models.particles.noise import NODES, NoiseKind
 

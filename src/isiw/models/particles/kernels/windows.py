@@ -8,8 +8,8 @@ from typing import Any, Final
 import numpy as np
 
 from isiw.compiled import exp, kernel, log, loop
-from isiw.models.particles.kernels.likelihood import facilitations
 from isiw.models.particles.kernels.predictions import position_of
+from isiw.models.particles.kernels.profile import facilitations
 from isiw.models.particles.kernels.records import FLOOR_SD, FORM, LOG_FLOOR, PRESENT, SHAPE, START, WIDTH
 from isiw.models.particles.shapes import PEAKS_AT, ShapeKind
 from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE
