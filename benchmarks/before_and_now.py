@@ -30,6 +30,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -66,6 +67,8 @@ def run(
     seed: Annotated[int, typer.Option(help="Seed of the people.")] = 100_000,
     workers: Annotated[int, typer.Option(help="Processes.")] = 2,
     to_stopping: Annotated[int | None, typer.Option(help="So many trials, and where the rule ends.")] = None,
+    *,
+    earlier_prior: Annotated[bool, typer.Option(help="With the prior of 1bbe107 in this version.")] = False,
     out: Annotated[Path, typer.Option(help="Folder of the tables.")] = Path("now"),
 ) -> None:
     """Run the default of the isiw that is imported."""
@@ -74,7 +77,7 @@ def run(
         marks, stopping = MARKS, "ignored"
         if to_stopping is not None:
             marks, stopping = tuple(sorted({*(m for m in (*MARKS, *LATER) if m <= to_stopping), to_stopping})), "noted"
-        study = study_of(name, people, seed, marks, stopping)
+        study = study_of(name, people, seed, marks, stopping, settings=prior_of_1bbe107() if earlier_prior else None)
         results = conduct(study, out / f"{name}.study", executor=Processes(workers))
         results.rows().to_parquet(out / f"{name}.parquet")
 
@@ -311,8 +314,43 @@ def _command(source: Path, arguments: list[str | Path]) -> tuple[float, float]:
     return time_s, peak_mb
 
 
+def prior_of_1bbe107() -> dict[str, Any]:
+    """Settings by which the priors of this version, of the window and for choosing ISIs, are those of 1bbe107."""
+    from isiw.models.particles.changes import ChangePrior  # noqa: PLC0415 - which earlier versions lack
+    from isiw.models.particles.laws import Intensity  # noqa: PLC0415
+    from isiw.models.particles.prior import Prior  # noqa: PLC0415
+    from isiw.models.particles.profile import Width  # noqa: PLC0415
+    from isiw.models.shared.scales import Scale  # noqa: PLC0415
+    from isiw.models.shared.start import Span  # noqa: PLC0415
+
+    prior, never = Prior(), 1e-9
+    hand = Scale(-19.0, 6.0)
+    spans = Span(0.7, 0.0, 115.0), Span(0.3, -30.0, 260.0, 20.0)
+    profile = replace(
+        prior.profile,
+        start=replace(prior.profile.start, spans=spans),
+        widths=(Width(0.7, Scale(100.0, 0.42)), Width(0.3, Scale(170.0, 0.5))),
+        early=(),
+    )
+    earlier = replace(
+        prior,
+        profile=profile,
+        muscles=tuple(replace(m, rest_pct=hand) if m.name == "hand" else m for m in prior.muscles),
+        intensities=(Intensity(1.0, Scale(90.0, 0.5)),),
+        session=replace(prior.session, far_drift_share=1e-6),
+        changes=ChangePrior(level=never, intensity=never, enhancement=never, scale=never),
+    )
+    return {"prior": earlier, "unusual_kept": 1 / 3}
+
+
 def study_of(
-    cohort: str, people: int, seed: int, marks: tuple[int, ...], stopping: str = "ignored", batch: int = 25
+    cohort: str,
+    people: int,
+    seed: int,
+    marks: tuple[int, ...],
+    stopping: str = "ignored",
+    batch: int = 25,
+    settings: dict[str, Any] | None = None,
 ) -> Study:
     """The default on a cohort; the hit delay is stated where a version can be told it.
 
@@ -323,9 +361,10 @@ def study_of(
         marks: trials after which there is an estimate; the last is the last.
         stopping: what a study makes of the stopping rule.
         batch: how many sessions are side by side.
+        settings: of the default.
     """
     told: dict[str, Any] = {"hit_delay": "stated"} if "hit_delay" in inspect.signature(Study).parameters else {}
-    default = (StudyStrategy("default"),)
+    default = (StudyStrategy("default", settings or {}),)
     plan: dict[str, Any] = {"engine": "batched", "batch": batch, "stopping": stopping}
     return Study(default, (cohort,), people, seed, marks[-1], marks, **plan, **told)
 
