@@ -40,7 +40,7 @@ class Observation:
         mep_high_mv: upper end of the interval that begins at `mep_mv` and holds the amplitude [mV], shape (b,); None
             if all amplitudes are points.
         known_mv: mean and SD of a part of the amplitude that is not the pulse's [mV], and the SD of a factor that
-            trials of nearly the same ISI share [natural log], shape (b, 3), or (b, 2) without that; None for none.
+            trials of nearly the same ISI share [natural log], shape (b, 3); None for none.
     """
 
     isi_ms: Tensor
@@ -58,7 +58,7 @@ class Observation:
         isi_sd_ms: Values | None = None,
         response: Sequence[bool | None] | None = None,
         mep_high_mv: Values | None = None,
-        known_mv: Sequence[tuple[float, ...]] | None = None,
+        known_mv: Sequence[tuple[float, float, float]] | None = None,
     ) -> Observation:
         """One trial of each person.
 
@@ -75,7 +75,7 @@ class Observation:
         seen = torch.full_like(mep, torch.nan) if response is None else _column(response)
         sds = torch.zeros_like(isi) if isi_sd_ms is None else _column(isi_sd_ms)
         high = None if mep_high_mv is None else _column(mep_high_mv)
-        known = None if known_mv is None else torch.tensor(known_mv, dtype=torch.float32)
+        known = None if known_mv is None else torch.tensor(known_mv, dtype=torch.float32).reshape(-1, 3)
         return cls(isi, mep, sds, seen, high, known)
 
 

@@ -46,9 +46,9 @@ def test_an_interval_ends_where_it_was_told_to() -> None:
 
 
 def test_a_known_part_is_kept_in_every_precision_and_taken_off_for_models_that_know_none() -> None:
-    told = Observation.of([1.0], [0.3], known_mv=[(0.1, 0.05)])
+    told = Observation.of([1.0], [0.3], known_mv=[(0.1, 0.05, 0.4)])
     trial = observed(told, LIMIT_MV, THRESHOLD_MV, order=0).to("cpu", torch.double)
-    assert trial.around[0, 0].tolist() == pytest.approx([0.1, 0.05, 0.0, 0.0, 0.0, 1.0])
+    assert trial.around[0, 0].tolist() == pytest.approx([0.1, 0.05, 0.4, 0.0, 0.0, 1.0])
     assert AmplitudeHistory.nothing(1).appended(told).mep_mv[0, 0] == pytest.approx(0.2)
 
 

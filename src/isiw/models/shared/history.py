@@ -92,7 +92,7 @@ def observed(observation: Observation, detection_limit_mv: float, response_thres
     if observation.known_mv is None:
         return trial
     around = trial.around.clone()
-    around[:, 0, : observation.known_mv.shape[-1]] = observation.known_mv.to(around)
+    around[:, 0, :3] = observation.known_mv.to(around)
     return replace(trial, circumstances=around)
 
 

@@ -19,7 +19,8 @@ from isiw.models.particles.noise import NODES, NoiseKind
 from isiw.models.shared.tables import FACTOR_NODES, FIRST_GROUP_MS, GROUPS, ISI_GROUP_MS, ISI_NODES
 
 ROOM: Final = 14 + len(FACTOR_NODES), field.PIECE
-"""Rows of numbers that the likelihood of a history needs in between; the last three are of the nodes."""
+"""Rows of numbers that the likelihood of a history needs in between; the last three are of the nodes, those
+before of the groups of trials that share a factor."""
 
 _f = np.float32
 _NIL, _HALF, _ONE, _TWO = _f(0.0), _f(0.5), _f(1.0), _f(2.0)
