@@ -2,6 +2,7 @@
 
     python -m benchmarks.throughput > benchmarks/results/throughput.md
     python -m benchmarks.throughput --law 500 > benchmarks/results/batch_law.md
+    python -m benchmarks.throughput --law 500 --device cuda > benchmarks/results/batch_law_cuda.md
 
 The sessions are those of a study on the `recruitment` cohort in the valve space whose stopping rule is ignored and
 whose estimate is recorded after 10, 20 and 30 trials. Timed is from the first session handed out to the last one
@@ -65,12 +66,13 @@ def print_throughput(plan: Study, arguments: argparse.Namespace) -> None:
         print(f"| {engine} | {study.people} | {workers} | {rate:.2f} | {rate / alone:.2f} |", flush=True)
 
 
-def print_law(plan: Study, workers: int) -> None:
-    """Compare the mean F1 of both engines, person by person."""
+def print_law(plan: Study, workers: int, device: str) -> None:
+    """Compare the mean F1 of both engines, person by person; batches are on a torch device."""
     print("| strategy | trials | F1 one at a time | F1 side by side | difference ± SE |\n|---|---|---|---|---|")
     for name, trials in LAW_TRIALS.items():
         study = replace(plan, strategies=(StudyStrategy(name),), trials=trials, marks=(trials // 2, trials))
-        tables = [finished(each, workers) for each in (study, replace(study, engine="batched"))]
+        batched = replace(study, engine="batched", device=device)
+        tables = [finished(study, workers), finished(batched, workers if device == "cpu" else 1)]
         f1 = [table.pivot_table(index="trial", columns="person", values="f1") for table in tables]
         difference = f1[1] - f1[0]
         for trial in study.marks:
@@ -89,6 +91,7 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2, help="as many as there are cores, beside one")
     parser.add_argument("--seed", type=int, default=10_000)
     parser.add_argument("--law", type=int, default=0, help="compare the mean F1 of both engines on so many people")
+    parser.add_argument("--device", default="cpu", help="with --law: the torch device of the batches")
     arguments = parser.parse_args()
     plan = Study(
         (StudyStrategy("default"),),
@@ -104,7 +107,7 @@ def main() -> None:
     print(f"- {made_with('torch', 'numpy', 'joblib')}")
     print(f"- {os.cpu_count()} cores, {platform.machine()}; one torch thread a worker\n")
     if arguments.law:
-        print_law(plan, arguments.workers)
+        print_law(plan, arguments.workers, arguments.device)
     else:
         print_throughput(plan, arguments)
 
