@@ -19,6 +19,7 @@ from isiw.models.particles.jumps import WindowTarget
 from isiw.models.particles.kernels.likelihood import ROOM
 from isiw.models.particles.kernels.moves import SCRATCH, UNKNOWN, sweeps
 from isiw.models.particles.kernels.records import columns_of, people_of, trial_records
+from isiw.models.particles.latents import Latents
 from isiw.models.particles.likelihood import total_log_likelihood
 from isiw.models.particles.moves import steps_of
 from isiw.models.particles.noise import NoiseKind, Response
@@ -166,6 +167,20 @@ def test_both_engines_hold_the_usual_for_as_probable_where_isis_are_chosen(profi
         for one in (partial(engine_for, "compiled"), TorchEngine)
     )
     torch.testing.assert_close(ours, theirs, atol=1e-3, rtol=1e-3)
+
+
+def test_densities_of_blocks_kept_from_trial_to_trial_are_those_of_the_particles() -> None:
+    posterior, kept = ParticleModel(particles=200).begin(VALVE_SPACE, 3, people=2), 0
+    for trial, isi_ms in enumerate((230.0, 100.0, 250.0, 400.0, 210.0, 270.0)):
+        mep_mv = 0.2 if isi_ms > 200.0 else 0.012
+        posterior = posterior.model.update(posterior, Observation.of([isi_ms, 230.0], [mep_mv, 0.015]))
+        posterior = posterior.noting_change() if trial == 3 else posterior
+        latents, engine = posterior.swarm.latents, posterior.engine
+        if latents.log_blocks is not None:
+            kept += 1
+            assert torch.equal(engine.log_usual(latents), engine.log_usual(Latents(latents.values, latents.kinds)))
+            assert (latents.log_blocks < UNKNOWN).any()
+    assert kept == 5
 
 
 def test_people_of_a_batch_have_the_likelihood_that_each_has_alone() -> None:

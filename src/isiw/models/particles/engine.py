@@ -104,28 +104,33 @@ class Compiled:
         """Log prior density of what ISIs are chosen with another law of; see `Engine`."""
         found, parts = np.empty(latents.values.shape[:2], dtype=np.float32), np.empty(SCRATCH[1], dtype=np.float32)
         with first_of("prior"):
-            log_usual(self.tables, *self._arrays(latents), parts, found)
+            log_usual(self.tables, *self._arrays(latents), self._log_blocks(latents), parts, found)
         return torch.from_numpy(found)
 
     def sweeps(
         self, number: int, latents: Latents, log_likelihood: Tensor, history: History, generator: torch.Generator
     ) -> Moved:
         """Move every particle some times; see `Engine`."""
-        people, particles = log_likelihood.shape
-        values, kinds = (array.copy() for array in self._arrays(latents))
-        densities = np.full((people, particles, len(self.tables.first)), UNKNOWN)
+        people = len(log_likelihood)
+        values, kinds, log_blocks = (array.copy() for array in (*self._arrays(latents), self._log_blocks(latents)))
         found, steps = log_likelihood.numpy().copy(), steps_of(history)
         dice = torch.randint(2**63 - 1, (people, 1), generator=generator).numpy().view(np.uint64)
         counts, room, scratch = (np.zeros(shape, dtype=np.float32) for shape in ((people, 4), ROOM, SCRATCH))
         with first_of("moves"):
-            told, state = trial_records(columns_of(history)), (values, kinds, found, densities, np.zeros(KINDS, int))
+            told, state = trial_records(columns_of(history)), (values, kinds, found, log_blocks, np.zeros(KINDS, int))
             sweeps(number, self.tables, told, steps, state, dice, (room, scratch), counts)
         shifts, shifted, jumps, jumped = torch.from_numpy(counts).T
-        moved = Latents(torch.from_numpy(values), torch.from_numpy(kinds))
+        moved = Latents(*(torch.from_numpy(array) for array in (values, kinds, log_blocks)))
         return Moved(moved, torch.from_numpy(found), shifted / shifts, jumped / jumps)
 
     def _arrays(self, latents: Latents) -> tuple[FloatArray, IntArray]:
         return latents.values.contiguous().numpy(), latents.kinds.contiguous().numpy()
+
+    def _log_blocks(self, latents: Latents) -> FloatArray:
+        if latents.log_blocks is None:
+            return np.full((*latents.values.shape[:2], len(self.tables.first)), UNKNOWN)
+        log_blocks: FloatArray = latents.log_blocks.numpy()
+        return log_blocks
 
 
 def log_likelihood_of(particles: FloatArray, history: History) -> Tensor:

@@ -179,7 +179,7 @@ class WindowTarget:
         )
         values = latents.values.clone()
         values[:, columns] = torch.where(which.unsqueeze(-1), new, old)
-        after_all = latents._replace(values=values).with_kind("change", torch.where(which, kind, latents.change))
+        after_all = Latents(values, latents.kinds).with_kind("change", torch.where(which, kind, latents.change))
         return after_all, torch.where(which, ratio, 0.0)
 
     def _log_density(self, change: Tensor) -> Tensor:

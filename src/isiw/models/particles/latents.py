@@ -85,6 +85,7 @@ class Latents(NamedTuple):
 
     values: Tensor  # of the model's latents, in their order, (b, p, d)
     kinds: Tensor  # whole numbers in the order of `KINDS`, (b, p, k)
+    log_blocks: Tensor | None = None  # log prior densities of blocks, as far as kernels that moved them know, (b, p, n)
 
     @classmethod
     def of(cls, values: Tensor, **kinds: Tensor | int) -> Latents:
@@ -95,13 +96,14 @@ class Latents(NamedTuple):
 
     def each(self, made: Callable[..., Tensor], *others: Latents) -> Latents:
         """Values and kinds made in one way of those of these particles, and of others."""
-        return Latents(*(made(*fields) for fields in zip(self, *others, strict=True)))
+        particles = self, *others
+        return Latents(made(*(p.values for p in particles)), made(*(p.kinds for p in particles)))
 
     def with_kind(self, name: str, kind: Tensor) -> Latents:
         """The same with one of `KINDS` changed, shape (b, p)."""
         kinds = self.kinds.clone()
         kinds[..., KINDS.index(name)] = kind
-        return self._replace(kinds=kinds)
+        return Latents(self.values, kinds)
 
     @property
     def shape(self) -> Tensor:

@@ -118,7 +118,8 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
     def as_usual(self) -> ParticlePosterior:
         """The same with the prior that ISIs are chosen with; see `ExpectsTheUsual`."""
         latents = self.swarm.latents
-        return replace(self, swarm=self.swarm.times(self.usual.log_usual(latents) - self.engine.log_usual(latents)))
+        usual = self.usual.log_usual(latents._replace(log_blocks=None))  # which are known under one's own prior
+        return replace(self, swarm=self.swarm.times(usual - self.engine.log_usual(latents)))
 
     def noting_change(self) -> ParticlePosterior:
         """The posterior if somebody has seen that something changes now; see `NotesChanges`."""
@@ -138,7 +139,7 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
         values = latents.values.clone()
         own = latents_of("changed", "change", device=values.device)
         values[..., own] = torch.where(chosen.unsqueeze(-1), noted, values[..., own])
-        latents = latents._replace(values=values).with_kind("change", torch.where(chosen, kind, latents.change))
+        latents = Latents(values, latents.kinds).with_kind("change", torch.where(chosen, kind, latents.change))
         swarm = replace(self.swarm, latents=latents).times(
             torch.where(untouched, math.log(share + left), math.log(left))
         )

@@ -170,9 +170,11 @@ class Swarm:
         size, worn = len(shuffled), worn.unsqueeze(-1)
         kept = torch.arange(size, device=shuffled.device)
         rows = self._rows(torch.where(worn, systematic(self.log_weights, size)[:, shuffled], kept))
+        log_blocks = self.latents.log_blocks
+        known = None if log_blocks is None else taken(log_blocks, rows)
         return replace(
             self,
-            latents=self.latents.each(partial(taken, rows=rows)),
+            latents=self.latents.each(partial(taken, rows=rows))._replace(log_blocks=known),
             log_weights=torch.where(worn, -math.log(size), self.log_weights),
             log_likelihood=taken(self.log_likelihood, rows),
         )

@@ -259,7 +259,7 @@ def _weighed(tables: Any, block: int, kinds: Any) -> Any:
 
 
 @writer
-def log_usual(tables: Any, values: Any, kinds: Any, parts: Any, found: Any) -> None:
+def log_usual(tables: Any, values: Any, kinds: Any, densities: Any, parts: Any, found: Any) -> None:
     """Write the log prior density of what ISIs are chosen with another law of, but for a constant, shape (b, p)."""
     edges = tables.kinds[4]
     for person in range(values.shape[0]):
@@ -269,4 +269,7 @@ def log_usual(tables: Any, values: Any, kinds: Any, parts: Any, found: Any) -> N
             found[person, i] = math.log(max(share, _LEAST))
             for block in range(len(tables.first)):
                 if _weighed(tables, block, kinds[person, i]):
-                    found[person, i] += log_block(values[person, i], block, tables, parts)
+                    density = densities[person, i, block]
+                    if density == UNKNOWN:
+                        density = log_block(values[person, i], block, tables, parts)
+                    found[person, i] += density
