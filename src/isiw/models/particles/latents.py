@@ -95,7 +95,7 @@ class Latents(NamedTuple):
         return cls(values, torch.stack(columns, dim=-1))
 
     def each(self, made: Callable[..., Tensor], *others: Latents) -> Latents:
-        """Values and kinds made in one way of those of these particles, and of others."""
+        """Values and kinds made in one way of those of these particles, and of others; without densities of blocks."""
         particles = self, *others
         return Latents(made(*(p.values for p in particles)), made(*(p.kinds for p in particles)))
 

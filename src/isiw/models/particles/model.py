@@ -118,7 +118,7 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
     def as_usual(self) -> ParticlePosterior:
         """The same with the prior that ISIs are chosen with; see `ExpectsTheUsual`."""
         latents = self.swarm.latents
-        usual = self.usual.log_usual(latents._replace(log_blocks=None))  # which are known under one's own prior
+        usual = self.usual.log_usual(latents._replace(log_blocks=None))  # the kept ones are those of the other prior
         return replace(self, swarm=self.swarm.times(usual - self.engine.log_usual(latents)))
 
     def noting_change(self) -> ParticlePosterior:
