@@ -97,6 +97,14 @@ def test_the_likelihood_of_ten_thousand_histories_is_that_of_torch(name: str) ->
     assert max(furthest(TARGETS[name], 100, 10, seed, 4.0 * (seed % 2)) for seed in range(10)) < 1e-3
 
 
+def test_no_trials_say_nothing() -> None:
+    target = TARGETS["default"]
+    latents = Prior().sample(2, 20, generator(1), VALVE_SPACE)
+    none = History.empty(2, torch.device("cpu"))
+    for engine in (engine_for("compiled", target), TorchEngine(target)):
+        assert not engine.log_likelihood(latents, none).any()
+
+
 def test_long_histories_are_summed_piece_by_piece() -> None:
     draws = generator(1)
     person = Prior().person(Prior().sample(1, 20, draws, VALVE_SPACE))

@@ -85,7 +85,7 @@ class Latents(NamedTuple):
 
     values: Tensor  # of the model's latents, in their order, (b, p, d)
     kinds: Tensor  # whole numbers in the order of `KINDS`, (b, p, k)
-    log_blocks: Tensor | None = None  # log prior densities of blocks, as far as kernels that moved them know, (b, p, n)
+    log_blocks: Tensor | None = None  # known log densities of blocks, under the prior they moved under, (b, p, n)
 
     @classmethod
     def of(cls, values: Tensor, **kinds: Tensor | int) -> Latents:

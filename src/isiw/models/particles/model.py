@@ -118,8 +118,8 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
     def as_usual(self) -> ParticlePosterior:
         """The same with the prior that ISIs are chosen with; see `ExpectsTheUsual`."""
         latents = self.swarm.latents
-        usual = self.usual.log_usual(latents._replace(log_blocks=None))  # the kept ones are those of the other prior
-        return replace(self, swarm=self.swarm.times(usual - self.engine.log_usual(latents)))
+        log_usual = self.usual.log_usual(latents._replace(log_blocks=None))  # the kept ones are of the other prior
+        return replace(self, swarm=self.swarm.times(log_usual - self.engine.log_usual(latents)))
 
     def noting_change(self) -> ParticlePosterior:
         """The posterior if somebody has seen that something changes now; see `NotesChanges`."""

@@ -129,7 +129,7 @@ def trial_records(columns: Any) -> Any:
     What is beside the sizes of both sorts is `SHARES`.
     """
     people, trials = columns.shape[:2]
-    pieces = (trials + PIECE - 1) // PIECE
+    pieces = max(1, (trials + PIECE - 1) // PIECE)
     records = np.zeros((people, 2, pieces, TRIAL, PIECE), dtype=np.float32)
     sizes = np.zeros((people, 3, pieces), dtype=np.int64)
     for person in range(people):
