@@ -171,7 +171,7 @@ def test_moves_that_learn_nothing_leave_the_prior_as_it_is(engine: EngineName) -
     trials = torch.zeros((1, 3))
     nothing = History(trials, trials, trials - torch.inf, trials + torch.inf, torch.arange(3.0).unsqueeze(0))
     moves = engine_for(engine, WindowTarget(prior, VALVE_SPACE))
-    moved = moves.sweeps(20, latents, torch.zeros(1, 8000), nothing, generator)
+    moved = moves.sweeps(torch.tensor([20]), latents, torch.zeros(1, 8000), nothing, generator)
     latents = moved.latents
     assert 0.05 < moved.shifts.item() < 1
     assert moved.jumps.item() > 0.8
@@ -284,6 +284,21 @@ def test_responses_seen_or_not_are_learnt_from() -> None:
     assert 310 < estimate.window.end_ms < 430
 
 
+def test_resampling_leaves_particles_to_a_rare_hypothesis_and_its_probability_as_it_is() -> None:
+    model = ParticleModel(particles=4000, moves=Moving(sweeps=0, min_ess=1.0))
+    swarm = model.begin(VALVE_SPACE, 1).swarm
+    changed = swarm.latents.change > 0
+    swarm = replace(swarm, log_weights=torch.log_softmax(torch.where(changed, -9.0, 0.0), dim=-1))
+    probability = (swarm.log_weights.exp() * changed).sum().item()
+    assert probability < 1e-4
+    engine = engine_for("torch", WindowTarget(model.prior, VALVE_SPACE))
+    moved = swarm.moved(engine, model.moves, torch.Generator().manual_seed(1))
+    changed = moved.latents.change > 0
+    assert changed.double().mean() > 0.1  # eight hypotheses, each with three in a hundred before the shares sum to one
+    assert (moved.log_weights.exp() * changed).sum().item() == pytest.approx(probability, rel=0.1)
+    assert moved.latents.present.double().mean() == pytest.approx(model.prior.profile.p_window, abs=0.1)
+
+
 def test_systematic_picks_are_as_frequent_as_their_weights() -> None:
     weights = torch.tensor([[0.1, 0.6, 0.3]])
     picks = systematic(weights.log(), 1000)
@@ -291,10 +306,10 @@ def test_systematic_picks_are_as_frequent_as_their_weights() -> None:
 
 
 @pytest.mark.parametrize(
-    ("trials", "resampled", "sweeps"), [(1, False, 8), (10, False, 5), (60, False, 2), (200, False, 1), (240, False, 1),
+    ("trials", "resampled", "sweeps"), [(1, True, 6), (1, False, 1), (60, True, 4), (200, True, 1), (240, False, 1),
                                         (300, False, 1), (301, False, 0), (301, True, 1), (2000, False, 0)],
 )  # fmt: skip
-def test_a_long_history_is_swept_now_and_then(trials: int, *, resampled: bool, sweeps: int) -> None:
+def test_sweeps_follow_resampling_and_a_long_history_has_few(trials: int, *, resampled: bool, sweeps: int) -> None:
     assert Moving().sweeps_after(trials, resampled=resampled) == sweeps
     assert Moving(sweeps=0).sweeps_after(trials, resampled=resampled) == 0
 

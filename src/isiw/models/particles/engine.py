@@ -41,9 +41,9 @@ class Engine(Protocol):
         """Log prior density of what ISIs are chosen with another law of, but for a constant, shape (b, p)."""
 
     def sweeps(
-        self, number: int, latents: Latents, log_likelihood: Tensor, history: History, generator: torch.Generator
+        self, numbers: Tensor, latents: Latents, log_likelihood: Tensor, history: History, generator: torch.Generator
     ) -> Moved:
-        """Move every particle some times under the posterior of a history."""
+        """Move every particle under the posterior of a history, those of each person so many times (b,)."""
 
 
 def engine_for(name: EngineName, target: Target, device: str = "cpu") -> Engine:
@@ -72,10 +72,18 @@ class TorchEngine:
         return self.target.log_usual(latents)
 
     def sweeps(
-        self, number: int, latents: Latents, log_likelihood: Tensor, history: History, generator: torch.Generator
+        self, numbers: Tensor, latents: Latents, log_likelihood: Tensor, history: History, generator: torch.Generator
     ) -> Moved:
         """Move every particle some times; see `Engine`."""
-        return Mover(self.target, history, generator).sweeps(number, latents, log_likelihood)
+        values, kinds, found = (field.clone() for field in (latents.values, latents.kinds, log_likelihood))
+        accepted = found.new_empty((2, len(found)))
+        for number in set(numbers.tolist()):  # those who move equally often, side by side
+            who = numbers == number
+            some = Latents(values[who], kinds[who])
+            moved = Mover(self.target, history.of_people(who), generator).sweeps(number, some, found[who])
+            values[who], kinds[who], found[who] = *moved.latents[:2], moved.log_likelihood
+            accepted[:, who] = torch.stack((moved.shifts, moved.jumps))
+        return Moved(Latents(values, kinds), found, *accepted)
 
 
 @dataclass(frozen=True)
@@ -108,7 +116,7 @@ class Compiled:
         return torch.from_numpy(found)
 
     def sweeps(
-        self, number: int, latents: Latents, log_likelihood: Tensor, history: History, generator: torch.Generator
+        self, numbers: Tensor, latents: Latents, log_likelihood: Tensor, history: History, generator: torch.Generator
     ) -> Moved:
         """Move every particle some times; see `Engine`."""
         people = len(log_likelihood)
@@ -118,7 +126,7 @@ class Compiled:
         counts, room, scratch = (np.zeros(shape, dtype=np.float32) for shape in ((people, 4), ROOM, SCRATCH))
         with first_of("moves"):
             told, state = trial_records(columns_of(history)), (values, kinds, found, log_blocks, np.zeros(KINDS, int))
-            sweeps(number, self.tables, told, steps, state, dice, (room, scratch), counts)
+            sweeps(numbers.numpy(), self.tables, told, steps, state, dice, (room, scratch), counts)
         shifts, shifted, jumps, jumped = torch.from_numpy(counts).T
         moved = Latents(*(torch.from_numpy(array) for array in (values, kinds, log_blocks)))
         return Moved(moved, torch.from_numpy(found), shifted / shifts, jumped / jumps)

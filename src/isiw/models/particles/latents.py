@@ -80,6 +80,10 @@ KINDS: Final = ("shape", "noise", "present", "depressed", "change")
 """What a particle is of: `ShapeKind`, `NoiseKind`, whether there is an enhancement, a depression, and `ChangeKind`."""
 
 
+HYPOTHESES: Final = 4 * len(ChangeKind)
+"""How many there are: a window or none, a depression or none, and what changes."""
+
+
 class Latents(NamedTuple):
     """Particles of b people, of any model."""
 
@@ -129,3 +133,8 @@ class Latents(NamedTuple):
     def change(self) -> Tensor:
         """What changes in the session, (b, p)."""
         return self.kinds[..., 4]
+
+    @property
+    def hypothesis(self) -> Tensor:
+        """Which of `HYPOTHESES` each particle is of, (b, p)."""
+        return len(ChangeKind) * (2 * self.kinds[..., 2] + self.kinds[..., 3]) + self.change

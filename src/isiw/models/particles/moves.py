@@ -22,7 +22,7 @@ from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
 from isiw.types import FloatArray
 
-JUMP_PROBABILITY = 0.3
+JUMP_PROBABILITY = 0.4
 PART_PROBABILITY = (0.25, 0.30, 0.25, 0.20)
 """How often a difference moves all latents, those of the profile alone, those of the response alone, and place, floor
 and size alone: particles whose floor is far off have another window and gain as well, and leave that with all three."""

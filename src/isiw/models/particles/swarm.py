@@ -16,10 +16,16 @@ import numpy as np
 from isiw.checks import Checked, Natural, Share
 from isiw.lazy import torch
 from isiw.models.particles.engine import Engine
-from isiw.models.particles.latents import Latents
+from isiw.models.particles.latents import HYPOTHESES, Latents
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
 from isiw.models.shared.tables import systematic
+
+LEAST_SHARE = 0.03
+"""Share of the particles that resampling leaves to a hypothesis, however improbable it has become: it can come back."""
+
+LEAST_PROBABILITY = 1e-9
+"""Less probable hypotheses are left fewer particles."""
 
 LEAST_ESS = 0.01
 """Effective sample size before resampling, as a share of the particles: below it a trial contradicted the belief."""
@@ -70,23 +76,22 @@ class Moving(Checked):
     """How often particles move, and when they are resampled.
 
     Args:
-        sweeps: sweeps of Markov chain moves after each trial; up to four times as many among the first 25, whose
-            history is short and tells apart the particles most.
+        sweeps: sweeps of Markov chain moves after each resampling; one follows each other trial.
         max_trial_sweeps: sweeps times trials are at most this many, so that a tell stays fast late in a session; where
             there are more trials, one sweep follows every second, third or later one, and each resampling.
         min_ess: effective sample size, as a share of the particles, below which they are resampled.
     """
 
-    sweeps: Natural = 2
+    sweeps: Natural = 6
     max_trial_sweeps: Natural = 240
     min_ess: Share = 0.5
 
-    def sweeps_after(self, trials: int, *, resampled: bool = True) -> int:
-        """How many sweeps follow a trial: more where the history is short, fewer where it has become long."""
+    def sweeps_after(self, trials: int, *, resampled: bool) -> int:
+        """How many sweeps follow a trial: most where it has said much, fewer where the history has become long."""
         if 0 < self.max_trial_sweeps < trials and self.sweeps:
             return int(resampled or trials % math.ceil(2 * trials / self.max_trial_sweeps) == 0)
-        early = min(4.0, max(1.0, 25 / max(1, trials)))
-        return min(int(self.sweeps * early), max(1, self.max_trial_sweeps // max(1, trials)))
+        most = max(1, self.max_trial_sweeps // max(1, trials)) if resampled else 1
+        return min(self.sweeps, most)
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,9 +149,9 @@ class Swarm:
         worn = ess < moves.min_ess
         # Systematic picks are ordered; shuffled, both halves of the particles represent the posterior.
         shuffled = torch.randperm(self.log_weights.shape[-1], generator=generator, device=generator.device)
-        resampled = bool(worn.any())
-        fresh = self._resampled(worn, shuffled) if resampled else self
-        sweeps = moves.sweeps_after(self.trials, resampled=resampled)
+        fresh = self._resampled(worn, shuffled) if bool(worn.any()) else self
+        least, most = (moves.sweeps_after(self.trials, resampled=resampled) for resampled in (False, True))
+        sweeps = torch.where(worn, most, least)
         moved = engine.sweeps(sweeps, fresh.latents, fresh.log_likelihood, self.history, generator)
         health = Health(ess, moved.shifts, moved.jumps)
         return replace(fresh, latents=moved.latents, log_likelihood=moved.log_likelihood, health=health)
@@ -168,16 +173,25 @@ class Swarm:
     def _resampled(self, worn: Tensor, shuffled: Tensor) -> Swarm:
         """Resample, in this order, those people whose effective sample size has fallen (b,); nobody else notices."""
         size, worn = len(shuffled), worn.unsqueeze(-1)
-        kept = torch.arange(size, device=shuffled.device)
-        rows = self._rows(torch.where(worn, systematic(self.log_weights, size)[:, shuffled], kept))
+        kept, log_favour = torch.arange(size, device=shuffled.device), self._log_favour()
+        picks = systematic(self.log_weights + log_favour, size)[:, shuffled]
+        rows = self._rows(torch.where(worn, picks, kept))
+        fresh = torch.log_softmax(-taken(log_favour, rows), dim=-1)
         log_blocks = self.latents.log_blocks
         known = None if log_blocks is None else taken(log_blocks, rows)
         return replace(
             self,
             latents=self.latents.each(partial(taken, rows=rows))._replace(log_blocks=known),
-            log_weights=torch.where(worn, -math.log(size), self.log_weights),
+            log_weights=torch.where(worn, fresh, self.log_weights),
             log_likelihood=taken(self.log_likelihood, rows),
         )
+
+    def _log_favour(self) -> Tensor:
+        """Log of how much more often particles are picked than their weights say, (b, p); 0 if none is too rare."""
+        hypotheses, weights = self.latents.hypothesis, self.log_weights.exp()
+        probability = weights.new_zeros((len(weights), HYPOTHESES)).scatter_add_(-1, hypotheses, weights)
+        favour = (LEAST_SHARE / probability.clamp_min(LEAST_PROBABILITY)).clamp_min(1.0)
+        return favour.log().gather(-1, hypotheses)
 
 
 @cache

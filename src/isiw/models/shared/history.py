@@ -63,6 +63,11 @@ class History:
             return both
         return replace(both, circumstances=torch.cat((self.around, trial.around), dim=1))
 
+    def of_people(self, who: Tensor) -> History:
+        """The trials of some of the people, as a mask (b,) says."""
+        circumstances = None if self.circumstances is None else self.circumstances[who]
+        return replace(History(*(column[who] for column in self.columns)), circumstances=circumstances)
+
     @property
     def around(self) -> Tensor:
         """The circumstances of all trials, shape (b, n, 6)."""

@@ -101,7 +101,9 @@ def test_moves_leave_the_prior_as_it_is(engine: EngineName) -> None:
     prior, generator = SupraPrior(), torch.Generator().manual_seed(2)
     drawn = prior.sample(1, 4000, generator, SPACE)
     moves = engine_for(engine, SupraTarget(prior, SPACE))
-    moved = moves.sweeps(8, drawn, torch.zeros(1, 4000), History.empty(1, torch.device("cpu")), generator)
+    moved = moves.sweeps(
+        torch.tensor([8]), drawn, torch.zeros(1, 4000), History.empty(1, torch.device("cpu")), generator
+    )
     assert (moved.latents.values != drawn.values).any(-1).double().mean() > 0.9
     assert moved.shifts.item() > 0.1
     fresh = prior.sample(1, 4000, generator, SPACE)

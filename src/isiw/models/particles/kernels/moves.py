@@ -220,15 +220,15 @@ def _move(tables: Any, state: Any, i: int, theirs: Any, trials: Any, dice: Any, 
 
 
 @writer
-def sweeps(number: int, tables: Any, history: Any, steps: Any, state: Any, dice: Any, rooms: Any, counts: Any) -> None:
-    """Move every particle some times, in place, one half by differences within the other."""
+def sweeps(numbers: Any, tables: Any, history: Any, steps: Any, state: Any, dice: Any, rooms: Any, counts: Any) -> None:
+    """Move every particle of each person some times, in place, one half by differences within the other."""
     values, kinds, log_likelihood, densities, chosen = state  # densities of the blocks, and room for one's kinds
     records, sizes = history
     half = values.shape[1] // 2
     for person in range(values.shape[0]):
         own = values[person], kinds[person], log_likelihood[person], densities[person], chosen
         trials = records[person], sizes[person], steps[person]
-        for _ in range(number):
+        for _ in range(numbers[person]):
             for i in range(values.shape[1]):
                 theirs = values[person, half:] if i < half else values[person, :half]
                 _move(tables, own, i, theirs, trials, dice[person], rooms, counts[person])
