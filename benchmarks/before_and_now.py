@@ -136,6 +136,10 @@ def honesty(before: Path, now: Path) -> pd.DataFrame:
         rows[f"sure_and_wrong_{which}"] = ((expected >= summary.SURE_F1) & (expected - f1 >= summary.WRONG_F1)).astype(
             float
         )
+        # How often it itself expects that what it is sure of is wrong altogether.
+        window_told, probability = both[f"reported_window_{which}"].astype(bool), both[f"probability_{which}"]
+        doubt = (1.0 - probability).where(window_told, probability)
+        rows[f"own_doubt_{which}"] = doubt.where(expected >= summary.SURE_F1, 0.0)
         rows[f"start_{which}"], rows[f"end_{which}"] = both[f"start_covered_{which}"], both[f"end_covered_{which}"]
         rows[f"false_window_{which}"] = both[f"reported_window_{which}"].astype(float).mask(there)
         rows[f"false_sure_{which}"] = (both[f"probability_{which}"] >= 0.9).astype(float).mask(there)

@@ -136,6 +136,19 @@ def test_moves_of_both_engines_are_accepted_as_often_and_lead_to_the_same_poster
     assert ours.log_likelihood.mean().item() == pytest.approx(theirs.log_likelihood.mean().item(), abs=0.5)
 
 
+@pytest.mark.parametrize("name", get_args(EngineName))
+def test_each_person_moves_as_often_as_they_need(name: EngineName) -> None:
+    target = TARGETS["default"]
+    latents = target.prior.sample(3, 100, generator(3), target.space)
+    told = history(target.person(latents), 6, generator(4))
+    engine = engine_for(name, target)
+    start = engine.log_likelihood(latents, told)
+    moved = engine.sweeps(torch.tensor([3, 0, 1]), latents, start, told, generator(5))
+    changed = (moved.latents.values != latents.values).any(-1).double().mean(-1)
+    assert changed[0] > changed[2] > changed[1] == 0.0
+    torch.testing.assert_close(moved.log_likelihood, engine.log_likelihood(moved.latents, told), atol=1e-3, rtol=1e-4)
+
+
 @pytest.mark.parametrize("space", [VALVE_SPACE, DesignSpace(0, 300, 5, reference="valve")], ids=["fine", "coarse"])
 def test_a_sample_predicts_what_it_predicts_in_torch(space: DesignSpace) -> None:
     target = WindowTarget(Prior(), space)
