@@ -82,13 +82,16 @@ def test_progress_is_told_as_it_happens_and_goes_on_from_where_a_client_left(tmp
     with client_of(tmp_path) as client:
         session = created(client)
         seen: list[str] = []
+        follows = threading.Event()
 
         def follow() -> None:
             with client_at(str(client.base_url)) as follower, follower.stream("GET", f"{session}/progress") as stream:
+                follows.set()
                 seen.extend(line for line in stream.iter_lines() if line)
 
         thread = threading.Thread(target=follow)
         thread.start()
+        assert follows.wait(timeout=10)
         asked = told(client, session, 2)
         done(client.post(f"{session}/exclude", json={"trial": 0}))
         done(client.post(f"{session}/close"))
