@@ -1,6 +1,6 @@
 """How far the particles of the default are from what many more say of the same trials: `python -m benchmarks.sampler`.
 
-`record` keeps the trials of sessions with the default, and what 8,000 particles with six times the sweeps make of them.
+`record` keeps the trials of sessions with the default, and what 4,000 particles with twice the sweeps make of them.
 `compare` gives the same trials to the default of the isiw that is imported, with several seeds; an earlier version is
 compared by putting its `src` before this one's. People are of the work seeds, as what this says is a choice's reason.
 """
@@ -21,9 +21,10 @@ import typer
 from benchmarks.before_and_now import study_of
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
+from benchmarks.steps import Noting
+from isiw.models.particles.changes import ChangeKind
 from isiw.models.protocol import Observation
-from isiw.studies.sessions import SimulatedSession, _Batch, examine
-from isiw.subjects.subject import Response
+from isiw.studies.sessions import SimulatedSession, examine
 
 MARKS = (20, 40, 60)
 COHORTS = "retuned,step,above-threshold,recruitment"
@@ -33,41 +34,30 @@ SAID = ["probability", "of a step", "expected_f1"]
 app = typer.Typer(help=__doc__)
 
 
-class _Recording(_Batch):
-    """People side by side, whose trials are kept."""
-
-    def __init__(self, sessions: Sequence[SimulatedSession]) -> None:
-        super().__init__(sessions, "cpu")
-        self.sessions, self.rows = sessions, list[dict[str, object]]()
-
-    def tell(self, responses: Sequence[Response]) -> None:
-        """Learn from one trial of each person."""
-        super().tell(responses)
-        for session, told in zip(self.sessions, responses, strict=True):
-            who = {"cohort": session.cohort, "person": session.person, "trial": self.course.told}
-            self.rows.append(who | {"isi_ms": told.isi_ms, "mep_mv": told.mep_mv, "isi_sd_ms": told.isi_sd_ms})
-
-
 def units_of(cohort: str, people: int, seed: int, trials: int) -> Iterator[Sequence[SimulatedSession]]:
     """Sessions with the default, side by side."""
     return (unit.sessions for unit in study_of(cohort, people, seed, (trials,)).units())
 
 
-def said_of(sessions: Sequence[SimulatedSession], trials: pd.DataFrame, seed: int, **settings: Any) -> pd.DataFrame:
-    """What particles make of recorded trials at the marks."""
-    model, space = sessions[0].player().model, sessions[0].space
-    sweeps = settings.pop("sweeps", 1)
-    moves = replace(model.moves, sweeps=sweeps * model.moves.sweeps, max_trial_sweeps=sweeps * 240)
-    posterior, rows = replace(model, moves=moves, **settings).begin(space, seed, len(sessions)), list[dict[str, Any]]()
+def said_of(
+    sessions: Sequence[SimulatedSession], trials: pd.DataFrame, seed: int, particles: int | None = None, sweeps: int = 1
+) -> pd.DataFrame:
+    """What the default's particles, or so many with so many times the sweeps, make of recorded trials at the marks."""
+    model, rows = sessions[0].player().model, list[dict[str, Any]]()
+    own = model.moves
+    moves = replace(own, sweeps=sweeps * own.sweeps, max_trial_sweeps=sweeps * own.max_trial_sweeps)
+    model = replace(model, particles=particles or model.particles, moves=moves)
+    posterior = model.begin(sessions[0].space, seed, len(sessions))
     for trial, told in trials.groupby("trial"):
         columns = (told.sort_values("person")[name].tolist() for name in ("isi_ms", "mep_mv", "isi_sd_ms"))
-        posterior = posterior.model.update(posterior, Observation.of(*columns))
+        posterior = model.update(posterior, Observation.of(*columns))
         if trial in MARKS:
-            swarm = posterior.swarm
-            stepped = ((swarm.latents.change > 0) & (swarm.latents.change != 3)) * swarm.log_weights.exp()
+            change = posterior.swarm.latents.change
+            stepped = (change != ChangeKind.NONE) & (change != ChangeKind.ENHANCEMENT)
+            of_step = (stepped * posterior.swarm.log_weights.exp()).sum(-1).tolist()
             for number, session in enumerate(sessions):
                 estimate = posterior.estimate(number)
-                said = (estimate.probability, float(stepped[number].sum()), estimate.expected_f1)
+                said = (estimate.probability, of_step[number], estimate.expected_f1)
                 who = (session.cohort, session.person, trial)
                 rows.append(dict(zip(KEYS, who, strict=True)) | dict(zip(SAID, said, strict=True)))
     return pd.DataFrame(rows)
@@ -79,7 +69,7 @@ def record(
     people: Annotated[int, typer.Option(help="People a cohort.")] = 25,
     seed: Annotated[int, typer.Option(help="Seed of the people.")] = 800,
     trials: Annotated[int, typer.Option(help="Trials a session.")] = 60,
-    particles: Annotated[int, typer.Option(help="Particles of the yardstick.")] = 8000,
+    particles: Annotated[int, typer.Option(help="Particles of the yardstick.")] = 4000,
     out: Annotated[Path, typer.Option(help="Folder of the tables.")] = Path("sampler"),
 ) -> None:
     """Keep trials, and what many particles say of them."""
@@ -88,10 +78,10 @@ def record(
     for name in cohorts.split(","):
         tables, yardsticks = [], []
         for sessions in units_of(name, people, seed, trials):
-            crowd = _Recording(sessions)
+            crowd = Noting(sessions)
             examine(sessions, crowd)
-            tables.append(pd.DataFrame(crowd.rows))
-            yardsticks += [said_of(sessions, tables[-1], n, particles=particles, sweeps=6) for n in (1001, 1002)]
+            tables.append(pd.DataFrame(crowd.named))
+            yardsticks += [said_of(sessions, tables[-1], n, particles, sweeps=2) for n in (1001, 1002)]
         pd.concat(tables).to_parquet(out / f"{name}.trials.parquet")
         means = pd.concat(yardsticks).groupby(KEYS, as_index=False)[SAID].mean()
         means.assign(seed=seed).to_parquet(out / f"{name}.yardstick.parquet")

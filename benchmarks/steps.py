@@ -63,7 +63,8 @@ class Noting(_Batch):
             change = estimate.change
             found = {} if change is None else {"kind": change.kind, "share": change.probability}
             who = {"cohort": session.cohort, "person": session.person, "seed": session.seed, "trial": self.told}
-            who |= {"isi_ms": told.isi_ms, "mep_mv": told.mep_mv, "expected_f1": estimate.expected_f1}
+            who |= {"isi_ms": told.isi_ms, "isi_sd_ms": told.isi_sd_ms, "mep_mv": told.mep_mv}
+            who |= {"expected_f1": estimate.expected_f1}
             self.named.append(who | {"kind": "", "share": 0.0} | found)
 
 

@@ -77,7 +77,7 @@ class TorchEngine:
         """Move every particle some times; see `Engine`."""
         values, kinds, found = (field.clone() for field in (latents.values, latents.kinds, log_likelihood))
         accepted = found.new_empty((2, len(found)))
-        for number in set(numbers.tolist()):  # those who move equally often, side by side
+        for number in sorted(set(numbers.tolist())):  # those who move equally often, side by side
             who = numbers == number
             some = Latents(values[who], kinds[who])
             moved = Mover(self.target, history.of_people(who), generator).sweeps(number, some, found[who])
