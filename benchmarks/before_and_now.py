@@ -10,11 +10,13 @@
     python -m benchmarks.before_and_now honest before now --out benchmarks/results/realities
     python -m benchmarks.before_and_now speed ../before/src src > benchmarks/results/before_and_now_speed.md
     python -m benchmarks.before_and_now session ../before/src src > benchmarks/results/session_speed.md
+    python -m benchmarks.before_and_now compiling ../before/src src > benchmarks/results/compiling.md
     python -m benchmarks.before_and_now start ../before/src src > benchmarks/results/before_and_now_start.md
 
 `run` keeps one table a cohort, and goes on where it was interrupted; `compare` pairs the people of both, `stops` where
 the stopping rule of each ends, `honest` how often each is sure and wrong; `speed` and `session` have both run the same
-sessions in turn, `start` the same commands about a log. The hit delay is stated where a version can be told it.
+sessions in turn, `compiling` the first trials on a machine, `start` the same commands about a log. The hit delay is
+stated where a version can be told it.
 Reported people come from seed 100,000 on; seeds below 1,000 are for work.
 """
 
@@ -193,9 +195,9 @@ def _lap_s(source: Path, seed: int) -> float:
     return _of_lap(source, "lap", seed)[0]
 
 
-def _of_lap(source: Path, lap: str, seed: int) -> list[float]:
-    """The numbers that a lap with the isiw in a folder prints."""
-    environment = os.environ | {"PYTHONPATH": str(source.resolve()), "OMP_NUM_THREADS": "1"}
+def _of_lap(source: Path, lap: str, seed: int, more: dict[str, str] | None = None) -> list[float]:
+    """The numbers that a lap with the isiw in a folder prints, with more in its environment."""
+    environment = os.environ | {"PYTHONPATH": str(source.resolve()), "OMP_NUM_THREADS": "1"} | (more or {})
     command = [sys.executable, "-m", "benchmarks.before_and_now", lap, str(seed)]
     ended = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)  # noqa: S603 - this file
     return [float(number) for number in ended.stdout.split()]
@@ -247,6 +249,40 @@ def _spent_s(seed: int, trials: int) -> np.ndarray:
         strategy.decision()
         spent_s.append((asked_s - began_s + told_s - answered_s, time.process_time() - told_s))
     return np.array(spent_s)
+
+
+@app.command()
+def compiling(
+    before: Annotated[Path, typer.Argument(help="Folder src of the other version.")],
+    now: Annotated[Path, typer.Argument(help="Folder src of this version.")],
+    laps: Annotated[int, typer.Option(help="How often each compiles everything.")] = 4,
+) -> None:
+    """Print the processor time that compiling adds to the first trials on a machine, each version in turn."""
+    rows = []
+    for number in range(laps):
+        order = (before, now) if number % 2 == 0 else (now, before)
+        spent_s = {source: _compiling_s(source, number) for source in order}
+        rows.append({"seed": number, "before_s": spent_s[before], "now_s": spent_s[now]})
+    table = pd.DataFrame(rows).assign(ratio=lambda t: t["before_s"] / t["now_s"])
+    print(f"- command: `{command_of('before_and_now')}`")
+    print(f"- {made_with('torch', 'numba')}; {platform.machine()}, one thread")
+    print("- processor time of three trials of the default with a decision after each, whose loops are compiled, less")
+    print("  that of the same in a process that loads them\n")
+    print(table.to_markdown(index=False, floatfmt=".2f"))
+
+
+def _compiling_s(source: Path, seed: int) -> float:
+    """Processor time that compiling takes with the isiw in a folder [s]."""
+    with tempfile.TemporaryDirectory() as empty:
+        first, second = (_of_lap(source, "first-lap", seed, {"NUMBA_CACHE_DIR": empty})[0] for _ in range(2))
+    return first - second
+
+
+@app.command(hidden=True)
+def first_lap(seed: int) -> None:
+    """Print the processor time of the first three trials with the isiw that is imported [s]."""
+    torch.set_num_threads(1)
+    print(_spent_s(seed, 3).sum())
 
 
 @app.command(hidden=True)

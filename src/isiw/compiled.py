@@ -52,28 +52,26 @@ def version() -> str:
 
 
 def kernel(function: F) -> F:
-    """Have a function compiled when it is first called; without Numba it is left as it is."""
+    """Have a function compiled when it is first called; without Numba it is left as it is.
+
+    It writes into the arrays that it is given and makes none, which would take seconds to compile.
+    """
     return _compiled(function, _SAFE)
 
 
-def writer(function: F) -> F:
-    """As `kernel`, for functions that make no arrays: looking at a part of one costs nothing there."""
-    return _compiled(function, _SAFE, _nrt=False)
-
-
 def loop(function: F) -> F:
-    """As `writer`, for functions that only others like it call: nothing is compiled that would let Python call them."""
-    return _compiled(function, _SAFE, _nrt=False, no_cpython_wrapper=True)
+    """As `kernel`, for functions that only others like it call: nothing is compiled that would let Python call them."""
+    return _compiled(function, _SAFE, no_cpython_wrapper=True)
 
 
 def inlined(function: F) -> F:
-    """As `writer`, for small functions that become a part of those that call them."""
-    return _compiled(function, _SAFE, _nrt=False, forceinline=True)
+    """As `kernel`, for small functions that become a part of those that call them."""
+    return _compiled(function, _SAFE, forceinline=True, no_cpython_wrapper=True)
 
 
 def part(function: F) -> F:
     """As `loop`, for long functions of many arrays, whose calls would be dear: compiled within those that call them."""
-    return _compiled(function, _SAFE, _nrt=False, inline="always")
+    return _compiled(function, _SAFE, inline="always")
 
 
 _CONSTANTS: Final = *(f"particles/{name}" for name in ("changes", "moves", "noise", "prior", "shapes")), "shared/tables"
@@ -99,7 +97,7 @@ def _compiled(function: F, fastmath: set[str], **more: bool | str) -> F:
 
     # Errors are numpy's: a check of each divisor is no vector instruction.
     options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": fastmath, "no_cfunc_wrapper": True}
-    options |= more
+    options |= {"_nrt": False, **more}
     try:
         compiled: F = numba.njit(cache=True, **options)(function)
     except RuntimeError:  # there is no folder to keep it in
@@ -272,4 +270,4 @@ def _total(values: Any, count: int) -> Any:
     return total
 
 
-total = _compiled(_total, _SAFE | {"reassoc"}, _nrt=False, no_cpython_wrapper=True)
+total = _compiled(_total, _SAFE | {"reassoc"}, no_cpython_wrapper=True)

@@ -30,18 +30,16 @@ _f = np.float32
 _NIL, _LEAST, _TINY = _f(0.0), _f(1e-12), _f(1e-30)
 
 
-@kernel
 def entropy_reductions(mass: Any) -> Any:
     """Entropy of the mean distribution less the mean entropy [nat], shape (b, t)."""
     people, _, candidates, outcomes = mass.shape
-    found = np.empty((people, candidates), dtype=np.float32)
-    mean, room = np.empty((candidates, outcomes), dtype=np.float32), np.empty(outcomes, dtype=np.float32)
+    found, mean = np.empty((people, candidates), np.float32), np.empty((candidates, outcomes), np.float32)
     for person in range(people):
-        _entropies(mass[person], mean, room, found[person])
+        _entropies(mass[person], mean, np.empty(outcomes, np.float32), found[person])
     return found
 
 
-@loop
+@kernel
 def _entropies(mass: Any, mean: Any, room: Any, found: Any) -> None:
     """Write the entropy of the mean distribution less the mean entropy of one person, shape (t,)."""
     samples, candidates, outcomes = mass.shape
@@ -64,7 +62,6 @@ def _entropies(mass: Any, mean: Any, room: Any, found: Any) -> None:
         found[t] -= total(room, outcomes)
 
 
-@kernel
 def variance_reductions(mass: Any, masks: Any) -> Any:
     """Variance of each ISI's probability of membership after the next outcome, summed, shape (b, t).
 
@@ -72,16 +69,21 @@ def variance_reductions(mass: Any, masks: Any) -> Any:
     """
     people, samples, candidates, outcomes = mass.shape
     points = masks.shape[2]
-    found = np.empty((people, candidates), dtype=np.float32)
-    steps, inside = np.empty((points, outcomes), dtype=np.float32), np.empty((3, outcomes), dtype=np.float32)
-    mean = np.empty(points, dtype=np.float32)
-    at, rises = np.empty((samples, points), dtype=np.int64), np.empty((samples, points), dtype=np.float32)
-    counts = np.empty(samples, dtype=np.int64)
+    found, mean = np.empty((people, candidates), np.float32), np.empty(points, np.float32)
+    steps, inside = np.empty((points, outcomes), np.float32), np.empty((3, outcomes), np.float32)
+    at, rises = np.empty((samples, points), np.int64), np.empty((samples, points), np.float32)
+    counts = np.empty(samples, np.int64)
     for person in range(people):
-        _changes(masks[person], at, rises, counts, mean)
-        for t in range(candidates):
-            found[person, t] = _reduction(mass[person], t, at, rises, counts, mean, steps, inside)
+        _reductions(mass[person], masks[person], (at, rises, counts, mean), steps, inside, found[person])
     return found
+
+
+@kernel
+def _reductions(mass: Any, masks: Any, changes: Any, steps: Any, inside: Any, found: Any) -> None:
+    at, rises, counts, mean = changes
+    _changes(masks, at, rises, counts, mean)
+    for t in range(len(found)):
+        found[t] = _reduction(mass, t, at, rises, counts, mean, steps, inside)
 
 
 @loop

@@ -38,7 +38,7 @@ class PersonSample(TabledSample):
         """Facilitation at a window's edge by the least-excess rule; above 1 where there is no window, shape (b, s)."""
         if self.records is not None:
             fine = self.space.step_ms <= FINE_MS
-            found = compiled.edge_levels(self.records, self._evoked.numpy(), self._grid_ms.numpy(), fine)
+            found = compiled.edge_levels(self.records, self._evoked.numpy(), self._grid_ms.numpy(), fine=fine)
             return torch.from_numpy(found)
         excess_mv = self.person.response.log_floor.exp().unsqueeze(-1) * (self._evoked - self._evoked[..., :1])
         peak_mv = interpolated(excess_mv.unsqueeze(-1), self._highest.unsqueeze(-1))[..., 0, 0]

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from isiw.compiled import bell, exp, inlined, log, loop, ndtr, part, per, per_root, total, writer
+from isiw.compiled import bell, exp, inlined, kernel, log, loop, ndtr, per, per_root, total
 from isiw.models.particles import noise
 from isiw.models.particles.kernels import records as field
 from isiw.models.particles.kernels.profile import facilitations
@@ -92,7 +92,7 @@ def _fade(particle: Any, trials: Any, count: int, level: Any) -> None:
             level[i] *= enhancement_after(fading, number[i])
 
 
-@part
+@loop
 def _known(particle: Any, trials: Any, count: int, factor_at: Any, known: Any, varies: Any) -> None:
     """Write the known part of each trial's amplitude, in floors, and its variance."""
     told, told_sd, per_floor = trials[field.KNOWN], trials[field.KNOWN_SD], exp(-particle[field.LOG_FLOOR])
@@ -278,7 +278,7 @@ def _inside(particle: Any, trials: Any, count: int, curve: Any, work: Any, likel
         likelihood[i] = max(_IN * mixed + _OUT * outlier, _LEAST_MASS)
 
 
-@part
+@loop
 def _by_trial(particle: Any, trials: Any, count: int, censored: Any, factor_at: Any, curve: Any, work: Any) -> None:
     """Write the log likelihood of each trial of a piece of one sort, at a node of the factor of known parts."""
     real, isi_sd, likelihood, summed = trials[field.REAL], trials[field.ISI_SD], work[9], work[10]
@@ -343,7 +343,7 @@ def history_likelihood(particle: Any, records: Any, sizes: Any, room: Any) -> fl
     return _averaged(groups) if shares else summed
 
 
-@writer
+@kernel
 def likelihoods(particles: Any, records: Any, sizes: Any, room: Any, found: Any) -> None:
     """Write the log likelihood of each person's history under each particle, shape (b, p)."""
     for person in range(particles.shape[0]):

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from isiw.compiled import kernel, loop, part, writer
+from isiw.compiled import kernel, loop, part
 from isiw.models.particles.changes import ChangeKind
 from isiw.models.particles.kernels.draws import blur, normal, uniform
 from isiw.models.particles.kernels.likelihood import history_likelihood
@@ -219,7 +219,7 @@ def _move(tables: Any, state: Any, i: int, theirs: Any, trials: Any, dice: Any, 
                 densities[i, block] = scratch[5, block]
 
 
-@writer
+@kernel
 def sweeps(numbers: Any, tables: Any, history: Any, steps: Any, state: Any, dice: Any, rooms: Any, counts: Any) -> None:
     """Move every particle of each person some times, in place, one half by differences within the other."""
     values, kinds, log_likelihood, densities, chosen = state  # densities of the blocks, and room for one's kinds
@@ -234,18 +234,23 @@ def sweeps(numbers: Any, tables: Any, history: Any, steps: Any, state: Any, dice
                 _move(tables, own, i, theirs, trials, dice[person], rooms, counts[person])
 
 
-@kernel
 def records(tables: Any, values: Any, kinds: Any, trials: int) -> Any:
     """Records of particles after so many trials, or with their changes if it is negative, shape (b, p, PARTICLE)."""
-    people, size, latents = values.shape
-    found, z = np.empty((people, size, PARTICLE), dtype=np.float32), np.zeros(latents + 1, dtype=np.float32)
-    for person in range(people):
-        for i in range(size):
-            z[:latents] = values[person, i]
+    found, z = np.empty((*kinds.shape[:2], PARTICLE), np.float32), np.zeros(values.shape[2] + 1, np.float32)
+    _records(tables, values, kinds, trials, z, found)
+    return found
+
+
+@kernel
+def _records(tables: Any, values: Any, kinds: Any, trials: int, z: Any, found: Any) -> None:
+    latents = values.shape[2]
+    for person in range(values.shape[0]):
+        for i in range(values.shape[1]):
+            for latent in range(latents):
+                z[latent] = values[person, i, latent]
             meant(z, kinds[person, i], tables.at, found[person, i])
             if trials >= 0:
                 settle(found[person, i], _f(trials))
-    return found
 
 
 @loop
@@ -258,7 +263,7 @@ def _weighed(tables: Any, block: int, kinds: Any) -> Any:
     return place or curve or first == tables.at[5] or change_comes
 
 
-@writer
+@kernel
 def log_usual(tables: Any, values: Any, kinds: Any, densities: Any, parts: Any, found: Any) -> None:
     """Write the log prior density of what ISIs are chosen with another law of, but for a constant, shape (b, p)."""
     edges = tables.kinds[4]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from isiw.compiled import LANES, bell, exp, inlined, kernel, log, loop, per, per_root, total, writer
+from isiw.compiled import LANES, bell, exp, inlined, kernel, log, loop, per, per_root, total
 from isiw.models.particles import noise
 from isiw.models.particles.kernels import records as field
 from isiw.models.particles.kernels.likelihood import NODE_WEIGHTS, NODES_AT, curve_of, is_curved
@@ -26,18 +26,22 @@ _OUT_DENSITY = _f(1.0 / (noise.OUTLIER_LOG_RANGE[1] - noise.OUTLIER_LOG_RANGE[0]
 _OUT, _IN = _f(noise.OUTLIER_PROBABILITY), _f(1.0 - noise.OUTLIER_PROBABILITY)
 
 
-@kernel
 def table_rows(particles: Any, rows: int) -> Any:
     """Facilitations of the tables' rows, shape (b, s, l): squares of equal steps, or equal steps from below 0."""
-    people, size = particles.shape[:2]
-    levels = np.empty((people, size, rows), dtype=np.float32)
+    levels = np.empty((*particles.shape[:2], rows), np.float32)
+    _table_rows(particles, levels)
+    return levels
+
+
+@kernel
+def _table_rows(particles: Any, levels: Any) -> None:
+    people, size, rows = levels.shape
     for person in range(people):
         for i in range(size):
             depth = particles[person, i, field.DEPTH]
             for row in range(rows):
                 share = _f(row) / _f(rows - 1)
                 levels[person, i, row] = share * (_ONE + depth) - depth if depth > _NIL else share * share
-    return levels
 
 
 @loop
@@ -71,14 +75,18 @@ def _evoked(particle: Any, levels: Any, means: Any) -> None:
         means[row] *= ratio * _responds(particle, max(levels[row], _NIL))
 
 
-@kernel
 def evoked_means(particles: Any, levels: Any) -> Any:
     """Expected MEP above the floor, in floors, shape (b, s, l)."""
-    means = np.empty(levels.shape, dtype=np.float32)
+    means = np.empty(levels.shape, np.float32)
+    _evoked_means(particles, levels, means)
+    return means
+
+
+@kernel
+def _evoked_means(particles: Any, levels: Any, means: Any) -> None:
     for person in range(particles.shape[0]):
         for i in range(particles.shape[1]):
             _evoked(particles[person, i], levels[person, i], means[person, i])
-    return means
 
 
 @loop
@@ -140,18 +148,21 @@ def _outcomes(particle: Any, levels: Any, gain: Any, lines: Any, nodes: Any, tab
             table[row, y] = cell[y] * per_sum
 
 
-@kernel
 def outcome_tables(particles: Any, levels: Any, order: int, log_mep: Any, width: Any, table: Any) -> None:
     """Write the probability of each outcome of the next trial at some facilitations, shape (b, s, l, y)."""
-    people, size, rows = levels.shape
-    outcomes = log_mep.shape[1]
-    padded = (max(outcomes, rows) + LANES - 1) // LANES * LANES
-    lines, nodes = np.zeros((6, padded), dtype=np.float32), np.empty((2, NODES, padded), dtype=np.float32)
-    lines[1, :outcomes] = width
+    padded = (max(log_mep.shape[1], levels.shape[2]) + LANES - 1) // LANES * LANES
+    lines, nodes = np.zeros((6, padded), np.float32), np.empty((2, NODES, padded), np.float32)
+    lines[1, : len(width)] = width
+    _outcome_tables(particles, levels, order, log_mep, lines, nodes, table)
+
+
+@kernel
+def _outcome_tables(particles: Any, levels: Any, order: int, log_mep: Any, lines: Any, nodes: Any, table: Any) -> None:
     startle, relaxed = gain_of(order)
-    for person in range(people):
-        lines[0, :outcomes] = log_mep[person]
-        for i in range(size):
+    for person in range(levels.shape[0]):
+        for y in range(log_mep.shape[1]):
+            lines[0, y] = log_mep[person, y]
+        for i in range(levels.shape[1]):
             particle = particles[person, i]
             gain = particle[field.DRIFT] * relaxed + particle[field.STARTLED] * startle
             _outcomes(particle, levels[person, i], gain, lines, nodes, table[person, i])
@@ -174,7 +185,7 @@ def _between_rows(table: Any, level: Any, depth: Any, found: Any) -> None:
             blend[y] = first[y] + above * (second[y] - first[y])
 
 
-@writer
+@kernel
 def rows_between(particles: Any, table: Any, levels: Any, found: Any) -> None:
     """Write what lies between the rows of a table, shape (b, s, t, y)."""
     for person in range(levels.shape[0]):
@@ -183,12 +194,15 @@ def rows_between(particles: Any, table: Any, levels: Any, found: Any) -> None:
             _between_rows(table[person, i], levels[person, i], depth, found[person, i])
 
 
-@kernel
 def facilitation_rows(particles: Any, isi_ms: Any) -> Any:
     """Facilitation of each particle at some ISIs [ms] (t,), shape (b, s, t)."""
-    people, size = particles.shape[:2]
-    found = np.empty((people, size, len(isi_ms)), dtype=np.float32)
-    for person in range(people):
-        for i in range(size):
-            facilitations(particles[person, i], isi_ms, found[person, i], len(isi_ms))
+    found = np.empty((*particles.shape[:2], len(isi_ms)), np.float32)
+    _facilitation_rows(particles, isi_ms, found)
     return found
+
+
+@kernel
+def _facilitation_rows(particles: Any, isi_ms: Any, found: Any) -> None:
+    for person in range(particles.shape[0]):
+        for i in range(particles.shape[1]):
+            facilitations(particles[person, i], isi_ms, found[person, i], len(isi_ms))

@@ -122,7 +122,6 @@ def settle(particle: Any, order: Any) -> None:
     particle[STEP] = particle[STEP_DRIVE] = particle[STEP_SCALE] = particle[FADING] = _NIL
 
 
-@kernel
 def trial_records(columns: Any) -> Any:
     """Trials, known and censored, as (b, 2, pieces, TRIAL, PIECE), and how many a piece has, in lanes but for a few.
 
@@ -130,8 +129,15 @@ def trial_records(columns: Any) -> Any:
     """
     people, trials = columns.shape[:2]
     pieces = max(1, (trials + PIECE - 1) // PIECE)
-    records = np.zeros((people, 2, pieces, TRIAL, PIECE), dtype=np.float32)
-    sizes = np.zeros((people, 3, pieces), dtype=np.int64)
+    records = np.zeros((people, 2, pieces, TRIAL, PIECE), np.float32)
+    sizes = np.zeros((people, 3, pieces), np.int64)
+    _trial_records(columns, records, sizes)
+    return records, sizes
+
+
+@kernel
+def _trial_records(columns: Any, records: Any, sizes: Any) -> None:
+    people, trials, pieces = len(columns), columns.shape[1], sizes.shape[2]
     for person in range(people):
         for n in range(trials):
             column = columns[person, n]
@@ -154,4 +160,3 @@ def trial_records(columns: Any) -> Any:
             for piece in range(pieces):
                 over = sizes[person, sort, piece] % LANES
                 sizes[person, sort, piece] += LANES - over if over > FEW else 0
-    return records, sizes

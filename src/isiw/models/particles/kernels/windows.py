@@ -66,16 +66,19 @@ def _edge_level(particle: Any, evoked: Any, highest: Any) -> Any:
     return place * place
 
 
-@kernel
-def edge_levels(particles: Any, evoked: Any, isi_ms: Any, fine: bool) -> Any:  # noqa: FBT001 - kernels know no keywords
+def edge_levels(particles: Any, evoked: Any, isi_ms: Any, *, fine: bool) -> Any:
     """Facilitation at each window's edge, shape (b, s); 2 where there is no window."""
-    people, size = particles.shape[:2]
-    found, room = np.empty((people, size), dtype=np.float32), np.empty((2, max(3, len(isi_ms))), dtype=np.float32)
-    for person in range(people):
-        for i in range(size):
+    found, room = np.empty(particles.shape[:2], np.float32), np.empty((2, max(3, len(isi_ms))), np.float32)
+    _edge_levels(particles, evoked, isi_ms, fine, room, found)
+    return found
+
+
+@kernel
+def _edge_levels(particles: Any, evoked: Any, isi_ms: Any, fine: Any, room: Any, found: Any) -> None:
+    for person in range(particles.shape[0]):
+        for i in range(particles.shape[1]):
             highest = _highest(particles[person, i], isi_ms, fine, room)
             found[person, i] = _edge_level(particles[person, i], evoked[person, i], highest)
-    return found
 
 
 @loop
@@ -124,25 +127,21 @@ def _runs(particle: Any, level: Any, isi_ms: Any, room: Any, runs: Any) -> None:
         runs[0], runs[1] = first, behind
 
 
-@kernel
 def window_runs(particles: Any, levels: Any, isi_ms: Any) -> Any:
     """Which ISIs are in each particle's window, as two runs of indices (first, behind the last), shape (b, s, 4)."""
-    people, size = levels.shape
-    runs, room = np.empty((people, size, 4), dtype=np.int32), np.empty(len(isi_ms), dtype=np.float32)
-    for person in range(people):
-        for i in range(size):
-            _runs(particles[person, i], levels[person, i], isi_ms, room, runs[person, i])
+    runs, room = np.empty((*levels.shape, 4), np.int32), np.empty(len(isi_ms), np.float32)
+    _window_runs(particles, levels, isi_ms, room, runs)
     return runs
 
 
 @kernel
+def _window_runs(particles: Any, levels: Any, isi_ms: Any, room: Any, runs: Any) -> None:
+    for person in range(levels.shape[0]):
+        for i in range(levels.shape[1]):
+            _runs(particles[person, i], levels[person, i], isi_ms, room, runs[person, i])
+
+
 def masks_of(runs: Any, points: int) -> Any:
     """Windows as 0 or 1 (b, s, t) from their runs (b, s, 4) on so many ISIs."""
-    people, size = runs.shape[:2]
-    masks = np.zeros((people, size, points), dtype=np.float32)
-    for person in range(people):
-        for i in range(size):
-            for side in (0, 2):
-                for t in range(runs[person, i, side], runs[person, i, side + 1]):
-                    masks[person, i, t] = _ONE
-    return masks
+    at, (first, behind, other, other_behind) = np.arange(points), np.moveaxis(runs[..., np.newaxis], 2, 0)
+    return (((first <= at) & (at < behind)) | ((other <= at) & (at < other_behind))).astype(np.float32)
