@@ -99,9 +99,8 @@ SCENARIOS = {
 
 
 @pytest.fixture
-def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+def bench(tmp_path: Path) -> Any:
     """Makes the bench of one scenario, again and again the same."""
-    monkeypatch.setattr(os, "fsync", lambda _: None)  # which bytes stay is said by the test, not by this disk
     made = Bench(tmp_path / "bench" / "logs", tmp_path / "bench" / "ledger")
 
     def make(prepare: Any) -> Bench:

@@ -7,6 +7,7 @@ import os
 import platform
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple, TypedDict
@@ -39,6 +40,7 @@ ENGINE_VERSION: Final = 2
 """Which belief a session learns by, and which engine computes it, for its header."""
 
 _PACKAGES = ("numpy", "torch", "botorch", "gpytorch")
+_version = cache(importlib.metadata.version)  # which reads a file
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ class Earlier:
 
 def versions() -> dict[str, str]:
     """The versions that what a strategy asks depends on, by package; a log that states no engine is torch's."""
-    installed = {package: importlib.metadata.version(package) for package in _PACKAGES}
+    installed = {package: _version(package) for package in _PACKAGES}
     return {"isiw": isiw.__version__, "python": platform.python_version(), **installed, "engine": engine_version()}
 
 
