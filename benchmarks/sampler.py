@@ -1,8 +1,9 @@
 """How far the particles of the default are from what many more say of the same trials: `python -m benchmarks.sampler`.
 
 `record` keeps the trials of sessions with the default, and what 4,000 particles with twice the sweeps make of them.
-`compare` gives the same trials to the default of the isiw that is imported, with several seeds; an earlier version is
-compared by putting its `src` before this one's. People are of the work seeds, as what this says is a choice's reason.
+`compare` gives the same trials to the default of the isiw that is imported, with several seeds, and says how often both
+are sure and wrong; an earlier version is compared by putting its `src` before this one's. People are of the work seeds
+where what this says is a choice's reason.
 """
 
 from __future__ import annotations
@@ -22,14 +23,17 @@ from benchmarks.before_and_now import study_of
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
 from benchmarks.steps import Noting
+from isiw.metrics import f1
 from isiw.models.particles.changes import ChangeKind
 from isiw.models.protocol import Observation
+from isiw.studies import summary
 from isiw.studies.sessions import SimulatedSession, examine
 
 MARKS = (20, 40, 60)
 COHORTS = "retuned,step,above-threshold,recruitment"
 KEYS = ["cohort", "person", "trial"]
 SAID = ["probability", "of a step", "expected_f1"]
+WRONG = "sure and wrong"
 
 app = typer.Typer(help=__doc__)
 
@@ -57,9 +61,11 @@ def said_of(
             of_step = (stepped * posterior.swarm.log_weights.exp()).sum(-1).tolist()
             for number, session in enumerate(sessions):
                 estimate = posterior.estimate(number)
-                said = (estimate.probability, of_step[number], estimate.expected_f1)
+                actual = f1(estimate, session.subject().window(session.space, int(trial)), session.space)
+                wrong = estimate.expected_f1 >= summary.SURE_F1 and estimate.expected_f1 - actual >= summary.WRONG_F1
+                said = (estimate.probability, of_step[number], estimate.expected_f1, float(wrong))
                 who = (session.cohort, session.person, trial)
-                rows.append(dict(zip(KEYS, who, strict=True)) | dict(zip(SAID, said, strict=True)))
+                rows.append(dict(zip(KEYS, who, strict=True)) | dict(zip([*SAID, WRONG], said, strict=True)))
     return pd.DataFrame(rows)
 
 
@@ -83,7 +89,7 @@ def record(
             tables.append(pd.DataFrame(crowd.named))
             yardsticks += [said_of(sessions, tables[-1], n, particles, sweeps=2) for n in (1001, 1002)]
         pd.concat(tables).to_parquet(out / f"{name}.trials.parquet")
-        means = pd.concat(yardsticks).groupby(KEYS, as_index=False)[SAID].mean()
+        means = pd.concat(yardsticks).groupby(KEYS, as_index=False)[[*SAID, WRONG]].mean()
         means.assign(seed=seed).to_parquet(out / f"{name}.yardstick.parquet")
 
 
@@ -106,7 +112,8 @@ def compare(
         both = pd.concat(found).merge(yardstick, on=KEYS, suffixes=("", "_yardstick"))
         for trial, at in both.groupby("trial"):
             apart = {said: np.sqrt(np.mean((at[said] - at[f"{said}_yardstick"]) ** 2)) for said in SAID}
-            rows.append({"cohort": name, "trial": trial} | apart | {"s a session": spent_s})
+            wrong = {WRONG: at[WRONG].mean(), f"{WRONG}, yardstick": at[f"{WRONG}_yardstick"].mean()}
+            rows.append({"cohort": name, "trial": trial} | apart | wrong | {"s a session": spent_s})
     print(f"- command: `{command_of('sampler')}`")
     print(f"- {made_with('torch', 'numba')}\n")
     print(pd.DataFrame(rows).to_markdown(index=False, floatfmt=".3f"))
