@@ -65,7 +65,7 @@ def loop(function: F) -> F:
 
 
 def inlined(function: F) -> F:
-    """As `kernel`, for small functions that become a part of those that call them."""
+    """As `loop`, for small functions that become a part of those that call them."""
     return _compiled(function, _SAFE, forceinline=True, no_cpython_wrapper=True)
 
 
