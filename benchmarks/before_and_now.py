@@ -32,6 +32,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -178,16 +179,21 @@ def speed(
     laps: Annotated[int, typer.Option(help="How often each runs 50 sessions of 30 trials.")] = 4,
 ) -> None:
     """Print the processor time of both versions, each lap first as often as second; the stopping rule is ignored."""
+    _print_ratios(before, now, laps, _lap_s, "50 sessions of `recruitment` side by side, 30 trials each")
+
+
+def _print_ratios(before: Path, now: Path, laps: int, spent_s: Callable[[Path, int], float], what: str) -> None:
+    """Print the processor time that something takes with both versions, by lap, and its ratio."""
     rows = []
     for number in range(laps):
         order = (before, now) if number % 2 == 0 else (now, before)
-        spent_s = {source: _lap_s(source, number) for source in order}
-        rows.append({"seed": number, "before_s": spent_s[before], "now_s": spent_s[now]})
-    table = pd.DataFrame(rows).assign(ratio=lambda t: t["before_s"] / t["now_s"])
+        spent = {source: spent_s(source, number) for source in order}
+        rows.append((number, spent[before], spent[now], spent[before] / spent[now]))
     print(f"- command: `{command_of('before_and_now')}`")
-    print(f"- {made_with('torch')}; {platform.machine()}, one thread")
-    print("- processor time of 50 sessions of `recruitment` side by side, 30 trials each\n")
-    print(table.to_markdown(index=False, floatfmt=".2f"))
+    print(f"- {made_with('torch', 'numba')}; {platform.machine()}, one thread")
+    print(f"- processor time of {what}\n")
+    headings = ["seed", "before_s", "now_s", "ratio"]
+    print(pd.DataFrame(rows, columns=headings).to_markdown(index=False, floatfmt=("", ".2f", ".2f", ".2f")))
 
 
 def _lap_s(source: Path, seed: int) -> float:
@@ -258,17 +264,8 @@ def compiling(
     laps: Annotated[int, typer.Option(help="How often each compiles everything.")] = 4,
 ) -> None:
     """Print the processor time that compiling adds to the first trials on a machine, each version in turn."""
-    rows = []
-    for number in range(laps):
-        order = (before, now) if number % 2 == 0 else (now, before)
-        spent_s = {source: _compiling_s(source, number) for source in order}
-        rows.append({"seed": number, "before_s": spent_s[before], "now_s": spent_s[now]})
-    table = pd.DataFrame(rows).assign(ratio=lambda t: t["before_s"] / t["now_s"])
-    print(f"- command: `{command_of('before_and_now')}`")
-    print(f"- {made_with('torch', 'numba')}; {platform.machine()}, one thread")
-    print("- processor time of three trials of the default with a decision after each, whose loops are compiled, less")
-    print("  that of the same in a process that loads them\n")
-    print(table.to_markdown(index=False, floatfmt=".2f"))
+    what = "three trials of the default with a decision after each, whose loops are compiled, less\n"
+    _print_ratios(before, now, laps, _compiling_s, f"{what}  that of the same in a process that loads them")
 
 
 def _compiling_s(source: Path, seed: int) -> float:

@@ -32,7 +32,7 @@ def pytest_xdist_auto_num_workers() -> Generator[None, int, int]:
 
 @pytest.fixture(scope="session", autouse=True)
 def no_disk() -> Generator[None, None, None]:
-    """Nothing waits for a disk: no test cuts the power, and what is left on a disk then is made by `crashes`."""
+    """Nothing waits for the disk; what is left on it after a power cut is made by `session/crashes.py`."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(os, "fsync", lambda _: None)
         yield

@@ -143,5 +143,5 @@ def _window_runs(particles: Any, levels: Any, isi_ms: Any, room: Any, runs: Any)
 
 def masks_of(runs: Any, points: int) -> Any:
     """Windows as 0 or 1 (b, s, t) from their runs (b, s, 4) on so many ISIs."""
-    at, (first, behind, other, other_behind) = np.arange(points), np.moveaxis(runs[..., np.newaxis], 2, 0)
-    return (((first <= at) & (at < behind)) | ((other <= at) & (at < other_behind))).astype(np.float32)
+    at, firsts, behinds = np.arange(points), runs[..., ::2, np.newaxis], runs[..., 1::2, np.newaxis]
+    return ((firsts <= at) & (at < behinds)).any(-2).astype(np.float32)
