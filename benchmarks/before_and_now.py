@@ -193,7 +193,7 @@ def _print_ratios(before: Path, now: Path, laps: int, spent_s: Callable[[Path, i
     print(f"- {made_with('torch', 'numba')}; {platform.machine()}, one thread")
     print(f"- processor time of {what}\n")
     headings = ["seed", "before_s", "now_s", "ratio"]
-    print(pd.DataFrame(rows, columns=headings).to_markdown(index=False, floatfmt=("", ".2f", ".2f", ".2f")))
+    print(pd.DataFrame(rows, columns=headings).to_markdown(index=False, floatfmt=(".0f", ".2f", ".2f", ".2f")))
 
 
 def _lap_s(source: Path, seed: int) -> float:
