@@ -25,6 +25,8 @@ FOLDER: Final = Path("benchmarks/results/quick")
 QUICK: Final[Mapping[str, str]] = {
     "acquisition": "--cohorts gaussian,recruitment --people 4 --other-people 2 --oracle-people 2 --trials 10 --out OUT",
     "another_day": "--people 4 --earlier-trials 8 --trials 8 --out OUT",
+    "another_version compare": "--out OUT",
+    "another_version run": "--cohorts gaussian --people 2 --out OUT",
     "before_and_now compare": "--out OUT",
     "before_and_now run": "--cohorts gaussian --people 4 --out OUT",
     "before_and_now speed": "--laps 1",

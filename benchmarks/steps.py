@@ -4,7 +4,7 @@
 trial. `report` compares that with a CUSUM that knows the person's law, the size and the direction of the step, and
 whose threshold no more than 3 % of the sessions without a step reach. `bound` says how often the trials of a session
 could name its step to anyone who knows its trial, but neither the person nor the size. Reported people come from seed
-200,000 on.
+200,000 on. `run --knowing` runs a belief that knows what the people of a cohort have in common.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
 import pandas as pd
@@ -22,7 +22,11 @@ import typer
 from benchmarks.before_and_now import LATER, MARKS, honesty, study_of
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
+from isiw.models.particles.changes import ChangePrior
+from isiw.models.particles.laws import FOREARM, Floor, Intensity, NoiseShares
+from isiw.models.particles.prior import Prior
 from isiw.models.protocol import Observation
+from isiw.models.shared.scales import Scale
 from isiw.studies import summary
 from isiw.studies.sessions import SimulatedSession, _Batch, examine
 from isiw.subjects.responses import RecruitmentResponse
@@ -74,6 +78,8 @@ def run(
     people: Annotated[int, typer.Option(help="People a cohort.")] = 200,
     seed: Annotated[int, typer.Option(help="Seed of the people.")] = 220_000,
     trials: Annotated[int, typer.Option(help="Trials a session.")] = 60,
+    *,
+    knowing: Annotated[bool, typer.Option(help="With a prior that is the cohort's own law.")] = False,
     out: Annotated[Path, typer.Option(help="Folder of the tables.")] = Path("steps"),
 ) -> None:
     """Run the default, 25 people at a time; a cohort's tables grow with each 25, and it goes on behind them."""
@@ -84,7 +90,7 @@ def run(
         files = out / f"{name}.parquet", out / "named" / f"{name}.parquet"
         tables = [[pd.read_parquet(file)] if file.exists() else [] for file in files]
         done = set() if not tables[0] else set(tables[0][0]["person"])
-        for unit in study_of(name, people, seed, marks, "noted").units():
+        for unit in study_of(name, people, seed, marks, "noted", settings=law_of(name) if knowing else None).units():
             if {session.person for session in unit.sessions} <= done:
                 continue
             crowd = Noting(unit.sessions)
@@ -92,6 +98,36 @@ def run(
             tables[1].append(pd.DataFrame(crowd.named))
             for file, rows in zip(files, tables, strict=True):
                 pd.concat(rows).to_parquet(file)
+
+
+def law_of(cohort: str) -> dict[str, Any]:
+    """Settings of a belief that knows the muscle, that half have a window, and what changes: nobody could know more.
+
+    Sizes of changes are normal there, about as large as the cohort's.
+    """
+    never = 1e-6
+    still = ChangePrior(level=never, intensity=never, enhancement=never, scale=never)
+    laws = {
+        "above-threshold": (still, Intensity(1.0, Scale(105.0, 3.0))),
+        "retuned": (
+            replace(still, intensity=0.999, trial=Scale(16.0, 0.5), size_sd=1.15),
+            Intensity(1.0, Scale(90.0, 0.5)),
+        ),
+        "step": (replace(still, level=0.999, trial=Scale(15.0, 0.6), size_sd=1.45), Intensity(1.0, Scale(90.0, 0.5))),
+    }
+    changes, intensity = laws[cohort]
+    usual = Prior().as_usual(never)
+    profile = replace(usual.profile, p_window=0.5, start=replace(usual.profile.start, p_anywhere=0.0))
+    prior = replace(
+        usual,
+        profile=profile,
+        noise=NoiseShares(0.0, 0.0, 1.0, 0.0, 0.0),
+        muscles=(replace(FOREARM, share=1.0),),
+        intensities=(intensity,),
+        floors=(Floor(1.0, Scale(0.010, 0.25), Scale(0.18, 0.2)),),
+        changes=changes,
+    )
+    return {"prior": prior, "unusual_kept": 1.0}
 
 
 def log_ratios(
