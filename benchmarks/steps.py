@@ -23,8 +23,9 @@ from benchmarks.before_and_now import LATER, MARKS, honesty, study_of
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
 from isiw.models.particles.changes import ChangePrior
-from isiw.models.particles.laws import FOREARM, Floor, Intensity, NoiseShares
+from isiw.models.particles.laws import FOREARM, HAND, Floor, Intensity, NoiseShares
 from isiw.models.particles.prior import Prior
+from isiw.models.particles.profile import ProfilePrior
 from isiw.models.protocol import Observation
 from isiw.models.shared.scales import Scale
 from isiw.studies import summary
@@ -101,29 +102,26 @@ def run(
 
 
 def law_of(cohort: str) -> dict[str, Any]:
-    """Settings of a belief that knows the muscle, that half have a window, and what changes: nobody could know more.
+    """Settings of a belief that knows the muscle, that half have a window, and what changes, as the cohort has it.
 
     Sizes of changes are normal there, about as large as the cohort's.
     """
     never = 1e-6
     still = ChangePrior(level=never, intensity=never, enhancement=never, scale=never)
-    laws = {
-        "above-threshold": (still, Intensity(1.0, Scale(105.0, 3.0))),
-        "retuned": (
-            replace(still, intensity=0.999, trial=Scale(16.0, 0.5), size_sd=1.15),
-            Intensity(1.0, Scale(90.0, 0.5)),
-        ),
-        "step": (replace(still, level=0.999, trial=Scale(15.0, 0.6), size_sd=1.45), Intensity(1.0, Scale(90.0, 0.5))),
-    }
-    changes, intensity = laws[cohort]
+    at_90, above = (Intensity(1.0, Scale(90.0, 0.5)),), (Intensity(1.0, Scale(105.0, 3.0)),)
+    muscle, changes, intensities = {
+        "above-threshold": (FOREARM, still, above),
+        "hand-flat": (HAND, still, tuple(Intensity(1 / 3, Scale(pct, 0.5)) for pct in (90.0, 100.0, 110.0))),
+        "retuned": (FOREARM, replace(still, intensity=0.999, trial=Scale(16.0, 0.5), size_sd=1.15), at_90),
+        "step": (FOREARM, replace(still, level=0.999, trial=Scale(15.0, 0.6), size_sd=1.45), at_90),
+    }[cohort]
     usual = Prior().as_usual(never)
-    profile = replace(usual.profile, p_window=0.5, start=replace(usual.profile.start, p_anywhere=0.0))
     prior = replace(
         usual,
-        profile=profile,
+        profile=replace(usual.profile, p_window=0.5, start=replace(usual.profile.start, p_anywhere=0.0)),
         noise=NoiseShares(0.0, 0.0, 1.0, 0.0, 0.0),
-        muscles=(replace(FOREARM, share=1.0),),
-        intensities=(intensity,),
+        muscles=(replace(muscle, share=1.0),),
+        intensities=intensities,
         floors=(Floor(1.0, Scale(0.010, 0.25), Scale(0.18, 0.2)),),
         changes=changes,
     )
@@ -196,10 +194,37 @@ def _honest(folder: Path) -> pd.DataFrame:
         errors = pd.read_parquet(file).groupby(["cohort", "trial"])["f1"].sem()
         table = table.rename(columns=lambda column: column.removesuffix("_now"))
         table.insert(2, "f1_se", errors)
+        told_share = knowing_the_share(pd.read_parquet(file)).groupby(["cohort", "trial"]).mean()
+        table.insert(4, "f1_with_share", told_share["f1"])
+        table.insert(5, "expected_with_share", told_share["expected"])
         wrong = table["sure_and_wrong"]
-        table.insert(5, "sure_and_wrong_se", np.sqrt(wrong * (1.0 - wrong) / table["people"]))
+        table.insert(
+            table.columns.get_loc("sure_and_wrong") + 1,
+            "sure_and_wrong_se",
+            np.sqrt(wrong * (1.0 - wrong) / table["people"]),
+        )
         tables.append(table.reset_index())
     return pd.concat(tables)
+
+
+def knowing_the_share(rows: pd.DataFrame) -> pd.DataFrame:
+    """Actual and expected F1 if the prior of a window were the share of people with one; NaN if all or none have one.
+
+    Args:
+        rows: of one cohort.
+    """
+    share, there = rows["true_window"].mean(), rows["true_window"].astype(bool)
+    if share in {0.0, 1.0}:
+        return rows[["cohort", "trial"]].assign(f1=np.nan, expected=np.nan)
+    before = ProfilePrior().p_window
+    odds = rows["probability"] / (1.0 - rows["probability"]) * (share / (1.0 - share)) * ((1.0 - before) / before)
+    probability = 1.0 - 1.0 / (1.0 + odds)
+    of_window = rows["expected_f1"] / rows["probability"] * probability  # the window stays as it is
+    keeps = rows["reported_window"].astype(bool) & (probability >= 0.5) & (of_window >= 1.0 - probability)
+    none = rows["f1"].where(~rows["reported_window"].astype(bool), (~there).astype(float))
+    return rows[["cohort", "trial"]].assign(
+        f1=rows["f1"].where(keeps, none), expected=of_window.where(keeps, 1.0 - probability)
+    )
 
 
 def _at_stopping(folder: Path, named: pd.DataFrame) -> pd.DataFrame:

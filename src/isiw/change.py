@@ -5,13 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, Literal
 
+LIKELY_CHANGE: Final = 0.6
+"""Probability from which on an estimate names a change; at 0.5, more than 3 % of sessions would name one wrongly."""
+
 SURE_OF_A_CHANGE: Final = 0.9
 """Probability from which on a change during the session is said."""
 
 
 @dataclass(frozen=True)
 class Change:
-    """A change in the course of a session, whatever the ISI, that is more probable than none.
+    """A likely change in the course of a session, whatever the ISI.
 
     Args:
         kind: what changed: amplitudes, the intensity as far as MEPs show it, or the enhancement from trial to trial.

@@ -13,6 +13,7 @@ from enum import IntEnum
 from functools import cached_property
 from typing import Final, NamedTuple
 
+from isiw.change import LIKELY_CHANGE
 from isiw.change import Change as EstimatedChange
 from isiw.checks import Checked, Positive, Share
 from isiw.errors import InvalidValueError
@@ -193,7 +194,7 @@ class Change(NamedTuple):
         levelled, shifted = gain.abs() > MATTERS, shift_pct.abs() > MATTERS * INTENSITY_PCT
         stepped, faded = levelled | shifted, enhancement.log().abs() > MATTERS
         share = stepped.double().mean().item(), faded.double().mean().item()
-        if max(share) < 0.5:
+        if max(share) < LIKELY_CHANGE:
             return None
         if share[1] > share[0]:
             return EstimatedChange("enhancement", share[1], *_interval(enhancement[faded]))
