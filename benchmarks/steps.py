@@ -80,6 +80,7 @@ def run(
     seed: Annotated[int, typer.Option(help="Seed of the people.")] = 220_000,
     trials: Annotated[int, typer.Option(help="Trials a session.")] = 60,
     *,
+    stated: Annotated[bool, typer.Option(help="The intensity is stated.")] = False,
     knowing: Annotated[bool, typer.Option(help="With a prior that is the cohort's own law.")] = False,
     out: Annotated[Path, typer.Option(help="Folder of the tables.")] = Path("steps"),
 ) -> None:
@@ -91,7 +92,8 @@ def run(
         files = out / f"{name}.parquet", out / "named" / f"{name}.parquet"
         tables = [[pd.read_parquet(file)] if file.exists() else [] for file in files]
         done = set() if not tables[0] else set(tables[0][0]["person"])
-        for unit in study_of(name, people, seed, marks, "noted", settings=law_of(name) if knowing else None).units():
+        study = study_of(name, people, seed, marks, "noted", settings=law_of(name) if knowing else None)
+        for unit in replace(study, intensity="stated" if stated else "unstated").units():
             if {session.person for session in unit.sessions} <= done:
                 continue
             crowd = Noting(unit.sessions)

@@ -79,6 +79,7 @@ def main(
     table = pd.DataFrame(rows)
     error = table["expected"] - table["f1"]
     table["sure_and_wrong"] = (table["expected"] >= summary.SURE_F1) & (error >= summary.WRONG_F1)
+    table["without_the_sentence"] = table["sure_and_wrong"] & (table["told"] != 1)
     usual = table[table["sessions"] == "no response"].set_index(["person", "trial"])["f1"]
     table["f1_more"] = table["f1"] - table.join(usual.rename("usual"), on=["person", "trial"])["usual"]
     groups = table.drop(columns="person").groupby(["sessions", "trial"])
@@ -89,7 +90,8 @@ def main(
     print(
         "- `f1_more`: beside the same people without a response to the tap; `told`: of the windows that are reported,"
     )
-    print("  those with the sentence that the tap's own response may explain them\n")
+    print("  those with the sentence that the tap's own response may explain them; `without_the_sentence`: who is sure")
+    print("  and wrong without it\n")
     print(means.astype(float).to_markdown(floatfmt=".3f"))
 
 

@@ -51,6 +51,12 @@ def test_a_batch_of_one_is_that_session(strategy: str) -> None:
     pd.testing.assert_frame_equal(timeless(simulate_batch(batch)), timeless(one_at_a_time(batch)))
 
 
+def test_rounded_amplitudes_are_learnt_as_intervals_as_in_a_session() -> None:
+    for person in range(3):  # whose step shows after some trials
+        batch = sessions("default", 1, first=person, trials=12, cohort="coarse")
+        pd.testing.assert_frame_equal(timeless(simulate_batch(batch)), timeless(one_at_a_time(batch)))
+
+
 @pytest.mark.parametrize(
     ("strategy", "trials"),
     # NR draws to choose what to ask after its six initial ISIs; PF when a generation is complete.

@@ -18,11 +18,11 @@ from isiw.errors import InvalidValueError, StudyError
 from isiw.estimate import WindowEstimate
 from isiw.lazy import pd, torch
 from isiw.metrics import covers, f1
-from isiw.models.protocol import Observation, Posterior, ReportsTrouble, Tensor
+from isiw.models.protocol import Posterior, ReportsTrouble, Tensor
 from isiw.signals import wrong_isi
 from isiw.strategy.catalogue import known_settings, make_strategy
 from isiw.strategy.choice import Choice, instead_of_lost
-from isiw.strategy.course import Method
+from isiw.strategy.course import Method, Outcome, Outcomes, observation_of, observations_of
 from isiw.strategy.stopping import StopDecision, stimuli_left
 from isiw.strategy.strategy import Strategy
 from isiw.studies.execution import one_torch_thread
@@ -300,16 +300,22 @@ class _Batch:
             acquisition = _EachTheirOwn(all_of_them)
         method = Method(first.space, model, acquisition, first.stopping, first.initial_ms, first.cost)
         self.stopping = first.stopping
-        self.course = method.begin(first.seed, len(players))
+        self.seed, self.course = first.seed, method.begin(first.seed, len(players))
+        self.outcomes = [Outcomes(first.space.reference, first.amplitude_step_mv)] * len(players)
         self.mistrials, self.lost = [0] * len(players), [0] * len(players)
 
     def ask(self) -> Sequence[Choice]:
         return self.course.choices
 
     def tell(self, responses: Sequence[Response]) -> None:
-        isis_ms = [self.course.method.space.check_realised(r.isi_ms) for r in responses if r.isi_ms is not None]
-        meps_mv, sds_ms = [r.mep_mv for r in responses], [r.isi_sd_ms for r in responses]
-        self.course = self.course.after(Observation.of(isis_ms, meps_mv, sds_ms))
+        check, before = self.course.method.space.check_realised, self.outcomes
+        told = [Outcome(check(r.isi_ms), r.mep_mv, isi_sd_ms=r.isi_sd_ms) for r in responses if r.isi_ms is not None]
+        self.outcomes = [outcomes.after(one) for outcomes, one in zip(before, told, strict=True)]
+        if all(now.step_mv == then.step_mv for now, then in zip(self.outcomes, before, strict=True)):
+            learnt = [outcomes.learnt(one) for outcomes, one in zip(self.outcomes, told, strict=True)]
+            self.course = self.course.after(observation_of(learnt))
+        else:  # somebody's amplitudes turn out to be rounded
+            self.course = self.course.again(self.seed, observations_of(self.outcomes))
         self.lost = [0] * len(responses)
 
     def count_mistrial(self, person: int, lost: Choice) -> Choice:
