@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -153,18 +153,13 @@ class Outcomes:
         return found_step_mv([one.mep_mv for one in self.pulses if one.mep_mv is not None])
 
     @property
-    def all_learnt(self) -> tuple[Learnt | None, ...]:
-        """What is learnt from all pulses, as they are understood now; None if something changed there."""
-        told: list[Learnt | None] = []
-        for number, one in enumerate((*self.pulses, None)):
-            told += [None] * self.changes.count(number)
-            told += [] if one is None else [self.learnt(one)]
-        return tuple(told)
-
-    @property
     def observations(self) -> tuple[Observation | None, ...]:
         """The observations of all pulses, as they are understood now; None if something changed there."""
-        return tuple(observations_of([self]))
+        told: list[Observation | None] = []
+        for number, one in enumerate((*self.pulses, None)):
+            told += [None] * self.changes.count(number)
+            told += [] if one is None else [self.observation(one)]
+        return tuple(told)
 
     def observation(self, outcome: Outcome) -> Observation:
         """The observation that a model learns from an outcome."""
@@ -213,13 +208,6 @@ class Outcomes:
         sorts = [(one.isi_ms or 0.0, self._may_be_the_taps(one)) for one in met]
         open_ms, known_ms = ([isi_ms for isi_ms, may_be in sorts if may_be is yes] for yes in (True, False))
         return may_be_the_taps(window, open_ms, known_ms)
-
-
-def observations_of(people: Sequence[Outcomes]) -> Iterator[Observation | None]:
-    """The observations of all pulses of people side by side, as they are understood now; None if something changed."""
-    for trial in zip(*(outcomes.all_learnt for outcomes in people), strict=True):
-        learnt = [one for one in trial if one is not None]
-        yield observation_of(learnt) if learnt else None
 
 
 def found_step_mv(amplitudes_mv: Sequence[float]) -> float:

@@ -22,7 +22,7 @@ from isiw.models.protocol import Posterior, ReportsTrouble, Tensor
 from isiw.signals import wrong_isi
 from isiw.strategy.catalogue import known_settings, make_strategy
 from isiw.strategy.choice import Choice, instead_of_lost
-from isiw.strategy.course import Method, Outcome, Outcomes, observation_of, observations_of
+from isiw.strategy.course import Course, Method, Outcome, Outcomes, observation_of
 from isiw.strategy.stopping import StopDecision, stimuli_left
 from isiw.strategy.strategy import Strategy
 from isiw.studies.execution import one_torch_thread
@@ -300,22 +300,27 @@ class _Batch:
             acquisition = _EachTheirOwn(all_of_them)
         method = Method(first.space, model, acquisition, first.stopping, first.initial_ms, first.cost)
         self.stopping = first.stopping
-        self.seed, self.course = first.seed, method.begin(first.seed, len(players))
+        self.course = method.begin(first.seed, len(players))
+        self.seeds, self.alone = [player.seed for player in players], dict[int, Course]()
+        self.together = Outcomes(first.space.reference, first.amplitude_step_mv or 0.0)
         self.outcomes = [Outcomes(first.space.reference, first.amplitude_step_mv)] * len(players)
         self.mistrials, self.lost = [0] * len(players), [0] * len(players)
 
     def ask(self) -> Sequence[Choice]:
-        return self.course.choices
+        together = self.course.choices
+        return [together[n] if n not in self.alone else self.alone[n].choices[0] for n in range(len(together))]
 
     def tell(self, responses: Sequence[Response]) -> None:
         check, before = self.course.method.space.check_realised, self.outcomes
         told = [Outcome(check(r.isi_ms), r.mep_mv, isi_sd_ms=r.isi_sd_ms) for r in responses if r.isi_ms is not None]
         self.outcomes = [outcomes.after(one) for outcomes, one in zip(before, told, strict=True)]
-        if all(now.step_mv == then.step_mv for now, then in zip(self.outcomes, before, strict=True)):
-            learnt = [outcomes.learnt(one) for outcomes, one in zip(self.outcomes, told, strict=True)]
-            self.course = self.course.after(observation_of(learnt))
-        else:  # somebody's amplitudes turn out to be rounded
-            self.course = self.course.again(self.seed, observations_of(self.outcomes))
+        self.course = self.course.after(observation_of([self.together.learnt(one) for one in told]))
+        for person, (outcomes, one) in enumerate(zip(self.outcomes, told, strict=True)):
+            if outcomes.step_mv != before[person].step_mv:  # amplitudes turn out to be rounded: from here on alone
+                seed = self.seeds[person]
+                self.alone[person] = self.course.method.begin(seed).again(seed, outcomes.observations)
+            elif person in self.alone:
+                self.alone[person] = self.alone[person].after(outcomes.observation(one))
         self.lost = [0] * len(responses)
 
     def count_mistrial(self, person: int, lost: Choice) -> Choice:
@@ -328,16 +333,22 @@ class _Batch:
         self.lost[person] = 0
         return other
 
+    def _course_of(self, person: int) -> tuple[Course, int]:
+        """The course that a person is in, and their number there."""
+        return (self.alone[person], 0) if person in self.alone else (self.course, person)
+
     def estimate(self, person: int) -> WindowEstimate:
-        return self.course.estimate(person)
+        course, number = self._course_of(person)
+        return course.estimate(number)
 
     def decision(self, person: int) -> StopDecision:
-        return self.course.decision(person, self.mistrials[person])
+        course, number = self._course_of(person)
+        return course.decision(number, self.mistrials[person])
 
     def trouble(self) -> bool | None:
         """Whose fit failed is not known; only whether any did."""
-        posterior = self.course.posterior
-        failed = isinstance(posterior, ReportsTrouble) and posterior.trouble is not None
+        posteriors = [course.posterior for course in (self.course, *self.alone.values())]
+        failed = any(isinstance(each, ReportsTrouble) and each.trouble is not None for each in posteriors)
         return None if failed and self.course.people > 1 else failed
 
 
