@@ -22,6 +22,7 @@ import typer
 from benchmarks.before_and_now import LATER, MARKS, honesty, study_of
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
+from isiw.change import LIKELY_CHANGE
 from isiw.models.particles.changes import ChangePrior
 from isiw.models.particles.laws import FOREARM, HAND, Floor, Intensity, NoiseShares
 from isiw.models.particles.prior import Prior
@@ -173,7 +174,10 @@ def report(
     sessions: Annotated[int, typer.Option(help="Sessions without a step, of each person, for the threshold.")] = 10,
 ) -> None:
     """Say how many steps are named in time, and how many that are none."""
-    named = pd.concat([pd.read_parquet(file) for file in sorted((folder / "named").glob("*.parquet"))])
+    named = pd.concat(
+        [pd.read_parquet(file) for file in sorted((folder / "named").glob("*.parquet"))], ignore_index=True
+    )
+    named.loc[named["share"] < LIKELY_CHANGE, "kind"] = ""  # tables of versions that named changes earlier
     lines = [f"- command: `{command_of('steps')}`, after `run`", f"- {made_with('torch', 'scipy')}"]
     lines += ["", _honest(folder).to_markdown(index=False, floatfmt=".3f")]
     lines += ["", _at_stopping(folder, named).to_markdown(index=False, floatfmt=".3f")]
