@@ -51,10 +51,16 @@ def test_a_batch_of_one_is_that_session(strategy: str) -> None:
     pd.testing.assert_frame_equal(timeless(simulate_batch(batch)), timeless(one_at_a_time(batch)))
 
 
-def test_rounded_amplitudes_are_learnt_as_intervals_as_in_a_session() -> None:
-    for person in range(3):  # whose step shows after some trials
-        batch = sessions("default", 1, first=person, trials=12, cohort="coarse")
-        pd.testing.assert_frame_equal(timeless(simulate_batch(batch)), timeless(one_at_a_time(batch)))
+@pytest.mark.parametrize("strategy", EVERY)
+def test_rounded_amplitudes_are_learnt_as_intervals_as_in_a_session(strategy: str) -> None:
+    batch = sessions(strategy, 1, first=1, trials=12, cohort="coarse")  # whose step shows after some trials
+    pd.testing.assert_frame_equal(timeless(simulate_batch(batch)), timeless(one_at_a_time(batch)))
+
+
+def test_who_is_rounded_goes_on_as_if_alone() -> None:
+    batch = sessions("random", 3, trials=16, cohort="coarse")  # by then all three are known to be rounded
+    together, apart = (timeless(rows)[1::2] for rows in (simulate_batch(batch), one_at_a_time(batch)))
+    pd.testing.assert_frame_equal(together, apart)
 
 
 @pytest.mark.parametrize(

@@ -295,20 +295,20 @@ class _Batch:
         model: Any = first.model
         if is_dataclass(first.model) and hasattr(first.model, "device"):
             model = replace(first.model, device=device)
-        acquisition, all_of_them = first.acquisition, [player.acquisition for player in players]
-        if any(each != acquisition for each in all_of_them):
-            acquisition = _EachTheirOwn(all_of_them)
+        self.players, acquisition = players, first.acquisition
+        if any(player.acquisition != acquisition for player in players):
+            acquisition = _EachTheirOwn([player.acquisition for player in players])
         method = Method(first.space, model, acquisition, first.stopping, first.initial_ms, first.cost)
         self.stopping = first.stopping
         self.course = method.begin(first.seed, len(players))
-        self.seeds, self.alone = [player.seed for player in players], dict[int, Course]()
+        self.alone = dict[int, Course]()
         self.together = Outcomes(first.space.reference, first.amplitude_step_mv or 0.0)
         self.outcomes = [Outcomes(first.space.reference, first.amplitude_step_mv)] * len(players)
         self.mistrials, self.lost = [0] * len(players), [0] * len(players)
 
     def ask(self) -> Sequence[Choice]:
-        together = self.course.choices
-        return [together[n] if n not in self.alone else self.alone[n].choices[0] for n in range(len(together))]
+        together = enumerate(self.course.choices)
+        return [self.alone[person].choices[0] if person in self.alone else choice for person, choice in together]
 
     def tell(self, responses: Sequence[Response]) -> None:
         check, before = self.course.method.space.check_realised, self.outcomes
@@ -317,8 +317,9 @@ class _Batch:
         self.course = self.course.after(observation_of([self.together.learnt(one) for one in told]))
         for person, (outcomes, one) in enumerate(zip(self.outcomes, told, strict=True)):
             if outcomes.step_mv != before[person].step_mv:  # amplitudes turn out to be rounded: from here on alone
-                seed = self.seeds[person]
-                self.alone[person] = self.course.method.begin(seed).again(seed, outcomes.observations)
+                player = self.players[person]
+                course = replace(self.course.method, acquisition=player.acquisition).begin(player.seed)
+                self.alone[person] = course.again(player.seed, outcomes.observations)
             elif person in self.alone:
                 self.alone[person] = self.alone[person].after(outcomes.observation(one))
         self.lost = [0] * len(responses)
