@@ -90,7 +90,7 @@ class Another:
         self.batch.tell(responses)
 
     def count_mistrial(self, _: int, lost: Choice) -> Choice:
-        """Ask the same once more; a lost pair is of no use to a belief."""
+        """Ask the same once more."""
         return lost
 
     def estimate(self, person: int) -> WindowEstimate:
@@ -164,8 +164,6 @@ def beside(now: Path, others: Sequence[Path]) -> pd.DataFrame:
     own = own[own["trial"].isin(COMPARED)]
     table = own.groupby(["cohort", "trial"]).agg(people=("f1", "size")).assign(**_said(own, "now"))
     for other in others:
-        if not other.exists():
-            continue
         name, theirs = other.parent.name, pd.read_parquet(other)
         both = own.merge(theirs, on=["cohort", "seed", "person", "trial"], suffixes=("", "_then"))
         more = (both["f1"] - both["f1_then"]).groupby([both["cohort"], both["trial"]])
@@ -173,17 +171,15 @@ def beside(now: Path, others: Sequence[Path]) -> pd.DataFrame:
         found = (there["f1"] - there["f1_then"]).groupby([there["cohort"], there["trial"]])
         table = table.assign(**_said(theirs, name))
         table[f"more than {name}"] = _with_error(more)
-        table["with a window"] = _with_error(found)
-        table = table.rename(columns={"with a window": f"of people with a window, more than {name}"})
+        table[f"of people with a window, more than {name}"] = _with_error(found)
     return table.reset_index()
 
 
 def _said(rows: pd.DataFrame, name: str) -> dict[str, pd.Series]:
     """Mean F1, share of sure and wrong, and shares of covered edges of a version, by cohort and trial."""
-    wrong = (rows["expected_f1"] >= summary.SURE_F1) & (rows["expected_f1"] - rows["f1"] >= summary.WRONG_F1)
     columns = {
         f"F1 {name}": rows["f1"],
-        f"sure and wrong {name}": wrong.astype(float).where(rows["expected_f1"].notna()),
+        f"sure and wrong {name}": summary.sure_and_wrong(rows["expected_f1"], rows["f1"]),
         f"start {name}": rows["start_covered"],
         f"end {name}": rows["end_covered"],
     }

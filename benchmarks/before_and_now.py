@@ -136,9 +136,7 @@ def honesty(before: Path, now: Path) -> pd.DataFrame:
     for which in ("before", "now"):
         f1, expected = both[f"f1_{which}"], both[f"expected_f1_{which}"]
         rows[f"f1_{which}"], rows[f"expected_{which}"] = f1, expected
-        rows[f"sure_and_wrong_{which}"] = ((expected >= summary.SURE_F1) & (expected - f1 >= summary.WRONG_F1)).astype(
-            float
-        )
+        rows[f"sure_and_wrong_{which}"] = summary.sure_and_wrong(expected, f1)
         # How often it itself expects that what it is sure of is wrong altogether.
         window_told, probability = both[f"reported_window_{which}"].astype(bool), both[f"probability_{which}"]
         doubt = (1.0 - probability).where(window_told, probability)

@@ -244,8 +244,7 @@ def _at_stopping(folder: Path, named: pd.DataFrame) -> pd.DataFrame:
         expected.reindex(pd.MultiIndex.from_frame(trials.reset_index())),
     )
     table = pd.DataFrame({"trials": trials, "f1": f1, "expected": expected_f1.to_numpy()})
-    wrong = (table["expected"] >= summary.SURE_F1) & (table["expected"] - table["f1"] >= summary.WRONG_F1)
-    table["sure and wrong"] = wrong.astype(float)
+    table["sure and wrong"] = summary.sure_and_wrong(table["expected"], table["f1"])
     groups = table.groupby("cohort")
     return groups.mean().assign(se=groups["sure and wrong"].sem(), people=groups.size()).reset_index()
 

@@ -77,9 +77,8 @@ def main(
         for name, subject, alone in (("no response", silent, 0), ("taps alone", person, taps), ("none", person, 0)):
             rows += [row | {"sessions": name, "person": number} for row in session(subject, seed + number, alone)]
     table = pd.DataFrame(rows)
-    error = table["expected"] - table["f1"]
-    table["sure_and_wrong"] = (table["expected"] >= summary.SURE_F1) & (error >= summary.WRONG_F1)
-    table["without_the_sentence"] = table["sure_and_wrong"] & (table["told"] != 1)
+    table["sure_and_wrong"] = summary.sure_and_wrong(table["expected"], table["f1"])
+    table["without_the_sentence"] = table["sure_and_wrong"].where(table["told"] != 1, 0.0)
     usual = table[table["sessions"] == "no response"].set_index(["person", "trial"])["f1"]
     table["f1_more"] = table["f1"] - table.join(usual.rename("usual"), on=["person", "trial"])["usual"]
     groups = table.drop(columns="person").groupby(["sessions", "trial"])

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 from isiw.design import DesignSpace
@@ -77,6 +77,13 @@ class Observation:
         high = None if mep_high_mv is None else _column(mep_high_mv)
         known = None if known_mv is None else torch.tensor(known_mv, dtype=torch.float32).reshape(-1, 3)
         return cls(isi, mep, sds, seen, high, known)
+
+    @classmethod
+    def side_by_side(cls, people: Sequence[Observation]) -> Observation:
+        """One trial of each of some people, of whom the same is known."""
+        columns = [[getattr(one, column.name) for one in people] for column in fields(cls)]
+        joined: list[Any] = [None if column[0] is None else torch.cat(column) for column in columns]
+        return cls(*joined)
 
 
 def _column(values: Values) -> Tensor:

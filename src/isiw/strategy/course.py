@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Final, NamedTuple, TypedDict
+from typing import Final, TypedDict
 
 import numpy as np
 
@@ -93,30 +93,6 @@ class Outcome(Checked):
         return cls(trial.isi_ms, None if trial.mep_interval_mv else trial.mep_mv, **details_of(trial))
 
 
-class Learnt(NamedTuple):
-    """What a model learns from one outcome; see `Observation.of`."""
-
-    isi_ms: float | None
-    mep_mv: float | None
-    isi_sd_ms: float
-    response: bool | None
-    mep_high_mv: float  # NaN if the amplitude is no interval
-    known_mv: tuple[float, float, float]
-
-
-def observation_of(people: Sequence[Learnt]) -> Observation:
-    """One trial of each of some people."""
-    isis_ms, meps_mv, sds_ms, responses, highs_mv, known_mv = zip(*people, strict=True)
-    return Observation.of(
-        isis_ms,
-        meps_mv,
-        sds_ms,
-        responses,
-        None if all(map(math.isnan, highs_mv)) else highs_mv,
-        known_mv if any(mean_mv or sd_mv for mean_mv, sd_mv, _ in known_mv) else None,
-    )
-
-
 @dataclass(frozen=True)
 class Outcomes:
     """All outcomes so far: of pulses, and ISI [ms] and amplitude [mV] of taps alone; changes by pulses before."""
@@ -163,18 +139,21 @@ class Outcomes:
 
     def observation(self, outcome: Outcome) -> Observation:
         """The observation that a model learns from an outcome."""
-        return observation_of([self.learnt(outcome)])
-
-    def learnt(self, outcome: Outcome) -> Learnt:
-        """What a model learns from an outcome."""
         low_mv, high_mv = outcome.mep_mv, math.nan
         if outcome.mep_interval_mv is not None:
             low_mv, high_mv = outcome.mep_interval_mv
         elif self.step_mv and outcome.mep_mv is not None:
             low_mv, high_mv = max(0.0, outcome.mep_mv - self.step_mv / 2), outcome.mep_mv + self.step_mv / 2
         mean_mv, sd_mv, log_sd = self._tap_mv(outcome) or (0.0, 0.0, 0.0)
-        known_mv = mean_mv, math.hypot(sd_mv, outcome.mep_sd_mv), log_sd
-        return Learnt(outcome.isi_ms, low_mv, outcome.isi_sd_ms, outcome.response, high_mv, known_mv)
+        sd_mv = math.hypot(sd_mv, outcome.mep_sd_mv)
+        return Observation.of(
+            [outcome.isi_ms],
+            [low_mv],
+            [outcome.isi_sd_ms],
+            [outcome.response],
+            None if math.isnan(high_mv) else [high_mv],
+            [(mean_mv, sd_mv, log_sd)] if mean_mv or sd_mv else None,
+        )
 
     def _tap_mv(self, outcome: Outcome) -> tuple[float, float, float] | None:
         """Mean and SD of the tap's own part of an amplitude [mV], and the SD of its log mean; None if it is unknown."""

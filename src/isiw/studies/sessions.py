@@ -18,11 +18,11 @@ from isiw.errors import InvalidValueError, StudyError
 from isiw.estimate import WindowEstimate
 from isiw.lazy import pd, torch
 from isiw.metrics import covers, f1
-from isiw.models.protocol import Posterior, ReportsTrouble, Tensor
+from isiw.models.protocol import Observation, Posterior, ReportsTrouble, Tensor
 from isiw.signals import wrong_isi
 from isiw.strategy.catalogue import known_settings, make_strategy
 from isiw.strategy.choice import Choice, instead_of_lost
-from isiw.strategy.course import Course, Method, Outcome, Outcomes, observation_of
+from isiw.strategy.course import Course, Method, Outcome, Outcomes
 from isiw.strategy.stopping import StopDecision, stimuli_left
 from isiw.strategy.strategy import Strategy
 from isiw.studies.execution import one_torch_thread
@@ -314,7 +314,7 @@ class _Batch:
         check, before = self.course.method.space.check_realised, self.outcomes
         told = [Outcome(check(r.isi_ms), r.mep_mv, isi_sd_ms=r.isi_sd_ms) for r in responses if r.isi_ms is not None]
         self.outcomes = [outcomes.after(one) for outcomes, one in zip(before, told, strict=True)]
-        self.course = self.course.after(observation_of([self.together.learnt(one) for one in told]))
+        self.course = self.course.after(Observation.side_by_side([self.together.observation(one) for one in told]))
         for person, (outcomes, one) in enumerate(zip(self.outcomes, told, strict=True)):
             if outcomes.step_mv != before[person].step_mv:  # amplitudes turn out to be rounded: from here on alone
                 player = self.players[person]

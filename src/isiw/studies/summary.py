@@ -56,15 +56,19 @@ def summarise(rows: pd.DataFrame, errors: pd.DataFrame | None = None) -> pd.Data
     return table.sort_values(_GROUP, ignore_index=True)
 
 
+def sure_and_wrong(expected_f1: pd.Series, f1: pd.Series) -> pd.Series:
+    """1 for answers that are sure and wrong (see `SURE_F1`), else 0; NaN if no F1 is expected."""
+    wrong = (expected_f1 >= SURE_F1) & (expected_f1 - f1 >= WRONG_F1)
+    return wrong.astype(float).mask(expected_f1.isna())
+
+
 def _means(rows: pd.DataFrame) -> pd.DataFrame:
     going_on, ignored = rows["stop_trial"].isna(), rows["converged"].isna()
     at_end = {
         "end_delivered": rows["stop_trial"].mask(going_on & ~ignored, rows["delivered"]),
         "end_f1": rows["stop_f1"].mask(going_on & ~ignored, rows["f1"]),
     }
-    expected_f1 = rows["expected_f1"]
-    wrong = (expected_f1 >= SURE_F1) & (expected_f1 - rows["f1"] >= WRONG_F1)
-    at_end |= {"sure_and_wrong": wrong.astype(float).mask(expected_f1.isna())}
+    at_end |= {"sure_and_wrong": sure_and_wrong(rows["expected_f1"], rows["f1"])}
     groups = rows.assign(**at_end, called_none=~rows["reported_window"].astype(bool)).groupby(_GROUP)
     people, f1, se = groups.size(), groups["f1"].mean(), groups["f1"].sem()
     reach = se * scipy.stats.t.ppf(0.5 + LEVEL / 2, people - 1)
