@@ -36,6 +36,9 @@ PLAN = {"space": {"low_ms": 0, "high_ms": 200, "reference": "impact"}, "limits":
 
 DELIVERY_S = 0.005
 
+PATIENCE_S = 60.0
+"""How long a client repeats a call; a server that was killed is back in far less."""
+
 FILES = 1024
 """How many files a process may have open by default, on most systems."""
 
@@ -253,13 +256,16 @@ class _Rig:
 
     def _post(self, client: httpx.Client, path: str, body: dict[str, Any]) -> dict[str, Any]:
         """Send until it is answered; a session that the server has lost is resumed first."""
+        until_s = time.monotonic() + PATIENCE_S
         while True:
             try:
                 answer: dict[str, Any] = client.post(path, json=body).json()
                 if answer["ok"] or answer["error"]["type"] != "NotOpen":
                     return answer
                 client.post(f"{path.rpartition('/')[0]}/resume").raise_for_status()
-            except httpx.HTTPError:
+            except httpx.HTTPError as error:
+                if time.monotonic() > until_s:
+                    sys.exit(f"{path}: no answer for {PATIENCE_S:.0f} s, and at last: {error}")
                 self.repeated += 1
                 time.sleep(0.05)
 

@@ -70,31 +70,36 @@ def new_file(path: Path) -> IO[bytes]:
     return open(path, "a+b", opener=lambda name, flags: os.open(name, flags | os.O_EXCL, 0o666))
 
 
+def beside(path: Path) -> Path:
+    """A new random name beside a path, for a file that takes its place later."""
+    return path.with_name(f"{TEMPORARY}{uuid.uuid4().hex}")
+
+
 def written_beside(path: Path, content: bytes) -> Path:
     """A new file beside a path, under a random name; synced."""
-    beside = path.with_name(f"{TEMPORARY}{uuid.uuid4().hex}")
-    with new_file(beside) as file:
+    written = beside(path)
+    with new_file(written) as file:
         try:
             file.write(content)
             file.flush()
             force(file.fileno())
         except BaseException:
-            _removed(beside)
+            _removed(written)
             raise
-    return beside
+    return written
 
 
 def put(path: Path, content: bytes, *, replacing: bool) -> None:
     """Put a whole file in its place in one step, for good."""
-    beside = written_beside(path, content)
+    written = written_beside(path, content)
     try:
         if replacing:
-            beside.replace(path)
+            written.replace(path)
             sync_folder(path.parent)
         else:
-            take_free_place(beside, path)
+            take_free_place(written, path)
     except BaseException:
-        _removed(beside)
+        _removed(written)
         raise
 
 

@@ -59,8 +59,9 @@ class Disk:
 
     def _opening(self, usual: Callable[..., Any]) -> Callable[..., Any]:
         def opened(path: Path, mode: str = "r", *args: Any, **kwargs: Any) -> Any:
-            file = usual(path, mode, *args, **kwargs)
-            return file if mode == "rb" else _Watched(file, self._step)
+            if mode == "rb":
+                return usual(path, mode, *args, **kwargs)
+            return _Watched(self._step(usual, path, mode, *args, **kwargs), self._step)
 
         return opened
 

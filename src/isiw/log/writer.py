@@ -11,7 +11,7 @@ from typing import IO, Final, Self, cast
 from mcap.writer import Writer
 
 from isiw.errors import LogError, os_errors
-from isiw.files import in_the_way, is_reserved, sync_folder
+from isiw.files import beside, in_the_way, is_reserved
 from isiw.log.durable import (
     DurableFile,
     Fingerprint,
@@ -71,16 +71,16 @@ class LogWriter:
 
     @classmethod
     def create(cls, path: str | Path, header: AnyHeader) -> Self:
-        """Start a new log with its header."""
+        """Start a new log; it has its name once its header is on the disk, so that every log says whose it is."""
         target = Path(path)
         with os_errors(LogError, "the log cannot be created", target, "Make room, or choose another path."):
             _require_free(target)
-            with begun(part_of(target)) as file:
+            with begun(beside(target)) as file:
                 log = cls(target, file)
                 log.begin(header)
                 log.append(header)
                 log.sync()
-                sync_folder(target.parent)
+                file.move_to(part_of(target), replacing=False)
         return log
 
     @classmethod
