@@ -26,9 +26,10 @@ from isiw.change import LIKELY_CHANGE
 from isiw.models.particles.changes import ChangePrior
 from isiw.models.particles.laws import FOREARM, HAND, Floor, Intensity, NoiseShares
 from isiw.models.particles.prior import Prior
-from isiw.models.particles.profile import ProfilePrior
+from isiw.models.particles.profile import ProfilePrior, Width
 from isiw.models.protocol import Observation
 from isiw.models.shared.scales import Scale
+from isiw.models.shared.start import Span
 from isiw.studies import summary
 from isiw.studies.sessions import SimulatedSession, _Batch, examine
 from isiw.subjects.responses import RecruitmentResponse
@@ -105,23 +106,28 @@ def run(
 
 
 def law_of(cohort: str) -> dict[str, Any]:
-    """Settings of a belief that knows the muscle, that half have a window, and what changes, as the cohort has it.
+    """Settings of a belief that knows the muscle, how many have a window, and what changes, as the cohort has it.
 
-    Sizes of changes are normal there, about as large as the cohort's.
+    Sizes of changes are normal there, about as large as the cohort's; so are the logs of the widths of narrow windows.
     """
     never = 1e-6
     still = ChangePrior(level=never, intensity=never, enhancement=never, scale=never)
     at_90, above = (Intensity(1.0, Scale(90.0, 0.5)),), (Intensity(1.0, Scale(105.0, 3.0)),)
     muscle, changes, intensities = {
         "above-threshold": (FOREARM, still, above),
+        "narrow-unstated": (FOREARM, still, at_90),
         "hand-flat": (HAND, still, tuple(Intensity(1 / 3, Scale(pct, 0.5)) for pct in (90.0, 100.0, 110.0))),
         "retuned": (FOREARM, replace(still, intensity=0.999, trial=Scale(16.0, 0.5), size_sd=1.15), at_90),
         "step": (FOREARM, replace(still, level=0.999, trial=Scale(15.0, 0.6), size_sd=1.45), at_90),
     }[cohort]
     usual = Prior().as_usual(never)
+    profile = replace(usual.profile, p_window=0.5, start=replace(usual.profile.start, p_anywhere=0.0))
+    if cohort == "narrow-unstated":
+        start = replace(profile.start, spans=(Span(1.0, 5.0, 90.0),))
+        profile = replace(profile, p_window=1.0 - never, start=start, widths=(Width(1.0, Scale(26.0, 0.27)),))
     prior = replace(
         usual,
-        profile=replace(usual.profile, p_window=0.5, start=replace(usual.profile.start, p_anywhere=0.0)),
+        profile=profile,
         noise=NoiseShares(0.0, 0.0, 1.0, 0.0, 0.0),
         muscles=(replace(muscle, share=1.0),),
         intensities=intensities,
