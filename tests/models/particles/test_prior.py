@@ -208,7 +208,7 @@ def test_narrow_windows_are_possible_unless_a_tap_is_stated() -> None:
         return (person.shape.width_ms < 40.0).float().mean().item()
 
     assert narrow("tap") < 0.03
-    assert 0.15 < narrow(None) < 0.35 < narrow("electrical")
+    assert 0.06 < narrow(None) < 0.18 < narrow("electrical")
 
 
 def test_a_known_muscle_leaves_only_itself_and_what_has_no_name() -> None:
@@ -276,7 +276,7 @@ def test_as_usual_unusual_windows_keep_a_part_of_their_probability(hit_delay_ms:
     profile = ProfilePrior(start=StartPrior(hit_delay_ms=hit_delay_ms))
     usual = profile.as_usual(1 / 3)
     assert [span.share for span in usual.start.spans] == pytest.approx([1 - 0.365 / 3, 0.365 / 3])
-    assert [width.share for width in usual.widths] == pytest.approx([1 - 0.53 / 3, 0.23 / 3, 0.3 / 3])
+    assert [width.share for width in usual.widths] == pytest.approx([1 - 0.345 / 3, 0.23 / 3, 0.115 / 3])
     assert [law.share for law in usual.early] == pytest.approx([0.13 / 3])
     assert usual.start.p_anywhere == pytest.approx(0.04 / 3)
     assert (usual.p_window, usual.start.hit_delay_ms) == (profile.p_window, hit_delay_ms)

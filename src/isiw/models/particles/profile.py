@@ -81,10 +81,10 @@ class _Windows(NamedTuple):
 
 _AFTER: Final[Mapping[Conditioning | None, _Windows]] = MappingProxyType(
     {
-        # A tap most probably; but windows of 15–40 ms, as after an electrical pulse, too (decision 36).
+        # A tap most probably; but windows of 15–40 ms, as after an electrical pulse, too.
         None: _Windows(
             TAP_SPANS,
-            (Width(0.47, Scale(100.0, 0.42)), Width(0.23, Scale(190.0, 0.45)), Width(0.3, Scale(28.0, 0.35))),
+            (Width(0.655, Scale(100.0, 0.42)), Width(0.23, Scale(190.0, 0.45)), Width(0.115, Scale(28.0, 0.35))),
             (Early(0.13, Scale(-20.0, 12.0), Scale(190.0, 0.45)),),
         ),
         # 60–220 ms, mean 108 measured (dissertation, Table 4.1).
