@@ -149,10 +149,10 @@ def test_invalid_values_are_refused_and_change_nothing(
     told: dict[str, Any], error: type[Exception], what: str, particles: Strategy
 ) -> None:
     play(particles, [0.05])
-    before = particles.ask(), particles.posterior, str(particles.estimate()), particles.decision()
+    before = particles.ask(), particles.posterior, particles.estimate(), particles.decision()
     with pytest.raises(error, match=what):
         particles.tell(**told)
-    assert (particles.ask(), particles.posterior, str(particles.estimate()), particles.decision()) == before
+    assert (particles.ask(), particles.posterior, particles.estimate(), particles.decision()) == before
 
 
 def test_a_model_that_fails_leaves_the_strategy_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -204,10 +204,10 @@ def test_a_response_that_was_seen_raises_the_expected_mep_above_one_that_was_not
 
 def test_a_mistrial_moves_the_budget_and_nothing_else(particles: Strategy) -> None:
     play(particles, [0.05])
-    before = particles.ask(), particles.posterior, str(particles.estimate())
+    before = particles.ask(), particles.posterior, particles.estimate()
     reason = particles.decision().reason
     particles.count_mistrial()
-    assert (particles.ask(), particles.posterior, str(particles.estimate())) == before
+    assert (particles.ask(), particles.posterior, particles.estimate()) == before
     assert "59 stimuli are left" in reason
     assert particles.decision().reason == reason.replace("59 stimuli", "58 stimuli")
 

@@ -79,7 +79,7 @@ class LogWriter:
                 log = cls(target, file)
                 log.begin(header)
                 log.append(header)
-                log.sync()
+                log._writer.flush()
                 file.move_to(part_of(target), replacing=False)
         return log
 
