@@ -148,6 +148,8 @@ def honesty(before: Path, now: Path) -> pd.DataFrame:
     unclear = both["reported_window_now"].astype(bool) & (factor < window.LEAST_FACTOR)
     undecided = unclear & (both["probability_now"] < window.SURE)
     rows["undecided_now"] = undecided.astype(float)
+    left_open = ~both["reported_window_now"].astype(bool) & (1.0 - both["probability_now"] < window.SURE)
+    rows["said_and_wrong_now"] = rows["sure_and_wrong_now"].where(~(undecided | left_open), 0.0)
     rows["false_stated_now"] = (both["reported_window_now"].astype(bool) & ~undecided).astype(float).mask(there)
     groups = pd.DataFrame(rows).groupby([both["cohort"], both["trial"]])
     table = groups.mean().assign(people=groups["people"].sum())

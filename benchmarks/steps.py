@@ -4,7 +4,8 @@
 trial. `report` compares that with a CUSUM that knows the person's law, the size and the direction of the step, and
 whose threshold no more than 3 % of the sessions without a step reach. `bound` says how often the trials of a session
 could name its step to anyone who knows its trial, but neither the person nor the size. Reported people come from seed
-200,000 on. `run --knowing` runs a belief that knows what the people of a cohort have in common.
+200,000 on. `run --knowing` runs a belief that knows what the people of a cohort have in common, `run --first electrical`
+one to which an electrical pulse was stated.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from benchmarks.before_and_now import LATER, MARKS, honesty, study_of
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
 from isiw.change import LIKELY_CHANGE
+from isiw.design import IMPACT_SPACE, VALVE_SPACE
 from isiw.models.particles.changes import ChangePrior
 from isiw.models.particles.laws import FOREARM, HAND, Floor, Intensity, NoiseShares
 from isiw.models.particles.prior import Prior
@@ -34,6 +36,7 @@ from isiw.studies import summary
 from isiw.studies.sessions import SimulatedSession, _Batch, examine
 from isiw.subjects.responses import RecruitmentResponse
 from isiw.subjects.subject import Response, SimulatedSubject
+from isiw.text.stimuli import STIMULI
 from isiw.types import FloatArray
 
 WITHIN: Final = 15
@@ -84,18 +87,22 @@ def run(
     *,
     stated: Annotated[bool, typer.Option(help="The intensity is stated.")] = False,
     knowing: Annotated[bool, typer.Option(help="With a prior that is the cohort's own law.")] = False,
+    first: Annotated[str, typer.Option(help="ISIs count from what comes first: tap, electrical, or unstated.")] = "",
     out: Annotated[Path, typer.Option(help="Folder of the tables.")] = Path("steps"),
 ) -> None:
     """Run the default, 25 people at a time; a cohort's tables grow with each 25, and it goes on behind them."""
     torch.set_num_threads(1)
     (out / "named").mkdir(parents=True, exist_ok=True)
     marks = tuple(sorted({*(m for m in (*MARKS, *LATER) if m <= trials), trials}))
+    space = IMPACT_SPACE if first else VALVE_SPACE
+    conditioning = {"conditioning": first} if first in STIMULI else None
     for name in cohorts.split(","):
         files = out / f"{name}.parquet", out / "named" / f"{name}.parquet"
         tables = [[pd.read_parquet(file)] if file.exists() else [] for file in files]
         done = set() if not tables[0] else set(tables[0][0]["person"])
-        study = study_of(name, people, seed, marks, "noted", settings=law_of(name) if knowing else None)
-        for unit in replace(study, intensity="stated" if stated else "unstated").units():
+        study = study_of(name, people, seed, marks, "noted", settings=law_of(name) if knowing else conditioning)
+        study = replace(study, intensity="stated" if stated else "unstated", space=space)
+        for unit in study.units():
             if {session.person for session in unit.sessions} <= done:
                 continue
             crowd = Noting(unit.sessions)

@@ -79,11 +79,11 @@ def in_short(estimate: Estimate) -> str:
 
 def titled(estimate: Estimate) -> str:
     """The same for the head of a picture or a summary."""
-    window = f"{'Undecided, perhaps' if _is_guess(estimate) else 'Window'} {estimate.window}"
+    window = f"{'Undecided, perhaps' if is_guess(estimate) else 'Window'} {estimate.window}"
     return window if estimate.window else in_short(estimate).capitalize()
 
 
-def _is_guess(estimate: Estimate) -> bool:
+def is_guess(estimate: Estimate) -> bool:
     """True if a window is reported that the trials hardly speak for, so that it is undecided whether there is one."""
     factor = bayes_factor(estimate.probability, estimate.beforehand)
     unsure = factor is not None and factor < LEAST_FACTOR and not _is_sure(estimate)
@@ -103,7 +103,7 @@ def _chance(estimate: Estimate) -> str:
 
 def summary(estimate: Estimate) -> str:
     """A window in a line, each of its edges in another where they are known, and where the MEP is depressed."""
-    found, lead = in_short(estimate), "Undecided, if there is a window" if _is_guess(estimate) else "Window"
+    found, lead = in_short(estimate), "Undecided, if there is a window" if is_guess(estimate) else "Window"
     lines = [f"{found.capitalize() if estimate.window is None else f'{lead}: {found}'}{_chance(estimate)}"]
     for name, edge in (("Start", estimate.start), ("End", estimate.end)):
         if estimate.window is not None and edge.low_ms is not None and edge.high_ms is not None:
@@ -152,7 +152,7 @@ def finding(estimate: Estimate, first: StimulusWords, space: DesignSpace) -> str
     undecided = f"It is undecided whether there is a window{chance}"
     if window is None:
         return f"No window was found{chance}." if rules_out(probability) else f"{undecided}."
-    if _is_guess(estimate):
+    if is_guess(estimate):
         return f"{undecided}: the trials are weak evidence for one. If there is, the best guess is {window} {after}."
     enhances = f"The {first.name} {'' if probability >= SURE else 'probably '}enhances the MEP"
     isis = f"{window} {after}{chance}"

@@ -18,6 +18,7 @@ from isiw.session.judging import exclude
 from isiw.session.loop import Session
 from isiw.strategy.stopping import StopKind
 from isiw.trials import Channel, Measurement, Status, Trial
+from isiw.types import Reference
 from isiw.visit import Visit
 from isiw.window import Window
 from known import instance
@@ -230,6 +231,25 @@ def test_a_hit_delay_that_only_the_device_was_told_is_said_to_have_cost_stimuli(
     said = final_statement(run_by(record, "default", delay_ms=(150.0, 5.0)))
     assert "does not know the device's hit delay" in said
     assert "make_strategy(..., hit_delay_ms=(150, 5))" in said
+
+
+@pytest.mark.parametrize(
+    ("reference", "settings", "found", "said"),
+    [
+        ("impact", {}, {"segments_ms": (), "probability": 0.3}, True),
+        ("impact", {}, {"probability": 0.6, "beforehand": 0.69}, True),
+        ("impact", {}, {"probability": 0.97}, False),
+        ("impact", {"conditioning": "tap"}, {"segments_ms": (), "probability": 0.3}, False),
+        ("valve", {}, {"segments_ms": (), "probability": 0.3}, False),
+    ],
+)
+def test_that_what_comes_first_can_be_stated_is_said_if_no_window_is_named(
+    record: SessionRecord, reference: Reference, settings: dict[str, Any], found: dict[str, Any], *, said: bool
+) -> None:
+    run = with_estimate(run_by(record, "default", delay_ms=None, **settings), **found)
+    space = replace(run.header.space, reference=reference)
+    statement = final_statement(replace(run, header=run.header.model_copy(update={"space": space})))
+    assert ('State what comes first (conditioning = "tap" or "electrical")' in statement) == said
 
 
 @pytest.mark.parametrize(("name", "said"), [("gp-straddle", True), ("default", False), ("", False)])

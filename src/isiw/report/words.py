@@ -41,6 +41,7 @@ def final_statement(record: SessionRecord, config: Path | None = None) -> str:
             fit_sentence(record),
             _unstated_hit_delay(record),
             _unstated_intensity(record),
+            _unstated_stimulus(record),
             _expects_a_tap(record),
             last.reason if record.rests_on_data or last.stop_kind not in OF_THE_WINDOW else "",
         ]
@@ -132,6 +133,19 @@ def _unstated_intensity(record: SessionRecord) -> str:
         return ""
     call = f"make_strategy(..., intensity_pct_rmt={stated_pct:g})"
     return f"The strategy does not know the intensity, and assumes about 90 % of RMT. Next time: {call}."
+
+
+def _unstated_stimulus(record: SessionRecord) -> str:
+    """That most windows after an electrical pulse are missed if it is not stated, if no window is named."""
+    header, last = record.header, record.estimates[-1]
+    named = last.window is not None and not sentences.is_guess(last)
+    may_be_electrical = header.conditioning == "tap" and header.space.reference == "impact"
+    if named or not may_be_electrical or not record.rests_on_data or not _lacks(record, "conditioning"):
+        return ""
+    return (
+        'State what comes first (conditioning = "tap" or "electrical"): windows after an electrical pulse are narrow, '
+        "and most are missed if it is not stated."
+    )
 
 
 def _expects_a_tap(record: SessionRecord) -> str:
