@@ -4,7 +4,7 @@
 trial. `report` compares that with a CUSUM that knows the person's law, the size and the direction of the step, and
 whose threshold no more than 3 % of the sessions without a step reach. `bound` says how often the trials of a session
 could name its step to anyone who knows its trial, but neither the person nor the size. Reported people come from seed
-200,000 on. `run --knowing` runs a belief that knows what the people of a cohort have in common, `run --first electrical`
+200,000 on. `run --knowing` runs a belief that knows what the people of a cohort have in common, `--first electrical`
 one to which an electrical pulse was stated.
 """
 
@@ -216,6 +216,8 @@ def _honest(folder: Path) -> pd.DataFrame:
         told_share = knowing_the_share(pd.read_parquet(file)).groupby(["cohort", "trial"]).mean()
         table.insert(4, "f1_with_share", told_share["f1"])
         table.insert(5, "expected_with_share", told_share["expected"])
+        for name in ("false_window", "false_sure"):
+            table.insert(table.columns.get_loc(name) + 1, f"{name}_with_share", told_share[name])
         wrong = table["sure_and_wrong"]
         table.insert(
             table.columns.get_loc("sure_and_wrong") + 1,
@@ -227,22 +229,28 @@ def _honest(folder: Path) -> pd.DataFrame:
 
 
 def knowing_the_share(rows: pd.DataFrame) -> pd.DataFrame:
-    """Actual and expected F1 if the prior of a window were the share of people with one; NaN if all or none have one.
+    """What there would be if the prior of a window were the share of people with one; NaN if all or none have one.
+
+    F1 and expected F1, and of people without a window those with a best guess at one, and with a probability of .9.
 
     Args:
         rows: of one cohort.
     """
     share, there = rows["true_window"].mean(), rows["true_window"].astype(bool)
+    found, names = rows[["cohort", "trial"]], ("f1", "expected", "false_window", "false_sure")
     if share in {0.0, 1.0}:
-        return rows[["cohort", "trial"]].assign(f1=np.nan, expected=np.nan)
+        return found.assign(**dict.fromkeys(names, np.nan))
     before = ProfilePrior().p_window
     odds = rows["probability"] / (1.0 - rows["probability"]) * (share / (1.0 - share)) * ((1.0 - before) / before)
     probability = 1.0 - 1.0 / (1.0 + odds)
     of_window = rows["expected_f1"] / rows["probability"] * probability  # the window stays as it is
     keeps = rows["reported_window"].astype(bool) & (probability >= 0.5) & (of_window >= 1.0 - probability)
     none = rows["f1"].where(~rows["reported_window"].astype(bool), (~there).astype(float))
-    return rows[["cohort", "trial"]].assign(
-        f1=rows["f1"].where(keeps, none), expected=of_window.where(keeps, 1.0 - probability)
+    return found.assign(
+        f1=rows["f1"].where(keeps, none),
+        expected=of_window.where(keeps, 1.0 - probability),
+        false_window=keeps.astype(float).mask(there),
+        false_sure=(probability >= 0.9).astype(float).mask(there),
     )
 
 
