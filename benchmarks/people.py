@@ -40,6 +40,8 @@ ORACLES = {"oracle": simulate_oracle, "second": simulate_second_oracle}
 def by_trial(rows: pd.DataFrame, *oracles: pd.DataFrame) -> pd.DataFrame:
     """F1, by how much that of oracles is larger on the same people, and coverage; with their standard errors.
 
+    `knowledge` is by how much the first oracle's F1 is larger: what it is worth to know that there is a window.
+
     Args:
         rows: of the default.
         oracles: rows of those of `ORACLES`, in their order, as far as they were run.
@@ -50,6 +52,9 @@ def by_trial(rows: pd.DataFrame, *oracles: pd.DataFrame) -> pd.DataFrame:
     behind = [f"behind_{name}" for name, _ in zip(ORACLES, oracles, strict=False)]
     for name, others in zip(behind, oracles, strict=True):
         found[name] = others.set_index(keys)["f1"].reindex(same).to_numpy() - rows["f1"]
+    if len(behind) == len(ORACLES):
+        found["knowledge"] = found["behind_oracle"] - found["behind_second"]
+        behind.append("knowledge")
     grouped = found.groupby(["cohort", "trial"])
     names = ["f1", *behind, "expected_f1", "start_covered", "end_covered"]
     return _means(grouped, names).assign(called_none=grouped["called_none"].mean())

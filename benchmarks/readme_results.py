@@ -82,13 +82,12 @@ def curves_of(cohort: str) -> pd.DataFrame:
 
     The oracles have no standard error of their own: they are there to be compared on the same people.
     """
-    default = (
-        _table("people_usual.json", "By trial")
-        .assign(strategy="default")
-        .rename(columns={"start_covered": "start_coverage"})
+    own = _table("people.json", "By trial")
+    default = own.assign(strategy="default").rename(columns={"start_covered": "start_coverage"})
+    oracles = pd.concat(
+        own[["cohort", "trial"]].assign(f1=own["f1"] + own[f"behind_{name}"], f1_se=0.0, strategy=name)
+        for name in ("oracle", "second")
     )
-    both = _table("two_oracles.json", "Both oracles").assign(f1_se=0.0)
-    oracles = both.melt(["cohort", "trial", "f1_se"], ["oracle", "second"], var_name="strategy", value_name="f1")
     rows = pd.concat([default, oracles, opponents()])
     return rows[(rows["cohort"] == cohort) & (rows["trial"] <= LAST)]
 
