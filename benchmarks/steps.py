@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 import pandas as pd
@@ -87,7 +87,9 @@ def run(
     *,
     stated: Annotated[bool, typer.Option(help="The intensity is stated.")] = False,
     knowing: Annotated[bool, typer.Option(help="With a prior that is the cohort's own law.")] = False,
-    first: Annotated[str, typer.Option(help="ISIs count from what comes first: tap, electrical, or unstated.")] = "",
+    first: Annotated[
+        Literal["", "unstated", "tap", "electrical"], typer.Option(help="What comes first; ISIs then count from it.")
+    ] = "",
     out: Annotated[Path, typer.Option(help="Folder of the tables.")] = Path("steps"),
 ) -> None:
     """Run the default, 25 people at a time; a cohort's tables grow with each 25, and it goes on behind them."""
