@@ -8,6 +8,7 @@ What facilitation does to recorded amplitudes is put together in five ways, and 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -16,6 +17,7 @@ import typer
 from rich.progress import Progress
 
 from benchmarks.acquisition import MARKS, write
+from benchmarks.before_and_now import prior_of_1bbe107
 from benchmarks.provenance import facts_of
 from benchmarks.quick import understood
 from benchmarks.recorded_people import FOLDER, PEOPLE, RecordedSession
@@ -43,12 +45,17 @@ def main(
     seed: Annotated[int, typer.Option(help="Seed of the people.")] = 10_000,
     workers: Annotated[int, typer.Option(help="Processes.")] = 2,
     out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("recorded"),
+    *,
+    earlier_prior: Annotated[bool, typer.Option(help="The default with the prior of 1bbe107.")] = False,
 ) -> None:
     """Compare strategies on recorded MEPs."""
     if not FOLDER.is_dir():
         raise SystemExit(f"the recorded sweeps are not at hand: {FOLDER} is no folder")
     plan = seed, trials, tuple(mark for mark in MARKS if mark <= trials)
     units, tables = batches(strategies.split(","), people, 50, plan), []
+    if earlier_prior:
+        prior = tuple(prior_of_1bbe107().items())
+        units = [[replace(session, settings=(*session.settings, *prior)) for session in some] for some in units]
     with Progress() as progress:
         bar = progress.add_task("batches", total=len(units))
         for _, result in Processes(workers).results(simulate_batch, units):
