@@ -136,7 +136,7 @@ def _unstated_intensity(record: SessionRecord) -> str:
 
 
 def _unstated_stimulus(record: SessionRecord) -> str:
-    """That most windows after an electrical pulse are missed if it is not stated, if no window is named."""
+    """That windows after an electrical pulse are often missed if it is not stated, if no window is named."""
     header, last = record.header, record.estimates[-1]
     named = last.window is not None and not sentences.is_guess(last)
     may_be_electrical = header.conditioning == "tap" and header.space.reference == "impact"
@@ -144,7 +144,7 @@ def _unstated_stimulus(record: SessionRecord) -> str:
         return ""
     return (
         'State what comes first (conditioning = "tap" or "electrical"): windows after an electrical pulse are narrow, '
-        "and most are missed if it is not stated."
+        "and often missed if it is not stated."
     )
 
 
