@@ -123,3 +123,29 @@ def test_a_file_is_replayed_for_one_person(isiw: Command, people: Path) -> None:
     assert "All 10 pairs of stimuli say" in result.output
     assert Path("a.png").exists()
     assert "--only CODE" in isiw(*words).output
+
+
+def test_who_cannot_be_analysed_keeps_nobody_else_from_it(isiw: Command, people: Path) -> None:
+    rows = pd.read_csv(people)
+    same = rows[rows["subject"] == "A"].assign(subject="0", isi_ms=30.0)
+    pd.concat([same, rows[rows["subject"] == "B"]]).to_csv("some.csv", index=False)
+    done = isiw(
+        "analyse", "some.csv", "--reference", "impact", "--config", "few.toml", "--alone", "single", "-o", "logs"
+    )
+    assert done.exit_code == 1
+    assert "1 person of 2 could not be analysed; got '0'" in done.output
+    assert "the ISIs of some.csv, 0, are all the same" in done.output
+    assert Path("logs/B.mcap").exists()
+
+
+def test_a_replay_takes_every_option_that_a_file_may_need(isiw: Command, people: Path) -> None:
+    rows = pd.read_csv(people)
+    rows = rows[rows["subject"] == "A"].drop(columns="subject")
+    rows.loc[0, "isi_ms"] = -1.0
+    rows.to_csv("comma.csv", index=False, sep=";", decimal=",")
+    words = ("--reference", "impact", "--decimal", ",", "--seeds", 1, "--trials", 3)
+    done = isiw("replay", "comma.csv", "--alone", -1, *words)
+    assert done.exit_code == 0, done.output
+    assert "as --alone says" not in done.output
+    other = isiw("replay", "comma.csv", "--alone", -5, *words)
+    assert "No trial is TMS alone: no ISI is '-5', as --alone says." in other.output

@@ -43,6 +43,8 @@ Markers = Annotated[
 Channels = Annotated[
     list[str] | None, typer.Option("--channel", metavar="KEY=NAME", help="Which channel holds the EMG: emg=NAME.")
 ]
+Alone = Annotated[str | None, typer.Option(help="What stands for the ISI of TMS alone.", **NO_DEFAULT)]
+Decimal = Annotated[str | None, typer.Option(help="The decimal sign of the file.", **NO_DEFAULT)]
 Sheet = Annotated[str | None, typer.Option(help="The sheet of a workbook.", **NO_DEFAULT)]
 LayoutFile = Annotated[Path | None, typer.Option("--layout", help="How the files are laid out (TOML).", **NO_DEFAULT)]
 
@@ -58,8 +60,8 @@ def analyse(  # noqa: PLR0913, PLR0917 - an option each
     unit: Units = None,
     marker: Markers = None,
     channel: Channels = None,
-    alone: Annotated[str | None, typer.Option(help="What stands for the ISI of TMS alone.", **NO_DEFAULT)] = None,
-    decimal: Annotated[str | None, typer.Option(help="The decimal sign of the file.", **NO_DEFAULT)] = None,
+    alone: Alone = None,
+    decimal: Decimal = None,
     sheet: Sheet = None,
     layout: LayoutFile = None,
     config: Annotated[
@@ -75,20 +77,19 @@ def analyse(  # noqa: PLR0913, PLR0917 - an option each
     Called again with the same files and folder, it continues where it was interrupted.
     """
     with errors_reported("Interrupted: what is finished is kept; give the same command to continue."):
-        markers = isiw.existing.layout.pairs_of("--marker", marker or [])
-        channels = isiw.existing.layout.pairs_of("--channel", channel or [])
         said = {"reference": reference, "alone": alone, "decimal": decimal, "sheet": sheet}
-        read = _layout(layout, column, unit, **said, markers=markers, channels=channels)
+        read = _layout(layout, {"columns": column, "markers": marker, "channels": channel}, unit, **said)
         settings = isiw.config.load_config(config).with_overrides(strategy=strategy, seed=seed)
         way = isiw.existing.batch.way_of(settings, read, simulated=simulated)
         with working(f"Reading {counted(len(files), 'file')}"):
             people = isiw.existing.batch.read_files(files, way, output, only)
         _analyse_all(people, way, files[0])
+        _say_unused(people, way)
 
 
 @app.command(rich_help_panel=STUDIES)
 def replay(  # noqa: PLR0913, PLR0917 - an option each
-    file: Annotated[Path, typer.Argument(help="A table, or a log.", **NO_DEFAULT)],
+    file: Annotated[Path, typer.Argument(help="A table, a recording, or a log.", **NO_DEFAULT)],
     strategy: Annotated[list[str] | None, typer.Option(help="A name that isiw strategies lists; repeat it.")] = None,
     seeds: Annotated[int, typer.Option(help="How many times each strategy is run, with other draws.")] = 5,
     trials: Annotated[int, typer.Option(help="How many stimuli each time.")] = 60,
@@ -96,6 +97,10 @@ def replay(  # noqa: PLR0913, PLR0917 - an option each
     reference: Reference = None,
     column: Columns = None,
     unit: Units = None,
+    marker: Markers = None,
+    channel: Channels = None,
+    alone: Alone = None,
+    decimal: Decimal = None,
     sheet: Sheet = None,
     layout: LayoutFile = None,
     only: Annotated[str | None, typer.Option(help="The code of the one person who is wanted.", **NO_DEFAULT)] = None,
@@ -103,9 +108,11 @@ def replay(  # noqa: PLR0913, PLR0917 - an option each
 ) -> None:
     """How many stimuli would it have taken? Strategies choose ISIs, and the trials of a file answer."""
     with errors_reported("Interrupted."):
-        read = _layout(layout, column, unit, reference=reference, sheet=sheet)
+        said = {"reference": reference, "alone": alone, "decimal": decimal, "sheet": sheet}
+        read = _layout(layout, {"columns": column, "markers": marker, "channels": channel}, unit, **said)
+        way = isiw.existing.batch.Way(read)
         with working(f"Reading {file.name}"):
-            found = isiw.existing.batch.read_files([file], isiw.existing.batch.Way(read), only=only)
+            found = isiw.existing.batch.read_files([file], way, only=only)
         if len(found) > 1:
             people = isiw.existing.delivered.codes_of([one.delivered for one in found])
             raise isiw.errors.ConfigError("a replay is of one person", got=people, remedy="Say whose: --only CODE.")
@@ -117,32 +124,47 @@ def replay(  # noqa: PLR0913, PLR0917 - an option each
                 found[0].delivered, names, seeds=seeds, trials=trials, on_done=lambda: progress.advance(task)
             )
         show(f"{replayed}")
-        _say_unused(found)
+        _say_unused(found, way)
         if output is not None:
             show(f"picture: {replayed.plot(output, overwrite=overwrite)}")
 
 
-def _layout(file: Path | None, columns: list[str] | None, units: list[str] | None, **said: Any) -> Layout:
+def _layout(file: Path | None, named: dict[str, list[str] | None], units: list[str] | None, **said: Any) -> Layout:
     """The layout of a file, with what the command line says otherwise."""
     layout = isiw.existing.layout.read_layout(file) if file is not None else isiw.existing.Layout()
-    columns_of = isiw.existing.layout.pairs_of("--column", columns or [])
-    return layout.saying(columns=columns_of, units=tuple(units or ()), **said)
+    pairs = {key: isiw.existing.layout.pairs_of(f"--{key[:-1]}", texts or []) for key, texts in named.items()}
+    return layout.saying(**pairs, units=tuple(units or ()), **said)
 
 
 def _analyse_all(people: list[Person], way: Way, source: Path) -> None:
-    several = len(people) > 1
+    """Analyse each person; of several, those who cannot be analysed are named, and keep nobody else from it."""
+    several, failed = len(people) > 1, list[str]()
     with Progress(console=Console(stderr=True), disable=not several) as progress:
         task = progress.add_task("people", total=len(people))
         for person in people:
-            _analyse_one(person, way, source, several=several)
+            try:
+                _analyse_one(person, way, source, several=several)
+            except isiw.errors.InvalidValueError as error:
+                if not several:
+                    raise
+                failed.append(isiw.existing.delivered.codes_of([person.delivered]))
+                show(f"{failed[-1]}: {error}")
             progress.advance(task)
-    _say_unused(people)
+    if failed:
+        raise isiw.errors.InvalidValueError(
+            f"{counted(len(failed), 'person', 'people')} of {len(people)} could not be analysed",
+            got=", ".join(failed),
+            remedy="Correct what is said of each above, and give the same command again.",
+        )
 
 
-def _say_unused(people: list[Person]) -> None:
+def _say_unused(people: list[Person], way: Way) -> None:
     """Name the columns of which nothing was read: one of them may exclude trials, which count then."""
     if unused := dict.fromkeys(name for person in people for name in person.delivered.unused):
         show(f"Columns not used: {', '.join(unused)}. If one excludes trials, name it: --column exclude=NAME.")
+    mark, trials = way.layout.alone, [trial for person in people for trial in person.delivered.trials]
+    if mark and all(trial.isi_ms is not None for trial in trials):
+        show(f"No trial is TMS alone: no ISI is {mark!r}, as --alone says.")
 
 
 def _analyse_one(person: Person, way: Way, source: Path, *, several: bool) -> None:

@@ -20,6 +20,7 @@ from isiw.errors import InvalidValueError, LogError
 from isiw.estimate import WindowEstimate
 from isiw.existing.delivered import Delivered
 from isiw.files import made_folder, put
+from isiw.findings import Kind
 from isiw.log.durable import log_exists, log_of
 from isiw.log.headers import Header
 from isiw.log.reader import SessionRecord
@@ -31,6 +32,7 @@ from isiw.report.page import save_report
 from isiw.report.words import final_statement
 from isiw.session.assembly import header_of
 from isiw.session.examination import estimate_record
+from isiw.signals.limits import before_impact
 from isiw.signals.watch import Watch
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.stopping import StopKind
@@ -151,11 +153,11 @@ def analyse(
         StrategyError: an unknown strategy or setting.
     """
     require_space(space)
-    isis, meps = (np.asarray(values, dtype=np.float64) for values in (isi_ms, mep_mv))
+    isis, meps = _numbers("the ISIs", isi_ms), _numbers("the MEPs", mep_mv)
     if isis.shape != meps.shape or isis.ndim != 1:
         raise InvalidValueError("each trial has one ISI and one MEP", got=(isis.shape, meps.shape))
     delivered = Delivered(
-        _trials(isis, meps),
+        _trials(isis, meps, space),
         space.reference,
         subject=subject,
         visit=visit or Visit(),
@@ -165,13 +167,25 @@ def analyse(
     return analysed(delivered, make_strategy(strategy, space, seed, **settings))
 
 
-def _trials(isis_ms: FloatArray, meps_mv: FloatArray) -> TrialTable:
+def _numbers(what: str, values: ArrayLike) -> FloatArray:
+    """Numbers as an array; what a mask hides is NaN."""
+    try:
+        return np.ma.filled(np.ma.array(values, dtype=np.float64), np.nan)
+    except (TypeError, ValueError) as error:
+        raise InvalidValueError(
+            f"{what} are not numbers", got=values, remedy="Write NaN for what is missing."
+        ) from error
+
+
+def _trials(isis_ms: FloatArray, meps_mv: FloatArray, space: DesignSpace) -> TrialTable:
     trials = []
     for number, (isi, mep) in enumerate(zip(isis_ms.tolist(), meps_mv.tolist(), strict=True)):
-        isi_ms, lost = None if np.isnan(isi) else isi, bool(np.isnan(mep))
-        outcome: dict[str, Any] = {"reason": "outcome unknown"} if lost else {"mep_mv": mep}
-        status = Status.MISTRIAL if lost else Status.ACCEPTED
-        trials.append(Trial(number, status, isi_ms, isi_ms=isi_ms, **outcome))
+        isi_ms, mep_mv = None if np.isnan(isi) else isi, None if np.isnan(mep) else mep
+        lost = Kind.OUTCOME_UNKNOWN if mep_mv is None else None
+        if isi_ms is not None and before_impact(isi_ms, max(isi_ms, 0.0), space):
+            lost = Kind.TMS_BEFORE_IMPACT
+        status = Status.ACCEPTED if lost is None else Status.MISTRIAL
+        trials.append(Trial(number, status, isi_ms, isi_ms=isi_ms, mep_mv=mep_mv, reason=lost))
     return TrialTable(tuple(trials))
 
 

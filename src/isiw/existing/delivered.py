@@ -99,7 +99,8 @@ class Delivered:
                 got=", ".join(reasons) or None,
                 remedy="A trial counts if it has an ISI and an amplitude, and if no column excludes it.",
             )
-        low, high = math.floor(min(isis_ms) / step_ms), math.ceil(max(isis_ms) / step_ms)
+        lowest, highest = round(min(isis_ms) / step_ms, 6), round(max(isis_ms) / step_ms, 6)  # of times in s, too
+        low, high = math.floor(lowest), math.ceil(highest)
         if not 1 <= high - low < MOST_ISIS:
             raise InvalidValueError(
                 f"the ISIs of {self.named} are {'all the same' if high == low else 'too far apart for a window'}",

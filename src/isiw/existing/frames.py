@@ -29,13 +29,15 @@ _LINES: Final = 100
 _HEAD: Final = 40
 """So many bytes show how a text is encoded."""
 
+_BLANKS: Final = r"\s+"
+
 Rows = Sequence[Sequence[Any]]
 
 
 def read_frame(path: Path, layout: Layout) -> pd.DataFrame:
     """The table in a file, its cells as they are."""
     readers: Mapping[str, Callable[[bytes, Layout], pd.DataFrame]] = {
-        ".mat": lambda content, _: _of_vectors(_arrays(content)),
+        ".mat": lambda content, layout: _of_vectors(_arrays(content), layout),
         ".parquet": lambda content, _: named(pd.read_parquet(io.BytesIO(content))),
         **dict.fromkeys(WORKBOOKS, _workbook),
     }
@@ -87,21 +89,26 @@ def _texts(content: bytes, layout: Layout) -> pd.DataFrame:
     if "\0" in text:
         raise InvalidValueError("the file is no text, and so no table that can be read", remedy="Is it the right one?")
     lines = text.splitlines(keepends=True)[layout.skip_lines :]
-    first = 0 if layout.names else next((n for n in range(min(_LINES, len(lines))) if _begins(lines, n, layout)), 0)
-    lines = lines[first:]
+    lines = lines[0 if layout.names else _first(lines, layout) :]
     if lines and lines[0].startswith("#"):  # each part of the file begins so, with names of its own
         ends = (n for n, line in enumerate(lines) if n and line.startswith("#"))
         lines = [lines[0].lstrip("# "), *lines[1 : next(ends, None)]]
+    lines = [line for line in lines if not line.startswith("# ")]
     separator = layout.separator or _separator(lines[0] if lines else "")
     return _table([row for row in _split(lines, separator) if row], layout)
 
 
-def _begins(lines: Sequence[str], number: int, layout: Layout) -> bool:
-    """True if a line holds the columns' names, and those below it as many cells."""
-    line = lines[number].lstrip("# ")
-    separator = layout.separator or _separator(line)
-    names, *below = _split([line, *lines[number + 1 : number + 3]], separator)
-    return _is_header(names, layout) and all(len(row) >= len(names) for row in below if row)
+def _first(lines: Sequence[str], layout: Layout) -> int:
+    """The line with the columns' names: those below it have as many cells, or at least it has a sign between names."""
+    found = []
+    for number in range(min(_LINES, len(lines))):
+        line = lines[number].lstrip("# ")
+        separator = layout.separator or _separator(line)
+        names, *below = _split([line, *lines[number + 1 : number + 3]], separator)
+        if _is_header(names, layout):
+            whole = all(len(row) >= len(names) for row in below if row)
+            found.append((not whole, separator == _BLANKS, number))
+    return min(found, default=(True, True, 0))[-1]
 
 
 def _is_header(cells: Sequence[Any], layout: Layout) -> bool:
@@ -129,7 +136,8 @@ def _table(rows: Rows, layout: Layout) -> pd.DataFrame:
         body = body[1:]
     if not body:
         raise InvalidValueError("the table has no rows", got=", ".join(names), remedy="Is the file complete?")
-    if all(len(row) == len(names) + 1 and str(row[0]) == str(n) for n, row in enumerate(body, 1)):
+    numbered = all(len(row) == len(names) + 1 and str(row[0]) == str(n) for n, row in enumerate(body, 1))
+    if numbered and not all(is_missing(row[-1]) for row in body):  # those end with the sign that separates cells
         body = [row[1:] for row in body]  # R numbers its rows without naming the column of these numbers
     return pd.DataFrame([_cells(row, names, number) for number, row in enumerate(body, 1)], columns=names)
 
@@ -165,11 +173,11 @@ def _separator(line: str) -> str:
     """The separator of the columns' names; blanks, if there is no other."""
     counts = {sign: line.count(sign) for sign in ("\t", ";", ",", "|")}
     best = max(counts, key=lambda sign: counts[sign])
-    return best if counts[best] else r"\s+"
+    return best if counts[best] else _BLANKS
 
 
 def _split(lines: Sequence[str], separator: str) -> Iterator[list[str]]:
-    if separator == r"\s+":
+    if separator == _BLANKS:
         lines, separator = [" ".join(line.split()) for line in lines], " "
     return csv.reader(lines, delimiter=separator, skipinitialspace=True)
 
@@ -184,7 +192,7 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
         )
     book = pd.ExcelFile(io.BytesIO(content), engine="openpyxl")
     if layout.sheet is not None:
-        require_one("the workbook has no such sheet", layout.sheet, book.sheet_names)
+        require_one("sheet", "the workbook", layout.sheet, book.sheet_names)
     sheets = {
         str(name): _from_names(book.parse(name, header=None, dtype=object).to_numpy().tolist(), layout)
         for name in ([layout.sheet] if layout.sheet is not None else book.sheet_names)
@@ -211,22 +219,31 @@ def _arrays(content: bytes) -> dict[str, Any]:
             "files of MATLAB 7.3 cannot be read", remedy="Save it for 7: save('P01.mat', 'isi_ms', 'mep_mv', '-v7')."
         )
     values = scipy.io.loadmat(cast("Any", io.BytesIO(content)), simplify_cells=True)
-    return dict(_flat({name: value for name, value in values.items() if not name.startswith("__")}))
+    paths = dict(_flat({name: value for name, value in values.items() if not name.startswith("__")}))
+    last = [path[-1] for path in paths]
+    return {path[-1] if last.count(path[-1]) == 1 else ".".join(path): array for path, array in paths.items()}
 
 
-def _flat(values: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+def _flat(values: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """The arrays in structures by their path; of a structure for each trial, the values of each of its fields."""
     for name, value in values.items():
-        if isinstance(value, dict):
-            yield from _flat(value)
+        each = list(value) if isinstance(value, list) or (isinstance(value, np.ndarray) and value.ndim == 1) else []
+        if each and all(isinstance(one, dict) for one in each):
+            inner = {key: [one.get(key, np.nan) for one in each] for key in each[0]}
         else:
-            yield name, np.asarray(value)
+            inner = value if isinstance(value, dict) else {}
+        if inner:
+            yield from (((name, *path), array) for path, array in _flat(inner))
+        else:
+            yield (name,), np.asarray(value)
 
 
-def _of_vectors(arrays: Mapping[str, Any]) -> pd.DataFrame:
-    """The vectors of equal length in a file of MATLAB, as the columns of a table."""
+def _of_vectors(arrays: Mapping[str, Any], layout: Layout) -> pd.DataFrame:
+    """The vectors in a file of MATLAB that are as long as that of the ISIs, or the longest, as columns of a table."""
     squeezed = {name: array.squeeze() if array.size > 1 else array for name, array in arrays.items()}
     vectors = {name: array for name, array in squeezed.items() if array.ndim == 1}
-    longest = max((len(vector) for vector in vectors.values()), default=0)
+    of_isis = {name for name in vectors if name == layout.columns.get("isi") or letters(name) in COLUMNS["isi"]}
+    longest = max((len(vectors[name]) for name in of_isis or vectors), default=0)
     if longest == 0:
         raise InvalidValueError(
             "the file has no vectors that could be the columns of a table",

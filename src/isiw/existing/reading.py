@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import datetime as dt
+import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -15,17 +16,20 @@ from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.existing import frames, recordings, tables
 from isiw.existing.delivered import Delivered, anywhere, read_log, renumbered
-from isiw.existing.layout import MARKERS, Layout
+from isiw.existing.layout import ISI_UNITS_MS, MARKERS, Layout, letters
 from isiw.files import is_mcap
 from isiw.findings import Kind
 from isiw.lazy import pd
 from isiw.log.durable import log_exists
 from isiw.signals.judgement import judge_measurement
 from isiw.signals.limits import EMG_UNITS_MV
-from isiw.text.sanitize import counted
 from isiw.trials import Channel, Measurement, Status, Stimulus, Trial
 from isiw.types import FloatArray, Reference
 from isiw.visit import Visit
+
+_RATES: Final = frozenset({"fs", "srate", "samplerate", "samplingrate", "samplingfrequency", "sfreq", "rate", "ratehz"})
+_DATE: Final = re.compile(r"(\d{1,2})([./-])(\d{1,2})\2\d{2,4}(?!\d)")
+_WRITE_DATES: Final = "Write dates as 2026-01-31."
 
 
 def read_people(source: str | Path | Any, layout: Layout | None = None, *, subject: str = "") -> list[Delivered]:
@@ -80,7 +84,8 @@ def _read_waves(path: Path, layout: Layout, subject: str) -> Delivered:
     """The trials of a recording whose layout names the column, or the array, of the EMG."""
     if path.suffix.lower() == ".mat":
         arrays = frames.read_arrays(path)
-        if arrays.get(layout.channels["emg"], np.zeros(1)).ndim == 2:
+        tables.require_one("array", path.name, layout.channels["emg"], arrays)
+        if arrays[layout.channels["emg"]].squeeze().ndim > 1:
             return _of_matrix(arrays, layout, subject, path.name)
     return _of_columns(frames.read_frame(path, layout), layout, subject, path.name)
 
@@ -99,31 +104,35 @@ def _of_matrix(arrays: dict[str, FloatArray], layout: Layout, subject: str, sour
     vectors = {
         name: array.ravel().tolist() for name, array in arrays.items() if max(array.shape, default=0) == array.size
     }
-    isis_ms = tables.isis_of(vectors, layout, source)
+    columns = tables.of_vectors(vectors, layout, source)
     name, sweeps = layout.channels["emg"], np.asarray(arrays[layout.channels["emg"]], dtype=np.float64)
-    count = len(isis_ms)
-    if count not in sweeps.shape:
+    count = columns.rows
+    if sweeps.ndim != 2 or count not in sweeps.shape:
         raise InvalidValueError(
-            f"the sweeps of {source} are not as many as its ISIs",
-            got=(sweeps.shape, count),
-            remedy="Save one for each.",
+            f"the sweeps of {source} are not as many as its ISIs, in a matrix",
+            got=f"{' × '.join(map(str, sweeps.shape))} samples and {count} ISIs",
+            remedy="Save a row or a column for each ISI.",
         )
+    for other, array in arrays.items():
+        if array.size == 1 and letters(other) in _RATES and array.dtype.kind in "fiu":
+            _require_rate(rate_hz, float(array.item()), f"{other!r} of {source}")
     factor_mv = EMG_UNITS_MV[tables.required_unit("EMG", tables.Column(name, [], of=source), layout, EMG_UNITS_MV)]
     values_mv = factor_mv * (sweeps if sweeps.shape[0] == count else sweeps.T)
     channels = [Channel(each, rate_hz, "mV", -pulse_at_ms) for each in values_mv]
-    return recordings.of_sweeps(channels, isis_ms, layout, subject, source)
+    return recordings.of_sweeps(channels, columns, layout, subject, source)
 
 
 def _of_columns(frame: pd.DataFrame, layout: Layout, subject: str, source: str) -> Delivered:
     """A continuous recording, a row for each sample; blocks, each with lines of its own before it, are sweeps."""
     rate_hz = _required(layout, "rate_hz", f"the sampling rate of {source}")
+    remedy = "If no line holds their names, write names = [...] into the layout."
     for name in layout.channels.values():
-        remedy = "If no line holds their names, write names = [...] into the layout."
-        tables.require_one(f"{source} has no such column", name, frame, remedy)
+        tables.require_one("column", source, name, frame, remedy)
     breaks = frame.iloc[:, 0].astype(str).str.endswith("=").to_numpy()
     frame, block = frame[~breaks], np.cumsum(breaks)[~breaks]
     name = layout.channels["emg"]
     unit = tables.required_unit("EMG", tables.Column(name, [], of=source), layout, EMG_UNITS_MV)
+    _require_clock(frame[block == block[:1]], layout, rate_hz, source)
     channels = {"emg": Channel(EMG_UNITS_MV[unit] * _numbers(frame, name, layout, source), rate_hz, "mV")}
     if "acceleration" in layout.channels:
         values = _numbers(frame, layout.channels["acceleration"], layout, source)
@@ -150,9 +159,42 @@ def _of_columns(frame: pd.DataFrame, layout: Layout, subject: str, source: str) 
     return recordings.delivered_of(recording, recordings.sweeps_of(recording, layout), layout, subject)
 
 
+def _require_rate(stated_hz: float, found_hz: float, where: str) -> None:
+    if not 0.98 < found_hz / stated_hz < 1.02:
+        raise InvalidValueError(
+            f"the sampling rate is not the one that {where} says",
+            got=f"{stated_hz:g} Hz",
+            expected=f"{found_hz:g} Hz",
+            remedy="Correct rate_hz in the layout.",
+        )
+
+
+def _require_clock(frame: pd.DataFrame, layout: Layout, rate_hz: float, source: str) -> None:
+    """Raise if a column of times says another sampling rate than the layout."""
+    for name in sorted({*frame.columns} - {*layout.channels.values()}):
+        cells = frame.iloc[:, list(frame.columns).index(name)]
+        if (clock_hz := _clock_hz(cells, name, rate_hz)) is not None:
+            _require_rate(rate_hz, clock_hz, f"the column {name!r} of {source}")
+
+
+def _clock_hz(cells: pd.Series, name: str, rate_hz: float) -> float | None:
+    """The sampling rate that a column of times says; None if it is no such column, or of numbers of samples."""
+    times = pd.to_numeric(cells.astype(str).str.replace(",", "."), errors="coerce").to_numpy(dtype=np.float64)
+    step = (times[-1] - times[0]) / (len(times) - 1) if len(times) > 2 else 0.0
+    even = times[0] + step * np.arange(len(times))
+    if not step > 0 or not np.all(np.abs(times - even) <= 1.01 * step):  # they may be rounded
+        return None
+    unit = tables.unit_said(name, ISI_UNITS_MS)
+    rates = [1e3 / (step * per_ms) for known, per_ms in ISI_UNITS_MS.items() if unit in {None, known}]
+    if unit is None and math.isclose(step, 1.0, rel_tol=1e-6):
+        return None
+    return min(rates, key=lambda rate: abs(math.log(rate / rate_hz)))
+
+
 def _numbers(frame: pd.DataFrame, name: str, layout: Layout, source: str) -> FloatArray:
     cells = frame[name]
-    few = {name: tables.Column(name, cells.iloc[:1000].tolist(), of=source)}
+    texts = cells[cells.astype(str).str.contains("[.,]")].iloc[:1000].tolist()
+    few = {name: tables.Column(name, texts or cells.iloc[:1000].tolist(), of=source)}
     if not pd.api.types.is_numeric_dtype(cells) and tables.with_decimals(few, layout.decimal)[name].decimal == ",":
         cells = cells.str.replace(",", ".")
     numbers = pd.to_numeric(cells, errors="coerce").to_numpy(dtype=np.float64)
@@ -191,11 +233,20 @@ def people_of(frame: pd.DataFrame, layout: Layout, source: str, name: str = "") 
 
 
 def _days(columns: tables.Columns, rows: Sequence[int]) -> dict[int | None, list[int]]:
-    """The rows of each day; days without a number of their own are counted as they come."""
+    """The rows of each day, by a column of days, or of dates; those without a number are counted as they come."""
+    column = columns["day"] if "day" in columns.of else columns["date"]
+    texts = {row: column.text(row) for row in rows}
+    if column is columns["date"] and len({*texts.values()} - {""}) > 1:
+        texts = {row: text and f"{_moment(column, row).date()}" for row, text in texts.items()}
+    elif column is columns["date"]:
+        return {None: list(rows)}
+    if any(texts.values()) and not all(texts.values()):
+        empty = next(row for row, text in texts.items() if not text)
+        raise column.refused(empty, "is empty", "Write the day into each row.")
     days: dict[str, list[int]] = {}
-    for row in rows:
-        days.setdefault(columns["day"].text(row), []).append(row)
-    if list(days) == [""]:
+    for row, text in texts.items():
+        days.setdefault(text, []).append(row)
+    if list(days) == [""] or (column is columns["date"] and len(days) == 1):
         return {None: list(rows)}
     numbers = [int(found[-1]) if len(found := re.findall(r"\d+", day)) == 1 else 0 for day in days]
     if len(set(numbers)) < len(numbers) or min(numbers) < 1:
@@ -207,7 +258,7 @@ def _person(
     columns: tables.Columns, rows: Sequence[int], layout: Layout, reference: Reference, subject: str, day: int | None
 ) -> Delivered:
     _require_ascending(columns, rows)
-    _require_said(columns, rows, layout)
+    columns.require_said(rows, layout.alone)
     trials = [_trial(columns, row, number, layout, anywhere(reference)) for number, row in enumerate(rows)]
     blocks = [columns["block"].text(row) for row in rows]
     return Delivered(
@@ -225,10 +276,10 @@ def _person(
 
 def _trial(columns: tables.Columns, row: int, number: int, layout: Layout, space: DesignSpace) -> Trial:
     """One row as a trial: as the file judges it, or else as a session would."""
-    alone = tables.says_alone(columns.of["isi"].cells[row], layout.alone)
+    alone = columns.tms_alone(row, layout.alone)
     isi_ms = None if alone else columns["isi"].number(row)
     asked_ms = columns["asked"].number(row) if "asked" in columns.of else isi_ms
-    mep_mv, lost = columns["mep"].number(row), _lost(columns, row)
+    mep_mv, lost = columns["mep"].number(row), columns.lost(row)
     if mep_mv is not None and not 0 <= mep_mv <= MOST_MEP_MV:
         remedy = "It must be from peak to peak, in the unit that is stated; is --unit right?"
         raise columns.of["mep"].refused(row, "is no amplitude", remedy)
@@ -240,7 +291,7 @@ def _trial(columns: tables.Columns, row: int, number: int, layout: Layout, space
         "background_rms_uv": columns["background"].number(row),
         "excluded": "status" in columns.of and columns["exclude"].flag(row) is True,
     }
-    if columns["tap_alone"].flag(row):
+    if columns.tap_alone(row):
         return Trial(number, Status.ACCEPTED, tap_alone=True, **{**facts, "commanded_isi_ms": None})
     if lost is None and (mep_mv is None or (isi_ms is None and asked_ms is not None)):
         lost = Kind.OUTCOME_UNKNOWN
@@ -250,36 +301,6 @@ def _trial(columns: tables.Columns, row: int, number: int, layout: Layout, space
         judged = judge_measurement(measured, Stimulus(number, meant_ms), space)
         lost = judged.reason
     return Trial(number, Status.ACCEPTED if lost is None else Status.MISTRIAL, reason=lost, **facts)
-
-
-def _lost(columns: tables.Columns, row: int) -> Kind | None:
-    """Why the file counts a row as lost; None if it does not."""
-    judged = columns["status"].flag(row)
-    bad = columns["exclude"].flag(row) and "status" not in columns.of
-    if judged is not False and not bad:
-        return None
-    return Kind.of_mistrial(columns["reason"].text(row))
-
-
-def _require_said(columns: tables.Columns, rows: Sequence[int], layout: Layout) -> None:
-    """Raise if nobody says what rows without an ISI are."""
-    if "asked" in columns.of or layout.alone is not None:
-        return
-    isi = columns.of["isi"]
-    empty = [
-        row
-        for row in rows
-        if not tables.says_alone(isi.cells[row], None) and not tables.says_alone(columns["condition"].text(row), None)
-        and not isi.text(row) and columns["mep"].number(row) is not None
-        and _lost(columns, row) is None and not columns["tap_alone"].flag(row)
-    ]  # fmt: skip
-    if empty:
-        raise InvalidValueError(
-            f"{counted(len(empty), 'row has', 'rows have')} an amplitude and no ISI in {isi.of}",
-            got=f"row {empty[0] + 1}",
-            remedy="If these are TMS alone, say --alone with what stands in their place, or --alone '' for an empty "
-            "cell; if not, mark them in a column called exclude.",
-        )
 
 
 def _require_ascending(columns: tables.Columns, rows: Sequence[int]) -> None:
@@ -295,8 +316,12 @@ def _require_ascending(columns: tables.Columns, rows: Sequence[int]) -> None:
             raise order.refused(odd, "is none of a trial", "Delete the row if it is a sum or a mean.")
         places = [order.number(row) or 0.0 for row in known]
     else:  # times of the day, perhaps
-        moments = pd.to_datetime(pd.Series(texts), errors="coerce", format="mixed")
-        places = [] if moments.isna().any() else [moment.timestamp() for moment in moments]
+        in_order = _day_first(texts)
+        orders = (True, False) if in_order is None else (in_order,)
+        read = [_moments(texts, day_first=day_first) for day_first in orders]
+        known_moments = [[one for one in each if one is not None] for each in read]
+        whole = [each for each in known_moments if len(each) == len(texts)]
+        places = next((each for each in whole if each == sorted(each)), whole[0] if whole else [])
     repeated = next((text for text, other in zip(texts[1:], places[1:], strict=False) if places.count(other) > 1), None)
     if places != sorted(places):
         raise InvalidValueError(
@@ -316,7 +341,34 @@ def _created(columns: tables.Columns, row: int) -> str:
     column = columns.of.get("date")
     if column is None or not column.text(row):
         return ""
-    moment = pd.to_datetime(column.text(row), errors="coerce", utc=True)
-    if pd.isna(moment):
-        raise column.refused(row, "is no date", "Write dates as 2026-01-31.")
-    return dt.datetime.fromtimestamp(moment.timestamp(), tz=dt.UTC).isoformat(timespec="microseconds")
+    return _moment(column, row).isoformat(timespec="microseconds")
+
+
+def _moment(column: tables.Column, row: int) -> dt.datetime:
+    """The date in a row, in UTC; whether day or month come first is seen in the other rows."""
+    day_first = _day_first(column.text(other) for other in range(len(column.cells)))
+    if day_first is None:
+        raise column.refused(row, "may have the day first, or the month", _WRITE_DATES)
+    (moment,) = _moments([column.text(row)], day_first=day_first)
+    if moment is None:
+        raise column.refused(row, "is no date", _WRITE_DATES)
+    return dt.datetime.fromtimestamp(moment, tz=dt.UTC)
+
+
+def _moments(texts: Sequence[str], *, day_first: bool) -> list[float | None]:
+    """Dates and times as seconds; None for what is neither."""
+    found = []
+    for text in texts:
+        moment = pd.to_datetime(text, errors="coerce", utc=True, dayfirst=day_first and bool(_DATE.match(text)))
+        found.append(None if pd.isna(moment) else moment.timestamp())
+    return found
+
+
+def _day_first(texts: Iterable[str]) -> bool | None:
+    """Whether dates of numbers begin with the day; None if that cannot be seen."""
+    dates = [found for text in texts if (found := _DATE.match(text))]
+    if any(date[2] == "." or int(date[1]) > 12 for date in dates):
+        return True
+    if all(date[1] == date[3] for date in dates) or any(int(date[3]) > 12 for date in dates):
+        return False
+    return None

@@ -14,9 +14,9 @@ import numpy as np
 
 from isiw.errors import InvalidValueError
 from isiw.existing.delivered import Delivered, anywhere, renumbered
-from isiw.existing.frames import reading
+from isiw.existing.frames import named, reading
 from isiw.existing.layout import Layout
-from isiw.existing.tables import isis_of, require_one
+from isiw.existing.tables import Columns, require_one
 from isiw.lazy import pd
 from isiw.signals.judgement import judge
 from isiw.signals.limits import EMG_UNITS_MV, SignalLimits
@@ -78,24 +78,39 @@ def of_epochs(epochs: Any, layout: Layout, subject: str, source: str = "the epoc
     if epochs.metadata is None:
         raise InvalidValueError(f"{source} do not hold the ISIs", expected="a column isi_ms in their metadata")
     told = replace(layout, alone="") if layout.alone is None else layout
-    isis_ms = isis_of({str(key): cells.tolist() for key, cells in epochs.metadata.items()}, told, source)
+    columns = Columns.found(named(epochs.metadata), told, f"the metadata of {source}", needed=("isi",))
     name = _channel_name(epochs, "emg", layout, source)
     values_mv = _factor_mv(epochs, name, layout, source) * epochs.get_data(picks=[name], verbose="ERROR")[:, 0]
     rate_hz, t0_ms = float(epochs.info["sfreq"]), 1e3 * float(epochs.tmin)
     channels = [Channel(emg_mv, rate_hz, "mV", t0_ms) for emg_mv in values_mv]
-    return of_sweeps(channels, isis_ms, layout, subject, source)
+    return of_sweeps(channels, columns, told, subject, source)
 
 
-def of_sweeps(
-    channels: Sequence[Channel], isis_ms: Sequence[float | None], layout: Layout, subject: str, source: str
-) -> Delivered:
-    """The trials of sweeps whose clocks begin at the pulse; one without an ISI is TMS alone."""
+def of_sweeps(channels: Sequence[Channel], columns: Columns, layout: Layout, subject: str, source: str) -> Delivered:
+    """The trials of sweeps whose clocks begin at the pulse, with columns that say what each one is."""
     begin = "t_hit_ms" if layout.required_reference(source) == "impact" else "t_valve_ms"
+    rows = range(columns.rows)
+    columns.require_said(rows, layout.alone)
+    for key, what in (("subject", "people"), ("day", "days")):
+        several = {columns[key].text(row): None for row in rows}
+        if len(several) > 1:
+            raise InvalidValueError(
+                f"the sweeps of {source} are of several {what}",
+                got=f"{columns[key].name} {', '.join(several)}",
+                remedy="Analyse those of each by themselves.",
+            )
     sweeps: list[Found] = []
-    for number, (isi_ms, emg) in enumerate(zip(isis_ms, channels, strict=True)):
+    for row, emg in zip(rows, channels, strict=True):
+        if columns.tap_alone(row):
+            raise columns["isi"].refused(row, "is of a tap alone, whose sweep has no pulse", "Leave that sweep out.")
+        isi_ms = None if columns.tms_alone(row, layout.alone) else columns["isi"].number(row)
         begins: dict[str, Any] = {begin: None if isi_ms is None else -isi_ms}
-        sweeps.append((Stimulus(number, isi_ms), Sweep({"emg": emg}, t_tms_ms=0.0, **begins), {}))
-    return delivered_of(Recording({}, pd.DataFrame(), source), sweeps, layout, subject)
+        meant = Stimulus(row, None if isi_ms is None else max(isi_ms, 0.0))
+        said = {"excluded": columns.lost(row) is not None}
+        sweeps.append((meant, Sweep({"emg": emg}, t_tms_ms=0.0, **begins), said))
+    person = next(iter({columns["subject"].text(row) for row in rows}), "") or subject
+    found = delivered_of(Recording({}, pd.DataFrame(), source), sweeps, layout, person)
+    return replace(found, unused=columns.unused)
 
 
 Found = tuple[Stimulus, Sweep, Mapping[str, Any]]
@@ -122,6 +137,7 @@ def delivered_of(recording: Recording, sweeps: Sequence[Found], layout: Layout, 
         subject=subject,
         source=recording.source,
         signals=signals,
+        units=("ms", layout.unit_of(EMG_UNITS_MV) or "mV"),
         sweeps={number: sweep.channels for number, (_, sweep, _) in enumerate(sweeps)},
     )
 
@@ -140,7 +156,7 @@ def _channel_name(raw: Any, key: str, layout: Layout, source: str) -> str:
     names = list(raw.ch_names)
     stated = layout.channels.get(key)
     if stated is not None:
-        require_one(f"{source} has no such channel", stated, names)
+        require_one("channel", source, stated, names)
         return stated
     kinds = dict(zip(names, raw.get_channel_types(), strict=True))
     fitting = [name for name in names if kinds[name] == key] or [name for name in names if key in name.casefold()]
@@ -244,6 +260,8 @@ def sweeps_of(recording: Recording, layout: Layout) -> list[Found]:
         origin_s = None if isi_s is None else pulse_s - isi_s
         sweep = _cut(recording.channels, (begin_s, last_s), pulse_s, origin_s, key)
         isi_ms = None if isi_s is None else 1e3 * isi_s
+        if _is_bad(recording.events, min(pulse_s - _BEFORE_MS / 1e3, origin_s or pulse_s), pulse_s):
+            said = {**said, "excluded": True}
         asked = said.get("commanded_isi_ms")
         commanded_ms = isi_ms if asked is None or isi_ms is None or asked != asked else float(asked)  # noqa: PLR0124
         found.append((Stimulus(number, commanded_ms), sweep, said))
@@ -253,6 +271,13 @@ def sweeps_of(recording: Recording, layout: Layout) -> list[Found]:
             remedy="Is the marker of the pulse the right one? Say --marker pulse=NAME.",
         )
     return found
+
+
+def _is_bad(events: pd.DataFrame, begin_s: float, pulse_s: float) -> bool:
+    """True if an annotation that MNE takes for one of bad data overlaps what is judged of a sweep."""
+    bad = events[events["name"].astype(str).str.lower().str.startswith("bad")]
+    last_s = pulse_s + _AFTER_MS / 1e3
+    return bool(((bad["onset"] <= last_s) & (bad["onset"] + bad["duration"] >= begin_s)).any())
 
 
 def _after_s(origins_s: FloatArray, pulse_s: float, layout: Layout) -> float | None:

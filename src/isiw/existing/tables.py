@@ -11,8 +11,10 @@ from typing import Any, Final
 
 from isiw.errors import InvalidValueError, did_you_mean
 from isiw.existing.layout import COLUMNS, ISI_UNITS_MS, UNIT_WORDS, Layout, letters
+from isiw.findings import Kind
 from isiw.lazy import pd
 from isiw.signals.limits import EMG_UNITS_MV
+from isiw.text.sanitize import counted
 
 _MISSING: Final = frozenset({"", "nan", "(null)", "na", "n/a", "none", "null", "<na>", "nat", "-", "--", ".", "?"})
 _YES: Final = frozenset({"1", "1.0", "true", "yes", "y", "x", "accepted", "accept", "ok", "good", "valid", "keep"})
@@ -21,6 +23,8 @@ _ALONE: Final = frozenset({"tms alone", "tms only", "tms", "single", "single pul
                            "baseline", "control", "unconditioned", "unpaired", "ts alone", "ts only", "test",
                            "test alone", "test only", "test pulse", "test stimulus", "no tap"})  # fmt: skip
 """What a cell of ISIs says of TMS alone, hyphens and underscores as blanks."""
+_TAP_ALONE: Final = frozenset({"tap alone", "tap only", "hit only", "hammer only", "no tms", "no pulse", "cs alone",
+                               "cs only", "conditioning alone", "conditioning only"})  # fmt: skip
 
 _NUMBER: Final = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?inf(inity)?", re.IGNORECASE)
 _GROUPED: Final = {
@@ -36,7 +40,7 @@ def is_missing(cell: Any) -> bool:
     """True if a cell holds nothing."""
     if isinstance(cell, str):
         return cell.strip().casefold() in _MISSING
-    return cell is None or cell != cell or type(cell).__name__ in {"NAType", "NaTType"}  # noqa: PLR0124 - NaN
+    return cell is None or type(cell).__name__ in {"NAType", "NaTType"} or cell != cell  # noqa: PLR0124 - NaN
 
 
 def _value(text: str, decimal: str) -> float:
@@ -55,13 +59,19 @@ def says_alone(cell: Any, mark: str | None) -> bool:
     """True if a cell of ISIs stands for TMS alone; an empty one does only if that is the mark."""
     if mark is not None and (is_missing(cell) if not mark.strip() else _same(cell, mark)):
         return True
-    return isinstance(cell, str) and " ".join(re.split(r"[\s_-]+", cell.strip().casefold())) in _ALONE
+    return isinstance(cell, str) and _plain(cell) in _ALONE
+
+
+def _plain(text: str) -> str:
+    return " ".join(re.split(r"[\s_-]+", text.strip().casefold()))
 
 
 def _same(cell: Any, mark: str) -> bool:
+    """True if a cell is the mark, as a text or as a number."""
     if str(cell).strip().casefold() == mark.strip().casefold():
         return True
-    return isinstance(cell, Real) and bool(_NUMBER.fullmatch(mark.strip())) and float(cell) == float(mark)
+    numbers = [{_value(str(one), sign) for sign in ".,"} for one in (cell, mark)]
+    return any(number in numbers[1] for number in numbers[0] if math.isfinite(number))
 
 
 @dataclass(frozen=True)
@@ -167,12 +177,59 @@ class Columns:
     def __getitem__(self, key: str) -> Column:
         return self.of.get(key, self.empty)
 
+    def tms_alone(self, row: int, mark: str | None) -> bool:
+        """True if a row is TMS alone: its ISI says so, or its condition does, and it has no ISI, or 0 and less."""
+        isi = self.of["isi"]
+        if says_alone(isi.cells[row], mark):
+            return True
+        return says_alone(self["condition"].text(row), None) and (isi.number(row) or 0.0) <= 0
+
+    def tap_alone(self, row: int) -> bool:
+        """True if a row is a tap alone, by a column for it or by its condition."""
+        return bool(self["tap_alone"].flag(row)) or _plain(self["condition"].text(row)) in _TAP_ALONE
+
+    def lost(self, row: int) -> Kind | None:
+        """Why a row is marked as lost; None if it is not."""
+        judged = self["status"].flag(row)
+        bad = self["exclude"].flag(row) and "status" not in self.of
+        if judged is not False and not bad:
+            return None
+        return Kind.of_mistrial(self["reason"].text(row))
+
+    def require_said(self, rows: Sequence[int], mark: str | None) -> None:
+        """Raise if it is not stated what rows without an ISI are, or if a row is both a pair and TMS alone."""
+        isi, condition = self.of["isi"], self["condition"]
+        alone = [row for row in rows if says_alone(condition.text(row), None)]
+        both = [row for row in alone if mark is None and not self.tms_alone(row, mark)]
+        if both and len(alone) < len(rows):  # who writes one word into all rows does not mean this
+            raise condition.refused(
+                both[0],
+                f"says TMS alone, and the ISI there is {isi.text(both[0])}",
+                "If it is TMS alone, leave its ISI empty, or say --alone with the number that stands there; if it is a "
+                "pair, rename the column.",
+            )
+        empty = [
+            row
+            for row in rows
+            if not isi.text(row) and not self.tms_alone(row, mark) and not self.tap_alone(row)
+            and "asked" not in self.of and self.lost(row) is None
+            and ("mep" not in self.of or self["mep"].number(row) is not None)
+        ]  # fmt: skip
+        if empty:
+            raise InvalidValueError(
+                f"{counted(len(empty), 'row has', 'rows have')} an amplitude and no ISI in {isi.of}",
+                got=f"row {empty[0] + 1}",
+                remedy="If these are TMS alone, say --alone with what stands in their place, or --alone '' for an "
+                "empty cell; if not, mark them in a column called exclude.",
+            )
+
     @classmethod
-    def found(cls, frame: pd.DataFrame, layout: Layout, source: str) -> Columns:
+    def found(cls, frame: pd.DataFrame, layout: Layout, source: str, needed: Sequence[str] = ("isi", "mep")) -> Columns:
         """The columns of a table, as they are named or else as they are called."""
         names = [str(name) for name in frame.columns]
-        held = {key: _named(key, names, layout, source) for key in COLUMNS}
-        for key in ("isi", "mep"):
+        wanted = [key for key in COLUMNS if key != "mep" or key in needed]
+        held = {key: _named(key, names, layout, source) for key in wanted}
+        for key in needed:
             if held[key] is None:
                 raise _missing(key, names, source)
         columns = {}
@@ -183,32 +240,46 @@ class Columns:
         numeric = ("isi", "mep", "asked", "isi_sd", "background")
         columns |= with_decimals({key: columns[key] for key in numeric if key in columns}, layout.decimal)
         isi_unit = required_unit("ISIs", columns["isi"], layout, ISI_UNITS_MS)
-        mep_unit = required_unit("amplitudes", columns["mep"], layout, EMG_UNITS_MV)
-        factors = {"isi": ISI_UNITS_MS[isi_unit], "mep": EMG_UNITS_MV[mep_unit]}
+        factors, mep_unit = {"isi": ISI_UNITS_MS[isi_unit]}, "mV"
+        if "mep" in columns:
+            mep_unit = required_unit("amplitudes", columns["mep"], layout, EMG_UNITS_MV)
+            factors["mep"] = EMG_UNITS_MV[mep_unit]
         for key in ("asked", "isi_sd"):
             if key in columns:
-                factors[key] = ISI_UNITS_MS[_told(columns[key].name, ISI_UNITS_MS) or isi_unit]
+                factors[key] = ISI_UNITS_MS[unit_said(columns[key].name, ISI_UNITS_MS) or isi_unit]
         if "background" in columns:
-            factors["background"] = 1e3 * EMG_UNITS_MV[_told(columns["background"].name, EMG_UNITS_MV) or "uV"]
+            factors["background"] = 1e3 * EMG_UNITS_MV[unit_said(columns["background"].name, EMG_UNITS_MV) or "uV"]
         columns |= {key: replace(columns[key], factor=factor) for key, factor in factors.items()}
-        unused = tuple(name for name in names if name not in held.values() and name.strip())
-        return cls(columns, len(frame), (isi_unit, mep_unit), unused, Column("", [None] * len(frame), of=source))
+        if "subject" not in layout.columns and _numbers_rows(columns.get("subject")):
+            held["subject"] = None
+            del columns["subject"]
+        unread = [name for name in names if name not in held.values()]
+        found = cls(columns, len(frame), (isi_unit, mep_unit), (), Column("", [None] * len(frame), of=source))
+        unread += [columns["condition"].name] if found._has_conditions() else []
+        return replace(found, unused=tuple(name for name in unread if name.strip()))
+
+    def _has_conditions(self) -> bool:
+        """True if the condition also tells pairs from each other, of which nothing is read."""
+        words = {_plain(self["condition"].text(row)) for row in range(self.rows)}
+        return len(words - _ALONE - _TAP_ALONE - {""}) > 1
 
 
-def require_one(what: str, stated: str, names: Iterable[object], remedy: str | None = None) -> None:
-    """Raise if a file has nothing of the name that is stated."""
+def require_one(kind: str, source: str, stated: str, names: Iterable[object], remedy: str | None = None) -> None:
+    """Raise if a file has nothing of a kind of the name that is stated, or more than one."""
     known = [str(name) for name in names]
     if stated not in known:
         remedy = did_you_mean(stated, known) or remedy
-        raise InvalidValueError(what, got=stated, expected=f"one of {', '.join(known)}", remedy=remedy)
+        raise InvalidValueError(
+            f"{source} has no such {kind}", got=stated, expected=f"one of {', '.join(known)}", remedy=remedy
+        )
+    if known.count(stated) > 1:
+        raise InvalidValueError(f"several {kind}s of {source} have this name", got=stated, remedy="Rename them.")
 
 
 def _named(key: str, names: list[str], layout: Layout, source: str) -> str | None:
     """The column that holds something; None if there is none."""
     if (stated := layout.columns.get(key)) is not None:
-        if names.count(stated) > 1:
-            raise InvalidValueError(f"several columns of {source} have this name", got=stated, remedy="Rename them.")
-        require_one(f"{source} has no such column", stated, names)
+        require_one("column", source, stated, names)
         return stated
     taken = set(layout.columns.values())
     for known in COLUMNS[key]:
@@ -233,22 +304,24 @@ def _missing(key: str, names: list[str], source: str) -> InvalidValueError:
     )
 
 
-def isis_of(vectors: Mapping[str, Sequence[Any]], layout: Layout, source: str) -> list[float | None]:
-    """The ISIs among the vectors that come with sweeps [ms]; None is TMS alone."""
+def of_vectors(vectors: Mapping[str, Sequence[Any]], layout: Layout, source: str) -> Columns:
+    """The columns that come with sweeps: the vectors that are as long as that of the ISIs."""
     name = _named("isi", list(vectors), layout, source)
     if name is None:
         raise _missing("isi", list(vectors), source)
-    cells = list(vectors[name])
-    column = with_decimals({"isi": Column(name, cells, of=source)}, layout.decimal)["isi"]
-    column = replace(column, factor=ISI_UNITS_MS[required_unit("ISIs", column, layout, ISI_UNITS_MS)])
-    alone = [says_alone(cell, layout.alone) for cell in cells]
-    isis_ms = [None if alone[row] else column.number(row) for row in range(len(cells))]
-    if lost := [row for row, isi_ms in enumerate(isis_ms) if isi_ms is None and not alone[row]]:
-        raise column.refused(lost[0], "is empty", "If it is TMS alone, say --alone ''.")
-    return isis_ms
+    beside = {other: cells for other, cells in vectors.items() if len(cells) == len(vectors[name])}
+    return Columns.found(pd.DataFrame(beside), layout, source, needed=("isi",))
 
 
-def _told(name: str, known: Mapping[str, float]) -> str | None:
+def _numbers_rows(column: Column | None) -> bool:
+    """True if a column called id has another value in each row, so that it is of trials and not of people."""
+    if column is None or letters(column.name) != "id":
+        return False
+    values = [column.text(row) for row in range(len(column.cells))]
+    return len(values) > 1 and len({*values}) == len(values)
+
+
+def unit_said(name: str, known: Mapping[str, float]) -> str | None:
     """The unit that a column's name says, of those of one quantity."""
     words = [*re.findall(r"[\[(](.*?)[\])]", name), *re.findall(r"[^\W_]+", name)[1:]]
     told = [unit for word in words if (unit := UNIT_WORDS.get(word.strip().casefold(), "")) in known]
@@ -257,7 +330,7 @@ def _told(name: str, known: Mapping[str, float]) -> str | None:
 
 def required_unit(what: str, column: Column, layout: Layout, known: Mapping[str, float]) -> str:
     """The column's unit, as it is stated or as its name says."""
-    unit = layout.unit_of(known) or _told(column.name, known)
+    unit = layout.unit_of(known) or unit_said(column.name, known)
     if unit is None:
         units = "ms or s" if "ms" in known else "mV, uV or V"
         numbers = [value for row in range(len(column.cells)) if isinstance(value := _tried(column, row), float)]

@@ -1,0 +1,187 @@
+"""Files that say something twice, half, or in a way that can be read in two ways: read rightly, or asked about."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import mne
+import numpy as np
+import pandas as pd
+import pytest
+import scipy.io
+
+import isiw
+from existing.test_recordings import KNOWN, NAMES, raw
+from existing.test_waves import COLUMNS, EMG_MV, TRIGGERS, lines, read, trigger
+from isiw.errors import InvalidValueError
+from isiw.existing.delivered import Delivered
+from isiw.existing.layout import Layout
+from isiw.existing.reading import read_people
+
+IMPACT = Layout(reference="impact")
+
+
+def of_text(text: str, folder: Path, **said: Any) -> list[Delivered]:
+    (folder / "P01.csv").write_text(text, encoding="utf-8")
+    return read_people(folder / "P01.csv", Layout(**{"reference": "impact", **said}))
+
+
+def trials_of(people: list[Delivered]) -> list[tuple[float | None, float | None]]:
+    (person,) = people
+    return [(trial.isi_ms, trial.mep_mv) for trial in person.trials]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Nr;ISI (ms);MEP (mV);Latency\n1;10;0,15;22,4;\n2;20;0,3;21,4;\n3;40;0,5;20,1;\n",
+        "trial,isi_ms,mep_mv\n1,10,0.15,\n2,20,0.3,\n3,40,0.5,\n",
+        "P01 session\nisi_ms,mep_mv,comment\n10,0.15\n20,.3,ok\n40,.5\n",
+        "isi_ms,mep_mv\n# pause\n10,0.15\n20,.3\n# pause\n40,.5\n",
+        "id,isi_ms,mep_mv\n1,10,0.15\n2,20,.3\n3,40,.5\n",
+    ],
+    ids=["a sign at each end", "where R numbers", "cells left out below a title", "remarks", "an id of trials"],
+)
+def test_rows_and_names_fit_each_other(text: str, tmp_path: Path) -> None:
+    assert trials_of(of_text(text, tmp_path)) == [(10, 0.15), (20, 0.3), (40, 0.5)]
+
+
+@pytest.mark.parametrize("filler", ["0", "-1", "-1.0", ""])
+def test_a_condition_says_what_is_tms_alone_whatever_stands_for_its_isi(filler: str, tmp_path: Path) -> None:
+    text = f"condition,isi_ms,mep_mv\nsingle,{filler},0.1\npaired,20,0.3\nsingle,{filler},.12\npaired,40,0.5\n"
+    assert trials_of(of_text(text, tmp_path)) == [(None, 0.1), (20, 0.3), (None, 0.12), (40, 0.5)]
+
+
+def test_a_condition_that_contradicts_an_isi_is_asked_about(tmp_path: Path) -> None:
+    text = "condition,isi_ms,mep_mv\nsingle,90,0.1\npaired,20,0.3\npaired,40,0.5\n"
+    with pytest.raises(InvalidValueError, match=r"row 1 .* says TMS alone, and the ISI there is 90"):
+        of_text(text, tmp_path)
+    assert trials_of(of_text(text, tmp_path, alone="90")) == [(None, 0.1), (20, 0.3), (40, 0.5)]
+
+
+def test_a_condition_says_what_is_a_tap_alone_and_others_are_named(tmp_path: Path) -> None:
+    (person,) = of_text("condition,isi_ms,mep_mv\ntap only,50,.01\npaired,20,0.3\npaired,40,0.5\n", tmp_path)
+    assert [trial.tap_alone for trial in person.trials] == [True, False, False]
+    assert person.unused == ()
+    (person,) = of_text("condition,isi_ms,mep_mv\nrest,50,.01\nrest,20,0.3\nactive,40,0.5\n", tmp_path)
+    assert person.unused == ("condition",)
+
+
+@pytest.mark.parametrize(("mark", "cell"), [("-1", "-1.0"), ("0", "0.0"), ("-1.0", "-1"), ("-1", "-1,0")])
+def test_a_mark_is_a_number_however_it_is_written(mark: str, cell: str, tmp_path: Path) -> None:
+    text = f"isi_ms;mep_mv\n{cell};0.1\n20;0.3\n40;0.5\n"
+    assert trials_of(of_text(text, tmp_path, alone=mark)) == [(None, 0.1), (20, 0.3), (40, 0.5)]
+
+
+def test_an_empty_isi_is_asked_about_whatever_else_is_tms_alone(tmp_path: Path) -> None:
+    with pytest.raises(InvalidValueError, match="1 row has an amplitude and no ISI"):
+        of_text("isi_ms,mep_mv\nsingle,0.1\n,0.9\n20,.2\n30,.3\n", tmp_path, alone="single")
+
+
+def test_structures_of_matlab_with_the_same_names_are_asked_about(tmp_path: Path) -> None:
+    path, isis_ms, meps_mv = tmp_path / "P01.mat", [10.0, 20.0, 40.0], [0.15, 0.3, 0.5]
+    one = {"isi_ms": isis_ms, "mep_mv": meps_mv}
+    scipy.io.savemat(path, {"day1": one, "day2": {"isi_ms": [1.0, 2.0, 3.0], "mep_mv": [0.1, 0.1, 0.1]}})
+    with pytest.raises(InvalidValueError, match=r"day1\.isi_ms, day1\.mep_mv, day2\.isi_ms"):
+        read_people(path, IMPACT)
+    named = Layout(reference="impact", columns={"isi": "day1.isi_ms", "mep": "day1.mep_mv"})
+    assert trials_of(read_people(path, named)) == list(zip(isis_ms, meps_mv, strict=True))
+    scipy.io.savemat(path, {"trials": [dict(zip(one, pair, strict=True)) for pair in zip(*one.values(), strict=True)]})
+    assert trials_of(read_people(path, IMPACT)) == list(zip(isis_ms, meps_mv, strict=True))
+    scipy.io.savemat(path, {**one, "t": np.arange(1000.0)})
+    assert trials_of(read_people(path, IMPACT)) == list(zip(isis_ms, meps_mv, strict=True))
+
+
+def test_a_sampling_rate_is_compared_with_the_times_in_the_file(tmp_path: Path) -> None:
+    taps, pulses = trigger("tap"), trigger("pulse")
+    text = lines(EMG_MV, taps, pulses)
+    for rate_hz in (2000, 5000):
+        with pytest.raises(InvalidValueError, match=r"the column 'time' of P01\.txt says.* 4000 Hz"):
+            read(tmp_path, text, f"rate_hz = {rate_hz}\n{COLUMNS}[channels]\n{TRIGGERS}")
+    assert len(read(tmp_path, text, f"rate_hz = 4000\n{COLUMNS}[channels]\n{TRIGGERS}").trials) == 6
+    with pytest.raises(InvalidValueError, match="several columns"):
+        read(tmp_path, text, f"rate_hz = 4000\n{COLUMNS.replace('time', 'EMG')}[channels]\n{TRIGGERS}")
+    with pytest.raises(InvalidValueError, match="If they are in mV, say --unit mV"):
+        read(tmp_path, text, f"rate_hz = 4000\n{COLUMNS.replace('mV', 'uV')}[channels]\n{TRIGGERS}")
+
+
+def test_a_matrix_of_matlab_is_found_or_asked_about(tmp_path: Path) -> None:
+    path, sweeps = tmp_path / "P01.mat", np.zeros((3, 100))
+    layout = Layout(
+        reference="impact", rate_hz=4000.0, pulse_at_ms=10.0, units=("mV",), alone="", channels={"emg": "sweeps"}
+    )
+    for arrays, asked in (
+        ({"sweep": sweeps}, "no such array"),
+        ({"sweeps": sweeps[:, :, None] + np.zeros(2)}, "3 × 100 × 2 samples"),
+        ({"sweeps": sweeps, "fs": 2000.0}, "'fs' of P01.mat says"),
+    ):
+        scipy.io.savemat(path, {"isi_ms": [10.0, 20.0, 30.0], **arrays})
+        with pytest.raises(InvalidValueError, match=asked):
+            read_people(path, layout)
+
+
+def test_sweeps_that_are_marked_as_bad_do_not_count() -> None:
+    recording = raw()
+    third_s = [one["onset"] for one in recording.annotations if one["description"] == NAMES["pulse"]][2]
+    recording.annotations.append(third_s - 0.1, 0.3, "BAD_cough")
+    (person,) = read_people(recording, KNOWN)
+    assert [trial.told for trial in person.trials] == [True, True, False, True, True, True]
+
+
+def epochs(**metadata: Any) -> mne.Epochs:
+    recording = raw()
+    events, ids = mne.events_from_annotations(recording, regexp=NAMES["pulse"])
+    isis_ms = [30.0, 60.0, 90.0, 120.0, 45.0, None]
+    columns = pd.DataFrame({"isi_ms": isis_ms, **metadata})
+    return mne.Epochs(recording, events, ids, -0.4, 0.1, baseline=None, preload=True, metadata=columns)
+
+
+def test_the_metadata_of_epochs_are_read_as_the_columns_of_a_table() -> None:
+    (person,) = read_people(epochs(exclude=[0, 1, 0, 0, 0, 0], note="x"), KNOWN)
+    assert [trial.told for trial in person.trials] == [True, False, True, True, True, True]
+    assert person.unused == ("note",)
+    with pytest.raises(InvalidValueError, match="several people"):
+        read_people(epochs(subject=[*"AABBBB"]), KNOWN)
+    (person,) = read_people(epochs(condition=["paired"] * 4 + ["single"] * 2, isi_ms=[30.0, 60, 90, 120, 0, 0]), KNOWN)
+    assert [trial.isi_ms is None for trial in person.trials] == [False] * 4 + [True] * 2
+    (person,) = read_people(epochs(isi_ms=[30.0, 60, 90, 120, -45, -45]), KNOWN)
+    assert [str(trial.reason or "") for trial in person.trials][-2:] == ["TMS before impact"] * 2
+
+
+def dated(*dates: str, **more: list[Any]) -> list[Delivered]:
+    return read_people(pd.DataFrame({"isi_ms": [10.0, 20, 30, 40], "mep_mv": 0.1, "date": dates, **more}), IMPACT)
+
+
+def test_days_come_first_with_points_and_slashes_are_asked_about() -> None:
+    people = dated("31.01.2024", "31.01.2024", "01.02.2024", "01.02.2024")
+    assert [(one.visit.day, one.created[:10]) for one in people] == [(1, "2024-01-31"), (2, "2024-02-01")]
+    (person,) = dated(*["10.01.2024 9:05"] * 4)
+    assert person.created.startswith("2024-01-10T09:05")
+    (person,) = dated(*["01/13/2024"] * 4)
+    assert person.created.startswith("2024-01-13")
+    with pytest.raises(InvalidValueError, match="Write dates as 2026-01-31"):
+        dated(*["10/01/2024"] * 4)
+    (person,) = dated("2024-01-31", "", "", "")
+    assert person.visit.day is None
+    with pytest.raises(InvalidValueError, match="Write the day into each row"):
+        dated("2024-01-31", "", "2024-02-20", "")
+    with pytest.raises(InvalidValueError, match="Write the day into each row"):
+        dated(*["2024-01-31"] * 4, day=[1, "", 2, ""])
+    (person,) = dated(*[""] * 4, time=["31.01.2024 10:00", "31.01.2024 10:01", "01.02.2024 10:00", "01.02.2024 10:01"])
+    assert len(person.trials) == 4
+
+
+def test_what_is_masked_or_comes_before_the_impact_does_not_count() -> None:
+    space = isiw.DesignSpace(0, 100, reference="impact")
+    isis_ms = np.ma.array([10.0, 20.0, 50.0, -10.0], mask=[False, False, True, False])
+    meps_mv = np.ma.array([0.1, 0.2, 9.9, 0.1], mask=[False, False, True, False])
+    trials = isiw.analyse(isis_ms, meps_mv, space=space, particles=20).record.table
+    assert [str(trial.reason or "") for trial in trials] == ["", "", "outcome unknown", "TMS before impact"]
+    with pytest.raises(InvalidValueError, match="the ISIs are not numbers"):
+        isiw.analyse(["10", "x"], [0.1, 0.2], space=space)
+
+
+def test_what_pandas_holds_for_missing_is_empty() -> None:
+    table = pd.DataFrame({"isi_ms": [10, 20, None, 30], "mep_mv": [0.1, 0.2, None, 0.4]}).convert_dtypes()
+    assert trials_of(read_people(table, IMPACT)) == [(10, 0.1), (20, 0.2), (30, 0.4)]
