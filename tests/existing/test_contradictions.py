@@ -121,6 +121,18 @@ def test_a_matrix_of_matlab_is_found_or_asked_about(tmp_path: Path) -> None:
             read_people(path, layout)
 
 
+@pytest.mark.parametrize(
+    ("table", "several"),
+    [
+        ({"Interval (s)": [4.9, 4.8, 4.5], "Delay (ms)": [10, 20, 40], "mep_mv": 0.1}, "Interval .s. or Delay"),
+        ({"isi_ms": [10, 20, 40], "Amplitude (V)": 4.5, "p2p (mV)": 0.1}, "Amplitude .V. or p2p"),
+    ],
+)
+def test_two_columns_that_may_hold_the_same_are_asked_about(table: dict[str, Any], several: str) -> None:
+    with pytest.raises(InvalidValueError, match=several):
+        read_people(pd.DataFrame(table), IMPACT)
+
+
 def test_sweeps_that_are_marked_as_bad_do_not_count() -> None:
     recording = raw()
     third_s = [one["onset"] for one in recording.annotations if one["description"] == NAMES["pulse"]][2]

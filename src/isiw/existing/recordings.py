@@ -129,7 +129,8 @@ def delivered_of(recording: Recording, sweeps: Sequence[Found], layout: Layout, 
         raise InvalidValueError(
             f"no sweep of {recording.source} counts",
             got=", ".join(reasons),
-            remedy="Is the EMG channel the right one, its unit right, and the marker of the pulse? See docs/timing.md.",
+            remedy="Is the EMG channel the right one, its unit right, and the marker of the pulse? Is the EMG at rest "
+            f"without mains hum, at most {signals.background_uv:g} µV RMS? See docs/timing.md.",
         )
     return Delivered(
         renumbered(trials),

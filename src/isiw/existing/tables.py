@@ -26,6 +26,10 @@ _ALONE: Final = frozenset({"tms alone", "tms only", "tms", "single", "single pul
 _TAP_ALONE: Final = frozenset({"tap alone", "tap only", "hit only", "hammer only", "no tms", "no pulse", "cs alone",
                                "cs only", "conditioning alone", "conditioning only"})  # fmt: skip
 
+_VAGUE: Final = frozenset({"interval", "delay", "soa", "amplitude", "amp", "peaktopeak", "peaktopeakamplitude",
+                           "emgpeaktopeak", "p2pamplitude", "ptpamplitude", "p2p", "ptp"})  # fmt: skip
+"""Names of columns that may also be of the interval between trials, or of the stimulus: two of them are asked about."""
+
 _NUMBER: Final = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?inf(inity)?", re.IGNORECASE)
 _GROUPED: Final = {
     ".": re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d+)?"),
@@ -281,18 +285,18 @@ def _named(key: str, names: list[str], layout: Layout, source: str) -> str | Non
     if (stated := layout.columns.get(key)) is not None:
         require_one("column", source, stated, names)
         return stated
-    taken = set(layout.columns.values())
-    for known in COLUMNS[key]:
-        fitting = [name for name in names if letters(name) == known and name not in taken]
-        if len(fitting) > 1:
-            raise InvalidValueError(
-                f"several columns of {source} may hold the {key}",
-                got=" or ".join(fitting),
-                remedy=f'Say --column "{key}={fitting[0]}".' if len(set(fitting)) > 1 else "Rename one of them.",
-            )
-        if fitting:
-            return fitting[0]
-    return None
+    free = [name for name in names if name not in layout.columns.values()]
+    fitting = {known: [name for name in free if letters(name) == known] for known in COLUMNS[key]}
+    found = [known for known in COLUMNS[key] if fitting[known]]
+    rivals = [known for known in found if known == found[0] or {known, found[0]} <= _VAGUE]
+    several = [name for known in rivals for name in fitting[known]]
+    if len(several) > 1:
+        raise InvalidValueError(
+            f"several columns of {source} may hold the {key}",
+            got=" or ".join(several),
+            remedy=f'Say --column "{key}={several[0]}".' if len(set(several)) > 1 else "Rename one of them.",
+        )
+    return several[0] if several else None
 
 
 def _missing(key: str, names: list[str], source: str) -> InvalidValueError:
