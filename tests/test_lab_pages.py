@@ -27,14 +27,14 @@ def blocks(page: str, language: str) -> list[str]:
 
 
 @contextmanager
-def example(page: str, place: Path) -> Iterator[None]:
+def example(page: str, place: Path) -> Iterator[subprocess.Popen[bytes]]:
     """The files of a page, and its rig running beside."""
     (rig,), (config,) = blocks(page, "python"), blocks(page, "toml")
     (place / "rig.py").write_text(rig, encoding="utf-8")
     (place / "session.toml").write_text(f'log = "log.mcap"\n{config}', encoding="utf-8")
     with subprocess.Popen([sys.executable, "rig.py"], cwd=place) as process:
         try:
-            yield
+            yield process
         finally:
             process.kill()
 
@@ -42,8 +42,9 @@ def example(page: str, place: Path) -> Iterator[None]:
 @pytest.mark.slow
 def test_the_example_of_the_folder_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    with example("folder.md", tmp_path):
+    with example("folder.md", tmp_path) as rig:
         while not (tmp_path / "shared").exists():
+            assert rig.poll() is None, "the rig has ended"
             time.sleep(0.01)
         config = load_config("session.toml")
         check_device(partial(device_for, config), config.space.design())
