@@ -15,7 +15,7 @@ from isiw.log.reader import read_session
 from isiw.session.loop import Session
 from isiw.session.resume import open_session, resume
 from isiw.session.sink import SessionUpdate
-from isiw.session.threshold import open_threshold
+from isiw.session.threshold import open_threshold, read_threshold
 from isiw.strategy.threshold import IntensityRange, make_threshold_search
 from isiw.trials import Measurement, Stimulus
 from scripted import ScriptedDevice, scripted_strategy
@@ -119,3 +119,44 @@ def test_a_threshold_search_gets_no_further_intensity_once_its_log_is_gone(log: 
         recorder.ask()
     with pytest.raises(LogError, match=r"s\.rescued\.mcap"):
         recorder.close()
+
+
+@pytest.mark.parametrize("happening", ["deleted", "shortened", "replaced"])
+def test_what_was_asked_is_not_repeated_and_an_outcome_no_success_once_the_log_is_gone(
+    log: Path, happening: str
+) -> None:
+    session = open_session(scripted_strategy(9), log)
+    isi_ms = session.ask()
+    HAPPENINGS[happening](log.with_name("s.mcap.part"))
+    for call in (session.ask, lambda: session.tell(isi_ms, 0.1)):
+        with pytest.raises(LogError, match="as it was written"):
+            call()
+    with pytest.raises(LogError, match=r"s\.rescued\.mcap"):
+        session.close()
+    assert [trial.mep_mv for trial in read_session(log.with_name("s.rescued.mcap")).table] == [0.1]
+
+
+def test_an_intensity_is_not_repeated_and_its_outcome_no_success_once_the_log_is_gone(log: Path) -> None:
+    device = DeviceInfo("nobody", "impact", simulated=True)
+    search = open_threshold(make_threshold_search("bayes", IntensityRange(20, 80)), log, device=device)
+    search.ask()
+    log.with_name("s.mcap.part").unlink()
+    for call in (search.ask, lambda: search.tell(0.2)):
+        with pytest.raises(LogError, match="the file is gone"):
+            call()
+    with pytest.raises(LogError, match=r"s\.rescued\.mcap"):
+        search.close()
+    assert [outcome.mep_mv for outcome in read_threshold(log.with_name("s.rescued.mcap")).outcomes] == [0.2]
+
+
+def test_what_was_asked_is_not_repeated_once_the_session_is_closed(log: Path) -> None:
+    device = DeviceInfo("nobody", "impact", simulated=True)
+    session = open_session(scripted_strategy(9), log)
+    search = open_threshold(
+        make_threshold_search("bayes", IntensityRange(20, 80)), log.with_name("t.mcap"), device=device
+    )
+    for recorder in (session, search):
+        recorder.ask()
+        recorder.close()
+        with pytest.raises(LogError, match="the log is closed"):
+            recorder.ask()

@@ -14,7 +14,7 @@ from typing import Any, Final, Generic, NamedTuple, Protocol, TypeAlias, TypeVar
 
 from isiw import checks, sentences
 from isiw.change import Change
-from isiw.errors import LimitExceededError, error_text
+from isiw.errors import LimitExceededError, StrategyError, error_text
 from isiw.findings import Finding, Kind, Severity
 from isiw.log.headers import Header
 from isiw.log.schema import Correction, EstimateRecord, Event, EventKind, Intent, Record
@@ -48,10 +48,9 @@ LearnerT = TypeVar("LearnerT", bound="_Learner[Any, Any]")
 
 
 class _Learner(Protocol[TableT, TrialT_contra]):
-    """A learner from stimuli, of which it knows `known`: a strategy for a window, or a search for a threshold."""
+    """A learner from stimuli: a strategy for a window, or a search for a threshold."""
 
-    @property
-    def known(self) -> int: ...
+    def knows(self, trials: TableT, /) -> bool: ...
     def learn(self, trial: TrialT_contra, /) -> None: ...
     def trouble_with(self, trial: TrialT_contra, /) -> str | None: ...
     def doubt(self, trials: TableT, /) -> Finding | None: ...
@@ -82,6 +81,7 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
         self.learner, self.trials, self._sink, self._freely = learner, trials, sink, freely
         self.unconcluded: TrialT | None = None
         self.overruled = False
+        self._learnt, self._learning = trials, self.unconcluded
         self._events = list(events)
         self._keys = {event.key for event in self._events}
         self._doubted = {event.finding for event in self._events}
@@ -170,6 +170,15 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
             self.overruled = True
         self._sink.log.sync()
 
+    def require_own(self) -> None:
+        """Raise StrategyError if the learner knows other trials than it has learnt here."""
+        if not self.learner.knows(self._learnt):
+            raise StrategyError(
+                "the strategy knows of trials that are not this session's, or was told of one twice",
+                remedy="Deliver nothing. What was reported is in the log: close the session, and resume it with a new "
+                "strategy. Give each session a strategy of its own, and report outcomes to the session alone.",
+            )
+
     def conclude(
         self,
         decide: Callable[[], StopDecision] | None = None,
@@ -186,6 +195,7 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
             except BaseException:
                 self.overruled = True
                 raise
+            self._learnt, self._learning = self.trials, trial
         if trial is not None:
             self._learn(trial)
         known = self.log_belief(decide, ask_next) if len(self.trials) else None
@@ -194,8 +204,11 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
         return known
 
     def _learn(self, trial: TrialT) -> None:
-        if self.learner.known < len(self.trials):
+        if self._learning is not trial or not self.learner.knows(self.trials):  # else it was interrupted behind it
+            self.require_own()
+            self._learning = trial
             self._freely(self.learner.learn, trial)
+        self._learnt = self.trials
         if (trouble := self.learner.trouble_with(trial)) is not None and self._sink.is_open:
             self.event("fit", trouble)
         doubt = self._freely(self.learner.doubt, self.trials)
@@ -223,9 +236,8 @@ class _WindowLearner:
     def __init__(self, strategy: Strategy, events: Iterable[Event] = ()) -> None:
         self.strategy, self._changes = strategy, changed_after(events)
 
-    @property
-    def known(self) -> int:
-        return self.strategy.delivered
+    def knows(self, trials: TrialTable) -> bool:
+        return self.strategy.delivered == len(trials)
 
     def learn(self, trial: Trial) -> None:
         learn(self.strategy, trial)

@@ -116,7 +116,7 @@ class Session(Judging):
                 the plan of the strategy; nothing was delivered.
             LimitExceededError: a stimulus was refused; nothing was delivered.
             LogError: the log cannot be written, or is no longer at its path; nothing is delivered without a log.
-            StrategyError: the strategy knows of trials that are not this session's; nothing was delivered.
+            StrategyError: the strategy knows of trials that are not this session's; nothing more is delivered.
         """
         try:
             return self._run(progress=progress, keys=keys)

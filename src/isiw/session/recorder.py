@@ -63,12 +63,20 @@ class Recording(Generic[RecordedT]):
         else:
             self.fail(error)
 
+    def _require_durable(self) -> None:
+        """Return once everything logged is on the disk, at the log's path; raise LogError where it is not."""
+        self._log.sync()
+        self._log.require_in_place()
+
     def _conclude(self, trial: RecordedT) -> None:
-        """Put a trial on disk, then learn it, then put on disk what is known."""
+        """Put a trial on disk, then learn it, then put on disk what is known.
+
+        Of a log that is no longer at its path the trial is kept all the same: closing saves what the session holds.
+        """
         self._pacing.came()
         self._examination.came(trial)
-        self._sink.log.sync()
         self._asked = None
+        self._require_durable()
         self._examination.conclude()
 
 
@@ -124,6 +132,7 @@ class Recorder(Recording[Trial], Judging):
         Raises:
             LimitExceededError: a limit is reached; deliver nothing.
             LogError: the log cannot be written, or is no longer at its path; deliver nothing.
+            StrategyError: the strategy was told of trials by somebody else than this session; deliver nothing.
         """
         while (isi_ms := self._asked_now(deadline_s)) is None:
             self._clock.sleep_s(self.wait_s())  # meanwhile TMS alone can be told, trials judged, and others may ask
@@ -132,7 +141,9 @@ class Recorder(Recording[Trial], Judging):
     def _asked_now(self, deadline_s: float | None) -> float | None:
         """The ISI that is asked [ms], already or from now on; None if limits and protocol allow no stimulus yet."""
         with self._lock:
+            self._require_own()
             if self.asked is not None and self.asked.isi_ms is not None:
+                self._require_durable()
                 return self.asked.isi_ms
             if self.asked is not None:  # TMS alone that was given, and never told
                 self._conclude(Trial.unknown(self.asked))
@@ -140,7 +151,6 @@ class Recorder(Recording[Trial], Judging):
             self._limits.require_state(Readiness())
             if self.wait_s() > ROUNDING_S:
                 return None
-            self._examination.conclude()
             isi_ms = self.strategy.ask(deadline_s)
             self._limits.require_isi(isi_ms)
             self._begin(isi_ms, self.strategy.fallback_reason)
@@ -181,7 +191,8 @@ class Recorder(Recording[Trial], Judging):
                 impact, or an ISI that is too uncertain; the outcome is not logged, and the right value can be given.
                 TMS alone counts as given from the first try on.
             OutOfSpaceError: an ISI beyond the space and its tolerance.
-            LogError: the log cannot be written.
+            LogError: the log cannot be written, or is no longer at its path; closing saves the outcome with the rest.
+            StrategyError: as for `ask`; the outcome is logged.
 
         Warns:
             ImplausibleDataWarning: what looks like a slip of unit; it is learnt and logged all the same.
@@ -252,14 +263,19 @@ class Recorder(Recording[Trial], Judging):
     def estimate(self) -> WindowEstimate:
         """The estimate of the window now."""
         with self._lock:
-            self._examination.conclude()
+            self._require_own()
             return self.strategy.estimate()
 
     def decision(self) -> StopDecision:
         """The decision to stop now or not, with its reason."""
         with self._lock:
-            self._examination.conclude()
+            self._require_own()
             return self.strategy.decision()
+
+    def _require_own(self) -> None:
+        """Learn what is not learnt yet, and raise if the strategy knows anything else."""
+        self._examination.conclude()
+        self._examination.require_own()
 
     def _require_asked(self) -> Stimulus:
         if self.asked is None:

@@ -190,6 +190,7 @@ class Steps:
         if trial is not None and known is not None:
             self._report(trial, known.decision, known.next_isi_ms)
             return known.decision
+        self._examination.require_own()
         if (decision := self.at_the_end()) is None:
             self._one_trial()
         return decision

@@ -178,12 +178,14 @@ class _Pulses:
 class _ThresholdLearner:
     """A search as an examination sees it."""
 
-    def __init__(self, search: ThresholdSearch, known: int) -> None:
-        self.search, self.known = search, known
+    def __init__(self, search: ThresholdSearch) -> None:
+        self.search = search
+
+    def knows(self, trials: _Pulses) -> bool:
+        return self.search.pulses == _learnable(trials.outcomes)
 
     def learn(self, outcome: PulseOutcome) -> None:
         self.search.pulses = (*self.search.pulses, *_learnable([outcome]))
-        self.known = outcome.trial + 1
 
     def trouble_with(self, outcome: PulseOutcome) -> None:
         """Nothing goes wrong when a pulse is learnt."""
@@ -192,7 +194,7 @@ class _ThresholdLearner:
         """Nothing here changes with time."""
 
     def learn_again(self, trials: _Pulses) -> None:
-        self.search.pulses, self.known = _learnable(trials.outcomes), len(trials)
+        self.search.pulses = _learnable(trials.outcomes)
 
     def judged(self, trials: _Pulses, verdict: Event) -> _Pulses:
         reason, number = {"reason": verdict.text}, verdict.trial
@@ -227,9 +229,9 @@ class ThresholdRecorder(Recording[PulseOutcome]):
         ages_s: Sequence[float] = (),
     ) -> None:
         super().__init__(log, clock)
-        self.header, table = header, _Pulses(tuple(earlier))
+        self.header = header
         self._examination: Examination[_ThresholdLearner, _Pulses, PulseOutcome] = Examination(
-            _ThresholdLearner(search, len(table)), table, self._sink
+            _ThresholdLearner(search), _Pulses(tuple(earlier)), self._sink
         )
         self._pacing = Pacing(Limits(0.0, 0.0, header.min_iti_s), clock, ages_s)  # a pulse alone has no ISI
         self._asked: float | None = None
@@ -259,7 +261,11 @@ class ThresholdRecorder(Recording[PulseOutcome]):
 
     def ask(self) -> float:
         """The next intensity [% MSO], the same until its outcome; on disk as about to be given before this returns."""
-        if self._asked is None:
+        self._examination.conclude()
+        self._examination.require_own()
+        if self._asked is not None:
+            self._require_durable()
+        else:
             if self.given >= self.header.max_pulses:
                 raise LimitExceededError(
                     f"the limit of {self.header.max_pulses} pulses is reached, so no further pulse follows",
