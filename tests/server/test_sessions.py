@@ -248,6 +248,19 @@ def test_a_change_with_a_key_is_logged_once_and_named_in_the_log(
     assert [(event.trial, event.text) for event in changes] == [(1, "coil re-seated")]
 
 
+@pytest.mark.parametrize(("call", "text"), [("change", "coil moved"), ("change", "break"), ("note", "another")])
+def test_a_key_that_something_else_has_is_refused_and_swallows_nothing(
+    client: httpx.Client, session: str, tmp_path: Path, call: str, text: str
+) -> None:
+    told(client, session, 2)
+    done(client.post(f"{session}/note", json={"text": "break", "key": "1"}))
+    error = refused(client.post(f"{session}/{call}", json={"text": text, "key": "1"}), 409, "OtherKey")
+    assert (error["field"], error["expected"]) == ("key", "note: break")
+    done(client.post(f"{session}/{call}", json={"text": text, "key": "2"}))
+    events = [(event.kind, event.text, event.key) for event in read_session(tmp_path / "P07.mcap").events]
+    assert events == [("note", "break", "1"), (call, text, "2")]
+
+
 def test_a_note_whose_text_ends_like_a_key_swallows_no_later_one(
     client: httpx.Client, session: str, tmp_path: Path
 ) -> None:
@@ -266,8 +279,8 @@ def test_a_key_that_an_older_log_has_in_the_notes_text_is_still_recognised(
         done(client.post(f"{session}/note", json={"text": "coil moved (key n1)"}))
     done(client.post(f"{session}/close"))
     done(client.post(f"{session}/resume"))
-    for key in ("n1", "n2"):
-        done(client.post(f"{session}/note", json={"text": "again", "key": key}))
+    for text, key in (("coil moved", "n1"), ("again", "n2")):
+        done(client.post(f"{session}/note", json={"text": text, "key": key}))
     assert notes_in(tmp_path / "P07.mcap") == [("coil moved (key n1)", "n1"), ("again", "n2")]
 
 

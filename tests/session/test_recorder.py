@@ -484,7 +484,10 @@ def test_a_change_is_learnt_where_it_was_noted_also_after_a_verdict_and_after_re
     with open_session(scripted_strategy(9), log, resume=True) as resumed:
         assert changes(resumed) == (2,)
         assert resumed.ask() == after
-        resumed.note_change("and again", key="c1")
+        resumed.note_change("coil re-seated", key="c1")
+        for log_it in (resumed.note, resumed.note_change):
+            with pytest.raises(InvalidValueError, match="Give each note and each change a key of its own"):
+                log_it("and again", key="c1")
         assert changes(resumed) == (2,)
     events = [event for event in read_session(log).events if event.kind == "change"]
     assert [(event.trial, event.text) for event in events] == [(2, "coil re-seated")]

@@ -266,3 +266,10 @@ def test_a_method_of_ones_own_is_logged_and_needed_again(log: Path) -> None:
         resume_threshold(log, ThresholdSearch("my own", MaximumLikelihood(), IntensityRange(20, 90)))
     with resume_threshold(log, own()) as resumed:
         assert resumed.ask() == expected
+
+
+def test_a_pulse_is_excluded_by_a_whole_number(log: Path) -> None:
+    with opened(log) as recorder:
+        answer(recorder, 2)
+        with pytest.raises(InvalidValueError, match="the number of a pulse must be a whole number"):
+            recorder.exclude(True, "a cough")

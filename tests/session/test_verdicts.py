@@ -7,7 +7,7 @@ import signal
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import pytest
@@ -318,3 +318,17 @@ def test_excluded_trials_are_not_told_as_lost(log: Path) -> None:
         session.ask()
         assert session.strategy.fallback_reason is None
         assert session.strategy.spent == 6
+
+
+@pytest.mark.parametrize("number", [True, 0.0, "0", None])
+def test_a_trial_is_named_by_a_whole_number(log: Path, number: Any) -> None:
+    with open_session(scripted_strategy(9), log) as session:
+        for _ in range(2):
+            session.tell(session.ask(), 0.1)
+        session.exclude(1)
+        for judge in (session.exclude, session.include, session.reject, session.accept):
+            with pytest.raises(InvalidValueError, match="the number of a trial must be a whole number"):
+                judge(number)
+    with pytest.raises(InvalidValueError, match="the number of a trial must be a whole number"):
+        exclude(log, number, "a cough")
+    assert [event.kind for event in read_session(log).events] == ["exclusion"]

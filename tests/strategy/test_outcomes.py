@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
+from isiw.session.resume import open_session
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.course import Outcome, Outcomes, found_step_mv
 from isiw.strategy.strategy import Strategy
@@ -150,3 +152,35 @@ def test_a_tap_alone_needs_an_isi_and_an_amplitude(wrong: Any) -> None:
     with pytest.raises(InvalidValueError):
         one.tell(*wrong, pulse=False)
     assert one.delivered == 0
+
+
+@pytest.mark.parametrize(
+    "slip",
+    [
+        {"mep_interval_mv": (50, 500)},
+        {"mep_interval_mv": (50, math.inf)},
+        {"mep_interval_mv": (0, 50)},
+        {"mep_mv": 0.3, "mep_sd_mv": 20.0},
+    ],
+)
+def test_an_interval_or_an_sd_in_microvolts_is_refused(tmp_path: Path, slip: dict[str, Any]) -> None:
+    one = strategy()
+    with pytest.raises(InvalidValueError, match="Is it in µV"):
+        one.tell(100.0, **slip)
+    with open_session(strategy(), tmp_path / "s.mcap") as session:
+        isi_ms = session.ask()
+        with pytest.raises(InvalidValueError, match="Is it in µV"):
+            session.tell(isi_ms, **slip)
+        assert (one.delivered, len(session.trials)) == (0, 0)
+
+
+@pytest.mark.parametrize("pulse", ["no", None, 0, 1])
+def test_whether_a_pulse_was_given_is_true_or_false(tmp_path: Path, pulse: Any) -> None:
+    one = strategy()
+    with pytest.raises(InvalidValueError, match="pulse must be True or False"):
+        one.tell(100.0, 0.1, pulse=pulse)
+    with open_session(strategy(), tmp_path / "s.mcap") as session:
+        isi_ms = session.ask()
+        with pytest.raises(InvalidValueError, match="pulse must be True or False"):
+            session.tell(isi_ms, 0.1, pulse=pulse)
+        assert (one.delivered, len(session.trials)) == (0, 0)

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Callable, Iterable
 from typing import Final
 
-from isiw.checks import text
+from isiw.checks import text, whole
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.findings import Kind
@@ -53,6 +53,22 @@ def excluded_by(events: Iterable[Event]) -> list[int]:
             if event.kind == "exclusion":
                 excluded.append(event.trial)
     return excluded
+
+
+def is_logged(event: Event, events: Iterable[Event]) -> bool:
+    """True if an event was logged with its key before; raise if something else has the key."""
+    before = next((each for each in events if event.key is not None and each.key == event.key), None)
+    if before is None:
+        return False
+    texts = {event.text, f"{event.text} (key {event.key})"}  # as older logs have it
+    if before.kind != event.kind or before.text not in texts:
+        raise InvalidValueError(
+            f"the key {event.key!r} is that of something else in this log",
+            got=f"{event.kind}: {event.text}",
+            expected=f"{before.kind}: {before.text}",
+            remedy="Nothing was logged. Give each note and each change a key of its own.",
+        )
+    return True
 
 
 def exclusion(trials: TrialTable, number: int, reason: str = "") -> Event:
@@ -108,7 +124,7 @@ def correction(trials: TrialTable, number: int, why: str, corrected: Correction)
 
 
 def _require(verb: str, number: int, possible: list[int], which: str) -> None:
-    if number not in possible:
+    if whole("the number of a trial", number) not in possible:
         raise InvalidValueError(
             f"cannot {verb} this trial",
             got=number,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Final
 
@@ -13,7 +13,7 @@ from isiw.estimate import Estimate
 from isiw.findings import Kind
 from isiw.log.reader import SessionRecord
 from isiw.server.answers import AskAnswer, EstimateAnswer, Refusal, SessionAnswer, TrialAnswer, failed
-from isiw.server.requests import AskRequest, ExcludeRequest, MistrialRequest, TellRequest
+from isiw.server.requests import AskRequest, ExcludeRequest, MistrialRequest, NoteRequest, TellRequest
 from isiw.session.recorder import Recorder
 from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.trials import Status, Trial
@@ -165,6 +165,13 @@ class DrivenSession:
         if self.recorder.asked is not None:
             self.recorder.mistrial(Kind.OUTCOME_UNKNOWN)
             self._concluded()
+
+    def remark(self, log: Callable[..., None], request: NoteRequest) -> None:
+        """Log a note or a change, once with its key; something else's key is refused."""
+        try:
+            log(request.text, key=request.key)
+        except InvalidValueError as error:
+            raise Refusal.of(error, 409, "OtherKey", field="key") from error
 
     def exclude(self, request: ExcludeRequest) -> None:
         """Let a trial not count; one that is excluded already stays so."""

@@ -117,7 +117,7 @@ class NoteRequest(_Request):
     key: str | None = Field(
         default=None,
         pattern=r"^[A-Za-z0-9_-]{1,64}$",
-        description="Of the client's choice: a note or change with the same key is logged once only.",
+        description="Of the client's choice: the same note or change is logged once only, another is refused.",
     )
 
 

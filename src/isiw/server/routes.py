@@ -138,7 +138,7 @@ def mistrial(
 def note(folder: Folder, name: Name, body: Annotated[NoteRequest, Depends(BodyOf(NoteRequest))]) -> Response:
     """Log a remark. Safe to repeat with a key."""
     with folder.driving(name) as session:
-        session.recorder.note(body.text, key=body.key)
+        session.remark(session.recorder.note, body)
     return _json(OkAnswer())
 
 
@@ -146,7 +146,7 @@ def note(folder: Folder, name: Name, body: Annotated[NoteRequest, Depends(BodyOf
 def change(folder: Folder, name: Name, body: Annotated[NoteRequest, Depends(BodyOf(NoteRequest))]) -> Response:
     """That something changed that may bear on all later MEPs, such as the coil's place. Safe to repeat with a key."""
     with folder.driving(name) as session:
-        session.recorder.note_change(body.text, key=body.key)
+        session.remark(session.recorder.note_change, body)
     return _json(OkAnswer())
 
 

@@ -18,7 +18,7 @@ from isiw.errors import LimitExceededError, StrategyError, error_text
 from isiw.findings import Finding, Kind, Severity
 from isiw.log.headers import Header
 from isiw.log.schema import Correction, EstimateRecord, Event, EventKind, Intent, Record
-from isiw.log.verdicts import correction, excluded_by, under_all
+from isiw.log.verdicts import correction, excluded_by, is_logged, under_all
 from isiw.session.sink import Sink
 from isiw.signals.tap import TapResponses
 from isiw.strategy.choice import candidate_isis
@@ -81,9 +81,9 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
         self.learner, self.trials, self._sink, self._freely = learner, trials, sink, freely
         self.unconcluded: TrialT | None = None
         self.overruled = False
-        self._learnt, self._learning = trials, self.unconcluded
+        self._learnt = trials
+        self._learning: TrialT | None = None
         self._events = list(events)
-        self._keys = {event.key for event in self._events}
         self._doubted = {event.finding for event in self._events}
         self._refusal: Exception | None = None
         self._lock = threading.RLock()
@@ -114,13 +114,14 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
             self._sink.log.sync()
 
     def note(self, text: str, trial: int | None = None, key: str | None = None) -> None:
-        """Put a remark on disk; with a key that a note has already, nothing."""
+        """Put a remark on disk; with a key that the same one has already, nothing."""
         checks.text("a note", text)
         checks.text("the key of a note", key or "")
         with self._lock:
-            if key is None or key not in self._keys:
-                self._sink.append(Event(kind="note", trial=self.last if trial is None else trial, text=text, key=key))
-                self._keys.add(key)
+            event = Event(kind="note", trial=self.last if trial is None else trial, text=text, key=key)
+            if not is_logged(event, self._events):
+                self._sink.append(event)
+                self._events.append(event)
         self._sink.log.sync()
 
     def log_faults(self) -> None:
@@ -158,12 +159,11 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
             self.unconcluded = trial
 
     def judge(self, verdict: Callable[[TableT], Event]) -> None:
-        """Put a verdict on disk, unless its key was logged before; all trials are then learnt again."""
+        """Put a verdict on disk, unless it was logged with its key before; all trials are then learnt again."""
         with self._lock:
             event = verdict(self.trials)
-            if event.key is not None and event.key in self._keys:
+            if is_logged(event, self._events):
                 return
-            self._keys.add(event.key)
             self._sink.append(event)
             self.trials = self.learner.judged(self.trials, event)
             self._events.append(event)

@@ -40,11 +40,14 @@ class Judging(ABC):
         return self._examination.trials
 
     def note(self, text: str, *, key: str | None = None) -> None:
-        """Log a remark; with a key that a note of this session has already, nothing."""
+        """Log a remark; with a key that the same one has already, nothing. A key of something else is refused."""
         self._examination.note(text, key=key)
 
     def note_change(self, text: str, *, key: str | None = None) -> None:
-        """Log that something bears on all MEPs from here on; a strategy that reckons with changes expects one."""
+        """Log that something bears on all MEPs from here on; a strategy that reckons with changes expects one.
+
+        A key is as for `note`.
+        """
         self._judge(lambda trials: change(trials, text, key))
 
     @property

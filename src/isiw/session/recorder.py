@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable
 from typing import Any, Generic, Self, TypeVar
 
-from isiw.checks import number
+from isiw.checks import flag, number
 from isiw.devices.clock import ROUNDING_S, Clock, Pacing
 from isiw.devices.protocol import Readiness
 from isiw.errors import ImplausibleDataWarning, InvalidValueError, warn
@@ -20,7 +20,7 @@ from isiw.session.assembly import Earlier
 from isiw.session.examination import Examination, examination_of
 from isiw.session.judging import Judging
 from isiw.session.sink import Sink
-from isiw.signals.limits import isi_far, require_plausible
+from isiw.signals.limits import isi_far, require_plausible, require_plausible_range
 from isiw.signals.rig import REMEDIES, Evidence, told_of
 from isiw.signals.watch import Doubts, findings
 from isiw.strategy.course import Outcome
@@ -197,6 +197,7 @@ class Recorder(Recording[Trial], Judging):
         Warns:
             ImplausibleDataWarning: what looks like a slip of unit; it is learnt and logged all the same.
         """
+        pulse = flag("pulse", pulse)
         with self._lock:
             self._examination.conclude()
             if (isi_ms is None or not pulse) and self.asked is None:  # it was given, whatever the limits allow
@@ -211,6 +212,7 @@ class Recorder(Recording[Trial], Judging):
         isi_ms = None if isi_ms is None else number("a realised ISI [ms]", isi_ms)
         asked = self._require_asked()
         require_plausible(isi_ms, mep_mv, asked.isi_ms, space, outcome.isi_sd_ms)
+        require_plausible_range(outcome.mep_sd_mv, outcome.mep_interval_mv)
         isi_ms = None if isi_ms is None else space.check_realised(isi_ms)
         if (isi_ms is None or not pulse) != (asked.isi_ms is None) or asked.tap_alone is pulse:
             alone = "a tap alone" if asked.tap_alone else "TMS alone"

@@ -330,7 +330,7 @@ class ThresholdRecorder(Recording[PulseOutcome]):
             LogError: the log cannot be written.
         """
         counting = [outcome.trial for outcome in self.outcomes if not outcome.reason]
-        if trial not in counting:
+        if whole("the number of a pulse", trial) not in counting:
             raise InvalidValueError(
                 "cannot exclude this pulse",
                 got=trial,

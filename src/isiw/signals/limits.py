@@ -126,6 +126,16 @@ def require_amplitude(mep_mv: float, besides: Finding | None = None) -> None:
         raise refused(found, mep_mv)
 
 
+def require_plausible_range(sd_mv: float, ends_mv: tuple[float, float] | None) -> None:
+    """Refuse an end of an interval that no muscle gives, and an SD that no amplitudes of a muscle have [mV]."""
+    for end_mv in ends_mv or ():
+        if AMPLITUDE_MV.most < end_mv < math.inf:
+            require_amplitude(end_mv)
+    if 2 * sd_mv > AMPLITUDE_MV.most:  # the SD of anything is at most half of its range
+        slip = AMPLITUDE_MV.slip(2 * sd_mv)
+        raise refused(_implausible(f"an SD of {sd_mv:.4g} mV is more than any muscle gives", f"{slip}"), sd_mv)
+
+
 def off_by(isi_ms: float, asked_ms: float, space: DesignSpace) -> bool:
     """Whether an ISI [ms] is farther than the space's tolerance from the one that was asked [ms]."""
     return abs(isi_ms - asked_ms) > space.tolerance_ms

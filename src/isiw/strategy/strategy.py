@@ -7,13 +7,13 @@ from dataclasses import replace
 from typing import Unpack
 
 from isiw.acquisition.protocol import AcquisitionFunction, greedy_batch, require_acquisition
-from isiw.checks import amplitude, deadline, number, whole
+from isiw.checks import amplitude, deadline, flag, number, whole
 from isiw.design import DesignSpace, require_space
 from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError, warn
 from isiw.estimate import WindowEstimate
 from isiw.findings import NO_MEP
 from isiw.models.protocol import Posterior, PredictsMeps, ReportsTrouble, ResponseModel
-from isiw.signals.limits import isi_far, require_plausible
+from isiw.signals.limits import isi_far, require_plausible, require_plausible_range
 from isiw.signals.rig import Evidence, Told
 from isiw.signals.watch import Doubts, findings, is_silent
 from isiw.strategy.choice import Asked, Choice, Cost, instead_of_lost
@@ -251,12 +251,14 @@ class Strategy:
         """
         plain_ms = None if isi_ms is None else number("a realised ISI [ms]", isi_ms)
         plain_mv = None if mep_mv is None else number("mep_mv", mep_mv, least=0)
-        if not pulse:
+        if not flag("pulse", pulse):
             self.learn_tap(plain_ms, plain_mv)
             return
         asked_ms = None if plain_ms is None else self._asked.meant_ms(plain_ms, plain_mv, self.space)
         require_plausible(plain_ms, plain_mv, asked_ms, self.space, isi_sd_ms)
         more = Details(response=response, isi_sd_ms=isi_sd_ms, mep_sd_mv=mep_sd_mv, mep_interval_mv=mep_interval_mv)
+        outcome = Outcome(isi_ms, mep_mv, **more)
+        require_plausible_range(outcome.mep_sd_mv, outcome.mep_interval_mv)
         self.learn(isi_ms, mep_mv, **more)
         told = [Told(one.mep_mv, one.isi_ms) for one in self._outcomes.pulses if one.mep_mv is not None]
         evidence = Evidence(told=told, detection_limit_mv=self.detection_limit_mv)
