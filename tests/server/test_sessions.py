@@ -330,6 +330,28 @@ def test_who_resumes_an_open_session_does_not_know_what_came_of_its_open_trial(
     ]
 
 
+def test_who_closes_a_session_makes_its_open_trial_a_mistrial(
+    client: httpx.Client, session: str, tmp_path: Path
+) -> None:
+    done(client.post(f"{session}/ask"))
+    closed = done(client.post(f"{session}/close"))
+    assert (closed["open"], closed["trials"], closed["open_trial"]) == (False, 1, None)
+    assert read_session(tmp_path / "P07.mcap").table[0].reason is Kind.OUTCOME_UNKNOWN
+
+
+@pytest.mark.parametrize("other", [{"pulse": False}, {"isi_sd_ms": 2.0}, {"background_rms_uv": 3.0}])
+def test_an_outcome_that_differs_in_one_value_is_refused_by_its_name(
+    client: httpx.Client, session: str, other: dict[str, object]
+) -> None:
+    outcome = {"trial": 0, "isi_ms": done(client.post(f"{session}/ask"))["isi_ms"], "mep_mv": 0.1}
+    for _ in range(2):
+        done(client.post(f"{session}/tell", json=outcome))
+    error = refused(client.post(f"{session}/tell", json=outcome | other), 409, "OtherOutcome")
+    name, value = min(other.items())
+    assert f"{name}={value}" in error["got"]
+    assert name not in error["expected"]
+
+
 def test_what_breaks_a_log_closes_its_session(
     client: httpx.Client, session: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

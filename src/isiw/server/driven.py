@@ -66,7 +66,8 @@ class DrivenSession:
             raise not_open(self.name)
 
     def close(self) -> SessionAnswer:
-        """Close its log; how it stands then."""
+        """Close its log, an open trial as a mistrial; how it stands then."""
+        self.give_up()
         stands = self.stands()
         self.closed = True
         self.recorder.close()
@@ -139,9 +140,7 @@ class DrivenSession:
     def tell(self, request: TellRequest) -> TrialAnswer:
         """Log the outcome of a trial; told again it is answered as at first."""
         if request.trial in self._outcomes:
-            uv = request.background_rms_uv
-            told = (request.isi_ms, request.mep_mv, request.isi_sd_ms, uv, request.pulse)
-            return self._known(request.trial, told, f"isi_ms={request.isi_ms} mep_mv={request.mep_mv}")
+            return self._known(request.trial, _in_words(request))
         self._require_next(request.trial, asked=request.pulse and request.isi_ms is not None)
         self.recorder.tell(
             request.isi_ms,
@@ -155,7 +154,7 @@ class DrivenSession:
     def mistrial(self, request: MistrialRequest) -> TrialAnswer:
         """That a trial is lost; told again it is answered as at first."""
         if request.trial in self._outcomes:
-            return self._known(request.trial, (Kind.of_mistrial(request.reason),), f"mistrial, {request.reason}")
+            return self._known(request.trial, f"mistrial, {request.reason}", Kind.of_mistrial(request.reason))
         self._require_next(request.trial, asked=True)
         self.recorder.mistrial(request.reason)
         return self._concluded()
@@ -198,11 +197,11 @@ class DrivenSession:
             field="trial",
         )
 
-    def _known(self, number: int, told: tuple[object, ...], words: str) -> TrialAnswer:
+    def _known(self, number: int, words: str, reason: Kind | None = None) -> TrialAnswer:
         """The first answer about a trial, to who tells it again."""
         trial = self.recorder.trials[number]
-        recorded, recorded_words = _recorded(trial)
-        if told == recorded:
+        recorded = _recorded(trial)
+        if reason == trial.reason if trial.status is Status.MISTRIAL else words == recorded:
             return self._outcomes[number]
         late = trial.reason is Kind.OUTCOME_UNKNOWN
         if late:
@@ -213,7 +212,7 @@ class DrivenSession:
             "Late" if late else "OtherOutcome",
             f"trial {number} has another outcome already",
             got=words,
-            expected=f"what is recorded: {recorded_words}",
+            expected=f"what is recorded: {recorded}",
             remedy="It stays as it is." + (" What came too late is in the log as a note." if late else ""),
             field="trial",
         )
@@ -244,9 +243,17 @@ def _outcomes(record: SessionRecord) -> dict[int, TrialAnswer]:
     return {trial.index: TrialAnswer.of(trial, decision, said) for trial, decision, said in trials}
 
 
-def _recorded(trial: Trial) -> tuple[tuple[object, ...], str]:
-    """The values that were told about a trial, and the same in words."""
+def _recorded(trial: Trial) -> str:
+    """What was told about a trial, in words."""
     if trial.status is Status.MISTRIAL:
-        return (trial.reason,), f"mistrial, {trial.reason}"
-    told = (trial.isi_ms, trial.mep_mv, trial.isi_sd_ms, trial.background_rms_uv, not trial.tap_alone)
-    return told, f"isi_ms={trial.isi_ms} mep_mv={trial.mep_mv}"
+        return f"mistrial, {trial.reason}"
+    names = ("isi_ms", "mep_mv", "isi_sd_ms", "background_rms_uv")
+    told = {name: getattr(trial, name) for name in names}
+    return _in_words(TellRequest.model_construct(trial=trial.index, **told, pulse=not trial.tap_alone))
+
+
+def _in_words(told: TellRequest) -> str:
+    """What is told about a trial, in words that differ where its values do."""
+    usual = {"isi_sd_ms": 0.0, "background_rms_uv": None, "pulse": True}
+    values = told.model_dump(exclude={"trial"})
+    return " ".join(f"{name}={value}" for name, value in values.items() if name not in usual or value != usual[name])

@@ -215,11 +215,10 @@ class Recorder(Recording[Trial], Judging):
         require_plausible_range(outcome.mep_sd_mv, outcome.mep_interval_mv)
         isi_ms = None if isi_ms is None else space.check_realised(isi_ms)
         if (isi_ms is None or not pulse) != (asked.isi_ms is None) or asked.tap_alone is pulse:
-            alone = "a tap alone" if asked.tap_alone else "TMS alone"
             raise InvalidValueError(
                 "the outcome is not of the kind of trial that was requested",
-                got=isi_ms,
-                expected=f"the outcome of {alone if asked.isi_ms is None else f'{asked.isi_ms:g} ms'}",
+                got=f"the outcome of {_kind(isi_ms, tap_alone=not pulse)}",
+                expected=f"the outcome of {_kind(asked.isi_ms, tap_alone=asked.tap_alone)}",
                 remedy="Tell that first, or call mistrial().",
             )
         trial = Trial(asked.trial, Status.ACCEPTED, asked.isi_ms, isi_ms=isi_ms, mep_mv=mep_mv,
@@ -292,3 +291,8 @@ class Recorder(Recording[Trial], Judging):
             self._on_doubt(f"{doubt}")
         else:
             warn(f"{doubt}", ImplausibleDataWarning)
+
+
+def _kind(isi_ms: float | None, *, tap_alone: bool) -> str:
+    """Which kind of trial it is, in words."""
+    return "a tap alone" if tap_alone else "TMS alone" if isi_ms is None else f"a pair at {isi_ms:g} ms"

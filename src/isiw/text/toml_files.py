@@ -110,6 +110,8 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         ):
             text = file.read(_LARGEST + 1)
         return parsed(text)
+    except ConfigError:
+        raise
     except UnicodeDecodeError as error:
         raise ConfigError(
             "this is not a TOML file, or it is not saved as UTF-8",
