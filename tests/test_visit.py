@@ -106,3 +106,14 @@ def test_visits_are_unlike_where_both_note_another_muscle_or_a_clearly_different
         assert like.unlike(noted) is None
     assert noted.unlike(Visit(muscle="FDI")) == "different muscles, FCR and FDI"
     assert noted.unlike(Visit(intensity_pct_rmt=99.5)) == "different intensities, 110 and 99.5 % of RMT"
+
+
+@pytest.mark.parametrize("iti_s", [(2.0, 4.0), (2.0, 5.0), (3.0, 3.0)])
+def test_intervals_that_the_limits_replace_are_refused_where_they_are_stated(iti_s: tuple[float, float]) -> None:
+    with pytest.raises(InvalidValueError, match="intervals up to more than 5 s"):
+        VisitProtocol(iti_s=iti_s).require_effect(5.0)
+
+
+@pytest.mark.parametrize("iti_s", [(2.0, 6.0), (5.0, 5.0), None])
+def test_intervals_of_which_some_are_longer_than_the_limits_are_kept(iti_s: tuple[float, float] | None) -> None:
+    VisitProtocol(iti_s=iti_s).require_effect(5.0)

@@ -34,7 +34,7 @@ from typing import (
 import numpy as np
 
 from isiw.errors import InvalidValueError, did_you_mean
-from isiw.findings import AMPLITUDE_MV, DELAY_MS, SHARE
+from isiw.findings import AMPLITUDE_MV, DELAY_MS, INTERVAL_S, SHARE
 
 _T = TypeVar("_T")
 
@@ -96,6 +96,14 @@ def amplitude_interval(what: str, ends_mv: object) -> tuple[float, float]:
         got=ends_mv,
         expected="two amplitudes in mV that ascend, such as (0, 0.05)",
     )
+
+
+def patience(what: str, value: object) -> float:
+    """How long a device may take, no longer than anybody waits for it [s]."""
+    plain_s = number(what, value, above=0)
+    too_long = f"{what} is longer than anybody waits for a device"
+    INTERVAL_S.require(too_long, plain_s, f"at most {INTERVAL_S.most:g} s", got=value)
+    return plain_s
 
 
 def deadline(what: str, value: object) -> float | None:
@@ -184,7 +192,17 @@ def flag(what: str, value: object) -> bool:
     return bool(value)
 
 
+def function(what: str, value: object) -> Callable[..., Any]:
+    """Something that can be called."""
+    if not callable(value):
+        raise InvalidValueError(
+            f"{what} must be a function", got=value, remedy="Give the function, without calling it."
+        )
+    return value
+
+
 Number: TypeAlias = Annotated[float, number]
+Patience: TypeAlias = Annotated[float, patience]
 Positive: TypeAlias = Annotated[float, partial(number, above=0)]
 NonNegative: TypeAlias = Annotated[float, partial(number, least=0)]
 Share: TypeAlias = Annotated[float, share]

@@ -22,7 +22,7 @@ from isiw.checks import (
     share,
 )
 from isiw.errors import InvalidValueError
-from isiw.findings import INTERVAL_S
+from isiw.findings import INTENSITY_PCT, INTERVAL_S
 
 _ITI_DRAWS, _CONTROL_DRAWS = 1, 2
 """What is drawn, so that the two never share their draws."""
@@ -60,6 +60,29 @@ class Visit(Checked):
     intensity_pct_mso: Positive | None = None
     electrodes: Text = ""
 
+    def require_intensity(self, assumed_pct_rmt: float | None = None) -> None:
+        """Raise if an intensity is probably in another unit, or not the one that the strategy assumes.
+
+        It is for a visit that somebody states: those of earlier logs stay readable.
+
+        Args:
+            assumed_pct_rmt: the intensity that the strategy assumes [% RMT]; None if it assumes none.
+
+        Raises:
+            InvalidValueError: an intensity below 3 %, or one other than the strategy's.
+        """
+        noted = self.intensity_pct_rmt
+        require_percent("the visit's intensity_pct_rmt", noted)
+        require_percent("the visit's intensity_pct_mso", self.intensity_pct_mso)
+        if noted is not None and assumed_pct_rmt is not None and not math.isclose(noted, assumed_pct_rmt):
+            raise InvalidValueError(
+                "the visit and the strategy state different intensities of the pulse",
+                got=f"{assumed_pct_rmt:g} % of RMT in the strategy",
+                expected=f"{noted:g}, as the visit says",
+                remedy="Correct intensity_pct_rmt under [visit] or under [strategy.settings] (in Python of isiw.Visit "
+                f"or make_strategy(..., intensity_pct_rmt={noted:g})).",
+            )
+
     def unlike(self, other: Visit) -> str | None:
         """Why the window of the person's other visit is not this one's, in words; None if nothing noted says so."""
         if muscles := different_muscles((self.muscle, other.muscle)):
@@ -68,6 +91,13 @@ class Visit(Checked):
         if own is not None and others is not None and abs(own - others) > MOST_APART_PCT_RMT:
             return f"different intensities, {own:g} and {others:g} % of RMT"
         return None
+
+
+def require_percent(what: str, intensity_pct: float | None) -> None:
+    """Raise if an intensity [%] is probably in another unit; None is none."""
+    if intensity_pct is not None:
+        scale = INTENSITY_PCT
+        scale.require(f"{what} is probably in another unit", intensity_pct, f"at least {scale.least:g} %")
 
 
 def different_muscles(noted: Iterable[str]) -> list[str]:
@@ -139,7 +169,7 @@ class VisitProtocol(Checked):
         return _exact(self.tms_alone) + _exact(self.tap_alone)
 
     def require_effect(self, min_iti_s: float) -> None:
-        """Raise if the intervals are as long as the rests, so that these are none.
+        """Raise if the intervals are as long as the rests, so that these are none, or no longer than the limits' own.
 
         It is for a protocol that somebody states: those of earlier logs stay readable.
 
@@ -147,8 +177,15 @@ class VisitProtocol(Checked):
             min_iti_s: the interval of the limits, which holds if the protocol has none [s].
 
         Raises:
-            InvalidValueError: a rest that is no longer than the longest interval.
+            InvalidValueError: a rest that is no longer than the longest interval, or intervals that the limits replace.
         """
+        if self.iti_s is not None and self.iti_s[1] <= min_iti_s and self.iti_s != (min_iti_s, min_iti_s):
+            raise InvalidValueError(
+                "the protocol's intervals are no longer than the limits allow at least, so they would have no effect",
+                got=f"iti_s {self.iti_s[0]:g} to {self.iti_s[1]:g}, min_iti_s {min_iti_s:g}",
+                expected=f"intervals up to more than {min_iti_s:g} s",
+                remedy="Set a longer iti_s [s] in the protocol, or a shorter min_iti_s in the limits.",
+            )
         longest_s = min_iti_s if self.iti_s is None else self.iti_s[1]
         if self.block_trials is not None and self.rest_s <= longest_s:
             raise InvalidValueError(

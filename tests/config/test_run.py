@@ -330,3 +330,36 @@ def test_a_space_can_be_a_list_of_isis_and_not_a_range_as_well(tmp_path: Path) -
     path.write_text('[space]\nisis_ms = [10, 20, 50]\nhigh_ms = 60.0\nreference = "impact"\n')
     with pytest.raises(ConfigError, match="exclude each other"):
         load_config(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('[device]\nfactory = "rig:make"\ntimeout_s = 30000', r"device.timeout_s.*Is it in ms"),
+        ('[device]\nfactory = "rig:make"\ntimeout_s = true', r"device.timeout_s.*finite number"),
+        ("[limits]\nmax_coil_c = 4000.0", "such as 40"),
+        ('[visit]\nintensity_pct_rmt = "1.1"', "visit.intensity_pct_rmt.*expected a number"),
+        ("[visit]\nintensity_pct_rmt = 1.1", "Is it in parts of 1"),
+        ("[protocol]\niti_s = [2.0, 4.0]", "intervals up to more than 5 s"),
+    ],
+)
+def test_what_would_disable_a_safeguard_or_is_no_number_is_refused(
+    config_file: WriteFile, text: str, words: str
+) -> None:
+    with pytest.raises((ConfigError, InvalidValueError), match=words):
+        load_config(config_file(text))
+
+
+def test_a_strategys_intensity_in_parts_of_one_is_refused(config_file: WriteFile) -> None:
+    config = load_config(config_file("[strategy.settings]\nintensity_pct_rmt = 1.1"))
+    with pytest.raises(InvalidValueError, match="the strategy's intensity_pct_rmt is probably in another unit"):
+        session_for(config)
+
+
+def test_an_intensity_of_the_visit_that_the_settings_contradict_begins_nothing(
+    config_file: WriteFile, tmp_path: Path
+) -> None:
+    text = f"log = '{tmp_path}/s.mcap'\n[visit]\nintensity_pct_rmt = 110\n[strategy.settings]\nintensity_pct_rmt = 80"
+    with pytest.raises(InvalidValueError, match="the visit and the strategy state different intensities"):
+        session_for(load_config(config_file(text))).run()
+    assert not list(tmp_path.glob("s.mcap*"))

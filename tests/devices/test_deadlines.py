@@ -379,3 +379,10 @@ def test_a_delivery_that_nobody_waits_for_any_more_is_given_up(released: threadi
 def test_deadlines_that_nobody_can_keep_are_refused(values: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError):
         Deadlines(**values)
+
+
+@pytest.mark.parametrize("verb", ["describe_s", "stage_s", "readiness_s", "stop_s", "unstage_s"])
+@pytest.mark.parametrize("wrong", [1e9, 5000, True])
+def test_a_deadline_that_nobody_waits_for_is_refused(verb: str, wrong: float) -> None:
+    with pytest.raises(InvalidValueError, match=f"Deadlines.{verb}"):
+        Deadlines(**{verb: wrong})

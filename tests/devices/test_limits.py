@@ -154,3 +154,11 @@ def test_a_state_within_the_limits_is_accepted() -> None:
         Readiness(coil_c=40.0, intensity_pct_mso=55.0)
     )
     Limits(0, 200).require_state(Readiness())
+
+
+@pytest.mark.parametrize("max_coil_c", [4000.0, 104.0])
+def test_a_coil_that_nobody_could_bear_is_no_limit_where_it_is_stated(max_coil_c: float) -> None:
+    limits = Limits(0.0, 100.0, max_coil_c=max_coil_c)  # as in an earlier log
+    with pytest.raises(InvalidValueError, match="such as 40"):
+        limits.require_effect()
+    Limits(0.0, 100.0, max_coil_c=43.0).require_effect()

@@ -100,6 +100,11 @@ def test_a_malformed_body_is_refused_in_words_and_begins_nothing(
         ({"space": {"reference": "impct"}}, "space.reference", "Did you mean impact?"),
         ({"limits": {"min_iti_s": 5000.0}}, None, "Is it in ms?"),
         ({"visit": {"intensity_pct_rmt": 1.2}}, None, "Is it in parts of 1?"),
+        (
+            {"visit": {"intensity_pct_rmt": 110}, "strategy": {"settings": {"intensity_pct_rmt": 80}}},
+            None,
+            "state different intensities",
+        ),
     ],
 )
 def test_a_plan_that_cannot_be_is_refused_by_the_name_of_its_field(

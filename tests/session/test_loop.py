@@ -393,7 +393,13 @@ def test_a_strategy_that_knows_of_other_trials_is_refused_before_anything_is_del
     assert len(Session(device, strategy.restarted(), log=log).run().trials) == 3
 
 
-@pytest.mark.parametrize("times", [{"timeout_s": 0.0}, {"timeout_s": math.nan}, {"ask_deadline_s": -1.0}])
+WRONG_TIMES: tuple[dict[str, Any], ...] = (
+    *({"timeout_s": wrong} for wrong in (0.0, math.nan, 30_000, True)),
+    {"ask_deadline_s": -1.0},
+)
+
+
+@pytest.mark.parametrize("times", WRONG_TIMES)
 def test_invalid_times_are_refused(log: Path, times: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match=r"timeout_s|deadline_s"):
         Session(ScriptedDevice(), scripted_strategy(3), log=log, **times)

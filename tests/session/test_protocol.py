@@ -56,7 +56,7 @@ def test_intervals_and_rests_are_those_of_the_protocol(log: Path) -> None:
 
 def test_the_limits_are_a_floor_that_no_protocol_passes(log: Path) -> None:
     limits = Limits.of_space(scripted_strategy().space, min_iti_s=20.0, max_pulses=25)
-    protocol = VisitProtocol(iti_s=(5.0, 6.0), tms_alone=0.3, tap_alone=0.2, block_trials=5, rest_s=10.0)
+    protocol = VisitProtocol(iti_s=(5.0, 21.0), tms_alone=0.3, tap_alone=0.2, block_trials=5, rest_s=22.0)
     result = Session(device(), scripted_strategy(30), log=log, limits=limits, protocol=protocol).run()
     t_s = [intent.t_s for intent in read_session(log).intents]
     assert len(t_s) == len(result.trials) == 25

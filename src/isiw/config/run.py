@@ -173,6 +173,7 @@ def load_config(path: str | Path | None = None) -> RunConfig:
         values["device"] = {"folder": folder} | device
     config = _read_from(folder, checked(RunConfig, values, str(path)))
     require_units(values)
+    config.visit.noted().require_intensity()
     require_together(values)
     limits_for(config).require_effect()
     config.protocol.require_effect(config.limits.min_iti_s)

@@ -5,12 +5,22 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
-from isiw.checks import choice
+from isiw.checks import choice, patience
 from isiw.design import DesignSpace, missing_reference
 from isiw.devices.limits import USUAL_ITI_S
 from isiw.devices.robot.mechanism import LINE_DELAY_MS, EventTime, Geometry, SensorNoise
@@ -18,7 +28,7 @@ from isiw.devices.robot.tapper import Tapper, TapperSettings, preset
 from isiw.devices.robot.vane.rotation import Vane
 from isiw.devices.robot.vane.tapper import WAIT_MS, RotatingTapper
 from isiw.errors import ConfigError
-from isiw.findings import INTENSITY_PCT, STOP_WIDTH_MS, UnitScale
+from isiw.findings import STOP_WIDTH_MS
 from isiw.strategy.catalogue import list_strategies, settings_for
 from isiw.subjects.cohorts import COHORTS, person_of
 from isiw.subjects.subject import SimulatedSubject
@@ -26,27 +36,21 @@ from isiw.text.toml_files import checked
 from isiw.types import Reference
 from isiw.visit import Visit
 
-_SCALES: Final[Mapping[tuple[str, ...], UnitScale]] = {
-    ("visit", "intensity_pct_rmt"): INTENSITY_PCT,
-    ("visit", "intensity_pct_mso"): INTENSITY_PCT,
-    ("strategy", "settings", "stop_width_ms"): STOP_WIDTH_MS,
-}
-
 STOPS_NOTHING_MS: Final = 0.005
 """A smaller width to stop at is there to stop nothing."""
 
 
 def require_units(values: Mapping[str, Any]) -> None:
-    """Check that no value looks as if it were in another unit than its key says."""
-    for keys, scale in _SCALES.items():
-        value = _given(values, *keys)
-        slip = None if value is None else scale.slip(value)
-        if slip is not None and not (scale is STOP_WIDTH_MS and (value or 0.0) < STOPS_NOTHING_MS):
-            remedy = f"{slip} If no width is to end the session, write 0.001." if scale is STOP_WIDTH_MS else slip
-            expected = f"at least {scale.least:g}"
-            raise ConfigError(
-                f"{'.'.join(keys)} is probably in another unit", got=value, expected=expected, remedy=remedy
-            )
+    """Check that no width to stop at looks as if it were in another unit than its key says."""
+    value = _given(values, "strategy", "settings", "stop_width_ms")
+    slip = None if value is None or value < STOPS_NOTHING_MS else STOP_WIDTH_MS.slip(value)
+    if slip is not None:
+        raise ConfigError(
+            "strategy.settings.stop_width_ms is probably in another unit",
+            got=value,
+            expected=f"at least {STOP_WIDTH_MS.least:g}",
+            remedy=f"{slip} If no width is to end the session, write 0.001.",
+        )
 
 
 def _given(values: Any, *keys: str) -> float | None:
@@ -196,7 +200,7 @@ class DeviceConfig(Section):
     kind: Literal["tapper", "rotating-tapper"] | None = None
     settings: dict[str, Any] = Field(default_factory=dict)
     folder: Path | None = None
-    timeout_s: float = Field(default=TIMEOUT_S, gt=0.0, allow_inf_nan=False)
+    timeout_s: Annotated[float, BeforeValidator(partial(patience, "the time-out"))] = TIMEOUT_S
 
     @model_validator(mode="after")
     def _either(self) -> Self:
@@ -228,12 +232,14 @@ class DeviceConfig(Section):
 class VisitConfig(Section):
     """Who is examined, and what is noted about it, as in `isiw.Visit`."""
 
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+
     subject: str = ""
     day: int | None = Field(default=None, ge=1)
     operator: str = ""
     muscle: str = ""
-    intensity_pct_rmt: float | None = Field(default=None, gt=0.0, allow_inf_nan=False)
-    intensity_pct_mso: float | None = Field(default=None, gt=0.0, allow_inf_nan=False)
+    intensity_pct_rmt: float | None = Field(default=None, gt=0.0)
+    intensity_pct_mso: float | None = Field(default=None, gt=0.0)
     electrodes: str = ""
 
     def noted(self) -> Visit:

@@ -13,7 +13,7 @@ from typing import Any, Final
 from isiw.config.run import RunConfig, limits_for
 from isiw.config.sections import RobotConfig, SimulatedConfig, SubjectConfig, robot_for
 from isiw.design import DesignSpace
-from isiw.devices.protocol import Device, DeviceInfo
+from isiw.devices.protocol import Device, DeviceInfo, info_of
 from isiw.devices.simulated import RecordedPerson, SimulatedDevice, SimulatedPerson, load_recordings
 from isiw.errors import ConfigError, StrategyError
 from isiw.files import write_output
@@ -235,7 +235,7 @@ def session_for(config: RunConfig) -> Session:
     space = config.design()
     log = config.log or fresh_log_path(config)
     device = device_for(config)
-    info = device.describe()
+    info = info_of(device)
     known = {
         "hit_delay_ms": info.hit_delay_ms,
         "conditioning": None if info.conditioning == "tap" else info.conditioning,  # a tap may be nothing stated

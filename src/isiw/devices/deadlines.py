@@ -11,8 +11,17 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Generic, TypeVar
 
-from isiw.checks import Checked, Count, Positive
-from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, ReportsReadiness, readiness_of, require_staged
+from isiw.checks import Checked, Count, Patience
+from isiw.devices.protocol import (
+    Answer,
+    Device,
+    DeviceInfo,
+    Readiness,
+    ReportsReadiness,
+    info_of,
+    readiness_of,
+    require_staged,
+)
 from isiw.errors import DeviceError, DeviceTimeoutError, StillArmedError, error_text
 from isiw.trials import Stimulus
 
@@ -34,11 +43,11 @@ class Deadlines(Checked):
         stop_attempts: how often `stop` is tried before the device counts as still armed.
     """
 
-    describe_s: Positive = 10.0
-    stage_s: Positive = 60.0
-    readiness_s: Positive = 5.0
-    stop_s: Positive = 5.0
-    unstage_s: Positive = 10.0
+    describe_s: Patience = 10.0
+    stage_s: Patience = 60.0
+    readiness_s: Patience = 5.0
+    stop_s: Patience = 5.0
+    unstage_s: Patience = 10.0
     stop_attempts: Count = 3
 
 
@@ -145,7 +154,7 @@ class PunctualDevice:
         self._late: _Call[Answer] | None = None
         self._worker: _Worker | None = None
         self._owner = threading.get_ident()
-        self._info = self._within("describe", device.describe, self._deadlines.describe_s)
+        self._info = self._within("describe", partial(info_of, device), self._deadlines.describe_s)
         self._name = self._info.name
 
     def describe(self) -> DeviceInfo:
@@ -162,7 +171,7 @@ class PunctualDevice:
                     "the device was not armed: an earlier call, for which isiw no longer waits, is still running and "
                     "could still fire",
                     got=self._name,
-                    remedy="Check the device and try again; or end this process and resume the session from its log.",
+                    remedy="Check the device, try again; or end this process, and resume the session if it has a log.",
                 )
             self._staged, self._stopped, self._disarmed = True, False, False
             call = self._begun(self._device.stage)
@@ -251,7 +260,7 @@ class PunctualDevice:
             f"the device did not answer in time: {name}",
             got=self._name if name != "describe" else None,
             expected=f"an answer within {deadline_s:g} s",
-            remedy="The device was disarmed. Check it, then resume the session from its log."
+            remedy="The device was disarmed. Check it, then start again; if the session has a log, resume it."
             if name != "describe"
             else "Nothing was armed by this session. Check the device, then start again.",
         )

@@ -19,6 +19,9 @@ _SAME_PCT_MSO = 0.01  # what a conversion on the way may lose
 USUAL_ITI_S = 5.0
 """Between two stimuli that isiw delivers, if nobody states another interval [s]."""
 
+MOST_COIL_C = 60.0
+"""No coil that touches a person may be as hot as that [°C]."""
+
 
 @dataclass(frozen=True)
 class Limits(Checked):
@@ -101,11 +104,20 @@ class Limits(Checked):
         return replace(self, min_iti_s=iti_s) if self.min_iti_s is None else self
 
     def require_effect(self) -> None:
-        """Raise InvalidValueError if the interval alone keeps what a rest or a period asks for, or is probably in ms.
+        """Raise InvalidValueError if a limit limits nothing, or is probably in another unit.
+
+        The interval alone may keep what a rest or a period asks for, or be in ms, and no coil be as hot as its limit.
 
         It is for limits that somebody states: those of earlier logs stay readable.
         """
         interval_s("Limits.min_iti_s", self.iti_s)
+        if self.max_coil_c is not None and self.max_coil_c > MOST_COIL_C:
+            raise InvalidValueError(
+                "Limits.max_coil_c is hotter than a coil may be that touches a person, so it would have no effect",
+                got=self.max_coil_c,
+                expected=f"at most {MOST_COIL_C:g} °C",
+                remedy="Is it in °F, or in tenths of a degree? Write it in °C, such as 40.",
+            )
         if self.max_block_pulses is not None and self.rest_s <= self.iti_s:
             raise InvalidValueError(
                 "the rest of the limits is no longer than the interval between two stimuli, so it would have no effect",

@@ -136,6 +136,18 @@ class HasMemory(Protocol):
         """Come into the state of having delivered these stimuli since the session's beginning."""
 
 
+def info_of(device: Device) -> DeviceInfo:
+    """A device's description of itself."""
+    info: object = device.describe()
+    if not isinstance(info, DeviceInfo):
+        raise DeviceError(
+            "describe() did not return an isiw.DeviceInfo",
+            got=info,
+            remedy='Return DeviceInfo("what it is", "impact"), or "valve", the event that its ISIs count from.',
+        )
+    return info
+
+
 def readiness_of(device: Device) -> Readiness:
     """The state that a device reports; ready, if it cannot report one."""
     state: object = device.readiness() if isinstance(device, ReportsReadiness) else Readiness()

@@ -50,6 +50,8 @@ def part_of(path: Path) -> Path:
 
 def log_of(path: Path) -> Path:
     """Where a log is once it is finished, from either of its names."""
+    if "\0" in str(path):
+        raise LogError("no file can have a NUL character in its path", got=str(path), remedy="Choose another path.")
     return path.with_suffix("") if path.suffix == ".part" else path
 
 

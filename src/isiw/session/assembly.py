@@ -13,7 +13,7 @@ from types import MappingProxyType
 from typing import Any, Final, NamedTuple, TypedDict
 
 import isiw
-from isiw.checks import deadline, number, text
+from isiw.checks import deadline, patience, text
 from isiw.compiled import version as engine_version
 from isiw.devices.clock import Clock
 from isiw.devices.limits import USUAL_ITI_S, Limits
@@ -94,8 +94,9 @@ def require_untold(strategy: Strategy, trials: int = 0) -> None:
         )
 
 
-def require_room(strategy: Strategy, header: Header) -> None:
-    """Raise if the limits end a strategy's plan before its end, so that it would say nothing about most ISIs."""
+def require_fitting(strategy: Strategy, header: Header) -> None:
+    """Raise if the visit states another intensity than the strategy, or the limits end the strategy's plan early."""
+    header.visit.require_intensity(header.strategy.settings.get("intensity_pct_rmt"))
     planned, most = strategy.stimuli_planned, header.limits.max_pulses
     if planned is None or (needed := header.protocol.stimuli_for(planned)) <= most:
         return
@@ -210,7 +211,7 @@ def assembled(
         limits=limits,
         device=rig.info,
         signals=options.get("signals") or SignalLimits(),
-        timeout_s=number("timeout_s", options.get("timeout_s", 30.0), above=0),
+        timeout_s=patience("timeout_s", options.get("timeout_s", 30.0)),
         ask_deadline_s=deadline("ask_deadline_s", options.get("ask_deadline_s")),
         config=dict(options.get("config") or {}),
     ).model_copy(update=dict(earlier.kept))

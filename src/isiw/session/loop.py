@@ -15,7 +15,7 @@ from isiw.log.headers import Header
 from isiw.log.pulses import earlier_pulses_s
 from isiw.log.schema import Event
 from isiw.log.writer import LogWriter
-from isiw.session.assembly import Earlier, Options, assembled, require_room, require_untold
+from isiw.session.assembly import Earlier, Options, assembled, require_fitting, require_untold
 from isiw.session.console import OperatorConsole, Table
 from isiw.session.judging import Judging
 from isiw.session.sink import Follower, SessionResult
@@ -200,7 +200,7 @@ class Session(Judging):
             self._limits.require_effect()
             self._header.protocol.require_effect(self._limits.iti_s)
             self._header.signals.require_behind_artefact()
-            require_room(self.strategy, self._header)
+            require_fitting(self.strategy, self._header)
 
     def _judge(self, verdict: Callable[[TrialTable], Event]) -> None:
         self._examination.judge(verdict)

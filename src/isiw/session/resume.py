@@ -11,7 +11,7 @@ from isiw.checks import text
 from isiw.design import DesignSpace
 from isiw.devices.clock import MonotonicClock
 from isiw.devices.limits import USUAL_ITI_S, Limits
-from isiw.devices.protocol import Device, DeviceInfo, HasMemory
+from isiw.devices.protocol import Device, DeviceInfo, HasMemory, info_of
 from isiw.errors import InvalidValueError
 from isiw.log.durable import log_exists
 from isiw.log.headers import Header
@@ -24,9 +24,9 @@ from isiw.session.assembly import (
     OwnLoopOptions,
     ResumeOptions,
     header_of,
+    require_fitting,
     require_known,
     require_parts,
-    require_room,
     require_untold,
 )
 from isiw.session.examination import estimate_record
@@ -85,7 +85,7 @@ def open_session(
         salvaged = salvage(path)
         return _own_loop_resumed(salvaged, read_salvaged(salvaged), strategy, changes, options)
     header = _header(strategy, **stated)
-    require_room(strategy, header)
+    require_fitting(strategy, header)
     clock, on_doubt = options.get("clock") or MonotonicClock(), options.get("on_doubt")
     return Recorder(strategy, LogWriter.create(path, header), header, clock, on_doubt=on_doubt)
 
@@ -218,7 +218,7 @@ def _session_resumed(
         limits = limits_of_log(header)
     else:
         limits.require_effect()
-    require_as_real(device.describe(), header.device)
+    require_as_real(info_of(device), header.device)
     strategy = strategy.restarted() if strategy else None
     strategy, earlier = taken_up(salvaged, record, strategy, limits, options)
     if isinstance(device, HasMemory):

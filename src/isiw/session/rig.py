@@ -9,12 +9,13 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Never
+from typing import Annotated, Never
 
 from filelock import FileLock, Timeout
 
-from isiw.checks import Checked, Natural, NonNegative, choice
+from isiw.checks import Checked, NonNegative, choice, function, whole
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.deadlines import Deadlines, PunctualDevice
 from isiw.devices.limited import LimitedDevice
@@ -75,7 +76,7 @@ class Safeguards(Checked):
 
     Args:
         deadlines: how long each verb of the device may take.
-        retries: how often a stimulus is tried again that the device refused before firing.
+        retries: how often a stimulus is tried again that the device refused before firing, at most 10 times.
         backoff_s: how long to wait before the first of these [s]; twice as long before each further one.
         on_pause: is called with the reason when the session has paused and the device is disarmed; True goes on, and
             arms again. Without it the operator is asked in the terminal, and where there is none the session ends.
@@ -85,10 +86,10 @@ class Safeguards(Checked):
     """
 
     deadlines: Deadlines = field(default_factory=Deadlines)
-    retries: Natural = 3
+    retries: Annotated[int, partial(whole, least=0, most=10)] = 3
     backoff_s: NonNegative = 1.0
-    on_pause: Callable[[str], bool] | None = None
-    dead_man: Callable[[], bool] | None = None
+    on_pause: Annotated[Callable[[str], bool], function] | None = None
+    dead_man: Annotated[Callable[[], bool], function] | None = None
     earlier_logs: str | Path | None = None
 
     @property

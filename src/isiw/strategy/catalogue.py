@@ -22,6 +22,7 @@ from isiw.strategy.settings.common import (
     settings_values,
 )
 from isiw.strategy.strategy import Strategy
+from isiw.visit import require_percent
 
 
 @dataclass(frozen=True)
@@ -153,6 +154,7 @@ def make_strategy(name: str = "default", space: DesignSpace = VALVE_SPACE, seed:
     strategy = remade_strategy(name, space, seed, **settings)
     if isinstance(profile := profile_of(strategy.model), ProfilePrior):
         profile.require_rig(space)
+    require_percent("the strategy's intensity_pct_rmt", strategy.recipe.settings.get("intensity_pct_rmt"))
     return strategy
 
 
