@@ -383,6 +383,6 @@ def test_deadlines_that_nobody_can_keep_are_refused(values: dict[str, Any]) -> N
 
 @pytest.mark.parametrize("verb", ["describe_s", "stage_s", "readiness_s", "stop_s", "unstage_s"])
 @pytest.mark.parametrize("wrong", [1e9, 5000, True])
-def test_a_deadline_that_nobody_waits_for_is_refused(verb: str, wrong: float) -> None:
+def test_a_deadline_that_nobody_waits_for_is_refused(verb: str, wrong: Any) -> None:
     with pytest.raises(InvalidValueError, match=f"Deadlines.{verb}"):
         Deadlines(**{verb: wrong})

@@ -44,7 +44,7 @@ def test_an_isi_is_not_even_repeated_by_a_strategy_that_was_told_beside_the_sess
     with open_session(strategy, log) as session:
         isi_ms = session.ask()
         strategy.tell(isi_ms, 0.1)
-        with pytest.raises(StrategyError, match="told of one twice"):
+        with pytest.raises(StrategyError, match="one of them twice"):
             session.ask()
 
 
@@ -53,7 +53,7 @@ def test_an_outcome_that_was_told_twice_is_logged_once_and_found(log: Path) -> N
     with open_session(strategy, log) as session:
         isi_ms = session.ask()
         strategy.tell(isi_ms, 0.1)
-        with pytest.raises(StrategyError, match="told of one twice"):
+        with pytest.raises(StrategyError, match="one of them twice"):
             session.tell(isi_ms, 0.1)
     assert [trial.mep_mv for trial in read_session(log).table] == [0.1]
     with open_session(scripted_strategy(9), log, resume=True) as resumed:

@@ -174,7 +174,7 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
         """Raise StrategyError if the learner knows other trials than it has learnt here."""
         if not self.learner.knows(self._learnt):
             raise StrategyError(
-                "the strategy knows of trials that are not this session's, or was told of one twice",
+                "the strategy has learnt trials that are not this session's, or one of them twice",
                 remedy="Deliver nothing. What was reported is in the log: close the session, and resume it with a new "
                 "strategy. Give each session a strategy of its own, and report outcomes to the session alone.",
             )

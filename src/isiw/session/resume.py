@@ -126,6 +126,8 @@ def _own_loop_resumed(
     _require_reported(details["limits"])
     strategy, earlier = taken_up(salvaged, record, strategy, details["limits"], options)
     header = _header(strategy, **details).model_copy(update=dict(earlier.kept))
+    if "visit" in changes:
+        header.visit.require_intensity(header.strategy.settings.get("intensity_pct_rmt"))
     writer = earlier.open_log(header)
     for first in earlier.first_records:
         writer.append(first)
