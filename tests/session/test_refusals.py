@@ -79,3 +79,11 @@ def test_a_tap_alone_that_is_told_for_a_pair_is_named_in_the_refusal(log: Path) 
         words = f"got 'the outcome of a tap alone'; expected the outcome of a pair at {isi_ms:g} ms"
         with pytest.raises(InvalidValueError, match=words):
             session.tell(isi_ms, 0.1, pulse=False)
+
+
+def test_a_visit_that_is_stated_on_resuming_agrees_with_the_strategy(log: Path) -> None:
+    settings: dict[str, Any] = {"particles": 100, "intensity_pct_rmt": 80.0}
+    open_session(make_strategy(**settings), log).close()
+    with pytest.raises(InvalidValueError, match="different intensities"):
+        open_session(make_strategy(**settings), log, resume=True, visit=Visit(intensity_pct_rmt=110.0))
+    assert read_session(log).finished
