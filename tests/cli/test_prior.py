@@ -123,11 +123,15 @@ def test_a_damaged_log_is_refused_or_learnt_with_a_warning_as_told(isiw: Command
     damaged = folder / "damaged.mcap"
     damaged.write_bytes(logs[0].read_bytes())
     damage(damaged)
-    for command in (("prior", "learn", damaged, "-o", "d.toml"), ("run", "--after", damaged, "--log", "d2.mcap")):
+    for command, way_on in (
+        (("prior", "learn", damaged, "-o", "d.toml"), "isiw prior learn --damaged"),
+        (("run", "short.toml", "--after", damaged, "--log", "d2.mcap"), "damaged=True"),
+        (("run", "short.toml", "--earlier", damaged, "--log", "d2.mcap"), "isiw export, then isiw analyse"),
+    ):
         refused = isiw(*command)
         assert refused.exit_code == DAMAGED, refused.output
         assert "damaged.mcap: " in refused.output
-        assert "--damaged" in refused.output
+        assert way_on in refused.output
     assert not (folder / "d.toml").exists()
     assert not list(folder.glob("d2.mcap*"))
     learnt = isiw("prior", "learn", damaged, "--damaged", "-o", "d.toml")
@@ -155,3 +159,21 @@ def test_only_a_prior_is_replaced_by_a_prior(isiw: Command, logs: Any, lab: Path
     assert "the file that is there is not a lab's prior" in refused.output
     assert (folder / "short.toml").read_text() == content
     assert isiw("prior", "learn", *logs, "-o", lab, "--overwrite").exit_code == 0
+
+
+def test_a_session_counts_once_however_its_logs_are_named(isiw: Command, logs: Any, folder: Path) -> None:
+    copy = folder / "copied.mcap"
+    copy.write_bytes(logs[0].read_bytes())
+    assert isiw("exclude", copy, 0, "--reason", "coil slipped").exit_code == 0
+    for twice in (
+        ("--earlier", logs[0], "--earlier", logs[0]),
+        ("--earlier", logs[0], "--after", logs[0]),
+        ("--earlier", logs[0], "--earlier", copy),
+        ("--after", logs[0], "--after", copy),
+    ):
+        refused = isiw("run", "short.toml", *twice, "--log", "t.mcap")
+        assert refused.exit_code == 1
+        assert "two logs are of the same session" in refused.output
+        assert not list(folder.glob("t.mcap*"))
+    refused = isiw("prior", "learn", logs[0], copy, "--again", "-o", "t.toml")
+    assert "two logs are of the same session" in refused.output

@@ -303,6 +303,10 @@ def test_a_log_that_was_made_before_slips_were_refused_is_read_and_goes_on(
 def test_a_simulated_session_does_not_go_on_with_another_simulated_person(isiw: Command, tmp_path: Path) -> None:
     (tmp_path / "c.toml").write_text("[strategy.settings]\nmax_trials = 2\nparticles = 100\n", encoding="utf-8")
     isiw("run", "c.toml", "--seed", 3, "--log", "s.mcap")
+    assert isiw("resume", "s.mcap", "c.toml").exit_code == 0  # the log's seed, since the file states none
+    (tmp_path / "c.toml").write_text(
+        "seed = 4\n[strategy.settings]\nmax_trials = 2\nparticles = 100\n", encoding="utf-8"
+    )
     refused = isiw("resume", "s.mcap", "c.toml")
     assert refused.exit_code == 1
     assert "simulates another person" in refused.output

@@ -85,9 +85,13 @@ def test_sessions_without_a_code_are_different_people(tmp_path: Path) -> None:
         begun = f"2026-11-21T1{hour}:00:00+00:00"
         write_sweeps(tmp_path / "logs" / f"{name}.mcap", {0: {}}, subject="", created=begun)
     exported = export_logs(tmp_path / "logs", tmp_path / "out", pseudonymise=True)
-    assert len(exported.pseudonyms) == 2
+    assert sorted(Path(name.rpartition(" ")[2]).name for name in exported.pseudonyms) == ["a.mcap", "b.mcap"]
     export_logs(tmp_path / "logs", tmp_path / "named")
     assert pd.read_csv(tmp_path / "named" / "trials.csv").subject.tolist() == ["unnamed1", "unnamed2"]
+    write_sweeps(tmp_path / "logs" / "c.mcap", {0: {}}, subject="unnamed1", created="2026-11-21T13:00:00+00:00")
+    export_logs(tmp_path / "logs", tmp_path / "three")
+    three = pd.read_csv(tmp_path / "three" / "trials.csv").subject
+    assert sorted(three) == ["unnamed1", "unnamed2", "unnamed3"]
 
 
 def test_a_log_that_cannot_be_read_is_not_named(logs: Path, tmp_path: Path) -> None:

@@ -155,3 +155,10 @@ def test_the_printed_table_fits_100_columns_and_names_people_and_reference() -> 
     assert "30 people" in text
     assert "minus default" in text
     assert text.splitlines()[1].split()[-1] == "60"  # the last mark is kept
+
+
+def test_nobody_counts_twice() -> None:
+    twice = pd.concat([rows("nr", "wide", [0.9, 0.6]), rows("default", "wide", [0.9, 0.6])] * 2)
+    for made in (summarise, differences):
+        with pytest.raises(InvalidValueError, match="would count twice"):
+            made(twice)

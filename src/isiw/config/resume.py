@@ -157,10 +157,11 @@ def _require_same_simulated(config: RunConfig, record: SessionRecord) -> None:
     except ConfigError:
         return
     now = SimulatedConfig(**config.subject.model_dump(exclude={"data"}))
-    if (was.seed, was.subject, was.device) != (config.seed, now, config.robot):
+    seed = config.seed if "seed" in config.model_fields_set else was.seed  # isiw run may have had it as --seed
+    if (was.seed, was.subject, was.device) != (seed, now, config.robot):
         raise ConfigError(
             "the configuration simulates another person, or another robot",
-            got=f"seed {config.seed}, {config.subject}, {config.robot or 'no robot'}",
+            got=f"seed {seed}, {config.subject}, {config.robot or 'no robot'}",
             expected=f"seed {was.seed}, {was.subject}, {was.device or 'no robot'}",
             remedy="Leave the configuration out; the simulated person's settings are in the log: "
             f"{continued_by(record.path, record.header)}",

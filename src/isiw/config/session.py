@@ -24,6 +24,7 @@ from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import now
 from isiw.models.particles.prior import Prior
 from isiw.priors import after, read_lab_prior
+from isiw.priors.days import require_each_once, require_whole
 from isiw.session.loop import Session
 from isiw.strategy.catalogue import known_settings, make_strategy, settings_for
 from isiw.subjects.cohorts import person_of
@@ -115,7 +116,9 @@ def earlier_trials(config: RunConfig, device: DeviceInfo) -> tuple[Trial, ...]:
     """The earlier trials of the visit, which a strategy learns before its first ask."""
     records = [read_session(path) for path in config.earlier]
     _require_people(config, records, device)
+    require_each_once([*records, *(read_session(path) for path in config.after)])
     for record in records:
+        require_whole(record, "as a table: isiw export, then isiw analyse")
         header = record.header
         if (header.space.reference, header.conditioning) != (device.reference, device.conditioning):
             raise ConfigError(

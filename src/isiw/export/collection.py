@@ -46,7 +46,7 @@ def pseudonymised(
     The days between a person's visits and the time of day stay; a session without a code is another person's.
     """
     draws = draws or secrets.SystemRandom()
-    names = [record.header.subject or f"unnamed session {number}" for number, record in enumerate(records)]
+    names = [record.header.subject or f"the session without a code in {record.path}" for record in records]
     order = sorted(set(names))
     draws.shuffle(order)
     people = {}
@@ -225,10 +225,11 @@ def read_logs(source: str | Path) -> tuple[list[SessionRecord], list[str]]:
     return kept, left_out + copies
 
 
-def numbered(records: Iterable[SessionRecord]) -> list[Part]:
+def numbered(records: Sequence[SessionRecord]) -> list[Part]:
     """Sessions with person and number, as they were begun; each without a code is taken for another person's."""
     sessions: Counter[str] = Counter()
-    unnamed = (f"unnamed{number}" for number in itertools.count(1))
+    codes = {record.header.subject for record in records}
+    unnamed = (code for number in itertools.count(1) if (code := f"unnamed{number}") not in codes)
     parts = []
     for record in sorted(records, key=lambda each: each.header.created):
         subject = record.header.subject or next(unnamed)

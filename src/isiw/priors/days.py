@@ -58,15 +58,29 @@ def require_meps(record: SessionRecord) -> None:
         raise LogError(f"the session has {lacking}", got=str(record.path), remedy="Leave this log out.")
 
 
-def require_whole(record: SessionRecord) -> None:
+def require_whole(record: SessionRecord, way_on: str = "in Python with isiw.priors.after(..., damaged=True)") -> None:
     """Check that nothing is lost of a session that is learnt from: an exclusion may be among it."""
     if record.losses:
         raise DamagedLogError(
             "the log is damaged, so that what a person excluded may count as if nobody had",
             got=f"{record.path}: {' '.join(record.losses[:TOLD_LOSSES])}",
             remedy=f"Leave it out; or, if what {command('show', record.path)} lists is right, let it count "
-            "all the same: damaged=True, or isiw prior learn --damaged.",
+            f"all the same, {way_on}.",
         )
+
+
+def require_each_once(records: Sequence[SessionRecord]) -> None:
+    """Check that no two logs are of one session, whatever was excluded in one of them afterwards."""
+    for first, second in itertools.combinations(records, 2):
+        trials = list(zip(first.table, second.table, strict=False))
+        of_one = len({first.header.subject, second.header.subject} - {""}) < 2
+        if of_one and trials and all(replace(one, excluded=other.excluded) == other for one, other in trials):
+            raise InvalidValueError(
+                "two logs are of the same session",
+                got=f"{first.path} and {second.path}",
+                expected="each session once",
+                remedy="Leave one out.",
+            )
 
 
 def stated_hit_delay_ms(record: SessionRecord) -> tuple[float, float] | None:
@@ -193,7 +207,6 @@ def _require_days_of_one_person(records: Sequence[SessionRecord]) -> None:
                 expected="the first one first",
             )
     for first, second in itertools.combinations(records, 2):
-        trials = list(zip(first.table, second.table, strict=False))
         paths = f"{first.path} and {second.path}"
         if unlike := first.header.visit.unlike(second.header.visit):
             raise InvalidValueError(
@@ -209,8 +222,7 @@ def _require_days_of_one_person(records: Sequence[SessionRecord]) -> None:
                 expected="taps in both, or electrical pulses in both",
                 remedy="Leave one out.",
             )
-        if trials and all(one == other for one, other in trials):
-            raise InvalidValueError("two logs are of the same session", got=paths, expected="each session once")
+    require_each_once(records)
 
 
 def _require_window(record: SessionRecord, posterior: ParticlePosterior) -> None:

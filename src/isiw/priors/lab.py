@@ -24,6 +24,7 @@ from isiw.models.particles.prior import Prior
 from isiw.models.particles.profile import ProfilePrior, ShapeShares
 from isiw.priors.days import (
     recalled,
+    require_each_once,
     require_meps,
     require_whole,
     stated_hit_delay_ms,
@@ -166,7 +167,7 @@ def learn(
         LogError: no list, no log in it, one that cannot be read or has no MEP, the same log or person twice, or
             sessions of different events, hit delays, conditioning stimuli, muscles or intensities, or some simulated.
         DamagedLogError: a log is damaged.
-        InvalidValueError: a seed that is no whole number from 0 on.
+        InvalidValueError: a seed that is no whole number from 0 on, or two logs of one session.
     """
     seed = whole("seed", seed, least=0)
     if isinstance(logs, str | Path):
@@ -174,7 +175,7 @@ def learn(
     records = [read_session(path) for path in logs]
     for record in records:
         if not damaged:
-            require_whole(record)
+            require_whole(record, "with damaged=True, or isiw prior learn --damaged")
         require_meps(record)
     sessions = tuple(_learnt_session(record) for record in records)
     _require_different(records, sessions, again=again)
@@ -206,6 +207,7 @@ def _require_different(records: Sequence[SessionRecord], sessions: Sequence[Lear
         subjects = [session.subject for session in sessions]
         remedy = "Leave one out, or count each session as a person of its own: again=True, or --again."
         _require_once(records, subjects, "two logs are of the same person, or do not say of whom", remedy)
+    require_each_once(records)
     if len({session.simulated for session in sessions}) > 1:
         simulated = [str(record.path) for record in records if record.header.device.simulated]
         raise LogError("some of the sessions are simulated, others are not", got=simulated, remedy="Leave these out.")

@@ -45,7 +45,11 @@ def summarise(rows: pd.DataFrame, errors: pd.DataFrame | None = None) -> pd.Data
         (`end_delivered`, `end_f1`; NaN if the rule is ignored); share for whom it did so before the budget was used
         up; people without rows because they failed; median time of an ask and a tell [ms]. A strategy that failed for
         everybody has one row, at trial 0.
+
+    Raises:
+        InvalidValueError: two rows of one person, strategy, cohort and trial.
     """
+    _require_each_once(rows)
     failed = pd.Series(dtype="int64") if errors is None or not len(errors) else errors.groupby(_GROUP[:2]).size()
     table = _means(rows) if len(rows) else pd.DataFrame(columns=[*_GROUP, "people"])
     present = set(zip(table["cohort"], table["strategy"], strict=True))
@@ -54,6 +58,18 @@ def summarise(rows: pd.DataFrame, errors: pd.DataFrame | None = None) -> pd.Data
     pairs = zip(table["cohort"], table["strategy"], strict=True)
     table["failed"] = [int(failed.get(pair, 0)) for pair in pairs]
     return table.sort_values(_GROUP, ignore_index=True)
+
+
+def _require_each_once(rows: pd.DataFrame) -> None:
+    """Raise if somebody would count twice, as when studies with the same people are put together."""
+    twice = rows.duplicated([*_GROUP, "person"]) if len(rows) else pd.Series(dtype=bool)
+    if twice.any():
+        first = rows[twice].iloc[0]
+        raise InvalidValueError(
+            "somebody has two rows of one strategy and trial, and would count twice",
+            got=", ".join(f"{key} {first[key]}" for key in (*_GROUP, "person")),
+            remedy="Leave out one of the studies, or give people with other seeds numbers of their own.",
+        )
 
 
 def sure_and_wrong(expected_f1: pd.Series, f1: pd.Series) -> pd.Series:
@@ -95,8 +111,10 @@ def differences(rows: pd.DataFrame, reference: str | None = None) -> pd.DataFram
         (Bonferroni). With fewer than two people there is no interval (NaN).
 
     Raises:
-        InvalidValueError: an unknown reference, or fewer than two strategies.
+        InvalidValueError: an unknown reference, fewer than two strategies, or two rows of one person, strategy, cohort
+            and trial.
     """
+    _require_each_once(rows)
     labels = sorted(rows["strategy"].unique()) if len(rows) else []
     if len(labels) < 2:
         raise InvalidValueError("a comparison needs two strategies", got=", ".join(labels) or "none")
