@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -12,10 +13,13 @@ from isiw.design import DesignSpace
 from isiw.estimate import Edge, Estimate
 from isiw.findings import NO_MEP, Kind
 from isiw.text.stimuli import STIMULI, TAP
-from isiw.trials import Status, Trial
+from isiw.trials import Status, Stimulus, Trial
 from isiw.window import Window
 
 SPACE = DesignSpace(10, 320, reference="impact")
+PAIR, TMS = Trial(1, Status.ACCEPTED, 90.0, mep_mv=0.1), Trial(2, Status.ACCEPTED, None, mep_mv=0.1)
+ALONE, LOST = Trial(3, Status.ACCEPTED, None, tap_alone=True), Trial(4, Status.MISTRIAL, 90.0, Kind.NO_IMPACT)
+UNKNOWN = Trial.unknown(Stimulus(5, None))
 FOUND: dict[str, Any] = {
     "probability": 0.98,
     "segments_ms": (30.0, 160.0),
@@ -195,10 +199,26 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
             ),
         ),
         (
-            sentences.counts(5, 3, {"TMS alone": 1}, {"no impact": 1}, 1),
-            "5 stimuli were delivered, including 1 of TMS alone; 3 count; mistrials: 1 no impact; 1 excluded.",
+            sentences.counts([PAIR, PAIR, TMS, replace(PAIR, excluded=True), LOST]),
+            "5 stimuli were delivered: 4 pairs and 1 pulse of TMS alone; 3 count; mistrials: 1 no impact; 1 excluded.",
         ),
-        (sentences.counts(1, 1, {}, {}, 0), "1 pair of stimuli was delivered; 1 counts."),
+        (sentences.counts([PAIR]), "1 pair of stimuli was delivered; 1 counts."),
+        (sentences.counts([]), "0 pairs of stimuli were delivered; 0 count."),
+        (sentences.counts([TMS]), "1 stimulus was delivered: 1 pulse of TMS alone; 1 counts."),
+        (
+            sentences.counts([*[PAIR] * 20, *[ALONE] * 2, *[TMS] * 2]),
+            (
+                "24 stimuli were delivered: 20 pairs, 2 taps alone and 2 pulses of TMS alone; "
+                "22 count (the taps alone do not)."
+            ),
+        ),
+        (
+            sentences.counts([PAIR, ALONE, UNKNOWN], STIMULI["electrical"]),
+            (
+                "3 stimuli were delivered: 1 pair, 1 electrical pulse alone and 1 of unknown kind; "
+                "1 counts (the electrical pulse alone does not); mistrials: 1 outcome unknown."
+            ),
+        ),
         (sentences.fit(2, 9), "The fit had trouble in 2 of 9 trials; isiw show lists them."),
         (sentences.doubt(3, "Equal."), "Doubt since trial 3: Equal."),
         (sentences.truth(None, None, None), "This simulated person in fact has no window."),
@@ -212,7 +232,10 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
         ),
         (
             sentences.moved(0.3, 0.1),
-            "the window moved by more than the usual shift from day to day (30 %; 10 % without data);",
+            (
+                "the probability that the window moved by more than the usual shift from day to day is 30 % "
+                "(10 % without data);"
+            ),
         ),
         (
             sentences.later(0.4, 0.6),

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 from isiw.change import Change
@@ -122,9 +123,9 @@ def tap_unknown(estimate: Estimate, first: StimulusWords = _EITHER) -> str:
     if not estimate.tap_may_explain:
         return ""
     return (
-        f"The {first.alone} was not measured within this window, or evokes as much there: its own response, and not "
-        "the MEP, may be what is larger. In the next session deliver it alone more often (in a configuration: "
-        "[protocol] tap_alone)."
+        f"The {first.alone} was not measured within this window, or its response there is as large. So the window may "
+        f"be the muscle's response to the {first.name} itself, and not the MEP. In the next session deliver "
+        f"the {first.name} alone there (in a configuration: [protocol] tap_alone)."
     )
 
 
@@ -329,18 +330,35 @@ def few_outside(outside: int, pairs: int, alone: int) -> str:
     )
 
 
-def counts(given: int, told: int, controls: Mapping[str, int], mistrials: Mapping[str, int], unwanted: int) -> str:
+def counts(delivered: Sequence[Trial], first: StimulusWords = TAP) -> str:
     """The numbers of stimuli that were delivered and that count, and why the others do not."""
-    pairs = counted(given, "pair of stimuli was delivered", "pairs of stimuli were delivered")
-    if controls:
-        kinds = " and ".join(f"{count} of {kind}" for kind, count in sorted(controls.items(), reverse=True))
-        pairs = f"{given} stimuli were delivered, including {kinds}"
-    parts = [f"{pairs}; {counted(told, 'counts', 'count')}"]
+    told, accepted_taps = sum(trial.told for trial in delivered), sum(t.tap_alone and t.counts for t in delivered)
+    alone = f" (the {first.name}{' alone does' if accepted_taps == 1 else 's alone do'} not)" if accepted_taps else ""
+    parts = [f"{_delivered(delivered, first)}; {counted(told, 'counts', 'count')}{alone}"]
+    mistrials = Counter(str(trial.reason) for trial in delivered if trial.reason is not None)
     if mistrials:
         parts.append("mistrials: " + ", ".join(f"{count} {reason}" for reason, count in mistrials.items()))
-    if unwanted:
+    if unwanted := sum(trial.excluded for trial in delivered):
         parts.append(f"{unwanted} excluded")
     return "; ".join(parts) + "."
+
+
+def _delivered(delivered: Sequence[Trial], first: StimulusWords) -> str:
+    """How many stimuli were delivered, by kind if some were no pairs; without a full stop."""
+    pairs = sum(trial.commanded_isi_ms is not None for trial in delivered)
+    taps = sum(trial.commanded_isi_ms is None and trial.tap_alone for trial in delivered)
+    pulses = sum(trial.is_control and not trial.tap_alone for trial in delivered)
+    if pairs == len(delivered):
+        return counted(pairs, "pair of stimuli was delivered", "pairs of stimuli were delivered")
+    kinds = {
+        counted(pairs, "pair"): pairs,
+        counted(taps, first.alone, f"{first.name}s alone"): taps,
+        counted(pulses, "pulse of TMS alone", "pulses of TMS alone"): pulses,
+        f"{(unclear := len(delivered) - pairs - taps - pulses)} of unknown kind": unclear,
+    }
+    *earlier, last = [kind for kind, count in kinds.items() if count]
+    listed = f"{', '.join(earlier)} and {last}" if earlier else last
+    return f"{counted(len(delivered), 'stimulus was delivered', 'stimuli were delivered')}: {listed}"
 
 
 def fit(troubled: int, trials: int) -> str:
@@ -366,8 +384,8 @@ def moved(probability: float | None, before: float) -> str:
     """The probability that a window moved more than it does from day to day."""
     if probability is None:
         return ""
-    chance = f"({100 * probability:.0f} %; {100 * before:.0f} % without data)"
-    return f"the window moved by more than the usual shift from day to day {chance};"
+    chance = f"{100 * probability:.0f} % ({100 * before:.0f} % without data)"
+    return f"the probability that the window moved by more than the usual shift from day to day is {chance};"
 
 
 def later(starts_later: float | None, ends_later: float | None) -> str:

@@ -240,6 +240,8 @@ def test_the_report_says_all_of_it() -> None:
     report = timing_report(study)
     assert "90 taps" in report
     assert "in ms after the valve command:" in report
+    assert "SD of 8.5 ms says how far the next person's may differ from it" in report
+    assert "after the actuator's own valve opens:" in timing_report(study_vane(rotations=2))
     assert float(report.split("t_hit")[1].split()[0]) == pytest.approx(180.0, abs=2.0)
     assert f"{study.pooled_sd_ms:.2f} ms" in report
     assert all(f"\n{isi:7g}" in report for isi in STUDY_ISI_MS)
@@ -255,7 +257,7 @@ def test_what_is_not_known_is_no_number() -> None:
 def test_a_study_of_nothing_is_an_error() -> None:
     with pytest.raises(InvalidValueError, match="taps must be"):
         study_preset("bench", taps=0)
-    with pytest.raises(InvalidValueError, match="needs sweeps"):
+    with pytest.raises(InvalidValueError, match="time of the valve command; got 'nothing'"):
         study_sweeps("nothing", [], [])
 
 

@@ -311,7 +311,7 @@ def test_sessions_beside_each_other_are_a_page_for_everybody(
     assert HOSTILE in opened.text("h3 >> nth=0")
     assert page.locator("main b, main img, script").count() == 0
     assert page.locator("#windows svg").is_visible()
-    moved = "the window moved by more than the usual shift from day to day (91 %; 30 % without data)"
+    moved = "the window moved by more than the usual shift from day to day is 91 % (30 % without data)"
     assert moved in opened.text(".finding >> nth=0")
     assert broken_rules(page) == []
     page.screenshot(path=pictures / "compared.png", full_page=True)

@@ -28,7 +28,8 @@ def difference(record: SessionRecord) -> Difference:
 
 def test_the_page_says_how_probable_a_difference_is_and_has_a_row_a_session(record: SessionRecord) -> None:
     page = Page(comparison_page([record, record], [difference(record)]))
-    assert "the window moved by more than the usual shift from day to day (91 %; 30 % without data)" in page.words
+    moved = "the window moved by more than the usual shift from day to day is 91 % (30 % without data)"
+    assert f"the probability that {moved}" in page.words
     cells = page.of("td")
     assert [cells.count(cell) for cell in ("34–94 ms", "29–39 ms", "after 150 ms", "0.90")] == [2, 2, 2, 2]
     assert page.of("h3") == [f"1: {HOSTILE},", f"2: {HOSTILE},"]

@@ -112,7 +112,7 @@ def test_a_page_about_electrical_pulses_speaks_of_no_tap(page: Page, record: Ses
     assert of_a_tap.findall(words) == []
     for said in (
         "time after the electrical pulse [ms]", "ISI after the electrical pulse [ms]", "electrical pulse alone",
-        "Dotted orange line: electrical pulse.", "nothing is learnt from an electrical pulse alone",
+        "Dotted orange line: electrical pulse.", "shows the electrical pulse's own response",
         "0–200 ms after the electrical pulse, every 1 ms",
     ):  # fmt: skip
         assert said in words

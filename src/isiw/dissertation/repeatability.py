@@ -226,8 +226,8 @@ def study_sweeps(name: str, sweeps: Iterable[Sweep], commanded_isi_ms: Iterable[
         parts.append(TapEvents(*(times_ms + shift_ms for times_ms in events.columns().values())))
     if not parts:
         raise InvalidValueError(
-            "a study needs sweeps with an acceleration and the valve's time",
-            got=f"none in {name}",
+            "isiw timing needs sweeps with an acceleration and the time of the valve command",
+            got=name,
             remedy="Run a session on a device that hands over its sweeps, with the channel acceleration.",
         )
     commanded = np.array([np.nan if isi is None else isi for isi in commanded_isi_ms])
@@ -251,10 +251,11 @@ def study_session(record: SessionRecord) -> TimingStudy:
 def timing_report(study: TimingStudy) -> str:
     """A study in words and tables."""
     events = study.event_table
+    origin = "the valve command" if study.kind == "taps" else "the actuator's own valve opens"
     lines = [
         f"{study.name}: {len(study.commanded_ms)} {study.kind}",
         "",
-        "When each event comes, in ms after the valve command:",
+        f"When each event comes, in ms after {origin}:",
         "event          mean     SD   range            n",
     ]
     lines += [
@@ -280,6 +281,8 @@ def timing_report(study: TimingStudy) -> str:
             "For ISIs that count from the valve command, state when the tap hits:",
             f"    hit_delay_ms = [{mean_ms:.1f}, {sd_ms:.1f}]",
             "Write it into the DeviceInfo of your rig, or under [strategy.settings] of a configuration.",
+            f"The mean is one person's; the SD of {sd_ms:.1f} ms says how far the next person's may differ from it.",
+            f"If you measured several people, write their mean and an SD of {HIT_DELAY_SD_MS:g} ms.",
         ]
     return "\n".join(lines)
 

@@ -190,7 +190,9 @@ def _remark(trial: Trial, first: StimulusWords) -> str:
         return f"accepted by the operator; had been: {trial.overruled}"
     if trial.reason is not None and trial.mep_mv is not None:
         return f"{1e3 * trial.mep_mv:.0f} µV were measured"
-    return f"nothing is learnt from {first.one} alone" if trial.tap_alone and trial.counts else ""
+    if trial.tap_alone and trial.counts:
+        return f"shows the {first.name}'s own response; does not count as a pair"
+    return ""
 
 
 def lost_rows(record: SessionRecord) -> list[tuple[int, str, str]]:

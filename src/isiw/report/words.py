@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from pathlib import Path
 
 from isiw import sentences
@@ -89,12 +88,7 @@ def finding_sentences(record: SessionRecord) -> list[str]:
 
 def counts_sentence(record: SessionRecord) -> str:
     """The numbers of stimuli that were delivered and that count, and why the others do not."""
-    mistrials = Counter(str(trial.reason) for trial in record.table if trial.reason is not None)
-    if unknown := len(record.unknown):
-        mistrials["outcome unknown"] += unknown
-    controls = Counter(sentences.asked(t, record.header.stimulus) for t in record.table if t.is_control)
-    unwanted = sum(trial.excluded for trial in record.table)
-    return sentences.counts(record.given, len(record.table.told), controls, mistrials, unwanted)
+    return sentences.counts((*record.table, *record.unknown_trials), record.header.stimulus)
 
 
 def fit_sentence(record: SessionRecord) -> str:
