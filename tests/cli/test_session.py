@@ -55,6 +55,14 @@ def test_run_never_overwrites_a_log(isiw: Command, short: Path, log: Path) -> No
     assert log.read_bytes() == before
 
 
+def test_a_plan_that_does_not_fit_into_the_limits_names_no_log(isiw: Command, tmp_path: Path) -> None:
+    result = isiw("run", "--strategy", "pf", "--log", "pf.mcap")
+    assert result.exit_code == 1
+    assert "Write max_pulses = 600 under [limits]" in result.output
+    assert "pf.mcap" not in result.output
+    assert list(tmp_path.glob("pf*")) == []
+
+
 def test_exclude_appends_and_resume_learns_without_it(isiw: Command, log: Path) -> None:
     assert isiw("exclude", log, 1, "--reason", "sneezed").exit_code == 0
     shown = isiw("show", log).output
@@ -207,5 +215,5 @@ def test_a_protocol_is_kept_and_its_controls_are_told_from_pairs(isiw: Command, 
     for kind in ("tap alone", "TMS alone"):
         assert kind in result.output
         assert kind in shown
-    assert "stimuli were delivered, " in result.output
+    assert "stimuli were delivered: " in result.output
     assert sum(trial.commanded_isi_ms is not None for trial in record.table) == 3

@@ -239,7 +239,7 @@ def test_rests_that_limit_nothing_are_refused_where_they_are_stated_and_go_on_fr
     with pytest.raises(InvalidValueError, match="no effect"):
         open_session(scripted_strategy(4), log, **own)
     assert not list(log.parent.iterdir())
-    monkeypatch.setattr(Session, "_require_effect", lambda _: None)
+    monkeypatch.setattr(Session, "require_effect", lambda _: None)
     with pytest.raises(KeyboardInterrupt):
         Session(ScriptedDevice(), scripted_strategy(4), log=log, on_trial=stop_after(2), **part).run()
     monkeypatch.undo()

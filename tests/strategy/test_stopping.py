@@ -93,14 +93,15 @@ def test_a_hypothesis_that_is_still_likely_must_agree(doubters: int, *, stop: bo
     )
     decision = CredibleWidth(30)(Progress(3, 3, estimate))
     assert decision.stop == stop
-    assert f"its end is known to {0 if stop else 40} ms (90 % intervals, whichever plausible" in decision.reason
+    end = f"its start is known to 0 ms and its end to {0 if stop else 40} ms"
+    assert f"{end} (90 % intervals that span those of each plausible kind of noise)" in decision.reason
 
 
 def test_an_f1_that_does_not_end_the_session_never_reads_as_the_one_that_does() -> None:
     nearly, enough = (ExpectedF1(0.92)(expecting(f1, probability=0.95)) for f1 in (0.9199, 0.92))
     assert (nearly.stop, enough.stop) == (False, True)
-    assert "an expected F1 of 0.91; 0.92 ends the session" in nearly.reason
-    assert "an expected F1 of 0.92." in enough.reason
+    assert "so far is at least 0.91; 0.92 ends the session" in nearly.reason
+    assert "its expected F1 is at least 0.92." in enough.reason
 
 
 def test_without_intervals_the_edges_are_not_known() -> None:
@@ -126,7 +127,7 @@ def expecting(*f1s: float, told: int = 40, probability: float | None = 0.98) -> 
 def test_a_window_that_is_expected_to_be_right_stops(f1: float, probability: float, *, stop: bool) -> None:
     decision = ExpectedF1(0.9)(expecting(f1, probability=probability))
     assert decision.stop == stop
-    assert f"F1 of {f1:.2f}" in decision.reason
+    assert f"is at least {f1:.2f}" in decision.reason
 
 
 def test_an_expected_f1_of_1_asked_for_never_stops() -> None:
@@ -146,12 +147,13 @@ def test_stimuli_that_added_little_are_the_last(first: float, told: int, probabi
     f1s = np.linspace(first, 0.8, 11).tolist()
     decision = SmallGain(0.02)(expecting(0.1, *f1s, told=told, probability=probability))
     assert decision.stop == stop
-    assert f"added {0.8 - first:.2f}" in decision.reason
+    assert f"added {'0.10' if first < 0.75 else 'less than 0.02'} to the expected F1" in decision.reason
 
 
 def test_a_gain_of_zero_lets_a_session_go_on_also_where_the_expected_f1_falls() -> None:
     falling = expecting(*np.linspace(0.9, 0.8, 11).tolist())
     assert SmallGain(0.001)(falling).stop
+    assert "added less than 0.001 to" in SmallGain(0.001)(falling).reason
     assert not SmallGain(0.0)(falling).stop
 
 

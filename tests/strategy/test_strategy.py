@@ -119,8 +119,8 @@ def test_a_strategy_is_printed_with_what_it_is_made_of_and_what_it_knows() -> No
     assert str(strategy).splitlines() == [
         "Strategy 'even', seed 3",
         "Space: 0–500 ms after the valve command, every 1 ms",
-        "Model: ParticleModel, asked by EvenSpacing",
-        "Trials: 1 told, 1 mistrials",
+        "Model: ParticleModel, ISIs chosen by EvenSpacing",
+        "Trials: 1 learnt, 1 mistrials",
     ]
     assert str(scripted_strategy()).startswith("Strategy, seed 0\n")
 

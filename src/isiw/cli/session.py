@@ -141,6 +141,7 @@ def _run_to_the_end(session: Session, config: Path | None, *, live: bool, resume
     before, ours = len(session.trials), resumed or not log_exists(session.log_path)
     try:
         with errors_reported(_INTERRUPTED), _shown_live(session) if live else nullcontext():
+            session.require_effect()
             show(f"log: {session.log_path}")
             result = session.run(progress=True)
     except BaseException as end:

@@ -125,7 +125,7 @@ class Session(Judging):
 
     def _run(self, *, progress: bool | None, keys: bool) -> SessionResult:
         require_untold(self.strategy, len(self.trials))
-        self._require_effect()
+        self.require_effect()
         earlier_s, sink = self._earlier_s(), self._sink
         shown = sink.on_trial is None and is_terminal(sys.stdout) if progress is None else progress
         table = Table(self._console, self._header, sink.faults, shown=shown)
@@ -195,7 +195,13 @@ class Session(Judging):
         """True if its log is open."""
         return self._sink.is_open
 
-    def _require_effect(self) -> None:
+    def require_effect(self) -> None:
+        """Raise what `run` raises before there is a log: limits or a protocol that limit nothing, or hold no plan.
+
+        Raises:
+            InvalidValueError: a rest or a period of limits or protocol that limits nothing, or limits that do not hold
+                the plan of the strategy.
+        """
         if not self._earlier.first_records:  # what an earlier log says goes on as it was
             self._limits.require_effect()
             self._header.protocol.require_effect(self._limits.iti_s)

@@ -151,10 +151,12 @@ class CredibleWidth(Checked):
         widths = [0.0 if low == high else high - low for low, high in intervals]
         probability = progress.estimate.probability or 0.0
         start, end = (f"is known to {x:.0f} ms" if math.isfinite(x) else "is still unknown" for x in widths)
-        whatever = "" if progress.estimate.hypothesis_samples is None else ", whichever plausible noise model holds"
-        edges = f"its start {start} and its end {end} ({100 * self.level:.0f} % intervals{whatever})"
+        end = end.removeprefix("is known ") if all(map(math.isfinite, widths)) else end
+        every = "" if progress.estimate.hypothesis_samples is None else " that span those of each plausible kind of noise"
+        edges = f"its start {start} and its end {end} ({100 * self.level:.0f} % intervals{every})"
         if max(widths) > self.width_ms:
-            return StopKind.KNOWN.go_on(f"The window is to be known to {self.width_ms:g} ms: {edges}.")
+            ends = f"The session ends when both edges of the window are known to {self.width_ms:g} ms"
+            return StopKind.KNOWN.go_on(f"{ends}; {edges}.")
         if probability < self.min_probability:
             needed = f"{probability:.2f}, and {self.min_probability:g} is needed"
             return StopKind.KNOWN.go_on(f"The window is not probable enough yet ({needed}): {edges}.")
@@ -195,11 +197,11 @@ class ExpectedF1(Checked):
         if estimate.too_little is not None:
             return StopKind.TOO_LITTLE.go_on(estimate.too_little)
         floored = math.floor(100 * estimate.expected_f1 + 1e-9) / 100  # so that nothing is said that is not reached
-        expected = f"an expected F1 of {floored:.2f}"
+        least = f"is at least {floored:.2f}"
         if self.f1 < 1.0 and estimate.expected_f1 >= self.f1 and estimate.probability >= self.min_probability:
-            return _stop_unless_by_time(StopKind.KNOWN, estimate, f"The window is known, with {expected}.")
+            return _stop_unless_by_time(StopKind.KNOWN, estimate, f"The window is known: its expected F1 {least}.")
         ends = f"; {self.f1:g} ends the session" if self.f1 < 1.0 else ""
-        return StopKind.KNOWN.go_on(f"The window as it is known so far has {expected}{ends}.")
+        return StopKind.KNOWN.go_on(f"The expected F1 of the window so far {least}{ends}.")
 
 
 @dataclass(frozen=True)
@@ -222,8 +224,10 @@ class SmallGain(Checked):
         before = earlier[0].expected_f1 if len(earlier) > self.last else None
         if now.expected_f1 is None or now.probability is None or before is None:
             return StopKind.SMALL_GAIN.go_on(f"It is too early to say what {self.last} more stimuli would add.")
-        added = f"the last {self.last} stimuli added {now.expected_f1 - before:.2f} to the expected F1"
-        small = self.gain > 0 and now.expected_f1 - before < self.gain and now.probability >= self.min_probability
+        gained = now.expected_f1 - before
+        size = f"less than {self.gain:g}" if gained < self.gain else f"{gained:.2f}"
+        added = f"the last {self.last} stimuli added {size} to the expected F1"
+        small = self.gain > 0 and gained < self.gain and now.probability >= self.min_probability
         if small and progress.told >= self.min_told:
             reason = f"Another {self.last} stimuli would add little: {added}, now {now.expected_f1:.2f}."
             return _stop_unless_by_time(StopKind.SMALL_GAIN, now, reason)

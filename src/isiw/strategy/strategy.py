@@ -85,8 +85,8 @@ class Strategy:
             (
                 f"{name}, seed {self.seed}",
                 f"Space: {self.space}",
-                f"Model: {type(self.model).__name__}, asked by {type(self.acquisition).__name__}",
-                f"Trials: {self._course.told} told, {self._mistrials} mistrials",
+                f"Model: {type(self.model).__name__}, ISIs chosen by {type(self.acquisition).__name__}",
+                f"Trials: {self._course.told} learnt, {self._mistrials} mistrials",
             )
         )
 
