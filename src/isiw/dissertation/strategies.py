@@ -67,9 +67,9 @@ class Settling(Checked):
     """Stops when the reported edges have settled, as the dissertation's regressions do (4.3).
 
     Args:
-        stop_variance_ms2: stop when the variance [ms²] of the last values of the edges is below this,
-        stop_last: how many values,
-        stop_edges: and of which edges: "both" (the text), or "either" (the pseudo-code).
+        stop_variance_ms2: stop when the variance [ms²] of the last values of the edges is below this.
+        stop_last: number of last values of the edges whose variance is taken.
+        stop_edges: the edges whose variance has to be small: "both" (the text), or "either" (the pseudo-code).
         max_trials: stop after this many stimuli, the initial ones among them; mistrials count, control trials do not.
             By default 98 more than the initial ones, which are 99 iterations (4.3).
     """

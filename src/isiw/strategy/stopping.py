@@ -152,8 +152,9 @@ class CredibleWidth(Checked):
         probability = progress.estimate.probability or 0.0
         start, end = (f"is known to {x:.0f} ms" if math.isfinite(x) else "is still unknown" for x in widths)
         end = end.removeprefix("is known ") if all(map(math.isfinite, widths)) else end
-        every = "" if progress.estimate.hypothesis_samples is None else " that span those of each plausible kind of noise"
-        edges = f"its start {start} and its end {end} ({100 * self.level:.0f} % intervals{every})"
+        weighs = progress.estimate.hypothesis_samples is not None
+        intervals_of = "intervals that span those of each plausible kind of noise" if weighs else "intervals"
+        edges = f"its start {start} and its end {end} ({100 * self.level:.0f} % {intervals_of})"
         if max(widths) > self.width_ms:
             ends = f"The session ends when both edges of the window are known to {self.width_ms:g} ms"
             return StopKind.KNOWN.go_on(f"{ends}; {edges}.")

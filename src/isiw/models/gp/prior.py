@@ -133,7 +133,7 @@ class ProcessSettings(Checked):
         kernel: `"rbf"`, the squared exponential, or `"matern"` with smoothness 5/2.
         noise: `"equal"` at all ISIs, or `"by-isi"`. Whether there is a profile at all is judged under equal noise.
         hyperparameters: `"marginalised"` over a grid, or `"map"`, the most likely ones.
-        prior: of the hyperparameters.
+        prior: prior of the hyperparameters.
         fixed: hyperparameters and scale that are not learnt, for equal noise.
         max_evaluations: evaluations after which the search for the most likely hyperparameters gives up.
 

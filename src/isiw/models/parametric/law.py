@@ -59,8 +59,8 @@ class FloorPrior(Checked):
     """Of the EMG floor.
 
     Args:
-        mean_mv: its expectation [mV]; 6–20 µV measured, and wide enough for rigs with ten times the gain.
-        cv: its CV from trial to trial; 0.12–0.35 measured.
+        mean_mv: expectation of the floor [mV]; 6–20 µV measured, and wide enough for rigs with ten times the gain.
+        cv: CV of the floor from trial to trial; 0.12–0.35 measured.
     """
 
     mean_mv: PositiveScale = Scale(0.009, 0.8)
@@ -92,11 +92,11 @@ class WindowPrior(Checked):
         p_window: probability that there is a window.
         start: where windows start.
         width_ms: the width; 60–220 ms, mean 108 measured [Kim2020, Table 4.1].
-        floor: of the EMG floor.
+        floor: prior of the EMG floor.
         amplitude: excess at the centre over the floor; MEPs peak at 0.03–0.3 mV [Kim2020, 4.2].
         cv: CV of what is evoked; 0.36 above 2 mV, 1.1 below 0.1 mV measured.
         outliers: logit of an outlier's probability; about 2 to 7 % of a threshold's false positives.
-        input_noise: of the likelihood with noise on the input.
+        input_noise: prior of the likelihood with noise on the input.
     """
 
     p_window: Annotated[float, partial(number, above=0, most=1)] = 0.75

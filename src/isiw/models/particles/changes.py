@@ -58,7 +58,7 @@ class ChangePrior(Checked):
         trial: how many trials come before a change.
         size_sd: SD of the size of a change: of a level, natural log.
         noted: after how many trials each change was noted that somebody saw.
-        noted_share: probability that a change that was noted is one of the amplitudes.
+        noted_share: probability that a noted change is one of the amplitudes.
     """
 
     level: Share = 0.08

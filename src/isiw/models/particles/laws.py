@@ -43,11 +43,11 @@ class NoiseShares(Shares):
     """Probabilities of the kinds of noise, in the order of `NoiseKind`.
 
     Args:
-        constant_cv: of noise of a constant CV.
-        missing: of the same with missing responses.
-        recruitment: of a recruitment curve with noise on its input.
-        all_or_none: of responses that are all or none: those of a very steep curve.
-        rectified: of a recruitment curve that starts at a threshold.
+        constant_cv: probability of noise of a constant CV.
+        missing: probability of noise of a constant CV with missing responses.
+        recruitment: probability of a recruitment curve with noise on its input.
+        all_or_none: probability of responses that are all or none, as those of a very steep curve.
+        rectified: probability of a recruitment curve that starts at a threshold.
     """
 
     constant_cv: Share = 0.36
@@ -62,7 +62,7 @@ class Intensity(Checked):
     """A law of the intensity of the pulse.
 
     Args:
-        share: its probability.
+        share: probability of this law.
         pct_rmt: the intensity [% RMT].
     """
 
@@ -75,8 +75,8 @@ class Muscle(Checked):
     """A law of recruitment curves: `s = A / (1 + exp(-k (x + sigma_x z1 - x50))) exp(sigma_y z2)` (Goetz et al.).
 
     Args:
-        name: what it is called.
-        share: its probability.
+        name: name of the muscle.
+        share: probability of this muscle.
         ratio: the largest MEP over the floor, A.
         slope_per_pct: k [1 / % RMT].
         input_sd: SD of the noise on the input, k sigma_x: about the same in steep curves and flat ones.
@@ -167,9 +167,9 @@ class Gain(Checked):
     """A law of responses in proportion to the facilitation, with noise of a constant CV.
 
     Args:
-        share: its probability.
+        share: probability of this law.
         ratio: the best expected MEP over the floor; MEPs peak at 0.03–0.3 mV (dissertation, 4.2).
-        cv: the CV.
+        cv: CV of the responses.
     """
 
     share: Share
@@ -182,12 +182,13 @@ class SwitchPrior(Checked):
     """Of how often responses come that may be missing or are all or none, in logits, and of the size of the latter.
 
     Args:
-        reliability: of a response at the best ISI where responses may be missing; often about one half (dissertation,
-            Fig. 6.5).
-        switched_on: of a response at the best ISI where responses are all or none.
-        switched_off: of such a response without a tap; 0.05–0.25 of the trials at 90 % RMT are above 50 µV in the hand,
-            next to none in the forearm.
-        sizes: of responses that are all or none, a forearm's or a hand's; their ratio is that of the mean response.
+        reliability: probability of a response at the best ISI if responses may be missing, in logits; often about one
+            half (dissertation, Fig. 6.5).
+        switched_on: probability of a response at the best ISI if responses are all or none, in logits.
+        switched_off: probability of such a response without a tap, in logits; 0.05–0.25 of the trials at 90 % RMT are
+            above 50 µV in the hand, next to none in the forearm.
+        sizes: sizes of responses that are all or none, a forearm's or a hand's; their ratio is that of the mean
+            response.
     """
 
     reliability: AnyLaw = Scale(0.2, 0.7)
@@ -208,9 +209,9 @@ class Floor(Checked):
     """A law of the EMG floor.
 
     Args:
-        share: its probability.
-        median_mv: its median [mV]; 6–20 µV measured.
-        log_sd: its SD from trial to trial, natural log; 0.12–0.35.
+        share: probability of this law.
+        median_mv: median of the EMG floor [mV]; 6–20 µV measured.
+        log_sd: SD of the EMG floor from trial to trial, natural log; 0.12–0.35.
     """
 
     share: Share
@@ -224,8 +225,8 @@ class SessionPrior(Checked):
 
     Args:
         drift_sd: SD of what the log of evoked MEPs drifts by in the long run; about 0.26 over a session measured.
-        far_drift_sd: the same where they drift far.
-        far_drift_share: probability that they do.
+        far_drift_sd: the same SD of those that drift far.
+        far_drift_share: probability that evoked MEPs drift far.
         startup: how strongly the first trials startle, 1 being as much as in blocks of plain TMS.
     """
 

@@ -45,14 +45,14 @@ class ParticleModel(Checked):
     Args:
         prior: the prior over people.
         particles: how many particles a person has.
-        thinned: how many of them represent the posterior where every candidate ISI is scored.
+        thinned: how many of the particles represent the posterior when every candidate ISI is scored.
         moves: how often particles move, and when they are resampled.
         detection_limit_mv: an amplitude of 0 lies below this [mV].
         amplitude_step_mv: the step of the converter or display that amplitudes come from [mV]; an amplitude then stands
             for the interval of a step about it. None to have it found in the amplitudes, 0 for none.
         response_threshold_mv: a response that was seen lies above this [mV].
         unusual_kept: the part of their probability that unusual starts and widths of the window, intensities, drifts
-            and changes keep where the next ISI is chosen; what is believed and reported keeps all of it.
+            and changes keep where the next ISI is chosen; the reported estimate keeps all of it.
         device: torch device.
         engine: `"compiled"` loops on the CPU, or `"torch"`, which stands in where there are none; the same seed asks
             other ISIs with each.

@@ -17,7 +17,7 @@ class Place(Checked):
     """A law of the window's start and width together.
 
     Args:
-        share: its probability.
+        share: probability of this law.
         start_ms: the start on the clock of the reference [ms].
         width_ms: the width [ms].
         reference: the event that the start counts from.

@@ -84,18 +84,18 @@ class Prior(Checked):
     """The prior over people.
 
     Args:
-        profile: of the facilitation by ISI.
+        profile: prior of the facilitation by ISI.
         noise: probabilities of the kinds of noise.
-        gains: of responses with noise of a constant CV.
-        switch: of how often responses come.
-        muscles: of recruitment curves.
-        rectified: of recruitment curves that start at a threshold.
-        intensities: of the intensity of the pulse, where it is not stated.
-        floors: of the EMG floor.
-        session: of how amplitudes drift within a session.
-        changes: of what else changes within it.
-        muscle: the name of the muscle, where it is known: the others that have a name are left out then.
-        intensity_pct_rmt: intensity of the pulse, where it is stated [% RMT].
+        gains: laws of responses with noise of a constant CV.
+        switch: prior of how often responses come if they may be missing or are all or none.
+        muscles: laws of recruitment curves.
+        rectified: law of recruitment curves that start at a threshold.
+        intensities: laws of the intensity of the pulse if it is not stated.
+        floors: laws of the EMG floor.
+        session: prior of the drift of amplitudes within a session.
+        changes: prior of what else changes within a session.
+        muscle: the name of the muscle, if it is known; the others that have a name are then left out.
+        intensity_pct_rmt: intensity of the pulse if it is stated [% RMT].
     """
 
     profile: ProfilePrior = field(default_factory=ProfilePrior)

@@ -31,10 +31,10 @@ class ShapeShares(Shares):
     Most profiles pass a normality test (dissertation, 4.2: 8 of 11), the others are described in its outlook (8.1).
 
     Args:
-        gaussian: of Gaussian profiles.
-        skewed: of skewed ones.
-        plateau: of flat-topped ones.
-        two_peak: of those with two peaks.
+        gaussian: probability of a Gaussian profile.
+        skewed: probability of a skewed profile.
+        plateau: probability of a flat-topped profile.
+        two_peak: probability of a profile with two peaks.
     """
 
     gaussian: Share = 0.68
@@ -48,7 +48,7 @@ class Width(Checked):
     """A law of the window's width.
 
     Args:
-        share: its probability.
+        share: probability of this law.
         width_ms: the width.
     """
 
@@ -61,7 +61,7 @@ class Early(Checked):
     """A law of wide windows that start before the hit: of start and width together.
 
     Args:
-        share: its probability.
+        share: probability of this law.
         start_ms: the start from the impact [ms].
         width_ms: the width.
     """
@@ -124,13 +124,13 @@ class ProfilePrior(Checked):
 
     Args:
         p_window: probability that there is any facilitation.
-        shapes: probabilities of the families.
+        shapes: probabilities of the families of profiles.
         start: where windows start.
-        widths: how wide they are.
+        widths: how wide windows are.
         early: windows that start before the hit, which are wide; the rest of the probability is that of `start` and
             `widths`, which do not depend on each other.
-        places: where and how wide they are as far as earlier sessions say; the rest of the probability is that of
-            all others.
+        places: where windows are, and how wide, as far as earlier sessions say; the rest of the probability is that
+            of all other windows.
         conditioning: what the first stimulus of a pair is: a tap on the tendon, or an electrical pulse to the nerve;
             None where it is not stated, and a tap is most probable.
     """

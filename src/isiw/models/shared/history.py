@@ -191,7 +191,7 @@ class FloorTreatment(Checked):
             `"median"`, `"lowest"`: the median or the lowest tenth of all MEPs is, with or without TMS alone; the
             median is too high if a method asks mostly inside the window. `"zeroed"`: an MEP below the threshold
             is 0. `"raw"`: MEPs as they are; if the floor exceeds 0.135 of the peak, such a curve has no edges.
-        threshold_mv: of `"zeroed"` [mV]; the dissertation's thresholds of a response are 0.015–0.033 mV (4.1.1).
+        threshold_mv: threshold of `"zeroed"` [mV]; in the dissertation 0.015–0.033 mV (4.1.1).
     """
 
     floor: FloorKind = "subtracted"

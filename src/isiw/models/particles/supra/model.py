@@ -31,7 +31,7 @@ class SupraModel(Checked):
     Args:
         prior: the prior over people.
         particles: how many particles a person has.
-        thinned: how many of them represent the posterior where every candidate ISI is scored.
+        thinned: how many of the particles represent the posterior when every candidate ISI is scored.
         moves: how often particles move, and when they are resampled.
         detection_limit_mv: an amplitude of 0 lies below this [mV].
         response_threshold_mv: a response that was seen lies above this [mV].

@@ -63,9 +63,9 @@ class Segment(Checked):
     """Of the ISIs at which the tap enhances, or depresses, the MEP.
 
     Args:
-        probability: that there are any.
-        widths: how wide they are.
-        shift_pct: by how much the input of the recruitment curve is shifted in their middle [% RMT].
+        probability: probability that there are such ISIs.
+        widths: how wide their segment is.
+        shift_pct: by how much the input of the recruitment curve is shifted in its middle [% RMT].
     """
 
     probability: Share
@@ -82,7 +82,7 @@ class Curve(Checked):
     """A law of recruitment curves above the motor threshold.
 
     Args:
-        share: its probability.
+        share: probability of this curve.
         ratio: the largest MEP over the floor.
         slope_per_pct: slope [1 / % RMT].
         input_sd: SD of the noise on the input, in logits.
@@ -108,11 +108,11 @@ class SupraPrior:
 
     Args:
         start: where either segment starts.
-        enhanced: of the enhanced ISIs.
-        depressed: of the depressed ones.
-        curves: of recruitment curves, the usual one first.
-        floors: of the EMG floor.
-        session: of what changes within a session.
+        enhanced: prior of the ISIs at which the tap enhances the MEP.
+        depressed: prior of the ISIs at which the tap depresses the MEP.
+        curves: laws of recruitment curves, the usual one first.
+        floors: laws of the EMG floor.
+        session: prior of what changes within a session.
     """
 
     start: StartPrior = _START
