@@ -86,9 +86,9 @@ class WindowEstimate(Checked):
             belongs to, as an index of `hypothesis_names`, shape (s,).
         hypothesis_names: what the hypotheses are called.
         expected_f1: posterior mean of the F1 of the reported decision.
-        best_isi: the ISI of the largest expected MEP.
-        largest_excluded: an enhancement that, with 90 % probability, is larger than the largest at any ISI of the
-            space; its shift is that of the window's peak, wherever it lies.
+        best_isi: the ISI of the largest expected MEP, given that there is a window: median and 90 % interval [ms].
+        largest_excluded: an enhancement [mV] that, with 90 % probability, is larger than the largest at any ISI of the
+            space; its shift [% RMT] is that of the window's peak, wherever it lies.
         unusual: how probable it is that parts of this person are of another law than the usual one, by their names.
         pairs: how many pairs of stimuli it rests on; None if that is not known.
         silent: whether no trial that it rests on showed an MEP, so that nothing is known about a window.
@@ -232,7 +232,11 @@ class WindowEstimate(Checked):
 
     @property
     def beyond_probability(self) -> tuple[float, float] | None:
-        """Probability that the window starts before the range, and that it ends beyond it, given that there is one."""
+        """Probabilities that the window starts before the range, and ends beyond it, given that there is one.
+
+        Returns:
+            (start, end), each in 0–1; None without samples of the edges.
+        """
         if self.edge_samples_ms is None or not len(self.edge_samples_ms):
             return None
         start, end = np.isinf(self.edge_samples_ms).mean(axis=0).tolist()

@@ -158,6 +158,9 @@ class Measurement(Checked):
         t_valve_ms: time of the valve command [ms], if known.
         t_hit_ms: time of the impact [ms], if known.
         t_tms_ms: time of the magnetic pulse [ms], if known.
+
+    Raises:
+        InvalidValueError: an amplitude or an EMG below 0, an SD outside 0–50 ms, or a value that is not finite.
     """
 
     mep_mv: Amplitude

@@ -51,6 +51,9 @@ class Visit(Checked):
         intensity_pct_rmt: intensity of the pulse [% of the resting motor threshold]; None if it is not noted.
         intensity_pct_mso: the same [% of the maximum stimulator output]; None if it is not noted.
         electrodes: which, and where they are.
+
+    Raises:
+        InvalidValueError: a day below 1, an intensity that is not positive, or a note that is no text.
     """
 
     day: Count | None = None

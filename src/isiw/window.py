@@ -104,7 +104,14 @@ class Window:
 
     @classmethod
     def of_edges(cls, edges_ms: Sequence[float]) -> Window | None:
-        """The window whose segments start and end at these ISIs [ms] in turn, or None if there are none."""
+        """The window whose segments start and end at these ISIs in turn; None if there are none.
+
+        Args:
+            edges_ms: start and end of each segment in turn [ms], ascending, shape (2 k,) for k segments.
+
+        Raises:
+            InvalidValueError: ISIs that do not ascend.
+        """
         segments = tuple(zip(edges_ms[::2], edges_ms[1::2], strict=True))
         return cls(edges_ms[0], edges_ms[-1], segments) if segments else None
 

@@ -41,6 +41,9 @@ class Deadlines(Checked):
         stop_s: each attempt at `stop` [s].
         unstage_s: `unstage` [s].
         stop_attempts: how often `stop` is tried before the device counts as still armed.
+
+    Raises:
+        InvalidValueError: a time that is not positive, or no attempt at all.
     """
 
     describe_s: Patience = 10.0

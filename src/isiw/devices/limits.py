@@ -42,6 +42,9 @@ class Limits(Checked):
             report it. Where None, one that is reported when the device is staged may not change any more.
         max_consecutive_mistrials: a session pauses after so many rejected trials, or of a faulty rig, in a row.
         isis_ms: the only ISIs that are allowed [ms]; by default all of the range, or of its grid.
+
+    Raises:
+        InvalidValueError: ISIs that do not ascend, or an invalid number.
     """
 
     low_ms: Number

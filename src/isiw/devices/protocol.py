@@ -77,6 +77,9 @@ class Readiness(Checked):
         reason: why it is not ready.
         coil_c: temperature of the coil [°C]; None if it is not measured.
         intensity_pct_mso: intensity that is set [% of the maximum stimulator output]; None if it is not known.
+
+    Raises:
+        InvalidValueError: `ready` that is neither True nor False, a value that is not finite, or an intensity below 0.
     """
 
     ready: Flag = True

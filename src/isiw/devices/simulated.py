@@ -85,6 +85,10 @@ class SimulatedPerson:
         name: what the log calls the device.
         hit_delay_ms: mean and SD of the hit delay that the device states [ms].
         conditioning: what it delivers first.
+
+    Raises:
+        InvalidValueError: an unknown reference or conditioning, a hit delay that is no pair of positive numbers, or a name
+            that is no text.
     """
 
     def __init__(

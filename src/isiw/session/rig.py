@@ -83,6 +83,9 @@ class Safeguards(Checked):
         dead_man: is called before each stimulus; anything but True refuses it and ends the session.
         earlier_logs: a folder of logs, whose folders are looked into, too; the same subject's stimuli in it count for
             the limits' period and block. A log that cannot be read refuses the session.
+
+    Raises:
+        InvalidValueError: a number of retries, or a time, below 0.
     """
 
     deadlines: Deadlines = field(default_factory=Deadlines)

@@ -380,7 +380,11 @@ class Strategy:
         return estimate.noting(silent=True) if self._is_silent else estimate
 
     def prediction_mv(self) -> tuple[FloatArray, FloatArray] | None:
-        """The band of nine of ten next MEPs [mV], at the ISIs of the estimate; None if the model predicts none."""
+        """The band in which nine of ten next MEPs lie, at each ISI of `estimate().grid_ms`.
+
+        Returns:
+            Its lower and its upper limit [mV], (low, high), each of shape (t,); None if the model predicts no MEPs.
+        """
         return self.posterior.prediction_mv(0.9) if isinstance(self.posterior, PredictsMeps) else None
 
     def decision(self) -> StopDecision:

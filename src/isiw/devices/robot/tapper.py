@@ -120,6 +120,9 @@ class Tapper:
         geometry: the person's wrist under the robot, or the name of a preset.
         settings: how the robot is run.
         seed: of the taps and the sensors' noise.
+
+    Raises:
+        InvalidValueError: an unknown preset.
     """
 
     def __init__(

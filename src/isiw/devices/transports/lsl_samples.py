@@ -34,6 +34,9 @@ class LslChannel(Checked):
         unit: the unit of its samples, such as "mV".
         rate_hz: the sampling rate of the stream [Hz].
         column: which of the stream's channels it is, from 0.
+
+    Raises:
+        InvalidValueError: a name or a unit that is no text, a rate that is not positive, or a column below 0.
     """
 
     stream: Text

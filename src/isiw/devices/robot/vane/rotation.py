@@ -55,6 +55,9 @@ class Rotor(Checked):
         damping_nm_s: moment by speed, B, which stands for air that leaks past the vane [N m s/rad].
         leak_l_min: air that a chamber at the reservoir's pressure loses [l/min of free air].
         dead_ml: air that is left in a chamber when the vane is at its stop [ml].
+
+    Raises:
+        InvalidValueError: a size that is not positive, or a friction, a damping or a leak below 0.
     """
 
     height_mm: Positive
