@@ -87,8 +87,8 @@ class SimulatedPerson:
         conditioning: what it delivers first.
 
     Raises:
-        InvalidValueError: an unknown reference or conditioning, a hit delay that is no pair of positive numbers, or a name
-            that is no text.
+        InvalidValueError: an unknown reference or conditioning, a hit delay that is no pair of positive numbers, or a
+            name that is no text.
     """
 
     def __init__(
