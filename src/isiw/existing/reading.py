@@ -5,7 +5,8 @@ from __future__ import annotations
 import datetime as dt
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -15,6 +16,7 @@ from isiw.checks import MOST_MEP_MV
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.existing import frames, recordings, tables
+from isiw.existing.dates import dates_of, times_of
 from isiw.existing.delivered import Delivered, anywhere, read_log, renumbered
 from isiw.existing.layout import ISI_UNITS_MS, MARKERS, Layout, letters
 from isiw.files import is_mcap
@@ -28,8 +30,6 @@ from isiw.types import FloatArray, Reference
 from isiw.visit import Visit
 
 _RATES: Final = frozenset({"fs", "srate", "samplerate", "samplingrate", "samplingfrequency", "sfreq", "rate", "ratehz"})
-_DATE: Final = re.compile(r"(\d{1,2})([./-])(\d{1,2})\2\d{2,4}(?!\d)")
-_WRITE_DATES: Final = "Write dates as 2026-01-31."
 
 
 def read_people(source: str | Path | Any, layout: Layout | None = None, *, subject: str = "") -> list[Delivered]:
@@ -227,27 +227,33 @@ def people_of(frame: pd.DataFrame, layout: Layout, source: str, name: str = "") 
     people: dict[str, list[int]] = {}
     for subject, row in zip(subjects, rows, strict=True):
         people.setdefault(subject, []).append(row)
-    visits = [(own, subject, day) for subject, theirs in people.items() for day, own in _days(columns, theirs).items()]
-    visits.sort(key=lambda visit: visit[0][0])
-    return [_person(columns, own, layout, reference, subject or name, day) for own, subject, day in visits]
+    dates = dates_of(columns["date"], rows)
+    visits = [
+        (own, subject, day) for subject, theirs in people.items() for day, own in _days(columns, theirs, dates).items()
+    ]
+    found = []
+    for own, subject, day in sorted(visits, key=lambda visit: visit[0][0]):
+        begun = dates[own[0]].isoformat(timespec="microseconds") if own[0] in dates else ""
+        person = _person(columns, own, layout, reference, subject or name)
+        found.append(replace(person, visit=Visit(day=day), created=begun))
+    return found
 
 
-def _days(columns: tables.Columns, rows: Sequence[int]) -> dict[int | None, list[int]]:
-    """The rows of each day, by a column of days, or of dates; those without a number are counted as they come."""
-    column = columns["day"] if "day" in columns.of else columns["date"]
-    texts = {row: column.text(row) for row in rows}
-    if column is columns["date"] and len({*texts.values()} - {""}) > 1:
-        texts = {row: text and f"{_moment(column, row).date()}" for row, text in texts.items()}
-    elif column is columns["date"]:
+def _days(
+    columns: tables.Columns, rows: Sequence[int], dates: Mapping[int, dt.datetime]
+) -> dict[int | None, list[int]]:
+    """The rows of each day, by a column of days, or by several dates; days without a number are counted."""
+    named = "day" in columns.of
+    texts = [columns["day"].text(row) if named else f"{dates[row].date()}" if row in dates else "" for row in rows]
+    several = len({*texts} - {""}) > 1
+    if "" in texts and (several or (named and any(texts))):
+        column = columns["day" if named else "date"]
+        raise column.refused(rows[texts.index("")], "is empty", "Write the day into each row.")
+    if not any(texts) or not (named or several):
         return {None: list(rows)}
-    if any(texts.values()) and not all(texts.values()):
-        empty = next(row for row, text in texts.items() if not text)
-        raise column.refused(empty, "is empty", "Write the day into each row.")
     days: dict[str, list[int]] = {}
-    for row, text in texts.items():
+    for row, text in zip(rows, texts, strict=True):
         days.setdefault(text, []).append(row)
-    if list(days) == [""] or (column is columns["date"] and len(days) == 1):
-        return {None: list(rows)}
     numbers = [int(found[-1]) if len(found := re.findall(r"\d+", day)) == 1 else 0 for day in days]
     if len(set(numbers)) < len(numbers) or min(numbers) < 1:
         numbers = list(range(1, len(days) + 1))
@@ -255,7 +261,7 @@ def _days(columns: tables.Columns, rows: Sequence[int]) -> dict[int | None, list
 
 
 def _person(
-    columns: tables.Columns, rows: Sequence[int], layout: Layout, reference: Reference, subject: str, day: int | None
+    columns: tables.Columns, rows: Sequence[int], layout: Layout, reference: Reference, subject: str
 ) -> Delivered:
     _require_ascending(columns, rows)
     columns.require_said(rows, layout.alone)
@@ -265,9 +271,7 @@ def _person(
         renumbered(trials),
         reference,
         subject=subject,
-        visit=Visit(day=day),
         source=columns["isi"].of,
-        created=_created(columns, rows[0]),
         units=columns.units,
         unused=columns.unused,
         blocks={n: block for n, block in enumerate(blocks) if n and block != blocks[n - 1]},
@@ -316,12 +320,7 @@ def _require_ascending(columns: tables.Columns, rows: Sequence[int]) -> None:
             raise order.refused(odd, "is none of a trial", "Delete the row if it is a sum or a mean.")
         places = [order.number(row) or 0.0 for row in known]
     else:  # times of the day, perhaps
-        in_order = _day_first(texts)
-        orders = (True, False) if in_order is None else (in_order,)
-        read = [_moments(texts, day_first=day_first) for day_first in orders]
-        known_moments = [[one for one in each if one is not None] for each in read]
-        whole = [each for each in known_moments if len(each) == len(texts)]
-        places = next((each for each in whole if each == sorted(each)), whole[0] if whole else [])
+        places = times_of(texts)
     repeated = next((text for text, other in zip(texts[1:], places[1:], strict=False) if places.count(other) > 1), None)
     if places != sorted(places):
         raise InvalidValueError(
@@ -335,40 +334,3 @@ def _require_ascending(columns: tables.Columns, rows: Sequence[int]) -> None:
             remedy="Leave one row for each trial, such as that of one muscle; or name a column of people or blocks: "
             "--column subject=NAME, --column block=NAME.",
         )
-
-
-def _created(columns: tables.Columns, row: int) -> str:
-    column = columns.of.get("date")
-    if column is None or not column.text(row):
-        return ""
-    return _moment(column, row).isoformat(timespec="microseconds")
-
-
-def _moment(column: tables.Column, row: int) -> dt.datetime:
-    """The date in a row, in UTC; whether day or month come first is seen in the other rows."""
-    day_first = _day_first(column.text(other) for other in range(len(column.cells)))
-    if day_first is None:
-        raise column.refused(row, "may have the day first, or the month", _WRITE_DATES)
-    (moment,) = _moments([column.text(row)], day_first=day_first)
-    if moment is None:
-        raise column.refused(row, "is no date", _WRITE_DATES)
-    return dt.datetime.fromtimestamp(moment, tz=dt.UTC)
-
-
-def _moments(texts: Sequence[str], *, day_first: bool) -> list[float | None]:
-    """Dates and times as seconds; None for what is neither."""
-    found = []
-    for text in texts:
-        moment = pd.to_datetime(text, errors="coerce", utc=True, dayfirst=day_first and bool(_DATE.match(text)))
-        found.append(None if pd.isna(moment) else moment.timestamp())
-    return found
-
-
-def _day_first(texts: Iterable[str]) -> bool | None:
-    """Whether dates of numbers begin with the day; None if that cannot be seen."""
-    dates = [found for text in texts if (found := _DATE.match(text))]
-    if any(date[2] == "." or int(date[1]) > 12 for date in dates):
-        return True
-    if all(date[1] == date[3] for date in dates) or any(int(date[3]) > 12 for date in dates):
-        return False
-    return None
