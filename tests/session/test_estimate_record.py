@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from isiw.session.loop import Session
 from isiw.session.resume import open_session
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.choice import Asked, candidate_isis
+from isiw.strategy.course import Course
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Measurement
 from known import instance, known
@@ -66,13 +68,16 @@ def test_asking_and_predicting_change_no_ask() -> None:
     assert watched.ask() == unwatched.ask()
 
 
-def test_a_fallback_is_no_choice_of_the_scores() -> None:
+def test_a_fallback_is_no_choice_of_the_scores(monkeypatch: pytest.MonkeyPatch) -> None:
     late = strategy()
     while not (late.choice and late.choice.by == "acquisition"):
         late.tell(late.ask(), 0.02)
         late.ask()
     late.tell(late.ask(), 0.02)
+    go, chosen = threading.Event(), Course.chosen
+    monkeypatch.setattr(Course, "chosen", lambda *of: chosen(*of) if go.wait(30) else ())
     isi_ms = late.ask(deadline_s=0.0)
+    go.set()
     assert known(late.choice).by == "fallback"
     written = estimate_record(late, 0, late.decision(), isi_ms)
     assert (written.chosen_by, written.scores) == ("fallback", ())
