@@ -137,7 +137,8 @@ def analyse(
     """Estimate a person's window from trials that exist already.
 
     Args:
-        isi_ms: the ISI of each trial [ms], in the order of delivery, shape (n,); NaN is TMS alone.
+        isi_ms: the ISI of each trial [ms], in the order of delivery, shape (n,); NaN is TMS alone. A pulse before the
+            impact does not count, nor do values that a mask hides.
         mep_mv: peak-to-peak amplitude of its MEP [mV], shape (n,); 0 is below the detection limit, NaN a lost trial.
         space: the ISIs at which a window is sought; trials at others teach, too.
         strategy: the strategy that estimates, one of `isiw.list_strategies()`.
