@@ -12,6 +12,7 @@ from isiw import sentences
 from isiw.design import DesignSpace
 from isiw.estimate import Edge, Estimate
 from isiw.findings import NO_MEP, Kind
+from isiw.report.words import counts
 from isiw.text.stimuli import STIMULI, TAP
 from isiw.trials import Status, Stimulus, Trial
 from isiw.window import Window
@@ -199,21 +200,21 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
             ),
         ),
         (
-            sentences.counts([PAIR, PAIR, TMS, replace(PAIR, excluded=True), LOST]),
+            counts([PAIR, PAIR, TMS, replace(PAIR, excluded=True), LOST]),
             "5 stimuli were delivered: 4 pairs and 1 pulse of TMS alone; 3 count; mistrials: 1 no impact; 1 excluded.",
         ),
-        (sentences.counts([PAIR]), "1 pair of stimuli was delivered; 1 counts."),
-        (sentences.counts([]), "0 pairs of stimuli were delivered; 0 count."),
-        (sentences.counts([TMS]), "1 stimulus was delivered: 1 pulse of TMS alone; 1 counts."),
+        (counts([PAIR]), "1 pair of stimuli was delivered; 1 counts."),
+        (counts([]), "0 pairs of stimuli were delivered; 0 count."),
+        (counts([TMS]), "1 stimulus was delivered: 1 pulse of TMS alone; 1 counts."),
         (
-            sentences.counts([*[PAIR] * 20, *[ALONE] * 2, *[TMS] * 2]),
+            counts([*[PAIR] * 20, *[ALONE] * 2, *[TMS] * 2]),
             (
                 "24 stimuli were delivered: 20 pairs, 2 taps alone and 2 pulses of TMS alone; "
                 "22 count (the taps alone do not)."
             ),
         ),
         (
-            sentences.counts([PAIR, ALONE, UNKNOWN], STIMULI["electrical"]),
+            counts([PAIR, ALONE, UNKNOWN], STIMULI["electrical"]),
             (
                 "3 stimuli were delivered: 1 pair, 1 electrical pulse alone and 1 of unknown kind; "
                 "1 counts (the electrical pulse alone does not); mistrials: 1 outcome unknown."

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
 from isiw.change import Change
@@ -328,37 +327,6 @@ def few_outside(outside: int, pairs: int, alone: int) -> str:
         f"and the number of pulses of TMS alone was {alone}. In the next session add TMS alone (in a configuration: "
         "[protocol] tms_alone), or widen the range of ISIs."
     )
-
-
-def counts(delivered: Sequence[Trial], first: StimulusWords = TAP) -> str:
-    """The numbers of stimuli that were delivered and that count, and why the others do not."""
-    told, accepted_taps = sum(trial.told for trial in delivered), sum(t.tap_alone and t.counts for t in delivered)
-    alone = f" (the {first.name}{' alone does' if accepted_taps == 1 else 's alone do'} not)" if accepted_taps else ""
-    parts = [f"{_delivered(delivered, first)}; {counted(told, 'counts', 'count')}{alone}"]
-    mistrials = Counter(str(trial.reason) for trial in delivered if trial.reason is not None)
-    if mistrials:
-        parts.append("mistrials: " + ", ".join(f"{count} {reason}" for reason, count in mistrials.items()))
-    if unwanted := sum(trial.excluded for trial in delivered):
-        parts.append(f"{unwanted} excluded")
-    return "; ".join(parts) + "."
-
-
-def _delivered(delivered: Sequence[Trial], first: StimulusWords) -> str:
-    """How many stimuli were delivered, by kind if some were no pairs; without a full stop."""
-    pairs = sum(trial.commanded_isi_ms is not None for trial in delivered)
-    taps = sum(trial.commanded_isi_ms is None and trial.tap_alone for trial in delivered)
-    pulses = sum(trial.is_control and not trial.tap_alone for trial in delivered)
-    if pairs == len(delivered):
-        return counted(pairs, "pair of stimuli was delivered", "pairs of stimuli were delivered")
-    kinds = {
-        counted(pairs, "pair"): pairs,
-        counted(taps, first.alone, f"{first.name}s alone"): taps,
-        counted(pulses, "pulse of TMS alone", "pulses of TMS alone"): pulses,
-        f"{(unclear := len(delivered) - pairs - taps - pulses)} of unknown kind": unclear,
-    }
-    *earlier, last = [kind for kind, count in kinds.items() if count]
-    listed = f"{', '.join(earlier)} and {last}" if earlier else last
-    return f"{counted(len(delivered), 'stimulus was delivered', 'stimuli were delivered')}: {listed}"
 
 
 def fit(troubled: int, trials: int) -> str:

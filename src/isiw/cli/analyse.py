@@ -84,7 +84,6 @@ def analyse(  # noqa: PLR0913, PLR0917 - an option each
         with working(f"Reading {counted(len(files), 'file')}"):
             people = isiw.existing.batch.read_files(files, way, output, only)
         _analyse_all(people, way, files[0])
-        _say_unused(people, way)
 
 
 @app.command(rich_help_panel=STUDIES)
@@ -150,6 +149,7 @@ def _analyse_all(people: list[Person], way: Way, source: Path) -> None:
                 failed.append(isiw.existing.delivered.codes_of([person.delivered]))
                 show(f"{failed[-1]}: {error}")
             progress.advance(task)
+    _say_unused(people, way)
     if failed:
         raise isiw.errors.InvalidValueError(
             f"{counted(len(failed), 'person', 'people')} of {len(people)} could not be analysed",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
 from isiw import sentences
@@ -13,7 +15,9 @@ from isiw.report.evidence import changed_with_time, contradiction, no_comparison
 from isiw.session.examination import change_found
 from isiw.strategy.catalogue import known_settings, list_strategies
 from isiw.strategy.stopping import OF_THE_WINDOW
-from isiw.text.sanitize import command
+from isiw.text.sanitize import command, counted
+from isiw.text.stimuli import TAP, StimulusWords
+from isiw.trials import Trial
 from isiw.window import Window
 
 TRIAL_HEADINGS = ("trial", "commanded", "outcome", "realised")
@@ -88,7 +92,7 @@ def finding_sentences(record: SessionRecord) -> list[str]:
 
 def counts_sentence(record: SessionRecord) -> str:
     """The numbers of stimuli that were delivered and that count, and why the others do not."""
-    return sentences.counts((*record.table, *record.unknown_trials), record.header.stimulus)
+    return counts((*record.table, *record.unknown_trials), record.header.stimulus)
 
 
 def fit_sentence(record: SessionRecord) -> str:
@@ -170,3 +174,34 @@ def trial_rows(record: SessionRecord) -> list[tuple[str, ...]]:
     first, trials = record.header.stimulus, sorted([*record.table, *record.unknown_trials], key=lambda each: each.index)
     rows = ((t, "–" if t.isi_ms is None else f"{t.isi_ms:.4g} ms") for t in trials)
     return [(str(t.index), sentences.asked(t, first), sentences.outcome(t), isi) for t, isi in rows]
+
+
+def counts(delivered: Sequence[Trial], first: StimulusWords = TAP) -> str:
+    """The numbers of stimuli that were delivered and that count, and why the others do not."""
+    told, accepted_taps = sum(trial.told for trial in delivered), sum(t.tap_alone and t.counts for t in delivered)
+    alone = f" (the {first.name}{' alone does' if accepted_taps == 1 else 's alone do'} not)" if accepted_taps else ""
+    parts = [f"{_delivered(delivered, first)}; {counted(told, 'counts', 'count')}{alone}"]
+    mistrials = Counter(str(trial.reason) for trial in delivered if trial.reason is not None)
+    if mistrials:
+        parts.append("mistrials: " + ", ".join(f"{count} {reason}" for reason, count in mistrials.items()))
+    if unwanted := sum(trial.excluded for trial in delivered):
+        parts.append(f"{unwanted} excluded")
+    return "; ".join(parts) + "."
+
+
+def _delivered(delivered: Sequence[Trial], first: StimulusWords) -> str:
+    """How many stimuli were delivered, by kind if some were no pairs; without a full stop."""
+    pairs = sum(trial.commanded_isi_ms is not None for trial in delivered)
+    taps = sum(trial.commanded_isi_ms is None and trial.tap_alone for trial in delivered)
+    pulses = sum(trial.is_control and not trial.tap_alone for trial in delivered)
+    if pairs == len(delivered):
+        return counted(pairs, "pair of stimuli was delivered", "pairs of stimuli were delivered")
+    kinds = {
+        counted(pairs, "pair"): pairs,
+        counted(taps, first.alone, f"{first.name}s alone"): taps,
+        counted(pulses, "pulse of TMS alone", "pulses of TMS alone"): pulses,
+        f"{(unclear := len(delivered) - pairs - taps - pulses)} of unknown kind": unclear,
+    }
+    *earlier, last = [kind for kind, count in kinds.items() if count]
+    listed = f"{', '.join(earlier)} and {last}" if earlier else last
+    return f"{counted(len(delivered), 'stimulus was delivered', 'stimuli were delivered')}: {listed}"

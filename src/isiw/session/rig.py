@@ -85,7 +85,7 @@ class Safeguards(Checked):
             the limits' period and block. A log that cannot be read refuses the session.
 
     Raises:
-        InvalidValueError: a number of retries, or a time, below 0.
+        InvalidValueError: retries outside 0–10, a time below 0, or an `on_pause` or a `dead_man` that is no function.
     """
 
     deadlines: Deadlines = field(default_factory=Deadlines)
