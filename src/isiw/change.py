@@ -12,6 +12,10 @@ SURE_OF_A_CHANGE: Final = 0.9
 """Probability from which on a change during the session is said."""
 
 
+MOST_NOTED: Final = 20
+"""So many changes that somebody noted are learnt in a session, several at one trial as one; more are remarks."""
+
+
 @dataclass(frozen=True)
 class Change:
     """A likely change in the course of a session, whatever the ISI.

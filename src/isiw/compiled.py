@@ -17,9 +17,11 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, Final, TypeVar, cast
 
 import numpy as np
+
+from isiw.errors import warn
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -38,8 +40,11 @@ PATIENCE_S: Final = 120.0
 _SAFE: Final = {"contract", "arcp", "afn", "nsz"}
 """What the compiler may do to numbers. It may not reorder sums: p a + (1 - p) b would lose a small a."""
 
-AVAILABLE: Final = importlib.util.find_spec("numba") is not None and os.environ.get("ISIW_ENGINE") != "torch"
-"""True if there are compiled kernels here; the environment variable ISIW_ENGINE=torch does without them."""
+_UNWANTED: Final = os.environ.get("ISIW_ENGINE") == "torch" or os.environ.get("NUMBA_DISABLE_JIT", "0") not in {"", "0"}
+
+AVAILABLE: Final = importlib.util.find_spec("numba") is not None and not _UNWANTED
+"""True if there are compiled kernels here; the environment variable ISIW_ENGINE=torch does without them, and so does
+NUMBA_DISABLE_JIT=1, with which they would take minutes a trial."""
 
 
 def version() -> str:
@@ -98,11 +103,66 @@ def _compiled(function: F, fastmath: set[str], **more: bool | str) -> F:
     # Errors are numpy's: a check of each divisor is no vector instruction.
     options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": fastmath, "no_cfunc_wrapper": True}
     options |= {"_nrt": False, **more}
-    try:
-        compiled: F = numba.njit(cache=True, **options)(function)
-    except RuntimeError:  # there is no folder to keep it in
-        compiled = numba.njit(**options)(function)
-    return compiled
+    compiled: Any = numba.njit(**options)(function)
+    with suppress(RuntimeError):  # there is no folder to keep it in
+        compiled._cache = _Kept(function)  # noqa: SLF001 - as its option cache=True does, with a cache of Numba's own
+    return cast("F", compiled)
+
+
+if AVAILABLE:
+    from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+    class _Files(IndexDataCacheFile):  # type: ignore[misc] # Numba has no types
+        """The files of a loop, each with a checksum behind it: machine code of other bytes may end the process."""
+
+        def _save_data(self, name: str, data: object) -> None:
+            content = self._dump(data)
+            with self._open_for_write(self._data_path(name)) as file:
+                file.write(content + _checksum(content))
+
+        def _load_data(self, name: str) -> Any:
+            content = Path(self._data_path(name)).read_bytes()
+            if content[-CHECKSUM_BYTES:] != _checksum(content[:-CHECKSUM_BYTES]):
+                raise ValueError(name)
+            return super()._load_data(name)  # which reads up to the checksum
+
+    class _Kept(FunctionCache):  # type: ignore[misc] # see above
+        """The cache of a loop: where a file of it cannot be used, the loop is compiled, and kept again."""
+
+        def __init__(self, function: Callable[..., Any]) -> None:
+            super().__init__(function)
+            one = self._cache_file
+            self._cache_file = _Files(self._cache_path, self._impl.filename_base, one._source_stamp)  # noqa: SLF001
+
+        def load_overload(self, signature: Any, target: Any) -> Any:
+            try:
+                return super().load_overload(signature, target)
+            except Exception:  # noqa: BLE001 - there is no end to what a damaged file can lead to
+                _warn_of_damage(self._cache_path)
+            with suppress(Exception):
+                self.flush()  # the list of its files is begun again, or none could be kept
+            return None
+
+        def save_overload(self, signature: Any, compiled: Any) -> None:
+            with suppress(Exception):  # the disk is full, or not ours: it is compiled again next time
+                super().save_overload(signature, compiled)
+
+
+CHECKSUM_BYTES: Final = 16
+
+
+def _checksum(content: bytes) -> bytes:
+    return hashlib.blake2b(content, digest_size=CHECKSUM_BYTES).digest()
+
+
+def _warn_of_damage(folder: str) -> None:
+    if _DAMAGED not in _CALLED:
+        _CALLED.add(_DAMAGED)
+        warn(
+            f"Compiled loops that isiw keeps in {folder} are damaged. They are not used, and compiled again, "
+            "which takes up to half a minute once. The results are the same.",
+            RuntimeWarning,
+        )
 
 
 @contextmanager
@@ -150,6 +210,7 @@ def _say(compiled: Any) -> None:
 
 
 _SAID: Final = "said"
+_DAMAGED: Final = "damaged"
 _CALLED: Final[set[str]] = set()
 
 if AVAILABLE:

@@ -66,6 +66,7 @@ class Kind(StrEnum):
     ARTEFACT = "an artefact in the MEP window"
     REPEATED = "the same sweep again"
     CHANGED = "a change at one trial"
+    MANY_CHANGES = "more changes than are learnt"
 
     IN_SECONDS = "an ISI in seconds"
     ORDER = "ISI and amplitude swapped"

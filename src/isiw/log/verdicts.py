@@ -6,10 +6,11 @@ import dataclasses
 from collections.abc import Callable, Iterable
 from typing import Final
 
+from isiw.change import MOST_NOTED
 from isiw.checks import text, whole
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.findings import Kind
+from isiw.findings import Finding, Kind, Severity
 from isiw.log.schema import Correction, Event, EventKind
 from isiw.signals.limits import implausible_amplitude
 from isiw.trials import Trial, TrialTable
@@ -26,6 +27,16 @@ VERDICTS: Final[dict[EventKind, Callable[[Trial, Event], Trial]]] = {
 
 LOOKED_AT: Final = "Rejected by the operator after looking at the MEP."
 """The reason of an exclusion that rejects an MEP."""
+
+CHANGE: Final[EventKind] = "change"
+
+MANY_CHANGES: Final = Finding(
+    Kind.MANY_CHANGES,
+    Severity.DOUBT,
+    f"{MOST_NOTED} changes were noted, and no more are learnt in a session",
+    "Further ones are in the log as remarks. If the coil or the gain changes all the time, what is measured says "
+    "little about a window: end the session, find out why, and begin another.",
+)
 
 _KEPT: Final = "It remains a mistrial; its waveforms, if any, stay in the log."
 
@@ -61,11 +72,12 @@ def is_logged(event: Event, events: Iterable[Event]) -> bool:
     if before is None:
         return False
     texts = {event.text, f"{event.text} (key {event.key})"}  # as older logs have it
-    if before.kind != event.kind or before.text not in texts:
+    was, is_now = (CHANGE if each.finding is Kind.MANY_CHANGES else each.kind for each in (before, event))
+    if was != is_now or before.text not in texts:
         raise InvalidValueError(
             f"the key {event.key!r} is that of something else in this log",
-            got=f"{event.kind}: {event.text}",
-            expected=f"{before.kind}: {before.text}",
+            got=f"{is_now}: {event.text}",
+            expected=f"{was}: {before.text}",
             remedy="Nothing was logged. Give each note and each change a key of its own.",
         )
     return True
@@ -113,7 +125,12 @@ def acceptance(trials: TrialTable, number: int, space: DesignSpace) -> Event:
 def change(trials: TrialTable, what: str, key: str | None = None) -> Event:
     """That something changed after the last trial that may bear on all later MEPs; trials count as they did."""
     text("the key of a change", key or "")
-    return Event(kind="change", trial=trials[-1].index if trials else None, text=text("a change", what), key=key)
+    return Event(kind=CHANGE, trial=trials[-1].index if trials else None, text=text("a change", what), key=key)
+
+
+def changed_after(events: Iterable[Event]) -> list[int]:
+    """The trials after which somebody noted a change, each once."""
+    return list(dict.fromkeys(event.trial for event in events if event.kind == CHANGE and event.trial is not None))
 
 
 def correction(trials: TrialTable, number: int, why: str, corrected: Correction) -> Event:

@@ -35,7 +35,7 @@ from isiw.strategy.strategy import Strategy
 from isiw.trials import TrialTable
 from isiw.visit import Visit, VisitProtocol
 
-BELIEF_VERSION: Final = 5
+BELIEF_VERSION: Final = 6
 ENGINE_VERSION: Final = 2
 """Which belief a session learns by, and which engine computes it, for its header."""
 

@@ -13,12 +13,12 @@ from functools import partial
 from typing import Any, Final, Generic, NamedTuple, Protocol, TypeAlias, TypeVar
 
 from isiw import checks, sentences
-from isiw.change import Change
+from isiw.change import MOST_NOTED, Change
 from isiw.errors import LimitExceededError, StrategyError, error_text
 from isiw.findings import Finding, Kind, Severity
 from isiw.log.headers import Header
 from isiw.log.schema import Correction, EstimateRecord, Event, EventKind, Intent, Record
-from isiw.log.verdicts import correction, excluded_by, is_logged, under_all
+from isiw.log.verdicts import changed_after, correction, excluded_by, is_logged, under_all
 from isiw.session.sink import Sink
 from isiw.signals.tap import TapResponses
 from isiw.strategy.choice import candidate_isis
@@ -92,6 +92,12 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
     def last(self) -> int | None:
         """The number of the last trial; None before the first."""
         return len(self.trials) - 1 if len(self.trials) else None
+
+    def is_new(self, finding: Finding) -> bool:
+        """True where the finding's kind was no doubt before; from now on it was."""
+        new = finding.kind not in self._doubted
+        self._doubted.add(finding.kind)
+        return new
 
     @property
     def last_excluded(self) -> int | None:
@@ -167,7 +173,7 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
             self._sink.append(event)
             self.trials = self.learner.judged(self.trials, event)
             self._events.append(event)
-            self.overruled = True
+            self.overruled = self.overruled or event.kind != "note"
         self._sink.log.sync()
 
     def require_own(self) -> None:
@@ -212,8 +218,7 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
         if (trouble := self.learner.trouble_with(trial)) is not None and self._sink.is_open:
             self.event("fit", trouble)
         doubt = self._freely(self.learner.doubt, self.trials)
-        if doubt is not None and doubt.kind not in self._doubted and self._sink.is_open:
-            self._doubted.add(doubt.kind)
+        if doubt is not None and self._sink.is_open and self.is_new(doubt):
             self.event("doubt", f"{doubt}", finding=doubt.kind)
 
     def log_belief(
@@ -254,6 +259,13 @@ class _WindowLearner:
     def judged(self, trials: TrialTable, verdict: Event) -> TrialTable:
         self._changes += changed_after([verdict])
         return under_all(trials, [verdict])
+
+    def noted(self, change: Event) -> Event:
+        """A change as it is logged: a remark once `MOST_NOTED` were noted, at other trials."""
+        before = {*self._changes, *([None] if self.strategy.earlier and not self.strategy.same_level else [])}
+        if change.trial is None or change.trial in before or len(before) < MOST_NOTED:
+            return change
+        return change.model_copy(update={"kind": "note", "finding": Kind.MANY_CHANGES})
 
     def decision(self) -> StopDecision:
         return self.strategy.decision()
@@ -300,17 +312,12 @@ def learn(strategy: Strategy, trial: Trial) -> None:
         strategy.count_mistrial()
 
 
-def changed_after(events: Iterable[Event]) -> list[int]:
-    """The trials after which somebody noted a change."""
-    return [event.trial for event in events if event.kind == "change" and event.trial is not None]
-
-
 def relearned(strategy: Strategy, trials: Iterable[Trial], changes: Sequence[int] = ()) -> Strategy:
     """The same strategy, which has learnt all trials from the beginning, and what changed after some of them."""
     again = strategy.restarted()
     for trial in trials:
         learn(again, trial)
-        for _ in range(changes.count(trial.index)):
+        if trial.index in changes:
             again.note_change()
     return again
 

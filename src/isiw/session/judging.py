@@ -7,12 +7,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import isiw
-from isiw.errors import LogError
+from isiw.errors import ImplausibleDataWarning, LogError, warn
+from isiw.findings import Finding
 from isiw.log.kinds import require_session
 from isiw.log.reader import read_salvaged
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event
-from isiw.log.verdicts import LOOKED_AT, acceptance, change, exclusion, inclusion
+from isiw.log.verdicts import LOOKED_AT, MANY_CHANGES, acceptance, change, exclusion, inclusion
 from isiw.log.writer import LogWriter
 from isiw.session.examination import WindowExamination, estimate_record, learn
 from isiw.session.replay import strategy_of
@@ -46,9 +47,30 @@ class Judging(ABC):
     def note_change(self, text: str, *, key: str | None = None) -> None:
         """Log that something bears on all MEPs from here on; a strategy that reckons with changes expects one.
 
-        A key is as for `note`.
+        Several at one trial are one change. At most 20 (`isiw.change.MOST_NOTED`) are learnt in a session; further ones
+        are kept as remarks, which the first of them says as a doubt. A key is as for `note`.
+
+        Warns:
+            ImplausibleDataWarning: more changes than are learnt, once, where neither keys nor `on_doubt` are there.
         """
-        self._judge(lambda trials: change(trials, text, key))
+        noted: list[Event] = []
+
+        def verdict(trials: TrialTable) -> Event:
+            noted.append(self._examination.learner.noted(change(trials, text, key)))
+            return noted[0]
+
+        self._judge(verdict)
+        if noted[0].finding is MANY_CHANGES.kind and self._examination.is_new(MANY_CHANGES):
+            self._warn(MANY_CHANGES)
+
+    def _warn(self, doubt: Finding) -> None:
+        """Log a doubt, and say it."""
+        self._examination.event("doubt", f"{doubt}", finding=doubt.kind, durable=True)
+        self._say(f"{doubt}")
+
+    def _say(self, doubt: str) -> None:
+        """Say a doubt to whoever is there."""
+        warn(doubt, ImplausibleDataWarning)
 
     @property
     def last_excluded(self) -> int | None:

@@ -211,6 +211,12 @@ class Session(Judging):
     def _judge(self, verdict: Callable[[TrialTable], Event]) -> None:
         self._examination.judge(verdict)
 
+    def _say(self, doubt: str) -> None:
+        if self._console.reads_keys:
+            self._console.screen.say(doubt)
+        else:
+            super()._say(doubt)
+
     def _earlier_s(self) -> list[float]:
         """The ages of earlier stimuli to the same person [s], as far as the logs to look at know."""
         limits, folder = self._limits, self._safeguards.earlier_logs

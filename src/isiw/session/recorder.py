@@ -10,7 +10,7 @@ from typing import Any, Generic, Self, TypeVar
 from isiw.checks import flag, number
 from isiw.devices.clock import ROUNDING_S, Clock, Pacing
 from isiw.devices.protocol import Readiness
-from isiw.errors import ImplausibleDataWarning, InvalidValueError, warn
+from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
 from isiw.findings import Finding, Kind, Severity
 from isiw.log.headers import Header
@@ -285,12 +285,11 @@ class Recorder(Recording[Trial], Judging):
             )
         return self.asked
 
-    def _warn(self, doubt: Finding) -> None:
-        self._examination.event("doubt", f"{doubt}", finding=doubt.kind, durable=True)
+    def _say(self, doubt: str) -> None:
         if self._on_doubt is not None:
-            self._on_doubt(f"{doubt}")
+            self._on_doubt(doubt)
         else:
-            warn(f"{doubt}", ImplausibleDataWarning)
+            super()._say(doubt)
 
 
 def _kind(isi_ms: float | None, *, tap_alone: bool) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Final, NamedTuple
 
+from isiw.change import MOST_NOTED
 from isiw.checks import whole
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
@@ -17,10 +18,10 @@ from isiw.log.pulses import pulses_s
 from isiw.log.reader import SessionRecord
 from isiw.log.salvage import Salvage
 from isiw.log.schema import MOST_TRIALS, Event, Intent
-from isiw.log.verdicts import VERDICTS, under
+from isiw.log.verdicts import MANY_CHANGES, VERDICTS, changed_after, under
 from isiw.log.writer import LogWriter
 from isiw.session.assembly import BELIEF_VERSION, ENGINE_VERSION, Earlier, versions
-from isiw.session.examination import changed_after, learn, relearned
+from isiw.session.examination import learn, relearned
 from isiw.signals.limits import SignalLimits
 from isiw.signals.tap import TapResponses
 from isiw.strategy.catalogue import known_settings, remade_strategy, settings_for
@@ -260,5 +261,7 @@ def _resumption(record: SessionRecord, replayed: Replayed, limits: Limits) -> Ev
         sentences.append(f"Outcome unknown: {numbers}.")
     if was_s != now_s:
         sentences.append(f"At least {now_s:g} s between two stimuli from here on; it was {was_s:g} s.")
+    if len(changed_after(record.events)) > MOST_NOTED:  # earlier versions took more
+        sentences.append(f"{MANY_CHANGES}")
     last = len(replayed.trials) - 1 if replayed.trials else None
     return Event(kind="resume", trial=last, text=" ".join((*sentences, *record.losses)))

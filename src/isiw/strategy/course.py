@@ -13,6 +13,7 @@ from typing import Final, TypedDict
 import numpy as np
 
 from isiw.acquisition.protocol import AcquisitionFunction, FollowsPlan, own_plan
+from isiw.change import MOST_NOTED
 from isiw.checks import Amplitude, AmplitudeInterval, Checked, Flag, NonNegative, can
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
@@ -120,6 +121,11 @@ class Outcomes:
     def after_tap(self, isi_ms: float, mep_mv: float) -> Outcomes:
         """The same after one more tap alone."""
         return replace(self, taps=(*self.taps, (isi_ms, mep_mv)))
+
+    def changing(self) -> Outcomes:
+        """The same if something changes now: several notes at one trial are one change, and `MOST_NOTED` are learnt."""
+        known = len(self.pulses) in self.changes or len(self.changes) >= MOST_NOTED
+        return self if known else replace(self, changes=(*self.changes, len(self.pulses)))
 
     @cached_property
     def step_mv(self) -> float:

@@ -347,11 +347,11 @@ class Strategy:
         """Learn that something changed that may bear on all MEPs from here on, such as the place of the coil.
 
         A model that reckons with changes takes one for likely between the last trial and the next, and what is asked
-        next is chosen again; to other models it means nothing.
+        next is chosen again; to other models it means nothing. Several at one trial are one change, and at most 20
+        (`isiw.change.MOST_NOTED`) are learnt.
         """
-        changes = (*self._outcomes.changes, len(self._outcomes.pulses))
-        self._course, self._outcomes = self._course.noting_change(), replace(self._outcomes, changes=changes)
-        self._asked = self._asked.again()
+        if (outcomes := self._outcomes.changing()) is not self._outcomes:
+            self._course, self._outcomes, self._asked = self._course.noting_change(), outcomes, self._asked.again()
 
     def count_mistrial(self) -> None:
         """Count a delivered stimulus without an outcome: it uses up budget, and its ISI is repeated at most twice."""

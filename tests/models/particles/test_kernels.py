@@ -16,8 +16,8 @@ from isiw.models.particles import ParticleModel
 from isiw.models.particles.changes import Change
 from isiw.models.particles.engine import Compiled, EngineName, TorchEngine, engine_for, log_likelihood_of
 from isiw.models.particles.jumps import WindowTarget
-from isiw.models.particles.kernels.likelihood import ROOM
-from isiw.models.particles.kernels.moves import SCRATCH, UNKNOWN, sweeps
+from isiw.models.particles.kernels.likelihood import room_for
+from isiw.models.particles.kernels.moves import UNKNOWN, scratch_for, sweeps
 from isiw.models.particles.kernels.records import columns_of, people_of, trial_records
 from isiw.models.particles.latents import Latents
 from isiw.models.particles.likelihood import total_log_likelihood
@@ -395,12 +395,12 @@ def test_sweeps_one_by_one_lead_where_sweeps_at_once_do(name: str) -> None:
     for number, calls in ((6, 1), (1, 6)):
         values, kinds = latents.values.numpy().copy(), latents.kinds.numpy().copy()
         log_likelihood, dice = start.copy(), np.full((1, 1), 7, dtype=np.uint64)
-        room, scratch, counts = (np.zeros(shape, dtype=np.float32) for shape in (ROOM, SCRATCH, (1, 4)))
+        counts, trials, steps = np.zeros((1, 4), dtype=np.float32), trial_records(columns_of(told)), steps_of(told)
+        rooms = room_for(trials[0]), scratch_for(tables)
         for _ in range(calls):
             densities = np.full((1, 300, len(tables.first)), UNKNOWN)
             state = values, kinds, log_likelihood, densities, np.zeros(5, dtype=int)
-            trials, steps = trial_records(columns_of(told)), steps_of(told)
-            sweeps(np.array([number]), tables, trials, steps, state, dice, (room, scratch), counts)
+            sweeps(np.array([number]), tables, trials, steps, state, dice, rooms, counts)
         found.append((values, kinds, log_likelihood, counts))
     for together, one_by_one in zip(*found, strict=True):
         np.testing.assert_array_equal(together, one_by_one)

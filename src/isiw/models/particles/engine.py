@@ -13,8 +13,8 @@ import numpy as np
 
 from isiw.compiled import AVAILABLE, first_of
 from isiw.lazy import torch
-from isiw.models.particles.kernels.likelihood import ROOM, likelihoods
-from isiw.models.particles.kernels.moves import SCRATCH, UNKNOWN, log_usual, records, sweeps
+from isiw.models.particles.kernels.likelihood import likelihoods, room_for
+from isiw.models.particles.kernels.moves import UNKNOWN, log_usual, records, scratch_for, sweeps
 from isiw.models.particles.kernels.records import columns_of, trial_records
 from isiw.models.particles.kernels.target import KINDS, Tables
 from isiw.models.particles.latents import Latents
@@ -110,7 +110,7 @@ class Compiled:
 
     def log_usual(self, latents: Latents) -> Tensor:
         """Log prior density of what ISIs are chosen with another law of; see `Engine`."""
-        found, parts = np.empty(latents.values.shape[:2], dtype=np.float32), np.empty(SCRATCH[1], dtype=np.float32)
+        found, (parts, *_) = np.empty(latents.values.shape[:2], dtype=np.float32), scratch_for(self.tables)
         with first_of("prior"):
             log_usual(self.tables, *self._arrays(latents), self._log_blocks(latents), parts, found)
         return torch.from_numpy(found)
@@ -123,10 +123,11 @@ class Compiled:
         values, kinds, log_blocks = (array.copy() for array in (*self._arrays(latents), self._log_blocks(latents)))
         found, steps = log_likelihood.numpy().copy(), steps_of(history)
         dice = torch.randint(2**63 - 1, (people, 1), generator=generator).numpy().view(np.uint64)
-        counts, room, scratch = (np.zeros(shape, dtype=np.float32) for shape in ((people, 4), ROOM, SCRATCH))
+        counts = np.zeros((people, 4), dtype=np.float32)
         with first_of("moves"):
             told, state = trial_records(columns_of(history)), (values, kinds, found, log_blocks, np.zeros(KINDS, int))
-            sweeps(numbers.numpy(), self.tables, told, steps, state, dice, (room, scratch), counts)
+            rooms = room_for(told[0]), scratch_for(self.tables)
+            sweeps(numbers.numpy(), self.tables, told, steps, state, dice, rooms, counts)
         shifts, shifted, jumps, jumped = torch.from_numpy(counts).T
         moved = Latents(*(torch.from_numpy(array) for array in (values, kinds, log_blocks)))
         return Moved(moved, torch.from_numpy(found), shifted / shifts, jumped / jumps)
@@ -143,7 +144,7 @@ class Compiled:
 
 def log_likelihood_of(particles: FloatArray, history: History) -> Tensor:
     """Log likelihood of a history under each of some particles as kernels have them, shape (b, p)."""
-    found, room = np.empty(particles.shape[:2], dtype=np.float32), np.empty(ROOM, dtype=np.float32)
+    found = np.empty(particles.shape[:2], dtype=np.float32)
     trials, sizes = trial_records(columns_of(history))
-    likelihoods(particles, trials, sizes, room, found)
+    likelihoods(particles, trials, sizes, room_for(trials), found)
     return torch.from_numpy(found)

@@ -123,10 +123,9 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
 
     def noting_change(self) -> ParticlePosterior:
         """The posterior if somebody has seen that something changes now; see `NotesChanges`."""
-        trials = self.trials
-        if not trials:
+        trials, before, latents = self.trials, self.model.prior.changes, self.swarm.latents
+        if not trials or trials in before.noted:  # several notes at one trial are one change
             return self
-        before, latents = self.model.prior.changes, self.swarm.latents
         changes = before.noting(trials)
         model = replace(self.model, prior=replace(self.model.prior, changes=changes))
         generator = step_generator(self.model.device, self.seed, NOTED + len(changes.noted))

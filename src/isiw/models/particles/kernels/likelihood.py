@@ -17,10 +17,13 @@ from isiw.models.particles.kernels.profile import facilitations
 from isiw.models.particles.kernels.records import enhancement_after
 from isiw.models.particles.noise import NODES, NoiseKind
 from isiw.models.shared.tables import FACTOR_NODES, FIRST_GROUP_MS, GROUPS, ISI_GROUP_MS, ISI_NODES
+from isiw.types import FloatArray
 
-ROOM: Final = 14 + len(FACTOR_NODES), field.PIECE
-"""Rows of numbers that the likelihood of a history needs in between; the last three are of the nodes, those
-before of the groups of trials that share a factor."""
+_OF_TRIALS: Final = 11
+_OF_NODES: Final = _OF_TRIALS + len(FACTOR_NODES)
+_ROWS: Final = _OF_NODES + 3
+"""Rows of numbers that the likelihood of a history needs in between: of trials, then of the groups of trials that share
+a factor, then of the nodes."""
 
 _f = np.float32
 _NIL, _HALF, _ONE, _TWO = _f(0.0), _f(0.5), _f(1.0), _f(2.0)
@@ -43,6 +46,11 @@ _TINY, _EVER = _f(1e-6), _f(40.0)
 _FACTORS_AT: Final = np.array([at for at, _ in FACTOR_NODES], dtype=np.float32)
 _FIRST_MS, _GROUP_MS = _f(FIRST_GROUP_MS), _f(ISI_GROUP_MS)
 _FACTOR_SHARES: Final = np.array([share for _, share in FACTOR_NODES])
+
+
+def room_for(records: FloatArray) -> FloatArray:
+    """Room for what the likelihood of some records of trials needs in between; see `trial_records`."""
+    return np.zeros((_ROWS, max(records.shape[-1], GROUPS, NODES)), dtype=np.float32)
 
 
 @loop
@@ -325,7 +333,7 @@ def _averaged(groups: Any) -> float:
 @loop
 def history_likelihood(particle: Any, records: Any, sizes: Any, room: Any) -> float:
     """Log likelihood of one person's history under a particle; see `trial_records`."""
-    curve, nodes, groups = room[ROOM[0] - 3 :], NODES, room[11 : 11 + len(_FACTORS_AT)]
+    curve, nodes, groups = room[_OF_NODES:], NODES, room[_OF_TRIALS:_OF_NODES]
     curve_of(particle, curve[0, :nodes], curve[1, :nodes], curve[2])
     shares, summed = sizes[field.SHARES, 0], 0.0
     if shares:

@@ -15,7 +15,7 @@ from isiw.models.particles.changes import ChangeKind
 from isiw.models.particles.kernels.draws import blur, normal, uniform
 from isiw.models.particles.kernels.likelihood import history_likelihood
 from isiw.models.particles.kernels.records import PARTICLE, settle
-from isiw.models.particles.kernels.target import KINDS, fresh_values, log_block, log_line, meant, which
+from isiw.models.particles.kernels.target import KINDS, Tables, fresh_values, log_block, log_line, meant, which
 from isiw.models.particles.moves import (
     A_LITTLE,
     ANOTHER_KIND,
@@ -27,9 +27,11 @@ from isiw.models.particles.moves import (
     STEP_SD,
 )
 from isiw.models.particles.noise import NoiseKind
+from isiw.types import FloatArray
 
-SCRATCH: Final = 7, 64
-"""Rows of numbers that moves need in between, and how many latents or blocks a row has room for."""
+_ROWS: Final = 6
+"""Rows of numbers that moves need in between: old and new latents, fresh ones, what they mean, the parts of a density,
+and densities of blocks."""
 
 _f = np.float32
 _BLUR, _LEAST, _NIL, _ONE = _f(BLUR), _f(1e-30), _f(0.0), _f(1.0)
@@ -38,6 +40,12 @@ _RECRUITMENT, _RECTIFIED = NoiseKind.RECRUITMENT, NoiseKind.RECTIFIED
 _UNCHANGED, _ENHANCEMENT = ChangeKind.NONE, ChangeKind.ENHANCEMENT
 UNKNOWN: Final = _f(1e30)
 """In place of the log density of a block that was not worked out yet."""
+
+
+def scratch_for(tables: Tables) -> FloatArray:
+    """Room for what moves need in between: each row holds all latents, blocks, or parts of a density of a prior."""
+    parts = int(np.abs(tables.components).max()) + len(tables.places)
+    return np.zeros((_ROWS, max(len(tables.spreads) + 1, len(tables.first), parts, PARTICLE)), dtype=np.float32)
 
 
 @loop

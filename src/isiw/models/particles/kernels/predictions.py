@@ -150,7 +150,7 @@ def _outcomes(particle: Any, levels: Any, gain: Any, lines: Any, nodes: Any, tab
 
 def outcome_tables(particles: Any, levels: Any, order: int, log_mep: Any, width: Any, table: Any) -> None:
     """Write the probability of each outcome of the next trial at some facilitations, shape (b, s, l, y)."""
-    padded = (max(log_mep.shape[1], levels.shape[2]) + LANES - 1) // LANES * LANES
+    padded = (max(log_mep.shape[1], levels.shape[2], NODES) + LANES - 1) // LANES * LANES
     lines, nodes = np.zeros((6, padded), np.float32), np.empty((2, NODES, padded), np.float32)
     lines[1, : len(width)] = width
     _outcome_tables(particles, levels, order, log_mep, lines, nodes, table)
@@ -179,7 +179,7 @@ def position_of(level: Any, depth: Any, rows: int) -> Any:
 def _between_rows(table: Any, level: Any, depth: Any, found: Any) -> None:
     for t in range(len(level)):
         position = position_of(level[t], depth, table.shape[0])
-        row = min(int(position), table.shape[0] - 2)
+        row = max(min(int(position), table.shape[0] - 2), 0)  # no number is no row either
         above, first, second, blend = position - _f(row), table[row], table[row + 1], found[t]
         for y in range(table.shape[1]):
             blend[y] = first[y] + above * (second[y] - first[y])

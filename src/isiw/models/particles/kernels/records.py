@@ -34,7 +34,8 @@ STARTLE, RELAXED, REAL, NUMBER = 4, 11, 12, 13
 TRIAL: Final = 14
 SHARES: Final = 2
 """In place of a sort of trials: whether trials share an unknown factor of their known parts."""
-PIECE: Final = 128
+PIECE: Final = 8 * LANES
+"""So many trials of a sort are worked on at once."""
 FEW: Final = 2
 """So few trials take longer side by side with lanes that are empty than one after the other."""
 
@@ -137,13 +138,13 @@ def trial_records(columns: Any) -> Any:
 
 @kernel
 def _trial_records(columns: Any, records: Any, sizes: Any) -> None:
-    people, trials, pieces = len(columns), columns.shape[1], sizes.shape[2]
+    people, trials, pieces, most = len(columns), columns.shape[1], sizes.shape[2], records.shape[4]
     for person in range(people):
         for n in range(trials):
             column = columns[person, n]
             sort = 1 if column[LOW] != column[HIGH] else 0
             piece = 0
-            while sizes[person, sort, piece] == PIECE:
+            while sizes[person, sort, piece] == most:
                 piece += 1
             i = sizes[person, sort, piece]
             record = records[person, sort, piece]

@@ -53,7 +53,7 @@ def _edge_level(particle: Any, evoked: Any, highest: Any) -> Any:
     rows = len(evoked)
     floor_mv = exp(particle[LOG_FLOOR])
     position = position_of(highest, _NIL, rows)
-    row = min(int(position), rows - 2)
+    row = max(min(int(position), rows - 2), 0)
     peak_mv = floor_mv * (evoked[row] + (position - _f(row)) * (evoked[row + 1] - evoked[row]) - evoked[0])
     baseline_mv = floor_mv * (evoked[0] + exp(_HALF * particle[FLOOR_SD] * particle[FLOOR_SD]))
     if particle[PRESENT] == _NIL or peak_mv < max(_ENOUGH * baseline_mv, _ENOUGH_MV):
