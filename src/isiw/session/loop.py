@@ -18,6 +18,7 @@ from isiw.log.writer import LogWriter
 from isiw.session.assembly import Earlier, Options, assembled, require_fitting, require_untold
 from isiw.session.console import OperatorConsole, Table
 from isiw.session.judging import Judging
+from isiw.session.rehearsal import rehearse
 from isiw.session.sink import Follower, SessionResult
 from isiw.session.steps import Pause, ended, paused
 from isiw.session.terminal import goes_on, is_terminal, somebody_there
@@ -126,6 +127,7 @@ class Session(Judging):
     def _run(self, *, progress: bool | None, keys: bool) -> SessionResult:
         require_untold(self.strategy, len(self.trials))
         self.require_effect()
+        rehearse(self.strategy)
         earlier_s, sink = self._earlier_s(), self._sink
         shown = sink.on_trial is None and is_terminal(sys.stdout) if progress is None else progress
         table = Table(self._console, self._header, sink.faults, shown=shown)

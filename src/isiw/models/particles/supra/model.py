@@ -18,7 +18,7 @@ from isiw.models.particles.posterior import SwarmPosterior
 from isiw.models.particles.supra.jumps import SupraTarget
 from isiw.models.particles.supra.predictions import SupraSample
 from isiw.models.particles.supra.prior import SupraPrior
-from isiw.models.particles.swarm import Moving, Swarm
+from isiw.models.particles.swarm import IN_BRIEF, Moving, Swarm
 from isiw.models.protocol import Observation, Tensor
 from isiw.models.shared.tables import step_generator
 from isiw.models.windows import Runs, SampledProfiles, best_window, grid_of, profile_grid, sampled_estimate
@@ -51,6 +51,10 @@ class SupraModel(Checked):
         latents = self.prior.sample(people, self.particles, step_generator("cpu", seed, 0), space)
         engine = engine_for(self.engine, SupraTarget(self.prior, space))
         return SupraPosterior(self, space, seed, Swarm.of(latents), engine)
+
+    def in_brief(self) -> SupraModel:
+        """The same model with few particles; see `Rehearses`."""
+        return replace(self, particles=IN_BRIEF, thinned=IN_BRIEF)
 
     def update(self, posterior: SupraPosterior, observation: Observation) -> SupraPosterior:
         """The posterior after one more trial."""

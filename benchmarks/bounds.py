@@ -1,0 +1,130 @@
+"""Does any compiled loop read or write beyond an array? Random sessions with the bounds of all loops checked.
+
+    python -m benchmarks.bounds > benchmarks/results/bounds.md
+
+Each session has another space, number of particles and length, and is a random mix of all that a session of a lab's
+own loop may have: amplitudes, censored ones, intervals, uncertain ISIs, TMS alone, taps alone, lost trials, notes of
+changes, and trials that are excluded. The loops are compiled with `NUMBA_BOUNDSCHECK=1`, into a cache of their own; one
+that leaves an array raises an IndexError.
+"""
+
+from __future__ import annotations
+
+import argparse
+import collections
+import os
+import subprocess
+import sys
+import tempfile
+import time
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+import isiw
+from benchmarks.provenance import command_of, made_with
+from benchmarks.quick import understood
+
+CHECKED = {
+    "NUMBA_BOUNDSCHECK": "1",
+    "NUMBA_OPT": "1",
+    "OMP_NUM_THREADS": "1",
+    "NUMBA_CACHE_DIR": str(Path(tempfile.gettempdir()) / "isiw-bounds-checked"),
+}
+"""The environment in which bounds are checked."""
+
+STRATEGIES = ("default", "default", "default", "particles-window", "supra-threshold")
+MOST_STEPS = 18
+KINDS = ("amplitude", "censored", "interval", "uncertain ISI", "TMS alone", "tap alone", "lost", "change", "excluded")
+WEIGHTS = (8, 2, 2, 1, 2, 2, 1, 2, 1)
+
+
+def space_of(rng: np.random.Generator) -> isiw.DesignSpace:
+    """A random design space: a grid, fine or coarse, or a list of ISIs."""
+    reference = ("impact", "valve")[rng.integers(2)]
+    if rng.random() < 0.2:
+        isis_ms = rng.choice(np.arange(-20.0, 500.0), size=rng.integers(2, 70), replace=False).tolist()
+        return isiw.DesignSpace.of(isis_ms, reference=reference)
+    step_ms = float(rng.choice([0.5, 1.0, 2.0, 5.0, 10.0]))
+    low_ms = float(rng.integers(-50, 150))
+    return isiw.DesignSpace(low_ms, low_ms + step_ms * int(rng.integers(1, 120)), step_ms, reference=reference)
+
+
+def played(seed: int, folder: Path) -> collections.Counter[str]:
+    """Play one random session; how many there were of each of `KINDS`.
+
+    Args:
+        seed: of everything in it.
+        folder: where its log is put.
+    """
+    rng, counts = np.random.default_rng(seed), collections.Counter[str]()
+    space, particles = space_of(rng), int(rng.integers(2, 70))
+    name = STRATEGIES[rng.integers(len(STRATEGIES))]
+    strategy = isiw.make_strategy(name, space=space, seed=seed, particles=particles, thinned=int(rng.integers(1, 70)))
+    with isiw.open_session(strategy, folder / f"{seed}.mcap") as session:
+        for _ in range(rng.integers(1, MOST_STEPS)):
+            kind = str(rng.choice(KINDS, p=np.divide(WEIGHTS, sum(WEIGHTS))))
+            counts[kind] += 1
+            _step(session, kind, rng)
+        session.estimate()
+    return counts
+
+
+def _step(session: isiw.Recorder, kind: str, rng: np.random.Generator) -> None:
+    mep_mv = round(float(np.exp(rng.normal(-2.5, 1.2))), int(rng.integers(2, 6))) + 0.001
+    if kind == "change":
+        session.note_change("the coil moved")
+    elif kind == "excluded":
+        if counting := [trial.index for trial in session.trials if trial.counts]:
+            session.exclude(int(rng.choice(counting)))
+    elif kind == "TMS alone":
+        session.tell(None, mep_mv)
+    elif kind == "tap alone":
+        session.tell(float(rng.choice(session.strategy.space.grid_ms)), mep_mv, pulse=False)
+    else:
+        isi_ms = session.ask() + float(rng.normal(0.0, 1.0))
+        if kind == "lost":
+            session.mistrial("background activity")
+        elif kind == "interval":
+            session.tell(isi_ms, mep_interval_mv=(mep_mv, float(rng.choice([2.0 * mep_mv, np.inf]))))
+        else:
+            session.tell(isi_ms, 0.0 if kind == "censored" else mep_mv, isi_sd_ms=3.0 * (kind == "uncertain ISI"))
+
+
+def main() -> None:
+    """Play many random sessions with bounds checked, and say what went wrong."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sessions", type=int, default=2000)
+    parser.add_argument("--seed", type=int, default=0, help="of the first one")
+    options = parser.parse_args()
+    if os.environ.get("NUMBA_BOUNDSCHECK") != "1":
+        again = [sys.executable, "-m", "benchmarks.bounds", *sys.argv[1:]]
+        ended = subprocess.run(again, env=os.environ | CHECKED, check=False)  # noqa: S603 - this script
+        raise SystemExit(ended.returncode)
+    warnings.simplefilter("ignore")
+    counts, wrong = collections.Counter[str](), dict[int, str]()
+    with tempfile.TemporaryDirectory() as folder:
+        played(options.seed + options.sessions, Path(folder))  # which compiles the loops
+        began_s = time.process_time()
+        for seed in range(options.seed, options.seed + options.sessions):
+            try:
+                counts += played(seed, Path(folder))
+            except Exception as error:  # noqa: BLE001 - which is what is looked for
+                wrong[seed] = f"{type(error).__name__}: {error}"
+        spent_s = time.process_time() - began_s
+    print(f"- command: `{command_of('bounds')}`")
+    print(f"- {made_with('numba', 'numpy', 'torch')}, seeds {options.seed} to {options.seed + options.sessions - 1}\n")
+    print(f"{options.sessions:,} random sessions with bounds checked, {spent_s / options.sessions:.2f} s each:\n")
+    print("| of which | number |\n|---|---|")
+    for kind in KINDS:
+        print(f"| {kind} | {counts[kind]:,} |")
+    print(f"| **sessions that an error ended** | **{len(wrong):,}** |")
+    for seed, error in list(wrong.items())[:20]:
+        print(f"\nSeed {seed}: {error}")
+    raise SystemExit(bool(wrong))
+
+
+if __name__ == "__main__":
+    understood("bounds")
+    main()
