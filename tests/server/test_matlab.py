@@ -65,6 +65,40 @@ disp(lab.trials);
 """
 
 
+OTHER = """
+first = isiw(getenv('ISIW_URL'), getenv('ISIW_TOKEN'));
+second = isiw(getenv('ISIW_URL'), getenv('ISIW_TOKEN'));
+first.create('P07', struct('limits', struct('min_iti_s', 0), 'strategy', struct('name', 'nr')));
+[trial, isi_ms] = first.ask();
+try, second.resume('P07'); catch problem, disp(problem.identifier); end
+second.resume('P07', [], true);
+disp(second.trials);
+try, first.mistrial(1, 'no impact'); catch problem, disp(problem.identifier); end
+try, first.tell(trial, isi_ms, 0.1); catch problem, disp(problem.identifier); end
+[trial, isi_ms] = second.ask();
+second.tell(trial, isi_ms, 0.1);
+try, first.tell(trial, isi_ms, 0.2); catch problem, disp(problem.identifier); end
+first = isiw(getenv('ISIW_URL'), getenv('ISIW_TOKEN'));
+try, first.resume('P07'); catch problem, disp(problem.identifier); end
+second.close();
+first.resume('P07');
+disp(first.trials);
+"""
+
+
+def test_two_objects_are_two_clients_and_one_takes_a_session_over_only_where_it_says_so(tmp_path: Path) -> None:
+    (tmp_path / "other.m").write_text(OTHER)
+    with client_of(tmp_path / "sessions") as client:
+        ran = octave(client, str(tmp_path / "other.m"))
+    assert ran.returncode == 0, ran.stderr
+    lines = [line.strip() for line in ran.stdout.splitlines()]
+    assert lines == [
+        "isiw:OtherClient", "1", "isiw:NotAsked", "isiw:Late", "isiw:OtherOutcome", "isiw:OtherClient", "2",
+    ]  # fmt: skip
+    clients = [event.client for event in read_session(tmp_path / "sessions" / "P07.mcap").events if event.client]
+    assert len(set(clients)) == len(clients) == 3
+
+
 def test_what_is_refused_is_an_error_in_words_and_can_be_put_right(tmp_path: Path) -> None:
     (tmp_path / "refused.m").write_text(REFUSED)
     with client_of(tmp_path / "sessions") as client:

@@ -79,14 +79,15 @@ def test_the_intent_is_on_disk_before_the_answer(client: httpx.Client, session: 
 
 
 def test_an_open_trial_is_asked_for_again_only_by_its_number_as_it_may_have_been_delivered(
-    client: httpx.Client, session: str
+    client: httpx.Client,
 ) -> None:
-    first = done(client.post(f"{session}/ask"))
+    session, own = created(client, client="A"), {"client": "A"}
+    first = done(client.post(f"{session}/ask", json=own))
     assert first["again"] is False
-    error = refused(client.post(f"{session}/ask"), 409, "TrialOpen")
+    error = refused(client.post(f"{session}/ask", json=own), 409, "TrialOpen")
     assert "trial=0" in error["remedy"]
-    assert done(client.post(f"{session}/ask", json={"trial": 0})) == {**first, "again": True}
-    refused(client.post(f"{session}/ask", json={"trial": 1}), 409, "WrongTrial")
+    assert done(client.post(f"{session}/ask", json={"trial": 0, **own})) == {**first, "again": True}
+    refused(client.post(f"{session}/ask", json={"trial": 1, **own}), 409, "WrongTrial")
 
 
 def test_the_same_outcome_told_again_is_one_trial_and_answered_as_at_first(

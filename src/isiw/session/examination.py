@@ -117,8 +117,11 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
         """Put a remark on disk; with a key that the same one has already, nothing."""
         checks.text("a note", text)
         checks.text("the key of a note", key or "")
+        self.remark(Event(kind="note", trial=self.last if trial is None else trial, text=text, key=key))
+
+    def remark(self, event: Event) -> None:
+        """Put an event on disk that changes no trial; with a key that the same one has already, nothing."""
         with self._lock:
-            event = Event(kind="note", trial=self.last if trial is None else trial, text=text, key=key)
             if not is_logged(event, self._events):
                 self._sink.append(event)
                 self._events.append(event)

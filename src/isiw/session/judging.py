@@ -43,6 +43,10 @@ class Judging(ABC):
         """Log a remark; with a key that the same one has already, nothing. A key of something else is refused."""
         self._examination.note(text, key=key)
 
+    def remark(self, event: Event) -> None:
+        """Log an event that changes no trial, as a note does."""
+        self._examination.remark(event)
+
     def note_change(self, text: str, *, key: str | None = None) -> None:
         """Log that something bears on all MEPs from here on; a strategy that reckons with changes expects one.
 
