@@ -82,9 +82,14 @@ classdef isiw < handle
       this.asked = trial;
     end
 
-    function tell(this, trial, isi_ms, mep_mv)
-      % The realised ISI [ms] ([] for TMS alone, as the trial lab.trials) and the MEP from peak to peak [mV].
-      pairs = {'trial', number(trial), 'isi_ms', number(isi_ms), 'mep_mv', number(mep_mv), 'client', this.key};
+    function tell(this, trial, isi_ms, mep_mv, confirm)
+      % The realised ISI [ms] ([] for TMS alone, as the trial lab.trials) and the MEP from peak to peak [mV]. CONFIRM is
+      % true to confirm realised ISIs that are far from those asked, after the error isiw:InDoubt.
+      if nargin < 5
+        confirm = false;
+      end
+      pairs = {'trial', number(trial), 'isi_ms', number(isi_ms), 'mep_mv', number(mep_mv), ...
+               'client', this.key, 'confirm', truth(confirm)};
       this.conclude(this.post(this.path('tell'), pairs));
     end
 

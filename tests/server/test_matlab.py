@@ -64,6 +64,30 @@ lab.resume('P07');
 disp(lab.trials);
 """
 
+DOUBTED = """
+warning('off', 'isiw:Doubt');
+lab = isiw(getenv('ISIW_URL'), getenv('ISIW_TOKEN'));
+lab.create('P07', struct('limits', struct('min_iti_s', 0), 'strategy', struct('name', 'nr')));
+while lab.trials < 8
+  [trial, isi_ms] = lab.ask();
+  try
+    lab.tell(trial, 250, 0.1);
+  catch problem
+    disp(problem.identifier);
+    lab.tell(trial, 250, 0.1, true);
+  end
+end
+"""
+
+
+def test_realised_isis_in_doubt_are_an_error_until_they_are_confirmed(tmp_path: Path) -> None:
+    (tmp_path / "doubted.m").write_text(DOUBTED)
+    with client_of(tmp_path / "sessions") as client:
+        ran = octave(client, str(tmp_path / "doubted.m"))
+    assert ran.returncode == 0, ran.stderr
+    assert ran.stdout.split() == ["isiw:InDoubt"]
+    assert len(read_session(tmp_path / "sessions" / "P07.mcap").table.told) == 8
+
 
 OTHER = """
 first = isiw(getenv('ISIW_URL'), getenv('ISIW_TOKEN'));

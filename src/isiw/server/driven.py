@@ -162,6 +162,7 @@ class DrivenSession:
                 isi_sd_ms=request.isi_sd_ms,
                 background_rms_uv=request.background_rms_uv,
                 pulse=request.pulse,
+                confirm=request.confirm,
             )
         return self._concluded()
 
@@ -190,6 +191,8 @@ class DrivenSession:
             if self.recorder.asked is not None:
                 text = f"An outcome of trial {trial} was refused: {words}; {error.what}"
                 self.recorder.remark(Event(kind="note", trial=trial, text=text, key=text))
+            if error.found is Kind.ISIS_FAR:
+                raise Refusal.of(error, 409, "InDoubt", field="confirm") from error
             raise
 
     def give_up(self) -> None:
@@ -206,8 +209,9 @@ class DrivenSession:
             raise Refusal.of(error, 409, "OtherKey", field="key") from error
 
     def exclude(self, request: ExcludeRequest) -> None:
-        """Let a trial not count; one that is excluded already stays so."""
-        if not any(trial.index == request.trial and trial.excluded for trial in self.recorder.trials):
+        """Let a trial not count; one that is excluded already stays so, unless its ISI is in doubt."""
+        excluded = (trial.index for trial in self.recorder.trials if trial.excluded)
+        if request.trial not in {*excluded} - {*self.recorder.in_doubt}:
             self.recorder.exclude(request.trial, request.reason)
 
     def include(self, trial: int) -> None:
@@ -288,5 +292,5 @@ def _recorded(trial: Trial) -> str:
 def _in_words(told: TellRequest) -> str:
     """What is told about a trial, in words that differ where its values do."""
     usual = {"isi_sd_ms": 0.0, "background_rms_uv": None, "pulse": True}
-    values = told.model_dump(exclude={"trial", "client"})
+    values = told.model_dump(exclude={"trial", "client", "confirm"})
     return " ".join(f"{name}={value}" for name, value in values.items() if name not in usual or value != usual[name])

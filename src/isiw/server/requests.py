@@ -120,6 +120,9 @@ class TellRequest(_Request):
         default=True,
         description="False for a tap alone, which needs no ask: mep_mv is what the MEP window would hold at isi_ms.",
     )
+    confirm: bool = Field(
+        default=False, description="True confirms realised ISIs that are far from those asked; otherwise InDoubt."
+    )
     client: str | None = _TOLD_BY
 
 
