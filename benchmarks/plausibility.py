@@ -3,6 +3,10 @@
 Simulated people are asked by the default strategy, and what they answer is told to it: with a slip, for four trials,
 and as it is, for a whole session. Besides, the tapping robot runs sessions in which nothing is wrong. A refusal is an
 error, a flag is a warning; see `isiw.Strategy.tell`.
+
+    python -m benchmarks.plausibility --isis
+
+looks at realised ISIs instead, of right rigs and of loops with a mistake, by the rule that asks for a confirmation.
 """
 
 from __future__ import annotations
@@ -17,6 +21,7 @@ from pathlib import Path
 from typing import Final
 
 import isiw
+from benchmarks.plausibility_isis import isis_report
 from benchmarks.provenance import command_of
 from benchmarks.quick import understood
 from isiw.errors import ImplausibleDataWarning, InvalidValueError
@@ -166,7 +171,15 @@ def main() -> None:
     parser.add_argument("--trials", type=int, default=40, help="trials of each session of right data")
     parser.add_argument("--rigs", type=int, default=200, help="sessions of the right robot")
     parser.add_argument("--out", type=Path, default=RESULTS, help="path of the report, without suffix")
+    parser.add_argument("--isis", action="store_true", help="realised ISIs alone, of right rigs and wrong loops")
+    parser.add_argument("--sessions", type=int, default=1000, help="with --isis, sessions of each rig and loop")
     given = parser.parse_args()
+    if given.isis:
+        out = RESULTS.with_name("plausibility_isis") if given.out == RESULTS else given.out
+        text = isis_report(given.sessions, given.trials, command_of("plausibility"))
+        out.with_suffix(".md").write_text(text, encoding="utf-8")
+        print(text)
+        return
     accused = right_rig(given.rigs, RIG_TRIALS)
     rigs = f"The right robot, {RIG_TRIALS} trials with raw sweeps: paused or doubted in {accused} of {given.rigs}.\n"
     told = report(slips(12), right(given.people, given.trials), given.trials, command_of("plausibility"))

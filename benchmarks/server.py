@@ -24,6 +24,7 @@ import numpy as np
 import isiw
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
+from benchmarks.server_clients import shared
 from benchmarks.server_strangers import operated_meanwhile, served_meanwhile
 from benchmarks.server_tries import Served, fuzzed, killed, tried
 
@@ -179,6 +180,11 @@ def outsiders(folder: Path, tries: int) -> None:
     print(f"\nThe session's reason to end: {reason}\n")
 
 
+def clients(folder: Path, rounds: int) -> None:
+    """Several clients of one session at a time."""
+    print(f"## Several clients of one session\n\n{shared(folder, rounds)}\n")
+
+
 MOST_STRANGERS = 1000
 
 PARTS: dict[str, tuple[Callable[[Path, int], None], int]] = {
@@ -187,6 +193,7 @@ PARTS: dict[str, tuple[Callable[[Path, int], None], int]] = {
     "kills": (kills, 100),
     "description": (description, 100),
     "outsiders": (outsiders, 200),
+    "clients": (clients, 200),
 }
 
 

@@ -2,7 +2,7 @@ classdef isiw < handle
 % ISIW  Ask an isiw server which inter-stimulus interval comes next, and tell it what came of it.
 %
 %   lab = isiw('http://127.0.0.1:8473', token);
-%   lab.create('P07', struct('seed', 7));      % or lab.resume('P07'), to continue a session
+%   lab.create('P07', struct('seed', 7));      % or lab.resume('P07'), to continue a session that was closed
 %   while ~lab.stop
 %       [trial, isi_ms] = lab.ask();           % waits until the next stimulus is allowed
 %       ...                                    % your hardware delivers the pair at isi_ms
@@ -11,7 +11,8 @@ classdef isiw < handle
 %   lab.close();
 %
 % Every call can be repeated without doubling anything, so one whose answer is lost is repeated here. Where it is
-% refused, an error says why and what to do. For MATLAB from R2019b on, and GNU Octave from 7 on.
+% refused, an error says why and what to do. Each object is a client of its own, by a random key: what one was given,
+% the server gives to no other. For MATLAB from R2019b on, and GNU Octave from 7 on.
 
   properties (SetAccess = private)
     id = '';          % the session
@@ -24,6 +25,7 @@ classdef isiw < handle
   properties (Access = private)
     url
     token
+    key               % of this client
     attempts = 10     % of a call that is not answered
     noted = 0
     asked = []        % the trial that was asked for and has no outcome
@@ -34,6 +36,9 @@ classdef isiw < handle
       % The server's address, and the token that it prints when it starts.
       this.url = regexprep(char(url), '/+$', '');
       this.token = char(token);
+      [~, random] = fileparts(tempname());  % rand is the same in each new session of MATLAB
+      this.key = regexprep([datestr(now, 'yyyymmddTHHMMSSFFF') '-' random], '[^A-Za-z0-9_-]', '-');
+      this.key = this.key(1:min(end, 64));
     end
 
     function create(this, id, plan)
@@ -41,7 +46,7 @@ classdef isiw < handle
       if nargin < 3
         plan = struct();
       end
-      pairs = {'id', char(id)};
+      pairs = {'id', char(id), 'client', this.key};
       for name = fieldnames(plan)'
         pairs(end + 1:end + 2) = {name{1}, jsonencode(plan.(name{1}))};
       end
@@ -50,13 +55,18 @@ classdef isiw < handle
       this.asked = [];
     end
 
-    function resume(this, id, lost_pulses)
-      % Continue a session. A trial without an outcome becomes a mistrial.
+    function resume(this, id, lost_pulses, takeover)
+      % Continue a session. A trial without an outcome becomes a mistrial. TAKEOVER is true to continue one that another
+      % client was driving, such as MATLAB before it crashed: make sure that it has ended, and that its rig is disarmed.
       if nargin < 3
         lost_pulses = [];
       end
+      if nargin < 4
+        takeover = false;
+      end
       this.id = char(id);
-      this.take(this.post(this.path('resume'), {'lost_pulses', number(lost_pulses)}));
+      pairs = {'lost_pulses', number(lost_pulses), 'client', this.key, 'takeover', truth(takeover)};
+      this.take(this.post(this.path('resume'), pairs));
       this.asked = [];
     end
 
@@ -66,27 +76,34 @@ classdef isiw < handle
         error('isiw:TrialOpen', ['trial %d was requested and has no outcome; it may have been delivered. ' ...
               'Tell it, or call mistrial(%d, ''outcome unknown'').'], this.asked, this.asked);
       end
-      answer = this.post(this.path('ask'), {'trial', number(this.trials)});
+      answer = this.post(this.path('ask'), {'trial', number(this.trials), 'client', this.key});
       trial = answer.trial;
       isi_ms = answer.isi_ms;
       this.asked = trial;
     end
 
-    function tell(this, trial, isi_ms, mep_mv)
-      % The realised ISI [ms] ([] for TMS alone, as the trial lab.trials) and the MEP from peak to peak [mV].
-      pairs = {'trial', number(trial), 'isi_ms', number(isi_ms), 'mep_mv', number(mep_mv)};
+    function tell(this, trial, isi_ms, mep_mv, confirm)
+      % The realised ISI [ms] ([] for TMS alone, as the trial lab.trials) and the MEP from peak to peak [mV]. CONFIRM is
+      % true to confirm realised ISIs that are far from those asked, after the error isiw:InDoubt.
+      if nargin < 5
+        confirm = false;
+      end
+      pairs = {'trial', number(trial), 'isi_ms', number(isi_ms), 'mep_mv', number(mep_mv), ...
+               'client', this.key, 'confirm', truth(confirm)};
       this.conclude(this.post(this.path('tell'), pairs));
     end
 
     function tap(this, isi_ms, mep_mv)
       % A tap alone, as the trial lab.trials: the amplitude of what the MEP window would hold at this ISI [ms], [mV].
-      pairs = {'trial', number(this.trials), 'isi_ms', number(isi_ms), 'mep_mv', number(mep_mv), 'pulse', 'false'};
+      pairs = {'trial', number(this.trials), 'isi_ms', number(isi_ms), 'mep_mv', number(mep_mv), 'pulse', 'false', ...
+               'client', this.key};
       this.conclude(this.post(this.path('tell'), pairs));
     end
 
     function mistrial(this, trial, reason)
       % A trial was lost: it counts as a stimulus, and nothing is learnt from it.
-      this.conclude(this.post(this.path('mistrial'), {'trial', number(trial), 'reason', char(reason)}));
+      pairs = {'trial', number(trial), 'reason', char(reason), 'client', this.key};
+      this.conclude(this.post(this.path('mistrial'), pairs));
     end
 
     function note(this, text)
@@ -170,6 +187,15 @@ classdef isiw < handle
         pause(answer.error.retry_s);
       end
     end
+  end
+end
+
+function text = truth(value)
+  % True or false, as JSON has it.
+  if value
+    text = 'true';
+  else
+    text = 'false';
   end
 end
 

@@ -94,12 +94,13 @@ MEANINGS: Final[Mapping[str, Mapping[str, str]]] = {
         "refused a stimulus; fault: an error; resume: the session continues; fallback: another ISI than the strategy's "
         "choice; fit: the model's fit failed; refused: it was not delivered; late: an answer past its deadline; "
         "pause: paused, or continued; doubt: somebody should look at the data; note: a remark; change: something "
-        "changed that bears on all later MEPs.",
+        "changed that bears on all later MEPs; client: another client drives the session.",
         "finding": "of a doubt or a pause, what was found.",
         "trial": "the trial that was judged, refused or late; else the last one before the event.",
         "text": "what happened, in sentences.",
         "key": "of a note or a change: a second one with the same key is not logged.",
         "corrected": "of a correction, the values that the trial really had; None for those that stay.",
+        "client": "the key of the client that drives the session from here on; None if it stated none.",
     },
     "/threshold/pulse": {
         "trial": "number of the pulse, from 0.",

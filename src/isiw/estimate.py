@@ -92,6 +92,8 @@ class WindowEstimate(Checked):
         unusual: how probable it is that parts of this person are of another law than the usual one, by their names.
         pairs: how many pairs of stimuli it rests on; None if that is not known.
         silent: whether no trial that it rests on showed an MEP, so that nothing is known about a window.
+        in_doubt: whether realised ISIs were reported that are far from those asked, and nobody has confirmed them; then
+            there is no window.
         depressed: the ISIs that depress the MEP, as far as they are reported; None if there are none, or if
             nobody looked for them.
         depressed_probability: probability that there are any; None if the model does not look for them.
@@ -124,6 +126,7 @@ class WindowEstimate(Checked):
     unusual: WorkedOut[Mapping[str, float]] = field(default=WorkedOut("unusual", _NOTHING), repr=False)
     pairs: int | None = None
     silent: bool = False
+    in_doubt: bool = False
     depressed: Window | None = None
     depressed_probability: Share | None = None
     change: WorkedOut[Change | None] = field(default=WorkedOut("change", None))
@@ -149,6 +152,10 @@ class WindowEstimate(Checked):
         if self.window is not None and self.probability is not None and self.probability < 0.5:
             raise InvalidValueError("a window is reported although 'no window' is more probable", got=self.probability)
 
+    def doubted(self) -> WindowEstimate:
+        """The same where realised ISIs are in doubt: no window is reported."""
+        return self.noting(in_doubt=True, window=None, start_ms=None, end_ms=None, edge_samples_ms=None, depressed=None)
+
     @property
     def hypotheses(self) -> dict[str, float] | None:
         """Probability of each of the model's hypotheses by name, given a window; None if it has none."""
@@ -165,7 +172,7 @@ class WindowEstimate(Checked):
     def has_answer(self) -> bool:
         """True if anything is said about a window; not where a method waits for more trials, nor without any MEP."""
         says = self.window is not None or self.probability is not None or self.grid_ms is not None
-        return says and not self.silent
+        return says and not self.silent and not self.in_doubt
 
     @property
     def rests_on_data(self) -> bool:
@@ -174,8 +181,8 @@ class WindowEstimate(Checked):
 
     @property
     def too_little(self) -> str | None:
-        """A sentence if too little was measured to report a window; None if enough was."""
-        found = lacking(self.pairs, silent=self.silent)
+        """A sentence if too little was measured, or too doubtful, to report a window; None if enough was."""
+        found = lacking(self.pairs, silent=self.silent, in_doubt=self.in_doubt)
         return None if found is None else f"{found}"
 
     def interval(self, level: float = 0.9) -> tuple[Interval, Interval] | None:

@@ -53,6 +53,7 @@ class Kind(StrEnum):
     EARLY_AT_ONE_ISI = "pulses too early at one ISI"
 
     ISI_FAR = "an ISI far from the one asked"
+    ISIS_FAR = "realised ISIs far from those asked"
     EQUAL = "equal amplitudes"
     SILENT = "no MEP at all"
     STOPPED = "no more MEPs"
@@ -115,8 +116,18 @@ TOO_FEW: Final = Finding(
 )
 
 
-def lacking(pairs: int | None, *, silent: bool) -> Finding | None:
-    """The finding that too little was measured to speak of a window; None if enough was."""
+IN_DOUBT: Final = Finding(
+    Kind.ISIS_FAR,
+    Severity.DOUBT,
+    "Realised ISIs were reported that are far from those that were asked for, so nothing is said about a window",
+    "Until they are confirmed or excluded, these trials do not count.",
+)
+
+
+def lacking(pairs: int | None, *, silent: bool, in_doubt: bool = False) -> Finding | None:
+    """The finding that too little was measured, or too doubtful, to speak of a window; None if enough was."""
+    if in_doubt:
+        return IN_DOUBT
     if silent:
         return NO_MEP
     return None if pairs is None or pairs >= ENOUGH_PAIRS else TOO_FEW

@@ -50,7 +50,7 @@ def client_of(folder: Path, **rules: Any) -> Iterator[httpx.Client]:
             thread.join()
 
 
-def created(client: httpx.Client, name: str = "P07", **changes: Any) -> str:
+def created(client: httpx.Client, name: str = "P07", /, **changes: Any) -> str:
     """The path of a session that was begun."""
     done(client.post("/sessions", json={**PLAN, "id": name, **changes}))
     return f"/sessions/{name}"

@@ -34,7 +34,8 @@ def test_the_loop_with_curl_runs_as_it_stands_there(tmp_path: Path) -> None:
     assert '"ok":false' not in ran.stdout
     record = read_session(tmp_path / "P01.mcap")
     assert [trial.mep_mv for trial in record.table.told] == [0.1, 0.11, 0.12]
-    assert [(event.text, event.key) for event in record.events] == [
+    assert [event.kind for event in record.events] == ["client", "note", "change"]
+    assert [(event.text, event.key) for event in record.events[1:]] == [
         ("coil at 5 mm", "n1"),
         ("coil re-seated", "c1"),
     ]

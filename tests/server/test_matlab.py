@@ -64,6 +64,64 @@ lab.resume('P07');
 disp(lab.trials);
 """
 
+DOUBTED = """
+warning('off', 'isiw:Doubt');
+lab = isiw(getenv('ISIW_URL'), getenv('ISIW_TOKEN'));
+lab.create('P07', struct('limits', struct('min_iti_s', 0), 'strategy', struct('name', 'nr')));
+while lab.trials < 8
+  [trial, isi_ms] = lab.ask();
+  try
+    lab.tell(trial, 250, 0.1);
+  catch problem
+    disp(problem.identifier);
+    lab.tell(trial, 250, 0.1, true);
+  end
+end
+"""
+
+
+def test_realised_isis_in_doubt_are_an_error_until_they_are_confirmed(tmp_path: Path) -> None:
+    (tmp_path / "doubted.m").write_text(DOUBTED)
+    with client_of(tmp_path / "sessions") as client:
+        ran = octave(client, str(tmp_path / "doubted.m"))
+    assert ran.returncode == 0, ran.stderr
+    assert ran.stdout.split() == ["isiw:InDoubt"]
+    assert len(read_session(tmp_path / "sessions" / "P07.mcap").table.told) == 8
+
+
+OTHER = """
+first = isiw(getenv('ISIW_URL'), getenv('ISIW_TOKEN'));
+second = isiw(getenv('ISIW_URL'), getenv('ISIW_TOKEN'));
+first.create('P07', struct('limits', struct('min_iti_s', 0), 'strategy', struct('name', 'nr')));
+[trial, isi_ms] = first.ask();
+try, second.resume('P07'); catch problem, disp(problem.identifier); end
+second.resume('P07', [], true);
+disp(second.trials);
+try, first.mistrial(1, 'no impact'); catch problem, disp(problem.identifier); end
+try, first.tell(trial, isi_ms, 0.1); catch problem, disp(problem.identifier); end
+[trial, isi_ms] = second.ask();
+second.tell(trial, isi_ms, 0.1);
+try, first.tell(trial, isi_ms, 0.2); catch problem, disp(problem.identifier); end
+first = isiw(getenv('ISIW_URL'), getenv('ISIW_TOKEN'));
+try, first.resume('P07'); catch problem, disp(problem.identifier); end
+second.close();
+first.resume('P07');
+disp(first.trials);
+"""
+
+
+def test_two_objects_are_two_clients_and_one_takes_a_session_over_only_where_it_says_so(tmp_path: Path) -> None:
+    (tmp_path / "other.m").write_text(OTHER)
+    with client_of(tmp_path / "sessions") as client:
+        ran = octave(client, str(tmp_path / "other.m"))
+    assert ran.returncode == 0, ran.stderr
+    lines = [line.strip() for line in ran.stdout.splitlines()]
+    assert lines == [
+        "isiw:OtherClient", "1", "isiw:NotAsked", "isiw:Late", "isiw:OtherOutcome", "isiw:OtherClient", "2",
+    ]  # fmt: skip
+    clients = [event.client for event in read_session(tmp_path / "sessions" / "P07.mcap").events if event.client]
+    assert len(set(clients)) == len(clients) == 3
+
 
 def test_what_is_refused_is_an_error_in_words_and_can_be_put_right(tmp_path: Path) -> None:
     (tmp_path / "refused.m").write_text(REFUSED)

@@ -13,7 +13,7 @@ import pytest
 
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError, LogError
-from isiw.findings import TOO_FEW, Kind
+from isiw.findings import IN_DOUBT, TOO_FEW, Kind
 from isiw.log.reader import read_session
 from isiw.log.schema import Record, encode
 from isiw.server.answers import Refusal
@@ -79,14 +79,15 @@ def test_the_intent_is_on_disk_before_the_answer(client: httpx.Client, session: 
 
 
 def test_an_open_trial_is_asked_for_again_only_by_its_number_as_it_may_have_been_delivered(
-    client: httpx.Client, session: str
+    client: httpx.Client,
 ) -> None:
-    first = done(client.post(f"{session}/ask"))
+    session, own = created(client, client="A"), {"client": "A"}
+    first = done(client.post(f"{session}/ask", json=own))
     assert first["again"] is False
-    error = refused(client.post(f"{session}/ask"), 409, "TrialOpen")
+    error = refused(client.post(f"{session}/ask", json=own), 409, "TrialOpen")
     assert "trial=0" in error["remedy"]
-    assert done(client.post(f"{session}/ask", json={"trial": 0})) == {**first, "again": True}
-    refused(client.post(f"{session}/ask", json={"trial": 1}), 409, "WrongTrial")
+    assert done(client.post(f"{session}/ask", json={"trial": 0, **own})) == {**first, "again": True}
+    refused(client.post(f"{session}/ask", json={"trial": 1, **own}), 409, "WrongTrial")
 
 
 def test_the_same_outcome_told_again_is_one_trial_and_answered_as_at_first(
@@ -445,3 +446,42 @@ def test_what_is_believed_can_be_asked_for_before_anything_is_told(client: httpx
     estimate = done(client.get(f"{session}/estimate"))
     assert len(estimate["grid_ms"]) == len(estimate["profile_mv"]) == 201
     assert done(client.get(f"{session}/decision"))["stop"] is False
+
+
+def test_realised_isis_in_doubt_are_refused_until_they_are_confirmed(
+    client: httpx.Client, session: str, tmp_path: Path
+) -> None:
+    for number in range(6):
+        asked_ms = done(client.post(f"{session}/ask"))["isi_ms"]
+        outcome = {"trial": number, "isi_ms": max(0.0, asked_ms - 60), "mep_mv": mep_mv(asked_ms)}
+        response = client.post(f"{session}/tell", json=outcome)
+        if response.status_code != 200:
+            break
+    error = refused(response, 409, "InDoubt")
+    assert error["field"] == "confirm"
+    estimate = done(client.get(f"{session}/estimate"))
+    assert (estimate["text"], estimate["segments_ms"], estimate["probability"]) == (f"{IN_DOUBT}", [], None)
+    answer = done(client.post(f"{session}/tell", json=outcome | {"confirm": True}))
+    assert done(client.post(f"{session}/tell", json=outcome | {"confirm": True})) == answer
+    assert done(client.get(session))["told"] == number + 1
+    assert [event.kind for event in read_session(tmp_path / "P07.mcap").events].count("note") == 1
+
+
+def test_trials_in_doubt_are_excluded_by_the_client_that_has_reported_them_wrongly(
+    client: httpx.Client, session: str
+) -> None:
+    doubts: list[str] = []
+    while not any(f"{IN_DOUBT}" in each for each in doubts):
+        answer = done(client.post(f"{session}/ask"))
+        wrong = {
+            "trial": answer["trial"],
+            "isi_ms": max(0.0, answer["isi_ms"] - 60),
+            "mep_mv": 0.1 + answer["trial"] / 100,
+        }
+        doubts += done(client.post(f"{session}/tell", json=wrong))["doubts"]
+    rows = done(client.get(f"{session}/trials"))["trials"]
+    for row in rows:
+        if row["excluded"]:
+            done(client.post(f"{session}/exclude", json={"trial": row["trial"], "reason": "reported wrongly"}))
+    answer = done(client.post(f"{session}/ask"))
+    done(client.post(f"{session}/tell", json={"trial": answer["trial"], "isi_ms": answer["isi_ms"], "mep_mv": 0.1}))

@@ -7,6 +7,7 @@ import random
 from pathlib import Path
 
 import pytest
+from benchmarks.server_clients import shared
 from benchmarks.server_strangers import operated_meanwhile, served_meanwhile
 from benchmarks.server_tries import Served, fuzzed, killed
 
@@ -32,3 +33,8 @@ def test_whoever_has_the_token_is_answered_beside_many_who_have_not(tmp_path: Pa
     operated_s, reason = operated_meanwhile(tmp_path, 150, 2)
     assert max(operated_s) < 1
     assert "Ended on the live page" in reason
+
+
+@pytest.mark.slow
+def test_several_clients_of_one_session_never_deliver_a_trial_twice_or_too_early(tmp_path: Path) -> None:
+    assert "each once; none that was delivered is missing" in shared(tmp_path, 5)

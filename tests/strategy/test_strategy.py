@@ -429,7 +429,6 @@ def test_an_isi_far_from_the_one_asked_is_told_with_one_warning() -> None:
 def test_pulses_that_give_no_mep_any_more_are_told_with_one_warning() -> None:
     strategy, said = scripted_strategy(), []
     for mep_mv in [0.1, 0.2] * 4 + [0.0] * 12:
-        strategy.ask()
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             strategy.tell(100.0, mep_mv)

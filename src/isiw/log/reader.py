@@ -18,7 +18,7 @@ from isiw.log.kinds import LogKind, continued_by, of_another_kind
 from isiw.log.records import Onset, Records, unknown_of
 from isiw.log.salvage import Salvage, salvage
 from isiw.log.schema import EstimateRecord, Event, Intent, PulseOutcome, Record
-from isiw.log.verdicts import VERDICTS, under_all
+from isiw.log.verdicts import VERDICTS, doubted_by, under_all
 from isiw.sentences import JUDGED_SINCE
 from isiw.signals.measures import Measures, measures
 from isiw.signals.tap import TapResponses
@@ -158,9 +158,14 @@ class SessionRecord(_StimuliRecord[Header]):
 
     @property
     def too_little(self) -> str | None:
-        """A sentence if too little was measured to report a window; None if enough was."""
-        found = lacking(self.pairs, silent=self.is_silent)
+        """A sentence if too little was measured, or too doubtful, to report a window; None if enough was."""
+        found = lacking(self.pairs, silent=self.is_silent, in_doubt=self.in_doubt)
         return None if found is None else f"{found}"
+
+    @property
+    def in_doubt(self) -> bool:
+        """True if realised ISIs are in doubt, which nobody has confirmed or judged."""
+        return bool(doubted_by(self.events))
 
     @property
     def pairs(self) -> int:

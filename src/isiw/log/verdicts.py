@@ -13,6 +13,7 @@ from isiw.errors import InvalidValueError
 from isiw.findings import Finding, Kind, Severity
 from isiw.log.schema import Correction, Event, EventKind
 from isiw.signals.limits import implausible_amplitude
+from isiw.signals.reported import doubtful_from, is_far
 from isiw.trials import Trial, TrialTable
 
 VERDICTS: Final[dict[EventKind, Callable[[Trial, Event], Trial]]] = {
@@ -57,13 +58,52 @@ def under_all(trials: TrialTable, events: Iterable[Event]) -> TrialTable:
 
 def excluded_by(events: Iterable[Event]) -> list[int]:
     """The trials that some events leave excluded, the one that was excluded last at the end."""
-    excluded: list[int] = []
+    return [number for number, event in _last_verdicts(events).items() if event.kind == "exclusion"]
+
+
+def doubted_by(events: Iterable[Event]) -> list[int]:
+    """The trials that are excluded since their realised ISIs are in doubt, which nobody has confirmed or judged."""
+    return [
+        number
+        for number, event in _last_verdicts(events).items()
+        if event.kind == "exclusion" and event.finding is Kind.ISIS_FAR
+    ]
+
+
+def _last_verdicts(events: Iterable[Event]) -> dict[int, Event]:
+    """The last verdict on each trial that says whether it counts, in the order in which they were given."""
+    last: dict[int, Event] = {}
     for event in events:
         if event.kind in VERDICTS and event.kind != "correction" and event.trial is not None:
-            excluded = [number for number in excluded if number != event.trial]
-            if event.kind == "exclusion":
-                excluded.append(event.trial)
-    return excluded
+            last.pop(event.trial, None)
+            last[event.trial] = event
+    return last
+
+
+def newly_doubted(trials: TrialTable, events: Iterable[Event], space: DesignSpace) -> list[Trial]:
+    """The trials whose realised ISIs are in doubt now; none once ISIs were confirmed, nor any that were judged."""
+    judged = [event for event in events if event.kind in VERDICTS and event.finding is Kind.ISIS_FAR]
+    if any(event.kind == "inclusion" for event in judged):
+        return []
+    seen = {event.trial for event in judged}
+    asked = [
+        (trial, is_far(trial.isi_error_ms, space, trial.isi_sd_ms))
+        for trial in trials
+        if trial.told and trial.index not in seen and trial.isi_error_ms is not None
+    ]
+    first = doubtful_from([far for _, far in asked])
+    return [] if first is None else [trial for trial, _ in asked[first:]]
+
+
+def isi_doubted(trial: Trial) -> Event:
+    """That a trial does not count, as its realised ISI is in doubt."""
+    text = f"Realised ISI in doubt: {trial.isi_ms:g} ms instead of {trial.commanded_isi_ms:g} ms."
+    return Event(kind="exclusion", trial=trial.index, text=text, finding=Kind.ISIS_FAR)
+
+
+def isi_confirmed(number: int) -> Event:
+    """That a trial counts whose realised ISI was in doubt, as it was confirmed."""
+    return Event(kind="inclusion", trial=number, text="The realised ISI was confirmed.", finding=Kind.ISIS_FAR)
 
 
 def is_logged(event: Event, events: Iterable[Event]) -> bool:
@@ -83,9 +123,10 @@ def is_logged(event: Event, events: Iterable[Event]) -> bool:
     return True
 
 
-def exclusion(trials: TrialTable, number: int, reason: str = "") -> Event:
-    """That a trial does not count from here on."""
-    _require("exclude", number, [trial.index for trial in trials if trial.counts], "that counts")
+def exclusion(trials: TrialTable, number: int, reason: str = "", events: Iterable[Event] = ()) -> Event:
+    """That a trial does not count from here on; by the events so far it may be one that is in doubt."""
+    possible = {trial.index for trial in trials if trial.counts} | {*doubted_by(events)}
+    _require("exclude", number, sorted(possible), "that counts")
     return Event(kind="exclusion", trial=number, text=text("the reason of an exclusion", reason))
 
 
@@ -131,6 +172,14 @@ def change(trials: TrialTable, what: str, key: str | None = None) -> Event:
 def changed_after(events: Iterable[Event]) -> list[int]:
     """The trials after which somebody noted a change, each once."""
     return list(dict.fromkeys(event.trial for event in events if event.kind == CHANGE and event.trial is not None))
+
+
+def or_remark(noted: Event, events: Iterable[Event], *, already: bool) -> Event:
+    """A change as it is logged: a remark once `MOST_NOTED` were noted at other trials; one may be known already."""
+    before = set(changed_after(events))
+    if noted.trial is None or noted.trial in before or len(before) + already < MOST_NOTED:
+        return noted
+    return noted.model_copy(update={"kind": "note", "finding": Kind.MANY_CHANGES})
 
 
 def correction(trials: TrialTable, number: int, why: str, corrected: Correction) -> Event:

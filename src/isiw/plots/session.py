@@ -90,7 +90,8 @@ def session_figure(record: SessionRecord, *, truth: Window | None = None) -> Fig
     _draw_probability(chance, record)
     if last is None:
         told = len(record.table.told)
-        saying(profile, f"too few trials count ({told}): no estimate is drawn" if told else "no trial counts")
+        lacking = "realised ISIs are in doubt" if record.in_doubt else f"too few trials count ({told})"
+        saying(profile, f"{lacking}: no estimate is drawn" if told else "no trial counts")
         for axes in (edges, chance):
             saying(axes, "no estimate that rests on trials")
     explain(figure, ncols=3, note=BELOW_THE_MEAN if last and last.grid_ms else None)
@@ -197,6 +198,8 @@ def _alone_ms(record: SessionRecord) -> float:
 
 
 def _found(record: SessionRecord) -> str:
+    if record.in_doubt:
+        return "Realised ISIs are in doubt"
     if record.is_silent:
         return "No MEP was seen"
     if not record.rests_on_data:

@@ -84,7 +84,7 @@ def _trial(record: SessionRecord, trial: Trial) -> dict[str, Any]:
 
 def _belief(record: SessionRecord, estimate: EstimateRecord) -> dict[str, Any]:
     pairs = sum(trial.isi_ms is not None for trial in _known_by(record, estimate.trial))
-    nothing = lacking(pairs, silent=record.is_silent)
+    nothing = lacking(pairs, silent=record.is_silent, in_doubt=record.in_doubt)
     window = estimate.window if nothing is None else None
     found = f"{nothing or finding(estimate, record.header.stimulus, record.header.space)}"
     if nothing is None and (changed := change_found(estimate.change, _known_by(record, estimate.trial))):

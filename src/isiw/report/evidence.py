@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from isiw import sentences
-from isiw.findings import NO_MEP
+from isiw.findings import IN_DOUBT, NO_MEP
 from isiw.log.reader import SessionRecord
 from isiw.signals.rig import told_of
 from isiw.signals.watch import stopped_after
@@ -37,6 +37,8 @@ def nothing_measured(record: SessionRecord) -> str | None:
     """That too little was measured to speak of a window, and why; None if there was enough."""
     if record.rests_on_data:
         return None
+    if record.in_doubt:
+        return f"{IN_DOUBT}"
     given, told = record.given, len(record.table.told)
     if record.is_silent:
         return sentences.all_silent(told, NO_MEP.text)

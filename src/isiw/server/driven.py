@@ -12,7 +12,9 @@ from isiw.errors import InvalidValueError, LimitExceededError, LogError
 from isiw.estimate import Estimate
 from isiw.findings import Kind
 from isiw.log.reader import SessionRecord
+from isiw.log.schema import Event
 from isiw.server.answers import AskAnswer, EstimateAnswer, Refusal, SessionAnswer, TrialAnswer, failed
+from isiw.server.clients import driven_from_here, given_once, logged_client, require_own
 from isiw.server.requests import AskRequest, ExcludeRequest, MistrialRequest, NoteRequest, TellRequest
 from isiw.session.recorder import Recorder
 from isiw.strategy.stopping import StopDecision, StopKind
@@ -32,6 +34,7 @@ class DrivenSession:
         self, name: str, subject: str, recorder: Recorder, doubts: list[str], record: SessionRecord | None = None
     ) -> None:
         self.name, self.subject, self.recorder = name, subject, recorder
+        self.client = None if record is None else logged_client(record)
         self.closed = False
         self._doubts, self._lock = doubts, threading.Lock()
         self._outcomes = {} if record is None else _outcomes(record)
@@ -110,9 +113,16 @@ class DrivenSession:
                 retry_s=wait_s,
             )
 
+    def give_to(self, client: str | None) -> None:
+        """Let a client drive the session from here on; another's key is refused then."""
+        if client != self.client:
+            self.recorder.remark(driven_from_here(client))
+            self.client = client
+
     def ask(self, request: AskRequest) -> AskAnswer:
-        """The next ISI; that of an open trial only to who names the trial, as it may have been delivered."""
+        """The next ISI; that of an open trial only to the client that it was given to, and that names the trial."""
         asked, comes_next = self.recorder.asked, len(self.recorder.trials)
+        require_own(self.client, request.client, None if asked is None else asked.trial)
         if asked is not None and asked.isi_ms is None:
             raise Refusal(
                 409,
@@ -120,7 +130,7 @@ class DrivenSession:
                 f"trial {asked.trial} is {'a tap' if asked.tap_alone else 'TMS'} alone, and its outcome was refused",
                 remedy="Tell a valid outcome, or make it a mistrial.",
             )
-        if asked is not None and request.trial is None:
+        if asked is not None and request.trial is None and self.client is not None:
             raise Refusal(
                 409,
                 "TrialOpen",
@@ -133,6 +143,8 @@ class DrivenSession:
             raise Refusal(
                 409, "WrongTrial", "another trial comes next", got=request.trial, expected=f"trial {comes_next}"
             )
+        if asked is not None and self.client is None:
+            raise given_once(asked.trial, asked.isi_ms)
         self.require_no_wait(request.wait_s)  # another client may have been faster
         isi_ms = self.recorder.ask(request.deadline_s)
         return AskAnswer(trial=comes_next, isi_ms=isi_ms, again=asked is not None)
@@ -142,13 +154,16 @@ class DrivenSession:
         if request.trial in self._outcomes:
             return self._known(request.trial, _in_words(request))
         self._require_next(request.trial, asked=request.pulse and request.isi_ms is not None)
-        self.recorder.tell(
-            request.isi_ms,
-            request.mep_mv,
-            isi_sd_ms=request.isi_sd_ms,
-            background_rms_uv=request.background_rms_uv,
-            pulse=request.pulse,
-        )
+        with self._refusals_of(request.trial, _in_words(request)):
+            self._require_given_to(request.client)
+            self.recorder.tell(
+                request.isi_ms,
+                request.mep_mv,
+                isi_sd_ms=request.isi_sd_ms,
+                background_rms_uv=request.background_rms_uv,
+                pulse=request.pulse,
+                confirm=request.confirm,
+            )
         return self._concluded()
 
     def mistrial(self, request: MistrialRequest) -> TrialAnswer:
@@ -156,8 +171,29 @@ class DrivenSession:
         if request.trial in self._outcomes:
             return self._known(request.trial, f"mistrial, {request.reason}", Kind.of_mistrial(request.reason))
         self._require_next(request.trial, asked=True)
+        with self._refusals_of(request.trial, f"mistrial, {request.reason}"):
+            self._require_given_to(request.client)
         self.recorder.mistrial(request.reason)
         return self._concluded()
+
+    def _require_given_to(self, client: str | None) -> None:
+        """Raise if another client, by its key, reports what came of the ISI that was given out."""
+        asked = self.recorder.asked
+        if client is not None and asked is not None and asked.isi_ms is not None:
+            require_own(self.client, client, asked.trial)
+
+    @contextmanager
+    def _refusals_of(self, trial: int, words: str) -> Iterator[None]:
+        """Within, an outcome of the open trial that is refused is in the log, once, with the reason."""
+        try:
+            yield
+        except (Refusal, InvalidValueError) as error:
+            if self.recorder.asked is not None:
+                text = f"An outcome of trial {trial} was refused: {words}; {error.what}"
+                self.recorder.remark(Event(kind="note", trial=trial, text=text, key=text))
+            if error.found is Kind.ISIS_FAR:
+                raise Refusal.of(error, 409, "InDoubt", field="confirm") from error
+            raise
 
     def give_up(self) -> None:
         """Make an open trial a mistrial: nobody knows what came of it."""
@@ -173,8 +209,9 @@ class DrivenSession:
             raise Refusal.of(error, 409, "OtherKey", field="key") from error
 
     def exclude(self, request: ExcludeRequest) -> None:
-        """Let a trial not count; one that is excluded already stays so."""
-        if not any(trial.index == request.trial and trial.excluded for trial in self.recorder.trials):
+        """Let a trial not count; one that is excluded already stays so, unless its ISI is in doubt."""
+        excluded = (trial.index for trial in self.recorder.trials if trial.excluded)
+        if request.trial not in {*excluded} - {*self.recorder.in_doubt}:
             self.recorder.exclude(request.trial, request.reason)
 
     def include(self, trial: int) -> None:
@@ -255,5 +292,5 @@ def _recorded(trial: Trial) -> str:
 def _in_words(told: TellRequest) -> str:
     """What is told about a trial, in words that differ where its values do."""
     usual = {"isi_sd_ms": 0.0, "background_rms_uv": None, "pulse": True}
-    values = told.model_dump(exclude={"trial"})
+    values = told.model_dump(exclude={"trial", "client", "confirm"})
     return " ".join(f"{name}={value}" for name, value in values.items() if name not in usual or value != usual[name])

@@ -14,6 +14,7 @@ from isiw.config.sections import LimitsConfig, SpaceConfig, StrategyConfig, Visi
 from isiw.errors import IsiwError
 from isiw.log.schema import MOST_TRIALS, TrialNumber
 from isiw.server.answers import Refusal
+from isiw.server.clients import KEY
 from isiw.text.toml_files import (
     UNKNOWN,
     DoubledKeyError,
@@ -57,6 +58,11 @@ class CreateRequest(_Request):
     strategy: StrategyConfig = StrategyConfig()
     limits: LimitsConfig = LimitsConfig()
     protocol: VisitProtocol = VisitProtocol()
+    client: str | None = Field(
+        default=None,
+        pattern=KEY,
+        description="The client's own random key: each ask carries it, and no other client is given a trial.",
+    )
 
 
 class ResumeRequest(_Request):
@@ -68,6 +74,12 @@ class ResumeRequest(_Request):
         lt=MOST_TRIALS,
         description="Needed if the log's end is missing: how many stimuli were given that are not in it.",
     )
+    client: str | None = Field(
+        default=None, pattern=KEY, description="The key of the client that drives the session from here on."
+    )
+    takeover: bool = Field(
+        default=False, description="Whether another client drove it that has ended; that one's key is refused then."
+    )
 
 
 class AskRequest(_Request):
@@ -75,7 +87,11 @@ class AskRequest(_Request):
 
     trial: TrialNumber | None = Field(
         default=None,
-        description="The number of the trial that comes next. Named again, it is a retry, and answered as before.",
+        description="The number of the trial that comes next. Named again with the client's key, it is a retry, and "
+        "answered as before.",
+    )
+    client: str | None = Field(
+        default=None, pattern=KEY, description="The key that was stated when the session was created or resumed."
     )
     wait_s: float = Field(
         default=10.0, ge=0.0, le=MOST_WAIT_S, description="How long to wait here for the inter-trial interval [s]."
@@ -83,6 +99,11 @@ class AskRequest(_Request):
     deadline_s: float = Field(
         default=10.0, ge=0.0, le=60.0, description="After this time [s] the next ISI is an evenly spaced one."
     )
+
+
+_TOLD_BY: Any = Field(
+    default=None, pattern=KEY, description="The client's key, if any; another's than that which asked is refused."
+)
 
 
 class TellRequest(_Request):
@@ -99,6 +120,10 @@ class TellRequest(_Request):
         default=True,
         description="False for a tap alone, which needs no ask: mep_mv is what the MEP window would hold at isi_ms.",
     )
+    confirm: bool = Field(
+        default=False, description="True confirms realised ISIs that are far from those asked; otherwise InDoubt."
+    )
+    client: str | None = _TOLD_BY
 
 
 class MistrialRequest(_Request):
@@ -108,6 +133,7 @@ class MistrialRequest(_Request):
     reason: Text = Field(
         default="rejected", description="A reason that isiw knows, such as no impact; any other becomes a note."
     )
+    client: str | None = _TOLD_BY
 
 
 class NoteRequest(_Request):

@@ -21,6 +21,7 @@ from isiw.server.answers import (
     ErrorAnswer,
     EstimateAnswer,
     OkAnswer,
+    Refusal,
     SessionAnswer,
     SessionsAnswer,
     TrialAnswer,
@@ -99,17 +100,24 @@ def stands(folder: Folder, name: Name) -> Response:
 
 @router.post("/sessions/{id}/resume", responses=_errors(400, 404, 409, 415), response_model=SessionAnswer)
 def resume(folder: Folder, name: Name, body: Annotated[ResumeRequest, Depends(BodyOf(ResumeRequest))]) -> Response:
-    """Continue a session. A trial without an outcome becomes a mistrial "outcome unknown"."""
-    return _json(folder.resume(name, body.lost_pulses))
+    """Continue a session. A trial without an outcome becomes a mistrial "outcome unknown".
+
+    While another client drives it, that is refused unless it says `takeover`.
+    """
+    return _json(folder.resume(name, body))
 
 
 @router.post("/sessions/{id}/ask", responses=_errors(400, 404, 409, 415, 429), response_model=AskAnswer)
-async def ask(folder: Folder, name: Name, body: Annotated[AskRequest, Depends(BodyOf(AskRequest))]) -> Response:
-    """The next ISI, on disk as about to be delivered. Safe to repeat where it names the trial."""
+async def ask(
+    request: Request, folder: Folder, name: Name, body: Annotated[AskRequest, Depends(BodyOf(AskRequest))]
+) -> Response:
+    """The next ISI, on disk as about to be delivered. Safe to repeat where it names the trial and the client."""
     opened, end_s = await run_in_threadpool(folder.opened, name), time.monotonic() + body.wait_s
     while (wait_s := opened.recorder.wait_s()) > 0:  # without holding a thread
         opened.require_no_wait(end_s - time.monotonic())
         await asyncio.sleep(wait_s)
+    if await request.is_disconnected():  # nobody would hear the ISI, which is given out once
+        raise Refusal(408, "Disconnected", "the client has hung up meanwhile, so no trial began")
 
     def asked() -> AskAnswer:
         with folder.driving(name) as session:

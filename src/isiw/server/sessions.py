@@ -17,14 +17,18 @@ from isiw.log.durable import log_exists, log_of, part_of
 from isiw.log.headers import SERVED_KEY
 from isiw.log.reader import SessionRecord, read_session
 from isiw.server.answers import EstimateAnswer, Refusal, SessionAnswer, SessionEntry, TrialRow
+from isiw.server.clients import logged_client, require_free
 from isiw.server.driven import DrivenSession, not_open
-from isiw.server.requests import NAME, CreateRequest
+from isiw.server.requests import NAME, CreateRequest, ResumeRequest
 from isiw.session.replay import strategy_of
 from isiw.session.resume import open_session
 from isiw.session.terminal import alarm
 from isiw.strategy.catalogue import known_settings, make_strategy
 
 MOST_OPEN: Final = 20
+
+ANYBODY: Final = ResumeRequest()
+"""Resuming without a key."""
 
 T = TypeVar("T")
 
@@ -72,32 +76,36 @@ class Sessions:
         path = self._path(request.id)
         if log_exists(path):
             record = self.record(request.id)
-            if record.intents or record.header.config.get(SERVED_KEY) != request.model_dump_json():
+            if record.intents or record.header.config.get(SERVED_KEY) != _planned(request):
                 raise Refusal(
                     409, "Exists", "there is a session with this id", got=request.id,
                     remedy="Choose another id, or resume it.", field="id",
                 )  # fmt: skip
-            return self.resume(request.id)
+            return self.resume(request.id, ResumeRequest(client=request.client))
         with self._opened_as(request.id):
             return self._begin(request)
 
-    def resume(self, name: str, lost_pulses: int | None = None) -> SessionAnswer:
+    def resume(self, name: str, request: ResumeRequest = ANYBODY) -> SessionAnswer:
         """Continue a session; a trial without an outcome becomes a mistrial, since it may have been delivered."""
         if self._is_open(name):
             with self.driving(name) as session:
+                require_free(session.client, request.client, takeover=request.takeover)
                 session.give_up()
+                session.give_to(request.client)
                 return session.stands()
         with self._opened_as(name):
             path, doubts = self._existing(name), list[str]()
             record = read_session(path)
-            strategy = strategy_of(record.header)
-            recorder = open_session(strategy, path, resume=True, lost_pulses=lost_pulses, on_doubt=doubts.append)
-            return self._take(DrivenSession(name, record.header.subject, recorder, doubts, record))
+            if not record.finished:  # a session that was closed is nobody's
+                require_free(logged_client(record), request.client, takeover=request.takeover)
+            strategy, lost = strategy_of(record.header), request.lost_pulses
+            recorder = open_session(strategy, path, resume=True, lost_pulses=lost, on_doubt=doubts.append)
+            return self._take(DrivenSession(name, record.header.subject, recorder, doubts, record), request.client)
 
     def close(self, name: str) -> SessionAnswer:
         """Close a session, if it is open; one that was open when its server was killed is resumed first."""
         if not self._is_open(name) and part_of(self._existing(name)).exists():
-            self.resume(name)
+            self.resume(name, ResumeRequest(takeover=True))
         if self._is_open(name):
             with self.driving(name) as session:
                 return session.close()
@@ -169,13 +177,14 @@ class Sessions:
             subject=request.visit.subject,
             visit=request.visit.noted(),
             protocol=request.protocol,
-            config={SERVED_KEY: request.model_dump_json()},  # a text, as in TOML there is no null
+            config={SERVED_KEY: _planned(request)},
             on_doubt=doubts.append,
         )
-        return self._take(DrivenSession(request.id, request.visit.subject, recorder, doubts))
+        return self._take(DrivenSession(request.id, request.visit.subject, recorder, doubts), request.client)
 
-    def _take(self, session: DrivenSession) -> SessionAnswer:
+    def _take(self, session: DrivenSession, client: str | None) -> SessionAnswer:
         try:
+            session.give_to(client)
             stands = session.stands()
         except BaseException:
             session.recorder.close()
@@ -198,6 +207,11 @@ class Sessions:
         if not (path.is_file() or part_of(path).is_file()):
             raise Refusal(404, "NoSuchSession", "there is no such session", got=name, remedy="Create it first.")
         return path
+
+
+def _planned(request: CreateRequest) -> str:
+    """What a session is begun with, whoever begins it; a text, as in TOML there is no null."""
+    return request.model_dump_json(exclude={"client"})
 
 
 def _stood(name: str, record: SessionRecord) -> SessionAnswer:

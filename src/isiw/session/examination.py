@@ -13,12 +13,12 @@ from functools import partial
 from typing import Any, Final, Generic, NamedTuple, Protocol, TypeAlias, TypeVar
 
 from isiw import checks, sentences
-from isiw.change import MOST_NOTED, Change
+from isiw.change import Change
 from isiw.errors import LimitExceededError, StrategyError, error_text
 from isiw.findings import Finding, Kind, Severity
 from isiw.log.headers import Header
 from isiw.log.schema import Correction, EstimateRecord, Event, EventKind, Intent, Record
-from isiw.log.verdicts import changed_after, correction, excluded_by, is_logged, under_all
+from isiw.log.verdicts import changed_after, correction, doubted_by, excluded_by, is_logged, or_remark, under_all
 from isiw.session.sink import Sink
 from isiw.signals.tap import TapResponses
 from isiw.strategy.choice import candidate_isis
@@ -83,8 +83,8 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
         self.overruled = False
         self._learnt = trials
         self._learning: TrialT | None = None
-        self._events = list(events)
-        self._doubted = {event.finding for event in self._events}
+        self.events = list(events)
+        self._doubted = {event.finding for event in self.events}
         self._refusal: Exception | None = None
         self._lock = threading.RLock()
 
@@ -102,7 +102,7 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
     @property
     def last_excluded(self) -> int | None:
         """The trial that was excluded last, of those that are; None if none is."""
-        excluded = excluded_by(self._events)
+        excluded = excluded_by(self.events)
         return excluded[-1] if excluded else None
 
     def event(
@@ -123,11 +123,14 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
         """Put a remark on disk; with a key that the same one has already, nothing."""
         checks.text("a note", text)
         checks.text("the key of a note", key or "")
+        self.remark(Event(kind="note", trial=self.last if trial is None else trial, text=text, key=key))
+
+    def remark(self, event: Event) -> None:
+        """Put an event on disk that changes no trial; with a key that the same one has already, nothing."""
         with self._lock:
-            event = Event(kind="note", trial=self.last if trial is None else trial, text=text, key=key)
-            if not is_logged(event, self._events):
+            if not is_logged(event, self.events):
                 self._sink.append(event)
-                self._events.append(event)
+                self.events.append(event)
         self._sink.log.sync()
 
     def log_faults(self) -> None:
@@ -168,11 +171,11 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
         """Put a verdict on disk, unless it was logged with its key before; all trials are then learnt again."""
         with self._lock:
             event = verdict(self.trials)
-            if is_logged(event, self._events):
+            if is_logged(event, self.events):
                 return
             self._sink.append(event)
             self.trials = self.learner.judged(self.trials, event)
-            self._events.append(event)
+            self.events.append(event)
             self.overruled = self.overruled or event.kind != "note"
         self._sink.log.sync()
 
@@ -239,7 +242,8 @@ class _WindowLearner:
     """A strategy as an examination sees it; another one once all trials were learnt again."""
 
     def __init__(self, strategy: Strategy, events: Iterable[Event] = ()) -> None:
-        self.strategy, self._changes = strategy, changed_after(events)
+        self.strategy, self._events = strategy, list(events)
+        self.strategy.in_doubt = bool(doubted_by(self._events))
 
     def knows(self, trials: TrialTable) -> bool:
         return self.strategy.delivered == len(trials)
@@ -254,18 +258,16 @@ class _WindowLearner:
         return change_found(self.strategy.estimate().change, trials.told)
 
     def learn_again(self, trials: TrialTable) -> None:
-        self.strategy = relearned(self.strategy, trials, self._changes)
+        self.strategy = relearned(self.strategy, trials, changed_after(self._events))
+        self.strategy.in_doubt = bool(doubted_by(self._events))
 
     def judged(self, trials: TrialTable, verdict: Event) -> TrialTable:
-        self._changes += changed_after([verdict])
+        self._events.append(verdict)
         return under_all(trials, [verdict])
 
     def noted(self, change: Event) -> Event:
-        """A change as it is logged: a remark once `MOST_NOTED` were noted, at other trials."""
-        before = {*self._changes, *([None] if self.strategy.earlier and not self.strategy.same_level else [])}
-        if change.trial is None or change.trial in before or len(before) < MOST_NOTED:
-            return change
-        return change.model_copy(update={"kind": "note", "finding": Kind.MANY_CHANGES})
+        """A change as it is logged; that earlier trials may have another level is one already."""
+        return or_remark(change, self._events, already=bool(self.strategy.earlier) and not self.strategy.same_level)
 
     def decision(self) -> StopDecision:
         return self.strategy.decision()

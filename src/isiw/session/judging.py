@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import isiw
@@ -13,7 +13,7 @@ from isiw.log.kinds import require_session
 from isiw.log.reader import read_salvaged
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event
-from isiw.log.verdicts import LOOKED_AT, MANY_CHANGES, acceptance, change, exclusion, inclusion
+from isiw.log.verdicts import LOOKED_AT, MANY_CHANGES, acceptance, change, doubted_by, exclusion, inclusion
 from isiw.log.writer import LogWriter
 from isiw.session.examination import WindowExamination, estimate_record, learn
 from isiw.session.replay import strategy_of
@@ -43,6 +43,10 @@ class Judging(ABC):
     def note(self, text: str, *, key: str | None = None) -> None:
         """Log a remark; with a key that the same one has already, nothing. A key of something else is refused."""
         self._examination.note(text, key=key)
+
+    def remark(self, event: Event) -> None:
+        """Log an event that changes no trial, as a note does."""
+        self._examination.remark(event)
 
     def note_change(self, text: str, *, key: str | None = None) -> None:
         """Log that something bears on all MEPs from here on; a strategy that reckons with changes expects one.
@@ -79,7 +83,12 @@ class Judging(ABC):
 
     def exclude(self, trial: int, reason: str = "") -> None:
         """Let a trial not count from here on: an event is appended, and the strategy learns again without it."""
-        self._judge(lambda trials: exclusion(trials, trial, reason))
+        self._judge(lambda trials: exclusion(trials, trial, reason, self._examination.events))
+
+    @property
+    def in_doubt(self) -> tuple[int, ...]:
+        """The trials that do not count, as realised ISIs that are far from those asked were not confirmed."""
+        return tuple(doubted_by(self._examination.events))
 
     def include(self, trial: int) -> None:
         """Let a trial count again that was excluded, and learn again with it."""
@@ -120,6 +129,7 @@ def estimate_again(
     for number, trial in enumerate(trials, start=1):
         learn(made, trial)
         replayed(number)
+    made.in_doubt = record.in_doubt
     last = record.table[-1].index
     said = f"Estimated again with isiw {isiw.__version__} from the trials as they count now."
     with LogWriter.continuing(path, salvaged, record.header) as log:
@@ -140,7 +150,7 @@ def exclude(path: str | Path, trial: int, reason: str) -> None:
         DamagedLogError: the log's end is missing; resume the session first.
         InvalidValueError: no such trial, or one that counts for nothing anyway.
     """
-    _judge(path, lambda trials: exclusion(trials, trial, reason))
+    _judge(path, lambda trials, events: exclusion(trials, trial, reason, events))
 
 
 def include(path: str | Path, trial: int) -> None:
@@ -155,14 +165,14 @@ def include(path: str | Path, trial: int) -> None:
         DamagedLogError: the log's end is missing; resume the session first.
         InvalidValueError: no excluded trial has this number.
     """
-    _judge(path, lambda trials: inclusion(trials, trial))
+    _judge(path, lambda trials, _: inclusion(trials, trial))
 
 
-def _judge(path: str | Path, verdict: Callable[[TrialTable], Event]) -> None:
+def _judge(path: str | Path, verdict: Callable[[TrialTable, Sequence[Event]], Event]) -> None:
     salvaged = salvage(path)
     record = read_salvaged(salvaged)
     require_session(record.path, record.header)
-    event = verdict(record.table)
+    event = verdict(record.table, record.events)
     record.require_end()
     if record.losses:  # then the header may be written again
         record.require_read()

@@ -12,15 +12,17 @@ from isiw.devices.clock import ROUNDING_S, Clock, Pacing
 from isiw.devices.protocol import Readiness
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
-from isiw.findings import Finding, Kind, Severity
+from isiw.findings import IN_DOUBT, Finding, Kind, Severity
 from isiw.log.headers import Header
 from isiw.log.schema import Event, Intent
+from isiw.log.verdicts import isi_confirmed, isi_doubted, newly_doubted
 from isiw.log.writer import LogWriter
 from isiw.session.assembly import Earlier
 from isiw.session.examination import Examination, examination_of
 from isiw.session.judging import Judging
 from isiw.session.sink import Sink
 from isiw.signals.limits import isi_far, require_plausible, require_plausible_range
+from isiw.signals.reported import unconfirmed
 from isiw.signals.rig import REMEDIES, Evidence, told_of
 from isiw.signals.watch import Doubts, findings
 from isiw.strategy.course import Outcome
@@ -173,8 +175,12 @@ class Recorder(Recording[Trial], Judging):
         mep_sd_mv: float = 0.0,
         mep_interval_mv: tuple[float, float] | None = None,
         pulse: bool = True,
+        confirm: bool = False,
     ) -> None:
         """Report the outcome of the ISI that was asked; it is on disk before the strategy learns it.
+
+        After three realised ISIs that are far from those asked, the trials since the first do not count and no window
+        is reported, until the next `tell` confirms them, or they are excluded.
 
         Args:
             isi_ms: the realised ISI on the space's reference [ms]; None is TMS alone, which was given without being
@@ -185,11 +191,12 @@ class Recorder(Recording[Trial], Judging):
             mep_sd_mv: as for `Strategy.tell` [mV].
             mep_interval_mv: as for `Strategy.tell` [mV].
             pulse: False is a tap alone, as for `Strategy.tell`, which was given without a request.
+            confirm: whether all realised ISIs are right, however far from those asked; it is logged.
 
         Raises:
             InvalidValueError: nothing was asked, a value that cannot be, a slip of unit or order, a pulse before the
-                impact, or an ISI that is too uncertain; the outcome is not logged, and the right value can be given.
-                TMS alone counts as given from the first try on.
+                impact, an ISI that is too uncertain, or earlier ISIs that are to be confirmed; the outcome is not
+                logged, and the right value can be given. TMS alone counts as given from the first try on.
             OutOfSpaceError: an ISI beyond the space and its tolerance.
             LogError: the log cannot be written, or is no longer at its path; closing saves the outcome with the rest.
             StrategyError: as for `ask`; the outcome is logged.
@@ -205,9 +212,9 @@ class Recorder(Recording[Trial], Judging):
                 if len(self.trials) >= self._limits.max_pulses:
                     self._examination.event("limit", f"TMS alone was given beyond {self._limits.max_pulses} pulses.")
             outcome = Outcome(isi_ms, mep_mv, None, isi_sd_ms, mep_sd_mv, mep_interval_mv)
-            self._tell(outcome, background_rms_uv, pulse=pulse)
+            self._tell(outcome, background_rms_uv, pulse=pulse, confirm=flag("confirm", confirm))
 
-    def _tell(self, outcome: Outcome, background_rms_uv: float | None, *, pulse: bool) -> None:
+    def _tell(self, outcome: Outcome, background_rms_uv: float | None, *, pulse: bool, confirm: bool) -> None:
         isi_ms, mep_mv, space = outcome.isi_ms, outcome.mep_mv, self.strategy.space
         isi_ms = None if isi_ms is None else number("a realised ISI [ms]", isi_ms)
         asked = self._require_asked()
@@ -224,12 +231,36 @@ class Recorder(Recording[Trial], Judging):
         trial = Trial(asked.trial, Status.ACCEPTED, asked.isi_ms, isi_ms=isi_ms, mep_mv=mep_mv,
                       isi_sd_ms=outcome.isi_sd_ms, background_rms_uv=background_rms_uv, tap_alone=not pulse,
                       mep_sd_mv=outcome.mep_sd_mv, mep_interval_mv=outcome.mep_interval_mv)  # fmt: skip
+        if self.in_doubt and asked.isi_ms is not None:
+            self._confirm(confirm=confirm)
         self._conclude(trial)
+        if self._put_in_doubt():
+            return
         evidence = Evidence(told=told_of(self.trials), detection_limit_mv=self._detection_limit_mv)
         off = isi_far(isi_ms, asked.isi_ms, self.strategy.space)
         self._doubts = self._doubts.after((off, *findings(evidence)))
         if self._doubts.new is not None:
             self._warn(self._doubts.new)
+
+    def _confirm(self, *, confirm: bool) -> None:
+        """Let the trials in doubt count where they are confirmed, and raise where they are not."""
+        if not confirm:
+            wrong = "exclude those trials, put your loop right, and report this outcome again"
+            raise unconfirmed(self.in_doubt, self.strategy.space, wrong)
+        for trial in self.in_doubt:
+            self._examination.judge(lambda _, trial=trial: isi_confirmed(trial))  # type: ignore[misc]
+        self._examination.conclude()
+
+    def _put_in_doubt(self) -> bool:
+        """Let trials not count whose realised ISIs are in doubt, and say so; True if there are any."""
+        found = newly_doubted(self.trials, self._examination.events, self.strategy.space)
+        for trial in found:
+            self._examination.judge(lambda _, trial=trial: isi_doubted(trial))  # type: ignore[misc]
+        if found:
+            self._examination.conclude()
+            self._doubts = self._doubts.after((IN_DOUBT,))
+            self._warn(IN_DOUBT)
+        return bool(found)
 
     def mistrial(self, reason: Kind | str) -> None:
         """That the trial of the ISI that was asked is lost: it counts as a stimulus, and is not learnt.

@@ -89,6 +89,7 @@ def replay(
     unknown = record.unknown_trials
     for trial in unknown:
         learn(strategy, trial)
+    strategy.in_doubt = record.in_doubt
     table = TrialTable(tuple(sorted((*learned, *unknown), key=lambda trial: trial.index)))
     return Replayed(strategy, table, unknown, tuple(differing), len(table) if differing or not verify else first)
 

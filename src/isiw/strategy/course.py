@@ -96,13 +96,17 @@ class Outcome(Checked):
 
 @dataclass(frozen=True)
 class Outcomes:
-    """All outcomes so far: of pulses, and ISI [ms] and amplitude [mV] of taps alone; changes by pulses before."""
+    """All outcomes so far: of pulses, and ISI [ms] and amplitude [mV] of taps alone; changes by pulses before.
+
+    Pulses whose ISI is `doubted`, by their numbers, are no observations.
+    """
 
     reference: Reference
     stated_step_mv: float | None = None
     pulses: tuple[Outcome, ...] = ()
     taps: tuple[tuple[float, float], ...] = ()
     changes: tuple[int, ...] = ()
+    doubted: frozenset[int] = frozenset()
 
     def of(self, trials: Iterable[Trial]) -> Outcomes:
         """The same after some trials of a session."""
@@ -140,7 +144,7 @@ class Outcomes:
         told: list[Observation | None] = []
         for number, one in enumerate((*self.pulses, None)):
             told += [None] * self.changes.count(number)
-            told += [] if one is None else [self.observation(one)]
+            told += [] if one is None or number in self.doubted else [self.observation(one)]
         return tuple(told)
 
     def observation(self, outcome: Outcome) -> Observation:

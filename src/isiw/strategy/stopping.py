@@ -11,6 +11,7 @@ from typing import Annotated, Final, Protocol, runtime_checkable
 from isiw.checks import Checked, Count, Positive, Share, can, number
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
+from isiw.findings import Finding, Kind
 from isiw.text.sanitize import counted
 from isiw.window import SURE
 
@@ -81,6 +82,13 @@ def _stop_unless_by_time(kind: StopKind, estimate: WindowEstimate, reason: str) 
         "It is too early to stop: that amplitudes have changed with time, and there is no window, has probability "
         f"{estimate.time_alone:.2f}."
     )
+
+
+def for_lack(decision: StopDecision, found: Finding | None) -> StopDecision:
+    """The decision if something is lacking to speak of a window; in doubt none but a budget stops."""
+    if found is None or (decision.stop and (found.kind is not Kind.ISIS_FAR or decision.kind is StopKind.BUDGET)):
+        return decision
+    return StopKind.TOO_LITTLE.go_on(f"{found}")
 
 
 class StoppingRule(Protocol):

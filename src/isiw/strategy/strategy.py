@@ -11,15 +11,15 @@ from isiw.checks import amplitude, deadline, flag, number, whole
 from isiw.design import DesignSpace, require_space
 from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError, warn
 from isiw.estimate import WindowEstimate
-from isiw.findings import NO_MEP
+from isiw.findings import lacking
 from isiw.models.protocol import Posterior, PredictsMeps, ReportsTrouble, ResponseModel
-from isiw.signals.limits import isi_far, require_plausible, require_plausible_range
-from isiw.signals.rig import Evidence, Told
-from isiw.signals.watch import Doubts, findings, is_silent
+from isiw.signals.limits import require_plausible, require_plausible_range
+from isiw.signals.watch import is_silent
 from isiw.strategy.choice import Asked, Choice, Cost, instead_of_lost
 from isiw.strategy.course import Details, Method, Outcome, Outcomes
+from isiw.strategy.reported import Reported
 from isiw.strategy.settings.common import Recipe
-from isiw.strategy.stopping import StopDecision, StopKind, StoppingRule, stimuli_left
+from isiw.strategy.stopping import StopDecision, StoppingRule, for_lack, stimuli_left
 from isiw.trials import Trial
 from isiw.types import FloatArray
 
@@ -62,8 +62,7 @@ class Strategy:
         seed = whole("the seed", seed, least=0)
         self.space, self.model, self.acquisition, self.stopping = space, model, acquisition, stopping
         self.initial_ms = tuple(space.snap(isi_ms) for isi_ms in initial_ms)
-        self.recipe = recipe or Recipe(name="", seed=seed)
-        self.cost, self.seed = cost, seed
+        self.recipe, self.cost, self.seed = recipe or Recipe(name="", seed=seed), cost, seed
         self._course = Method(space, model, acquisition, stopping, self.initial_ms, cost).begin(seed)
         missing = [c.__name__ for c in acquisition.needs if not isinstance(self.posterior, c)]
         if missing:
@@ -75,35 +74,23 @@ class Strategy:
         self._mistrials = self._controls = self._lost = 0
         self._outcomes = Outcomes(space.reference, self.amplitude_step_mv)
         self.earlier: tuple[Trial, ...] = ()  # learnt before the first ask
-        self.same_level = True
-        self._doubts = Doubts()
-        self._asked = Asked()
+        self.same_level, self.in_doubt = True, False  # in doubt: ISIs were far from those asked, and not confirmed
+        self._asked, self._reported = Asked(), Reported(space)
 
     def __str__(self) -> str:
         name = f"Strategy {self.recipe.name!r}" if self.recipe.name else "Strategy"
-        return "\n".join(
-            (
-                f"{name}, seed {self.seed}",
-                f"Space: {self.space}",
-                f"Model: {type(self.model).__name__}, ISIs chosen by {type(self.acquisition).__name__}",
-                f"Trials: {self._course.told} learnt, {self._mistrials} mistrials",
-            )
+        return (
+            f"{name}, seed {self.seed}\nSpace: {self.space}\n"
+            f"Model: {type(self.model).__name__}, ISIs chosen by {type(self.acquisition).__name__}\n"
+            f"Trials: {self._course.told} learnt, {self._mistrials} mistrials"
         )
 
     __repr__ = __str__  # in a notebook, too, somebody sees from which event its ISIs count
 
     def restarted(self) -> Strategy:
         """The same strategy before its first trial; it has learnt the earlier ones."""
-        again = Strategy(
-            self.space,
-            self.model,
-            self.acquisition,
-            self.stopping,
-            initial_ms=self.initial_ms,
-            cost=self.cost,
-            seed=self.seed,
-            recipe=self.recipe,
-        )
+        how = {"initial_ms": self.initial_ms, "cost": self.cost, "seed": self.seed, "recipe": self.recipe}
+        again = Strategy(self.space, self.model, self.acquisition, self.stopping, **how)  # type: ignore[arg-type]
         again.learn_all(self.earlier, same_level=self.same_level)
         return again
 
@@ -157,8 +144,7 @@ class Strategy:
         deadline_s = deadline("deadline_s", deadline_s)
         choice = self._asked.choice
         if choice is None:
-            course = self._course
-            choice = (course.choices if deadline_s is None else course.choices_within(deadline_s))[0]
+            choice = (self._course.choices if deadline_s is None else self._course.choices_within(deadline_s))[0]
             self._asked = replace(self._asked.noting(choice), choice=choice)
         return choice.isi_ms
 
@@ -223,8 +209,12 @@ class Strategy:
         mep_sd_mv: float = 0.0,
         mep_interval_mv: tuple[float, float] | None = None,
         pulse: bool = True,
+        confirm: bool = False,
     ) -> None:
         """Learn from one accepted trial.
+
+        After three realised ISIs that are far from those asked, what was told since the first does not count and no
+        window is reported, until the next `tell` confirms them.
 
         Args:
             isi_ms: the realised ISI on the space's reference [ms]; None for TMS alone, which uses up no budget.
@@ -236,12 +226,13 @@ class Strategy:
             pulse: whether the magnetic pulse was given. Without it, this is a tap alone, which uses up no budget:
                 `mep_mv` is the amplitude of what the MEP window would hold at `isi_ms`, and what the tap itself adds to
                 amplitudes near this ISI is learnt.
+            confirm: whether all realised ISIs are right, however far from those asked.
 
         Raises:
             InvalidValueError: NaN, infinite or negative values, a response that is neither True nor False, not exactly
                 one of `mep_mv`, `mep_interval_mv` and `response`, an amplitude that no muscle gives, swapped arguments,
-                seconds, a pulse before the impact, an ISI that is too uncertain, or a tap alone without ISI or
-                amplitude.
+                seconds, a pulse before the impact, an ISI that is too uncertain, a tap alone without ISI or amplitude,
+                or earlier ISIs that are to be confirmed.
             OutOfSpaceError: an ISI beyond the space and its tolerance.
             StrategyError: a kind of outcome that the model cannot learn from.
 
@@ -259,12 +250,20 @@ class Strategy:
         more = Details(response=response, isi_sd_ms=isi_sd_ms, mep_sd_mv=mep_sd_mv, mep_interval_mv=mep_interval_mv)
         outcome = Outcome(isi_ms, mep_mv, **more)
         require_plausible_range(outcome.mep_sd_mv, outcome.mep_interval_mv)
+        reported = self._reported if plain_ms is None else self._reported.confirmed_by(confirm=flag("confirm", confirm))
         self.learn(isi_ms, mep_mv, **more)
-        told = [Told(one.mep_mv, one.isi_ms) for one in self._outcomes.pulses if one.mep_mv is not None]
-        evidence = Evidence(told=told, detection_limit_mv=self.detection_limit_mv)
-        self._doubts = self._doubts.after((isi_far(plain_ms, asked_ms, self.space), *findings(evidence)))
-        if self._doubts.new is not None:
-            warn(f"{self._doubts.new}", ImplausibleDataWarning)
+        self._reported = reported.after(self._outcomes.pulses, asked_ms, self.detection_limit_mv)
+        self._leave_out(self._reported.doubted)
+        if self._reported.new is not None:
+            warn(f"{self._reported.new}", ImplausibleDataWarning)
+
+    def _leave_out(self, doubted: frozenset[int]) -> None:
+        """Learn again without the pulses in doubt; they use up budget."""
+        if doubted == self._outcomes.doubted:
+            return
+        self._mistrials += len(doubted) - len(self._outcomes.doubted)
+        self._outcomes, self.in_doubt = replace(self._outcomes, doubted=doubted), bool(doubted)
+        self._course, self._asked = self._course.again(self.seed, self._outcomes.observations), self._asked.again()
 
     def learn(self, isi_ms: float | None, mep_mv: float | None = None, **more: Unpack[Details]) -> None:
         """Learn from one trial that was judged before, as a session does: as `tell`, however implausible.
@@ -377,7 +376,8 @@ class Strategy:
         estimate = self._course.estimate()
         if self._outcomes.tap_may_explain(estimate.window):
             estimate = estimate.noting(tap_may_explain=True)
-        return estimate.noting(silent=True) if self._is_silent else estimate
+        estimate = estimate.noting(silent=True) if self._is_silent else estimate
+        return estimate.doubted() if self.in_doubt else estimate
 
     def prediction_mv(self) -> tuple[FloatArray, FloatArray] | None:
         """The band in which nine of ten next MEPs lie, at each ISI of `estimate().grid_ms`.
@@ -391,7 +391,7 @@ class Strategy:
         """The decision to stop now or not, with its reason."""
         silent = self._is_silent
         decision = self._course.decision(mistrials=self._mistrials, silent=silent)
-        return StopKind.TOO_LITTLE.go_on(f"{NO_MEP}") if silent and not decision.stop else decision
+        return for_lack(decision, lacking(None, silent=silent, in_doubt=self.in_doubt))
 
     @property
     def _is_silent(self) -> bool:
