@@ -32,6 +32,7 @@ QUICK: Final[Mapping[str, str]] = {
     "before_and_now speed": "--laps 1",
     "before_and_now stops": "--out OUT",
     "calibration": "--replications 4 --trials 5 --people 1 --out OUT",
+    "deaths": "--kills 9 --out OUT",
     "dissertation": "--few --out OUT",
     "fair_opponent": "--people 3 --trials 12 --out OUT",
     "first_words": "--trials 6",

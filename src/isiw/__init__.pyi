@@ -42,6 +42,7 @@ from .devices.transports.folder import FolderDevice as FolderDevice
 from .devices.transports.line import LineDevice as LineDevice
 from .devices.transports.lsl import LslDevice as LslDevice
 from .devices.transports.lsl_samples import LslChannel as LslChannel
+from .devices.watchdog import Watchdog as Watchdog
 from .dissertation import interval as interval
 from .dissertation import repeatability as repeatability
 from .dissertation import response_counts as response_counts

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol, TypeAlias, runtime_checkable
+from typing import Final, Literal, Protocol, TypeAlias, runtime_checkable
 
 from isiw.checks import (
     Checked,
@@ -24,6 +24,12 @@ Answer: TypeAlias = Sweep | Measurement
 """What came of a stimulus: waveforms, or the MEP as the device measured it."""
 
 
+Guard: TypeAlias = Literal["watchdog", "heartbeat"]
+"""What disarms a device if isiw dies."""
+
+NOT_PROTECTED: Final = "not protected if isiw dies"
+
+
 @dataclass(frozen=True)
 class DeviceInfo(Checked):
     """A device's description of itself; the log keeps it.
@@ -40,10 +46,12 @@ class DeviceInfo(Checked):
         conditioning: what it delivers first: a tap on the tendon, or an electrical pulse to the nerve, as an impact.
         address: what it is connected to, such as "COM3"; no two sessions of a computer drive a device of one address.
         tap_alone: whether it can deliver a tap without the magnetic pulse, which `Stimulus.tap_alone` asks for.
+        if_isiw_dies: what disarms it if isiw dies while it is armed: "watchdog", a process beside isiw, such as
+            `isiw.Watchdog`, or "heartbeat", a sign of life without which it disarms itself; None if nothing does.
 
     Raises:
-        InvalidValueError: an unknown reference or conditioning stimulus, a detection limit or a hit delay that is not
-            positive, a name, version, address or unit that is no text, or a word where True or False is due.
+        InvalidValueError: an unknown reference, conditioning stimulus or guard, a detection limit or a hit delay that
+            is not positive, a name, version, address or unit that is no text, or a word where True or False is due.
     """
 
     name: Text
@@ -56,6 +64,7 @@ class DeviceInfo(Checked):
     address: Text = ""
     tap_alone: Flag = False
     conditioning: Conditioning = "tap"
+    if_isiw_dies: Guard | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -132,6 +141,24 @@ class ReportsReadiness(Protocol):
 
 
 @runtime_checkable
+class DiesArmed(Protocol):
+    """Capability: a device that can show that it is disarmed if isiw dies."""
+
+    def die_armed(self, timeout_s: float) -> float | None:
+        """Have a process of its own arm the staged device and die. Delivers nothing.
+
+        Args:
+            timeout_s: the longest that disarming may take [s].
+
+        Returns:
+            The time until it was disarmed [s]; None if that cannot be tried here.
+
+        Raises:
+            DeviceError: it is not known to be disarmed.
+        """
+
+
+@runtime_checkable
 class HasMemory(Protocol):
     """Capability: a device whose answers depend on the stimuli before, as simulated and replayed ones do."""
 
@@ -149,6 +176,13 @@ def info_of(device: Device) -> DeviceInfo:
             remedy='Return DeviceInfo("what it is", "impact"), or "valve", the event that its ISIs count from.',
         )
     return info
+
+
+def unprotected(info: DeviceInfo) -> str | None:
+    """A sentence for whoever arms a device that stays armed if isiw dies; None for any other."""
+    if info.simulated or info.if_isiw_dies is not None:
+        return None
+    return f"{info.name} is {NOT_PROTECTED}: what is armed then stays armed. Keep the switch of the stimulator at hand."
 
 
 def readiness_of(device: Device) -> Readiness:

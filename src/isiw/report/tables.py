@@ -11,6 +11,7 @@ from itertools import groupby, pairwise
 from typing import Any, NamedTuple
 
 from isiw.devices.limits import Limits
+from isiw.devices.protocol import NOT_PROTECTED, unprotected
 from isiw.findings import Kind
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Event, Intent
@@ -97,7 +98,7 @@ def _device(record: SessionRecord) -> str:
     info = record.header.device
     parts = [info.name, *([f"version {info.version}"] if info.version else [])]
     parts += [f"at {info.address}"] if info.address else []
-    return ", ".join([*parts, _whose(info.simulated)])
+    return ", ".join([*parts, _whose(info.simulated), *([NOT_PROTECTED] if unprotected(info) else [])])
 
 
 def _whose(simulated: bool) -> str:  # noqa: FBT001 - it is all that is said

@@ -13,6 +13,7 @@ from typing import Final, Protocol
 import numpy as np
 
 from isiw.design import DesignSpace
+from isiw.devices.protocol import unprotected
 from isiw.errors import InvalidValueError, LogError, error_text
 from isiw.estimate import WindowEstimate
 from isiw.log.headers import Header
@@ -274,6 +275,8 @@ class Table:
         self._console, self._header, self._faults, self._shown = console, header, faults, shown
         if shown:
             between = " " if _most() < COLUMNS else "\n"
+            warning = unprotected(header.device)
+            sys.stdout.write(f"{folded(plain(warning))}\n" if warning else "")
             sys.stdout.write(f"{folded(between.join(PROGRESS_LEGEND))}\n")
             show_progress(PROGRESS_HEADINGS)
 

@@ -15,7 +15,7 @@ from isiw.design import DesignSpace
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.deadlines import PunctualDevice
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import Answer, Device, DeviceInfo, HasMemory, Readiness, readiness_of
+from isiw.devices.protocol import Answer, Device, DeviceInfo, DiesArmed, HasMemory, Readiness, readiness_of, unprotected
 from isiw.errors import DeviceError, DeviceTimeoutError, IsiwError, NotDelivered, StillArmedError, error_text
 from isiw.findings import Kind
 from isiw.log.schema import waveform_topic
@@ -37,6 +37,7 @@ from isiw.testing.suites import broken, require
 from isiw.text.sanitize import shown
 from isiw.trials import Measurement, Stimulus, Sweep, Trial
 
+_DISARMED_S: Final = 2.0
 _VERBS: Final = ("describe", "stage", "deliver", "stop", "unstage")
 
 
@@ -93,7 +94,7 @@ def _checked(
     if virtual and device.describe().simulated:
         pace = replace(pace, clock=VirtualClock())
     say(_announcement(device, pace))
-    deliveries = _check_delivery(device, rules, pace)
+    deliveries = _check_delivery(device, rules, pace, say)
     if isinstance(device, HasMemory):
         _check_memory(make, rules.space, pace)
     table = device_table(device.describe(), deliveries, rules.limits)
@@ -109,7 +110,10 @@ def _announcement(device: Device, pace: CheckPace) -> str:
     pairs = 8 if isinstance(device, HasMemory) else 3
     alone = ", one magnetic pulse alone and one tap alone" if info.tap_alone else " and one magnetic pulse alone"
     iti_s = max(pace.iti_s, pace.limits.iti_s)
-    return f"This check stimulates: {pairs} pairs{alone}, {iti_s:g} s apart. Keep the coil on a phantom."
+    warning = unprotected(info)
+    return f"This check stimulates: {pairs} pairs{alone}, {iti_s:g} s apart. Keep the coil on a phantom." + (
+        f" {warning}" if warning else ""
+    )
 
 
 @dataclass(frozen=True)
@@ -127,7 +131,7 @@ class _Rules:
         return judge_measurement(answer, stimulus, self.space, self.limits)
 
 
-def _check_delivery(device: Device, rules: _Rules, pace: CheckPace) -> list[Delivery]:
+def _check_delivery(device: Device, rules: _Rules, pace: CheckPace, say: Callable[[str], None]) -> list[Delivery]:
     guarded = Guarded(device, pace)
     with guarded.exclusive():
         guarded.require_stop()
@@ -143,6 +147,8 @@ def _check_delivery(device: Device, rules: _Rules, pace: CheckPace) -> list[Deli
                 answer, took_s = guarded.deliver(stimulus)
                 trial = _checked_answer(guarded.info, stimulus, answer, rules)
                 deliveries.append(Delivery(stimulus, answer, trial, took_s))
+            if guarded.info.if_isiw_dies is not None:
+                say(_disarmed_if_isiw_dies(device, guarded.info))
             for _ in range(2):
                 guarded.disarm()
                 guarded.require_refusal("after stop()")
@@ -153,6 +159,20 @@ def _check_delivery(device: Device, rules: _Rules, pace: CheckPace) -> list[Deli
             guarded.disarm()
             guarded.require_refusal("after being staged again and stopped")
     return deliveries
+
+
+def _disarmed_if_isiw_dies(device: Device, info: DeviceInfo) -> str:
+    """Kill a process that has armed the staged device, and say how long it stayed armed."""
+    took_s = None
+    if isinstance(device, DiesArmed):
+        try:
+            took_s = device.die_armed(_DISARMED_S)
+        except DeviceError as error:
+            promise = f"{info.name} is disarmed within {_DISARMED_S:g} s when a process dies that has armed it"
+            raise broken(promise, error_text(error)) from error
+    if took_s is not None:
+        return f"A process that had armed {info.name} was killed: disarmed after {1e3 * took_s:.0f} ms."
+    return f"{info.name} says that it is disarmed if isiw dies, by a {info.if_isiw_dies}. That was not tried."
 
 
 def _check_description(device: Device, space: DesignSpace) -> None:

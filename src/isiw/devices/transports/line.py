@@ -19,6 +19,7 @@ from isiw.devices.transports.line_exchange import Line, LineSettings
 from isiw.devices.transports.line_table import (
     LineCommands,
     LineExchange,
+    has_handle,
     isi_ms_of,
     mep_mv_of,
     number_of,
@@ -59,7 +60,9 @@ class LineDevice:
         require_address(text("address", address))
         self._commands = from_table(LineCommands, commands, "commands")
         self._settings = from_table(LineSettings, line or {}, "line")
-        self._info = described(info, address=address, tap_alone=self._commands.tap_alone is not None)
+        self._watched = self._settings.watchdog and has_handle(address)
+        known = {"if_isiw_dies": "watchdog"} if self._watched else {}
+        self._info = described(info, address=address, tap_alone=self._commands.tap_alone is not None, **known)
         self._measure = measure
         measuring = self._commands.measuring
         if not (all(measuring) if measure is None else not any(measuring)):
@@ -114,6 +117,16 @@ class LineDevice:
                 "the command to fire was sent, so the stimulus may have been given; its outcome is not known: "
                 f"{error_text(error)}"
             ) from error
+
+    def die_armed(self, timeout_s: float) -> float | None:
+        """The time until the instrument is disarmed if a process dies that armed it [s]; None without a watchdog."""
+        if not self._watched:
+            return None
+        with self._turn(self._since_stop) as line:
+            self._may_be_armed = True
+            took_s = line.die_armed(self._commands.arm, self._commands.disarm, timeout_s)
+            self._may_be_armed = False
+            return took_s
 
     def stop(self) -> None:
         """Disarm: over the connection that there is, or over a fresh one if that one fails."""
@@ -199,15 +212,25 @@ class LineDevice:
         with self._busy, suppress(DeviceError):
             if self._line is not None and self._line.trusted:
                 self._line.drain()  # it fails if the connection broke while nothing was in flight
+                self._watch(self._line)
                 return
         self._close()
         line = self._opened(end_s, lambda: self._since_stop is not era)
+        self._watch(line)
         with self._busy:
             if self._since_stop is era:
                 self._line = line
                 return
         line.close()
         raise NotDelivered(f"{self._info.name} was stopped", remedy="Call stage() first.")
+
+    def _watch(self, line: Line) -> None:
+        if self._watched:
+            try:
+                line.watch(self._commands.disarm)
+            except DeviceError:
+                line.close()
+                raise
 
     def _opened(self, end_s: float = math.inf, given_up: Callable[[], bool] = lambda: False) -> Line:
         """A fresh connection over which the instrument has confirmed that it is disarmed."""

@@ -16,11 +16,14 @@ from typing import Annotated, TypeVar
 from isiw.checks import (
     Checked,
     Count,
+    Flag,
     NonNegative,
     Positive,
     choice,
 )
+from isiw.devices.dying import armed_by_another
 from isiw.devices.transports.line_table import Connection, LineExchange, command_values
+from isiw.devices.watchdog import Watchdog
 from isiw.errors import DeviceError, DeviceTimeoutError
 from isiw.text.sanitize import read_whole
 
@@ -30,6 +33,8 @@ _LONGEST_LINE = 1000
 _MOST_READS = 5
 _MOST_TOLD = 5
 _LONGEST_TOLD = 80
+_STARTING_S = 10.0
+_REPEATING_S = 0.5  # for which a watchdog repeats itself
 
 _log = logging.getLogger(__name__)
 
@@ -48,6 +53,8 @@ class LineSettings(Checked):
         connect_s: how long it may take from opening the connection until it says that it is disarmed [s]; boards that
             start again when their port is opened need a second or two. `stop` may need this and twice `timeout_s`.
         isi_tolerance_ms: how far the ISI that is read back may be from the one that was set [ms].
+        watchdog: whether a process beside isiw disarms the instrument if isiw dies; there is none on Windows, nor where
+            the address is that of a port's software, such as "rfc2217://…".
     """
 
     baud: Count = 115_200
@@ -55,6 +62,7 @@ class LineSettings(Checked):
     timeout_s: Positive = 1.0
     connect_s: Positive = 2.5
     isi_tolerance_ms: NonNegative = 0.001
+    watchdog: Flag = True
 
 
 class Line:
@@ -66,6 +74,7 @@ class Line:
     def __init__(self, connection: Connection, settings: LineSettings, refusal: str) -> None:
         self._connection, self._settings, self._refusal = connection, settings, refusal
         self._incoming = _Lines()
+        self._watchdog: Watchdog | None = None
         self.trusted = True
 
     def ask(
@@ -86,7 +95,7 @@ class Line:
         if not exchange.numbered:
             self.drain()
         self.trusted = False
-        self._guarded(lambda: self._connection.send(f"{command}{self._settings.line_end}".encode("ascii")))
+        self._guarded(lambda: self._connection.send(self._written(command)))
         deadline_s = time.monotonic() + timeout_s
         said = self._answer(command, exchange, number, deadline_s, given_up)
         self.trusted = True
@@ -105,16 +114,71 @@ class Line:
         others.add(self._incoming.take_rest())
         others.say("before a command")
 
+    def _written(self, command: str) -> bytes:
+        return f"{command}{self._settings.line_end}".encode("ascii")
+
+    def watch(self, disarm: LineExchange) -> None:
+        """See to it that the instrument is disarmed if isiw dies."""
+        if self._watchdog is not None and not self._watchdog.watches:
+            self._watchdog.end()
+            self._watchdog = None
+        if self._watchdog is None:
+            self._watchdog = self._guarded(lambda: Watchdog(self._connection.handle, self._disarming(disarm)[1]))
+
+    def _disarming(self, disarm: LineExchange) -> tuple[int, bytes]:
+        """The number of a command to disarm, and its bytes, before which whatever was begun is ended."""
+        number = next(_sequence)
+        return number, self._settings.line_end.encode("ascii") + self._written(
+            disarm.command(command_values(number, 0, None))
+        )
+
+    def die_armed(self, arm: LineExchange, disarm: LineExchange, timeout_s: float) -> float:
+        """Have another process arm, kill it, and wait until the instrument says that it is disarmed.
+
+        Args:
+            arm: the command to arm.
+            disarm: the command that the other process's watchdog sends.
+            timeout_s: how long each answer may take [s].
+
+        Returns:
+            The time from the death to the answer [s].
+        """
+        arming, (disarming, disarm_data) = next(_sequence), self._disarming(disarm)
+        arm_data = self._written(arm.command(command_values(arming, 0, None)))
+        self.trusted = False
+        with self._guarded(lambda: armed_by_another(self._connection.handle, arm_data, disarm_data)) as process:
+            try:
+                until_s = time.monotonic() + _STARTING_S + timeout_s
+                self._answer("arm", arm, arming, until_s, lambda: process.poll() is not None)
+            finally:
+                process.kill()
+            died_s = time.monotonic()
+            self._answer("disarm", disarm, disarming, died_s + timeout_s, lambda: False, may_refuse=False)
+        took_s = time.monotonic() - died_s
+        time.sleep(_REPEATING_S)
+        self.drain()
+        self.trusted = True
+        return took_s
+
     def close(self) -> None:
         """Close the connection; calling it again is harmless."""
         self.trusted = False
+        if self._watchdog is not None:
+            self._watchdog.end()  # it would keep the port open
         try:
             self._connection.close()
         except OSError as error:
             _log.warning("closing the connection failed: %s", error)
 
     def _answer(
-        self, command: str, exchange: LineExchange, number: int, deadline_s: float, given_up: Callable[[], bool]
+        self,
+        command: str,
+        exchange: LineExchange,
+        number: int,
+        deadline_s: float,
+        given_up: Callable[[], bool],
+        *,
+        may_refuse: bool = True,  # what refuses the empty line before a watchdog's command does not refuse that
     ) -> dict[str, str]:
         others = _Others()
         try:
@@ -122,7 +186,8 @@ class Line:
                 said = exchange.match(line)
                 if said is not None and (not exchange.numbered or _is(number, said.get("sequence"))):
                     return said
-                self._require_not_refused(line, number)
+                if may_refuse:
+                    self._require_not_refused(line, number)
                 others.add(line)
         finally:
             others.say(f"while {command!r} was to be answered")

@@ -18,6 +18,7 @@ from typing import Annotated, Final, TypeAlias
 from urllib.parse import urlsplit
 
 from isiw.checks import Checked, Positive, Text, from_table, number
+from isiw.devices.watchdog import SUPPORTED
 from isiw.errors import InvalidValueError
 from isiw.text.named_code import library
 from isiw.text.sanitize import read_number
@@ -58,6 +59,11 @@ def _host_and_port(address: str) -> tuple[str | None, int | None]:
     return host, port
 
 
+def has_handle(address: str) -> bool:
+    """True if another process can inherit a connection to an address."""
+    return SUPPORTED and (address.startswith(_TCP) or "://" not in address)
+
+
 class _Tcp:
     """Bytes to and from an instrument; whatever fails is an OSError."""
 
@@ -87,6 +93,11 @@ class _Tcp:
         """Close it; calling it again is harmless."""
         self._socket.close()
 
+    @property
+    def handle(self) -> int:
+        """Its number in this process, which a process that is started can inherit."""
+        return self._socket.fileno()
+
 
 class _Serial:
     """The same over a serial port, which no other program can open meanwhile."""
@@ -115,6 +126,10 @@ class _Serial:
 
     def close(self) -> None:
         self._port.close()
+
+    @property
+    def handle(self) -> int:
+        return int(self._port.fileno())
 
 
 Connection: TypeAlias = _Tcp | _Serial

@@ -24,9 +24,10 @@
   };
 
   function tellPhase() {
-    const { phase, pause } = shown;
+    const { phase, pause, unprotected } = shown;
     element("phase").dataset.phase = phase;
-    said("phase", phase === "paused" ? `Paused: ${pause.reason} The device is disarmed.` : phases[phase]);
+    const running = phase === "running" && unprotected ? ` ${unprotected}` : "";
+    said("phase", phase === "paused" ? `Paused: ${pause.reason} The device is disarmed.` : `${phases[phase]}${running}`);
   }
 
   function tellLast(trial) {

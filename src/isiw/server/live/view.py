@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Final, NamedTuple
 
+from isiw.devices.protocol import unprotected
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import EstimateRecord, Event, Intent, Record, Waveform
 from isiw.report.drawn import drawn
@@ -122,6 +123,7 @@ class View:
             "pause": None if pause is None else {"number": pause.number, "reason": plain(pause.reason)},
             "subject": plain(record.header.subject) or "an unnamed subject",
             "facts": self._facts,
+            "unprotected": plain(unprotected(record.header.device) or ""),
             "drawn": drawn(record),
             "delivered": len(record.table),
             "most": record.header.limits.max_pulses,
