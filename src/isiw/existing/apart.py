@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from isiw.errors import InvalidValueError
-from isiw.existing import answer
+from isiw.existing import answer, frames
 from isiw.existing.delivered import Delivered
 from isiw.existing.layout import Layout
 from isiw.existing.limits import ReadingLimits
@@ -53,21 +53,23 @@ def read_apart(
         ConfigError: a library is not installed.
         OSError: a file that cannot be opened.
     """
+    seconds = limits.seconds_for(path, table=path.suffix.lower() in frames.SUFFIXES)
     request = {
         "path": str(path),
         "layout": asdict(layout),
         "subject": subject,
         "limits": asdict(limits),
+        "seconds": seconds,
         "also": [str(other) for other in also],
     }
     with tempfile.TemporaryDirectory(prefix="isiw-") as folder:
-        status = _run({**request, "answer": folder}, limits.seconds_for(path))
+        status = _run({**request, "answer": folder}, seconds)
         if status == 0:
             found = answer.read_answer(Path(folder))
             if isinstance(found, list):
                 return found
             raise _failed(path, limits, found)
-    raise _ended(path, limits, status)
+    raise _ended(path, limits, status, seconds)
 
 
 def _run(request: Mapping[str, Any], seconds: float) -> int | None:
@@ -91,12 +93,10 @@ def _run(request: Mapping[str, Any], seconds: float) -> int | None:
     return process.returncode
 
 
-def _ended(path: Path, limits: ReadingLimits, status: int | None) -> InvalidValueError:
+def _ended(path: Path, limits: ReadingLimits, status: int | None, seconds: float) -> InvalidValueError:
     """The error that a process ended without an answer."""
     if status is None or status == -getattr(signal, "SIGXCPU", 0):
-        return limits.passed(
-            path.name, "takes too long to read", None, limits.seconds_for(path), " s of processor time"
-        )
+        return limits.passed(path.name, "takes too long to read", None, seconds, " s of processor time")
     if status == -getattr(signal, "SIGKILL", 0):  # by the system, if memory is short
         return _too_large(path, limits)
     return InvalidValueError(

@@ -34,7 +34,7 @@ def _answer(request: Mapping[str, Any], folder: Path) -> None:
     layout = checked(Layout, request["layout"], "the layout")
     _load_libraries(path)
     csv.field_size_limit(2**31 - 1)  # a cell that is too long is refused in words later
-    limit_process(limits.seconds_for(path), limits.memory_mb)
+    limit_process(request["seconds"], limits.memory_mb)
     gate = Gate(path, [Path(other) for other in request["also"]])
     sys.addaudithook(gate)
     try:

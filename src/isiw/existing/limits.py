@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import zipfile
 from collections.abc import Callable
@@ -14,8 +15,8 @@ from isiw.errors import InvalidValueError
 from isiw.files import opened
 from isiw.lazy import pd
 
-_BYTES_PER_S: Final = 4e6
-"""A file has a second more for each so many bytes."""
+_BYTES_PER_S: Final = {True: 1e5, False: 4e6}
+"""A table has a second more for each so many bytes, of which trials are made; a recording for each so many samples."""
 
 _CHUNK: Final = 2**20
 
@@ -31,7 +32,7 @@ class ReadingLimits(Checked):
         file_mb: the size of the file [MB].
         unpacked_mb: what the parts of a packed file, such as a workbook, are unpacked to [MB].
         memory_mb: the memory of the process that reads [MB].
-        seconds: its processor time [s], besides a second for each 4 MB of the file.
+        seconds: its processor time [s], besides a second for each 0.1 MB of a table, and for each 4 MB of a recording.
         rows: the rows of a table.
         columns: its columns.
         cells: its cells.
@@ -45,7 +46,7 @@ class ReadingLimits(Checked):
     file_mb: Positive = 4000.0
     unpacked_mb: Positive = 500.0
     memory_mb: Positive = 700.0
-    seconds: Positive = 5.0
+    seconds: Positive = 3.0
     rows: Count = 1_000_000
     columns: Count = 2_000
     cells: Count = 5_000_000
@@ -65,10 +66,10 @@ class ReadingLimits(Checked):
         kinds = {one.name: type(getattr(self, one.name)) for one in fields(self)}
         return replace(self, **{name: kind(getattr(self, name) * factor) for name, kind in kinds.items()})
 
-    def seconds_for(self, path: Path) -> float:
+    def seconds_for(self, path: Path, *, table: bool) -> float:
         """The processor time for one file [s]."""
         size = path.stat().st_size if path.is_file() else 0
-        return self.seconds + size / _BYTES_PER_S
+        return self.seconds + size / _BYTES_PER_S[table]
 
     def passed(self, source: str, what: str, got: object, most: float, unit: str = "") -> InvalidValueError:
         """The error that a file has more than a limit allows."""
@@ -165,7 +166,7 @@ def _setters() -> tuple[Callable[[int], None], Callable[[float], None]]:
     def set_time(seconds: float) -> None:
         used = resource.getrusage(resource.RUSAGE_SELF)
         _, hard = resource.getrlimit(resource.RLIMIT_CPU)
-        most = int(used.ru_utime + used.ru_stime + seconds) + 1
+        most = math.ceil(used.ru_utime + used.ru_stime + seconds)
         most = most if hard == resource.RLIM_INFINITY else min(most, hard)
         resource.setrlimit(resource.RLIMIT_CPU, (most, hard))
 
