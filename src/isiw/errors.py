@@ -47,7 +47,7 @@ class IsiwError(Exception):
         self.what, self.got, self.expected, self.remedy, self.found = what, got, expected, remedy, found
         parts = [_cut(what, _LONGEST_TEXT // 10)]
         if got is not None:
-            parts.append(f"got {_shortened(got)}")
+            parts.append(f"got {shortened(got)}")
         if expected is not None:
             parts.append(f"expected {_cut(expected, _LONGEST_TEXT // 10)}")
         remedy = remedy and _cut(remedy, _LONGEST_TEXT // 5)
@@ -119,7 +119,7 @@ _LONGEST_TEXT = 10_000
 _LONGEST_GOT = 200
 
 
-def _shortened(value: object) -> str:
+def shortened(value: object) -> str:
     """A value as it prints, of a long one the beginning and the end."""
     try:
         return _cut(repr(value), _LONGEST_GOT)

@@ -47,6 +47,10 @@ Alone = Annotated[str | None, typer.Option(help="What stands for the ISI of TMS 
 Decimal = Annotated[str | None, typer.Option(help="The decimal sign of the file.", **NO_DEFAULT)]
 Sheet = Annotated[str | None, typer.Option(help="The sheet of a workbook.", **NO_DEFAULT)]
 LayoutFile = Annotated[Path | None, typer.Option("--layout", help="How the files are laid out (TOML).", **NO_DEFAULT)]
+Also = Annotated[
+    list[Path] | None, typer.Option(help="A file elsewhere that a recording may refer to; repeat it.", **NO_DEFAULT)
+]
+Larger = Annotated[float, typer.Option(help="By what to multiply the limits of reading a file.")]
 
 
 @app.command(rich_help_panel=LOGS)
@@ -64,6 +68,8 @@ def analyse(  # noqa: PLR0913, PLR0917 - an option each
     decimal: Decimal = None,
     sheet: Sheet = None,
     layout: LayoutFile = None,
+    also: Also = None,
+    larger: Larger = 1.0,
     config: Annotated[
         Path | None, typer.Option(help="Space, strategy, seed and visit as for isiw run (TOML).", **NO_DEFAULT)
     ] = None,
@@ -80,7 +86,7 @@ def analyse(  # noqa: PLR0913, PLR0917 - an option each
         said = {"reference": reference, "alone": alone, "decimal": decimal, "sheet": sheet}
         read = _layout(layout, {"columns": column, "markers": marker, "channels": channel}, unit, **said)
         settings = isiw.config.load_config(config).with_overrides(strategy=strategy, seed=seed)
-        way = isiw.existing.batch.way_of(settings, read, simulated=simulated)
+        way = isiw.existing.batch.way_of(settings, read, simulated=simulated, **_reading(larger, also))
         with working(f"Reading {counted(len(files), 'file')}"):
             people = isiw.existing.batch.read_files(files, way, output, only)
         _analyse_all(people, way, files[0])
@@ -102,6 +108,8 @@ def replay(  # noqa: PLR0913, PLR0917 - an option each
     decimal: Decimal = None,
     sheet: Sheet = None,
     layout: LayoutFile = None,
+    also: Also = None,
+    larger: Larger = 1.0,
     only: Annotated[str | None, typer.Option(help="The code of the one person who is wanted.", **NO_DEFAULT)] = None,
     overwrite: Overwrite = False,  # noqa: FBT002 - a flag of the command line
 ) -> None:
@@ -109,7 +117,7 @@ def replay(  # noqa: PLR0913, PLR0917 - an option each
     with errors_reported("Interrupted."):
         said = {"reference": reference, "alone": alone, "decimal": decimal, "sheet": sheet}
         read = _layout(layout, {"columns": column, "markers": marker, "channels": channel}, unit, **said)
-        way = isiw.existing.batch.Way(read)
+        way = isiw.existing.batch.Way(read, **_reading(larger, also))
         with working(f"Reading {file.name}"):
             found = isiw.existing.batch.read_files([file], way, only=only)
         if len(found) > 1:
@@ -133,6 +141,11 @@ def _layout(file: Path | None, named: dict[str, list[str] | None], units: list[s
     layout = isiw.existing.layout.read_layout(file) if file is not None else isiw.existing.Layout()
     pairs = {key: isiw.existing.layout.pairs_of(f"--{key[:-1]}", texts or []) for key, texts in named.items()}
     return layout.saying(**pairs, units=tuple(units or ()), **said)
+
+
+def _reading(larger: float, also: list[Path] | None) -> dict[str, Any]:
+    """What limits the reading of a file, as the command line says it."""
+    return {"limits": isiw.existing.ReadingLimits().larger(larger), "also": tuple(also or ())}
 
 
 def _analyse_all(people: list[Person], way: Way, source: Path) -> None:
@@ -179,7 +192,8 @@ def _analyse_one(person: Person, way: Way, source: Path, *, several: bool) -> No
     show(f"{name}{analysis}", style=None if several else "bold")
     if person.log is not None:
         show(f"log:     {person.log}")
-    beside = person.log or (source.with_name(f"{source.stem}_{person.delivered.subject}") if several else source)
+    code = isiw.existing.batch.code_in_names(person.delivered.subject)
+    beside = person.log or (source.with_name(f"{source.stem}_{code}.x") if several else source)
     picture = free_beside(beside, ".png")
     analysis.plot(picture)
     show(f"picture: {picture}")

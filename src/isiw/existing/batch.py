@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -15,7 +15,9 @@ from isiw.design import DesignSpace
 from isiw.errors import ConfigError, InvalidValueError, LogError
 from isiw.existing.analysis import Analysis, analysed
 from isiw.existing.delivered import Delivered, codes_of
+from isiw.existing.gate import hash_of
 from isiw.existing.layout import Layout
+from isiw.existing.limits import ReadingLimits
 from isiw.existing.reading import read_people
 from isiw.log.durable import log_exists
 from isiw.log.reader import read_session
@@ -26,12 +28,17 @@ ANALYSED_KEY: Final = "isiw_analyse"
 """Where a log keeps from which file and how it was made."""
 
 
+_LONGEST_STEM: Final = 200
+"""What a file's name may have before its suffix [bytes]; most systems take 255 in all."""
+
+
 class Person(NamedTuple):
     """Trials of one person, where their log goes, and what it is made of."""
 
     delivered: Delivered
     log: Path | None
     made_of: Mapping[str, Any]
+    refused: InvalidValueError | None = None  # why they cannot be analysed, which keeps nobody else from it
 
 
 @dataclass(frozen=True)
@@ -46,10 +53,12 @@ class Way:
     subject: str = ""  # of a person who has no code in the file
     visit: Visit = field(default_factory=Visit)
     simulated: bool = False
+    limits: ReadingLimits = field(default_factory=ReadingLimits)
+    also: tuple[Path, ...] = ()  # files elsewhere that recordings may refer to
 
 
-def way_of(config: RunConfig, layout: Layout, *, simulated: bool = False) -> Way:
-    """Space, strategy, seed and visit of a configuration, by which trials are analysed."""
+def way_of(config: RunConfig, layout: Layout, *, simulated: bool = False, **reading: Any) -> Way:
+    """Space, strategy, seed and visit of a configuration, by which trials are analysed, and what limits reading."""
     if config.prior is not None or config.after:
         raise ConfigError(
             "an analysis says what the trials themselves tell, and learns from no prior and no earlier session",
@@ -65,6 +74,7 @@ def way_of(config: RunConfig, layout: Layout, *, simulated: bool = False) -> Way
         config.visit.subject,
         config.visit.noted(),
         simulated,
+        **reading,
     )
 
 
@@ -77,10 +87,11 @@ def read_files(
     if only is not None and not people:
         codes = codes_of([one.delivered for one in everybody])
         raise InvalidValueError("no person has this code", got=only, expected=codes)
-    paths = _paths([one.delivered for one in people], output)
-    found = [one._replace(log=path) for one, path in zip(people, paths, strict=True)]
+    found = _placed(people, output)
     for person in found:
-        if person.log is not None and log_exists(person.log) and not is_there(person):
+        if person.log is None or person.refused is not None:
+            continue
+        if log_exists(person.log) and not is_there(person):
             raise LogError(
                 "there is another log already, and it is never overwritten",
                 got=str(person.log),
@@ -99,12 +110,11 @@ def _read(source: Path, way: Way) -> Iterator[Person]:
             got=(layout.reference, way.space.reference),
             remedy="ISIs of one cannot be compared with those of the other: correct one of them.",
         )
-    for delivered in read_people(source, layout, subject=way.subject):
+    for delivered in read_people(source, layout, subject=way.subject, limits=way.limits, also=way.also):
         visit = replace(way.visit, day=delivered.visit.day or way.visit.day)
         simulated = way.simulated or delivered.simulated
         made_of = {
-            "file": source.name,
-            "sha256": hashlib.sha256(source.read_bytes()).hexdigest(),
+            **_identity(source, delivered.files),
             "layout": {key: value for key, value in asdict(layout).items() if value not in (None, {}, ())},
             "strategy": {"name": way.strategy, "seed": way.seed, "settings": dict(way.settings)},
             "space": "as delivered" if way.space is None else f"{way.space}",
@@ -114,40 +124,60 @@ def _read(source: Path, way: Way) -> Iterator[Person]:
         yield Person(replace(delivered, visit=visit, simulated=simulated), None, as_logged)
 
 
-def _paths(people: Sequence[Delivered], output: str | Path | None) -> list[Path | None]:
-    """Where the logs go: the file that is named, or a file for each in a folder."""
+def _identity(source: Path, files: Mapping[str, str]) -> dict[str, Any]:
+    """What tells the content of a file from another, with those that it refers to."""
+    beside = {name: sha256 for name, sha256 in files.items() if name != source.name}
+    own = files.get(source.name) or (hash_of(source) if source.is_file() else "")
+    return {"file": source.name, "sha256": own} | ({"beside": beside} if beside else {})
+
+
+def _placed(people: Sequence[Person], output: str | Path | None) -> list[Person]:
+    """People with the place of each one's log: the file that is named, or a file for each in a folder."""
     if output is None:
-        return [None] * len(people)
+        return list(people)
     if Path(output).suffix == ".mcap":
         if len(people) > 1:
             raise InvalidValueError(
                 f"there are trials of {len(people)} people or days, and a log is of one",
-                got=codes_of(people),
+                got=codes_of([one.delivered for one in people]),
                 remedy="Name a folder with --output, or one of them with --only CODE.",
             )
-        return [Path(output)]
-    codes = [re.sub(r"[^\w.-]+", "_", one.subject).strip("._") or "unnamed" for one in people]
-    days = [f"_day{one.visit.day}" if one.visit.day else "" for one in people]
-    stems = list(map(str.__add__, codes, days))
-    twice = sorted({stem for stem in stems if stems.count(stem) > 1})
-    if twice:
-        raise InvalidValueError(
-            "two of the people or days would have one log",
-            got=twice[0],
-            remedy="Give each a code, or a day, of their own.",
-        )
-    return [Path(output) / f"{stem}.mcap" for stem in stems]
+        return [one._replace(log=Path(output)) for one in people]
+    days = [f"_day{day}" if (day := one.delivered.visit.day) else "" for one in people]
+    stems = [code_in_names(one.delivered.subject) + day for one, day in zip(people, days, strict=True)]
+    times = Counter(stems)
+    return [
+        one._replace(log=Path(output) / f"{stem}.mcap", refused=_no_log_of_its_own(stem, times[stem]))
+        for one, stem in zip(people, stems, strict=True)
+    ]
+
+
+def code_in_names(subject: str) -> str:
+    """A person's code as the name of a file can have it, which knows no `/`."""
+    return re.sub(r"[^\w.-]+", "_", subject).strip("._") or "unnamed"
+
+
+def _no_log_of_its_own(stem: str, times: int) -> InvalidValueError | None:
+    """Why a person's log can have no such name; None if it can."""
+    if times > 1:
+        remedy = "Give each a code, or a day, of their own."
+        return InvalidValueError("two of the people or days would have one log", got=stem, remedy=remedy)
+    if len(stem.encode()) > _LONGEST_STEM:
+        return InvalidValueError("this code is too long for the name of a log", got=stem, remedy="Give a shorter one.")
+    return None
 
 
 def is_there(person: Person) -> bool:
     """True if the log of a person is there already, of the same file, read and analysed in the same way."""
-    if person.log is None or not log_exists(person.log):
+    if person.log is None or person.refused is not None or not log_exists(person.log):
         return False
     return read_session(person.log).header.config.get(ANALYSED_KEY) == dict(person.made_of)
 
 
 def analyse_person(person: Person, way: Way) -> Analysis:
     """Analyse one person, and write their log if it has a place."""
+    if person.refused is not None:
+        raise person.refused
     delivered = person.delivered
     strategy = make_strategy(way.strategy, way.space or delivered.space(), way.seed, **way.settings)
     analysis = analysed(delivered, strategy, {ANALYSED_KEY: dict(person.made_of)})

@@ -43,6 +43,7 @@ class Delivered:
         simulated: true if nobody was stimulated: the person is simulated.
         units: the units in which ISIs and amplitudes are stated where they are from.
         unused: the columns of a table of which nothing was read.
+        files: the SHA-256 of each file that was read, by its name.
 
     Raises:
         InvalidValueError: no pair of stimuli, more trials than any session has, or numbers that are probably in another
@@ -62,6 +63,7 @@ class Delivered:
     simulated: bool = False
     units: tuple[str, str] = ("ms", "mV")
     unused: tuple[str, ...] = ()
+    files: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if len(self.trials) >= MOST_TRIALS:

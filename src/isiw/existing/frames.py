@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import warnings
+from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -69,7 +70,7 @@ def reading(path: Path, what: str, remedy: str) -> Generator[None, None, None]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of styles, names and dates; what is read is checked
             yield
-    except (ConfigError, InvalidValueError):
+    except (ConfigError, InvalidValueError, MemoryError):
         raise
     except Exception as error:  # each reader has errors of its own
         why, *_ = str(error).splitlines() or [type(error).__name__]
@@ -220,8 +221,8 @@ def _arrays(content: bytes) -> dict[str, Any]:
         )
     values = scipy.io.loadmat(cast("Any", io.BytesIO(content)), simplify_cells=True)
     paths = dict(_flat({name: value for name, value in values.items() if not name.startswith("__")}))
-    last = [path[-1] for path in paths]
-    return {path[-1] if last.count(path[-1]) == 1 else ".".join(path): array for path, array in paths.items()}
+    last = Counter(path[-1] for path in paths)
+    return {path[-1] if last[path[-1]] == 1 else ".".join(path): array for path, array in paths.items()}
 
 
 def _flat(values: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], Any]]:

@@ -55,7 +55,7 @@ CHANNELS: Final = ("emg", "acceleration", "events", *MARKERS)
 
 def letters(name: str) -> str:
     """A column's name in letters alone, without its unit."""
-    words = re.findall(r"[^\W_]+", re.sub(r"[\[(].*?[\])]", " ", name.casefold()))
+    words = re.findall(r"[^\W_]+", re.sub(r"[\[(][^][()]*[\])]", " ", name.casefold()))
     while len(words) > 1 and (words[-1] in UNIT_WORDS or words[-1] == "in"):
         words.pop()
     return "".join(words)

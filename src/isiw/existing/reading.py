@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import math
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,9 +17,11 @@ from isiw.checks import MOST_MEP_MV
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.existing import frames, recordings, tables
+from isiw.existing.apart import read_apart
 from isiw.existing.dates import dates_of, times_of
 from isiw.existing.delivered import Delivered, anywhere, read_log, renumbered
 from isiw.existing.layout import ISI_UNITS_MS, MARKERS, Layout, letters
+from isiw.existing.limits import ReadingLimits
 from isiw.files import is_mcap
 from isiw.findings import Kind
 from isiw.lazy import pd
@@ -32,16 +35,26 @@ from isiw.visit import Visit
 _RATES: Final = frozenset({"fs", "srate", "samplerate", "samplingrate", "samplingfrequency", "sfreq", "rate", "ratehz"})
 
 
-def read_people(source: str | Path | Any, layout: Layout | None = None, *, subject: str = "") -> list[Delivered]:
-    """The people whose trials a file or a table holds.
+def read_people(
+    source: str | Path | Any,
+    layout: Layout | None = None,
+    *,
+    subject: str = "",
+    limits: ReadingLimits | None = None,
+    also: Sequence[str | Path] = (),
+) -> list[Delivered]:
+    """The people whose trials a file or a table holds; a file is read by a process of its own.
 
     Args:
         source: the path of a table, a recording or a log; or a `pandas.DataFrame`, `mne.io.Raw` or `mne.Epochs`.
         layout: how it is laid out, as far as it does not say so itself.
         subject: the code of a person who has none in it; by default the file's name.
+        limits: the most that is read of a file.
+        also: files elsewhere that a recording may refer to; of others only those of its own folder are read.
 
     Raises:
-        InvalidValueError: something that is ambiguous, missing or cannot be true; the message says what to do.
+        InvalidValueError: something that is ambiguous, missing or cannot be true, or a limit that is reached; the
+            message says what to do.
         ConfigError: a library is not installed.
         LogError: a log that cannot be read.
     """
@@ -53,7 +66,13 @@ def read_people(source: str | Path | Any, layout: Layout | None = None, *, subje
         return [read_log(path)]
     if not path.exists():
         raise InvalidValueError("there is no such file", got=str(path), remedy="Check the path.")
+    return read_apart(path, layout, subject, limits or ReadingLimits(), also)
+
+
+def people_in(path: Path, layout: Layout, subject: str, limits: ReadingLimits) -> list[Delivered]:
+    """The people whose trials a file holds, read by this process."""
     suffix = ".fif" if path.name.endswith(".fif.gz") else path.suffix.lower()
+    limits.require_file(path, text=suffix in frames.TEXTS)
     if suffix in recordings.SUFFIXES:
         return [recordings.read_recording(path, layout, subject or path.stem)]
     if path.is_dir() or suffix not in frames.SUFFIXES:
@@ -65,8 +84,14 @@ def read_people(source: str | Path | Any, layout: Layout | None = None, *, subje
             remedy="Save or export it as one of these, such as CSV; of BrainVision's files name the .vhdr.",
         )
     if "emg" in layout.channels:
-        return [_read_waves(path, layout, subject or path.stem)]
-    return people_of(frames.read_frame(path, layout), layout, path.name, subject or path.stem)
+        return [_read_waves(path, layout, subject or path.stem, limits)]
+    return people_of(_frame(path, layout, limits), layout, path.name, subject or path.stem)
+
+
+def _frame(path: Path, layout: Layout, limits: ReadingLimits) -> pd.DataFrame:
+    frame = frames.read_frame(path, layout)
+    limits.require_table(frame, path.name)
+    return frame
 
 
 def _in_memory(source: Any, layout: Layout, subject: str) -> list[Delivered]:
@@ -80,14 +105,14 @@ def _in_memory(source: Any, layout: Layout, subject: str) -> list[Delivered]:
     raise InvalidValueError("this holds no trials", got=source, expected="a path, a DataFrame, or mne.Epochs or Raw")
 
 
-def _read_waves(path: Path, layout: Layout, subject: str) -> Delivered:
+def _read_waves(path: Path, layout: Layout, subject: str, limits: ReadingLimits) -> Delivered:
     """The trials of a recording whose layout names the column, or the array, of the EMG."""
     if path.suffix.lower() == ".mat":
         arrays = frames.read_arrays(path)
         tables.require_one("array", path.name, layout.channels["emg"], arrays)
         if arrays[layout.channels["emg"]].squeeze().ndim > 1:
             return _of_matrix(arrays, layout, subject, path.name)
-    return _of_columns(frames.read_frame(path, layout), layout, subject, path.name)
+    return _of_columns(_frame(path, layout, limits), layout, subject, path.name)
 
 
 def _required(layout: Layout, key: Literal["rate_hz", "pulse_at_ms"], what: str) -> float:
@@ -254,7 +279,7 @@ def _days(
     days: dict[str, list[int]] = {}
     for row, text in zip(rows, texts, strict=True):
         days.setdefault(text, []).append(row)
-    numbers = [int(found[-1]) if len(found := re.findall(r"\d+", day)) == 1 else 0 for day in days]
+    numbers = [int(found[-1]) if len(found := re.findall(r"\d+", day[:80])) == 1 else 0 for day in days]
     if len(set(numbers)) < len(numbers) or min(numbers) < 1:
         numbers = list(range(1, len(days) + 1))
     return dict(zip(numbers, days.values(), strict=True))
@@ -321,7 +346,8 @@ def _require_ascending(columns: tables.Columns, rows: Sequence[int]) -> None:
         places = [order.number(row) or 0.0 for row in known]
     else:  # times of the day, perhaps
         places = times_of(texts)
-    repeated = next((text for text, other in zip(texts[1:], places[1:], strict=False) if places.count(other) > 1), None)
+    times = Counter(places)
+    repeated = next((text for text, place in zip(texts, places, strict=False) if times[place] > 1), None)
     if places != sorted(places):
         raise InvalidValueError(
             f"the rows of {order.of} are not in the order of its column {order.name!r}",

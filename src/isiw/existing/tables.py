@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from numbers import Real
 from typing import Any, Final
@@ -30,7 +31,7 @@ _VAGUE: Final = frozenset({"interval", "delay", "soa", "amplitude", "amp", "peak
                            "emgpeaktopeak", "p2pamplitude", "ptpamplitude", "p2p", "ptp"})  # fmt: skip
 """Names of columns that may also be of the interval between trials, or of the stimulus: two of them are asked about."""
 
-_NUMBER: Final = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?inf(inity)?", re.IGNORECASE)
+_NUMBER: Final = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?|[-+]?inf(inity)?", re.IGNORECASE)
 _GROUPED: Final = {
     ".": re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d+)?"),
     ",": re.compile(r"[-+]?[1-9]\d{0,2}(\.\d{3})+(,\d+)?"),
@@ -57,6 +58,13 @@ def _value(text: str, decimal: str) -> float:
         text = text.replace(group, "")
     text = text.replace(decimal, ".")
     return float(text) if _NUMBER.fullmatch(text) else math.nan
+
+
+def _float(cell: object) -> float:
+    """A number as a float; NaN if it is none, or a whole one that no float can hold."""
+    with suppress(OverflowError):
+        return float(cell) if isinstance(cell, Real) and not isinstance(cell, bool) else math.nan
+    return math.nan
 
 
 def says_alone(cell: Any, mark: str | None) -> bool:
@@ -93,10 +101,7 @@ class Column:
         cell = self.cells[row]
         if is_missing(cell):
             return None
-        if isinstance(cell, str):
-            value = _value(cell, self.decimal)
-        else:
-            value = float(cell) if isinstance(cell, Real) and not isinstance(cell, bool) else math.nan
+        value = _value(cell, self.decimal) if isinstance(cell, str) else _float(cell)
         if not math.isfinite(value):
             usual = "Correct it, leave the cell empty, or name another column: --column KEY=NAME."
             is_comma = isinstance(cell, str) and "," in cell and self.decimal != ","
@@ -119,7 +124,7 @@ class Column:
         cell = self.cells[row]
         if is_missing(cell):
             return ""
-        whole = isinstance(cell, Real) and not isinstance(cell, bool) and float(cell).is_integer()
+        whole = _float(cell).is_integer()
         return str(int(cell)) if whole else str(cell).strip()
 
     def refused(self, row: int, why: str, remedy: str) -> InvalidValueError:
@@ -285,8 +290,8 @@ def _named(key: str, names: list[str], layout: Layout, source: str) -> str | Non
     if (stated := layout.columns.get(key)) is not None:
         require_one("column", source, stated, names)
         return stated
-    free = [name for name in names if name not in layout.columns.values()]
-    fitting = {known: [name for name in free if letters(name) == known] for known in COLUMNS[key]}
+    free = [(name, letters(name)) for name in names if name not in layout.columns.values()]
+    fitting = {known: [name for name, plain in free if plain == known] for known in COLUMNS[key]}
     found = [known for known in COLUMNS[key] if fitting[known]]
     rivals = [known for known in found if known == found[0] or {known, found[0]} <= _VAGUE]
     several = [name for known in rivals for name in fitting[known]]
@@ -327,7 +332,7 @@ def _numbers_rows(column: Column | None) -> bool:
 
 def unit_said(name: str, known: Mapping[str, float]) -> str | None:
     """The unit that a column's name says, of those of one quantity."""
-    words = [*re.findall(r"[\[(](.*?)[\])]", name), *re.findall(r"[^\W_]+", name)[1:]]
+    words = [*re.findall(r"[\[(]([^][()]*)[\])]", name), *re.findall(r"[^\W_]+", name)[1:]]
     told = [unit for word in words if (unit := UNIT_WORDS.get(word.strip().casefold(), "")) in known]
     return told[-1] if told else None
 

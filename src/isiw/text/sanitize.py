@@ -56,7 +56,7 @@ def _plain(character: str) -> str:
     return "" if category in _OBEYED else "\n" if category in ("Zl", "Zp") else character
 
 
-_NUMBER: Final = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+_NUMBER: Final = re.compile(r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _WHOLE: Final = re.compile(r"[0-9]{1,18}")
 
 

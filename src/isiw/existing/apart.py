@@ -1,0 +1,120 @@
+"""Files of other programs are read by a process of its own, whose memory, time and files are limited.
+
+A small file can make a library that reads it take all memory or all time. Here that ends the process that reads, and
+isiw says which limit was reached.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Final
+
+from isiw.errors import InvalidValueError
+from isiw.existing import answer, frames
+from isiw.existing.delivered import Delivered
+from isiw.existing.layout import Layout
+from isiw.existing.limits import ReadingLimits
+
+_WAITS: Final = 5.0
+"""By the clock a process may take so many times its processor time, since it may wait for a disk."""
+
+_START_S: Final = 60.0
+"""So long it may take to start [s]."""
+
+_CHILD: Final = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from isiw.existing.child import main; main()"
+"""What the process runs: it finds what this one finds, and nothing in the folder in which it is started."""
+
+_ONE_THREAD: Final = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+"""Each thread of a library for matrices takes memory of its own."""
+
+
+def read_apart(
+    path: Path, layout: Layout, subject: str, limits: ReadingLimits, also: Sequence[str | Path] = ()
+) -> list[Delivered]:
+    """The people whose trials a file holds, read by a process of its own.
+
+    Args:
+        path: the file.
+        layout: how it is laid out.
+        subject: the code of a person who has none in it.
+        limits: the most that is read.
+        also: files elsewhere that it may refer to.
+
+    Raises:
+        InvalidValueError: what reading raises, or a limit that was reached.
+        ConfigError: a library is not installed.
+        OSError: a file that cannot be opened.
+    """
+    seconds = limits.seconds_for(path, table=path.suffix.lower() in frames.SUFFIXES)
+    request = {
+        "path": str(path),
+        "layout": asdict(layout),
+        "subject": subject,
+        "limits": asdict(limits),
+        "seconds": seconds,
+        "also": [str(other) for other in also],
+    }
+    with tempfile.TemporaryDirectory(prefix="isiw-") as folder:
+        status = _run({**request, "answer": folder}, seconds)
+        if status == 0:
+            found = answer.read_answer(Path(folder))
+            if isinstance(found, list):
+                return found
+            raise _failed(path, limits, found)
+    raise _ended(path, limits, status, seconds)
+
+
+def _run(request: Mapping[str, Any], seconds: float) -> int | None:
+    """The status with which the process ends; None if it had to be ended."""
+    paths = json.dumps([place for place in sys.path if place])
+    with subprocess.Popen(  # noqa: S603 - this Python, and words that are isiw's own
+        [sys.executable, "-P", "-c", _CHILD, paths],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, **_ONE_THREAD},
+    ) as process:
+        try:
+            process.communicate(json.dumps(request).encode(), timeout=_START_S + _WAITS * seconds)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            return None
+        except BaseException:
+            process.kill()
+            raise
+    return process.returncode
+
+
+def _ended(path: Path, limits: ReadingLimits, status: int | None, seconds: float) -> InvalidValueError:
+    """The error that a process ended without an answer."""
+    if status is None or status == -getattr(signal, "SIGXCPU", 0):
+        return limits.passed(path.name, "takes too long to read", None, seconds, " s of processor time")
+    if status == -getattr(signal, "SIGKILL", 0):  # by the system, if memory is short
+        return _too_large(path, limits)
+    return InvalidValueError(
+        f"{path.name} cannot be read: what reads it ended without an answer",
+        got=f"status {status}",
+        remedy="Is the file damaged? Save it again, as CSV if there is no other way. If it is large, say --larger 2.",
+    )
+
+
+def _failed(path: Path, limits: ReadingLimits, found: Mapping[str, Any]) -> InvalidValueError:
+    """The error that a process failed in a way of its own."""
+    if found["memory"]:
+        return _too_large(path, limits)
+    return InvalidValueError(
+        f"{path.name} cannot be read: {found['fault']}",
+        remedy="Is the file damaged? Save it again, as CSV if there is no other way.",
+    )
+
+
+def _too_large(path: Path, limits: ReadingLimits) -> InvalidValueError:
+    return limits.passed(path.name, "takes too much memory to read", None, limits.memory_mb, " MB")

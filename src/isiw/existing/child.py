@@ -1,0 +1,55 @@
+"""The process that reads one file: it takes a request, limits itself, reads, and writes an answer."""
+
+from __future__ import annotations
+
+import csv
+import json
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from isiw.existing import answer, frames, recordings
+from isiw.existing.gate import Gate, require_no_links
+from isiw.existing.layout import Layout
+from isiw.existing.limits import ReadingLimits, limit_process
+from isiw.existing.reading import people_in
+from isiw.lazy import pd
+from isiw.text.named_code import library
+from isiw.text.toml_files import checked
+
+
+def main() -> None:
+    """Answer the request that stands at the standard input."""
+    request = json.loads(sys.stdin.buffer.read())
+    folder = Path(request["answer"])
+    try:
+        _answer(request, folder)
+    except BaseException as error:  # noqa: BLE001 - whatever a library fails with is the answer
+        answer.write_error(folder, error)
+
+
+def _answer(request: Mapping[str, Any], folder: Path) -> None:
+    path, limits = Path(request["path"]), ReadingLimits(**request["limits"])
+    layout = checked(Layout, request["layout"], "the layout")
+    _load_libraries(path)
+    csv.field_size_limit(2**31 - 1)  # a cell that is too long is refused in words later
+    limit_process(request["seconds"], limits.memory_mb)
+    gate = Gate(path, [Path(other) for other in request["also"]])
+    sys.addaudithook(gate)
+    try:
+        require_no_links(path)
+        people = people_in(path, layout, request["subject"], limits)
+    finally:
+        gate.require_nothing_refused()
+    answer.write_people(folder, people, gate.hashes())
+
+
+def _load_libraries(path: Path) -> None:
+    """Load what takes long to load before the time of reading begins; what is missing is told when it is needed."""
+    pd.DataFrame  # noqa: B018 - which loads pandas
+    suffix = path.suffix.lower()
+    if suffix in recordings.SUFFIXES:
+        library("mne", "import").io.read_raw  # noqa: B018 - which loads its readers
+    elif suffix in frames.WORKBOOKS:
+        library("openpyxl", "import")

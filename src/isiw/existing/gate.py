@@ -1,0 +1,145 @@
+"""The files that a reader opens: those of the header's own folder and those that are named, and no others."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import stat
+import sysconfig
+import zoneinfo
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, Final
+
+from isiw.errors import ConfigError, InvalidValueError
+from isiw.files import opened
+from isiw.text.named_code import library
+
+_HDF5: Final = b"\x89HDF\r\n\x1a\n"
+_HDF5_AT: Final = (0, 512)
+"""Where a file of HDF5 begins: MATLAB's have a text of their own before it."""
+
+_CHUNK: Final = 2**20
+
+
+class Gate:
+    """An audit hook that sees each file as it is opened for reading, whatever library does it.
+
+    Libraries follow the names in a header wherever they lead. So it is not the names that are checked, which each
+    format writes in its own way, but what is opened.
+    """
+
+    def __init__(self, source: Path, also: Iterable[Path] = ()) -> None:
+        self.source = source
+        self._folder = _real(source if source.is_dir() else source.parent)
+        self._named = {_real(source), *map(_real, also)}
+        self._code = [_real(Path(folder)) for folder in _code_folders()]
+        self.read: dict[Path, None] = {}
+        self.refused: InvalidValueError | None = None
+
+    def __call__(self, event: str, args: tuple[Any, ...]) -> None:
+        """See an event of Python; raise if it opens a file elsewhere."""
+        if event != "open" or not isinstance(args[0], str | bytes | os.PathLike):
+            return
+        if args[2] & (os.O_WRONLY | os.O_RDWR) == os.O_WRONLY:
+            return
+        path = Path(os.fsdecode(args[0]))
+        try:
+            mode = path.stat().st_mode
+        except (OSError, ValueError):  # whoever opens it sees that it is not there
+            return
+        if stat.S_ISDIR(mode):
+            return
+        real = _real(path)
+        if any(real.is_relative_to(folder) for folder in self._code):
+            return
+        if not self._may_be_read(real):
+            self.refused = self._elsewhere(path)
+            raise self.refused
+        if not stat.S_ISREG(mode):
+            self.refused = InvalidValueError(f"a file of {self.source.name} is no regular file", got=str(path))
+            raise self.refused
+        self.read[real] = None
+
+    def _may_be_read(self, real: Path) -> bool:
+        if real in self._named or real.parent == self._folder:
+            return True
+        return self.source.is_dir() and real.is_relative_to(self._folder)
+
+    def _elsewhere(self, path: Path) -> InvalidValueError:
+        return InvalidValueError(
+            f"{self.source.name} refers to a file elsewhere, and only files of its own folder are read",
+            got=str(path),
+            remedy="If it belongs to it, put it into that folder, or name it: --also FILE (in Python also=[FILE]).",
+        )
+
+    def require_nothing_refused(self) -> None:
+        """Raise if a file was refused, also if the library that wanted it went on without."""
+        if self.refused is not None:
+            raise self.refused
+
+    def hashes(self) -> dict[str, str]:
+        """The SHA-256 of each file that was read, by its name, and below a folder that is the source by its path."""
+        found = {}
+        for path in sorted({*self.read, *({_real(self.source)} if self.source.is_file() else ())}):
+            inside = self.source.is_dir() and path.is_relative_to(self._folder)
+            name = path.relative_to(self._folder).as_posix() if inside else path.name
+            name = self.source.name if path == _real(self.source) else name
+            while name in found:  # files of one name in several folders
+                name += "'"
+            found[name] = hash_of(path)
+        return found
+
+
+def hash_of(path: Path) -> str:
+    """The SHA-256 of a file."""
+    found = hashlib.sha256()
+    with opened(path) as file:
+        while chunk := file.read(_CHUNK):
+            found.update(chunk)
+    return found.hexdigest()
+
+
+def require_no_links(path: Path) -> None:
+    """Raise if a file of HDF5 says that parts of it are in other files, which its library opens past any hook."""
+    if not path.is_file() or not _is_hdf5(path):
+        return
+    try:
+        h5py = library("h5py", "import")
+    except ConfigError:  # then nothing else can read it either
+        return
+    with h5py.File(path, "r") as file:
+        found: list[str] = []
+
+        def look(name: str, link: Any) -> None:
+            if isinstance(link, h5py.ExternalLink):
+                found.append(f"{name} in {link.filename}")
+                return
+            thing = file.get(name) if isinstance(link, h5py.HardLink) else None
+            if isinstance(thing, h5py.Dataset) and (thing.external or thing.is_virtual):
+                found.append(name)
+
+        file.visititems_links(look)
+    if found:
+        raise InvalidValueError(
+            f"{path.name} refers to other files, and only what is in it is read",
+            got=", ".join(found[:3]),
+            remedy="Save it as one file.",
+        )
+
+
+def _is_hdf5(path: Path) -> bool:
+    with opened(path) as file:
+        head = file.read(max(_HDF5_AT) + len(_HDF5))
+    return any(head[at:].startswith(_HDF5) for at in _HDF5_AT)
+
+
+def _real(path: Path) -> Path:
+    return Path(os.path.realpath(path))
+
+
+def _code_folders() -> list[str]:
+    """Where Python, its libraries, isiw and the rules of time zones are: they are loaded while a file is read."""
+    paths = sysconfig.get_paths()
+    places = [paths[key] for key in ("stdlib", "platstdlib", "purelib", "platlib")]
+    return [*places, str(Path(__file__).parents[1]), *zoneinfo.TZPATH]

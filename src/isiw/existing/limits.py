@@ -1,0 +1,173 @@
+"""The limits of what is read from a file of another program, each with what it says when it is passed."""
+
+from __future__ import annotations
+
+import math
+import os
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import IO, Final
+
+from isiw.checks import Checked, Count, Positive, number
+from isiw.errors import InvalidValueError
+from isiw.files import opened
+from isiw.lazy import pd
+
+_BYTES_PER_S: Final = {True: 1e5, False: 4e6}
+"""A table has a second more for each so many bytes, of which trials are made; a recording for each so many samples."""
+
+_CHUNK: Final = 2**20
+
+LARGEST_FACTOR: Final = 1e6
+"""By which limits are multiplied at most, so that each remains a number."""
+
+
+@dataclass(frozen=True)
+class ReadingLimits(Checked):
+    """The most that is read from one file; `larger` gives a file more of everything.
+
+    Args:
+        file_mb: the size of the file [MB].
+        unpacked_mb: what the parts of a packed file, such as a workbook, are unpacked to [MB].
+        memory_mb: the memory of the process that reads [MB].
+        seconds: its processor time [s], besides a second for each 0.1 MB of a table, and for each 4 MB of a recording.
+        rows: the rows of a table.
+        columns: its columns.
+        cells: its cells.
+        name_length: the length of a column's name [characters].
+        cell_length: the length of the text in a cell [characters].
+
+    Raises:
+        InvalidValueError: a limit that is not positive.
+    """
+
+    file_mb: Positive = 4000.0
+    unpacked_mb: Positive = 500.0
+    memory_mb: Positive = 700.0
+    seconds: Positive = 3.0
+    rows: Count = 1_000_000
+    columns: Count = 2_000
+    cells: Count = 5_000_000
+    name_length: Count = 1_000
+    cell_length: Count = 32_767
+
+    def larger(self, factor: float) -> ReadingLimits:
+        """The same, each multiplied.
+
+        Args:
+            factor: by how much, at least 1.
+
+        Raises:
+            InvalidValueError: a factor below 1 or above `LARGEST_FACTOR`.
+        """
+        factor = number("by how much limits of reading are larger", factor, least=1, most=LARGEST_FACTOR)
+        kinds = {one.name: type(getattr(self, one.name)) for one in fields(self)}
+        return replace(self, **{name: kind(getattr(self, name) * factor) for name, kind in kinds.items()})
+
+    def seconds_for(self, path: Path, *, table: bool) -> float:
+        """The processor time for one file [s]."""
+        size = path.stat().st_size if path.is_file() else 0
+        return self.seconds + size / _BYTES_PER_S[table]
+
+    def passed(self, source: str, what: str, got: object, most: float, unit: str = "") -> InvalidValueError:
+        """The error that a file has more than a limit allows."""
+        return InvalidValueError(
+            f"{source} {what}",
+            got=got,
+            expected=f"at most {most:g}{unit}",
+            remedy="Is it the right file? If it is, say --larger 2 (in Python limits=isiw.existing.ReadingLimits()"
+            ".larger(2)), or more.",
+        )
+
+    def require_file(self, path: Path, *, text: bool) -> None:
+        """Raise if a file is too large, or what it unpacks to, or if a text has too many lines."""
+        if not path.is_file():
+            return
+        with opened(path) as file:
+            size = os.fstat(file.fileno()).st_size
+            if size > 1e6 * self.file_mb:
+                raise self.passed(path.name, "is too large", f"{size / 1e6:.0f} MB", self.file_mb, " MB")
+            if file.read(2) == b"PK":
+                self._require_parts(path.name, file)
+            elif text:
+                self._require_lines(path.name, file)
+
+    def _require_parts(self, source: str, file: IO[bytes]) -> None:
+        try:
+            with zipfile.ZipFile(file) as packed:
+                unpacked_mb = sum(part.file_size for part in packed.infolist()) / 1e6
+        except (zipfile.BadZipFile, ValueError, NotImplementedError):  # its reader says what is wrong
+            return
+        if unpacked_mb > self.unpacked_mb:
+            raise self.passed(source, "unpacks to too much", f"{unpacked_mb:.0f} MB", self.unpacked_mb, " MB")
+
+    def _require_lines(self, source: str, file: IO[bytes]) -> None:
+        lines = dict.fromkeys((b"\n", b"\r"), 0)
+        file.seek(0)
+        while chunk := file.read(_CHUNK):
+            for end in lines:
+                lines[end] += chunk.count(end)
+        if (most := max(lines.values())) > self.rows:
+            raise self.passed(source, "has too many lines", most, self.rows)
+
+    def require_table(self, frame: pd.DataFrame, source: str) -> None:
+        """Raise if a table has too many rows, columns or cells, or too long a name or text."""
+        for what, got, most in (
+            ("has too many columns", frame.shape[1], self.columns),
+            ("has too many rows", frame.shape[0], self.rows),
+            ("has too many cells", frame.size, self.cells),
+        ):
+            if got > most:
+                raise self.passed(source, what, got, most)
+        longest_name = max((len(str(name)) for name in frame.columns), default=0)
+        if longest_name > self.name_length:
+            raise self.passed(
+                source, "has too long a name of a column", f"{longest_name} characters", self.name_length, " characters"
+            )
+        for name, cells in frame.items():
+            if pd.api.types.is_numeric_dtype(cells):
+                continue
+            longest = max((len(cell) for cell in cells if isinstance(cell, str | bytes)), default=0)
+            if longest > self.cell_length:
+                raise self.passed(
+                    source,
+                    f"has too long a text in the column {name!r}",
+                    f"{longest} characters",
+                    self.cell_length,
+                    " characters",
+                )
+
+
+def limit_process(seconds: float, memory_mb: float) -> None:
+    """Limit what this process may take, where the system can: it has `resource`, and on Linux counts all memory.
+
+    Args:
+        seconds: processor time from now on [s].
+        memory_mb: memory in all [MB].
+    """
+    set_memory, set_time = _setters()
+    set_memory(int(1e6 * memory_mb))
+    set_time(seconds)
+
+
+def _setters() -> tuple[Callable[[int], None], Callable[[float], None]]:
+    try:
+        import resource  # noqa: PLC0415 - Windows has none
+    except ImportError:
+        return (lambda _: None), (lambda _: None)
+
+    def set_memory(most: int) -> None:
+        _, hard = resource.getrlimit(resource.RLIMIT_DATA)
+        most = most if hard == resource.RLIM_INFINITY else min(most, hard)
+        resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
+
+    def set_time(seconds: float) -> None:
+        used = resource.getrusage(resource.RUSAGE_SELF)
+        _, hard = resource.getrlimit(resource.RLIMIT_CPU)
+        most = math.ceil(used.ru_utime + used.ru_stime + seconds)
+        most = most if hard == resource.RLIM_INFINITY else min(most, hard)
+        resource.setrlimit(resource.RLIMIT_CPU, (most, hard))
+
+    return set_memory, set_time
