@@ -15,6 +15,8 @@ Rig = Callable[[Sequence[float], np.random.Generator], float]
 """The realised ISI [ms] of the last trial, by all that were asked for."""
 
 STEP_MS: Final = 10.0
+FIRST: Final = 10_000
+"""The first seed."""
 
 RIGHT: Final[Mapping[str, Rig]] = {
     "jitter, SD 2 ms": lambda asked, rng: asked[-1] + 2 * rng.standard_normal(),
@@ -73,14 +75,15 @@ def isis_report(sessions: int, trials: int, command: str) -> str:
         trials: how long each is.
         command: what made them.
     """
+    far = [f"{far_ms(space):g} ms in {space.low_ms:g} to {space.high_ms:g} ms" for space in SPACES]
     lines = [
         "# Realised ISIs that are asked about",
         "",
         f"`{command}`",
         "",
-        f"{sessions} sessions of {trials} trials for each cell, seeds 0 to {sessions - 1}; half of them ask at random,",
-        f"half in a random order of evenly spaced ISIs. {FAR_ONES} far ones among {AMONG} in a row are asked about; far is",
-        f"{', '.join(f'{far_ms(space):g} ms in {space.low_ms:g} to {space.high_ms:g} ms' for space in SPACES)}.",
+        f"{sessions} sessions of {trials} trials for each cell, seeds {FIRST} to {FIRST + sessions - 1};",
+        f"half of them ask at random, half in a random order of evenly spaced ISIs. {FAR_ONES} far ones among {AMONG}",
+        f"in a row are asked about; far is {', '.join(far)}.",
         "",
     ]
     for title, rigs in (("right rigs", RIGHT), ("loops with a mistake", WRONG)):
@@ -93,7 +96,9 @@ def isis_report(sessions: int, trials: int, command: str) -> str:
 
 
 def _cell(rig: Rig, space: isiw.DesignSpace, sessions: int, trials: int) -> str:
-    after = [doubted_after(space, ("even", "random")[seed % 2], rig, seed, trials) for seed in range(sessions)]
+    after = [
+        doubted_after(space, ("even", "random")[seed % 2], rig, seed, trials) for seed in range(FIRST, FIRST + sessions)
+    ]
     found = [number for number in after if number is not None]
     when = f"{np.median(found):g}, {np.quantile(found, 0.9):g}" if found else "–"
     return f"{len(found)} of {sessions} | {when}"
