@@ -79,8 +79,8 @@ def isis_report(sessions: int, trials: int, command: str) -> str:
         f"`{command}`",
         "",
         f"{sessions} sessions of {trials} trials for each cell, seeds 0 to {sessions - 1}; half of them ask at random,",
-        f"half in a random order of evenly spaced ISIs. {FAR_ONES} far ones among {AMONG} in a row are asked about; far is",
-        f"{', '.join(f'{far_ms(space):g} ms in {space.low_ms:g} to {space.high_ms:g} ms' for space in SPACES)}.",
+        f"half in a random order of evenly spaced ISIs. {FAR_ONES} far ones among {AMONG} in a row are asked about;",
+        f"far is {', '.join(f'{far_ms(space):g} ms in {space.low_ms:g} to {space.high_ms:g} ms' for space in SPACES)}.",
         "",
     ]
     for title, rigs in (("right rigs", RIGHT), ("loops with a mistake", WRONG)):
