@@ -95,7 +95,7 @@ MEANINGS: Final[Mapping[str, Mapping[str, str]]] = {
         "choice; fit: the model's fit failed; refused: it was not delivered; late: an answer past its deadline; "
         "pause: paused, or continued; doubt: somebody should look at the data; note: a remark; change: something "
         "changed that bears on all later MEPs; client: another client drives the session.",
-        "finding": "of a doubt or a pause, what was found.",
+        "finding": "of a doubt or a pause, what was found; of an exclusion or inclusion, that ISIs were in doubt.",
         "trial": "the trial that was judged, refused or late; else the last one before the event.",
         "text": "what happened, in sentences.",
         "key": "of a note or a change: a second one with the same key is not logged.",

@@ -177,8 +177,9 @@ class Event(LogRecord):
     `trial` is the one that was judged by an operator, refused or answered late, and otherwise the last one before the
     event. What is "refused" was not delivered, whatever the intent before it says. A note or a change with the
     `key` of an earlier one is not logged. A "change" bears on all MEPs after its trial. `finding` is what a
-    doubt or a pause is about, and `corrected` what a correction says that the trial's values really were. `client` is
-    the key of the client over HTTP that drives the session from a "client" on; None if it stated none.
+    doubt or a pause is about, or an exclusion by isiw and the inclusion that confirms its trial; `corrected` is what a
+    correction says that the trial's values really were. `client` is the key of the client over HTTP that drives the
+    session from a "client" on; None if it stated none.
     """
 
     kind: EventKind
