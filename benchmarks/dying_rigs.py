@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import os
-import re
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import isiw
 from benchmarks.pulse_peer import PEER_COMMANDS, Lie, PulsePeer
 from benchmarks.recording_device import RecordingDevice
+from benchmarks.simulated_board import SKETCH, device_of_the_page
 
-__all__ = ["RIGS", "Rig", "compiled_sketch", "device_of_the_page"]
+__all__ = ["RIGS", "Rig", "compiled_sketch"]
 
-ROOT = Path(__file__).parents[1]
 _INFO = {"name": "peer", "reference": "valve"}
 
 
@@ -84,25 +82,11 @@ def line(folder: Path) -> Iterator[Rig]:
 def compiled_sketch(folder: Path) -> Path:
     """The Arduino's sketch, compiled for this computer with stand-ins for the board's registers."""
     made = folder / "timer"
-    source = ROOT / "tests" / "clients" / "arduino" / "main.cpp"
+    source = SKETCH / "main.cpp"
     compiler = shutil.which("g++") or "g++"
-    subprocess.run([compiler, "-std=c++17", "-o", str(made), str(source)], check=True)  # noqa: S603 - our own source
+    options = ["-std=c++17", "-DSHORTEST_INTERVAL_MS=0", f"-I{source.parent}"]
+    subprocess.run([compiler, *options, "-o", str(made), str(source)], check=True)  # noqa: S603 - our own source
     return made
-
-
-def device_of_the_page(address: str) -> Any:
-    """The device that the example of the page makes; its amplifier measures another MEP in each trial."""
-    page = (ROOT / "docs" / "lab" / "arduino.md").read_text(encoding="utf-8")
-    example = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)[0]
-    names: dict[str, Any] = {}
-    exec(compile(example, "arduino.md", "exec"), names)  # noqa: S102 - our own page
-    names["measure"] = _measure
-    return names["make"](address)
-
-
-def _measure(stimulus: isiw.Stimulus, isi_ms: float | None, timeout_s: float) -> isiw.Measurement:
-    del timeout_s
-    return isiw.Measurement(0.05 + 0.01 * (stimulus.trial % 7), isi_ms)
 
 
 @contextmanager
@@ -130,7 +114,7 @@ def arduino(folder: Path) -> Iterator[Rig]:
     with subprocess.Popen([program], stdin=ours, stdout=ours, env=environment) as process:  # noqa: S603 - our own
         try:
             yield Rig(
-                lambda: device_of_the_page(os.ttyname(theirs)),
+                lambda: device_of_the_page(os.ttyname(theirs), shortest_iti_s=0.0),
                 lambda _: None,
                 lambda: None,
                 disarmed,

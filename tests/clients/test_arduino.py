@@ -1,30 +1,29 @@
 """The sketch of the Arduino timer, compiled for this computer and driven by `LineDevice` over a pseudo-terminal.
 
-Its own code runs, on stand-ins for the board's registers; it is not tried on a board here.
+Its own code runs, on stand-ins for the board's registers; `test_machine_code.py` tries the machine code of the board.
 """
 
 from __future__ import annotations
 
 import os
-import re
 import shutil
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import pytest
+from benchmarks.dying_rigs import compiled_sketch
+from benchmarks.simulated_board import Port, device_of_the_page
 
 import isiw
 from isiw.errors import DeviceError, NotDelivered
 from isiw.testing import check_device
 from isiw.trials import Measurement, Stimulus
 
-ROOT = Path(__file__).parents[2]
 SPACE = isiw.DesignSpace(0, 120, reference="valve")
 
 pytestmark = pytest.mark.skipif(
@@ -54,11 +53,7 @@ class Board:
 
 @pytest.fixture(scope="module")
 def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    made = tmp_path_factory.mktemp("sketch") / "timer"
-    source = ROOT / "tests" / "clients" / "arduino" / "main.cpp"
-    command = [str(shutil.which("g++")), "-std=c++17", "-Wall", "-Wextra", "-Werror", "-o", str(made), str(source)]
-    subprocess.run(command, check=True)  # noqa: S603 - our own source
-    return made
+    return compiled_sketch(tmp_path_factory.mktemp("sketch"))
 
 
 @pytest.fixture
@@ -77,25 +72,16 @@ def board(program: Path, tmp_path: Path, request: pytest.FixtureRequest) -> Iter
     os.close(theirs)
 
 
-def device_of_the_page(address: str) -> Any:
-    """What the example of the page makes."""
-    page = (ROOT / "docs" / "lab" / "arduino.md").read_text(encoding="utf-8")
-    (example,) = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
-    names: dict[str, Any] = {}
-    exec(compile(example, "arduino.md", "exec"), names)  # noqa: S102 - the point of the test
-    return names["make"](address)
-
-
 @pytest.fixture
 def device(board: Board) -> Iterator[Any]:
-    device = device_of_the_page(board.address)
+    device = device_of_the_page(board.address, 0.0)
     device.stage()
     yield device
     device.unstage()
 
 
 def test_the_example_of_the_page_conforms_on_the_sketch(board: Board) -> None:
-    check_device(lambda: device_of_the_page(board.address), SPACE, timeout_s=2.0, iti_s=0.0, say=lambda _: None)
+    check_device(lambda: device_of_the_page(board.address, 0.0), SPACE, timeout_s=2.0, iti_s=0.0, say=lambda _: None)
     assert [pin for pin, _ in board.rises] == ["valve", "trigger"] + ["trigger"] + ["valve", "trigger"] * 2 + ["valve"]
 
 
@@ -127,11 +113,10 @@ def test_an_open_interlock_refuses_before_firing(device: Any, board: Board) -> N
 def test_disarming_on_the_way_gives_no_trigger_any_more_and_the_next_stimulus_begins_low(
     device: Any, board: Board
 ) -> None:
-    with open_port(board) as port:
-        port.write(b"1 SET 1000000\n2 ARM\n3 FIRE\n")
+    with Port(board.address) as port:
+        port.say("1 SET 1000000", "2 ARM", "3 FIRE")
         until(lambda: ("valve", True) in [(pin, high) for pin, high, _ in board.edges])
-        port.write(b"4 DISARM\n")
-        until(lambda: b"4 DISARMED" in seen(port))
+        port.ask("4 DISARM", "4 DISARMED")
     assert [pin for pin, _ in board.rises] == ["valve"]
     assert board.edges[-1] == ("valve", False, -16)
     device.stage()
@@ -149,68 +134,45 @@ def test_a_trigger_that_is_not_heard_is_no_success(device: Any) -> None:
 @pytest.mark.parametrize(
     ("said", "answer"),
     [
-        (b"7 FIRE\n", b"7 ERR not armed"),
-        (b"7 GET\n", b"7 ERR no ISI is set"),
-        (b"7 SET 1000001\n", b"7 ERR too long"),
-        (b"7 SET -5\n", b"7 ERR no time"),
-        (b"7 SET 5x\n", b"7 ERR no time"),
-        (b"7 SET\n", b"7 ERR no time"),
-        (b"7 DANCE\n", b"7 ERR unknown command"),
-        (b"7\n", b"7 ERR no command"),
-        (b"9" * 5000 + b"\n7 DISARM\r\n", b"7 DISARMED"),
-        (b"1 ARM\n2 SET 5000\n7 FIRE\n", b"7 ERR not armed"),
+        ("7 FIRE", "7 ERR not armed"),
+        ("7 GET", "7 ERR no ISI is set"),
+        ("7 SET 1000001", "7 ERR too long"),
+        ("7 SET -5", "7 ERR no time"),
+        ("7 SET 5x", "7 ERR no time"),
+        ("7 SET", "7 ERR no time"),
+        ("7 DANCE", "7 ERR unknown command"),
+        ("7 ", "7 ERR no command"),
+        ("7", "0 ERR no number"),
     ],
 )
-def test_the_sketch_refuses_what_it_cannot_do(board: Board, said: bytes, answer: bytes) -> None:
-    with open_port(board) as port:
-        port.write(said)
-        until(lambda: answer in seen(port))
-    assert board.edges == []
+def test_the_sketch_refuses_what_it_cannot_do(board: Board, said: str, answer: str) -> None:
+    with Port(board.address) as port:
+        port.ask("1 ARM", "1 ARMED")
+        if "FIRE" in said:
+            port.ask("2 DISARM", "2 DISARMED")
+        port.ask(said, answer)
+        port.ask("8 ALONE", "8 ERR not armed" if "GET" not in said else "8 FIRED")
+    assert [pin for pin, _ in board.rises] == (["trigger"] if "GET" in said else [])
+
+
+def test_a_line_without_end_is_no_line(board: Board) -> None:
+    with Port(board.address) as port:
+        port.write(b"9" * 5000 + b"\n")
+        port.ask("7 DISARM", "7 DISARMED")
 
 
 @pytest.mark.slow
-def test_arming_is_for_two_seconds_and_for_one_stimulus(board: Board) -> None:
-    with open_port(board) as port:
-        port.write(b"1 ARM\n")
-        time.sleep(2.05)
-        port.write(b"2 ALONE\n")
-        until(lambda: b"2 ERR not armed" in seen(port))
-        port.write(b"3 ARM\n4 ALONE\n")
-        until(lambda: b"4 FIRED" in seen(port))
-        port.write(b"5 ALONE\n")
-        until(lambda: b"5 ERR not armed" in seen(port))
+def test_arming_is_for_two_seconds_at_most_and_for_one_stimulus(board: Board) -> None:
+    with Port(board.address) as port:
+        port.ask("1 ARM", "1 ARMED")
+        for _ in range(7):
+            time.sleep(0.3)
+            port.say("2 BEAT")
+        port.ask("2 ALONE", "2 ERR not armed")
+        port.ask("3 ARM", "3 ARMED")
+        port.ask("4 ALONE", "4 FIRED")
+        port.ask("5 ALONE", "5 ERR not armed")
     assert board.rises == [("trigger", 1040.0)]
-
-
-class Port:
-    """The board's port, and all that was read from it."""
-
-    def __init__(self, address: str) -> None:
-        self.handle = os.open(address, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-        self.seen = b""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        os.close(self.handle)
-
-    def write(self, data: bytes) -> None:
-        while data:
-            try:
-                data = data[os.write(self.handle, data) :]
-            except BlockingIOError:
-                time.sleep(0.001)
-
-
-def open_port(board: Board) -> Port:
-    return Port(board.address)
-
-
-def seen(port: Port) -> bytes:
-    with suppress(BlockingIOError):
-        port.seen += os.read(port.handle, 4096)
-    return port.seen
 
 
 def until(true: Any, within_s: float = 3.0) -> None:

@@ -348,3 +348,16 @@ def test_a_word_is_neither_simulated_nor_ready() -> None:
         DeviceInfo("rig", "impact", simulated=cast("bool", "false"))
     with pytest.raises(InvalidValueError, match=r"Readiness.ready"):
         Readiness(ready=cast("bool", "no"))
+
+
+@pytest.mark.parametrize(
+    ("own", "words"), [({"shortest_iti_s": 6.0}, "min_iti_s = 5"), ({"most_pulses": 2}, "max_pulses = 3")]
+)
+def test_limits_that_allow_more_than_the_device_gives_are_refused(
+    own: dict[str, Any], words: str, inner: ScriptedDevice, clock: VirtualClock
+) -> None:
+    inner.info = DeviceInfo("scripted", "valve", simulated=True, **own)
+    with pytest.raises(DeviceError, match=words):
+        LimitedDevice(inner, LIMITS, clock)
+    inner.info = DeviceInfo("scripted", "valve", simulated=True, shortest_iti_s=5.0, most_pulses=3)
+    LimitedDevice(inner, LIMITS, clock)

@@ -23,6 +23,24 @@ def require_real_time(info: DeviceInfo, clock: Clock) -> None:
         )
 
 
+def require_within_device(info: DeviceInfo, limits: Limits) -> None:
+    """Raise if limits allow what the device itself refuses."""
+    if info.shortest_iti_s is not None and limits.iti_s < info.shortest_iti_s:
+        raise DeviceError(
+            "the device gives stimuli less often than the limits allow",
+            got=f"min_iti_s = {limits.iti_s:g}",
+            expected=f"at least the {info.shortest_iti_s:g} s of {info.name}",
+            remedy="Raise min_iti_s under [limits], or set another interval in the device and in its info.",
+        )
+    if info.most_pulses is not None and limits.max_pulses > info.most_pulses:
+        raise DeviceError(
+            "the device gives fewer stimuli than the limits allow",
+            got=f"max_pulses = {limits.max_pulses}",
+            expected=f"at most the {info.most_pulses} of {info.name}",
+            remedy="Lower max_pulses under [limits], or set another number in the device and in its info.",
+        )
+
+
 class LimitedDevice:
     """A device that refuses what exceeds its limits, before anything is delivered. Safe to use from several threads.
 
@@ -44,6 +62,7 @@ class LimitedDevice:
         info = device.describe()
         if not waits_for_nobody:
             require_real_time(info, clock)
+        require_within_device(info, limits)
         self._device, self._info, self._dead_man = device, info, dead_man
         self._limits = Limits(**dataclasses.asdict(limits))
         self._delivered = delivered

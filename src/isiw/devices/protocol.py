@@ -8,6 +8,7 @@ from typing import Final, Literal, Protocol, TypeAlias, runtime_checkable
 
 from isiw.checks import (
     Checked,
+    Count,
     Flag,
     MeanAndSd,
     NonNegative,
@@ -48,10 +49,13 @@ class DeviceInfo(Checked):
         tap_alone: whether it can deliver a tap without the magnetic pulse, which `Stimulus.tap_alone` asks for.
         if_isiw_dies: what disarms it if isiw dies while it is armed: "watchdog", a process beside isiw, such as
             `isiw.Watchdog`, or "heartbeat", a sign of life without which it disarms itself; None if nothing does.
+        shortest_iti_s: the shortest time between two stimuli that it gives [s], which binds the limits; None if any.
+        most_pulses: the most stimuli that it gives from one start to the next; None if any number.
 
     Raises:
         InvalidValueError: an unknown reference, conditioning stimulus or guard, a detection limit or a hit delay that
-            is not positive, a name, version, address or unit that is no text, or a word where True or False is due.
+            is not positive, a limit below 0, a name, version, address or unit that is no text, or a word where True or
+            False is due.
     """
 
     name: Text
@@ -65,6 +69,8 @@ class DeviceInfo(Checked):
     tap_alone: Flag = False
     conditioning: Conditioning = "tap"
     if_isiw_dies: Guard | None = None
+    shortest_iti_s: NonNegative | None = None
+    most_pulses: Count | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()

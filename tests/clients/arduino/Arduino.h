@@ -16,7 +16,8 @@ using byte = uint8_t;
 enum { LOW, HIGH, INPUT, OUTPUT, INPUT_PULLUP };
 #define _BV(bit) (1 << (bit))
 enum { COM1B0 = 4, COM1B1, COM1A0, COM1A1 };
-enum { CS12 = 2, ICES1 = 6 };
+enum { CS12 = 2, ICES1 = 6, ICNC1 };
+enum { WDRF = 3 };
 enum { FOC1B = 6, FOC1A };
 enum { OCF1A = 1, OCF1B, ICF1 = 5 };
 enum { PSRSYNC = 0 };
@@ -27,7 +28,7 @@ inline double nowUs() {
 }
 inline unsigned long millis() { return static_cast<unsigned long>(nowUs() / 1000); }
 
-inline uint8_t TCCR1A = 0, GTCCR = 0, flags = 0;
+inline uint8_t TCCR1A = 0, GTCCR = 0, MCUSR = 0, flags = 0;
 inline uint16_t TCNT1 = 0, OCR1A = 0, OCR1B = 0, ICR1 = 0;
 inline bool jumper = std::getenv("NO_JUMPER") == nullptr;
 inline double startedUs = 0, looked = 0;
@@ -76,6 +77,10 @@ struct {
   }
 } inline TCCR1C;
 
+inline char *ultoa(unsigned long n, char *text, int) {
+  std::sprintf(text, "%lu", n);
+  return text;
+}
 inline void pinMode(byte, byte) {}
 inline void digitalWrite(byte, byte) {}
 inline int digitalRead(byte) { return access(std::getenv("INTERLOCK"), F_OK) == 0 ? HIGH : LOW; }
@@ -93,8 +98,5 @@ struct {
   }
   void send(const std::string &text) { if (::write(1, text.data(), text.size()) < 0) std::exit(1); }
   void print(const char *text) { send(text); }
-  void print(char c) { send(std::string(1, c)); }
-  void print(unsigned long n) { send(std::to_string(n)); }
   void println(const char *text) { send(std::string(text) + "\r\n"); }
-  void println(unsigned long n) { send(std::to_string(n) + "\r\n"); }
 } inline Serial;

@@ -1,12 +1,6 @@
-// The sketch as a program: its prototypes, which the Arduino IDE writes by itself, and its loop.
+// The sketch as a program of this computer.
 #include "Arduino.h"
-void obey();
-void set(unsigned long number, const char *argument);
-void get(unsigned long number);
-void arm(unsigned long number);
-void fire(unsigned long number, bool valve, bool trigger);
-bool give(bool valve, bool trigger, unsigned int ticks);
-#include "../../../clients/arduino/isi_timer/isi_timer.ino"
+#include "sketch.h"
 
 int main() {
   setup();

@@ -61,7 +61,8 @@ class LineDevice:
         self._commands = from_table(LineCommands, commands, "commands")
         self._settings = from_table(LineSettings, line or {}, "line")
         self._watched = self._settings.watchdog and has_handle(address)
-        known = {"if_isiw_dies": "watchdog"} if self._watched else {}
+        guard = "watchdog" if self._watched else "heartbeat" if self._commands.heartbeat is not None else None
+        known = {} if guard is None else {"if_isiw_dies": guard}
         self._info = described(info, address=address, tap_alone=self._commands.tap_alone is not None, **known)
         self._measure = measure
         measuring = self._commands.measuring
@@ -94,6 +95,8 @@ class LineDevice:
         era = self._since_stop
         self._close()
         self._connect(era, math.inf)
+        if self._commands.acknowledge is not None:
+            self._ask(era, self._commands.acknowledge, end_s=math.inf)
         with self._turn(era):
             self._staged = True
 
@@ -188,6 +191,7 @@ class LineDevice:
                 None if stimulus is None else stimulus.isi_ms,
                 timeout_s=max(0.0, min(end_s - time.monotonic(), self._limit_s(exchange))),
                 given_up=lambda: self._since_stop is not era,
+                heartbeat=self._commands.heartbeat if exchange in self._commands.firing else None,
             )
 
     def _limit_s(self, exchange: LineExchange) -> float:
@@ -216,7 +220,7 @@ class LineDevice:
                 return
         self._close()
         line = self._opened(end_s, lambda: self._since_stop is not era)
-        self._watch(line)
+        self._greet(line)
         with self._busy:
             if self._since_stop is era:
                 self._line = line
@@ -224,13 +228,36 @@ class LineDevice:
         line.close()
         raise NotDelivered(f"{self._info.name} was stopped", remedy="Call stage() first.")
 
+    def _greet(self, line: Line) -> None:
+        """See to it that the instrument is what `info` says, and disarmed if isiw dies."""
+        try:
+            if self._commands.hello is not None:
+                said = line.ask(self._commands.hello, timeout_s=self._limit_s(self._commands.hello))
+                self._require_limits(said)
+            self._watch(line)
+        except IsiwError:
+            line.close()
+            raise
+
+    def _require_limits(self, said: Mapping[str, str]) -> None:
+        """Raise if the instrument states other limits than `info`."""
+        shortest_ms = number_of(said, "shortest_iti_ms")
+        stated = {
+            "shortest_iti_s": None if shortest_ms is None else 1e-3 * shortest_ms,
+            "most_pulses": number_of(said, "most_pulses"),
+        }
+        for name, value in stated.items():
+            if value is not None and value != (known := getattr(self._info, name)):
+                raise DeviceError(
+                    f"the instrument has another {name} than its info says",
+                    got=f"{value:g}",
+                    expected=f"{known}",
+                    remedy=f"Write {name} = {value:g} into info, or change it in the instrument.",
+                )
+
     def _watch(self, line: Line) -> None:
         if self._watched:
-            try:
-                line.watch(self._commands.disarm)
-            except DeviceError:
-                line.close()
-                raise
+            line.watch(self._commands.disarm)
 
     def _opened(self, end_s: float = math.inf, given_up: Callable[[], bool] = lambda: False) -> Line:
         """A fresh connection over which the instrument has confirmed that it is disarmed."""

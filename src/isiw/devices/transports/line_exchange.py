@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import logging
+import math
 import re
 import secrets
 import time
@@ -11,7 +12,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import Annotated, TypeVar
+from typing import Annotated, Literal, TypeVar
 
 from isiw.checks import (
     Checked,
@@ -22,7 +23,7 @@ from isiw.checks import (
     choice,
 )
 from isiw.devices.dying import armed_by_another
-from isiw.devices.transports.line_table import Connection, LineExchange, command_values
+from isiw.devices.transports.line_table import Connection, LineExchange, LineHeartbeat, command_values, crc_of
 from isiw.devices.watchdog import Watchdog
 from isiw.errors import DeviceError, DeviceTimeoutError
 from isiw.text.sanitize import read_whole
@@ -53,6 +54,8 @@ class LineSettings(Checked):
         connect_s: how long it may take from opening the connection until it says that it is disarmed [s]; boards that
             start again when their port is opened need a second or two. `stop` may need this and twice `timeout_s`.
         isi_tolerance_ms: how far the ISI that is read back may be from the one that was set [ms].
+        checksum: "crc16" if each line ends with * and four hexadecimal digits, CRC-16/XMODEM of all before the *, in
+            commands and in answers; a line with another one is thrown away. "none" if lines have none.
         watchdog: whether a process beside isiw disarms the instrument if isiw dies; there is none on Windows, nor where
             the address is that of a port's software, such as "rfc2217://…".
     """
@@ -62,6 +65,7 @@ class LineSettings(Checked):
     timeout_s: Positive = 1.0
     connect_s: Positive = 2.5
     isi_tolerance_ms: NonNegative = 0.001
+    checksum: Literal["none", "crc16"] = "none"
     watchdog: Flag = True
 
 
@@ -85,6 +89,7 @@ class Line:
         *,
         timeout_s: float,
         given_up: Callable[[], bool] = lambda: False,
+        heartbeat: LineHeartbeat | None = None,
     ) -> dict[str, str]:
         """Send a command and wait for its answer; returns what the answer says by group."""
         number = next(_sequence)
@@ -97,7 +102,7 @@ class Line:
         self.trusted = False
         self._guarded(lambda: self._connection.send(self._written(command)))
         deadline_s = time.monotonic() + timeout_s
-        said = self._answer(command, exchange, number, deadline_s, given_up)
+        said = self._answer(command, exchange, number, deadline_s, given_up, heartbeat)
         self.trusted = True
         return said
 
@@ -115,7 +120,15 @@ class Line:
         others.say("before a command")
 
     def _written(self, command: str) -> bytes:
-        return f"{command}{self._settings.line_end}".encode("ascii")
+        seal = f"*{crc_of(command)}" if self._settings.checksum == "crc16" else ""
+        return f"{command}{seal}{self._settings.line_end}".encode("ascii")
+
+    def _unsealed(self, line: str) -> str:
+        """A line without its checksum; empty if that is wrong, which is an answer to nothing."""
+        if self._settings.checksum == "none":
+            return line
+        said, _, stated = line.rpartition("*")
+        return said if stated == crc_of(said) else ""
 
     def watch(self, disarm: LineExchange) -> None:
         """See to it that the instrument is disarmed if isiw dies."""
@@ -177,12 +190,13 @@ class Line:
         number: int,
         deadline_s: float,
         given_up: Callable[[], bool],
+        heartbeat: LineHeartbeat | None = None,
         *,
         may_refuse: bool = True,  # what refuses the empty line before a watchdog's command does not refuse that
     ) -> dict[str, str]:
         others = _Others()
         try:
-            for line in self._lines_until(deadline_s, given_up):
+            for line in self._lines_until(deadline_s, given_up, heartbeat):
                 said = exchange.match(line)
                 if said is not None and (not exchange.numbered or _is(number, said.get("sequence"))):
                     return said
@@ -204,12 +218,20 @@ class Line:
             self.trusted = True
             raise DeviceError("the instrument refuses", got=(said.get("reason") or line)[:_LONGEST_TOLD])
 
-    def _lines_until(self, deadline_s: float, given_up: Callable[[], bool]) -> Iterator[str]:
+    def _lines_until(
+        self, deadline_s: float, given_up: Callable[[], bool], heartbeat: LineHeartbeat | None
+    ) -> Iterator[str]:
+        every_s = math.inf if heartbeat is None else heartbeat.every_s
+        beat_s = time.monotonic() + every_s
         while time.monotonic() < deadline_s:
             while (line := self._incoming.next()) is not None:
-                yield line
+                yield self._unsealed(line)
             if given_up():
                 raise DeviceError("the device was stopped while the instrument was busy")
+            if heartbeat is not None and time.monotonic() >= beat_s:
+                beat = heartbeat.send.format_map(command_values(next(_sequence), 0, None))
+                self._guarded(partial(self._connection.send, self._written(beat)))
+                beat_s += every_s
             self._incoming.add(self._guarded(self._connection.receive))
 
     def _guarded(self, use: Callable[[], _T]) -> _T:

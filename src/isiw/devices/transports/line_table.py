@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 import socket
+from binascii import crc_hqx
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -215,6 +216,7 @@ _GROUPS: Final = {
     "tap_alone": _OUTCOME,
     "result": _ISI | _OUTCOME,
     "status": _STATE,
+    "hello": frozenset({"version", "shortest_iti_ms", "most_pulses"}),
 }
 """What an answer may say besides its sequence number."""
 
@@ -246,6 +248,32 @@ Command: TypeAlias = Annotated[LineExchange, _command]
 
 
 @dataclass(frozen=True)
+class LineHeartbeat(Checked):
+    """A sign of life, which is not answered.
+
+    Args:
+        send: what is sent, as in `LineExchange`; it may hold {sequence}.
+        every_s: how often [s]; a third of what the instrument waits, or less.
+    """
+
+    send: Text
+    every_s: Positive
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        LineExchange(self.send.replace("{sequence}", "1"), "")
+
+
+def _heartbeat(what: str, value: object) -> LineHeartbeat:
+    if not isinstance(value, Mapping | LineHeartbeat):
+        raise InvalidValueError(f"{what} must be a table", got=value, expected='{ send = "…", every_s = 0.1 }')
+    return from_table(LineHeartbeat, value, what)
+
+
+Beat: TypeAlias = Annotated[LineHeartbeat, _heartbeat]
+
+
+@dataclass(frozen=True)
 class LineCommands(Checked):
     r"""The commands of an instrument, each a `LineExchange` or a table with its arguments.
 
@@ -259,6 +287,11 @@ class LineCommands(Checked):
         tap_alone: gives the tap without the pulse; None if it cannot.
         result: asks what came of it: the realised ISI, if the answer to `fire` does not say it, and the MEP.
         status: asks whether it is ready; the answer may say coil_c [°C] and intensity_pct_mso [% MSO].
+        hello: asks, whenever a connection is opened, what the instrument is; a pattern that holds its version refuses
+            any other. The answer may say shortest_iti_ms [ms] and most_pulses, which must be those of `info`.
+        acknowledge: acknowledges what made the instrument refuse, such as an interlock that was open; is sent by
+            `stage`, that is when a session begins and when its operator continues it.
+        heartbeat: a sign of life, sent while a stimulus is under way, without which the instrument ends it.
         refusal: what an answer looks like that refuses any command, with (?P<reason>.*) where it says why; empty if
             it does not refuse in words. It holds (?P<sequence>\d+) if the answers do.
     """
@@ -272,6 +305,9 @@ class LineCommands(Checked):
     tap_alone: Command | None = None
     result: Command | None = None
     status: Command | None = None
+    hello: Command | None = None
+    acknowledge: Command | None = None
+    heartbeat: Beat | None = None
     refusal: str = ""
 
     def __post_init__(self) -> None:
@@ -307,6 +343,11 @@ class LineCommands(Checked):
 def _require_one(names: frozenset[str], there: frozenset[str], what: str, expected: str) -> None:
     if len(names & there) != 1:
         raise InvalidValueError(f"{what}, in one unit", got=sorted(names & there) or "none", expected=expected)
+
+
+def crc_of(text: str) -> str:
+    """The CRC-16/XMODEM of a line, as four hexadecimal digits."""
+    return f"{crc_hqx(text.encode('ascii', 'replace'), 0):04X}"
 
 
 def command_values(sequence: int, trial: int, isi_ms: float | None) -> dict[str, float]:

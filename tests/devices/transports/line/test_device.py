@@ -13,7 +13,7 @@ from benchmarks.faulty_device import check_ledger
 from benchmarks.pulse_peer import PEER_COMMANDS, Lie, PulsePeer
 
 import isiw
-from devices.transports.line.parts import PAIR, made, staged, unnumbered
+from devices.transports.line.parts import HASTY, PAIR, TIMEOUT_S, made, staged, unnumbered
 from isiw.errors import ConfigError, DeviceError, InvalidValueError, LogError, NotDelivered
 from isiw.testing import check_device
 from isiw.trials import Measurement, Stimulus, Sweep
@@ -129,3 +129,32 @@ def test_without_pyserial_a_serial_port_names_the_extra_to_install(monkeypatch: 
     monkeypatch.setitem(sys.modules, "serial", None)
     with pytest.raises(ConfigError, match=r"isiw\[serial\]"):
         made("COM3").stage()
+
+
+def greeting(said: str) -> dict[str, Any]:
+    return {**PEER_COMMANDS, "hello": {"send": "{sequence} STATUS", "reply": said}}
+
+
+def test_an_instrument_of_another_version_or_with_other_limits_is_not_staged(peer: PulsePeer) -> None:
+    with peer.over_tcp() as address:  # it says READY 25.0
+        with pytest.raises(DeviceError, match="does not answer"):
+            made(address, greeting(r"(?P<sequence>\d+) TIMER 2"), HASTY).stage()
+        with pytest.raises(DeviceError, match="another most_pulses"):
+            made(address, greeting(r"(?P<sequence>\d+) READY (?P<most_pulses>\d+).0"), HASTY).stage()
+        right = isiw.LineDevice(
+            address,
+            {"name": "peer", "reference": "valve", "most_pulses": 25},
+            greeting(r"(?P<sequence>\d+) READY (?P<most_pulses>\d+).0"),
+        )
+        right.stage()
+        right.unstage()
+
+
+def test_what_made_an_instrument_refuse_is_acknowledged_by_staging_and_by_nothing_else(peer: PulsePeer) -> None:
+    commands = {**PEER_COMMANDS, "acknowledge": {"send": "{sequence} STATUS", "reply": r"(?P<sequence>\d+) READY \S+"}}
+    with peer.over_tcp() as address:
+        device = staged(made(address, {key: value for key, value in commands.items() if key != "status"}))
+        device.deliver(PAIR, TIMEOUT_S)
+        device.stage()
+        device.unstage()
+    assert sum("STATUS" in line for line in peer.heard) == 2

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import strategies as st
 
 from isiw.devices.transports.line_exchange import Line, LineSettings
-from isiw.devices.transports.line_table import Connection, LineExchange
+from isiw.devices.transports.line_table import Connection, LineExchange, LineHeartbeat, crc_of
 from isiw.errors import DeviceError, DeviceTimeoutError
 
 ASKED = LineExchange("{sequence} GET", r"(?P<sequence>\d+) ISI (?P<isi_ms>\S+)")
@@ -133,3 +133,30 @@ def test_a_connection_that_breaks_is_an_error_of_the_device() -> None:
 def test_who_is_given_up_stops_waiting() -> None:
     with pytest.raises(DeviceError, match="stopped"):
         line(b"")[0].ask(ASKED, timeout_s=10.0, given_up=lambda: True)
+
+
+def sealed_line(script: bytes) -> tuple[Line, Scripted]:
+    connection = Scripted(script)
+    return Line(cast("Connection", connection), LineSettings(checksum="crc16"), ""), connection
+
+
+def test_the_checksum_is_that_of_xmodem() -> None:
+    assert crc_of("123456789") == "31C3"
+
+
+def test_a_command_is_sent_with_its_checksum_and_an_answer_with_another_one_is_none() -> None:
+    right = f"ISI 50*{crc_of('ISI 50')}\n".encode()
+    asked, connection = sealed_line(b"ISI 40*" + right[-5:] + b"ISI 30\n" + right)
+    assert asked.ask(PLAIN, timeout_s=1.0) == {"isi_ms": "50"}
+    assert connection.sent == f"GET*{crc_of('GET')}\n".encode()
+
+
+def test_a_sign_of_life_is_sent_as_long_as_an_answer_is_awaited() -> None:
+    asked, connection = line(b"")
+    with pytest.raises(DeviceTimeoutError):
+        asked.ask(PLAIN, timeout_s=0.2, heartbeat=LineHeartbeat("BEAT", 0.04))
+    beats = connection.sent.count(b"BEAT\n")
+    assert 2 <= beats <= 5
+    with pytest.raises(DeviceTimeoutError):
+        asked.ask(PLAIN, timeout_s=0.1)
+    assert connection.sent.count(b"BEAT\n") == beats
