@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -17,6 +18,7 @@ from isiw.existing.analysis import Analysis, analysed
 from isiw.existing.delivered import Delivered, codes_of
 from isiw.existing.layout import Layout
 from isiw.existing.reading import read_people
+from isiw.files import folded, is_reserved
 from isiw.log.durable import log_exists
 from isiw.log.reader import read_session
 from isiw.strategy.catalogue import make_strategy
@@ -126,17 +128,25 @@ def _paths(people: Sequence[Delivered], output: str | Path | None) -> list[Path 
                 remedy="Name a folder with --output, or one of them with --only CODE.",
             )
         return [Path(output)]
-    codes = [re.sub(r"[^\w.-]+", "_", one.subject).strip("._") or "unnamed" for one in people]
+    written = [unicodedata.normalize("NFC", one.subject) for one in people]  # an accent is part of its letter
+    codes = [re.sub(r"[^\w.-]+", "_", code).strip("._") or "unnamed" for code in written]
     days = [f"_day{one.visit.day}" if one.visit.day else "" for one in people]
     stems = list(map(str.__add__, codes, days))
-    twice = sorted({stem for stem in stems if stems.count(stem) > 1})
-    if twice:
+    logs = [f"{stem}.mcap" for stem in stems]
+    same = [folded(log) for log in logs]  # a file that is one on some computers, though its names are two
+    if twice := sorted({stem for stem, name in zip(stems, same, strict=True) if same.count(name) > 1}):
         raise InvalidValueError(
-            "two of the people or days would have one log",
-            got=twice[0],
-            remedy="Give each a code, or a day, of their own.",
+            "two of the people or days would have one log" + (", on other systems" if len(twice) > 1 else ""),
+            got=" and ".join(twice[:2]),
+            remedy="Give each a code, or a day, of their own, that differs in more than capitals.",
         )
-    return [Path(output) / f"{stem}.mcap" for stem in stems]
+    if reserved := next(filter(is_reserved, logs), None):
+        raise InvalidValueError(
+            "Windows keeps the name of a person's log for itself",
+            got=reserved,
+            remedy="Give the person another code.",
+        )
+    return [Path(output) / log for log in logs]
 
 
 def is_there(person: Person) -> bool:

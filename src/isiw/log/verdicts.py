@@ -55,32 +55,56 @@ def excluded_by(events: Iterable[Event]) -> list[int]:
     return excluded
 
 
+class KeyTakenError(InvalidValueError):
+    """A key that is that of something else in a log."""
+
+
 def is_logged(event: Event, events: Iterable[Event]) -> bool:
-    """True if an event was logged with its key before; raise if something else has the key."""
+    """True if an event was logged with its key before; raise KeyTakenError if something else has the key."""
     before = next((each for each in events if event.key is not None and each.key == event.key), None)
     if before is None:
         return False
     texts = {event.text, f"{event.text} (key {event.key})"}  # as older logs have it
-    if before.kind != event.kind or before.text not in texts:
-        raise InvalidValueError(
+    other_trial = event.kind in VERDICTS and before.trial != event.trial
+    if before.kind != event.kind or before.text not in texts or other_trial:
+        raise KeyTakenError(
             f"the key {event.key!r} is that of something else in this log",
-            got=f"{event.kind}: {event.text}",
-            expected=f"{before.kind}: {before.text}",
-            remedy="Nothing was logged. Give each note and each change a key of its own.",
+            got=_said(event),
+            expected=_said(before),
+            remedy="Nothing was logged. Give each note, change, exclusion and inclusion a key of its own.",
         )
     return True
 
 
-def exclusion(trials: TrialTable, number: int, reason: str = "") -> Event:
-    """That a trial does not count from here on."""
-    _require("exclude", number, [trial.index for trial in trials if trial.counts], "that counts")
-    return Event(kind="exclusion", trial=number, text=text("the reason of an exclusion", reason))
+def _said(event: Event) -> str:
+    return f"{event.kind}{f' of trial {event.trial}' if event.kind in VERDICTS else ''}: {event.text}"
 
 
-def inclusion(trials: TrialTable, number: int) -> Event:
-    """That a trial that was excluded counts again."""
-    _require("include", number, [trial.index for trial in trials if trial.excluded], "that is excluded")
-    return Event(kind="inclusion", trial=number, text="Included again by the operator.")
+def exclusion(
+    trials: TrialTable, number: int, reason: str = "", key: str | None = None, events: Iterable[Event] = ()
+) -> Event:
+    """That a trial does not count from here on; what was logged with its key before may be said whatever came since.
+
+    With a key, a trial that is excluded already may be excluded: a repetition of that must not do it later.
+    """
+    number, reason = whole("the number of a trial", number), text("the reason of an exclusion", reason)
+    text("the key of an exclusion", key or "")
+    event = Event.model_construct(kind="exclusion", trial=number, text=reason, key=key)  # its number is checked below
+    if not is_logged(event, events):
+        possible = [trial.index for trial in trials if trial.counts or (key is not None and trial.excluded)]
+        _require("exclude", number, possible, "that counts")
+    return event
+
+
+def inclusion(trials: TrialTable, number: int, key: str | None = None, events: Iterable[Event] = ()) -> Event:
+    """That a trial that was excluded counts again; a key is as for `exclusion`."""
+    number = whole("the number of a trial", number)
+    text("the key of an inclusion", key or "")
+    event = Event.model_construct(kind="inclusion", trial=number, text="Included again by the operator.", key=key)
+    if not is_logged(event, events):
+        possible = [trial.index for trial in trials if trial.excluded or (key is not None and trial.counts)]
+        _require("include", number, possible, "that is excluded")
+    return event
 
 
 def acceptance(trials: TrialTable, number: int, space: DesignSpace) -> Event:

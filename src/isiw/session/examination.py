@@ -94,6 +94,11 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
         return len(self.trials) - 1 if len(self.trials) else None
 
     @property
+    def events(self) -> tuple[Event, ...]:
+        """What was noted and judged so far, and what happened before the session was resumed."""
+        return tuple(self._events)
+
+    @property
     def last_excluded(self) -> int | None:
         """The trial that was excluded last, of those that are; None if none is."""
         excluded = excluded_by(self._events)

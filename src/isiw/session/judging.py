@@ -55,13 +55,17 @@ class Judging(ABC):
         """The trial that was excluded last, of those that are; None if none is."""
         return self._examination.last_excluded
 
-    def exclude(self, trial: int, reason: str = "") -> None:
-        """Let a trial not count from here on: an event is appended, and the strategy learns again without it."""
-        self._judge(lambda trials: exclusion(trials, trial, reason))
+    def exclude(self, trial: int, reason: str = "", *, key: str | None = None) -> None:
+        """Let a trial not count from here on: an event is appended, and the strategy learns again without it.
 
-    def include(self, trial: int) -> None:
-        """Let a trial count again that was excluded, and learn again with it."""
-        self._judge(lambda trials: inclusion(trials, trial))
+        With a key that the same exclusion has already, nothing happens, whatever came since: a request that is
+        repeated late undoes nothing. A key of something else is refused.
+        """
+        self._judge(lambda trials: exclusion(trials, trial, reason, key, self._examination.events))
+
+    def include(self, trial: int, *, key: str | None = None) -> None:
+        """Let a trial count again that was excluded, and learn again with it; a key is as for `exclude`."""
+        self._judge(lambda trials: inclusion(trials, trial, key, self._examination.events))
 
     def reject(self, trial: int) -> None:
         """Let a trial not count whose MEP an operator has looked at; an exclusion with this reason."""
