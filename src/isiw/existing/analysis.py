@@ -230,6 +230,7 @@ def _header(delivered: Delivered, strategy: Strategy, config: Mapping[str, Any])
         strategy,
         kind="imported",
         source=delivered.source,
+        given_by=delivered.given_by,
         subject=delivered.subject,
         visit=delivered.visit,
         device=device,

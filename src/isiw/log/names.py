@@ -41,10 +41,10 @@ def require_free(target: Path) -> None:
                 got=str(existing),
                 remedy=_way_on(existing),
             )
-        if (other := twin(existing)) is not None:
+        if (same := twin(existing)) is not None:
             raise LogError(
                 "on other systems the log would be the same file as another one",
-                got=f"{target}, beside {other.name}",
+                got=f"{target}, beside {same.name}",
                 expected="a name that differs in more than capitals and the spelling of accents",
                 remedy="Choose another name, or a folder of its own.",
             )

@@ -22,6 +22,7 @@ from isiw.log.durable import (
     part_of,
 )
 from isiw.log.headers import AnyHeader, as_toml
+from isiw.log.moments import boot_id
 from isiw.log.names import COPYING, require_free
 from isiw.log.salvage import Salvage, holds, salvage_file
 from isiw.log.schema import (
@@ -127,6 +128,7 @@ class LogWriter:
             "subject": header.subject,
             "seed": str(header.seed),
             "created": header.created,
+            "boot_id": boot_id(),  # by which the logs of this start of the computer are found, whatever its clock shows
         }
         configuration = configuration or as_toml(header)
         now_ns = clock_ns()

@@ -201,7 +201,9 @@ class Steps:
             return decision
         if self._rig.limited.pulses_left:
             return None
-        decision = StopKind.LIMIT.stop(f"The limit of {self._header.limits.max_pulses} pulses is reached.")
+        before = self._header.given_before
+        of_them = f", {before} of them before the session," if before else ""
+        decision = StopKind.LIMIT.stop(f"The limit of {self._header.limits.max_pulses} pulses{of_them} is reached.")
         self._examination.event("limit", decision.reason)
         self._examination.log_belief(lambda: decision)
         return decision

@@ -75,9 +75,8 @@ class Strategy:
         self._mistrials = self._controls = self._lost = 0
         self._outcomes = Outcomes(space.reference, self.amplitude_step_mv)
         self.earlier: tuple[Trial, ...] = ()  # learnt before the first ask
-        self.same_level = True
-        self._doubts = Doubts()
-        self._asked = Asked()
+        self.same_level, self.earlier_given = True, 0  # stimuli, also of trials from which nothing was learnt
+        self._doubts, self._asked = Doubts(), Asked()
 
     def __str__(self) -> str:
         name = f"Strategy {self.recipe.name!r}" if self.recipe.name else "Strategy"
@@ -105,6 +104,7 @@ class Strategy:
             recipe=self.recipe,
         )
         again.learn_all(self.earlier, same_level=self.same_level)
+        again.earlier_given = self.earlier_given
         return again
 
     @property
@@ -286,7 +286,7 @@ class Strategy:
         """Learn trials that were delivered before the first ask, at whatever ISIs; no plan and no budget counts them.
 
         Args:
-            trials: the trials, in order; mistrials and taps alone teach nothing.
+            trials: the trials, in order; mistrials and taps alone teach nothing. For `max_pulses` of limits all count.
             same_level: whether electrodes, coil and intensity stay as they were. Otherwise the level of the MEPs from
                 here on may be another one, as far as the model can say so; the window stays.
 
@@ -297,9 +297,9 @@ class Strategy:
         """
         if self.delivered or self.choice is not None or (self.earlier and not (same_level and self.same_level)):
             raise StrategyError(
-                "earlier trials are learnt once, before the first ask",
-                remedy="Make the strategy, then let it learn all of them.",
+                "earlier trials are learnt once, before the first ask", remedy="Let a new strategy learn all of them."
             )
+        trials = tuple(trials)
         learnt = tuple(trial for trial in trials if trial.told)
         for trial in learnt:
             self._learn(Outcome.of(trial))
@@ -307,6 +307,7 @@ class Strategy:
         if learnt and not same_level:
             self.note_change()
         self.earlier, self.same_level = (*self.earlier, *learnt), same_level
+        self.earlier_given += len(trials)
 
     def _learn(self, outcome: Outcome) -> None:
         """Learn from one trial, wherever its ISI lies."""
