@@ -108,14 +108,18 @@ classdef isiw < handle
 
     function note(this, text)
       % A remark for the log.
-      this.noted = this.noted + 1;
-      key = sprintf('%s-%d', datestr(now, 'yyyymmddTHHMMSSFFF'), this.noted);
-      this.post(this.path('note'), {'text', char(text), 'key', key});
+      this.post(this.path('note'), {'text', char(text), 'key', this.new_key()});
     end
 
     function exclude(this, trial, reason)
       % Exclude a trial; nothing is erased.
-      this.take(this.post(this.path('exclude'), {'trial', number(trial), 'reason', char(reason)}));
+      pairs = {'trial', number(trial), 'reason', char(reason), 'key', this.new_key()};
+      this.take(this.post(this.path('exclude'), pairs));
+    end
+
+    function include(this, trial)
+      % Let a trial count again that was excluded.
+      this.take(this.post(this.path('include'), {'trial', number(trial), 'key', this.new_key()}));
     end
 
     function answer = estimate(this)
@@ -138,6 +142,12 @@ classdef isiw < handle
       % Made for each call, as Octave's webwrite changes those that it is given.
       made = weboptions('Timeout', 60, 'ContentType', 'text', ...
                         'HeaderFields', {'Authorization', ['Bearer ' this.token]});
+    end
+
+    function key = new_key(this)
+      % By which a repetition is known, however late it comes.
+      this.noted = this.noted + 1;
+      key = sprintf('%s-%d', datestr(now, 'yyyymmddTHHMMSSFFF'), this.noted);
     end
 
     function take(this, answer)

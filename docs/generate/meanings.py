@@ -38,6 +38,7 @@ MEANINGS: Final[Mapping[str, Mapping[str, str]]] = {
     | {
         "kind": '"session", or "imported" for trials that were delivered without isiw.',
         "source": "of an imported log, where the trials are from.",
+        "given_by": "of an imported log, by when all trials had been given, as their dates say; empty if unknown.",
         "strategy": "name, seed and settings of the strategy; no name if it was built from a user's own objects.",
         "space": "the ISIs that may be delivered, as `isiw.DesignSpace`.",
         "limits": "what may be delivered, as `isiw.Limits`.",
@@ -49,7 +50,8 @@ MEANINGS: Final[Mapping[str, Mapping[str, str]]] = {
         "asks_from": "the first trial whose ISI was chosen with these versions.",
         "belief_version": "grows if the same settings come to another estimate; 1 in older logs.",
         "engine_version": "grows if the same settings are computed otherwise; 1 in older logs.",
-        "earlier": "trials that were learnt before the first ISI was chosen; they count against no limit.",
+        "earlier": "trials that were learnt before the first ISI was chosen.",
+        "earlier_given": "how many stimuli these and lost ones were; `max_pulses` counts them.",
         "earlier_same_level": "whether electrodes, coil and intensity are those of the earlier trials.",
     },
     "/intent": {
@@ -59,6 +61,8 @@ MEANINGS: Final[Mapping[str, Mapping[str, str]]] = {
         "tap_alone": "whether it is a tap without the magnetic pulse.",
         "intensity_pct_mso": "in a search for a threshold, the intensity [% of the maximum stimulator output].",
         "place_mm": "in a search for the hot spot, the place of the coil [mm].",
+        "boot_id": "the start of the computer that boot_s counts from; empty if the system gives none.",
+        "boot_s": "when it was, since that start, whatever the clock was set to [s].",
     },
     "/estimate": _EDGE
     | {

@@ -19,6 +19,8 @@ Every message says what is wrong, what was got, what was expected, and the way o
 
 Warnings, which are no errors:
 
+    ClockWarning                          the computer's clock was set, so what was given counts by other evidence
+    DiskWarning                           a disk cannot do all that a log asks of one
     ImplausibleDataWarning                data that look like a slip of unit; they are learnt all the same
     OtherVersionsWarning                  a session continues with other versions, and may choose other ISIs
 """
@@ -97,6 +99,14 @@ class RequestError(IsiwError):
 
 class StudyError(IsiwError):
     """A study that cannot be run, continued or read."""
+
+
+class ClockWarning(UserWarning):
+    """The computer's clock was set, or is wrong: stimuli count for limits by other evidence, or as given just now."""
+
+
+class DiskWarning(UserWarning):
+    """A disk cannot do all that a log asks of one; what is written there is not as safe as elsewhere."""
 
 
 class OtherVersionsWarning(UserWarning):

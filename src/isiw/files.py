@@ -1,7 +1,7 @@
 """Creates, replaces and opens files in folders that others can write to: whole, synced, and through no link.
 
 A file is written under a new random name, and takes its place in one step. What is opened to be read is a regular file,
-since a pipe in its place would keep isiw waiting for ever.
+since a pipe in its place would keep isiw waiting for ever. A folder that its disk cannot sync is said once, and used.
 
 On Windows the names of devices are refused. On macOS a disk is asked to empty its cache, which `fsync` alone does not.
 These branches have been type-checked, and have not been run.
@@ -14,12 +14,13 @@ import os
 import re
 import stat
 import sys
+import unicodedata
 import uuid
 from contextlib import suppress
 from pathlib import Path
 from typing import IO, Final
 
-from isiw.errors import InvalidValueError
+from isiw.errors import DiskWarning, InvalidValueError, warn
 
 if sys.platform == "darwin":
     import fcntl
@@ -40,6 +41,21 @@ _KINDS: Final = {
 def is_reserved(name: str) -> bool:
     """True if Windows takes a file's name for a device, or for another name: `CON`, `aux.mcap`, `log.`."""
     return bool(_RESERVED.fullmatch(name)) or name.endswith((".", " "))
+
+
+def folded(name: str) -> str:
+    """A file's name as systems compare it for which capitals and the spelling of accents make no difference."""
+    return unicodedata.normalize("NFC", unicodedata.normalize("NFD", name).casefold()).rstrip(". ")
+
+
+def twin(path: Path) -> Path | None:
+    """The file beside a path that has another name here and the same one on other systems; None if there is none."""
+    try:
+        names = sorted(other.name for other in path.parent.iterdir())
+    except FileNotFoundError:
+        return None
+    own = folded(path.name)
+    return next((path.with_name(name) for name in names if name != path.name and folded(name) == own), None)
 
 
 def in_the_way(path: Path) -> str | None:
@@ -70,6 +86,26 @@ def new_file(path: Path) -> IO[bytes]:
     return open(path, "a+b", opener=lambda name, flags: os.open(name, flags | os.O_EXCL, 0o666))
 
 
+def shared_file(path: Path) -> IO[bytes]:
+    """A file that all accounts of this computer may open, made if it is missing; through no link, and never emptied.
+
+    What is there is opened without the wish to make it, which some systems refuse in a folder for all if it is another
+    account's.
+    """
+    flags = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+    try:
+        handle = os.open(path, flags)
+    except FileNotFoundError:
+        try:
+            handle = os.open(path, flags | os.O_CREAT | os.O_EXCL, 0o666)
+        except FileExistsError:  # another process was faster
+            handle = os.open(path, flags)
+        else:
+            if hasattr(os, "fchmod"):
+                os.fchmod(handle, 0o666)  # whatever is taken from new files of this account
+    return os.fdopen(handle, "r+b")
+
+
 def beside(path: Path) -> Path:
     """A new random name beside a path, for a file that takes its place later."""
     return path.with_name(f"{TEMPORARY}{uuid.uuid4().hex}")
@@ -95,9 +131,9 @@ def put(path: Path, content: bytes, *, replacing: bool) -> None:
     try:
         if replacing:
             written.replace(path)
-            sync_folder(path.parent)
         else:
             take_free_place(written, path)
+        sync_folder(path.parent)
     except BaseException:
         _removed(written)
         raise
@@ -123,18 +159,35 @@ def take_free_place(file: Path, place: Path) -> None:
         file.rename(place)
     else:
         file.unlink()
-    sync_folder(place.parent)
+
+
+_CANNOT_SYNC: Final = frozenset(
+    {errno.EINVAL, errno.EBADF, errno.EIO, errno.ENOSYS, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EACCES, errno.EPERM}
+)
+_said: set[str] = set()
 
 
 def sync_folder(folder: Path) -> None:
-    """Make a rename in this folder durable; Windows does so by itself."""
+    """Make a rename in this folder durable, if its disk can; a warning says once that it cannot.
+
+    The files themselves are synced, so that only a power cut just after a rename may bring back a name from before.
+    Windows makes a rename durable by itself.
+    """
     if sys.platform == "win32":
         return
-    handle = os.open(folder, os.O_RDONLY)
     try:
-        force(handle)
-    finally:
-        os.close(handle)
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            force(handle)
+        finally:
+            os.close(handle)
+    except OSError as error:
+        if error.errno not in _CANNOT_SYNC:
+            raise
+        if (place := os.path.realpath(folder)) not in _said:
+            _said.add(place)
+            why = f"The disk of {folder} cannot sync a folder ({error.strerror}), as some network disks. It is used."
+            warn(f"{why} After a power cut the newest log there may have its name from before.", DiskWarning)
 
 
 def force(handle: int) -> None:

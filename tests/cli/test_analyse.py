@@ -101,6 +101,20 @@ def test_what_is_missing_or_ambiguous_is_asked_for_and_nothing_is_written(
     assert sorted(Path().iterdir()) == before
 
 
+@pytest.mark.slow
+def test_earlier_trials_of_a_visit_count_for_its_limit_lost_ones_among_them(isiw: Command, people: Path) -> None:
+    table = pd.read_csv(people)
+    table.loc[[2, 3], "mep_mv"] = np.nan
+    table.to_csv(people, index=False)
+    isiw("analyse", people, "--reference", "impact", "--config", "few.toml", "-o", "logs")
+    limited = f"{CONFIG}max_trials = 3\n[space]\nreference = 'impact'\n[limits]\nmax_pulses = "
+    for most, says in ((10, "have used up the limit of stimuli"), (12, "12 pulses, 10 of them before the session,")):
+        Path("limited.toml").write_text(f"{limited}{most}\n")
+        ended = isiw("run", "limited.toml", "--earlier", "logs/A.mcap", "--log", f"{most}.mcap")
+        assert says in f"{' '.join(ended.output.split())}"
+    assert len(library.read_session("12.mcap").table) == 2
+
+
 def test_a_session_is_run_with_earlier_trials(isiw: Command, people: Path) -> None:
     made = ("--reference", "impact", "--config", "few.toml", "--simulated", "--only", "A", "-o", "A.mcap")
     assert isiw("analyse", people, *made).exit_code == 0

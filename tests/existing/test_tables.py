@@ -142,6 +142,25 @@ def test_blocks_and_dates_are_kept() -> None:
     assert person.created.startswith("2024-05-01T10:00")
 
 
+@pytest.mark.parametrize(
+    ("dates", "given_by"),
+    [
+        (["2024-05-01 10:00Z", "2024-05-01 10:01Z"], "2024-05-01T10:01:00+00:00"),
+        (["2024-05-01 10:00+02:00", "2024-05-01 10:01+02:00"], "2024-05-01T08:01:00+00:00"),
+        (["2024-05-01 10:00", "2024-05-01 10:01"], "2024-05-01T22:01:00+00:00"),
+        (["2024-05-01 10:00Z", "2024-05-01 10:00Z"], "2024-05-02T10:00:00+00:00"),
+        (["2024-05-01", "2024-05-01"], "2024-05-02T12:00:00+00:00"),
+        (["2024-05-01 10:00Z", ""], ""),
+        (["", ""], ""),
+    ],
+    ids=["times", "zone", "any zone", "one time", "a day", "not all", "none"],
+)
+def test_trials_were_given_at_the_latest_when_their_dates_allow(dates: list[str], given_by: str) -> None:
+    table = pd.DataFrame({"isi_ms": [10.0, 20.0], "mep_mv": [0.1, 0.2], "date": dates})
+    (person,) = read_people(table, IMPACT)
+    assert person.given_by == given_by
+
+
 def test_a_layout_is_read_of_a_file(tmp_path: Path) -> None:
     (tmp_path / "signal.toml").write_text(
         'reference = "impact"\nskip_lines = 2\nseparator = "\\t"\nunits = ["s", "mV"]\n'

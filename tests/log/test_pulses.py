@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import shutil
+import time
 from collections.abc import Container
 from pathlib import Path
 from typing import Any
@@ -12,12 +13,14 @@ from typing import Any
 import pytest
 
 from isiw.errors import DamagedLogError, LogError
+from isiw.log import moments, writer
 from isiw.log.headers import Block, Header, Production, ProductionHeader
-from isiw.log.pulses import earlier_pulses_s, pulses_s
+from isiw.log.moments import Moment
+from isiw.log.pulses import earlier_pulse_ages, pulse_ages
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Intent, Message
 from isiw.log.writer import LogWriter
-from isiw.trials import Status, Trial
+from isiw.trials import Status, Stimulus, Trial
 
 HOUR_S = 3600.0
 
@@ -32,7 +35,7 @@ def make_log(path: Path, header: Header, intents: int = 3, refused: Container[in
 
 
 def earlier(folder: Path, subject: str = "P07") -> list[float]:
-    return earlier_pulses_s(folder, subject, HOUR_S, but=folder / "mine.mcap")
+    return [*earlier_pulse_ages(folder, subject, HOUR_S, but=folder / "mine.mcap").ages_s]
 
 
 def test_a_log_of_any_name_counts_and_the_own_one_never(
@@ -43,14 +46,14 @@ def test_a_log_of_any_name_counts_and_the_own_one_never(
     (tmp_path / "notes.txt").write_text("the coil at 5 mm")
     assert len(earlier(tmp_path)) == 3
     monkeypatch.chdir(tmp_path)
-    assert len(earlier_pulses_s(tmp_path, "P07", HOUR_S, but=Path("mine.mcap"))) == 3
+    assert len(earlier_pulse_ages(tmp_path, "P07", HOUR_S, but=Path("mine.mcap")).ages_s) == 3
 
 
 def test_every_intent_counts_by_its_time_unless_it_was_refused(tmp_path: Path, header: Header) -> None:
     found = salvage(make_log(tmp_path / "a.mcap", header, intents=3, refused=[1]))
     times_ns = [message.log_time_ns for message in found.messages if message.topic == "/intent"]
     now_ns = times_ns[-1] + 10_000_000_000
-    assert pulses_s(found, now_ns) == [(now_ns - times_ns[0]) / 1e9, 10.0]
+    assert pulse_ages(found, Moment(now_ns)).ages_s == ((now_ns - times_ns[0]) / 1e9, 10.0)
 
 
 def test_a_stimulus_whose_intent_is_lost_counts_by_the_record_of_its_trial(tmp_path: Path, header: Header) -> None:
@@ -58,17 +61,17 @@ def test_a_stimulus_whose_intent_is_lost_counts_by_the_record_of_its_trial(tmp_p
         log.append(Intent(trial=0, isi_ms=50.0))
         for trial in range(2):
             log.append(Trial(trial, Status.ACCEPTED, 50.0, isi_ms=50.0, mep_mv=0.1))
-    assert len(pulses_s(salvage(tmp_path / "a.mcap"))) == 2
+    assert len(pulse_ages(salvage(tmp_path / "a.mcap")).ages_s) == 2
 
 
 def test_a_record_that_makes_no_sense_is_no_stimulus(tmp_path: Path, header: Header) -> None:
     found = salvage(make_log(tmp_path / "a.mcap", header, intents=2))
     found.messages.append(Message("/intent", b'{"trial": "none"}', 0))
-    assert len(pulses_s(found)) == 2
+    assert len(pulse_ages(found).ages_s) == 2
 
 
 def test_a_stimulus_is_never_in_the_future(tmp_path: Path, header: Header) -> None:
-    assert pulses_s(salvage(make_log(tmp_path / "a.mcap", header, intents=1)), now_ns=0) == [0.0]
+    assert pulse_ages(salvage(make_log(tmp_path / "a.mcap", header, intents=1)), Moment(0)).ages_s == (0.0,)
 
 
 def without_its_end(log: Path) -> Path:
@@ -92,7 +95,7 @@ def test_a_damaged_file_is_no_error_where_its_log_went_on_with_what_was_left(tmp
     with LogWriter.continuing(log, salvage(log), header) as going_on:
         going_on.append(Event(kind="resume"))
         going_on.append(Intent(trial=3, isi_ms=50.0))
-    left = len(pulses_s(salvage(tmp_path / "a.mcap.damaged")))
+    left = len(pulse_ages(salvage(tmp_path / "a.mcap.damaged")).ages_s)
     assert len(earlier(tmp_path)) == left + 1
     log.rename(tmp_path / "renamed.mcap")
     with pytest.raises(DamagedLogError):
@@ -118,7 +121,7 @@ def test_logs_in_folders_of_the_folder_count_and_the_own_one_never(tmp_path: Pat
     make_log(day / "a.mcap", header, intents=3)
     make_log(day.parent / "b.mcap", header, intents=2)
     own = make_log(day / "mine.mcap", header)
-    assert len(earlier_pulses_s(tmp_path, "P07", HOUR_S, but=own)) == 5
+    assert len(earlier_pulse_ages(tmp_path, "P07", HOUR_S, but=own).ages_s) == 5
     (day / "c.mcap").write_bytes(b"no log")
     with pytest.raises(DamagedLogError):
         earlier(tmp_path)
@@ -196,3 +199,86 @@ def test_a_log_that_cannot_be_read_is_an_error_as_nobody_knows_what_it_holds(tmp
 def test_a_folder_that_is_not_there_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(LogError, match="no such folder"):
         earlier(tmp_path / "nowhere")
+
+
+class Computer:
+    """A computer whose clock can be set, and which can be started again."""
+
+    def __init__(self, patched: pytest.MonkeyPatch) -> None:
+        self.now_s, self.set_by_s, self.started_s = 1_800_000_000.0, 0.0, 1_799_990_000.0
+        patched.setattr(time, "time_ns", lambda: round((self.now_s + self.set_by_s) * 1e9))
+        patched.setattr(moments, "boot_s", lambda: self.now_s - self.started_s)
+        for module in (moments, writer):
+            patched.setattr(module, "boot_id", lambda: f"start at {self.started_s}")
+
+    def log(self, path: Path, header: Header, pulses: int = 3) -> Path:
+        """A log of a stimulus every ten seconds."""
+        with LogWriter.create(path, header) as log:
+            for trial in range(pulses):
+                log.append(Intent.of(Stimulus(trial, 50.0), 0.0))
+                self.now_s += 10.0
+        return path
+
+
+@pytest.fixture
+def computer(monkeypatch: pytest.MonkeyPatch) -> Computer:
+    return Computer(monkeypatch)
+
+
+@pytest.mark.parametrize(("hours", "says"), [(5, "set forward by 5:00:00"), (-5, "set back by 5:00:00"), (0, "")])
+def test_a_clock_that_is_set_after_stimuli_makes_them_no_older_and_no_younger(
+    tmp_path: Path, header: Header, computer: Computer, hours: int, says: str
+) -> None:
+    found = salvage(computer.log(tmp_path / "a.mcap", header))
+    computer.now_s += 600.0
+    computer.set_by_s = hours * HOUR_S
+    ages = pulse_ages(found)
+    assert ages.ages_s == (630.0, 620.0, 610.0)
+    assert len(ages.doubts) == bool(says)
+    assert says in " ".join(ages.doubts)
+
+
+def test_a_clock_that_was_set_between_stimuli_makes_the_first_no_older_after_another_start(
+    tmp_path: Path, header: Header, computer: Computer
+) -> None:
+    with LogWriter.create(tmp_path / "a.mcap", header) as log:
+        for trial in range(2):
+            log.append(Intent.of(Stimulus(trial, 50.0), 0.0))
+            computer.now_s += 10.0
+            computer.set_by_s = 2 * HOUR_S
+    computer.started_s = computer.now_s
+    assert pulse_ages(salvage(tmp_path / "a.mcap")).ages_s == (20.0, 10.0)
+
+
+def test_stimuli_that_are_still_to_come_by_the_clock_of_another_start_count_as_given_now_and_that_is_said(
+    tmp_path: Path, header: Header, computer: Computer
+) -> None:
+    found = salvage(computer.log(tmp_path / "a.mcap", header))
+    computer.started_s, computer.set_by_s = computer.now_s, -24 * HOUR_S  # its battery is empty
+    ages = pulse_ages(found)
+    assert ages.ages_s == (0.0, 0.0, 0.0)
+    assert "3 earlier stimuli are still to come" in "".join(ages.doubts)
+
+
+def test_a_log_of_this_start_counts_however_old_its_file_looks(
+    tmp_path: Path, header: Header, computer: Computer
+) -> None:
+    log = computer.log(tmp_path / "a.mcap", header)
+    os.utime(log, (computer.now_s, computer.now_s))
+    computer.set_by_s = 24 * HOUR_S
+    ages = earlier_pulse_ages(tmp_path, "P07", HOUR_S, but=tmp_path / "mine.mcap")
+    assert ages.ages_s == (30.0, 20.0, 10.0)
+    assert "set forward by 1 day" in "".join(ages.doubts)
+    computer.started_s = computer.now_s
+    assert earlier(tmp_path) == []  # of another start, whose clock nothing contradicts
+
+
+@pytest.mark.parametrize(("given_by", "count"), [("2020-01-01T00:00:00Z", 0), ("", 3), ("2100-01-01T00:00:00Z", 3)])
+def test_imported_trials_count_as_of_their_own_dates_and_without_these_as_of_their_import(
+    tmp_path: Path, header: Header, given_by: str, count: int
+) -> None:
+    imported = header.model_copy(update={"kind": "imported", "source": "table.csv", "given_by": given_by})
+    with LogWriter.create(tmp_path / "a.mcap", imported) as log:
+        for trial in range(3):
+            log.append(Trial(trial, Status.ACCEPTED, 50.0, isi_ms=50.0, mep_mv=0.1))
+    assert len(earlier(tmp_path)) == count

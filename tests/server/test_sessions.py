@@ -227,6 +227,42 @@ def test_an_excluded_trial_counts_again_once_it_is_included_and_both_may_be_repe
     assert [event.kind for event in read_session(tmp_path / "P07.mcap").events] == ["exclusion", "inclusion"]
 
 
+def test_a_late_repetition_of_an_exclusion_or_an_inclusion_with_a_key_changes_nothing(
+    client: httpx.Client, session: str, tmp_path: Path
+) -> None:
+    told(client, session, 3)
+    out, back = ({"trial": 1, "reason": "cough", "key": "k1"}, {"trial": 1, "key": "k2"})
+    assert done(client.post(f"{session}/exclude", json=out))["told"] == 2
+    assert done(client.post(f"{session}/include", json=back))["told"] == 3
+    assert done(client.post(f"{session}/exclude", json=out))["told"] == 3
+    done(client.post(f"{session}/close"))
+    done(client.post(f"{session}/resume"))
+    assert done(client.post(f"{session}/exclude", json=out))["told"] == 3
+    assert done(client.post(f"{session}/exclude", json={"trial": 1}))["told"] == 2
+    assert done(client.post(f"{session}/include", json=back))["told"] == 2
+    refused(client.post(f"{session}/exclude", json=out | {"trial": 2}), 409, "OtherKey")
+    refused(client.post(f"{session}/include", json=back | {"key": "k1"}), 409, "OtherKey")
+    refused(client.post(f"{session}/exclude", json={"trial": 9, "key": "k3"}), 422, "InvalidValueError")
+    events = [(event.kind, event.key) for event in read_session(tmp_path / "P07.mcap").events if event.key]
+    assert events == [("exclusion", "k1"), ("inclusion", "k2")]
+
+
+def test_what_is_so_already_is_remembered_with_its_key(client: httpx.Client, session: str) -> None:
+    told(client, session, 3)
+    done(client.post(f"{session}/exclude", json={"trial": 1}))
+    for told_now in (2, 3):
+        assert done(client.post(f"{session}/exclude", json={"trial": 1, "key": "k1"}))["told"] == told_now
+        assert done(client.post(f"{session}/include", json={"trial": 1}))["told"] == 3
+
+
+def test_an_id_that_is_another_sessions_on_other_systems_is_refused(client: httpx.Client, tmp_path: Path) -> None:
+    created(client, "P07a")
+    if (tmp_path / "p07A.mcap.part").exists():
+        pytest.skip("the disk itself takes them for one")
+    refused(client.post("/sessions", json={**PLAN, "id": "p07A"}), 409, "Exists")
+    assert [path.name for path in tmp_path.iterdir()] == ["P07a.mcap.part"]
+
+
 def test_a_note_with_a_key_is_logged_once_also_after_resuming(
     client: httpx.Client, session: str, tmp_path: Path
 ) -> None:

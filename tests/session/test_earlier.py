@@ -1,4 +1,4 @@
-"""Earlier trials of a visit: learnt before the first ask, logged, and counted against nothing."""
+"""Earlier trials of a visit: learnt before the first ask, logged, and counted by one limit alone."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ def earlier(n: int = 60, factor: float = 1.0) -> tuple[Trial, ...]:
     return isiw.analyse(isis_ms, meps_mv, space=SPACE, particles=50).record.table.trials
 
 
-def test_a_session_knows_earlier_trials_and_no_limit_counts_them(tmp_path: Path) -> None:
+def test_a_session_knows_earlier_trials_and_no_budget_counts_them(tmp_path: Path) -> None:
     trials = earlier()
-    limits = isiw.Limits.of_space(SPACE, min_iti_s=0, max_pulses=5)
+    limits = isiw.Limits.of_space(SPACE, min_iti_s=0, max_pulses=len(trials) + 5)
     strategy = isiw.make_strategy(space=SPACE, seed=2, **SETTINGS)
     with isiw.open_session(strategy, tmp_path / "a.mcap", earlier=trials, limits=limits) as session:
         assert (session.estimate().probability or 0.0) > 0.9
@@ -40,6 +40,15 @@ def test_a_session_knows_earlier_trials_and_no_limit_counts_them(tmp_path: Path)
     assert not record.header.earlier_same_level
     told = f"{len(record.header.earlier)} trials, learnt before the first"
     assert ("earlier", told) in isiw.report.tables.first_facts(record)
+
+
+@pytest.mark.parametrize(("most", "says"), [(60, "used up the limit"), (63, "does not fit into the limits")])
+def test_earlier_trials_leave_less_of_the_limit_of_pulses(tmp_path: Path, most: int, says: str) -> None:
+    strategy = isiw.make_strategy("incremental", space=SPACE, max_trials=4)
+    limits = isiw.Limits.of_space(SPACE, max_pulses=most)
+    with pytest.raises(isiw.errors.InvalidValueError, match=says):
+        isiw.open_session(strategy, tmp_path / "a.mcap", earlier=earlier(), limits=limits)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_session_that_goes_on_knows_them_still(tmp_path: Path) -> None:

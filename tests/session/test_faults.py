@@ -15,7 +15,7 @@ from isiw.devices.deadlines import Deadlines
 from isiw.devices.limits import Limits
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, LogError, NotDelivered
 from isiw.findings import Kind
-from isiw.log.pulses import pulses_s
+from isiw.log.pulses import pulse_ages
 from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
 from isiw.session.interrupts import STILL_ARMED
@@ -85,7 +85,7 @@ def test_a_device_that_goes_on_refusing_ends_the_session_and_it_can_be_resumed(l
     assert len(record.intents) == 4
     assert record.unknown == ()
     assert len(record.table) == 0
-    assert pulses_s(salvage(log)) == []
+    assert pulse_ages(salvage(log)).ages_s == ()
     assert [event.kind for event in record.events] == ["refused"] * 4, "the last one is not stated again as a fault"
     resumed = resume(log, ScriptedDevice(), scripted_strategy(4)).run()
     assert [trial.told for trial in resumed.trials] == [True] * 4

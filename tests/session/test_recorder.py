@@ -454,6 +454,18 @@ def failing(_: object) -> Never:
     raise LogError("the log is no longer at its path")
 
 
+def test_an_exclusion_with_a_key_is_done_once_whatever_came_since(log: Path) -> None:
+    with open_session(scripted_strategy(), log) as session:
+        run(session, 3)
+        session.exclude(1, "sneezed", key="k1")
+        session.include(1, key="k2")
+        session.exclude(1, "sneezed", key="k1")
+        assert not session.trials[1].excluded
+        with pytest.raises(InvalidValueError, match="key 'k1' is that of something else"):
+            session.exclude(2, "sneezed", key="k1")
+    assert [event.key for event in read_session(log).events] == ["k1", "k2"]
+
+
 def test_an_excluded_trial_is_unlearnt_and_stays_so(log: Path) -> None:
     with open_session(scripted_strategy(9), log) as session:
         asked = run(session, 3)
@@ -486,7 +498,7 @@ def test_a_change_is_learnt_where_it_was_noted_also_after_a_verdict_and_after_re
         assert resumed.ask() == after
         resumed.note_change("coil re-seated", key="c1")
         for log_it in (resumed.note, resumed.note_change):
-            with pytest.raises(InvalidValueError, match="Give each note and each change a key of its own"):
+            with pytest.raises(InvalidValueError, match="a key of its own"):
                 log_it("and again", key="c1")
         assert changes(resumed) == (2,)
     events = [event for event in read_session(log).events if event.kind == "change"]

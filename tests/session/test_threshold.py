@@ -13,7 +13,7 @@ import isiw
 from isiw.devices.clock import VirtualClock
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, LogError
-from isiw.log.pulses import earlier_pulses_s
+from isiw.log.pulses import earlier_pulse_ages
 from isiw.log.schema import Intent, PulseOutcome, ThresholdBelief
 from isiw.session import ThresholdRecorder, open_session, open_threshold, read_threshold, resume_threshold
 from isiw.session.threshold import search_of
@@ -222,7 +222,7 @@ def test_a_log_is_never_overwritten_and_the_way_on_is_named(log: Path) -> None:
 def test_pulses_on_the_way_to_a_threshold_count_among_a_persons_earlier_ones(log: Path) -> None:
     with open_threshold(search(), log, clock=FakeRealClock(), subject="P1") as recorder:
         answer(recorder, 4)
-    assert len(earlier_pulses_s(log.parent, "P1", 3600.0, but=log.with_name("other.mcap"))) == 4
+    assert len(earlier_pulse_ages(log.parent, "P1", 3600.0, but=log.with_name("other.mcap")).ages_s) == 4
 
 
 def test_a_simulated_search_goes_on_as_if_it_had_not_been_interrupted(log: Path, tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import ConfigError, InvalidValueError, LimitExceededError
-from isiw.log.pulses import pulses_s
+from isiw.log.pulses import pulse_ages
 from isiw.log.salvage import salvage
 from isiw.session import ThresholdRecorder, open_threshold, read_threshold, resume_threshold
 from isiw.session.threshold import search_of
@@ -143,7 +143,7 @@ def test_where_the_operator_ends_the_search_the_pulse_that_was_asked_was_not_giv
     typed(recorder, "n", "q")
     recorder.close()
     log = tmp_path / "t.mcap"
-    assert len(pulses_s(salvage(log))) == read_threshold(log).given == 1
+    assert len(pulse_ages(salvage(log)).ages_s) == read_threshold(log).given == 1
     with resume_threshold(log) as resumed:
         assert [outcome.reason for outcome in resumed.outcomes] == [""]
         typed(resumed, "y")

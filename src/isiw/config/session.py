@@ -113,7 +113,7 @@ def _require_people(
 
 
 def earlier_trials(config: RunConfig, device: DeviceInfo) -> tuple[Trial, ...]:
-    """The earlier trials of the visit, which a strategy learns before its first ask."""
+    """The earlier trials of the visit, which count for the limits, and which a strategy learns before its first ask."""
     records = [read_session(path) for path in config.earlier]
     _require_people(config, records, device)
     require_each_once([*records, *(read_session(path) for path in config.after)])
@@ -127,7 +127,7 @@ def earlier_trials(config: RunConfig, device: DeviceInfo) -> tuple[Trial, ...]:
                 expected=f"{device.conditioning} and {device.reference}",
                 remedy="Leave this file out.",
             )
-    return tuple(trial for record in records for trial in record.table.told)
+    return tuple(trial for record in records for trial in (*record.table, *record.unknown_trials))
 
 
 def told_imported(config: RunConfig) -> str:

@@ -102,6 +102,11 @@ class Limits(Checked):
         """The interval that holds if isiw delivers [s]."""
         return USUAL_ITI_S if self.min_iti_s is None else self.min_iti_s
 
+    @property
+    def looks_back(self) -> bool:
+        """True if it matters when earlier stimuli came, before the last interval."""
+        return self.max_block_pulses is not None or self.max_period_pulses is not None
+
     def stated(self, iti_s: float) -> Limits:
         """The same with this interval [s], unless another one is stated."""
         return replace(self, min_iti_s=iti_s) if self.min_iti_s is None else self

@@ -16,13 +16,14 @@ from matplotlib.figure import Figure
 from isiw.design import DesignSpace, require_space
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
-from isiw.errors import InvalidValueError, LogError
+from isiw.errors import InvalidValueError, LogError, os_errors
 from isiw.estimate import WindowEstimate
 from isiw.existing.delivered import Delivered
 from isiw.files import made_folder, put
 from isiw.findings import Kind
-from isiw.log.durable import log_exists, log_of
+from isiw.log.durable import log_of
 from isiw.log.headers import Header
+from isiw.log.names import require_free
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Event, Record, Waveform, clock_ns
 from isiw.log.writer import LogWriter
@@ -103,13 +104,11 @@ class Analysis:
             path: where to, such as `P01.mcap`; nothing is replaced.
 
         Raises:
-            LogError: there is a log already.
+            LogError: there is a log already, or no file can have this name.
         """
         target = log_of(Path(path))
-        if log_exists(target):
-            raise LogError(
-                "there is a log already, and it is never overwritten", got=str(target), remedy="Choose another path."
-            )
+        with os_errors(LogError, "the log cannot be created", target, "Choose another path."):
+            require_free(target)
         made_folder(target.parent)
         with tempfile.TemporaryDirectory() as folder:  # a log that is not whole never gets a name
             whole = Path(folder) / "log.mcap"
@@ -118,7 +117,8 @@ class Analysis:
                     log.append(Waveform.of(number, channel), name)
                 for record in self.record.history:
                     log.append(record)
-            put(target, whole.read_bytes(), replacing=False)
+            with os_errors(LogError, "the log cannot be created", target, "Make room, or choose another path."):
+                put(target, whole.read_bytes(), replacing=False)
         return target
 
 
@@ -230,6 +230,7 @@ def _header(delivered: Delivered, strategy: Strategy, config: Mapping[str, Any])
         strategy,
         kind="imported",
         source=delivered.source,
+        given_by=delivered.given_by,
         subject=delivered.subject,
         visit=delivered.visit,
         device=device,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import unicodedata
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -19,6 +20,7 @@ from isiw.existing.gate import hash_of
 from isiw.existing.layout import Layout
 from isiw.existing.limits import ReadingLimits
 from isiw.existing.reading import read_people
+from isiw.files import folded, is_reserved
 from isiw.log.durable import log_exists
 from isiw.log.reader import read_session
 from isiw.strategy.catalogue import make_strategy
@@ -145,25 +147,29 @@ def _placed(people: Sequence[Person], output: str | Path | None) -> list[Person]
         return [one._replace(log=Path(output)) for one in people]
     days = [f"_day{day}" if (day := one.delivered.visit.day) else "" for one in people]
     stems = [code_in_names(one.delivered.subject) + day for one, day in zip(people, days, strict=True)]
-    times = Counter(stems)
+    times = Counter(map(folded, stems))  # names that are two here may be one file on other computers
     return [
-        one._replace(log=Path(output) / f"{stem}.mcap", refused=_no_log_of_its_own(stem, times[stem]))
+        one._replace(log=Path(output) / f"{stem}.mcap", refused=_no_log_of_its_own(stem, times[folded(stem)]))
         for one, stem in zip(people, stems, strict=True)
     ]
 
 
 def code_in_names(subject: str) -> str:
-    """A person's code as the name of a file can have it, which knows no `/`."""
-    return re.sub(r"[^\w.-]+", "_", subject).strip("._") or "unnamed"
+    """A person's code as the name of a file can have it, which knows no `/`; an accent is part of its letter."""
+    return re.sub(r"[^\w.-]+", "_", unicodedata.normalize("NFC", subject)).strip("._") or "unnamed"
 
 
 def _no_log_of_its_own(stem: str, times: int) -> InvalidValueError | None:
     """Why a person's log can have no such name; None if it can."""
     if times > 1:
-        remedy = "Give each a code, or a day, of their own."
-        return InvalidValueError("two of the people or days would have one log", got=stem, remedy=remedy)
+        remedy = "Give each a code, or a day, of their own, that differs in more than capitals."
+        return InvalidValueError(
+            "two of the people or days would have one log, here or on other systems", got=stem, remedy=remedy
+        )
     if len(stem.encode()) > _LONGEST_STEM:
         return InvalidValueError("this code is too long for the name of a log", got=stem, remedy="Give a shorter one.")
+    if is_reserved(f"{stem}.mcap"):
+        return InvalidValueError("Windows keeps such a name for itself", got=stem, remedy="Give another code.")
     return None
 
 

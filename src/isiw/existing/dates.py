@@ -12,6 +12,10 @@ from isiw.existing.tables import Column
 from isiw.lazy import pd
 
 _DATE: Final = re.compile(r"(\d{1,2})([./-])(\d{1,2})\2\d{2,4}(?!\d)")
+_ZONE: Final = re.compile(r":.*(z|utc|gmt|[+-]\d\d:?\d\d)\s*$", re.IGNORECASE)
+_FURTHEST_BEHIND: Final = dt.timedelta(hours=12)
+"""Nowhere on Earth is the time of the day further behind UTC."""
+
 _REMEDY: Final = "Write dates as 2026-01-31."
 
 
@@ -26,6 +30,22 @@ def dates_of(column: Column, rows: Iterable[int]) -> dict[int, dt.datetime]:
         if pd.isna(date):
             raise column.refused(row, "is no date", _REMEDY)
     return {row: date.to_pydatetime() for row, date in dates.items()}
+
+
+def latest_of(texts: Sequence[str], dates: Sequence[dt.datetime | None]) -> str:
+    """When the last of some trials was given at the latest, as ISO 8601 in UTC; empty if one of them has no date.
+
+    A date without a time may be any of its day, and so may one of several trials; without a zone it may be of any.
+    """
+    known = [date for date in dates if date is not None]
+    if not known or len(known) < len(dates):
+        return ""
+    latest = max(known)
+    if len({*known}) < len(known) or any(date.time() == dt.time() for date in known):
+        latest += dt.timedelta(days=1)
+    if not all(_ZONE.search(text) for text in texts):
+        latest += _FURTHEST_BEHIND
+    return latest.isoformat(timespec="seconds")
 
 
 def times_of(texts: Sequence[str]) -> list[float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import math
 import statistics
 from collections.abc import Mapping, Sequence
@@ -13,7 +14,7 @@ from isiw.design import MOST_ISIS, DesignSpace
 from isiw.errors import InvalidValueError, LogError
 from isiw.existing.layout import ISI_UNITS_MS
 from isiw.findings import AMPLITUDE_MV, Kind
-from isiw.log.reader import read_session
+from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import MOST_TRIALS
 from isiw.signals.limits import EMG_UNITS_MV, SignalLimits, implausible_scale
 from isiw.text.sanitize import counted
@@ -36,6 +37,7 @@ class Delivered:
         visit: what is known of the visit.
         source: where they are from, in words.
         created: when the first one was delivered, as ISO 8601 in UTC; empty if unknown.
+        given_by: when all of them had been delivered, at the latest that their dates allow; empty if unknown.
         signals: what sweeps were judged by.
         sweeps: the waveforms, by trial and channel; empty if amplitudes alone are known.
         blocks: the first trial of each block, and what the block is called.
@@ -56,6 +58,7 @@ class Delivered:
     visit: Visit = field(default_factory=Visit)
     source: str = ""
     created: str = ""
+    given_by: str = ""
     signals: SignalLimits = field(default_factory=SignalLimits)
     sweeps: Mapping[int, Mapping[str, Channel]] = field(default_factory=dict)
     blocks: Mapping[int, str] = field(default_factory=dict)
@@ -162,11 +165,20 @@ def read_log(path: str | Path) -> Delivered:
         visit=header.visit,
         source=header.source or record.path.name,
         created=header.created,
+        given_by=header.given_by if header.imported else _last_given(record),
         signals=header.signals,
         sweeps=sweeps,
         conditioning=header.conditioning,
         simulated=header.device.simulated,
     )
+
+
+def _last_given(record: SessionRecord) -> str:
+    """When a session's last stimulus was about to be delivered, by its log; empty if that is not known of all."""
+    at_ns = [onset.at_ns for onset in record.onsets.values()]
+    if len(at_ns) < len(record.table) or not at_ns:
+        return ""
+    return dt.datetime.fromtimestamp(max(at_ns) / 1e9 + 1, dt.UTC).isoformat(timespec="seconds")
 
 
 def renumbered(trials: Sequence[Trial]) -> TrialTable:

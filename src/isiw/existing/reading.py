@@ -18,7 +18,7 @@ from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.existing import frames, recordings, tables
 from isiw.existing.apart import read_apart
-from isiw.existing.dates import dates_of, times_of
+from isiw.existing.dates import dates_of, latest_of, times_of
 from isiw.existing.delivered import Delivered, anywhere, read_log, renumbered
 from isiw.existing.layout import ISI_UNITS_MS, MARKERS, Layout, letters
 from isiw.existing.limits import ReadingLimits
@@ -260,7 +260,8 @@ def people_of(frame: pd.DataFrame, layout: Layout, source: str, name: str = "") 
     for own, subject, day in sorted(visits, key=lambda visit: visit[0][0]):
         begun = dates[own[0]].isoformat(timespec="microseconds") if own[0] in dates else ""
         person = _person(columns, own, layout, reference, subject or name)
-        found.append(replace(person, visit=Visit(day=day), created=begun))
+        given_by = latest_of([columns["date"].text(row) for row in own], [dates.get(row) for row in own])
+        found.append(replace(person, visit=Visit(day=day), created=begun, given_by=given_by))
     return found
 
 

@@ -67,15 +67,15 @@ def kept_for(path: Path) -> Path | None:
 
 
 class DurableFile:
-    """A new binary file that can be renamed while it is written."""
+    """A new binary file that can be renamed while it is written; `wanted` is the name by which errors call it."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, wanted: Path | None = None) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         # Appending, so that a file that is shortened behind our back stays shorter than what was written.
         self._file = new_file(path)
         self.path, self._size, self._synced = path, 0, False
         try:
-            lock(self._file, path)
+            lock(self._file, wanted or path)
         except LogError:
             self.abandon()
             path.unlink()
@@ -165,10 +165,10 @@ class DurableFile:
                 source.close()
         if replacing:
             self.path.replace(place)
-            sync_folder(place.parent)
         else:
             take_free_place(self.path, place)
         self.path = place
+        sync_folder(place.parent)
         if sys.platform == "win32":
             self._file = place.open("a+b")
             lock(self._file, place)
@@ -190,9 +190,9 @@ class DurableFile:
 
 
 @contextmanager
-def begun(path: Path) -> Iterator[DurableFile]:
+def begun(path: Path, wanted: Path | None = None) -> Iterator[DurableFile]:
     """A new file that is removed if its first records fail; once it has taken another file's place, it stays."""
-    file = DurableFile(path)
+    file = DurableFile(path, wanted)
     try:
         yield file
     except BaseException:

@@ -10,6 +10,7 @@ Its two topics have no frozen channel number: the file announces them.
 
 from __future__ import annotations
 
+import datetime as dt
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -165,11 +166,13 @@ class Header(_Header):
     `asks_from` is the first trial that was asked with these versions. `belief_version` and `engine_version` grow if
     the same settings come to another estimate, or compute it otherwise; 1 is what older logs mean. An "imported"
     one is of trials that were delivered without isiw, and `source` says where they are from: it was no session, and has
-    no intents. `earlier` are trials that were learnt before the first ask, and count against nothing.
+    no intents; `given_by` is when all of them had been given, as ISO 8601 in UTC, if their dates say so. `earlier` are
+    trials that were learnt before the first ask, and `earlier_given` is how many stimuli these and lost ones were.
     """
 
     kind: Literal["session", "imported"] = "session"
     source: str = ""
+    given_by: str = ""
     strategy: StrategyRecipe
     space: Annotated[DesignSpace, BeforeValidator(with_reference)]
     limits: Limits
@@ -182,7 +185,21 @@ class Header(_Header):
     belief_version: int = 1
     engine_version: int = 1
     earlier: tuple[Trial, ...] = ()
+    earlier_given: int = 0
     earlier_same_level: bool = False
+
+    @field_validator("given_by")
+    @classmethod
+    def _a_date(cls, given_by: str) -> str:
+        """Check what limits rest on."""
+        if given_by and dt.datetime.fromisoformat(given_by).tzinfo is None:
+            raise InvalidValueError("given_by has no zone", got=given_by)
+        return given_by
+
+    @property
+    def given_before(self) -> int:
+        """The number of stimuli that count for `max_pulses` before the session's own: those of earlier trials."""
+        return max(self.earlier_given, len(self.earlier))
 
     @property
     def imported(self) -> bool:

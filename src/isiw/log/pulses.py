@@ -1,18 +1,28 @@
-"""When a person was stimulated, by the logs."""
+"""When a person was stimulated, by the logs; what is uncertain counts as given at the latest time that is possible.
+
+Within one start of the computer the time that passed is measured, whatever its clock was set to meanwhile. Otherwise
+its clock is trusted, unless that says that a stimulus is still to come: then it counts as given just now.
+"""
 
 from __future__ import annotations
 
+import datetime as dt
+import math
 import os
-import time
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Final, NamedTuple
 
 from isiw.errors import DamagedLogError, LogError
-from isiw.files import is_mcap
+from isiw.files import is_mcap, opened
 from isiw.log.durable import kept_for, log_exists, log_of
+from isiw.log.headers import Header
+from isiw.log.moments import Moment
 from isiw.log.reader import of_production, read_any
 from isiw.log.salvage import Salvage, holds, salvage
 from isiw.log.schema import Event, Intent, Message, Record, decode
+from isiw.text.sanitize import counted
 from isiw.trials import Trial
 
 _SUFFIXES = {".mcap", ".part"}
@@ -21,28 +31,85 @@ _SUFFIXES = {".mcap", ".part"}
 _TIMED = ("/intent", "/trial", "/event")
 
 
-def pulses_s(salvaged: Salvage, now_ns: int | None = None) -> list[float]:
-    """The age of each stimulus of a log [s], refused ones left out; without an intent its trial's record counts."""
-    return _ages_s(_given(salvaged), now_ns)
+_NOTABLE_S: Final = 60.0
+"""A clock that differs by less was put right, as a computer does by itself."""
+
+_HEAD_BYTES: Final = 1 << 18
+"""Within so many first bytes every log says, without compression, in which start of the computer it was written."""
 
 
-def _given(salvaged: Salvage) -> list[tuple[int, int]]:
-    """The number of each stimulus that was about to be delivered, and when that was [ns since 1970]."""
-    at_ns: dict[int, int] = {}
+@dataclass(frozen=True)
+class Ages:
+    """How long ago some stimuli were given.
+
+    Args:
+        ages_s: of each, the oldest first [s].
+        doubts: a sentence for each thing that is wrong with the clock by which that is known.
+    """
+
+    ages_s: tuple[float, ...] = ()
+    doubts: tuple[str, ...] = ()
+
+
+class Given(NamedTuple):
+    """A stimulus that was about to be delivered: its number, and when that was."""
+
+    trial: int
+    at: Moment
+
+
+def pulse_ages(salvaged: Salvage, now: Moment | None = None) -> Ages:
+    """The age of each stimulus of a log, refused ones left out; without an intent its trial's record counts."""
+    return _aged(_given(salvaged), now or Moment.now())
+
+
+def _given(salvaged: Salvage) -> list[Given]:
+    """The stimuli that were about to be delivered."""
+    at: dict[int, Moment] = {}
     for message in salvaged.messages:
         record = _timed(message)
         if isinstance(record, Intent):
-            at_ns[record.trial] = message.log_time_ns
+            at[record.trial] = Moment(message.log_time_ns, record.boot_id, record.boot_s)
         elif isinstance(record, Trial):
-            at_ns.setdefault(record.index, message.log_time_ns)
+            at.setdefault(record.index, Moment(message.log_time_ns))
         elif isinstance(record, Event) and record.kind == "refused" and record.trial is not None:
-            at_ns.pop(record.trial, None)
-    return list(at_ns.items())
+            at.pop(record.trial, None)
+    return [Given(*each) for each in at.items()]
 
 
-def _ages_s(given: Iterable[tuple[int, int]], now_ns: int | None = None) -> list[float]:
-    now_ns = time.time_ns() if now_ns is None else now_ns
-    return [max(0.0, (now_ns - each_ns) / 1e9) for _, each_ns in given]
+def _aged(given: Iterable[Given], now: Moment, most_s: float = math.inf) -> Ages:
+    """The ages of stimuli, those older than `most_s` left out [s]."""
+    moments = [each.at for each in given]
+    last = {at.boot_id: at for at in sorted(moments, key=lambda at: at.boot_s or 0.0)}  # of each start of a computer
+    ages_s, set_by_s, ahead = [], 0.0, 0
+    for at in moments:
+        by_clock_s = (now.wall_ns - at.wall_ns) / 1e9
+        age_s = now.since_s(at)
+        if age_s is not None:
+            moved_s = by_clock_s - age_s
+        else:  # the clock may have been set while stimuli were given, so that the last one's time is nearest to today's
+            since_s = last[at.boot_id].since_s(at)
+            age_s = by_clock_s if since_s is None else (now.wall_ns - last[at.boot_id].wall_ns) / 1e9 + since_s
+            moved_s, ahead = 0.0, ahead + (age_s < -_NOTABLE_S)
+        if age_s <= most_s:
+            ages_s.append(max(0.0, age_s))
+            set_by_s = max(set_by_s, moved_s, key=abs)
+    return Ages(tuple(sorted(ages_s, reverse=True)), tuple(_doubts(set_by_s, ahead)))
+
+
+def _doubts(set_by_s: float, ahead: int) -> Iterator[str]:
+    if abs(set_by_s) > _NOTABLE_S:
+        way, moved = "forward" if set_by_s > 0 else "back", dt.timedelta(seconds=round(abs(set_by_s)))
+        yield (
+            f"The computer's clock was set {way} by {moved} since earlier stimuli were given. For the limits they "
+            "count by the time that really passed since then, which the computer measures besides."
+        )
+    if ahead:
+        yield (
+            f"By the computer's clock {counted(ahead, 'earlier stimulus is', 'earlier stimuli are')} still to come, so "
+            "that the clock is wrong, or was. For the limits they count as given just now. Set the clock before the "
+            "next session."
+        )
 
 
 def _timed(message: Message) -> Record | None:
@@ -53,23 +120,32 @@ def _timed(message: Message) -> Record | None:
         return None
 
 
-def earlier_pulses_s(folder: str | Path, subject: str, period_s: float, *, but: Path) -> list[float]:
-    """The ages of a subject's stimuli in a folder's logs [s], each once; those of simulations do not count."""
+def earlier_pulse_ages(folder: str | Path, subject: str, period_s: float, *, but: Path) -> Ages:
+    """The ages of a subject's stimuli of a period in a folder's logs, each once; those of simulations do not count."""
+    now = Moment.now()
     folder = Path(folder)
     if not folder.is_dir():
         raise LogError("there is no such folder of logs", got=str(folder), remedy="Check Safeguards.earlier_logs.")
     own = log_of(but.resolve())
-    given = {stimulus for log in sorted(_recent(folder, period_s) - {own}) for stimulus in _of_subject(log, subject)}
+    recent = sorted(_recent(folder, period_s, now) - {own})
+    given = {stimulus for log in recent for stimulus in _of_subject(log, subject)}
     if log_exists(own):
         given -= set(_given(salvage(own)))  # of which there may be a copy
-    return sorted((age_s for age_s in _ages_s(given) if age_s <= period_s), reverse=True)
+    return _aged(given, now, period_s)
 
 
-def _recent(folder: Path, period_s: float) -> set[Path]:
-    """The logs of a folder, and of its folders, that something was written to in a period."""
-    since_s = time.time() - period_s
+def _recent(folder: Path, period_s: float, now: Moment) -> set[Path]:
+    """The logs of a folder, and of its folders, that something was written to in a period, or in this start.
+
+    How old a file looks is up to the clock; in which start of the computer it was written is not.
+    """
+    since_s, this_start = now.wall_ns / 1e9 - period_s, now.boot_id.encode()
+
+    def may_count(file: Path) -> bool:
+        return file.stat().st_mtime >= since_s or bool(this_start and this_start in _head(file))
+
     try:
-        recent = [file for file in _files(folder) if file.is_file() and file.stat().st_mtime >= since_s]
+        recent = [file for file in _files(folder) if file.is_file() and may_count(file)]
         return {log_of(file.resolve()) for file in recent if file.suffix in _SUFFIXES or is_mcap(file)}
     except OSError as error:
         raise LogError(
@@ -77,6 +153,11 @@ def _recent(folder: Path, period_s: float) -> set[Path]:
             got=str(error.filename),
             remedy="Give isiw the right to read all of Safeguards.earlier_logs, or name another folder.",
         ) from error
+
+
+def _head(file: Path) -> bytes:
+    with opened(file) as found:
+        return found.read(_HEAD_BYTES)
 
 
 def _files(folder: Path) -> Iterator[Path]:
@@ -109,7 +190,7 @@ def _resumed(salvaged: Salvage) -> int:
     return sum(isinstance(record, Event) and record.kind == "resume" for record in records)
 
 
-def _of_subject(log: Path, subject: str) -> list[tuple[int, int]]:
+def _of_subject(log: Path, subject: str) -> list[Given]:
     salvaged = salvage(log)
     if of_production(salvaged) and not _given(salvaged):  # nobody is stimulated in such a task
         return []
@@ -124,4 +205,13 @@ def _of_subject(log: Path, subject: str) -> list[tuple[int, int]]:
             got=str(log),
             remedy="Resume that session with the number of pulses that were lost, or wait until the period is over.",
         )
-    return _given(salvaged)
+    given = _given(salvaged)
+    return _dated(given, header) if isinstance(header, Header) and header.imported else given
+
+
+def _dated(given: Iterable[Given], header: Header) -> list[Given]:
+    """The stimuli of an imported log by the dates of their data, and not later than they were imported."""
+    if not header.given_by:
+        return list(given)
+    latest_ns = round(dt.datetime.fromisoformat(header.given_by).timestamp() * 1e9)
+    return [Given(each.trial, Moment(min(latest_ns, each.at.wall_ns))) for each in given]

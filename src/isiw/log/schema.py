@@ -34,6 +34,7 @@ from isiw.errors import InvalidValueError, LogError, error_text
 from isiw.estimate import Estimate, WindowEstimate
 from isiw.findings import Kind
 from isiw.log.headers import ANY_HEADER, AnyHeader, Header, LogRecord, Production, ProductionHeader, ThresholdHeader
+from isiw.log.moments import Moment
 from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.strategy.threshold.pulses import ThresholdEstimate
 from isiw.text.toml_files import refuse_doubled
@@ -47,7 +48,10 @@ TrialNumber: TypeAlias = Annotated[int, Field(ge=0, lt=MOST_TRIALS)]
 
 
 class Intent(LogRecord):
-    """The intent to deliver a pair of stimuli, or without an ISI TMS alone or a tap alone."""
+    """The intent to deliver a pair of stimuli, or without an ISI TMS alone or a tap alone.
+
+    `boot_s` is when, since the start of the computer that `boot_id` names, if that is known: a clock may be set.
+    """
 
     trial: TrialNumber
     isi_ms: float | None
@@ -55,11 +59,15 @@ class Intent(LogRecord):
     tap_alone: bool = False
     intensity_pct_mso: float | None = None
     place_mm: tuple[float, float] | None = None
+    boot_id: str = ""
+    boot_s: FiniteFloat | None = None
 
     @classmethod
-    def of(cls, stimulus: Stimulus, t_s: float) -> Self:
-        """The intent to deliver a stimulus."""
-        return cls(trial=stimulus.trial, isi_ms=stimulus.isi_ms, t_s=t_s, tap_alone=stimulus.tap_alone)
+    def of(cls, stimulus: Stimulus, t_s: float, **more: Any) -> Self:
+        """The intent to deliver a stimulus now; `t_s` is the time on the session's clock [s]."""
+        now = Moment.now()
+        known = {"trial": stimulus.trial, "isi_ms": stimulus.isi_ms, "t_s": t_s, "tap_alone": stimulus.tap_alone}
+        return cls(**known | {"boot_id": now.boot_id, "boot_s": now.boot_s} | more)
 
 
 class PulseOutcome(LogRecord):

@@ -106,34 +106,58 @@ def isi_confirmed(number: int) -> Event:
     return Event(kind="inclusion", trial=number, text="The realised ISI was confirmed.", finding=Kind.ISIS_FAR)
 
 
+class KeyTakenError(InvalidValueError):
+    """A key that is that of something else in a log."""
+
+
 def is_logged(event: Event, events: Iterable[Event]) -> bool:
-    """True if an event was logged with its key before; raise if something else has the key."""
+    """True if an event was logged with its key before; raise KeyTakenError if something else has the key."""
     before = next((each for each in events if event.key is not None and each.key == event.key), None)
     if before is None:
         return False
     texts = {event.text, f"{event.text} (key {event.key})"}  # as older logs have it
     was, is_now = (CHANGE if each.finding is Kind.MANY_CHANGES else each.kind for each in (before, event))
-    if was != is_now or before.text not in texts:
-        raise InvalidValueError(
+    other_trial = event.kind in VERDICTS and before.trial != event.trial
+    if was != is_now or before.text not in texts or other_trial:
+        raise KeyTakenError(
             f"the key {event.key!r} is that of something else in this log",
-            got=f"{is_now}: {event.text}",
-            expected=f"{was}: {before.text}",
-            remedy="Nothing was logged. Give each note and each change a key of its own.",
+            got=_said(event, is_now),
+            expected=_said(before, was),
+            remedy="Nothing was logged. Give each note, change, exclusion and inclusion a key of its own.",
         )
     return True
 
 
-def exclusion(trials: TrialTable, number: int, reason: str = "", events: Iterable[Event] = ()) -> Event:
-    """That a trial does not count from here on; by the events so far it may be one that is in doubt."""
-    possible = {trial.index for trial in trials if trial.counts} | {*doubted_by(events)}
-    _require("exclude", number, sorted(possible), "that counts")
-    return Event(kind="exclusion", trial=number, text=text("the reason of an exclusion", reason))
+def _said(event: Event, kind: EventKind) -> str:
+    return f"{kind}{f' of trial {event.trial}' if kind in VERDICTS else ''}: {event.text}"
 
 
-def inclusion(trials: TrialTable, number: int) -> Event:
-    """That a trial that was excluded counts again."""
-    _require("include", number, [trial.index for trial in trials if trial.excluded], "that is excluded")
-    return Event(kind="inclusion", trial=number, text="Included again by the operator.")
+def exclusion(
+    trials: TrialTable, number: int, reason: str = "", key: str | None = None, events: Iterable[Event] = ()
+) -> Event:
+    """That a trial does not count from here on; what was logged with its key before may be said whatever came since.
+
+    By the events so far it may be one that is in doubt. With a key, a trial that is excluded already may be excluded: a
+    repetition of that must not do it later.
+    """
+    number, reason = whole("the number of a trial", number), text("the reason of an exclusion", reason)
+    text("the key of an exclusion", key or "")
+    event = Event.model_construct(kind="exclusion", trial=number, text=reason, key=key)  # its number is checked below
+    if not is_logged(event, events):
+        possible = {trial.index for trial in trials if trial.counts or (key is not None and trial.excluded)}
+        _require("exclude", number, sorted(possible | {*doubted_by(events)}), "that counts")
+    return event
+
+
+def inclusion(trials: TrialTable, number: int, key: str | None = None, events: Iterable[Event] = ()) -> Event:
+    """That a trial that was excluded counts again; a key is as for `exclusion`."""
+    number = whole("the number of a trial", number)
+    text("the key of an inclusion", key or "")
+    event = Event.model_construct(kind="inclusion", trial=number, text="Included again by the operator.", key=key)
+    if not is_logged(event, events):
+        possible = [trial.index for trial in trials if trial.excluded or (key is not None and trial.counts)]
+        _require("include", number, possible, "that is excluded")
+    return event
 
 
 def acceptance(trials: TrialTable, number: int, space: DesignSpace) -> Event:

@@ -11,7 +11,7 @@ from typing import IO, Final, Self, cast
 from mcap.writer import Writer
 
 from isiw.errors import LogError, os_errors
-from isiw.files import beside, in_the_way, is_reserved
+from isiw.files import beside
 from isiw.log.durable import (
     DurableFile,
     Fingerprint,
@@ -22,7 +22,8 @@ from isiw.log.durable import (
     part_of,
 )
 from isiw.log.headers import AnyHeader, as_toml
-from isiw.log.kinds import continued_by
+from isiw.log.moments import boot_id
+from isiw.log.names import COPYING, require_free
 from isiw.log.salvage import Salvage, holds, salvage_file
 from isiw.log.schema import (
     ANNOUNCEMENT,
@@ -31,7 +32,6 @@ from isiw.log.schema import (
     Message,
     Record,
     clock_ns,
-    decode,
     encode,
     is_of_isiw,
     json_schema,
@@ -43,9 +43,6 @@ CONFIGURATION = "configuration.toml"
 """The attachment that holds the header once more, as TOML."""
 
 _FROM_MEMORY = "Header, trials and events are written from memory; waveforms and estimates may be lost."
-
-_COPYING = ".resuming"
-"""The ending of a log's copy until it takes the log's place."""
 
 
 class LogWriter:
@@ -74,13 +71,18 @@ class LogWriter:
         """Start a new log; it has its name once its header is on the disk, so that every log says whose it is."""
         target = Path(path)
         with os_errors(LogError, "the log cannot be created", target, "Make room, or choose another path."):
-            _require_free(target)
-            with begun(beside(target)) as file:
+            require_free(target)
+            with begun(beside(target), target) as file:
                 log = cls(target, file)
                 log.begin(header)
                 log.append(header)
                 log._writer.flush()
-                file.move_to(part_of(target), replacing=False)
+                try:
+                    file.move_to(part_of(target), replacing=False)
+                except BaseException:
+                    if file.path == part_of(target):  # nothing is in it yet, and it would be in the way of the next try
+                        file.path.unlink()
+                    raise
         return log
 
     @classmethod
@@ -94,7 +96,7 @@ class LogWriter:
             _require_unchanged(source, salvage)
             replaces = _own_file(target, salvage)
             _require_unchanged(source, salvage)  # again, for a session that went on with it and ended just now
-            copy = target.with_name(f"{target.name}{_COPYING}")
+            copy = target.with_name(f"{target.name}{COPYING}")
             copy.unlink(missing_ok=True)  # of an earlier attempt that was killed; its source is still whole
             with begun(copy) as file:
                 log = cls(target, file)
@@ -126,6 +128,7 @@ class LogWriter:
             "subject": header.subject,
             "seed": str(header.seed),
             "created": header.created,
+            "boot_id": boot_id(),  # by which the logs of this start of the computer are found, whatever its clock shows
         }
         configuration = configuration or as_toml(header)
         now_ns = clock_ns()
@@ -196,7 +199,13 @@ class LogWriter:
     def _take_its_name(self) -> None:
         own = self.path.exists() and Fingerprint.of(self.path) == self._replaces
         try:
-            self._file.move_to(self.path, replacing=own)
+            try:
+                self._file.move_to(self.path, replacing=own)
+            except FileExistsError:
+                if not own:
+                    raise
+                self.path.unlink()  # a disk that renames over no file: the log is whole under its other name
+                self._file.move_to(self.path, replacing=False)
         except FileExistsError as error:
             raise LogError(
                 "another file has taken the log's place",
@@ -220,7 +229,7 @@ class LogWriter:
 
     def _write_from_memory(self, copy: Path, records: Sequence[Message], displacement: str) -> None:
         """Put a log of what is known in the place of a copy that lacks some of it; gaps in its numbers are losses."""
-        with begun(copy.with_name(f"{copy.name}{_COPYING}")) as file:
+        with begun(copy.with_name(f"{copy.name}{COPYING}")) as file:
             log = LogWriter(copy, file)
             log.begin(self._header)
             for record in records:
@@ -253,42 +262,6 @@ class LogWriter:
                 self._writer.add_metadata(f"{ANNOUNCEMENT}{number}", {"id": str(number), "topic": topic})
             self._channels[topic] = number
         return self._channels[topic]
-
-
-def _require_free(target: Path) -> None:
-    if target != log_of(target) or target.suffix == _COPYING:
-        raise LogError(
-            "a log cannot have this name", got=str(target), remedy="Name a file; .part is added while the session runs."
-        )
-    if is_reserved(target.name):
-        raise LogError(
-            "a log cannot have this name, which Windows keeps for itself",
-            got=str(target),
-            remedy="Choose another name, without a full stop or a space at its end.",
-        )
-    for existing in (target, part_of(target)):
-        if (other := in_the_way(existing)) is not None:
-            raise LogError(f"no log can be here: there is {other}", got=str(existing), remedy="Choose another path.")
-        if existing.exists():
-            raise LogError(
-                "there is a log already, and it is never overwritten",
-                got=str(existing),
-                remedy=_way_on(existing),
-            )
-
-
-def _way_on(existing: Path) -> str:
-    """The remedy for a file that is in the way; only what can be resumed is suggested to be resumed."""
-    try:
-        found = salvage_file(existing)
-    except LogError:
-        return "Choose another path; this is not a log that can be continued."
-    for message in reversed(found.messages):
-        if message.topic in {"/header", "/production_header"}:
-            with suppress(ValueError):
-                header = cast("AnyHeader", decode(message.topic, message.data))
-                return f"Choose another path, or continue it: {continued_by(log_of(existing), header)}"
-    return "Choose another path; nothing of this log can be continued."
 
 
 def _require_unchanged(source: IO[bytes], salvage: Salvage) -> None:

@@ -217,11 +217,13 @@ def counted_rows(record: SessionRecord) -> list[Counted]:
     isis_ms = [isi_ms for isi_ms in wanted_ms if isi_ms is not None]
     asked_ms = f"{min(isis_ms):g}–{max(isis_ms):g} ms" if isis_ms else "–"
     kept = "limits" not in record.unread
+    before = record.header.given_before
+    most = f"{limits.max_pulses}" + (f", with {before} before the session" if before else "")
     unknown = sum(trial.reason is Kind.OUTCOME_UNKNOWN for trial in record.table) + len(record.unknown)
     shortest_s = _shortest_s(record)
     runs = (len(list(run)) for is_lost, run in groupby(t.reason is not None for t in record.table) if is_lost)
     return [
-        Counted("stimuli delivered", f"{record.given}", f"at most {limits.max_pulses}" if kept else ""),
+        Counted("stimuli delivered", f"{record.given}", f"at most {most}" if kept else ""),
         Counted("of them with an unknown outcome", f"{unknown}", ""),
         Counted("shortest time between two stimuli", "not known" if shortest_s is None else f"{shortest_s:.2f} s",
                 f"at least {limits.iti_s:g} s" if kept else ""),

@@ -13,9 +13,17 @@ from isiw.estimate import Estimate
 from isiw.findings import Kind
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Event
+from isiw.log.verdicts import KeyTakenError
 from isiw.server.answers import AskAnswer, EstimateAnswer, Refusal, SessionAnswer, TrialAnswer, failed
 from isiw.server.clients import driven_from_here, given_once, logged_client, require_own
-from isiw.server.requests import AskRequest, ExcludeRequest, MistrialRequest, NoteRequest, TellRequest
+from isiw.server.requests import (
+    AskRequest,
+    ExcludeRequest,
+    IncludeRequest,
+    MistrialRequest,
+    NoteRequest,
+    TellRequest,
+)
 from isiw.session.recorder import Recorder
 from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.trials import Status, Trial
@@ -203,21 +211,22 @@ class DrivenSession:
 
     def remark(self, log: Callable[..., None], request: NoteRequest) -> None:
         """Log a note or a change, once with its key; something else's key is refused."""
-        try:
+        with _other_key():
             log(request.text, key=request.key)
-        except InvalidValueError as error:
-            raise Refusal.of(error, 409, "OtherKey", field="key") from error
 
     def exclude(self, request: ExcludeRequest) -> None:
-        """Let a trial not count; one that is excluded already stays so, unless its ISI is in doubt."""
-        excluded = (trial.index for trial in self.recorder.trials if trial.excluded)
-        if request.trial not in {*excluded} - {*self.recorder.in_doubt}:
-            self.recorder.exclude(request.trial, request.reason)
+        """Let a trial not count, once with its key; one that is excluded stays so, unless its ISI is in doubt."""
+        excluded = {trial.index for trial in self.recorder.trials if trial.excluded} - {*self.recorder.in_doubt}
+        if request.key is not None or request.trial not in excluded:
+            with _other_key():
+                self.recorder.exclude(request.trial, request.reason, key=request.key)
 
-    def include(self, trial: int) -> None:
-        """Let a trial count again; one that counts already does so."""
-        if not any(known.index == trial and known.counts for known in self.recorder.trials):
-            self.recorder.include(trial)
+    def include(self, request: IncludeRequest) -> None:
+        """Let a trial count again, once with its key; one that counts already does so."""
+        is_so = any(trial.index == request.trial and trial.counts for trial in self.recorder.trials)
+        if request.key is not None or not is_so:
+            with _other_key():
+                self.recorder.include(request.trial, key=request.key)
 
     def _require_next(self, trial: int, *, asked: bool) -> None:
         """Raise if a trial cannot have an outcome, as it was not asked for."""
@@ -260,6 +269,15 @@ class DrivenSession:
         answer = TrialAnswer.of(self.recorder.trials[-1], self.recorder.decision(), doubts)
         self._outcomes[answer.trial] = answer
         return answer
+
+
+@contextmanager
+def _other_key() -> Iterator[None]:
+    """Within, a key that is that of something else is a refusal."""
+    try:
+        yield
+    except KeyTakenError as error:
+        raise Refusal.of(error, 409, "OtherKey", field="key") from error
 
 
 def not_open(name: str) -> Refusal:

@@ -136,28 +136,35 @@ class MistrialRequest(_Request):
     client: str | None = _TOLD_BY
 
 
+_KEY: Final = r"^[A-Za-z0-9_-]{1,64}$"
+
+
 class NoteRequest(_Request):
     """A remark for the log, or what changed."""
 
     text: Text
     key: str | None = Field(
         default=None,
-        pattern=r"^[A-Za-z0-9_-]{1,64}$",
+        pattern=_KEY,
         description="Of the client's choice: the same note or change is logged once only, another is refused.",
     )
-
-
-class ExcludeRequest(_Request):
-    """Which trial should not count, and why."""
-
-    trial: TrialNumber
-    reason: Text = ""
 
 
 class IncludeRequest(_Request):
     """Which trial counts again."""
 
     trial: TrialNumber
+    key: str | None = Field(
+        default=None,
+        pattern=_KEY,
+        description="Of the client's choice: said again with it, it changes nothing, whatever was said since.",
+    )
+
+
+class ExcludeRequest(IncludeRequest):
+    """Which trial should not count, and why."""
+
+    reason: Text = ""
 
 
 class GoOnRequest(_Request):

@@ -160,7 +160,7 @@ def change(folder: Folder, name: Name, body: Annotated[NoteRequest, Depends(Body
 
 @router.post("/sessions/{id}/exclude", responses=_errors(400, 404, 409, 415), response_model=SessionAnswer)
 def exclude(folder: Folder, name: Name, body: Annotated[ExcludeRequest, Depends(BodyOf(ExcludeRequest))]) -> Response:
-    """Let a trial not count. Safe to repeat."""
+    """Let a trial not count. Safe to repeat; with a key also late."""
     with folder.driving(name) as session:
         session.exclude(body)
         return _json(session.stands())
@@ -168,9 +168,9 @@ def exclude(folder: Folder, name: Name, body: Annotated[ExcludeRequest, Depends(
 
 @router.post("/sessions/{id}/include", responses=_errors(400, 404, 409, 415), response_model=SessionAnswer)
 def include(folder: Folder, name: Name, body: Annotated[IncludeRequest, Depends(BodyOf(IncludeRequest))]) -> Response:
-    """Let a trial count again that was excluded. Safe to repeat."""
+    """Let a trial count again that was excluded. Safe to repeat; with a key also late."""
     with folder.driving(name) as session:
-        session.include(body.trial)
+        session.include(body)
         return _json(session.stands())
 
 

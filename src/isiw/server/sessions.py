@@ -12,7 +12,7 @@ from typing import Final, TypeVar
 
 from isiw.devices.limits import Limits
 from isiw.errors import error_text
-from isiw.files import made_folder
+from isiw.files import made_folder, twin
 from isiw.log.durable import log_exists, log_of, part_of
 from isiw.log.headers import SERVED_KEY
 from isiw.log.reader import SessionRecord, read_session
@@ -82,6 +82,11 @@ class Sessions:
                     remedy="Choose another id, or resume it.", field="id",
                 )  # fmt: skip
             return self.resume(request.id, ResumeRequest(client=request.client))
+        if other := twin(path) or twin(part_of(path)):
+            raise Refusal(
+                409, "Exists", f"on other systems its log would be the same file as {other.name}", got=request.id,
+                remedy="Choose an id that differs in more than capitals.", field="id",
+            )  # fmt: skip
         with self._opened_as(request.id):
             return self._begin(request)
 

@@ -21,6 +21,7 @@ from isiw.devices.protocol import Device
 from isiw.errors import InvalidValueError, StrategyError
 from isiw.log.durable import log_of
 from isiw.log.headers import Header, StrategyRecipe
+from isiw.log.pulses import Ages
 from isiw.log.schema import Event, Record, now
 from isiw.log.writer import LogWriter
 from isiw.session.console import OperatorConsole
@@ -52,7 +53,7 @@ class Earlier:
     events: tuple[Event, ...] = ()
     kept: Mapping[str, Any] = field(default_factory=dict)
     first_records: Sequence[Record] = ()
-    ages_s: Callable[[], Sequence[float]] = tuple
+    ages: Callable[[], Ages] = Ages
     taps: Callable[[SignalLimits], TapResponses] = lambda signals: TapResponses(signals.mep_window_ms)
 
 
@@ -97,13 +98,19 @@ def require_untold(strategy: Strategy, trials: int = 0) -> None:
 def require_fitting(strategy: Strategy, header: Header) -> None:
     """Raise if the visit states another intensity than the strategy, or the limits end the strategy's plan early."""
     header.visit.require_intensity(header.strategy.settings.get("intensity_pct_rmt"))
-    planned, most = strategy.stimuli_planned, header.limits.max_pulses
-    if planned is None or (needed := header.protocol.stimuli_for(planned)) <= most:
+    planned, most, before = strategy.stimuli_planned, header.limits.max_pulses, header.given_before
+    if before >= most:
+        raise InvalidValueError(
+            "the earlier trials of this visit have used up the limit of stimuli, so that none could follow",
+            got=f"max_pulses = {most}, {before} stimuli given before",
+            remedy="Write a larger max_pulses under [limits] if your ethics approval allows it.",
+        )
+    if planned is None or (needed := header.protocol.stimuli_for(planned) + before) <= most:
         return
-    name = strategy.recipe.name or type(strategy.acquisition).__name__
+    name, planned = strategy.recipe.name or type(strategy.acquisition).__name__, planned + before
     raise InvalidValueError(
         f"the plan of {name} does not fit into the limits",
-        got=f"max_pulses = {most}",
+        got=f"max_pulses = {most}" + (f", {before} of them given before the session" if before else ""),
         expected=f"at least {needed}, its control trials among them" if needed > planned else f"at least {needed}",
         remedy=f"Write max_pulses = {needed} under [limits] (in Python Limits.of_space(space, max_pulses={needed})), "
         "or a smaller max_trials under [strategy.settings], which ends the plan there.",
@@ -123,6 +130,7 @@ def header_of(strategy: Strategy, **details: Any) -> Header:
         belief_version=BELIEF_VERSION,
         engine_version=ENGINE_VERSION,
         earlier=strategy.earlier,
+        earlier_given=strategy.earlier_given,
         earlier_same_level=bool(strategy.earlier) and strategy.same_level,
         **details,
     )

@@ -9,25 +9,21 @@ from __future__ import annotations
 import operator
 import threading
 from collections.abc import Callable, Iterable, Sequence
-from functools import partial
-from typing import Any, Final, Generic, NamedTuple, Protocol, TypeAlias, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar
 
 from isiw import checks, sentences
 from isiw.change import Change
 from isiw.errors import LimitExceededError, StrategyError, error_text
 from isiw.findings import Finding, Kind, Severity
-from isiw.log.headers import Header
-from isiw.log.schema import Correction, EstimateRecord, Event, EventKind, Intent, Record
-from isiw.log.verdicts import changed_after, correction, doubted_by, excluded_by, is_logged, or_remark, under_all
+from isiw.log.schema import EstimateRecord, Event, EventKind, Intent, Record
+from isiw.log.verdicts import changed_after, doubted_by, excluded_by, is_logged, or_remark, under_all
 from isiw.session.sink import Sink
-from isiw.signals.tap import TapResponses
 from isiw.strategy.choice import candidate_isis
 from isiw.strategy.course import details_of
-from isiw.strategy.stopping import OF_THE_WINDOW, StopDecision, stimuli_left
+from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
-from isiw.trials import Sweep, Trial, TrialTable
+from isiw.trials import Trial, TrialTable
 from isiw.types import FloatArray
-from isiw.visit import PAIRS_FIRST
 
 TrialT = TypeVar("TrialT")
 TrialT_contra = TypeVar("TrialT_contra", contravariant=True)
@@ -98,6 +94,11 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
         new = finding.kind not in self._doubted
         self._doubted.add(finding.kind)
         return new
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """What was noted and judged so far, and what happened before the session was resumed."""
+        return tuple(self._events)
 
     @property
     def last_excluded(self) -> int | None:
@@ -342,58 +343,3 @@ def estimate_record(
 
 def _rounded(values: FloatArray) -> tuple[float, ...]:
     return tuple(float(f"{value:.{DIGITS}g}") for value in values)
-
-
-KNOWN: Final = "What the first stimulus alone does to the EMG is known now, and was subtracted."
-LONGER: Final = "A longer ISI shows the first stimulus's own response, which may explain the enhancement so far."
-
-LEAST_PROBABILITY: Final = 0.9
-"""A window that is as probable as this should not be the first stimulus's own response."""
-
-
-class OwnResponse:
-    """Learns the response from each sweep, and says what should be given so that more is known of it."""
-
-    def __init__(self, examination: WindowExamination, header: Header, taps: TapResponses) -> None:
-        self._examination, self._taps = examination, taps
-        self._protocol, device, self._high_ms = header.protocol, header.device, header.space.high_ms
-        self._gives_taps = bool(self._protocol.taps_first) and device.tap_alone and "emg" in device.channels
-
-    def after(self, trial: Trial, sweep: Sweep) -> Trial:
-        """Learn from a sweep; its trial with the amplitude without the response, as far as that is known."""
-        self._taps = self._taps.after(trial, sweep)
-        return self._taps.measured(trial)
-
-    def correct(self) -> None:
-        """Correct earlier amplitudes by what is known now."""
-        self._taps, others = self._taps.corrected(self._examination.trials)
-        for trial in others:
-            right = Correction(mep_mv=trial.mep_mv, mep_sd_mv=trial.mep_sd_mv, tap_mv=trial.tap_mv)
-            self._examination.judge(partial(correction, number=trial.index, why=KNOWN, corrected=right))
-
-    @property
-    def wants_tap(self) -> bool:
-        """True if a tap alone should come next."""
-        trials = self._examination.trials
-        if not self._gives_taps or len(trials) < PAIRS_FIRST:
-            return False
-        window = self._examination.learner.strategy.estimate().window
-        return len(trials) < PAIRS_FIRST + self._protocol.taps_first or self._taps.wants_taps(window, trials)
-
-    @property
-    def least_isi_ms(self) -> float | None:
-        """From which ISI on a pair would show the response at trials that a window rests on; None if none is needed."""
-        estimate, trials = self._examination.learner.strategy.estimate(), self._examination.trials
-        if (estimate.probability or 0.0) < LEAST_PROBABILITY:
-            return None
-        least_ms = self._taps.shown_from_ms(estimate.window, trials)
-        return None if least_ms is None or least_ms > self._high_ms else least_ms
-
-    def decided(self, decision: StopDecision) -> StopDecision:
-        """A decision to stop on a window waits until an ISI has shown that it is not the response, or none is left."""
-        if not decision.stop or decision.kind not in OF_THE_WINDOW or self.least_isi_ms is None:
-            return decision
-        strategy = self._examination.learner.strategy
-        if stimuli_left(strategy.stopping, strategy.spent) == 0:
-            return decision
-        return decision.kind.go_on(f"It is too early to stop. {LONGER}")

@@ -70,29 +70,33 @@ class Judging(ABC):
     def _warn(self, doubt: Finding) -> None:
         """Log a doubt, and say it."""
         self._examination.event("doubt", f"{doubt}", finding=doubt.kind, durable=True)
-        self._say(f"{doubt}")
+        self._say(f"{doubt}", ImplausibleDataWarning)
 
-    def _say(self, doubt: str) -> None:
+    def _say(self, doubt: str, category: type[Warning]) -> None:
         """Say a doubt to whoever is there."""
-        warn(doubt, ImplausibleDataWarning)
+        warn(doubt, category)
 
     @property
     def last_excluded(self) -> int | None:
         """The trial that was excluded last, of those that are; None if none is."""
         return self._examination.last_excluded
 
-    def exclude(self, trial: int, reason: str = "") -> None:
-        """Let a trial not count from here on: an event is appended, and the strategy learns again without it."""
-        self._judge(lambda trials: exclusion(trials, trial, reason, self._examination.events))
-
     @property
     def in_doubt(self) -> tuple[int, ...]:
         """The trials that do not count, as realised ISIs that are far from those asked were not confirmed."""
         return tuple(doubted_by(self._examination.events))
 
-    def include(self, trial: int) -> None:
-        """Let a trial count again that was excluded, and learn again with it."""
-        self._judge(lambda trials: inclusion(trials, trial))
+    def exclude(self, trial: int, reason: str = "", *, key: str | None = None) -> None:
+        """Let a trial not count from here on: an event is appended, and the strategy learns again without it.
+
+        With a key that the same exclusion has already, nothing happens, whatever came since: a request that is
+        repeated late undoes nothing. A key of something else is refused.
+        """
+        self._judge(lambda trials: exclusion(trials, trial, reason, key, self._examination.events))
+
+    def include(self, trial: int, *, key: str | None = None) -> None:
+        """Let a trial count again that was excluded, and learn again with it; a key is as for `exclude`."""
+        self._judge(lambda trials: inclusion(trials, trial, key, self._examination.events))
 
     def reject(self, trial: int) -> None:
         """Let a trial not count whose MEP an operator has looked at; an exclusion with this reason."""

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Unpack
 
 from isiw.devices.protocol import Device
-from isiw.errors import NotDelivered
+from isiw.errors import ClockWarning, NotDelivered, warn
 from isiw.log.headers import Header
-from isiw.log.pulses import earlier_pulses_s
+from isiw.log.pulses import earlier_pulse_ages
 from isiw.log.schema import Event
 from isiw.log.writer import LogWriter
 from isiw.session.assembly import Earlier, Options, assembled, require_fitting, require_untold
@@ -137,7 +137,7 @@ class Session(Judging):
                     sink.append(record)
                 if self.trials:
                     self._steps.log_belief()
-                self._rig.begin(len(self.trials), earlier_s)
+                self._rig.begin(self._header.given_before + len(self.trials), earlier_s)
                 decision = self._steps.at_the_end()  # of a session that was resumed; it need not be armed for nothing
                 if decision is None:
                     with self._operated(keys=keys) as decide, self._rig.armed():
@@ -213,23 +213,25 @@ class Session(Judging):
     def _judge(self, verdict: Callable[[TrialTable], Event]) -> None:
         self._examination.judge(verdict)
 
-    def _say(self, doubt: str) -> None:
+    def _say(self, doubt: str, category: type[Warning]) -> None:
         if self._console.reads_keys:
             self._console.screen.say(doubt)
         else:
-            super()._say(doubt)
+            super()._say(doubt, category)
 
     def _earlier_s(self) -> list[float]:
         """The ages of earlier stimuli to the same person [s], as far as the logs to look at know."""
         limits, folder = self._limits, self._safeguards.earlier_logs
-        matter = (limits.max_block_pulses, limits.max_period_pulses, self._header.protocol.block_trials)
-        if self._header.device.simulated or not any(matter):
+        if self._header.device.simulated or not (limits.looks_back or self._header.protocol.block_trials):
             return []
-        earlier_s = list(self._earlier.ages_s())
+        found = [self._earlier.ages()]
         if folder is not None:
             period_s = max(limits.period_s, limits.rest_s)
-            earlier_s += earlier_pulses_s(folder, self._header.subject, period_s, but=self.log_path)
-        return earlier_s
+            found.append(earlier_pulse_ages(folder, self._header.subject, period_s, but=self.log_path))
+        for doubt in dict.fromkeys(doubt for ages in found for doubt in ages.doubts):
+            warn(doubt, ClockWarning)
+            self._sink.faults.append(doubt)
+        return [age_s for ages in found for age_s in ages.ages_s]
 
     def _log_locked_limits(self) -> None:
         """Log the intensity that the device reported when it was armed, so that a resumed session is held to it."""

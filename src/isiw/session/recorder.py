@@ -10,10 +10,11 @@ from typing import Any, Generic, Self, TypeVar
 from isiw.checks import flag, number
 from isiw.devices.clock import ROUNDING_S, Clock, Pacing
 from isiw.devices.protocol import Readiness
-from isiw.errors import InvalidValueError
+from isiw.errors import ClockWarning, InvalidValueError
 from isiw.estimate import WindowEstimate
 from isiw.findings import IN_DOUBT, Finding, Kind, Severity
 from isiw.log.headers import Header
+from isiw.log.pulses import Ages
 from isiw.log.schema import Event, Intent
 from isiw.log.verdicts import isi_confirmed, isi_doubted, newly_doubted
 from isiw.log.writer import LogWriter
@@ -105,14 +106,18 @@ class Recorder(Recording[Trial], Judging):
     ) -> None:
         super().__init__(log, clock)
         self._on_doubt = on_doubt
-        trials, events, ages_s = (earlier.trials, earlier.events, earlier.ages_s()) if earlier else (None, (), ())
+        trials, events, ages = (earlier.trials, earlier.events, earlier.ages()) if earlier else (None, (), Ages())
         self._examination = examination_of(strategy, self._sink, trials, events)
         self._limits, self._protocol, self._seed = header.limits, header.protocol, header.seed
+        self._given_before = header.given_before
         self._asked: Stimulus | None = None
         self._lock = threading.RLock()
-        self._pacing = Pacing(header.limits, clock, ages_s)
+        self._pacing = Pacing(header.limits, clock, ages.ages_s)
         self._detection_limit_mv = header.detection_limit_mv
         self._doubts = Doubts.seen(told_of(self.trials), self._detection_limit_mv)
+        for doubt in ages.doubts if header.limits.looks_back else ():
+            self._examination.event("fault", doubt, durable=True)
+            self._say(doubt, ClockWarning)
 
     @property
     def asked(self) -> Stimulus | None:
@@ -149,7 +154,7 @@ class Recorder(Recording[Trial], Judging):
                 return self.asked.isi_ms
             if self.asked is not None:  # TMS alone that was given, and never told
                 self._conclude(Trial.unknown(self.asked))
-            self._limits.require_left(len(self.trials))
+            self._limits.require_left(self._given_before + len(self.trials))
             self._limits.require_state(Readiness())
             if self.wait_s() > ROUNDING_S:
                 return None
@@ -209,7 +214,7 @@ class Recorder(Recording[Trial], Judging):
             self._examination.conclude()
             if (isi_ms is None or not pulse) and self.asked is None:  # it was given, whatever the limits allow
                 self._begin(None, tap_alone=not pulse)
-                if len(self.trials) >= self._limits.max_pulses:
+                if self._given_before + len(self.trials) >= self._limits.max_pulses:
                     self._examination.event("limit", f"TMS alone was given beyond {self._limits.max_pulses} pulses.")
             outcome = Outcome(isi_ms, mep_mv, None, isi_sd_ms, mep_sd_mv, mep_interval_mv)
             self._tell(outcome, background_rms_uv, pulse=pulse, confirm=flag("confirm", confirm))
@@ -316,11 +321,11 @@ class Recorder(Recording[Trial], Judging):
             )
         return self.asked
 
-    def _say(self, doubt: str) -> None:
+    def _say(self, doubt: str, category: type[Warning]) -> None:
         if self._on_doubt is not None:
             self._on_doubt(doubt)
         else:
-            super()._say(doubt)
+            super()._say(doubt, category)
 
 
 def _kind(isi_ms: float | None, *, tap_alone: bool) -> str:

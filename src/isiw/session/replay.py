@@ -14,7 +14,7 @@ from isiw.devices.protocol import DeviceInfo
 from isiw.errors import ConfigError, DeviceError, InvalidValueError, OtherVersionsWarning, StrategyError, warn
 from isiw.log.headers import SCHEMA_VERSION, Header, StrategyRecipe
 from isiw.log.kinds import OWN_LOOP
-from isiw.log.pulses import pulses_s
+from isiw.log.pulses import Ages, pulse_ages
 from isiw.log.reader import SessionRecord
 from isiw.log.salvage import Salvage
 from isiw.log.schema import MOST_TRIALS, Event, Intent
@@ -180,11 +180,17 @@ def taken_up(
         partial(LogWriter.continuing, salvaged.path, salvaged, header),
         found.trials,
         record.events,
-        {"created": header.created, "asks_from": found.asks_from},
+        {"created": header.created, "asks_from": found.asks_from, "earlier_given": header.given_before},
         (*found.unknown, _resumption(record, found, limits)),
-        lambda: [*(known_s := pulses_s(salvaged)), *[0.0] * (len(found.trials) - len(known_s))],  # 0 s ago if not known
+        partial(_ages, salvaged, found.trials),
         partial(_taps, record),
     )
+
+
+def _ages(salvaged: Salvage, trials: TrialTable) -> Ages:
+    """How long ago the stimuli of a log were given; those of which it does not say when, just now."""
+    known = pulse_ages(salvaged)
+    return Ages((*known.ages_s, *[0.0] * (len(trials) - len(known.ages_s))), known.doubts)
 
 
 def _taps(record: SessionRecord, signals: SignalLimits) -> TapResponses:

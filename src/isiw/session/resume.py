@@ -56,7 +56,8 @@ def open_session(
         log: where the log is; it must not exist yet, unless the session is resumed.
         resume: whether to continue the log if there is one. A trial without an outcome in it becomes a mistrial.
         earlier: trials of this person that were delivered before, such as the `record.table` of a log or an analysis:
-            the strategy learns them before its first ask, as `Strategy.learn_all` does, and nothing counts them.
+            the strategy learns them before its first ask, as `Strategy.learn_all` does, and of the limits `max_pulses`
+            counts them.
         **options: `subject`, `visit`, `config`, `limits` and `protocol` as for `Session`, by default those that are
             logged already. The limits have 0 s between stimuli unless their `min_iti_s` is stated; control trials are
             the loop's own: `tell(None, …)` is TMS alone. `clock`, which `ask` waits by, before the first stimulus,

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import math
-import tempfile
+import os
+import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Never
-
-from filelock import FileLock, Timeout
+from typing import IO, Annotated, Never
 
 from isiw.checks import Checked, NonNegative, choice, function, whole
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
@@ -22,6 +21,8 @@ from isiw.devices.limited import LimitedDevice
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Answer, Device, DeviceInfo
 from isiw.errors import DeviceError, StillArmedError, error_text, os_errors
+from isiw.files import shared_file
+from isiw.log.durable import claim
 from isiw.log.schema import waveform_topic
 from isiw.models.protocol import profile_of
 from isiw.session.interrupts import INTERRUPTED, STILL_ARMED, Interrupts, end_process
@@ -49,17 +50,24 @@ def exclusive(device: Device, info: DeviceInfo) -> Iterator[None]:
         _driven.discard(id(device))
 
 
-def _address_claimed(info: DeviceInfo) -> AbstractContextManager[object]:
-    """The lock of a device's address, which is released behind it."""
+def lock_folder() -> Path:
+    """Where the locks of devices are: one folder for all accounts of this computer, whatever their settings."""
+    if sys.platform == "win32":
+        return Path(os.environ.get("PROGRAMDATA", r"C:\ProgramData"))
+    return Path("/tmp")  # noqa: S108 - not TMPDIR, which two terminals may set differently; nothing is read from it
+
+
+def _address_claimed(info: DeviceInfo) -> IO[bytes]:
+    """An open file that holds the lock of a device's address until it is closed, or its process ends."""
     digest = hashlib.sha256(info.address.encode(errors="backslashreplace")).hexdigest()[:16]
-    path = Path(tempfile.gettempdir()) / f"isiw-device-{digest}.lock"
-    lock = FileLock(path, mode=0o666)  # so that another account of this computer can take it, once it is free
+    path = lock_folder() / f"isiw-device-{digest}.lock"
     remedy = "If another account of this computer made it, let that account delete it once no session runs."
     with os_errors(DeviceError, "the device's lock cannot be taken", path, remedy):
-        try:
-            return lock.acquire(timeout=0)
-        except Timeout as error:
-            raise _taken(f"{info.name} at {info.address}") from error
+        file = shared_file(path)
+        if claim(file):
+            return file
+    file.close()
+    raise _taken(f"{info.name} at {info.address}")
 
 
 def _taken(which: str) -> DeviceError:

@@ -15,7 +15,8 @@ from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, Limi
 from isiw.findings import Finding, Kind
 from isiw.log.headers import Header
 from isiw.log.schema import Event, Intent, Waveform
-from isiw.session.examination import LONGER, OwnResponse, WindowExamination
+from isiw.session.examination import WindowExamination
+from isiw.session.own_response import LONGER, OwnResponse
 from isiw.session.rig import Rig
 from isiw.session.sink import SessionUpdate, Sink
 from isiw.signals.judgement import judge, judge_measurement
@@ -201,7 +202,9 @@ class Steps:
             return decision
         if self._rig.limited.pulses_left:
             return None
-        decision = StopKind.LIMIT.stop(f"The limit of {self._header.limits.max_pulses} pulses is reached.")
+        before = self._header.given_before
+        of_them = f", {before} of them before the session," if before else ""
+        decision = StopKind.LIMIT.stop(f"The limit of {self._header.limits.max_pulses} pulses{of_them} is reached.")
         self._examination.event("limit", decision.reason)
         self._examination.log_belief(lambda: decision)
         return decision

@@ -15,7 +15,7 @@ from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DamagedLogError, InvalidValueError, LimitExceededError
 from isiw.log.headers import StrategyRecipe, ThresholdHeader
 from isiw.log.kinds import LogKind, of_another_kind
-from isiw.log.pulses import pulses_s
+from isiw.log.pulses import pulse_ages
 from isiw.log.reader import SessionRecord, ThresholdRecord, read_any
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Intent, PulseOutcome, ThresholdBelief
@@ -26,6 +26,7 @@ from isiw.session.recorder import Recording
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.threshold.pulses import Pulse, ThresholdEstimate
 from isiw.strategy.threshold.search import ThresholdSearch, make_threshold_search
+from isiw.trials import Stimulus
 from isiw.visit import interval_s
 
 UNKNOWN = "outcome unknown"
@@ -111,7 +112,7 @@ def resume_threshold(
         )
     search = search_of(record, search)
     writer = LogWriter.continuing(log, salvaged, record.header)
-    recorder = ThresholdRecorder(search, writer, record.header, clock, record.outcomes, pulses_s(salvaged))
+    recorder = ThresholdRecorder(search, writer, record.header, clock, record.outcomes, pulse_ages(salvaged).ages_s)
     recorder.conclude_open(record.unknown)
     return recorder
 
@@ -273,8 +274,8 @@ class ThresholdRecorder(Recording[PulseOutcome]):
                 )
             intensity, self.place_mm = self.search.ask(), self.search.place_mm
             self._clock.sleep_s(self._pacing.wait_s())
-            now_s, at = self._clock.now_s(), {"intensity_pct_mso": intensity, "place_mm": self.place_mm}
-            self._examination.intend(Intent.model_validate({"trial": self.given, "isi_ms": None, "t_s": now_s, **at}))
+            at = {"intensity_pct_mso": intensity, "place_mm": self.place_mm}
+            self._examination.intend(Intent.of(Stimulus(self.given, None), self._clock.now_s(), **at))
             self._log.require_in_place()
             self._asked = intensity
         return self._asked

@@ -64,8 +64,7 @@ class Strategy:
         self.initial_ms = tuple(space.snap(isi_ms) for isi_ms in initial_ms)
         self.recipe, self.cost, self.seed = recipe or Recipe(name="", seed=seed), cost, seed
         self._course = Method(space, model, acquisition, stopping, self.initial_ms, cost).begin(seed)
-        missing = [c.__name__ for c in acquisition.needs if not isinstance(self.posterior, c)]
-        if missing:
+        if missing := [c.__name__ for c in acquisition.needs if not isinstance(self.posterior, c)]:
             raise StrategyError(
                 f"{type(acquisition).__name__} cannot work with {type(model).__name__}",
                 got=f"a posterior without {', '.join(missing)}",
@@ -74,8 +73,8 @@ class Strategy:
         self._mistrials = self._controls = self._lost = 0
         self._outcomes = Outcomes(space.reference, self.amplitude_step_mv)
         self.earlier: tuple[Trial, ...] = ()  # learnt before the first ask
-        self.same_level, self.in_doubt = True, False  # in doubt: ISIs were far from those asked, and not confirmed
-        self._asked, self._reported = Asked(), Reported(space)
+        self.same_level, self.earlier_given = True, 0  # stimuli, also of trials from which nothing was learnt
+        self.in_doubt, self._asked, self._reported = False, Asked(), Reported(space)
 
     def __str__(self) -> str:
         name = f"Strategy {self.recipe.name!r}" if self.recipe.name else "Strategy"
@@ -92,6 +91,7 @@ class Strategy:
         how = {"initial_ms": self.initial_ms, "cost": self.cost, "seed": self.seed, "recipe": self.recipe}
         again = Strategy(self.space, self.model, self.acquisition, self.stopping, **how)  # type: ignore[arg-type]
         again.learn_all(self.earlier, same_level=self.same_level)
+        again.earlier_given = self.earlier_given
         return again
 
     @property
@@ -285,7 +285,7 @@ class Strategy:
         """Learn trials that were delivered before the first ask, at whatever ISIs; no plan and no budget counts them.
 
         Args:
-            trials: the trials, in order; mistrials and taps alone teach nothing.
+            trials: the trials, in order; mistrials and taps alone teach nothing. For `max_pulses` of limits all count.
             same_level: whether electrodes, coil and intensity stay as they were. Otherwise the level of the MEPs from
                 here on may be another one, as far as the model can say so; the window stays.
 
@@ -296,9 +296,9 @@ class Strategy:
         """
         if self.delivered or self.choice is not None or (self.earlier and not (same_level and self.same_level)):
             raise StrategyError(
-                "earlier trials are learnt once, before the first ask",
-                remedy="Make the strategy, then let it learn all of them.",
+                "earlier trials are learnt once, before the first ask", remedy="Let a new strategy learn all of them."
             )
+        trials = tuple(trials)
         learnt = tuple(trial for trial in trials if trial.told)
         for trial in learnt:
             self._learn(Outcome.of(trial))
@@ -306,6 +306,7 @@ class Strategy:
         if learnt and not same_level:
             self.note_change()
         self.earlier, self.same_level = (*self.earlier, *learnt), same_level
+        self.earlier_given += len(trials)
 
     def _learn(self, outcome: Outcome) -> None:
         """Learn from one trial, wherever its ISI lies."""

@@ -126,7 +126,7 @@ class View:
             "unprotected": plain(unprotected(record.header.device) or ""),
             "drawn": drawn(record),
             "delivered": len(record.table),
-            "most": record.header.limits.max_pulses,
+            "most": max(0, record.header.limits.max_pulses - record.header.given_before),
             "left": None if update is None else update.stimuli_left,
             "leftS": None if update is None else update.left_s,
             "events": [[event.trial, event.kind, plain(event.text)] for event in tuple(self._events)],

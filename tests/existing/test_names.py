@@ -1,0 +1,55 @@
+"""The names of logs of several people: what is one file on any computer is refused before anything is analysed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError, LogError
+from isiw.existing.analysis import analyse
+from isiw.existing.batch import Way, read_files
+from isiw.existing.layout import Layout
+
+
+def read_people_of(codes: list[str], folder: Path) -> list[str]:
+    rows = [(code, isi_ms, 0.1 + isi_ms / 1000) for code in codes for isi_ms in (10, 20, 30, 40)]
+    pd.DataFrame(rows, columns=["subject", "isi_ms", "mep_mv"]).to_csv(folder / "people.csv", index=False)
+    people = read_files([folder / "people.csv"], Way(Layout(reference="impact")), folder / "logs")
+    return [person.log.name for person in people if person.log is not None]
+
+
+@pytest.mark.parametrize(
+    "codes", [["P07", "p07"], ["Mu\u0308ller", "M\u00fcller"], ["MÜLLER", "müller"], ["Straße", "STRASSE"]]
+)
+def test_two_codes_that_are_one_file_on_other_systems_are_refused(codes: list[str], tmp_path: Path) -> None:
+    with pytest.raises(InvalidValueError, match="would have one log"):
+        read_people_of(codes, tmp_path)
+
+
+@pytest.mark.parametrize("code", ["CON", "aux.1", "lpt1"])
+def test_a_code_that_windows_keeps_for_itself_is_refused(code: str, tmp_path: Path) -> None:
+    with pytest.raises(InvalidValueError, match="Windows keeps"):
+        read_people_of(["P07", code], tmp_path)
+
+
+def test_codes_that_differ_everywhere_have_a_log_each(tmp_path: Path) -> None:
+    assert read_people_of(["P07", "P08", "Ärzte"], tmp_path) == ["P07.mcap", "P08.mcap", "Ärzte.mcap"]
+
+
+def test_the_log_of_an_analysis_is_refused_by_the_name_that_was_given(tmp_path: Path) -> None:
+    space = DesignSpace(0, 100, reference="impact")
+    analysis = analyse([10, 20, 30, 40], [0.1, 0.2, 0.1, 0.3], space=space, strategy="even")
+    for name, says in (
+        ("s" * 300 + ".mcap", "too long.*sss"),
+        ("nul.mcap", "Windows keeps"),
+        ("p07.mcap", "same file"),
+    ):
+        (tmp_path / "P07.mcap").write_bytes(b"theirs")
+        if name == "p07.mcap" and (tmp_path / name).exists():
+            continue  # the disk itself takes them for one
+        with pytest.raises(LogError, match=says):
+            analysis.to_log(tmp_path / name)
+        assert [path.name for path in tmp_path.iterdir()] == ["P07.mcap"]
