@@ -79,7 +79,7 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
         self.overruled = False
         self._learnt = trials
         self._learning: TrialT | None = None
-        self.events = list(events)
+        self._events = list(events)
         self._doubted = {event.finding for event in self.events}
         self._refusal: Exception | None = None
         self._lock = threading.RLock()
@@ -129,9 +129,9 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
     def remark(self, event: Event) -> None:
         """Put an event on disk that changes no trial; with a key that the same one has already, nothing."""
         with self._lock:
-            if not is_logged(event, self.events):
+            if not is_logged(event, self._events):
                 self._sink.append(event)
-                self.events.append(event)
+                self._events.append(event)
         self._sink.log.sync()
 
     def log_faults(self) -> None:
@@ -172,11 +172,11 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
         """Put a verdict on disk, unless it was logged with its key before; all trials are then learnt again."""
         with self._lock:
             event = verdict(self.trials)
-            if is_logged(event, self.events):
+            if is_logged(event, self._events):
                 return
             self._sink.append(event)
             self.trials = self.learner.judged(self.trials, event)
-            self.events.append(event)
+            self._events.append(event)
             self.overruled = self.overruled or event.kind != "note"
         self._sink.log.sync()
 
