@@ -136,6 +136,18 @@ def test_the_two_ready_spaces_are_those_of_the_dissertation() -> None:
     assert (IMPACT_SPACE.low_ms, IMPACT_SPACE.high_ms, IMPACT_SPACE.reference) == (0, 320, "impact")
 
 
+@pytest.mark.parametrize("listed", [[0, 1e308], [-1e300, 20, 30], [20, 60_001]])
+def test_a_list_with_an_isi_beyond_a_minute_is_refused_in_words(listed: list[float]) -> None:
+    with pytest.raises(InvalidValueError, match=r"no ISI of a design space is so long.*Divide by 1000"):
+        DesignSpace.of(listed, reference="impact")
+
+
+@pytest.mark.parametrize("wrong", [{"high_ms": 1e308, "step_ms": 1e308}, {"tolerance_ms": 1e300}])
+def test_a_step_or_a_tolerance_beyond_a_minute_is_refused_in_words(wrong: dict[str, float]) -> None:
+    with pytest.raises(InvalidValueError, match="no ISI of a design space is so long"):
+        DesignSpace(**{"low_ms": 0.0, "high_ms": 500.0, **wrong}, reference="impact")
+
+
 @pytest.mark.parametrize("space", [(0, 1e6, 1.0), (0, 500, 1e-3), (0, 1e15, 1e-9), (-1.7e308, 1.7e308, 1.0)])
 def test_a_space_with_more_isis_than_anybody_needs_is_refused(space: tuple[float, float, float]) -> None:
     with pytest.raises(InvalidValueError, match=r"too many ISIs"):

@@ -19,6 +19,9 @@ from isiw.types import FloatArray, Reference
 MOST_ISIS = 10_001
 """Of a design space: a second in steps of 0.1 ms."""
 
+MOST_MS: Final = 60_000.0
+"""Of an ISI, before or after its reference: two stimuli a minute from each other are no pair."""
+
 _MOST_TOLD: Final = 12
 """ISIs of a list that are written one by one."""
 
@@ -41,8 +44,8 @@ class DesignSpace(Checked):
         isis_ms: the ISIs of a list [ms], ascending; by default there is a grid. `of` makes the other fields fit.
 
     Raises:
-        InvalidValueError: a bound that is not finite, an empty range, a step that does not fit, too many ISIs, an
-            unknown reference, or none.
+        InvalidValueError: a bound that is not finite or beyond a minute, an empty range, a step that does not fit, too
+            many ISIs, an unknown reference, or none.
     """
 
     low_ms: Number
@@ -62,7 +65,8 @@ class DesignSpace(Checked):
             tolerance_ms: as for a grid [ms].
 
         Raises:
-            InvalidValueError: fewer than two ISIs, one that is not finite, too many of them, or no reference.
+            InvalidValueError: fewer than two ISIs, one that is not finite or beyond a minute, too many of them, or no
+                reference.
         """
         listed = tuple(sorted({number("an ISI of the design space [ms]", isi_ms) for isi_ms in isis_ms}))
         if len(listed) < 2:
@@ -94,6 +98,14 @@ class DesignSpace(Checked):
                 expected=f"at most {MOST_ISIS}",
                 remedy="Choose a narrower range, or a larger step_ms.",
             )
+        far = {name: value for name, value in self._extents_ms.items() if abs(value) > MOST_MS}
+        if far:
+            raise InvalidValueError(
+                "no ISI of a design space is so long",
+                got=far,
+                expected=f"{-MOST_MS:g} to {MOST_MS:g} ms",
+                remedy="In microseconds? Divide by 1000.",
+            )
         if listed and (listed != tuple(sorted(set(listed))) or ends_ms != (listed[0], listed[-1], _widest_ms(listed))):
             raise InvalidValueError(
                 "the range of a list of ISIs is not that of the list",
@@ -106,6 +118,10 @@ class DesignSpace(Checked):
                 got=steps,
                 remedy="Choose high_ms = low_ms + k * step_ms with a whole k.",
             )
+
+    @property
+    def _extents_ms(self) -> dict[str, float]:
+        return {name: getattr(self, name) for name in ("low_ms", "high_ms", "step_ms", "tolerance_ms")}
 
     def __str__(self) -> str:
         return self.told(TAP)

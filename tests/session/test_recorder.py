@@ -15,6 +15,7 @@ from typing import Any, Never
 import pytest
 
 from forked import Forked
+from isiw.change import MOST_NOTED
 from isiw.design import DesignSpace
 from isiw.devices.clock import VirtualClock
 from isiw.devices.limits import Limits
@@ -29,7 +30,7 @@ from isiw.errors import (
 )
 from isiw.findings import Kind
 from isiw.log.reader import read_session
-from isiw.log.schema import EstimateRecord, Intent
+from isiw.log.schema import EstimateRecord, Event, Intent
 from isiw.log.writer import LogWriter
 from isiw.report import final_statement
 from isiw.session import examination
@@ -503,6 +504,50 @@ def test_a_change_is_learnt_where_it_was_noted_also_after_a_verdict_and_after_re
         assert changes(resumed) == (2,)
     events = [event for event in read_session(log).events if event.kind == "change"]
     assert [(event.trial, event.text) for event in events] == [(2, "coil re-seated")]
+
+
+def test_several_changes_at_one_trial_are_one(log: Path) -> None:
+    with open_session(scripted_strategy(9), log) as session:
+        run(session, 2)
+        for number in range(70):
+            session.note_change(f"the coil moved {number}")
+        run(session, 1)
+        assert instance(RememberingPosterior, session.strategy.posterior).changes == (2,)
+    assert len([event for event in read_session(log).events if event.kind == "change"]) == 70
+
+
+def test_more_changes_than_are_learnt_are_remarks_and_somebody_is_told_once(log: Path) -> None:
+    said: list[str] = []
+    with open_session(scripted_strategy(40), log, on_doubt=said.append) as session:
+        for number in range(MOST_NOTED + 4):
+            run(session, 1)
+            for _ in range(2):  # it is sent again
+                session.note_change(f"the coil moved {number}", key=f"c{number}")
+        session.note_change("the coil moved 3", key="c3")
+        learnt = tuple(range(1, MOST_NOTED + 1))
+        assert instance(RememberingPosterior, session.strategy.posterior).changes == learnt
+        with pytest.raises(InvalidValueError, match="Give each note and each change a key of its own"):
+            session.note("the coil moved 22", key="c22")
+    assert len(said) == 1
+    assert "20 changes were noted, and no more are learnt" in said[0]
+    events = read_session(log).events
+    remarks = [event for event in events if event.finding is Kind.MANY_CHANGES and event.kind == "note"]
+    assert [event.text for event in remarks] == [f"the coil moved {number}" for number in range(20, 24)]
+    with open_session(scripted_strategy(40), log, resume=True) as resumed:
+        assert instance(RememberingPosterior, resumed.strategy.posterior).changes == learnt
+
+
+def test_a_log_of_an_earlier_version_with_more_changes_resumes_with_those_that_are_learnt(log: Path) -> None:
+    with open_session(scripted_strategy(70), log) as session:
+        for number in range(MOST_NOTED + 2):
+            run(session, 1)
+            session._examination.judge(  # noqa: SLF001 - as earlier versions logged it
+                lambda _, number=number: Event(kind="change", trial=number, text="the coil moved")  # type: ignore[misc]
+            )
+    with open_session(scripted_strategy(70), log, resume=True) as resumed:
+        changes = instance(RememberingPosterior, resumed.strategy.posterior).changes
+        assert changes == tuple(range(1, MOST_NOTED + 1))
+    assert "20 changes were noted" in [event.text for event in read_session(log).events if event.kind == "resume"][-1]
 
 
 @pytest.mark.parametrize("nothing", [None, 3])

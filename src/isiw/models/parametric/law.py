@@ -18,6 +18,7 @@ from isiw.checks import Checked, number
 from isiw.design import DesignSpace
 from isiw.lazy import torch
 from isiw.models.protocol import Tensor
+from isiw.models.shared.normal import log_between
 from isiw.models.shared.scales import AnyScale, PositiveScale, Scale
 from isiw.models.shared.start import Span, StartPrior
 
@@ -143,6 +144,9 @@ OUTLIER_FLOORS: Final = 12.0
 OUTLIER_LOG_SD: Final = 1.3
 """Outliers are log-normal, with this multiple of the floor as their median and this log SD."""
 
+_EVER: Final = 50.0
+"""No MEP is as large or as small [log mV]."""
+
 _LOG_SQRT_2PI: Final = 0.5 * math.log(2.0 * math.pi)
 _EXPONENT: Final = 8.0
 """A Gaussian with SD = width / 4 falls as exp(-8 (offset / width)^2)."""
@@ -200,17 +204,14 @@ def _log_density(parts: _Components, log_mep: Tensor, likelihood: Likelihood) ->
     return -0.5 * (off.square() / variance + torch.log(variance)) - _LOG_SQRT_2PI
 
 
-def _below(parts: _Components, log_mep: Tensor, likelihood: Likelihood) -> Tensor:
-    """Probability of a smaller MEP on each node, shape (m, n, q)."""
+def _normal_score(parts: _Components, log_mep: Tensor, likelihood: Likelihood) -> Tensor:
+    """Standard normal variable that is as rarely smaller as an MEP is on each node, shape (m, n, q)."""
     if likelihood == "gamma":
         # The Wilson–Hilferty approximation [Wilson1931]: the cube root of a gamma variable is nearly normal.
         root = torch.exp((log_mep - torch.log(parts.mean_mv)) / 3.0)
-        z = (root - 1.0 + parts.cv2 / 9.0) * 3.0 / torch.sqrt(parts.cv2)
-    else:
-        variance = torch.log1p(parts.cv2)
-        z = (log_mep - torch.log(parts.mean_mv) + 0.5 * variance) / torch.sqrt(variance)
-    below: Tensor = torch.special.ndtr(z)
-    return below
+        return (root - 1.0 + parts.cv2 / 9.0) * 3.0 / torch.sqrt(parts.cv2)
+    variance = torch.log1p(parts.cv2)
+    return (log_mep - torch.log(parts.mean_mv) + 0.5 * variance) / torch.sqrt(variance)
 
 
 def log_likelihood(unknowns: Unknowns, level: Tensor, log_mep: Tensor, likelihood: Likelihood) -> Tensor:
@@ -222,19 +223,24 @@ def log_likelihood(unknowns: Unknowns, level: Tensor, log_mep: Tensor, likelihoo
     inside = _mixed(_log_density(parts, at.unsqueeze(-1), likelihood), likelihood)
     outside = -0.5 * _outlier_z(unknowns, at).square() - math.log(OUTLIER_LOG_SD) - _LOG_SQRT_2PI
     if not bool(known.all()):
+        high = torch.where(known, low + 1.0, high)  # ends that meet have no logarithm, nor its gradient
         inside = torch.where(known, inside, _log_between(parts, low, high, likelihood))
-        below_high, below_low = (torch.special.ndtr(_outlier_z(unknowns, end)) for end in (high, low))
-        outside = torch.where(known, outside, torch.log((below_high - below_low).clamp_min(1e-300)))
+        outlier_z = (_outlier_z(unknowns, end) for end in _finite(low, high))
+        outside = torch.where(known, outside, log_between(*outlier_z))
     p_outlier = unknowns.p_outlier.unsqueeze(-1)
     return torch.logaddexp(inside + torch.log1p(-p_outlier), outside + torch.log(p_outlier))
 
 
 def _log_between(parts: _Components, low: Tensor, high: Tensor, likelihood: Likelihood) -> Tensor:
-    # Ends at infinity leave no gradient of their own, and below the lower one is nothing.
-    ends = (torch.nan_to_num(end, neginf=-50.0, posinf=50.0).unsqueeze(-1) for end in (high, low))
-    to_high, to_low = (_below(parts, end, likelihood) for end in ends)
-    to_low = torch.where(low.isneginf().unsqueeze(-1), 0.0, to_low)
-    return _mixed(torch.log((to_high - to_low).clamp_min(1e-300)), likelihood)
+    from_z, to_z = (_normal_score(parts, end.unsqueeze(-1), likelihood) for end in _finite(low, high))
+    # Below the lower end is nothing, though the cube root of a gamma variable would have a little there.
+    below = torch.special.log_ndtr(to_z)
+    return _mixed(torch.where(low.isneginf().unsqueeze(-1), below, log_between(from_z, to_z)), likelihood)
+
+
+def _finite(low: Tensor, high: Tensor) -> tuple[Tensor, Tensor]:
+    """Ends of intervals of log MEPs; those at infinity would leave no gradient."""
+    return torch.nan_to_num(low, neginf=-_EVER), torch.nan_to_num(high, posinf=_EVER)
 
 
 def _outlier_z(unknowns: Unknowns, log_mep: Tensor) -> Tensor:

@@ -23,6 +23,7 @@ from typing import Final, NamedTuple
 from isiw.lazy import torch
 from isiw.models.particles.changes import Changed
 from isiw.models.protocol import Tensor
+from isiw.models.shared.normal import between
 
 NODES = 8
 NODE_REACH = 2.6
@@ -43,6 +44,9 @@ STEEPEST_ROOT = 0.2
 OUTLIER_PROBABILITY = 0.03
 OUTLIER_LOG_RANGE = (math.log(2.0), math.log(200.0))
 """Artefacts and false positives: log-uniform between these multiples of the floor."""
+
+LEAST_MASS = 1e-9
+"""No interval of an amplitude is less probable than this, whatever a particle says."""
 
 STARTUP = (0.29, 0.20)
 """What the first trials have on top of the others, natural log: measured on single trials in blocks."""
@@ -299,18 +303,14 @@ def _inside(
 ) -> Tensor:
     """Log probability that log(mep / floor) lies between two ends, shape (..., p, n)."""
     (mean, inverse_sd), (silent_mean, silent_sd) = components, _silent(response, around)
-
-    def below(end: Tensor) -> Tensor:
-        evoked = _over_nodes(torch.special.ndtr((end.unsqueeze(-2) - mean) * inverse_sd))
-        silent = torch.special.ndtr((end - silent_mean) / silent_sd)
-        first, last = OUTLIER_LOG_RANGE
-        outlier = ((end - first) / (last - first)).clamp(0.0, 1.0)
-        responds = _response_probability(response, level)
-        mixed: Tensor = responds * evoked + (1.0 - responds) * silent
-        return (1.0 - OUTLIER_PROBABILITY) * mixed + OUTLIER_PROBABILITY * outlier
-
-    low, high = ends
-    return torch.log((below(high) - below(low)).clamp_min(1e-9))
+    evoked = _over_nodes(between(*((end.unsqueeze(-2) - mean) * inverse_sd for end in ends)))
+    silent = between(*((end - silent_mean) / silent_sd for end in ends))
+    first, last = OUTLIER_LOG_RANGE
+    from_low, to_high = (((end - first) / (last - first)).clamp(0.0, 1.0) for end in ends)
+    responds = _response_probability(response, level)
+    mixed = responds * evoked + (1.0 - responds) * silent
+    mass = (1.0 - OUTLIER_PROBABILITY) * mixed + OUTLIER_PROBABILITY * (to_high - from_low)
+    return torch.log(mass.clamp_min(LEAST_MASS))
 
 
 def outcome_density(response: Response, level: Tensor, log_mep: Tensor) -> Tensor:

@@ -26,6 +26,8 @@ BEFORE_MS: Final = 100.0
 KNOT_MS: Final = 1.0
 MAX_KNOTS: Final = 4000
 LEAST_MASS: Final = 1e-6
+LEAST_DENSITY: Final = 1e-30
+"""Of a start that can be [1/ms]; smaller ones are taken for it, so that logarithms and shares are numbers."""
 
 ROBOT_HIT_DELAY_MS: Final = (180.0, 6.2)
 """Mean and SD over people of the tapping robot's hit delay [ms]; 172–188 ms were measured (dissertation, 4.2)."""
@@ -107,14 +109,17 @@ class StartPrior(Checked):
         """Log density at some starts, same shape; -inf where no start can be."""
         density, _ = _law(space, self, start_ms.dtype, start_ms.device)
         inside = (start_ms >= density.x[0]) & (start_ms <= density.x[-1])
-        return torch.where(inside, density.at(start_ms).clamp_min(1e-30).log(), -torch.inf)
+        return torch.where(inside, density.at(start_ms).clamp_min(LEAST_DENSITY).log(), -torch.inf)
 
     def usual(self, start_ms: Tensor, space: DesignSpace) -> Tensor:
         """Probability that some starts are of the usual span, whatever the rig, same shape."""
         spans = torch.stack([span.share * span.density(start_ms) for span in self.in_space(space)])
         usual = spans[:: len(self.spans)].sum(0)  # the first of all spans is there once for each kind of rig
         even = self.p_anywhere / (space.high_ms - space.low_ms + BEFORE_MS)
-        return (1.0 - self.p_anywhere) * usual / ((1.0 - self.p_anywhere) * spans.sum(0) + even)
+        among = ((1.0 - self.p_anywhere) * spans.sum(0) + even).clamp_min(
+            LEAST_DENSITY
+        )  # where no start is, there is 0
+        return (1.0 - self.p_anywhere) * usual / among
 
     def as_usual(self, kept: float) -> StartPrior:
         """The same with less probability of all but the usual span."""

@@ -37,7 +37,7 @@ _BETWEEN, _FAR = _f(noise.BETWEEN_NODES), _f(noise.FAR_BELOW)
 _CORNER, _STEEPEST = _f(noise.CORNER), _f(noise.STEEPEST_ROOT)
 _MISSING, _ALL_OR_NONE = _f(NoiseKind.MISSING), _f(NoiseKind.ALL_OR_NONE)
 _RECRUITMENT, _RECTIFIED = _f(NoiseKind.RECRUITMENT), _f(NoiseKind.RECTIFIED)
-_LEAST_SIZE, _LEAST_REACH, _LEAST_MASS = _f(1e-9), _f(1e-12), _f(1e-9)
+_LEAST_SIZE, _LEAST_REACH, _LEAST_MASS = _f(1e-9), _f(1e-12), _f(noise.LEAST_MASS)
 _ROOT = _f(1.0 / math.sqrt(2.0 * math.pi))
 _OUT_LOW, _OUT_HIGH = _f(noise.OUTLIER_LOG_RANGE[0]), _f(noise.OUTLIER_LOG_RANGE[1])
 _OUT_DENSITY = _f(1.0 / (noise.OUTLIER_LOG_RANGE[1] - noise.OUTLIER_LOG_RANGE[0]))
@@ -242,7 +242,10 @@ def _density(particle: Any, trials: Any, count: int, curve: Any, work: Any, like
 
 @loop
 def _between(low: Any, high: Any) -> Any:
-    """Probability that a standard normal variable is between two ends; exact in either tail."""
+    """Probability that a standard normal variable is between two ends, exact in either tail down to 1e-18.
+
+    That is far below `noise.LEAST_MASS`, and no logarithm is taken of less.
+    """
     right = low > _NIL
     return ndtr(-low if right else high) - ndtr(-high if right else low)
 
