@@ -29,6 +29,9 @@ _WAITS: Final = 5.0
 _START_S: Final = 60.0
 """So long it may take to start [s]."""
 
+_BYTES_A_ROW: Final = 10
+"""A row of a table has hardly less."""
+
 _CHILD: Final = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from isiw.existing.child import main; main()"
 """What the process runs: it finds what this one finds, and nothing in the folder in which it is started."""
 
@@ -53,17 +56,20 @@ def read_apart(
         ConfigError: a library is not installed.
         OSError: a file that cannot be opened.
     """
-    seconds = limits.seconds_for(path, table=path.suffix.lower() in frames.SUFFIXES)
+    is_table = path.suffix.lower() in frames.SUFFIXES
+    seconds = limits.seconds_for(path, table=is_table)
     request = {
         "path": str(path),
         "layout": asdict(layout),
         "subject": subject,
         "limits": asdict(limits),
-        "seconds": seconds,
+        "is_table": is_table,
         "also": [str(other) for other in also],
     }
+    rows = path.stat().st_size // _BYTES_A_ROW if is_table else 0
+    most_s = _START_S + _WAITS * limits.seconds_for(path, table=is_table, rows=rows)
     with tempfile.TemporaryDirectory(prefix="isiw-") as folder:
-        status = _run({**request, "answer": folder}, seconds)
+        status = _run({**request, "answer": folder}, most_s)
         if status == 0:
             found = answer.read_answer(Path(folder))
             if isinstance(found, list):
@@ -72,7 +78,7 @@ def read_apart(
     raise _ended(path, limits, status, seconds)
 
 
-def _run(request: Mapping[str, Any], seconds: float) -> int | None:
+def _run(request: Mapping[str, Any], most_s: float) -> int | None:
     """The status with which the process ends; None if it had to be ended."""
     paths = json.dumps([place for place in sys.path if place])
     with subprocess.Popen(  # noqa: S603 - this Python, and words that are isiw's own
@@ -83,7 +89,7 @@ def _run(request: Mapping[str, Any], seconds: float) -> int | None:
         env={**os.environ, **_ONE_THREAD},
     ) as process:
         try:
-            process.communicate(json.dumps(request).encode(), timeout=_START_S + _WAITS * seconds)
+            process.communicate(json.dumps(request).encode(), timeout=most_s)
         except subprocess.TimeoutExpired:
             process.kill()
             return None

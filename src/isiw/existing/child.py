@@ -5,14 +5,14 @@ from __future__ import annotations
 import csv
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from isiw.existing import answer, frames, recordings
 from isiw.existing.gate import Gate, require_no_links
 from isiw.existing.layout import Layout
-from isiw.existing.limits import ReadingLimits, limit_process
+from isiw.existing.limits import ReadingLimits, limit_memory, limit_time
 from isiw.existing.reading import people_in
 from isiw.lazy import pd
 from isiw.text.named_code import library
@@ -34,15 +34,21 @@ def _answer(request: Mapping[str, Any], folder: Path) -> None:
     layout = checked(Layout, request["layout"], "the layout")
     _load_libraries(path)
     csv.field_size_limit(2**31 - 1)  # a cell that is too long is refused in words later
-    limit_process(request["seconds"], limits.memory_mb)
+    limit_memory(limits.memory_mb)
+    limit_time(limits.seconds_for(path, table=request["is_table"]))
     gate = Gate(path, [Path(other) for other in request["also"]])
     sys.addaudithook(gate)
     try:
         require_no_links(path)
-        people = people_in(path, layout, request["subject"], limits)
+        people = people_in(path, layout, request["subject"], limits, _limit_time_of(path, limits))
     finally:
         gate.require_nothing_refused()
     answer.write_people(folder, people, gate.hashes())
+
+
+def _limit_time_of(path: Path, limits: ReadingLimits) -> Callable[[int], None]:
+    """Trials are made of rows that are read: for how many there are, there is more time."""
+    return lambda rows: limit_time(limits.seconds_for(path, table=True, rows=rows))
 
 
 def _load_libraries(path: Path) -> None:

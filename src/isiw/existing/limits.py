@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import zipfile
-from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import IO, Final
@@ -15,8 +14,21 @@ from isiw.errors import InvalidValueError
 from isiw.files import opened
 from isiw.lazy import pd
 
-_BYTES_PER_S: Final = {True: 1e5, False: 4e6}
-"""A table has a second more for each so many bytes, of which trials are made; a recording for each so many samples."""
+try:
+    import resource
+except ImportError:  # on Windows
+    resource = None  # type: ignore[assignment]
+
+_BYTES_PER_S: Final = {True: 1e6, False: 4e6}
+"""A table has a second more for each so many bytes, and a recording."""
+
+_ROWS_PER_S: Final = 2e3
+"""A second more for each so many rows, once they are read: a trial is made of each."""
+
+_SIGNS: Final = (b"\t", b";", b",", b"|")
+"""What separates the cells of a text."""
+
+_FIRST_LINES: Final = 100
 
 _CHUNK: Final = 2**20
 
@@ -32,7 +44,8 @@ class ReadingLimits(Checked):
         file_mb: the size of the file [MB].
         unpacked_mb: what the parts of a packed file, such as a workbook, are unpacked to [MB].
         memory_mb: the memory of the process that reads [MB].
-        seconds: its processor time [s], besides a second for each 0.1 MB of a table, and for each 4 MB of a recording.
+        seconds: its processor time [s], besides a second for each MB of a table, for each 2,000 of its rows, and for
+            each 4 MB of a recording.
         rows: the rows of a table.
         columns: its columns.
         cells: its cells.
@@ -66,10 +79,10 @@ class ReadingLimits(Checked):
         kinds = {one.name: type(getattr(self, one.name)) for one in fields(self)}
         return replace(self, **{name: kind(getattr(self, name) * factor) for name, kind in kinds.items()})
 
-    def seconds_for(self, path: Path, *, table: bool) -> float:
-        """The processor time for one file [s]."""
+    def seconds_for(self, path: Path, *, table: bool, rows: int = 0) -> float:
+        """The processor time for one file, of which so many rows are known [s]."""
         size = path.stat().st_size if path.is_file() else 0
-        return self.seconds + size / _BYTES_PER_S[table]
+        return self.seconds + size / _BYTES_PER_S[table] + rows / _ROWS_PER_S
 
     def passed(self, source: str, what: str, got: object, most: float, unit: str = "") -> InvalidValueError:
         """The error that a file has more than a limit allows."""
@@ -111,6 +124,10 @@ class ReadingLimits(Checked):
                 lines[end] += chunk.count(end)
         if (most := max(lines.values())) > self.rows:
             raise self.passed(source, "has too many lines", most, self.rows)
+        file.seek(0)
+        cells = max(1 + max(map(file.readline().count, _SIGNS)) for _ in range(_FIRST_LINES))
+        if cells > self.columns:
+            raise self.passed(source, "has too many columns", cells, self.columns)
 
     def require_table(self, frame: pd.DataFrame, source: str) -> None:
         """Raise if a table has too many rows, columns or cells, or too long a name or text."""
@@ -140,34 +157,22 @@ class ReadingLimits(Checked):
                 )
 
 
-def limit_process(seconds: float, memory_mb: float) -> None:
-    """Limit what this process may take, where the system can: it has `resource`, and on Linux counts all memory.
-
-    Args:
-        seconds: processor time from now on [s].
-        memory_mb: memory in all [MB].
-    """
-    set_memory, set_time = _setters()
-    set_memory(int(1e6 * memory_mb))
-    set_time(seconds)
-
-
-def _setters() -> tuple[Callable[[int], None], Callable[[float], None]]:
-    try:
-        import resource  # noqa: PLC0415 - Windows has none
-    except ImportError:
-        return (lambda _: None), (lambda _: None)
-
-    def set_memory(most: int) -> None:
+def limit_memory(memory_mb: float) -> None:
+    """Limit the memory that this process may take [MB], where the system can: Linux counts all of it, Windows none."""
+    if resource is not None:
+        most = int(1e6 * memory_mb)
         _, hard = resource.getrlimit(resource.RLIMIT_DATA)
-        most = most if hard == resource.RLIM_INFINITY else min(most, hard)
-        resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
+        resource.setrlimit(resource.RLIMIT_DATA, (_within(most, hard), hard))
 
-    def set_time(seconds: float) -> None:
+
+def limit_time(seconds: float) -> None:
+    """Limit the processor time that this process may take from now on [s], where the system can."""
+    if resource is not None:
         used = resource.getrusage(resource.RUSAGE_SELF)
         _, hard = resource.getrlimit(resource.RLIMIT_CPU)
         most = math.ceil(used.ru_utime + used.ru_stime + seconds)
-        most = most if hard == resource.RLIM_INFINITY else min(most, hard)
-        resource.setrlimit(resource.RLIMIT_CPU, (most, hard))
+        resource.setrlimit(resource.RLIMIT_CPU, (_within(most, hard), hard))
 
-    return set_memory, set_time
+
+def _within(most: int, hard: int) -> int:
+    return most if hard < 0 else min(most, hard)
