@@ -21,7 +21,7 @@ from isiw.errors import InvalidValueError
 from isiw.existing import answer, frames
 from isiw.existing.delivered import Delivered
 from isiw.existing.layout import Layout
-from isiw.existing.limits import ReadingLimits
+from isiw.existing.limits import ReadingLimits, passed, seconds_for
 
 _WAITS: Final = 5.0
 """By the clock a process may take so many times its processor time, since it may wait for a disk."""
@@ -57,7 +57,7 @@ def read_apart(
         OSError: a file that cannot be opened.
     """
     is_table = path.suffix.lower() in frames.SUFFIXES
-    seconds = limits.seconds_for(path, table=is_table)
+    seconds = seconds_for(limits, path, table=is_table)
     request = {
         "path": str(path),
         "layout": asdict(layout),
@@ -67,7 +67,7 @@ def read_apart(
         "also": [str(other) for other in also],
     }
     rows = path.stat().st_size // _BYTES_A_ROW if is_table else 0
-    most_s = _START_S + _WAITS * limits.seconds_for(path, table=is_table, rows=rows)
+    most_s = _START_S + _WAITS * seconds_for(limits, path, table=is_table, rows=rows)
     with tempfile.TemporaryDirectory(prefix="isiw-") as folder:
         status = _run({**request, "answer": folder}, most_s)
         if status == 0:
@@ -102,7 +102,7 @@ def _run(request: Mapping[str, Any], most_s: float) -> int | None:
 def _ended(path: Path, limits: ReadingLimits, status: int | None, seconds: float) -> InvalidValueError:
     """The error that a process ended without an answer."""
     if status is None or status == -getattr(signal, "SIGXCPU", 0):
-        return limits.passed(path.name, "takes too long to read", None, seconds, " s of processor time")
+        return passed(path.name, "takes too long to read", None, seconds, " s of processor time")
     if status == -getattr(signal, "SIGKILL", 0):  # by the system, if memory is short
         return _too_large(path, limits)
     return InvalidValueError(
@@ -123,4 +123,4 @@ def _failed(path: Path, limits: ReadingLimits, found: Mapping[str, Any]) -> Inva
 
 
 def _too_large(path: Path, limits: ReadingLimits) -> InvalidValueError:
-    return limits.passed(path.name, "takes too much memory to read", None, limits.memory_mb, " MB")
+    return passed(path.name, "takes too much memory to read", None, limits.memory_mb, " MB")

@@ -79,82 +79,88 @@ class ReadingLimits(Checked):
         kinds = {one.name: type(getattr(self, one.name)) for one in fields(self)}
         return replace(self, **{name: kind(getattr(self, name) * factor) for name, kind in kinds.items()})
 
-    def seconds_for(self, path: Path, *, table: bool, rows: int = 0) -> float:
-        """The processor time for one file, of which so many rows are known [s]."""
-        size = path.stat().st_size if path.is_file() else 0
-        return self.seconds + size / _BYTES_PER_S[table] + rows / _ROWS_PER_S
 
-    def passed(self, source: str, what: str, got: object, most: float, unit: str = "") -> InvalidValueError:
-        """The error that a file has more than a limit allows."""
-        return InvalidValueError(
-            f"{source} {what}",
-            got=got,
-            expected=f"at most {most:g}{unit}",
-            remedy="Is it the right file? If it is, say --larger 2 (in Python limits=isiw.existing.ReadingLimits()"
-            ".larger(2)), or more.",
+def seconds_for(limits: ReadingLimits, path: Path, *, table: bool, rows: int = 0) -> float:
+    """The processor time for one file, of which so many rows are known [s]."""
+    size = path.stat().st_size if path.is_file() else 0
+    return limits.seconds + size / _BYTES_PER_S[table] + rows / _ROWS_PER_S
+
+
+def passed(source: str, what: str, got: object, most: float, unit: str = "") -> InvalidValueError:
+    """The error that a file has more than a limit allows."""
+    return InvalidValueError(
+        f"{source} {what}",
+        got=got,
+        expected=f"at most {most:g}{unit}",
+        remedy="Is it the right file? If it is, say --larger 2 (in Python limits=isiw.existing.ReadingLimits()"
+        ".larger(2)), or more.",
+    )
+
+
+def require_file(limits: ReadingLimits, path: Path, *, text: bool) -> None:
+    """Raise if a file is too large, or what it unpacks to, or if a text has too many lines."""
+    if not path.is_file():
+        return
+    with opened(path) as file:
+        size = os.fstat(file.fileno()).st_size
+        if size > 1e6 * limits.file_mb:
+            raise passed(path.name, "is too large", f"{size / 1e6:.0f} MB", limits.file_mb, " MB")
+        if file.read(2) == b"PK":
+            _require_parts(limits, path.name, file)
+        elif text:
+            _require_lines(limits, path.name, file)
+
+
+def _require_parts(limits: ReadingLimits, source: str, file: IO[bytes]) -> None:
+    try:
+        with zipfile.ZipFile(file) as packed:
+            unpacked_mb = sum(part.file_size for part in packed.infolist()) / 1e6
+    except (zipfile.BadZipFile, ValueError, NotImplementedError):  # its reader says what is wrong
+        return
+    if unpacked_mb > limits.unpacked_mb:
+        raise passed(source, "unpacks to too much", f"{unpacked_mb:.0f} MB", limits.unpacked_mb, " MB")
+
+
+def _require_lines(limits: ReadingLimits, source: str, file: IO[bytes]) -> None:
+    lines = dict.fromkeys((b"\n", b"\r"), 0)
+    file.seek(0)
+    while chunk := file.read(_CHUNK):
+        for end in lines:
+            lines[end] += chunk.count(end)
+    if (most := max(lines.values())) > limits.rows:
+        raise passed(source, "has too many lines", most, limits.rows)
+    file.seek(0)
+    cells = max(1 + max(map(file.readline().count, _SIGNS)) for _ in range(_FIRST_LINES))
+    if cells > limits.columns:
+        raise passed(source, "has too many columns", cells, limits.columns)
+
+
+def require_table(limits: ReadingLimits, frame: pd.DataFrame, source: str) -> None:
+    """Raise if a table has too many rows, columns or cells, or too long a name or text."""
+    for what, got, most in (
+        ("has too many columns", frame.shape[1], limits.columns),
+        ("has too many rows", frame.shape[0], limits.rows),
+        ("has too many cells", frame.size, limits.cells),
+    ):
+        if got > most:
+            raise passed(source, what, got, most)
+    longest_name = max((len(str(name)) for name in frame.columns), default=0)
+    if longest_name > limits.name_length:
+        raise passed(
+            source, "has too long a name of a column", f"{longest_name} characters", limits.name_length, " characters"
         )
-
-    def require_file(self, path: Path, *, text: bool) -> None:
-        """Raise if a file is too large, or what it unpacks to, or if a text has too many lines."""
-        if not path.is_file():
-            return
-        with opened(path) as file:
-            size = os.fstat(file.fileno()).st_size
-            if size > 1e6 * self.file_mb:
-                raise self.passed(path.name, "is too large", f"{size / 1e6:.0f} MB", self.file_mb, " MB")
-            if file.read(2) == b"PK":
-                self._require_parts(path.name, file)
-            elif text:
-                self._require_lines(path.name, file)
-
-    def _require_parts(self, source: str, file: IO[bytes]) -> None:
-        try:
-            with zipfile.ZipFile(file) as packed:
-                unpacked_mb = sum(part.file_size for part in packed.infolist()) / 1e6
-        except (zipfile.BadZipFile, ValueError, NotImplementedError):  # its reader says what is wrong
-            return
-        if unpacked_mb > self.unpacked_mb:
-            raise self.passed(source, "unpacks to too much", f"{unpacked_mb:.0f} MB", self.unpacked_mb, " MB")
-
-    def _require_lines(self, source: str, file: IO[bytes]) -> None:
-        lines = dict.fromkeys((b"\n", b"\r"), 0)
-        file.seek(0)
-        while chunk := file.read(_CHUNK):
-            for end in lines:
-                lines[end] += chunk.count(end)
-        if (most := max(lines.values())) > self.rows:
-            raise self.passed(source, "has too many lines", most, self.rows)
-        file.seek(0)
-        cells = max(1 + max(map(file.readline().count, _SIGNS)) for _ in range(_FIRST_LINES))
-        if cells > self.columns:
-            raise self.passed(source, "has too many columns", cells, self.columns)
-
-    def require_table(self, frame: pd.DataFrame, source: str) -> None:
-        """Raise if a table has too many rows, columns or cells, or too long a name or text."""
-        for what, got, most in (
-            ("has too many columns", frame.shape[1], self.columns),
-            ("has too many rows", frame.shape[0], self.rows),
-            ("has too many cells", frame.size, self.cells),
-        ):
-            if got > most:
-                raise self.passed(source, what, got, most)
-        longest_name = max((len(str(name)) for name in frame.columns), default=0)
-        if longest_name > self.name_length:
-            raise self.passed(
-                source, "has too long a name of a column", f"{longest_name} characters", self.name_length, " characters"
+    for name, cells in frame.items():
+        if pd.api.types.is_numeric_dtype(cells):
+            continue
+        longest = max((len(cell) for cell in cells if isinstance(cell, str | bytes)), default=0)
+        if longest > limits.cell_length:
+            raise passed(
+                source,
+                f"has too long a text in the column {name!r}",
+                f"{longest} characters",
+                limits.cell_length,
+                " characters",
             )
-        for name, cells in frame.items():
-            if pd.api.types.is_numeric_dtype(cells):
-                continue
-            longest = max((len(cell) for cell in cells if isinstance(cell, str | bytes)), default=0)
-            if longest > self.cell_length:
-                raise self.passed(
-                    source,
-                    f"has too long a text in the column {name!r}",
-                    f"{longest} characters",
-                    self.cell_length,
-                    " characters",
-                )
 
 
 def limit_memory(memory_mb: float) -> None:

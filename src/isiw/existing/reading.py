@@ -21,7 +21,7 @@ from isiw.existing.apart import read_apart
 from isiw.existing.dates import dates_of, times_of
 from isiw.existing.delivered import Delivered, anywhere, read_log
 from isiw.existing.layout import ISI_UNITS_MS, MARKERS, Layout, letters
-from isiw.existing.limits import ReadingLimits
+from isiw.existing.limits import ReadingLimits, require_file, require_table
 from isiw.files import is_mcap
 from isiw.findings import Kind
 from isiw.lazy import pd
@@ -78,7 +78,7 @@ def people_in(
 ) -> list[Delivered]:
     """The people whose trials a file holds, read by this process, which is informed how many rows a table has."""
     suffix = ".fif" if path.name.endswith(".fif.gz") else path.suffix.lower()
-    limits.require_file(path, text=suffix in frames.TEXTS)
+    require_file(limits, path, text=suffix in frames.TEXTS)
     if suffix in recordings.SUFFIXES:
         return [recordings.read_recording(path, layout, subject or path.stem)]
     if path.is_dir() or suffix not in frames.SUFFIXES:
@@ -98,7 +98,7 @@ def people_in(
 
 def _frame(path: Path, layout: Layout, limits: ReadingLimits) -> pd.DataFrame:
     frame = frames.read_frame(path, layout)
-    limits.require_table(frame, path.name)
+    require_table(limits, frame, path.name)
     return frame
 
 
