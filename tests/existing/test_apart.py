@@ -49,18 +49,6 @@ def test_recordings_are_read_apart_as_they_are_here(kind: str, tmp_path: Path) -
 
 
 @pytest.mark.slow
-def test_settings_of_mne_are_no_file_of_the_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / ".mne").mkdir()
-    (tmp_path / ".mne" / "mne-python.json").write_text('{"MNE_USE_CUDA": "false"}')
-    for name in ("HOME", "APPDATA", "_MNE_FAKE_HOME_DIR"):
-        monkeypatch.setenv(name, str(tmp_path))
-    own = tmp_path / "own"
-    own.mkdir()
-    (person,) = read_people(as_brainvision(own), KNOWN)
-    assert sorted(person.files) == ["P01.eeg", "P01.vhdr", "P01.vmrk"]
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("way", ["absolute", "upwards", "link", "markers"])
 def test_a_header_that_names_a_file_elsewhere_is_refused_unless_the_file_is_named(way: str, tmp_path: Path) -> None:
     own, other = tmp_path / "own", tmp_path / "other"
