@@ -172,6 +172,9 @@ def test_only_files_of_the_own_folder_may_be_opened_and_all_of_them_are_hashed(t
     named = Gate(own / "P.vhdr", [other / "P.eeg"])
     named("open", (str(own / "link.eeg"), "rb", os.O_RDONLY))
     assert len(named.hashes()) == 2
+    settings = Gate(own / "P.vhdr", own=[other / "P.eeg"])  # of a library, and nothing of the recording
+    settings("open", (str(other / "P.eeg"), "rb", os.O_RDONLY))
+    assert list(settings.hashes()) == ["P.vhdr"]
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes with a name")

@@ -21,13 +21,16 @@ from isiw.errors import InvalidValueError
 from isiw.existing import answer, frames
 from isiw.existing.delivered import Delivered
 from isiw.existing.layout import Layout
-from isiw.existing.limits import ReadingLimits
+from isiw.existing.limits import ReadingLimits, passed, seconds_for
 
 _WAITS: Final = 5.0
 """By the clock a process may take so many times its processor time, since it may wait for a disk."""
 
 _START_S: Final = 60.0
 """So long it may take to start [s]."""
+
+_BYTES_A_ROW: Final = 10
+"""A row of a table has hardly less."""
 
 _CHILD: Final = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from isiw.existing.child import main; main()"
 """What the process runs: it finds what this one finds, and nothing in the folder in which it is started."""
@@ -53,17 +56,20 @@ def read_apart(
         ConfigError: a library is not installed.
         OSError: a file that cannot be opened.
     """
-    seconds = limits.seconds_for(path, table=path.suffix.lower() in frames.SUFFIXES)
+    is_table = path.suffix.lower() in frames.SUFFIXES
+    seconds = seconds_for(limits, path, table=is_table)
     request = {
         "path": str(path),
         "layout": asdict(layout),
         "subject": subject,
         "limits": asdict(limits),
-        "seconds": seconds,
+        "is_table": is_table,
         "also": [str(other) for other in also],
     }
+    rows = path.stat().st_size // _BYTES_A_ROW if is_table else 0
+    most_s = _START_S + _WAITS * seconds_for(limits, path, table=is_table, rows=rows)
     with tempfile.TemporaryDirectory(prefix="isiw-") as folder:
-        status = _run({**request, "answer": folder}, seconds)
+        status = _run({**request, "answer": folder}, most_s)
         if status == 0:
             found = answer.read_answer(Path(folder))
             if isinstance(found, list):
@@ -72,7 +78,7 @@ def read_apart(
     raise _ended(path, limits, status, seconds)
 
 
-def _run(request: Mapping[str, Any], seconds: float) -> int | None:
+def _run(request: Mapping[str, Any], most_s: float) -> int | None:
     """The status with which the process ends; None if it had to be ended."""
     paths = json.dumps([place for place in sys.path if place])
     with subprocess.Popen(  # noqa: S603 - this Python, and words that are isiw's own
@@ -83,7 +89,7 @@ def _run(request: Mapping[str, Any], seconds: float) -> int | None:
         env={**os.environ, **_ONE_THREAD},
     ) as process:
         try:
-            process.communicate(json.dumps(request).encode(), timeout=_START_S + _WAITS * seconds)
+            process.communicate(json.dumps(request).encode(), timeout=most_s)
         except subprocess.TimeoutExpired:
             process.kill()
             return None
@@ -96,7 +102,7 @@ def _run(request: Mapping[str, Any], seconds: float) -> int | None:
 def _ended(path: Path, limits: ReadingLimits, status: int | None, seconds: float) -> InvalidValueError:
     """The error that a process ended without an answer."""
     if status is None or status == -getattr(signal, "SIGXCPU", 0):
-        return limits.passed(path.name, "takes too long to read", None, seconds, " s of processor time")
+        return passed(path.name, "takes too long to read", None, seconds, " s of processor time")
     if status == -getattr(signal, "SIGKILL", 0):  # by the system, if memory is short
         return _too_large(path, limits)
     return InvalidValueError(
@@ -117,4 +123,4 @@ def _failed(path: Path, limits: ReadingLimits, found: Mapping[str, Any]) -> Inva
 
 
 def _too_large(path: Path, limits: ReadingLimits) -> InvalidValueError:
-    return limits.passed(path.name, "takes too much memory to read", None, limits.memory_mb, " MB")
+    return passed(path.name, "takes too much memory to read", None, limits.memory_mb, " MB")

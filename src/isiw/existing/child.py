@@ -5,14 +5,14 @@ from __future__ import annotations
 import csv
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from isiw.existing import answer, frames, recordings
 from isiw.existing.gate import Gate, require_no_links
 from isiw.existing.layout import Layout
-from isiw.existing.limits import ReadingLimits, limit_process
+from isiw.existing.limits import ReadingLimits, limit_memory, limit_time, seconds_for
 from isiw.existing.reading import people_in
 from isiw.lazy import pd
 from isiw.text.named_code import library
@@ -32,24 +32,33 @@ def main() -> None:
 def _answer(request: Mapping[str, Any], folder: Path) -> None:
     path, limits = Path(request["path"]), ReadingLimits(**request["limits"])
     layout = checked(Layout, request["layout"], "the layout")
-    _load_libraries(path)
+    own = _load_libraries(path)
     csv.field_size_limit(2**31 - 1)  # a cell that is too long is refused in words later
-    limit_process(request["seconds"], limits.memory_mb)
-    gate = Gate(path, [Path(other) for other in request["also"]])
+    limit_memory(limits.memory_mb)
+    limit_time(seconds_for(limits, path, table=request["is_table"]))
+    gate = Gate(path, [Path(other) for other in request["also"]], own)
     sys.addaudithook(gate)
     try:
         require_no_links(path)
-        people = people_in(path, layout, request["subject"], limits)
+        people = people_in(path, layout, request["subject"], limits, _limit_time_of(path, limits))
     finally:
         gate.require_nothing_refused()
     answer.write_people(folder, people, gate.hashes())
 
 
-def _load_libraries(path: Path) -> None:
-    """Load what takes long to load before the time of reading begins; what is missing is told when it is needed."""
+def _limit_time_of(path: Path, limits: ReadingLimits) -> Callable[[int], None]:
+    """Trials are made of rows that are read: for how many there are, there is more time."""
+    return lambda rows: limit_time(seconds_for(limits, path, table=True, rows=rows))
+
+
+def _load_libraries(path: Path) -> list[Path]:
+    """Load what takes long to load before the time of reading begins; the files of settings that it reads later on."""
     pd.DataFrame  # noqa: B018 - which loads pandas
     suffix = path.suffix.lower()
     if suffix in recordings.SUFFIXES:
-        library("mne", "import").io.read_raw  # noqa: B018 - which loads its readers
-    elif suffix in frames.WORKBOOKS:
+        mne = library("mne", "import")
+        mne.io.read_raw  # noqa: B018 - which loads its readers
+        return [Path(mne.get_config_path())]
+    if suffix in frames.WORKBOOKS:
         library("openpyxl", "import")
+    return []

@@ -29,11 +29,11 @@ class Gate:
     format writes in its own way, but what is opened.
     """
 
-    def __init__(self, source: Path, also: Iterable[Path] = ()) -> None:
+    def __init__(self, source: Path, also: Iterable[Path] = (), own: Iterable[Path] = ()) -> None:
         self.source = source
         self._folder = _real(source if source.is_dir() else source.parent)
         self._named = {_real(source), *map(_real, also)}
-        self._code = [_real(Path(folder)) for folder in _code_folders()]
+        self._code = [*map(_real, map(Path, _code_folders())), *map(_real, own)]  # a library has settings of its own
         self.read: dict[Path, None] = {}
         self.refused: InvalidValueError | None = None
 

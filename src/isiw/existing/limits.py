@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import zipfile
-from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import IO, Final
@@ -15,8 +14,21 @@ from isiw.errors import InvalidValueError
 from isiw.files import opened
 from isiw.lazy import pd
 
-_BYTES_PER_S: Final = {True: 1e5, False: 4e6}
-"""A table has a second more for each so many bytes, of which trials are made; a recording for each so many samples."""
+try:
+    import resource
+except ImportError:  # on Windows
+    resource = None  # type: ignore[assignment]
+
+_BYTES_PER_S: Final = {True: 1e6, False: 4e6}
+"""A table has a second more for each so many bytes, and a recording."""
+
+_ROWS_PER_S: Final = 2e3
+"""A second more for each so many rows, once they are read: a trial is made of each."""
+
+_SIGNS: Final = (b"\t", b";", b",", b"|")
+"""What separates the cells of a text."""
+
+_FIRST_LINES: Final = 100
 
 _CHUNK: Final = 2**20
 
@@ -32,7 +44,8 @@ class ReadingLimits(Checked):
         file_mb: the size of the file [MB].
         unpacked_mb: what the parts of a packed file, such as a workbook, are unpacked to [MB].
         memory_mb: the memory of the process that reads [MB].
-        seconds: its processor time [s], besides a second for each 0.1 MB of a table, and for each 4 MB of a recording.
+        seconds: its processor time [s], besides a second for each MB of a table, for each 2,000 of its rows, and for
+            each 4 MB of a recording.
         rows: the rows of a table.
         columns: its columns.
         cells: its cells.
@@ -66,108 +79,106 @@ class ReadingLimits(Checked):
         kinds = {one.name: type(getattr(self, one.name)) for one in fields(self)}
         return replace(self, **{name: kind(getattr(self, name) * factor) for name, kind in kinds.items()})
 
-    def seconds_for(self, path: Path, *, table: bool) -> float:
-        """The processor time for one file [s]."""
-        size = path.stat().st_size if path.is_file() else 0
-        return self.seconds + size / _BYTES_PER_S[table]
 
-    def passed(self, source: str, what: str, got: object, most: float, unit: str = "") -> InvalidValueError:
-        """The error that a file has more than a limit allows."""
-        return InvalidValueError(
-            f"{source} {what}",
-            got=got,
-            expected=f"at most {most:g}{unit}",
-            remedy="Is it the right file? If it is, say --larger 2 (in Python limits=isiw.existing.ReadingLimits()"
-            ".larger(2)), or more.",
-        )
-
-    def require_file(self, path: Path, *, text: bool) -> None:
-        """Raise if a file is too large, or what it unpacks to, or if a text has too many lines."""
-        if not path.is_file():
-            return
-        with opened(path) as file:
-            size = os.fstat(file.fileno()).st_size
-            if size > 1e6 * self.file_mb:
-                raise self.passed(path.name, "is too large", f"{size / 1e6:.0f} MB", self.file_mb, " MB")
-            if file.read(2) == b"PK":
-                self._require_parts(path.name, file)
-            elif text:
-                self._require_lines(path.name, file)
-
-    def _require_parts(self, source: str, file: IO[bytes]) -> None:
-        try:
-            with zipfile.ZipFile(file) as packed:
-                unpacked_mb = sum(part.file_size for part in packed.infolist()) / 1e6
-        except (zipfile.BadZipFile, ValueError, NotImplementedError):  # its reader says what is wrong
-            return
-        if unpacked_mb > self.unpacked_mb:
-            raise self.passed(source, "unpacks to too much", f"{unpacked_mb:.0f} MB", self.unpacked_mb, " MB")
-
-    def _require_lines(self, source: str, file: IO[bytes]) -> None:
-        lines = dict.fromkeys((b"\n", b"\r"), 0)
-        file.seek(0)
-        while chunk := file.read(_CHUNK):
-            for end in lines:
-                lines[end] += chunk.count(end)
-        if (most := max(lines.values())) > self.rows:
-            raise self.passed(source, "has too many lines", most, self.rows)
-
-    def require_table(self, frame: pd.DataFrame, source: str) -> None:
-        """Raise if a table has too many rows, columns or cells, or too long a name or text."""
-        for what, got, most in (
-            ("has too many columns", frame.shape[1], self.columns),
-            ("has too many rows", frame.shape[0], self.rows),
-            ("has too many cells", frame.size, self.cells),
-        ):
-            if got > most:
-                raise self.passed(source, what, got, most)
-        longest_name = max((len(str(name)) for name in frame.columns), default=0)
-        if longest_name > self.name_length:
-            raise self.passed(
-                source, "has too long a name of a column", f"{longest_name} characters", self.name_length, " characters"
-            )
-        for name, cells in frame.items():
-            if pd.api.types.is_numeric_dtype(cells):
-                continue
-            longest = max((len(cell) for cell in cells if isinstance(cell, str | bytes)), default=0)
-            if longest > self.cell_length:
-                raise self.passed(
-                    source,
-                    f"has too long a text in the column {name!r}",
-                    f"{longest} characters",
-                    self.cell_length,
-                    " characters",
-                )
+def seconds_for(limits: ReadingLimits, path: Path, *, table: bool, rows: int = 0) -> float:
+    """The processor time for one file, of which so many rows are known [s]."""
+    size = path.stat().st_size if path.is_file() else 0
+    return limits.seconds + size / _BYTES_PER_S[table] + rows / _ROWS_PER_S
 
 
-def limit_process(seconds: float, memory_mb: float) -> None:
-    """Limit what this process may take, where the system can: it has `resource`, and on Linux counts all memory.
+def passed(source: str, what: str, got: object, most: float, unit: str = "") -> InvalidValueError:
+    """The error that a file has more than a limit allows."""
+    return InvalidValueError(
+        f"{source} {what}",
+        got=got,
+        expected=f"at most {most:g}{unit}",
+        remedy="Is it the right file? If it is, say --larger 2 (in Python limits=isiw.existing.ReadingLimits()"
+        ".larger(2)), or more.",
+    )
 
-    Args:
-        seconds: processor time from now on [s].
-        memory_mb: memory in all [MB].
-    """
-    set_memory, set_time = _setters()
-    set_memory(int(1e6 * memory_mb))
-    set_time(seconds)
+
+def require_file(limits: ReadingLimits, path: Path, *, text: bool) -> None:
+    """Raise if a file is too large, or what it unpacks to, or if a text has too many lines."""
+    if not path.is_file():
+        return
+    with opened(path) as file:
+        size = os.fstat(file.fileno()).st_size
+        if size > 1e6 * limits.file_mb:
+            raise passed(path.name, "is too large", f"{size / 1e6:.0f} MB", limits.file_mb, " MB")
+        if file.read(2) == b"PK":
+            _require_parts(limits, path.name, file)
+        elif text:
+            _require_lines(limits, path.name, file)
 
 
-def _setters() -> tuple[Callable[[int], None], Callable[[float], None]]:
+def _require_parts(limits: ReadingLimits, source: str, file: IO[bytes]) -> None:
     try:
-        import resource  # noqa: PLC0415 - Windows has none
-    except ImportError:
-        return (lambda _: None), (lambda _: None)
+        with zipfile.ZipFile(file) as packed:
+            unpacked_mb = sum(part.file_size for part in packed.infolist()) / 1e6
+    except (zipfile.BadZipFile, ValueError, NotImplementedError):  # its reader says what is wrong
+        return
+    if unpacked_mb > limits.unpacked_mb:
+        raise passed(source, "unpacks to too much", f"{unpacked_mb:.0f} MB", limits.unpacked_mb, " MB")
 
-    def set_memory(most: int) -> None:
+
+def _require_lines(limits: ReadingLimits, source: str, file: IO[bytes]) -> None:
+    lines = dict.fromkeys((b"\n", b"\r"), 0)
+    file.seek(0)
+    while chunk := file.read(_CHUNK):
+        for end in lines:
+            lines[end] += chunk.count(end)
+    if (most := max(lines.values())) > limits.rows:
+        raise passed(source, "has too many lines", most, limits.rows)
+    file.seek(0)
+    cells = max(1 + max(map(file.readline().count, _SIGNS)) for _ in range(_FIRST_LINES))
+    if cells > limits.columns:
+        raise passed(source, "has too many columns", cells, limits.columns)
+
+
+def require_table(limits: ReadingLimits, frame: pd.DataFrame, source: str) -> None:
+    """Raise if a table has too many rows, columns or cells, or too long a name or text."""
+    for what, got, most in (
+        ("has too many columns", frame.shape[1], limits.columns),
+        ("has too many rows", frame.shape[0], limits.rows),
+        ("has too many cells", frame.size, limits.cells),
+    ):
+        if got > most:
+            raise passed(source, what, got, most)
+    longest_name = max((len(str(name)) for name in frame.columns), default=0)
+    if longest_name > limits.name_length:
+        raise passed(
+            source, "has too long a name of a column", f"{longest_name} characters", limits.name_length, " characters"
+        )
+    for name, cells in frame.items():
+        if pd.api.types.is_numeric_dtype(cells):
+            continue
+        longest = max((len(cell) for cell in cells if isinstance(cell, str | bytes)), default=0)
+        if longest > limits.cell_length:
+            raise passed(
+                source,
+                f"has too long a text in the column {name!r}",
+                f"{longest} characters",
+                limits.cell_length,
+                " characters",
+            )
+
+
+def limit_memory(memory_mb: float) -> None:
+    """Limit the memory that this process may take [MB], where the system can: Linux counts all of it, Windows none."""
+    if resource is not None:
+        most = int(1e6 * memory_mb)
         _, hard = resource.getrlimit(resource.RLIMIT_DATA)
-        most = most if hard == resource.RLIM_INFINITY else min(most, hard)
-        resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
+        resource.setrlimit(resource.RLIMIT_DATA, (_within(most, hard), hard))
 
-    def set_time(seconds: float) -> None:
+
+def limit_time(seconds: float) -> None:
+    """Limit the processor time that this process may take from now on [s], where the system can."""
+    if resource is not None:
         used = resource.getrusage(resource.RUSAGE_SELF)
         _, hard = resource.getrlimit(resource.RLIMIT_CPU)
         most = math.ceil(used.ru_utime + used.ru_stime + seconds)
-        most = most if hard == resource.RLIM_INFINITY else min(most, hard)
-        resource.setrlimit(resource.RLIMIT_CPU, (most, hard))
+        resource.setrlimit(resource.RLIMIT_CPU, (_within(most, hard), hard))
 
-    return set_memory, set_time
+
+def _within(most: int, hard: int) -> int:
+    return most if hard < 0 else min(most, hard)

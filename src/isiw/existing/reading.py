@@ -6,7 +6,7 @@ import datetime as dt
 import math
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -19,16 +19,16 @@ from isiw.errors import InvalidValueError
 from isiw.existing import frames, recordings, tables
 from isiw.existing.apart import read_apart
 from isiw.existing.dates import dates_of, latest_of, times_of
-from isiw.existing.delivered import Delivered, anywhere, read_log, renumbered
+from isiw.existing.delivered import Delivered, anywhere, read_log
 from isiw.existing.layout import ISI_UNITS_MS, MARKERS, Layout, letters
-from isiw.existing.limits import ReadingLimits
+from isiw.existing.limits import ReadingLimits, require_file, require_table
 from isiw.files import is_mcap
 from isiw.findings import Kind
 from isiw.lazy import pd
 from isiw.log.durable import log_exists
 from isiw.signals.judgement import judge_measurement
-from isiw.signals.limits import EMG_UNITS_MV
-from isiw.trials import Channel, Measurement, Status, Stimulus, Trial
+from isiw.signals.limits import EMG_UNITS_MV, SignalLimits
+from isiw.trials import Channel, Measurement, Status, Stimulus, Trial, TrialTable
 from isiw.types import FloatArray, Reference
 from isiw.visit import Visit
 
@@ -69,10 +69,16 @@ def read_people(
     return read_apart(path, layout, subject, limits or ReadingLimits(), also)
 
 
-def people_in(path: Path, layout: Layout, subject: str, limits: ReadingLimits) -> list[Delivered]:
-    """The people whose trials a file holds, read by this process."""
+def people_in(
+    path: Path,
+    layout: Layout,
+    subject: str,
+    limits: ReadingLimits,
+    on_rows: Callable[[int], object] = lambda _rows: None,
+) -> list[Delivered]:
+    """The people whose trials a file holds, read by this process, which is informed how many rows a table has."""
     suffix = ".fif" if path.name.endswith(".fif.gz") else path.suffix.lower()
-    limits.require_file(path, text=suffix in frames.TEXTS)
+    require_file(limits, path, text=suffix in frames.TEXTS)
     if suffix in recordings.SUFFIXES:
         return [recordings.read_recording(path, layout, subject or path.stem)]
     if path.is_dir() or suffix not in frames.SUFFIXES:
@@ -85,12 +91,14 @@ def people_in(path: Path, layout: Layout, subject: str, limits: ReadingLimits) -
         )
     if "emg" in layout.channels:
         return [_read_waves(path, layout, subject or path.stem, limits)]
-    return people_of(_frame(path, layout, limits), layout, path.name, subject or path.stem)
+    frame = _frame(path, layout, limits)
+    on_rows(len(frame))
+    return people_of(frame, layout, path.name, subject or path.stem)
 
 
 def _frame(path: Path, layout: Layout, limits: ReadingLimits) -> pd.DataFrame:
     frame = frames.read_frame(path, layout)
-    limits.require_table(frame, path.name)
+    require_table(limits, frame, path.name)
     return frame
 
 
@@ -291,10 +299,11 @@ def _person(
 ) -> Delivered:
     _require_ascending(columns, rows)
     columns.require_said(rows, layout.alone)
-    trials = [_trial(columns, row, number, layout, anywhere(reference)) for number, row in enumerate(rows)]
+    space, signals = anywhere(reference), SignalLimits()
+    trials = [_trial(columns, row, number, layout, space, signals) for number, row in enumerate(rows)]
     blocks = [columns["block"].text(row) for row in rows]
     return Delivered(
-        renumbered(trials),
+        TrialTable(tuple(trials)),
         reference,
         subject=subject,
         source=columns["isi"].of,
@@ -304,7 +313,9 @@ def _person(
     )
 
 
-def _trial(columns: tables.Columns, row: int, number: int, layout: Layout, space: DesignSpace) -> Trial:
+def _trial(
+    columns: tables.Columns, row: int, number: int, layout: Layout, space: DesignSpace, signals: SignalLimits
+) -> Trial:
     """One row as a trial: as the file judges it, or else as a session would."""
     alone = columns.tms_alone(row, layout.alone)
     isi_ms = None if alone else columns["isi"].number(row)
@@ -328,7 +339,7 @@ def _trial(columns: tables.Columns, row: int, number: int, layout: Layout, space
     if lost is None and not {"status", "exclude"} & columns.of.keys() and mep_mv is not None:
         measured = Measurement(mep_mv, isi_ms, facts["isi_sd_ms"] or 0.0, None)
         meant_ms = asked_ms if "asked" in columns.of or isi_ms is None else max(isi_ms, 0.0)
-        judged = judge_measurement(measured, Stimulus(number, meant_ms), space)
+        judged = judge_measurement(measured, Stimulus(number, meant_ms), space, signals)
         lost = judged.reason
     return Trial(number, Status.ACCEPTED if lost is None else Status.MISTRIAL, reason=lost, **facts)
 
