@@ -13,8 +13,9 @@ from typing import Any, Final, cast
 import numpy as np
 
 from isiw.errors import ConfigError, InvalidValueError
+from isiw.existing.cells import is_missing
 from isiw.existing.layout import COLUMNS, UNIT_WORDS, Layout, letters
-from isiw.existing.tables import is_missing, require_one
+from isiw.existing.tables import require_one
 from isiw.files import opened
 from isiw.lazy import pd, scipy
 from isiw.text.named_code import library
@@ -76,8 +77,9 @@ def reading(path: Path, what: str, remedy: str) -> Generator[None, None, None]:
         raise InvalidValueError(f"{what}: {why}", got=str(path), remedy=remedy) from error
 
 
-def named(frame: pd.DataFrame) -> pd.DataFrame:
+def named(frame: pd.DataFrame | None) -> pd.DataFrame:
     """A data frame whose index, if it has a name, is a column as others are, and whose columns have one name each."""
+    frame = pd.DataFrame() if frame is None else frame
     if any(name is not None for name in frame.index.names):
         frame = frame.reset_index()
     names = [" ".join(map(str, name)) if isinstance(name, tuple) else str(name) for name in frame.columns]
@@ -194,7 +196,9 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
     if layout.sheet is not None:
         require_one("sheet", "the workbook", layout.sheet, book.sheet_names)
     sheets = {
-        str(name): _from_names(book.parse(name, header=None, dtype=object).to_numpy().tolist(), layout)
+        str(name): _from_names(
+            book.parse(name, header=None, dtype=object, keep_default_na=False).to_numpy().tolist(), layout
+        )
         for name in ([layout.sheet] if layout.sheet is not None else book.sheet_names)
     }
     with_trials = [name for name, rows in sheets.items() if rows and _is_header(rows[0], layout)]
@@ -202,7 +206,17 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
         raise InvalidValueError(
             "several sheets of the workbook hold trials", got=", ".join(with_trials), remedy="Say --sheet NAME."
         )
-    return _table(sheets[(with_trials or list(sheets))[0]], layout)
+    filled = [name for name, rows in sheets.items() if len(rows) > 1]
+    if not with_trials and len(filled) > 1:
+        heads = (
+            f"{name} ({', '.join(str(cell) for cell in sheets[name][0] if not is_missing(cell))})" for name in filled
+        )
+        raise InvalidValueError(
+            "no sheet of the workbook is known to hold ISIs and amplitudes",
+            got="; ".join(heads),
+            remedy="Say --sheet NAME, and --column isi=NAME --column mep=NAME.",
+        )
+    return _table(sheets[(with_trials or filled or list(sheets))[0]], layout)
 
 
 def _from_names(rows: list[list[Any]], layout: Layout) -> list[list[Any]]:
