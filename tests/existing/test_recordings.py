@@ -66,7 +66,9 @@ def as_brainvision(path: Path) -> Path:
     return path / "P01.vhdr"
 
 
-def as_edf(path: Path, dimension: str = "uV", scale: float = 1e3, bdf: bool = False) -> Path:  # noqa: FBT001, FBT002
+def as_edf(
+    path: Path, dimension: str = "uV", scale: float = 1e3, *, bdf: bool = False, record_s: float | None = None
+) -> Path:
     emg_mv, events = recording()
     signal: Any = edfio.BdfSignal if bdf else edfio.EdfSignal
     signals = [
@@ -77,7 +79,7 @@ def as_edf(path: Path, dimension: str = "uV", scale: float = 1e3, bdf: bool = Fa
     ]
     notes = [edfio.EdfAnnotation(at_s, None, name) for at_s, name in events]
     kind: Any = edfio.Bdf if bdf else edfio.Edf
-    made = kind(signals, annotations=notes)
+    made = kind(signals, annotations=notes, data_record_duration=record_s)
     target = path / f"P01.{'bdf' if bdf else 'edf'}"
     made.write(target)
     return target

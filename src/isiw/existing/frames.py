@@ -38,7 +38,7 @@ Rows = Sequence[Sequence[Any]]
 def read_frame(path: Path, layout: Layout) -> pd.DataFrame:
     """The table in a file, its cells as they are."""
     readers: Mapping[str, Callable[[bytes, Layout], pd.DataFrame]] = {
-        ".mat": lambda content, layout: _of_vectors(_arrays(content), layout),
+        ".mat": lambda content, layout: _of_vectors(_arrays(content, path), layout),
         ".parquet": lambda content, _: named(pd.read_parquet(io.BytesIO(content))),
         **dict.fromkeys(WORKBOOKS, _workbook),
     }
@@ -51,7 +51,7 @@ def read_frame(path: Path, layout: Layout) -> pd.DataFrame:
 
 def read_arrays(path: Path) -> dict[str, Any]:
     """The arrays in a file of MATLAB by name, those in structures among them."""
-    arrays: dict[str, Any] = _read(path, _arrays)
+    arrays: dict[str, Any] = _read(path, lambda content: _arrays(content, path))
     return arrays
 
 
@@ -227,12 +227,11 @@ def _from_names(rows: list[list[Any]], layout: Layout) -> list[list[Any]]:
     return rows[next((n for n, row in enumerate(rows[:_LINES]) if _is_header(row, layout)), 0) :]
 
 
-def _arrays(content: bytes) -> dict[str, Any]:
+def _arrays(content: bytes, path: Path) -> dict[str, Any]:
     if content.startswith(b"MATLAB 7.3"):
-        raise InvalidValueError(
-            "files of MATLAB 7.3 cannot be read", remedy="Save it for 7: save('P01.mat', 'isi_ms', 'mep_mv', '-v7')."
-        )
-    values = scipy.io.loadmat(cast("Any", io.BytesIO(content)), simplify_cells=True)
+        values = library("pymatreader", "import").read_mat(str(path))
+    else:
+        values = scipy.io.loadmat(cast("Any", io.BytesIO(content)), simplify_cells=True)
     paths = dict(_flat({name: value for name, value in values.items() if not name.startswith("__")}))
     last = [path[-1] for path in paths]
     return {path[-1] if last.count(path[-1]) == 1 else ".".join(path): array for path, array in paths.items()}

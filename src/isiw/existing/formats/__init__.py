@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 
 from isiw.errors import InvalidValueError
 from isiw.existing import frames
-from isiw.existing.formats import columns, edf, eeglab, matlab, mne_files
+from isiw.existing.formats import acq, cfs, columns, edf, eeglab, matlab, mne_files, nwb, smr, statistics, windows, xdf
 from isiw.existing.formats.contents import Contents
 from isiw.existing.layout import Layout
 
@@ -36,6 +36,19 @@ FORMATS: Final = (
         "BrainVision", (".vhdr",), mne_files.read, "Are the .eeg and .vmrk beside it, under the names that it says?"
     ),
     Format("FIF", (".fif", ".fif.gz"), mne_files.read, _MNE),
+    Format("XDF", (".xdf", ".xdfz"), xdf.read, "Record again with LabRecorder, or save the streams as EDF+."),
+    Format(
+        "AcqKnowledge",
+        (".acq",),
+        acq.read,
+        "In AcqKnowledge: File, Save As, text (.txt) or MATLAB (.mat), and a layout.",
+    ),
+    Format("Spike2", (".smr",), smr.read, windows.SMRX),
+    Format("NWB", (".nwb",), nwb.read, "Is it a file of NWB 2, and complete?"),
+    Format("SPSS and Stata", (".sav", ".zsav", ".por", ".dta"), statistics.read, _TABLE),
+    Format("Signal", (".cfs",), cfs.read, cfs.WAY_IN),
+    Format("Spike2 from version 8 on", (".smrx",), windows.smrx, windows.SMRX),
+    Format("LabChart", (".adicht",), windows.adicht, windows.ADICHT),
     Format("CNT, GDF and MFF", (".cnt", ".gdf", ".mff"), mne_files.read, _MNE),
 )
 
