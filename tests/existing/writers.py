@@ -56,14 +56,13 @@ def as_xdf(path: Path, *, gap_s: float = 0.0, jitter_s: float = 0.0, offset_s: f
     parts.append(header(2, "Markers", "Markers", "string", 0.0))
     times_s = 1000.0 + np.arange(len(emg_mv)) / RATE_HZ
     for first in range(0, len(emg_mv), 32):
-        late_s = jitter_s * rng.standard_normal()
-        samples = b"".join(
-            b"\x08" + struct.pack("<df", at_s + late_s, 1e3 * value)
-            for at_s, value in zip(times_s[first : first + 32], emg_mv[first : first + 32], strict=True)
-            if not 0 <= at_s - 1003.2 < gap_s
-        )
-        if count := len(samples) // 13:
-            parts.append(chunk(3, struct.pack("<IBI", 1, 4, count) + samples))
+        kept = [n for n in range(first, min(first + 32, len(emg_mv))) if not 0 <= times_s[n] - 1003.2 < gap_s]
+        if kept:  # the first sample has a time, and the others follow it at the rate of the stream
+            late_s = jitter_s * rng.standard_normal()
+            values = np.zeros(len(kept) - 1, [("stamp", "u1"), ("value", "<f4")])
+            values["value"] = 1e3 * emg_mv[kept[1:]]
+            samples = b"\x08" + struct.pack("<df", times_s[kept[0]] + late_s, 1e3 * emg_mv[kept[0]]) + values.tobytes()
+            parts.append(chunk(3, struct.pack("<IBI", 1, 4, len(kept)) + samples))
     for at_s, name in named_events():
         content = struct.pack("<Bd", 8, 1000.0 - offset_s + at_s) + b"\x01" + bytes([len(name)]) + name.encode()
         parts.append(chunk(3, struct.pack("<IBB", 2, 1, 1) + content))
