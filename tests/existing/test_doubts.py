@@ -217,7 +217,8 @@ def test_a_unit_of_brainvision_is_read_as_the_header_writes_it(unit: str, tmp_pa
 
 
 def eeglab(path: Path, scale: float, *more: dict[str, Any], cut: slice = slice(0)) -> Path:
-    emg, stimuli = scale * EMG_MV, [{"type": name, "latency": 1 + round(at * RATE_HZ)} for at, name in recording()[1]]
+    emg = scale * EMG_MV
+    stimuli: list[dict[str, Any]] = [{"type": name, "latency": 1 + round(at * RATE_HZ)} for at, name in recording()[1]]
     kept = np.ones(len(emg), dtype=bool)
     kept[cut] = False
     for one in stimuli:
@@ -245,7 +246,7 @@ def test_what_was_cut_out_of_an_eeglab_file_is_a_gap(tmp_path: Path) -> None:
 
 
 def test_a_stated_unit_is_used_or_refused() -> None:
-    with pytest.raises(IsiwError, match="cannot be in mV.*say --unit V"):
+    with pytest.raises(IsiwError, match=r"cannot be in mV.*say --unit V"):
         read_people(raw(), KNOWN.saying(units=("mV",)))
     (person,) = read_people(raw(1e3), KNOWN.saying(units=("mV",)))
     require_as_written(person)

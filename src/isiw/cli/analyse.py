@@ -83,6 +83,7 @@ def analyse(  # noqa: PLR0913, PLR0917 - an option each
     seed: Annotated[int | None, typer.Option(help="Seed of the analysis.", **NO_DEFAULT)] = None,
     only: Annotated[str | None, typer.Option(help="The code of the one person who is wanted.", **NO_DEFAULT)] = None,
     simulated: Annotated[bool, typer.Option("--simulated", help="The trials are simulated.")] = False,  # noqa: FBT002 - a flag
+    look: Annotated[bool, typer.Option("--look", help="Say what is in the files, and analyse nothing.")] = False,  # noqa: FBT002 - a flag
 ) -> None:
     """Estimate the window from trials that were delivered without isiw; with -o, make a log of them.
 
@@ -93,6 +94,9 @@ def analyse(  # noqa: PLR0913, PLR0917 - an option each
         read = _layout(
             layout, {"columns": column, "where": where, "markers": marker, "channels": channel}, unit, **said
         )
+        if look:
+            _look_at(files, read)
+            return
         settings = isiw.config.load_config(config).with_overrides(strategy=strategy, seed=seed)
         way = isiw.existing.batch.way_of(settings, read, simulated=simulated)
         with working(f"Reading {counted(len(files), 'file')}"):
@@ -153,6 +157,17 @@ def _layout(file: Path | None, named: dict[str, list[str] | None], units: list[s
         key: isiw.existing.layout.pairs_of(f"--{key.removesuffix('s')}", texts or []) for key, texts in named.items()
     }
     return layout.saying(**pairs, units=tuple(units or ()), **said)
+
+
+def _look_at(files: list[Path], layout: Layout) -> None:
+    """Say what is in files, and draw the first sweeps of each that has any."""
+    for file in files:
+        with working(f"Looking into {file.name}"):
+            found = isiw.existing.look(file, layout)
+        show(f"{found}")
+        if found.figure is not None:
+            picture = free_beside(file.with_name(f"{file.stem}_look"), ".png")
+            show(f"picture: {isiw.plots.save_figure(found.figure, picture)}")
 
 
 def _analyse_all(people: list[Person], way: Way, source: Path) -> None:
