@@ -17,6 +17,7 @@ from isiw.existing.analysis import Analysis, analysed
 from isiw.existing.delivered import Delivered, codes_of
 from isiw.existing.layout import Layout
 from isiw.existing.reading import read_people
+from isiw.files import opened
 from isiw.log.durable import log_exists
 from isiw.log.reader import read_session
 from isiw.strategy.catalogue import make_strategy
@@ -99,12 +100,15 @@ def _read(source: Path, way: Way) -> Iterator[Person]:
             got=(layout.reference, way.space.reference),
             remedy="ISIs of one cannot be compared with those of the other: correct one of them.",
         )
-    for delivered in read_people(source, layout, subject=way.subject):
+    people = read_people(source, layout, subject=way.subject)
+    with opened(source) as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+    for delivered in people:
         visit = replace(way.visit, day=delivered.visit.day or way.visit.day)
         simulated = way.simulated or delivered.simulated
         made_of = {
             "file": source.name,
-            "sha256": hashlib.sha256(source.read_bytes()).hexdigest(),
+            "sha256": digest,
             "layout": {key: value for key, value in asdict(layout).items() if value not in (None, {}, ())},
             "strategy": {"name": way.strategy, "seed": way.seed, "settings": dict(way.settings)},
             "space": "as delivered" if way.space is None else f"{way.space}",

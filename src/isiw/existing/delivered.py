@@ -176,7 +176,7 @@ def read_log(path: str | Path) -> Delivered:
 
 def renumbered(trials: Sequence[Trial]) -> TrialTable:
     """Trials as a table, numbered from 0 on."""
-    return TrialTable(tuple(replace(trial, index=number) for number, trial in enumerate(trials)))
+    return TrialTable(tuple(one if one.index == n else replace(one, index=n) for n, one in enumerate(trials)))
 
 
 def codes_of(people: Sequence[Delivered]) -> str:
