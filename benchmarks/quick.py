@@ -59,6 +59,7 @@ QUICK: Final[Mapping[str, str]] = {
     "raw_sweeps reflex": "--people 1",
     "raw_sweeps rigs": "--people 4",
     "raw_sweeps sizes": "",
+    "read_files": "--minutes 1 --rows 2000",
     "readme_results": "--out OUT",
     "recorded": "--strategies default,nr --people 1 --trials 8 --out OUT",
     "reduction.redraw": "--out OUT",

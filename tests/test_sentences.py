@@ -186,7 +186,8 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
             sentences.at_rest((15.0, 35.0), 12),
             (
                 "From trial 12 on, the EMG in the MEP window, 15–35 ms after the pulse, was never larger than at rest. "
-                f"{_LOOK} Is the time of the pulse right? Does the MEP window fit the muscle?"
+                f"{_LOOK} Is the time of the pulse right? Does the MEP window fit the muscle? Do the clocks of the EMG "
+                "and of the events drift apart, as those of two computers do?"
             ),
         ),
         (

@@ -39,6 +39,7 @@ JUDGED_SINCE: Final = "Trials were excluded or included after this estimate; isi
 
 _LOOK: Final = "Did the stimulator fire? Was the EMG recorded? Was the intensity high enough?"
 _PLACED: Final = "Is the time of the pulse right? Does the MEP window fit the muscle?"
+_CLOCKS: Final = "Do the clocks of the EMG and of the events drift apart, as those of two computers do?"
 
 
 def edge_text(edge_ms: float) -> str:
@@ -316,6 +317,7 @@ def at_rest(window_ms: tuple[float, float] | None, since: int | None) -> str:
     sought = f"in the MEP window, {window_ms[0]:g}–{window_ms[1]:g} ms after the pulse," if window_ms else ""
     emg = f"the EMG {sought or 'after the pulse'}"
     look = f"{_LOOK} {_PLACED}" if window_ms else _LOOK
+    look = f"{look} {_CLOCKS}" if window_ms and since is not None else look
     seen = f"In no trial was {emg}" if since is None else f"From trial {since} on, {emg} was never"
     return f"{seen} larger than at rest. {look}"
 

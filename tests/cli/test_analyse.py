@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 import isiw as library
+from existing.test_recordings import as_edf
 
 if TYPE_CHECKING:
     from cli.conftest import Command
@@ -163,3 +164,21 @@ def test_a_replay_takes_every_option_that_a_file_may_need(isiw: Command, people:
     assert "as --alone says" not in done.output
     other = isiw("replay", "comma.csv", "--alone", -5, *words)
     assert "No trial is TMS alone: no ISI is '-5', as --alone says." in other.output
+
+
+def test_a_look_into_a_file_writes_no_log(isiw: Command, tmp_path: Path) -> None:
+    path = as_edf(tmp_path)
+    done = isiw("analyse", path, "--look", "--unmarked", "alone", "--channel", "emg=FCR", "-o", "P01.mcap")
+    assert done.exit_code == 0, done.output
+    assert "Proposed: isiw analyse" in done.output
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["P01.edf", "P01_look.png"]
+
+
+def test_rows_are_chosen_by_what_a_column_says(isiw: Command, people: Path) -> None:
+    rows = pd.read_csv(people)
+    pd.concat([rows.assign(muscle=name) for name in ("FCR", "FDI")]).to_csv("both.csv", index=False)
+    words = ("replay", "both.csv", "--reference", "impact", "--seeds", 1, "--trials", 3, "--strategy", "random")
+    assert "--where" in isiw(*words, "--only", "A").output
+    done = isiw(*words, "--only", "A", "--where", "muscle=FDI")
+    assert done.exit_code == 0, done.output
+    assert "All 10 pairs" in done.output

@@ -24,7 +24,7 @@ RATE_HZ = 4000.0
 ISIS_MS = (30.0, 60.0, 90.0, 120.0, 45.0)
 MEPS_MV = (0.4, 0.9, 1.6, 0.25, 0.7)
 NAMES = {"tap": "S  1", "pulse": "S  2"}
-KNOWN = Layout(reference="impact", markers=NAMES, channels={"emg": "FCR"})
+KNOWN = Layout(reference="impact", markers=NAMES, channels={"emg": "FCR"}, unmarked="alone")
 
 mne.set_log_level("ERROR")
 
@@ -66,7 +66,9 @@ def as_brainvision(path: Path) -> Path:
     return path / "P01.vhdr"
 
 
-def as_edf(path: Path, dimension: str = "uV", scale: float = 1e3, bdf: bool = False) -> Path:  # noqa: FBT001, FBT002
+def as_edf(
+    path: Path, dimension: str = "uV", scale: float = 1e3, *, bdf: bool = False, record_s: float | None = None
+) -> Path:
     emg_mv, events = recording()
     signal: Any = edfio.BdfSignal if bdf else edfio.EdfSignal
     signals = [
@@ -77,7 +79,7 @@ def as_edf(path: Path, dimension: str = "uV", scale: float = 1e3, bdf: bool = Fa
     ]
     notes = [edfio.EdfAnnotation(at_s, None, name) for at_s, name in events]
     kind: Any = edfio.Bdf if bdf else edfio.Edf
-    made = kind(signals, annotations=notes)
+    made = kind(signals, annotations=notes, data_record_duration=record_s)
     target = path / f"P01.{'bdf' if bdf else 'edf'}"
     made.write(target)
     return target
@@ -156,7 +158,7 @@ def test_a_trigger_channel_has_events_too() -> None:
         trigger[round(at_s * RATE_HZ) :][:8] = int(name[-1])
     info = mne.create_info(["FCR", "STI 014"], RATE_HZ, ["emg", "stim"])
     made = mne.io.RawArray(np.stack([1e-3 * emg_mv, trigger]), info)
-    (person,) = read_people(made, Layout(reference="impact", markers={"tap": "1", "pulse": "2"}))
+    (person,) = read_people(made, Layout(reference="impact", markers={"tap": "1", "pulse": "2"}, unmarked="alone"))
     require_as_written(person)
 
 
@@ -167,6 +169,9 @@ def test_the_metadata_of_epochs_say_units_and_tms_alone() -> None:
         (person,) = read_people(made, KNOWN)
         require_as_written(person)
     made.metadata = None
+    (person,) = read_people(made, KNOWN)  # the annotations within them say when the stimuli came
+    require_as_written(person)
+    made.set_annotations(None)
     with pytest.raises(IsiwError, match="isi_ms in their metadata"):
         read_people(made, KNOWN)
 
@@ -234,7 +239,7 @@ def test_a_unit_that_the_file_does_not_say_is_asked_for(tmp_path: Path) -> None:
     path = as_edf(tmp_path, "", 1e3)
     with pytest.raises(IsiwError, match="--unit"):
         read_people(path, KNOWN)
-    (person,) = read_people(path, Layout(reference="impact", markers=NAMES, channels={"emg": "FCR"}, units=("uV",)))
+    (person,) = read_people(path, KNOWN.saying(units=("uV",)))
     require_as_written(person)
 
 

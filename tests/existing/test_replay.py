@@ -42,7 +42,8 @@ def test_each_trial_answers_once_and_what_no_trial_is_left_for_is_said() -> None
     (run,) = replayed.runs
     assert len(run.windows) == 41
     assert max(run.far_ms) > 2.5
-    assert "could not be answered: no trial was left within 2.5 ms" in str(replayed)
+    first, *_ = str(replayed).splitlines()  # before the figures that rest on it
+    assert "could not be answered: no trial was left within 2.5 ms" in first
 
 
 def test_what_was_found_is_compared_with_a_window_that_is_known() -> None:

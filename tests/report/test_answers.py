@@ -10,9 +10,10 @@ import pytest
 from isiw.findings import Kind
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import EstimateRecord, Event, Intent, Record
-from isiw.report.answers import Answer, answers
+from isiw.report.answers import Answer, _in_words, answers
 from isiw.session.loop import Session
 from isiw.trials import Status, Trial
+from isiw.window import Window
 from scripted import ScriptedDevice, scripted_strategy
 
 
@@ -52,6 +53,20 @@ def test_timing_is_said_by_the_median_and_the_largest_error_and_what_it_cost(rec
 def test_an_isi_beyond_the_tolerance_is_not_right_where_nobody_rejected_it(record: SessionRecord) -> None:
     trials = [trial(0, isi_ms=150.0), trial(1, isi_ms=51.0)]
     assert answer(with_history(record, trials), "timing").answer == "not in 1 of 2 trials"
+
+
+def test_timing_is_not_known_of_imported_trials_for_which_nothing_was_commanded(record: SessionRecord) -> None:
+    imported = replace(record, header=record.header.model_copy(update={"kind": "imported"}))
+    timed = [trial(n, isi_ms=50.0 + 1e-12, t_valve_ms=10.0, t_tms_ms=60.0) for n in range(3)]
+    _, said, detail = answer(with_history(imported, timed), "timing")
+    assert said == "not known"
+    assert "No ISI was commanded" in detail
+    assert answer(with_history(imported, [trial(0, isi_ms=51.0)]), "timing").answer == "yes"
+
+
+def test_a_window_of_one_isi_is_no_range() -> None:
+    assert _in_words(Window(0.0, 0.0)) == "One ISI alone: 0 ms."
+    assert _in_words(Window(0.0, 10.0)) == "Window 0–10 ms."
 
 
 def test_a_tense_muscle_is_not_at_rest_where_nobody_rejected_the_trial(record: SessionRecord) -> None:

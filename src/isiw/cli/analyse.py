@@ -34,11 +34,21 @@ Columns = Annotated[
     list[str] | None,
     typer.Option("--column", metavar="KEY=NAME", help='What a column holds, such as "isi=Delay"; repeat it.'),
 ]
+Where = Annotated[
+    list[str] | None,
+    typer.Option("--where", metavar="COLUMN=VALUE", help='Rows to read, such as "muscle=FCR"; repeat it.'),
+]
 Units = Annotated[list[str] | None, typer.Option("--unit", help="Unit of ISIs (ms, s) or amplitudes (mV, uV, V).")]
 Reference = Annotated[str | None, typer.Option(help="What ISIs count from: impact, or valve.", **NO_DEFAULT)]
 Markers = Annotated[
     list[str] | None,
     typer.Option("--marker", metavar="KEY=NAME", help="What an event of a recording marks: pulse, tap or valve."),
+]
+Unmarked = Annotated[
+    str | None,
+    typer.Option(
+        help="What pulses without a marked tap are: TMS alone, or lost (the marker is missing).", **NO_DEFAULT
+    ),
 ]
 Channels = Annotated[
     list[str] | None, typer.Option("--channel", metavar="KEY=NAME", help="Which channel holds the EMG: emg=NAME.")
@@ -61,9 +71,11 @@ def analyse(  # noqa: PLR0913, PLR0917 - an option each
     ] = None,
     reference: Reference = None,
     column: Columns = None,
+    where: Where = None,
     unit: Units = None,
     marker: Markers = None,
     channel: Channels = None,
+    unmarked: Unmarked = None,
     alone: Alone = None,
     decimal: Decimal = None,
     sheet: Sheet = None,
@@ -77,14 +89,20 @@ def analyse(  # noqa: PLR0913, PLR0917 - an option each
     seed: Annotated[int | None, typer.Option(help="Seed of the analysis.", **NO_DEFAULT)] = None,
     only: Annotated[str | None, typer.Option(help="The code of the one person who is wanted.", **NO_DEFAULT)] = None,
     simulated: Annotated[bool, typer.Option("--simulated", help="The trials are simulated.")] = False,  # noqa: FBT002 - a flag
+    look: Annotated[bool, typer.Option("--look", help="Say what is in the files, and analyse nothing.")] = False,  # noqa: FBT002 - a flag
 ) -> None:
     """Estimate the window from trials that were delivered without isiw; with -o, make a log of them.
 
     Called again with the same files and folder, it continues where it was interrupted.
     """
     with errors_reported("Interrupted: what is finished is kept; give the same command to continue."):
-        said = {"reference": reference, "alone": alone, "decimal": decimal, "sheet": sheet}
-        read = _layout(layout, {"columns": column, "markers": marker, "channels": channel}, unit, **said)
+        said = {"reference": reference, "alone": alone, "decimal": decimal, "sheet": sheet, "unmarked": unmarked}
+        read = _layout(
+            layout, {"columns": column, "where": where, "markers": marker, "channels": channel}, unit, **said
+        )
+        if look:
+            _look_at(files, read, **_reading(larger, also))
+            return
         settings = isiw.config.load_config(config).with_overrides(strategy=strategy, seed=seed)
         way = isiw.existing.batch.way_of(settings, read, simulated=simulated, **_reading(larger, also))
         with working(f"Reading {counted(len(files), 'file')}"):
@@ -101,9 +119,11 @@ def replay(  # noqa: PLR0913, PLR0917 - an option each
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Picture to draw.", **NO_DEFAULT)] = None,
     reference: Reference = None,
     column: Columns = None,
+    where: Where = None,
     unit: Units = None,
     marker: Markers = None,
     channel: Channels = None,
+    unmarked: Unmarked = None,
     alone: Alone = None,
     decimal: Decimal = None,
     sheet: Sheet = None,
@@ -115,8 +135,10 @@ def replay(  # noqa: PLR0913, PLR0917 - an option each
 ) -> None:
     """How many stimuli would it have taken? Strategies choose ISIs, and the trials of a file answer."""
     with errors_reported("Interrupted."):
-        said = {"reference": reference, "alone": alone, "decimal": decimal, "sheet": sheet}
-        read = _layout(layout, {"columns": column, "markers": marker, "channels": channel}, unit, **said)
+        said = {"reference": reference, "alone": alone, "decimal": decimal, "sheet": sheet, "unmarked": unmarked}
+        read = _layout(
+            layout, {"columns": column, "where": where, "markers": marker, "channels": channel}, unit, **said
+        )
         way = isiw.existing.batch.Way(read, **_reading(larger, also))
         with working(f"Reading {file.name}"):
             found = isiw.existing.batch.read_files([file], way, only=only)
@@ -139,13 +161,26 @@ def replay(  # noqa: PLR0913, PLR0917 - an option each
 def _layout(file: Path | None, named: dict[str, list[str] | None], units: list[str] | None, **said: Any) -> Layout:
     """The layout of a file, with what the command line says otherwise."""
     layout = isiw.existing.layout.read_layout(file) if file is not None else isiw.existing.Layout()
-    pairs = {key: isiw.existing.layout.pairs_of(f"--{key[:-1]}", texts or []) for key, texts in named.items()}
+    pairs = {
+        key: isiw.existing.layout.pairs_of(f"--{key.removesuffix('s')}", texts or []) for key, texts in named.items()
+    }
     return layout.saying(**pairs, units=tuple(units or ()), **said)
 
 
 def _reading(larger: float, also: list[Path] | None) -> dict[str, Any]:
     """What limits the reading of a file, as the command line says it."""
     return {"limits": isiw.existing.ReadingLimits().larger(larger), "also": tuple(also or ())}
+
+
+def _look_at(files: list[Path], layout: Layout, **reading: Any) -> None:
+    """Say what is in files, and draw the first sweeps of each that has any."""
+    for file in files:
+        with working(f"Looking into {file.name}"):
+            found = isiw.existing.look(file, layout, **reading)
+        show(f"{found}")
+        if found.figure is not None:
+            picture = free_beside(file.with_name(f"{file.stem}_look"), ".png")
+            show(f"picture: {isiw.plots.save_figure(found.figure, picture)}")
 
 
 def _analyse_all(people: list[Person], way: Way, source: Path) -> None:
@@ -172,7 +207,9 @@ def _analyse_all(people: list[Person], way: Way, source: Path) -> None:
 
 
 def _say_unused(people: list[Person], way: Way) -> None:
-    """Name the columns of which nothing was read: one of them may exclude trials, which count then."""
+    """Name the columns of which nothing was read: one of them may exclude trials, which count then; and other notes."""
+    for note in dict.fromkeys(note for person in people for note in person.delivered.notes):
+        show(note)
     if unused := dict.fromkeys(name for person in people for name in person.delivered.unused):
         show(f"Columns not used: {', '.join(unused)}. If one excludes trials, name it: --column exclude=NAME.")
     mark, trials = way.layout.alone, [trial for person in people for trial in person.delivered.trials]

@@ -249,6 +249,8 @@ def _history(delivered: Delivered, strategy: Strategy, header: Header) -> Iterat
     places = np.linspace(0, len(learnt) - 1, MOST_ESTIMATES).round() if learnt else ()
     logged = {learnt[int(place)] for place in places}
     watch = Watch(header.space, header.signals, _NEVER, header.detection_limit_mv)
+    for note in delivered.notes:
+        yield Event(kind="note", trial=trials[0].index, text=note)
     for trial in trials:
         if trial.index in delivered.blocks:
             yield Event(kind="note", trial=trial.index, text=f"Block {delivered.blocks[trial.index]} begins.")

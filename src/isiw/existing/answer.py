@@ -10,7 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, Final, get_type_hints
+from types import MappingProxyType
+from typing import Any, Final, NamedTuple, get_type_hints
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, create_model
@@ -45,7 +46,16 @@ def _person() -> type[BaseModel]:
     return create_model("Person", __config__=ConfigDict(ser_json_inf_nan="strings"), **known)
 
 
-def write_people(folder: Path, people: Sequence[Delivered], hashes: Mapping[str, str]) -> None:
+class Answer(NamedTuple):
+    """The people that were read, and what is said of a file that was looked into."""
+
+    people: list[Delivered]
+    said: Mapping[str, Any]
+
+
+def write_people(
+    folder: Path, people: Sequence[Delivered], hashes: Mapping[str, str], said: Mapping[str, Any] = MappingProxyType({})
+) -> None:
     """Write what was read into a folder."""
     written, channels = [], []
     with (folder / SAMPLES).open("wb") as samples:
@@ -56,7 +66,7 @@ def write_people(folder: Path, people: Sequence[Delivered], hashes: Mapping[str,
                     channels.append([number, trial, name, len(channel.values), channel.rate_hz, channel.unit,
                                      channel.t0_ms])  # fmt: skip
             written.append(_person().model_construct(**{**vars(person), "files": hashes}).model_dump_json())
-    _write(folder, {"people": written, "channels": channels})
+    _write(folder, {"people": written, "channels": channels, "said": dict(said)})
 
 
 def write_error(folder: Path, error: BaseException) -> None:
@@ -77,8 +87,8 @@ def _write(folder: Path, values: Mapping[str, Any]) -> None:
     (folder / ANSWER).write_text(json.dumps(values), encoding="ascii")
 
 
-def read_answer(folder: Path) -> list[Delivered] | Mapping[str, Any]:
-    """The people that were read, or what failed in a way that isiw has no words for; an error in words is raised."""
+def read_answer(folder: Path) -> Answer | Mapping[str, Any]:
+    """What was read, or what failed in a way that isiw has no words for; an error in words is raised."""
     values = json.loads((folder / ANSWER).read_text(encoding="ascii"))
     if "error" in values:
         said = values["said"]
@@ -89,7 +99,7 @@ def read_answer(folder: Path) -> list[Delivered] | Mapping[str, Any]:
     if "people" not in values:
         return dict(values)
     people = [Delivered(**dict(_person().model_validate_json(text))) for text in values["people"]]
-    return _with_samples(folder / SAMPLES, people, values["channels"])
+    return Answer(_with_samples(folder / SAMPLES, people, values["channels"]), values["said"])
 
 
 def _with_samples(path: Path, people: Sequence[Delivered], channels: Sequence[Any]) -> list[Delivered]:

@@ -18,8 +18,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from isiw.errors import InvalidValueError
-from isiw.existing import answer, frames
-from isiw.existing.delivered import Delivered
+from isiw.existing import answer, formats
 from isiw.existing.layout import Layout
 from isiw.existing.limits import ReadingLimits, passed, seconds_for
 
@@ -40,8 +39,14 @@ _ONE_THREAD: Final = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "
 
 
 def read_apart(
-    path: Path, layout: Layout, subject: str, limits: ReadingLimits, also: Sequence[str | Path] = ()
-) -> list[Delivered]:
+    path: Path,
+    layout: Layout,
+    subject: str,
+    limits: ReadingLimits,
+    also: Sequence[str | Path] = (),
+    *,
+    look: bool = False,
+) -> answer.Answer:
     """The people whose trials a file holds, read by a process of its own.
 
     Args:
@@ -50,13 +55,14 @@ def read_apart(
         subject: the code of a person who has none in it.
         limits: the most that is read.
         also: files elsewhere that it may refer to.
+        look: whether only to look into it, and to say what is in it.
 
     Raises:
         InvalidValueError: what reading raises, or a limit that was reached.
         ConfigError: a library is not installed.
         OSError: a file that cannot be opened.
     """
-    is_table = path.suffix.lower() in frames.SUFFIXES
+    is_table = formats.format_of(path).is_table
     seconds = seconds_for(limits, path, table=is_table)
     request = {
         "path": str(path),
@@ -65,6 +71,7 @@ def read_apart(
         "limits": asdict(limits),
         "is_table": is_table,
         "also": [str(other) for other in also],
+        "look": look,
     }
     rows = path.stat().st_size // _BYTES_A_ROW if is_table else 0
     most_s = _START_S + _WAITS * seconds_for(limits, path, table=is_table, rows=rows)
@@ -72,7 +79,7 @@ def read_apart(
         status = _run({**request, "answer": folder}, most_s)
         if status == 0:
             found = answer.read_answer(Path(folder))
-            if isinstance(found, list):
+            if isinstance(found, answer.Answer):
                 return found
             raise _failed(path, limits, found)
     raise _ended(path, limits, status, seconds)

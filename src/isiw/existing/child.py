@@ -6,13 +6,16 @@ import csv
 import json
 import sys
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from isiw.existing import answer, frames, recordings
+from isiw.errors import ConfigError
+from isiw.existing import answer, formats
 from isiw.existing.gate import Gate, require_no_links
 from isiw.existing.layout import Layout
 from isiw.existing.limits import ReadingLimits, limit_memory, limit_time, seconds_for
+from isiw.existing.look import seen_in
 from isiw.existing.reading import people_in
 from isiw.lazy import pd
 from isiw.text.named_code import library
@@ -40,10 +43,13 @@ def _answer(request: Mapping[str, Any], folder: Path) -> None:
     sys.addaudithook(gate)
     try:
         require_no_links(path)
-        people = people_in(path, layout, request["subject"], limits, _limit_time_of(path, limits))
+        if request["look"]:
+            people, said = seen_in(path, layout, limits, _limit_time_of(path, limits))
+        else:
+            people, said = people_in(path, layout, request["subject"], limits, _limit_time_of(path, limits)), {}
     finally:
         gate.require_nothing_refused()
-    answer.write_people(folder, people, gate.hashes())
+    answer.write_people(folder, people, gate.hashes(), said)
 
 
 def _limit_time_of(path: Path, limits: ReadingLimits) -> Callable[[int], None]:
@@ -54,11 +60,12 @@ def _limit_time_of(path: Path, limits: ReadingLimits) -> Callable[[int], None]:
 def _load_libraries(path: Path) -> list[Path]:
     """Load what takes long to load before the time of reading begins; the files of settings that it reads later on."""
     pd.DataFrame  # noqa: B018 - which loads pandas
-    suffix = path.suffix.lower()
-    if suffix in recordings.SUFFIXES:
+    needed = formats.format_of(path).library
+    if needed == "mne":
         mne = library("mne", "import")
         mne.io.read_raw  # noqa: B018 - which loads its readers
         return [Path(mne.get_config_path())]
-    if suffix in frames.WORKBOOKS:
-        library("openpyxl", "import")
+    if needed:
+        with suppress(ConfigError):  # whoever reads the file says it
+            library(needed, "import")
     return []

@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Iterable, Sequence
 from typing import Final
 
-from isiw.existing.tables import Column
+from isiw.existing.cells import Column
 from isiw.lazy import pd
 
 _DATE: Final = re.compile(r"(\d{1,2})([./-])(\d{1,2})\2\d{2,4}(?!\d)")

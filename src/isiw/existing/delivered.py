@@ -12,11 +12,11 @@ from typing import Final
 
 from isiw.design import MOST_ISIS, DesignSpace
 from isiw.errors import InvalidValueError, LogError
-from isiw.existing.layout import ISI_UNITS_MS
+from isiw.existing.layout import EMG_UNITS, ISI_UNITS_MS
 from isiw.findings import AMPLITUDE_MV, Kind
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import MOST_TRIALS
-from isiw.signals.limits import EMG_UNITS_MV, SignalLimits, implausible_scale
+from isiw.signals.limits import SignalLimits, implausible_scale
 from isiw.text.sanitize import counted
 from isiw.trials import Channel, Trial, TrialTable
 from isiw.types import Conditioning, Reference
@@ -45,6 +45,7 @@ class Delivered:
         simulated: true if nobody was stimulated: the person is simulated.
         units: the units in which ISIs and amplitudes are stated where they are from.
         unused: the columns of a table of which nothing was read.
+        notes: what the operator should know of how they were read.
         files: the SHA-256 of each file that was read, by its name.
 
     Raises:
@@ -66,6 +67,7 @@ class Delivered:
     simulated: bool = False
     units: tuple[str, str] = ("ms", "mV")
     unused: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     files: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -131,16 +133,21 @@ class Delivered:
             fits = [unit for unit in ("ms", "s", "us") if 1 <= longest * ISI_UNITS_MS[unit] <= LONGEST_ISI_MS]
             raise self._in_another_unit("ISIs", "isi", f"at most {longest:g} {of_isis}", of_isis, fits)
         if implausible_scale(meps_mv) is not None or usual_mv > AMPLITUDE_MV.most:
-            usual = usual_mv / EMG_UNITS_MV[of_meps]
-            fits = [unit for unit in ("mV", "uV", "V") if 0.01 <= usual * EMG_UNITS_MV[unit] <= AMPLITUDE_MV.most]
+            usual = usual_mv / EMG_UNITS[of_meps]
+            fits = [unit for unit in ("mV", "uV", "V", "nV") if 0.01 <= usual * EMG_UNITS[unit] <= AMPLITUDE_MV.most]
             raise self._in_another_unit("amplitudes", "mep", f"{usual:.3g} {of_meps} in the median", of_meps, fits)
 
     def _in_another_unit(self, what: str, key: str, got: str, stated: str, fits: Sequence[str]) -> InvalidValueError:
         said = f"If they are in {fits[0]}, say --unit {fits[0]}; if" if fits else "If"
+        other = (
+            "channel holds the EMG, say --channel emg=NAME"
+            if self.sweeps
+            else f"column holds them, say --column {key}=NAME"
+        )
         return InvalidValueError(
             f"the {what} of {self.named} cannot be in {stated}",
             got=got,
-            remedy=f"{said} another column holds them, say --column {key}=NAME.",
+            remedy=f"{said} another {other}.",
         )
 
 
@@ -183,7 +190,7 @@ def _last_given(record: SessionRecord) -> str:
 
 def renumbered(trials: Sequence[Trial]) -> TrialTable:
     """Trials as a table, numbered from 0 on."""
-    return TrialTable(tuple(replace(trial, index=number) for number, trial in enumerate(trials)))
+    return TrialTable(tuple(one if one.index == n else replace(one, index=n) for n, one in enumerate(trials)))
 
 
 def codes_of(people: Sequence[Delivered]) -> str:

@@ -14,8 +14,9 @@ from typing import Any, Final, cast
 import numpy as np
 
 from isiw.errors import ConfigError, InvalidValueError
+from isiw.existing.cells import is_missing
 from isiw.existing.layout import COLUMNS, UNIT_WORDS, Layout, letters
-from isiw.existing.tables import is_missing, require_one
+from isiw.existing.tables import require_one
 from isiw.files import opened
 from isiw.lazy import pd, scipy
 from isiw.text.named_code import library
@@ -38,7 +39,7 @@ Rows = Sequence[Sequence[Any]]
 def read_frame(path: Path, layout: Layout) -> pd.DataFrame:
     """The table in a file, its cells as they are."""
     readers: Mapping[str, Callable[[bytes, Layout], pd.DataFrame]] = {
-        ".mat": lambda content, layout: _of_vectors(_arrays(content), layout),
+        ".mat": lambda content, layout: _of_vectors(_arrays(content, path), layout),
         ".parquet": lambda content, _: named(pd.read_parquet(io.BytesIO(content))),
         **dict.fromkeys(WORKBOOKS, _workbook),
     }
@@ -51,7 +52,7 @@ def read_frame(path: Path, layout: Layout) -> pd.DataFrame:
 
 def read_arrays(path: Path) -> dict[str, Any]:
     """The arrays in a file of MATLAB by name, those in structures among them."""
-    arrays: dict[str, Any] = _read(path, _arrays)
+    arrays: dict[str, Any] = _read(path, lambda content: _arrays(content, path))
     return arrays
 
 
@@ -77,8 +78,9 @@ def reading(path: Path, what: str, remedy: str) -> Generator[None, None, None]:
         raise InvalidValueError(f"{what}: {why}", got=str(path), remedy=remedy) from error
 
 
-def named(frame: pd.DataFrame) -> pd.DataFrame:
+def named(frame: pd.DataFrame | None) -> pd.DataFrame:
     """A data frame whose index, if it has a name, is a column as others are, and whose columns have one name each."""
+    frame = pd.DataFrame() if frame is None else frame
     if any(name is not None for name in frame.index.names):
         frame = frame.reset_index()
     names = [" ".join(map(str, name)) if isinstance(name, tuple) else str(name) for name in frame.columns]
@@ -195,7 +197,9 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
     if layout.sheet is not None:
         require_one("sheet", "the workbook", layout.sheet, book.sheet_names)
     sheets = {
-        str(name): _from_names(book.parse(name, header=None, dtype=object).to_numpy().tolist(), layout)
+        str(name): _from_names(
+            book.parse(name, header=None, dtype=object, keep_default_na=False).to_numpy().tolist(), layout
+        )
         for name in ([layout.sheet] if layout.sheet is not None else book.sheet_names)
     }
     with_trials = [name for name, rows in sheets.items() if rows and _is_header(rows[0], layout)]
@@ -203,7 +207,17 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
         raise InvalidValueError(
             "several sheets of the workbook hold trials", got=", ".join(with_trials), remedy="Say --sheet NAME."
         )
-    return _table(sheets[(with_trials or list(sheets))[0]], layout)
+    filled = [name for name, rows in sheets.items() if len(rows) > 1]
+    if not with_trials and len(filled) > 1:
+        heads = (
+            f"{name} ({', '.join(str(cell) for cell in sheets[name][0] if not is_missing(cell))})" for name in filled
+        )
+        raise InvalidValueError(
+            "no sheet of the workbook is known to hold ISIs and amplitudes",
+            got="; ".join(heads),
+            remedy="Say --sheet NAME, and --column isi=NAME --column mep=NAME.",
+        )
+    return _table(sheets[(with_trials or filled or list(sheets))[0]], layout)
 
 
 def _from_names(rows: list[list[Any]], layout: Layout) -> list[list[Any]]:
@@ -214,12 +228,11 @@ def _from_names(rows: list[list[Any]], layout: Layout) -> list[list[Any]]:
     return rows[next((n for n, row in enumerate(rows[:_LINES]) if _is_header(row, layout)), 0) :]
 
 
-def _arrays(content: bytes) -> dict[str, Any]:
+def _arrays(content: bytes, path: Path) -> dict[str, Any]:
     if content.startswith(b"MATLAB 7.3"):
-        raise InvalidValueError(
-            "files of MATLAB 7.3 cannot be read", remedy="Save it for 7: save('P01.mat', 'isi_ms', 'mep_mv', '-v7')."
-        )
-    values = scipy.io.loadmat(cast("Any", io.BytesIO(content)), simplify_cells=True)
+        values = library("pymatreader", "import").read_mat(str(path))
+    else:
+        values = scipy.io.loadmat(cast("Any", io.BytesIO(content)), simplify_cells=True)
     paths = dict(_flat({name: value for name, value in values.items() if not name.startswith("__")}))
     last = Counter(path[-1] for path in paths)
     return {path[-1] if last[path[-1]] == 1 else ".".join(path): array for path, array in paths.items()}

@@ -18,37 +18,45 @@ from isiw.types import Reference
 ISI_UNITS_MS: Final[Mapping[str, float]] = {"ms": 1.0, "s": 1e3, "us": 1e-3, "µs": 1e-3, "μs": 1e-3}
 """One of each unit in ms."""
 
+EMG_UNITS: Final[Mapping[str, float]] = {**EMG_UNITS_MV, "nV": 1e-6}
+"""One of each unit that files of others have, in mV."""
+
 UNIT_WORDS: Final[Mapping[str, str]] = {
     "ms": "ms", "msec": "ms", "millisecond": "ms", "milliseconds": "ms", "s": "s", "sec": "s", "second": "s",
-    "seconds": "s", "us": "us", "µs": "us", "μs": "us", "v": "V", "volt": "V", "volts": "V", "mv": "mV",
-    "millivolt": "mV", "millivolts": "mV", "uv": "uV", "µv": "uV", "μv": "uV", "microvolt": "uV", "microvolts": "uV",
+    "seconds": "s", "us": "us", "µs": "us", "μs": "us", "microsecond": "us", "microseconds": "us",
+    "millisekunden": "ms", "sekunden": "s", "v": "V", "volt": "V", "volts": "V", "mv": "mV", "millivolt": "mV",
+    "millivolts": "mV", "uv": "uV", "µv": "uV", "μv": "uV", "microv": "uV", "microvolt": "uV", "microvolts": "uV",
+    "mikrovolt": "uV", "nv": "nV", "nanovolt": "nV", "nanovolts": "nV",
 }  # fmt: skip
 """Units as files write them, in lower case."""
 
 COLUMNS: Final[Mapping[str, tuple[str, ...]]] = {
     "isi": ("isi", "realisedisi", "isirealised", "actualisi", "interstimulusinterval", "interpulseinterval", "ipi",
-            "interval", "delay", "soa"),
+            "interstimulusintervall", "interval", "delay", "soa", "intervall", "reizabstand", "abstand", "verzögerung"),
     "mep": ("mep", "mepamplitude", "mepamp", "mepp2p", "meppp", "mepptp", "meppeaktopeak", "mepsize", "ptpmep",
-            "amplitude", "peaktopeak", "peaktopeakamplitude", "emgpeaktopeak", "p2pamplitude", "ptpamplitude", "p2p",
-            "ptp", "amp"),
-    "asked": ("commandedisi", "askedisi", "nominalisi", "targetisi", "plannedisi", "isicommanded", "isinominal"),
+            "mepspitzespitze", "amplitude", "peaktopeak", "peaktopeakamplitude", "emgpeaktopeak", "p2pamplitude",
+            "ptpamplitude", "p2p", "ptp", "amp", "spitzespitze"),
+    "asked": ("commandedisi", "askedisi", "nominalisi", "targetisi", "plannedisi", "isicommanded", "isinominal",
+              "sollisi", "sollintervall"),
     "isi_sd": ("isisd",),
-    "background": ("backgroundrms", "background", "prestimrms", "rmsbackground", "baselinerms"),
-    "status": ("status", "accepted", "accept", "valid", "include", "included", "keep", "good"),
+    "background": ("backgroundrms", "background", "prestimrms", "rmsbackground", "baselinerms", "hintergrund"),
+    "status": ("status", "accepted", "accept", "valid", "include", "included", "keep", "good", "gültig",
+               "verwertbar"),
     "exclude": ("excluded", "exclude", "rejected", "reject", "bad", "artefact", "artifact",
-                "ausschluss", "ausgeschlossen"),
-    "reason": ("reason",),
+                "ausschluss", "ausgeschlossen", "verworfen", "artefakt"),
+    "reason": ("reason", "grund"),
     "tap_alone": ("tapalone",),
-    "subject": ("subject", "subjectid", "participant", "participantid", "subj", "person", "patient", "sub", "id"),
-    "day": ("day", "visit", "session", "sessionid", "ses"),
-    "condition": ("condition", "trialtype", "stimulus", "type"),
+    "subject": ("subject", "subjectid", "participant", "participantid", "subj", "person", "patient", "sub", "proband",
+                "probandin", "versuchsperson", "vp", "teilnehmer", "teilnehmerin", "id"),
+    "day": ("day", "visit", "session", "sessionid", "ses", "sitzung", "termin", "messtag"),
+    "condition": ("condition", "trialtype", "stimulus", "type", "bedingung", "reizart"),
     "block": ("block", "run"),
-    "order": ("trial", "trialnumber", "trialno", "trialnr", "index", "onset", "time"),
-    "date": ("date", "recordingdate"),
+    "order": ("trial", "trialnumber", "trialno", "trialnr", "index", "onset", "time", "durchgang", "uhrzeit"),
+    "date": ("date", "recordingdate", "datum"),
 }  # fmt: skip
 """By what they are called in letters alone, the columns that are found without being named; the first name wins."""
 
-MARKERS: Final = ("pulse", "tap", "valve")
+MARKERS: Final = ("pulse", "tap", "valve", "alone")
 CHANNELS: Final = ("emg", "acceleration", "events", *MARKERS)
 """What columns and arrays of a recording hold: those of `MARKERS` are triggers, that of events has texts."""
 
@@ -68,6 +76,7 @@ class Layout(Checked):
     Args:
         reference: the event that ISIs count from, `"impact"` (of the hammer, or an electrical pulse) or `"valve"`.
         columns: the name of a column by what it holds, one of `COLUMNS`.
+        where: by the name of a column, what its cells say in the rows to read, such as `FCR` of `muscle`; `*` for any.
         units: the units of columns whose names do not say theirs, such as `("ms", "mV")`.
         alone: what stands in the place of the ISI of TMS alone, such as `"single"` or `"-1"`; `""` is an empty cell.
         decimal: the decimal sign, `"."` or `","`.
@@ -75,17 +84,22 @@ class Layout(Checked):
         skip_lines: how many lines come before the one with the columns' names.
         names: the columns' names, if no line of the file holds them.
         sheet: the sheet of a workbook; by default the first one.
-        markers: of a recording, the name of an event by what it marks: `pulse` (of TMS), `tap` or `valve`.
+        markers: of a recording, the name of an event by what it marks: `pulse` (of TMS), `tap`, `valve`, or `alone` (a
+            pulse without a tap).
+        unmarked: of a recording, what pulses are that no tap comes before: TMS `alone`, or `lost`, since its marker is
+            missing; asked for if others have one.
         channels: of a recording, the name of a channel by what it holds: `emg`, `acceleration`; of one in columns of
             text also `events`, whose texts are events, and the triggers `pulse`, `tap` and `valve`.
         rate_hz: the sampling rate of a recording in columns of text, or of sweeps in MATLAB [Hz].
         pulse_at_ms: of sweeps in MATLAB, how long after their first sample the pulse comes [ms].
-        longest_isi_ms: the longest ISI of a recording; a pulse that comes later after a tap is TMS alone [ms].
+        longest_isi_ms: the longest ISI [ms]. In a recording a pulse that comes later after a tap has no tap; a table of
+            which most are longer is in another unit.
         mep_window_ms: where the MEP of a recording is sought [ms after the pulse]; by default as in a session.
     """
 
     reference: Reference | None = None
     columns: Mapping[str, str] = field(default_factory=dict)
+    where: Mapping[str, str] = field(default_factory=dict)
     units: tuple[str, ...] = ()
     alone: Text | None = None
     decimal: Literal[".", ","] | None = None
@@ -94,6 +108,7 @@ class Layout(Checked):
     names: tuple[str, ...] = ()
     sheet: str | None = None
     markers: Mapping[str, str] = field(default_factory=dict)
+    unmarked: Literal["alone", "lost"] | None = None
     channels: Mapping[str, str] = field(default_factory=dict)
     rate_hz: Positive | None = None
     pulse_at_ms: NonNegative | None = None
@@ -107,7 +122,7 @@ class Layout(Checked):
             for key in table:
                 choice(f"what a {what} holds", key, sorted(known))
         for unit in self.units:
-            choice("a unit", unit, [*ISI_UNITS_MS, *EMG_UNITS_MV])
+            choice("a unit", unit, [*ISI_UNITS_MS, *EMG_UNITS])
 
     def required_reference(self, source: str) -> Reference:
         """The event that the ISIs of a file count from, which nobody but the lab knows."""
@@ -126,7 +141,7 @@ class Layout(Checked):
     def saying(self, **values: Any) -> Layout:
         """The same, with what is said besides; of tables, the entries that are given."""
         given = {key: value for key, value in values.items() if value not in (None, (), {})}
-        for name in ("columns", "markers", "channels"):
+        for name in ("columns", "where", "markers", "channels"):
             if name in given:
                 given[name] = {**getattr(self, name), **given[name]}
         if "units" in given:

@@ -86,9 +86,21 @@ class Replay:
 
     def __str__(self) -> str:
         found = "no window" if self.window is None else f"the window {self.window}"
-        lines = [f"All {self.pairs} pairs of stimuli say: {found}. F1 against that, by the number of stimuli:"]
+        lines = [line for name in self.strategies if (line := self._unanswered(name))]
+        lines.append(f"All {self.pairs} pairs of stimuli say: {found}. F1 against that, by the number of stimuli:")
         lines += [line for name in self.strategies for line in self._lines(name)]
         return "\n".join([*lines, SHARED])
+
+    def _unanswered(self, name: str) -> str:
+        """How many of a strategy's ISIs no trial answered; empty if one answered each."""
+        far_ms = np.concatenate([run.far_ms for run in self.runs if run.strategy == name])
+        share = float((far_ms > NEAR_MS).mean())
+        if not share:
+            return ""
+        return (
+            f"{name}: {100 * share:.0f} % of its ISIs could not be answered: no trial was left within {NEAR_MS:g} ms, "
+            f"and the nearest one answered, at most {far_ms.max():.0f} ms away."
+        )
 
     def _lines(self, name: str) -> Iterator[str]:
         scores = self.f1_by_trial(name)
@@ -100,12 +112,6 @@ class Replay:
         stops = [run.stopped for run in runs if run.stopped is not None]
         if stops:
             yield f"  It would have stopped after {np.median(stops):.0f} ({len(stops)} of {len(runs)} seeds)."
-        far_ms = np.concatenate([run.far_ms for run in runs])
-        if (share := float((far_ms > NEAR_MS).mean())) > 0:
-            yield (
-                f"  {100 * share:.0f} % of its ISIs could not be answered: no trial was left within {NEAR_MS:g} ms, "
-                f"and the nearest one answered, at most {far_ms.max():.0f} ms away."
-            )
 
     def plot(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Draw F1 by the number of stimuli, with the band over seeds.

@@ -30,6 +30,9 @@ _OF_TIMING: Final = frozenset({Kind.NO_IMPACT, Kind.NO_PULSE, Kind.TMS_BEFORE_IM
 MOST_NAMED: Final = 8
 """Lost trials that are named one by one."""
 
+_ROUNDING_MS: Final = 1e-6
+"""Differences of two times are off by less, if they are equal."""
+
 _ENDING: Final[frozenset[EventKind]] = frozenset({"limit", "refused", "fault", "pause", "doubt"})
 
 
@@ -66,6 +69,9 @@ def _timing(record: SessionRecord) -> Answer:
             _verdict(record, len(rejected), 0),
             f"No trial that counts has a realised ISI. {_listed(rejected)}",
         )
+    if record.header.imported and max(errors_ms) < _ROUNDING_MS:
+        detail = "No ISI was commanded that the realised one could be compared with: the file says none."
+        return Answer(question, _verdict(record, len(rejected), 0), f"{detail} {_listed(rejected)}")
     confirmed = [timed_isi_ms(trial, space) is not None for trial in record.table]
     if not any(errors_ms) and not any(confirmed):
         times = f"{record.header.stimulus.pulse} or {record.header.stimulus.hit} time"
@@ -243,4 +249,6 @@ def _by_form(trials: TrialsByIsi) -> MethodAnswer:
 
 
 def _in_words(window: Window | None) -> str:
-    return "No window." if window is None else f"Window {window}."
+    if window is None:
+        return "No window."
+    return f"One ISI alone: {window.start_ms:g} ms." if window.start_ms == window.end_ms else f"Window {window}."

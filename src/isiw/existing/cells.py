@@ -1,0 +1,182 @@
+"""The cells of a column, as other programs write numbers, words, and what is missing."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from numbers import Real
+from typing import Any, Final
+
+from isiw.errors import InvalidValueError
+from isiw.existing.layout import UNIT_WORDS
+
+_MISSING: Final = frozenset({"", "nan", "(null)", "na", "n/a", "none", "null", "<na>", "nat", "-", "--", ".", "?"})
+_YES: Final = frozenset({"1", "1.0", "true", "yes", "y", "x", "accepted", "accept", "ok", "good", "valid", "keep",
+                         "ja", "j", "gut", "gültig"})  # fmt: skip
+_NO: Final = frozenset({"0", "0.0", "false", "no", "n", "mistrial", "rejected", "reject", "bad", "invalid", "excluded",
+                        "nein", "schlecht", "ungültig"})  # fmt: skip
+ALONE: Final = frozenset({"tms alone", "tms only", "tms", "single", "single pulse", "single tms", "sp", "alone", "ts",
+                           "baseline", "control", "unconditioned", "unpaired", "ts alone", "ts only", "test",
+                           "test alone", "test only", "test pulse", "test stimulus", "no tap", "nur tms", "tms allein",
+                           "einzelpuls", "einzelreiz", "kontrolle", "ohne tap", "ohne schlag"})  # fmt: skip
+"""What a cell of ISIs says of TMS alone, hyphens and underscores as blanks."""
+TAP_ALONE: Final = frozenset({"tap alone", "tap only", "hit only", "hammer only", "no tms", "no pulse", "cs alone",
+                               "cs only", "conditioning alone", "conditioning only", "nur tap", "nur schlag",
+                               "tap allein", "ohne tms"})  # fmt: skip
+
+_NUMBER: Final = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?|[-+]?inf(inity)?", re.IGNORECASE)
+_GROUPED: Final = {
+    ".": re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d+)?"),
+    ",": re.compile(r"[-+]?[1-9]\d{0,2}(\.\d{3})+(,\d+)?"),
+}
+"""By the decimal sign, numbers whose thousands are grouped by the other sign."""
+_NUMBER_BEFORE: Final = re.compile(r"^[-+\d.,\s]*(e[-+]?\d+)?\s*")
+_BLANKS: Final = re.compile(r"(?<=\d)[ '\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}](?=\d{3})")
+
+
+def is_missing(cell: Any) -> bool:
+    """True if a cell holds nothing."""
+    if isinstance(cell, str):
+        return cell.strip().casefold() in _MISSING
+    return cell is None or type(cell).__name__ in {"NAType", "NaTType"} or cell != cell  # noqa: PLR0124 - NaN
+
+
+def _value(text: str, decimal: str) -> float:
+    """The number that a text is; NaN if it is none."""
+    text = _BLANKS.sub("", text.strip().replace("\N{MINUS SIGN}", "-"))
+    group = "," if decimal == "." else "."
+    if group in text:
+        if not _GROUPED[decimal].fullmatch(text):
+            return math.nan
+        text = text.replace(group, "")
+    text = text.replace(decimal, ".")
+    return float(text) if _NUMBER.fullmatch(text) else math.nan
+
+
+def _float(cell: object) -> float:
+    """A number as a float; NaN if it is none, or a whole one that no float can hold."""
+    with suppress(OverflowError):
+        return float(cell) if isinstance(cell, Real) and not isinstance(cell, bool) else math.nan
+    return math.nan
+
+
+def says_alone(cell: Any, mark: str | None) -> bool:
+    """True if a cell of ISIs stands for TMS alone; an empty one does only if that is the mark."""
+    if mark is not None and (is_missing(cell) if not mark.strip() else _same(cell, mark)):
+        return True
+    return isinstance(cell, str) and plain(cell) in ALONE
+
+
+def plain(text: str) -> str:
+    """A text in lower case, with blanks for hyphens and underscores."""
+    return " ".join(re.split(r"[\s_-]+", text.strip().casefold()))
+
+
+def _same(cell: Any, mark: str) -> bool:
+    """True if a cell is the mark, as a text or as a number."""
+    if str(cell).strip().casefold() == mark.strip().casefold():
+        return True
+    numbers = [{_value(str(one), sign) for sign in ".,"} for one in (cell, mark)]
+    return any(number in numbers[1] for number in numbers[0] if math.isfinite(number))
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column that holds something known: its name and cells as they were read, and how its numbers are read."""
+
+    name: str
+    cells: Sequence[Any]
+    decimal: str = "."
+    of: str = "the data"
+    factor: float = 1.0  # that turns a number into ms, mV or µV
+    of_codes: bool = False  # of people, who may be called NA
+
+    def number(self, row: int) -> float | None:
+        """The number in a row [ms, mV or µV]; None if the cell is empty."""
+        cell = self.cells[row]
+        if is_missing(cell):
+            return None
+        value = _value(cell, self.decimal) if isinstance(cell, str) else _float(cell)
+        if not math.isfinite(value):
+            usual = "Correct it, leave the cell empty, or name another column: --column KEY=NAME."
+            is_comma = isinstance(cell, str) and "," in cell and self.decimal != ","
+            remedy = "If the comma is a decimal sign, say --decimal ," if is_comma else usual
+            raise self.refused(row, "is no number", remedy)
+        return value if self.factor == 1.0 else value * self.factor
+
+    def flag(self, row: int) -> bool | None:
+        """True if the cell of a row says yes; None if it is empty."""
+        cell = self.cells[row]
+        if is_missing(cell):
+            return None
+        word = str(cell).strip().casefold()
+        if word not in _YES | _NO:
+            raise self.refused(row, "says neither yes nor no", "Use accepted and rejected, or 1 and 0.")
+        return word in _YES
+
+    def text(self, row: int) -> str:
+        """The cell of a row as text; a whole number has no decimal sign."""
+        cell = self.cells[row]
+        if is_missing(cell) and not (self.of_codes and isinstance(cell, str) and cell.strip() in {"NA", "na", "Na"}):
+            return ""
+        whole = _float(cell).is_integer()
+        return str(int(cell)) if whole else str(cell).strip()
+
+    def refused(self, row: int, why: str, remedy: str) -> InvalidValueError:
+        """The error that a cell of a row cannot be read."""
+        return InvalidValueError(
+            f"row {row + 1} of the column {self.name!r} of {self.of} {why}", got=self.cells[row], remedy=remedy
+        )
+
+
+def with_decimals(columns: Mapping[str, Column], stated: str | None) -> dict[str, Column]:
+    """Columns with the decimal sign of each one's texts; one that may also group thousands is asked about."""
+    signs = {key: _signs(column) for key, column in columns.items()}
+    all_signs = set[str]().union(*signs.values())
+    usual = stated or (all_signs.pop() if len(all_signs) == 1 else None)
+    found = {}
+    for key, column in columns.items():
+        if usual is None and not signs[key] and (doubtful := _doubtful(column)):
+            raise InvalidValueError(
+                f"the {'comma' if ',' in doubtful else 'point'} in the column {column.name!r} of {column.of} may be a "
+                "decimal sign, or group thousands",
+                got=doubtful,
+                remedy="Say --decimal , or --decimal . to name the decimal sign.",
+            )
+        found[key] = replace(column, decimal=max(signs[key], key=",.".find, default=usual or "."))
+    return found
+
+
+def _signs(column: Column) -> set[str]:
+    """The decimal signs that texts of a column have for certain."""
+    texts = [cell for cell in column.cells if isinstance(cell, str)]
+    return {
+        sign
+        for sign, other in (".,", ",.")
+        if any(
+            sign in text and not math.isnan(_value(text, sign)) and math.isnan(_value(text, other)) for text in texts
+        )
+    }
+
+
+def _doubtful(column: Column) -> str | None:
+    """A text whose sign may be a decimal one, or group thousands; whole numbers beside points say that they group."""
+    texts = [cell.strip() for cell in column.cells if isinstance(cell, str)]
+    doubtful = [text for text in texts if any(grouped.fullmatch(text) for grouped in _GROUPED.values())]
+    if doubtful and ("," in doubtful[0] or any(text.isdigit() for text in texts)):
+        return doubtful[0]
+    return None
+
+
+def without_unit_in_cells(name: str, cells: list[Any]) -> tuple[str, list[Any]]:
+    """A column whose cells all say the same unit, such as "12.5 ms", as one whose name says it."""
+    texts = [cell for cell in cells if not is_missing(cell)]
+    ends = {_NUMBER_BEFORE.sub("", cell.casefold()) if isinstance(cell, str) else "" for cell in texts}
+    (unit,) = ends if len(ends) == 1 else ("",)
+    if unit not in UNIT_WORDS:
+        return name, cells
+    bare = [cell if is_missing(cell) else cell.strip()[: -len(unit)].strip() for cell in cells]
+    return f"{name} ({UNIT_WORDS[unit]})", bare

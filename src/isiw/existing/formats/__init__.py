@@ -1,0 +1,109 @@
+"""The formats of files that can be read: a row each, with the module that yields what such a file holds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from isiw.errors import InvalidValueError
+from isiw.existing import frames
+from isiw.existing.formats import acq, cfs, columns, edf, eeglab, matlab, mne_files, nwb, smr, statistics, windows, xdf
+from isiw.existing.formats.contents import Contents
+from isiw.existing.layout import Layout
+
+
+class Format(NamedTuple):
+    """A format: what files of it are called, how and by which library, and the shortest way in if one cannot be."""
+
+    name: str
+    suffixes: tuple[str, ...]
+    read: Callable[[Path, Layout], Contents]
+    way_in: str
+    library: str = ""
+    is_table: bool = False
+
+
+_TABLE: Final = "Save it as CSV, with the columns' names in the first line."
+_MNE: Final = "Are all of its files in one folder? Otherwise export it as EDF+ or BrainVision."
+
+FORMATS: Final = (
+    Format("text", (".csv", ".tsv", ".txt", ".dat", ".tab"), columns.read, _TABLE, is_table=True),
+    Format("Excel", (".xlsx", ".xlsm"), columns.read, _TABLE, library="openpyxl", is_table=True),
+    Format("Parquet", (".parquet",), columns.read, _TABLE, library="pyarrow", is_table=True),
+    Format("MATLAB", (".mat",), matlab.read, "In MATLAB: save('P01.mat', 'isi_ms', 'mep_mv', '-v7').", is_table=True),
+    Format("EDF and BDF", (".edf", ".bdf"), edf.read, "Export it again, as EDF+.", library="mne"),
+    Format(
+        "EEGLAB",
+        (".set",),
+        eeglab.read,
+        "In EEGLAB: File, Save current dataset as; its .fdt stays beside it.",
+        library="mne",
+    ),
+    Format(
+        "BrainVision",
+        (".vhdr",),
+        mne_files.read,
+        "Are the .eeg and .vmrk beside it, under the names that it says?",
+        library="mne",
+    ),
+    Format("FIF", (".fif", ".fif.gz"), mne_files.read, _MNE, library="mne"),
+    Format(
+        "XDF",
+        (".xdf", ".xdfz"),
+        xdf.read,
+        "Record again with LabRecorder, or save the streams as EDF+.",
+        library="pyxdf",
+    ),
+    Format(
+        "AcqKnowledge",
+        (".acq",),
+        acq.read,
+        "In AcqKnowledge: File, Save As, text (.txt) or MATLAB (.mat), and a layout.",
+        library="bioread",
+    ),
+    Format("Spike2", (".smr",), smr.read, windows.SMRX, library="neo"),
+    Format("NWB", (".nwb",), nwb.read, "Is it a file of NWB 2, and complete?", library="pynwb"),
+    Format(
+        "SPSS and Stata",
+        (".sav", ".zsav", ".por", ".dta"),
+        statistics.read,
+        _TABLE,
+        library="pyreadstat",
+        is_table=True,
+    ),
+    Format("Signal", (".cfs",), cfs.read, cfs.WAY_IN),
+    Format("Spike2 from version 8 on", (".smrx",), windows.smrx, windows.SMRX),
+    Format("LabChart", (".adicht",), windows.adicht, windows.ADICHT),
+    Format("CNT, GDF and MFF", (".cnt", ".gdf", ".mff"), mne_files.read, _MNE, library="mne"),
+)
+
+
+def format_of(path: Path) -> Format:
+    """The format of a file, by its name.
+
+    Raises:
+        InvalidValueError: none of them.
+    """
+    name = path.name.casefold()
+    found = next((one for one in FORMATS if name.endswith(one.suffixes)), None)
+    if found is None or (path.is_dir() and not name.endswith(".mff")):
+        raise InvalidValueError(
+            "this cannot be read",
+            got=path.name,
+            expected=f"a file of {', '.join(suffix for one in FORMATS for suffix in one.suffixes)}",
+            remedy="Save or export it as one of these, such as CSV; of BrainVision's files name the .vhdr.",
+        )
+    return found
+
+
+def read(path: Path, layout: Layout) -> Contents:
+    """What a file holds.
+
+    Raises:
+        InvalidValueError: a format that is not known, or a file that cannot be read.
+        ConfigError: a library is not installed.
+    """
+    found = format_of(path)
+    with frames.reading(path, f"the file cannot be read as {found.name}", found.way_in):
+        return found.read(path, layout)

@@ -1,0 +1,54 @@
+"""Signal's files (.cfs), by BioSig where its user has installed it; each frame is a sweep."""
+
+from __future__ import annotations
+
+import importlib
+import json
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from isiw.errors import ConfigError
+from isiw.existing.formats.contents import APART_S, Contents, Stretch, Track, events_of
+from isiw.existing.layout import Layout
+from isiw.types import FloatArray
+
+_FRAME: Final = 0x7FFE
+"""BioSig's type of an event where a new frame begins."""
+
+WAY_IN: Final = (
+    "In Signal: File, Export As, Text file (.txt), the frames one below the other, or MATLAB data (.mat). A layout "
+    "says what is what: docs/your-data.md. Or install BioSig for Python, whose licence is GPL-3."
+)
+
+
+def read(path: Path, _layout: Layout) -> Contents:
+    """The frames and markers of a file of Signal."""
+    try:
+        biosig = importlib.import_module("biosig")
+    except ImportError as error:
+        raise ConfigError("files of Signal are read by BioSig, which is not installed", remedy=WAY_IN) from error
+    said, values = json.loads(biosig.header(str(path.resolve()))), np.asarray(biosig.data(str(path.resolve())))
+    rate_hz, count = float(said["Samplingrate"]), len(values)
+    events = [(int(one["TYP"], 16), float(one["POS"]), one) for one in said.get("EVENT", ())]
+    firsts = sorted({0, *(round(at * rate_hz) for kind, at, _ in events if kind == _FRAME)} - {count})
+    frames = [
+        Stretch(first, end - first, n * APART_S)
+        for n, (first, end) in enumerate(zip(firsts, [*firsts[1:], count], strict=True))
+    ]
+    tracks = [
+        Track(one["Label"], rate_hz, tuple(frames), partial(_part, values, index), one.get("PhysicalUnit", ""))
+        for index, one in enumerate(said["CHANNEL"][: values.shape[1]])
+    ]
+    rows = [("sweep", frame.start_s, frame.samples / rate_hz) for frame in frames if len(frames) > 1]
+    for kind, at, one in events:
+        if kind != _FRAME:
+            frame = next(frame for frame in reversed(frames) if frame.first <= at * rate_hz + 0.5)
+            rows.append((str(one.get("Description") or kind), frame.start_s + at - frame.first / rate_hz, 0.0))
+    return Contents(path.name, tuple(tracks), events_of(rows))
+
+
+def _part(values: FloatArray, index: int, first: int, last: int) -> FloatArray:
+    return np.asarray(values[first:last, index], dtype=np.float64)

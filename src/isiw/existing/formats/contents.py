@@ -1,0 +1,140 @@
+"""The three things that every format yields: channels with times, events, and what the file says of trials."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from isiw.lazy import pd
+from isiw.types import FloatArray
+
+PIECE: Final = 2**20
+"""So many samples are in memory at once if a whole channel is looked through."""
+
+APART_S: Final = 100.0
+"""Sweeps without a time of their own, and what a pause of unknown length separates, are so far apart."""
+
+
+class Stretch(NamedTuple):
+    """Samples without a gap: the first one, how many, and when the first one was taken [s]."""
+
+    first: int
+    samples: int
+    start_s: float
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """A channel of a file, whose samples are read when they are needed.
+
+    Args:
+        name: what it is called.
+        rate_hz: its sampling rate.
+        stretches: where it was recorded, ascending.
+        read: its numbers from one sample to before another, scaled as the file says.
+        unit: the unit of these numbers, as the file writes it; empty if it says none.
+        kind: its type, such as `emg` or `stim`, where the file says so.
+    """
+
+    name: str
+    rate_hz: float
+    stretches: tuple[Stretch, ...]
+    read: Callable[[int, int], FloatArray]
+    unit: str = ""
+    kind: str = ""
+
+    @classmethod
+    def whole(cls, name: str, rate_hz: float, values: FloatArray, unit: str = "", start_s: float = 0.0) -> Track:
+        """A channel in memory without gaps."""
+        return cls(name, rate_hz, (Stretch(0, len(values), start_s),), lambda first, last: values[first:last], unit)
+
+    @classmethod
+    def of_sweeps(cls, name: str, rate_hz: float, sweeps: FloatArray, unit: str, kind: str = "") -> Track:
+        """A channel of sweeps of one length, shape (n, w)."""
+        values, length = np.ascontiguousarray(sweeps).ravel(), sweeps.shape[1]
+        stretches = tuple(Stretch(n * length, length, n * APART_S) for n in range(len(sweeps)))
+        return cls(name, rate_hz, stretches, lambda first, last: values[first:last], unit, kind)
+
+    def at(self, time_s: float) -> Stretch | None:
+        """The stretch that a time is in; None in a gap."""
+        slack_s = 0.5 / self.rate_hz
+        for stretch in self.stretches:
+            if stretch.start_s - slack_s <= time_s < stretch.start_s + stretch.samples / self.rate_hz + slack_s:
+                return stretch
+        return None
+
+    def cut(self, stretch: Stretch, begin_s: float, end_s: float) -> tuple[float, FloatArray]:
+        """What one stretch has between two times: when its first sample was taken [s], and its numbers."""
+        first = round((begin_s - stretch.start_s) * self.rate_hz)
+        last = first + round((end_s - begin_s) * self.rate_hz)
+        first, last = max(0, first), max(0, min(last, stretch.samples))
+        return stretch.start_s + first / self.rate_hz, self.read(stretch.first + first, stretch.first + last)
+
+    def pieces(self) -> Iterator[tuple[Stretch, int, FloatArray]]:
+        """The numbers of all stretches, some at a time: the stretch, which of its samples comes first, and they."""
+        for stretch in self.stretches:
+            for begin in range(0, stretch.samples, PIECE):
+                end = min(begin + PIECE, stretch.samples)
+                yield stretch, begin, self.read(stretch.first + begin, stretch.first + end)
+
+    def onsets_s(self) -> list[float]:
+        """When a trigger leaves the level at which it mostly is [s]."""
+        ends = [(values.min(), values.max()) for _, _, values in self.pieces()]
+        middle = (min(low for low, _ in ends) + max(high for _, high in ends)) / 2 if ends else 0.0
+        rises, falls, high = list[float](), list[float](), 0
+        for stretch, begin, values, before in self._with_last():
+            above = values > middle
+            high += int(above.sum())
+            turns = np.diff(above.astype(np.int8), prepend=np.int8((values[0] if before is None else before) > middle))
+            for times, turn in ((rises, 1), (falls, -1)):
+                times += [stretch.start_s + (begin + int(at)) / self.rate_hz for at in np.flatnonzero(turns == turn)]
+        return falls if 2 * high > sum(stretch.samples for stretch in self.stretches) else rises
+
+    def codes(self) -> list[tuple[float, int]]:
+        """When a channel of codes rises, as a trigger does [s], and to which code."""
+        found = list[tuple[float, int]]()
+        for stretch, begin, values, before in self._with_last():
+            codes = np.rint(values).astype(np.int64)
+            rises = np.diff(codes, prepend=codes[0] if before is None else round(before)) > 0
+            found += [
+                (stretch.start_s + (begin + int(at)) / self.rate_hz, int(codes[at])) for at in np.flatnonzero(rises)
+            ]
+        return [(at, code) for at, code in found if code > 0]
+
+    def _with_last(self) -> Iterator[tuple[Stretch, int, FloatArray, float | None]]:
+        """The numbers of all stretches, some at a time, and the last number before them in the same stretch."""
+        last = None
+        for stretch, begin, values in self.pieces():
+            yield stretch, begin, values, last if begin else None
+            last = float(values[-1])
+
+
+def events_of(rows: Iterable[Sequence[Any]]) -> pd.DataFrame:
+    """Events as a table: what each is called, when it was [s], and how long it lasted [s]."""
+    return pd.DataFrame([tuple(row) for row in rows], columns=["name", "onset", "duration"])
+
+
+@dataclass(frozen=True, eq=False)
+class Contents:
+    """What a file holds.
+
+    Args:
+        source: the file in words, for messages.
+        tracks: its channels; none of a table.
+        events: what happened when, with the columns `name`, `onset` and `duration` [s], and what is said of each.
+        trials: a row for each trial, or for each sweep; None if it says nothing of them.
+        pulse_at_s: of sweeps that `trials` says the ISIs of, when the pulse came after the first sample.
+        empty_is_alone: whether a sweep without an ISI is TMS alone.
+        notes: what the operator should know of how it was read.
+    """
+
+    source: str
+    tracks: tuple[Track, ...] = ()
+    events: pd.DataFrame = field(default_factory=lambda: events_of(()))
+    trials: pd.DataFrame | None = None
+    pulse_at_s: float | None = None
+    empty_is_alone: bool = False
+    notes: tuple[str, ...] = ()

@@ -1,0 +1,119 @@
+"""EEGLAB's files (.set, with or without .fdt): continuous ones with their boundaries, and epochs with their events."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from isiw.errors import InvalidValueError
+from isiw.existing.formats.beside import bids_events
+from isiw.existing.formats.contents import APART_S, Contents, Stretch, Track, events_of
+from isiw.existing.layout import EMG_UNITS, Layout
+from isiw.files import opened
+from isiw.text.named_code import library
+from isiw.types import FloatArray
+
+_ASSUMED: Final = (
+    "Files of EEGLAB say no unit, and µV are usual. If the numbers are in another unit, say --unit mV or --unit V."
+)
+
+
+def read(path: Path, layout: Layout) -> Contents:
+    """The channels and events of an EEGLAB file."""
+    found = library("pymatreader", "import").read_mat(str(path))
+    eeg = found.get("EEG", found)
+    if not {"data", "srate", "nbchan", "pnts"} <= eeg.keys():
+        raise InvalidValueError("the file has no data of EEGLAB", got=", ".join(list(eeg)[:9]))
+    rate_hz, samples, trials = float(eeg["srate"]), int(eeg["pnts"]), int(eeg.get("trials") or 1)
+    places = _listed(eeg.get("chanlocs"))
+    events = [one for one in _listed(eeg.get("event")) if not _empty(one.get("latency"))]
+    if trials > 1:
+        stretches = tuple(Stretch(n * samples, samples, n * APART_S) for n in range(trials))
+    else:
+        stretches = _between(events, samples, rate_hz)
+    tracks = []
+    for n in range(int(eeg["nbchan"])):
+        place = places[n] if n < len(places) else {}
+        label = str(place.get("labels") or f"channel {n + 1}")
+        kind = str(place.get("type") or "").casefold() if isinstance(place.get("type"), str) else ""
+        track = Track(label, rate_hz, stretches, partial(_values, eeg, path, n), "uV", kind)
+        tracks.append(track)
+    rows = [
+        (
+            _name(one["type"]),
+            _at_s(float(one["latency"]) - 1.0, stretches, rate_hz),
+            _number(one.get("duration")) / rate_hz,
+        )
+        for one in events
+        if _name(one.get("type")) != "boundary"
+    ]
+    beside = bids_events(path)
+    notes = () if layout.unit_of(EMG_UNITS) else (_ASSUMED,)
+    return Contents(path.name, tuple(tracks), events_of(rows) if beside is None else beside, notes=notes)
+
+
+def _values(eeg: Mapping[str, Any], path: Path, channel: int, first: int, last: int) -> FloatArray:
+    """Numbers of a channel, which are in this file, or in one beside it."""
+    count, data = int(eeg["nbchan"]), eeg["data"]
+    if isinstance(data, str):
+        with opened(path.with_name(Path(data.replace("\\", "/")).name)) as file:
+            file.seek(4 * count * first)
+            return (
+                np.frombuffer(file.read(4 * count * (last - first)), "<f4")
+                .reshape(-1, count)[:, channel]
+                .astype(np.float64)
+            )
+    values = np.asarray(data)
+    if count == 1 and (values.ndim == 1 or values.shape[0] != 1 or values.ndim < 2):
+        values = values[None]
+    flat = values[channel] if values.ndim < 3 else values[channel].T.ravel()
+    return np.asarray(flat[first:last], dtype=np.float64)
+
+
+def _between(events: list[Mapping[str, Any]], samples: int, rate_hz: float) -> tuple[Stretch, ...]:
+    """What lies between boundaries, where data were cut out or recording paused, for as long as the file says."""
+    found, first, start_s = [], 0, 0.0
+    cuts = sorted(
+        (math.ceil(float(one["latency"]) - 1.0), one) for one in events if _name(one.get("type")) == "boundary"
+    )
+    for at, one in cuts:
+        if 0 < at < samples and at > first:
+            found.append(Stretch(first, at - first, start_s))
+            missing_s = _number(one.get("duration")) / rate_hz
+            first, start_s = at, start_s + (at - first) / rate_hz + (missing_s or APART_S)
+    return (*found, Stretch(first, samples - first, start_s))
+
+
+def _at_s(sample: float, stretches: tuple[Stretch, ...], rate_hz: float) -> float:
+    """When a sample was taken, which may be between two of them [s]."""
+    stretch = [one for one in stretches if one.first <= sample + 0.5][-1]
+    return stretch.start_s + (sample - stretch.first) / rate_hz
+
+
+def _listed(value: Any) -> list[Mapping[str, Any]]:
+    """Structures one by one: a list of them, one alone, or a structure whose fields are lists."""
+    if isinstance(value, Mapping):
+        lists = {key: each for key, each in value.items() if isinstance(each, list | np.ndarray)}
+        longest = max(map(len, lists.values()), default=0)
+        if not lists or any(len(each) != longest for each in lists.values()) or len(lists) < len(value):
+            return [value]
+        return [{key: each[n] for key, each in lists.items()} for n in range(longest)]
+    return [one for one in value if isinstance(one, Mapping)] if isinstance(value, list | np.ndarray) else []
+
+
+def _empty(value: Any) -> bool:
+    return value is None or np.size(value) == 0
+
+
+def _number(value: Any) -> float:
+    return 0.0 if _empty(value) or isinstance(value, str) or not math.isfinite(float(value)) else float(value)
+
+
+def _name(value: Any) -> str:
+    """What an event is called; a whole number has no decimal sign."""
+    return f"{value:g}" if isinstance(value, int | float | np.number) else str(value).strip()

@@ -1,0 +1,52 @@
+"""Files of MATLAB: vectors that are the columns of a table, and sweeps that are the rows or columns of a matrix."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from isiw.errors import InvalidValueError
+from isiw.existing import frames, tables
+from isiw.existing.formats import columns
+from isiw.existing.formats.contents import Contents, Track
+from isiw.existing.layout import EMG_UNITS, Layout, letters
+from isiw.lazy import pd
+
+_RATES: Final = frozenset({"fs", "srate", "samplerate", "samplingrate", "samplingfrequency", "sfreq", "rate", "ratehz"})
+
+
+def read(path: Path, layout: Layout) -> Contents:
+    """A table of vectors, a recording in vectors, or sweeps beside a vector of their ISIs."""
+    if "emg" not in layout.channels:
+        return columns.read(path, layout)
+    arrays = frames.read_arrays(path)
+    tables.require_one("array", path.name, layout.channels["emg"], arrays)
+    if arrays[layout.channels["emg"]].squeeze().ndim > 1:
+        return _sweeps(arrays, layout, path.name)
+    return columns.read(path, layout)
+
+
+def _sweeps(arrays: Mapping[str, Any], layout: Layout, source: str) -> Contents:
+    rate_hz = columns.required(layout, "rate_hz", f"the sampling rate of {source}")
+    pulse_at_ms = columns.required(layout, "pulse_at_ms", f"the time of the pulse in a sweep of {source}")
+    vectors = {
+        name: array.ravel().tolist() for name, array in arrays.items() if max(array.shape, default=0) == array.size
+    }
+    beside = tables.as_long_as_isis(vectors, layout, source)
+    name, count = layout.channels["emg"], len(next(iter(beside.values())))
+    sweeps = np.asarray(arrays[name], dtype=np.float64)
+    if sweeps.ndim != 2 or count not in sweeps.shape:
+        raise InvalidValueError(
+            f"the sweeps of {source} are not as many as its ISIs, in a matrix",
+            got=f"{' × '.join(map(str, sweeps.shape))} samples and {count} ISIs",
+            remedy="Save a row or a column for each ISI.",
+        )
+    for other, array in arrays.items():
+        if array.size == 1 and letters(other) in _RATES and array.dtype.kind in "fiu":
+            columns.require_rate(rate_hz, float(array.item()), f"{other!r} of {source}")
+    unit = tables.unit_said(name, EMG_UNITS) or ""
+    track = Track.of_sweeps(name, rate_hz, sweeps if sweeps.shape[0] == count else sweeps.T, unit)
+    return Contents(source, (track,), trials=pd.DataFrame(beside), pulse_at_s=pulse_at_ms / 1e3)

@@ -1,0 +1,92 @@
+"""Neurodata Without Borders (.nwb): time series with conversion and offset, annotations, and tables of intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from isiw.existing.formats.contents import Contents, Stretch, Track, events_of
+from isiw.existing.formats.stamps import clocked
+from isiw.existing.layout import Layout
+from isiw.lazy import pd
+from isiw.text.named_code import library
+from isiw.types import FloatArray
+
+
+def read(path: Path, _layout: Layout) -> Contents:
+    """The time series, annotations and intervals of an NWB file, which stays open as long as they are needed."""
+    pynwb = library("pynwb", "import-nwb")
+    held = pynwb.NWBHDF5IO(str(path), "r", load_namespaces=True)
+    objects = list(held.read().objects.values())
+    tracks, rows, tables = list[Track](), list[tuple[str, float, float]](), list[pd.DataFrame]()
+    for one in objects:
+        if isinstance(one, pynwb.misc.AnnotationSeries):
+            texts, times_s = one.data[:], one.timestamps[:]
+            rows += [(_text(text), float(at), 0.0) for text, at in zip(texts, times_s, strict=True)]
+        elif isinstance(one, pynwb.epoch.TimeIntervals):
+            tables.append(one.to_dataframe())
+        elif isinstance(one, pynwb.core.DynamicTable) and "timestamp" in one.colnames:
+            rows += _stamped(one)
+        elif isinstance(one, pynwb.TimeSeries) and getattr(one.data, "ndim", np.ndim(one.data)) in {1, 2}:
+            tracks += _channels(one, held)
+    events = pd.concat([events_of(rows), *(_intervals(table) for table in tables)], ignore_index=True)
+    trials = next((table for table in tables if not tracks and len(table)), None)
+    return Contents(path.name, tuple(tracks), events.sort_values("onset", ignore_index=True), trials)
+
+
+def _channels(series: Any, held: Any) -> Iterator[Track]:
+    """The channels of a series, scaled by its conversion, that of each channel, and its offset."""
+    count = int(series.data.shape[1]) if len(series.data.shape) > 1 else 0
+    if not len(series.data) or np.asarray(series.data[:1]).dtype.kind not in "fiu":
+        return
+    if series.timestamps is None:
+        rate_hz, start_s = float(series.rate), float(series.starting_time or 0.0)
+        stretches: tuple[Stretch, ...] = (Stretch(0, len(series.data), start_s),)
+    else:
+        of_series = clocked(np.asarray(series.timestamps[:], dtype=np.float64), None, f"the series {series.name}")
+        rate_hz, stretches = of_series.rate_hz, of_series.stretches
+    of_each = getattr(series, "channel_conversion", None)
+    for channel in range(max(1, count)):
+        factor = float(series.conversion or 1.0) * (1.0 if of_each is None else float(of_each[channel]))
+        name = series.name if count < 2 else f"{series.name} {channel + 1}"
+        place = channel if count else None
+        part = partial(_part, series, held, place, factor, float(series.offset or 0.0))
+        yield Track(name, rate_hz, stretches, part, str(series.unit or ""), "emg" if "emg" in name.casefold() else "")
+
+
+def _part(
+    series: Any, _held: Any, channel: int | None, factor: float, offset: float, first: int, last: int
+) -> FloatArray:
+    values = series.data[first:last] if channel is None else series.data[first:last, channel]
+    return np.asarray(values, dtype=np.float64) * factor + offset
+
+
+def _stamped(table: Any) -> Iterator[tuple[str, float, float]]:
+    """The rows of a table of events, by their texts, or by the table's name."""
+    frame = table.to_dataframe()
+    label = next((name for name in ("annotation", "label", "event_type") if name in frame), None)
+    for place, at in enumerate(frame["timestamp"].to_numpy(dtype=np.float64).tolist()):
+        text = "" if label is None else _text(frame[label].iloc[place])
+        yield text or str(table.name), at, 0.0
+
+
+def _text(value: Any) -> str:
+    return value.decode("utf-8") if isinstance(value, bytes) else str(value)
+
+
+def _intervals(table: pd.DataFrame) -> pd.DataFrame:
+    """The rows of a table of intervals as sweeps, or by their labels, and each column of times as events."""
+    others = table.drop(columns=["start_time", "stop_time"])
+    label = next((name for name in ("label", "event", "event_type", "name") if name in others), None)
+    lasts = (table["stop_time"] - table["start_time"]).to_numpy(dtype=np.float64)
+    names = ["sweep"] * len(table) if label is None else list(map(_text, others[label]))
+    found = [others.assign(name=names, onset=table["start_time"].to_numpy(dtype=np.float64), duration=lasts)]
+    for column in others:
+        if str(column).endswith("_time"):
+            times_s = others[column].dropna().to_numpy(dtype=np.float64)
+            found.append(events_of((str(column).removesuffix("_time"), at, 0.0) for at in times_s.tolist()))
+    return pd.concat(found, ignore_index=True)

@@ -1,0 +1,93 @@
+"""Times of samples, one by one: where they leave a gap, and at which rate samples were really taken."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from isiw.errors import InvalidValueError
+from isiw.existing.formats.contents import Stretch
+from isiw.types import FloatArray
+
+_GAP_S: Final = 2.5e-3
+"""Samples that come later than expected by so much, and stay so, come after a gap; those that do not, jitter."""
+_AROUND_S: Final = 1.0
+_ENOUGH_S: Final = 10.0
+"""A stretch that is longer says at which rate its samples were really taken."""
+
+
+class Clocked(NamedTuple):
+    """The rate at which samples were really taken, their stretches, and how far the times scatter about these [s]."""
+
+    rate_hz: float
+    stretches: tuple[Stretch, ...]
+    scatter_s: float
+
+
+def clocked(times_s: FloatArray, nominal_hz: float | None, what: str) -> Clocked:
+    """Times of samples as stretches without a gap; what is left out is jitter.
+
+    A gap is found whatever its length, and no stretch is stretched over it.
+
+    Args:
+        times_s: when each sample was taken [s], shape (n,).
+        nominal_hz: the rate that is stated; None for that of the times.
+        what: whose samples these are, for messages.
+    """
+    steps_s = np.diff(times_s)
+    if len(times_s) < 3 or not np.isfinite(times_s).all() or not np.median(steps_s) > 0:
+        raise InvalidValueError(f"the times of the samples of {what} do not ascend", got=f"{len(times_s)} samples")
+    nominal_s = 1.0 / nominal_hz if nominal_hz else float(np.median(steps_s))
+    late_s = times_s - np.arange(len(times_s)) * nominal_s
+    around = max(3, round(_AROUND_S / nominal_s))
+    least_s = max(_GAP_S, 1.5 * nominal_s, 2.0 * _jitter_s(late_s, around))
+    late = (np.flatnonzero(steps_s > nominal_s + 0.8 * least_s) + 1).tolist()
+    begins = [0, *_gaps(late_s, late, (0, len(times_s)), around, least_s)]
+    ends = [*begins[1:], len(times_s)]
+    spans = list(zip(begins, ends, strict=True))
+    longest = max(spans, key=lambda span: span[1] - span[0])
+    period_s = _period_s(times_s[slice(*longest)], nominal_s)
+    stretches, scatter = [], list[FloatArray]()
+    for begin, end in spans:
+        even_s = period_s * np.arange(end - begin)
+        start_s = float(np.median(times_s[begin:end] - even_s))
+        stretches.append(Stretch(begin, end - begin, start_s))
+        scatter.append(np.abs(times_s[begin:end] - even_s - start_s))
+    return Clocked(1.0 / period_s, tuple(stretches), float(np.quantile(np.concatenate(scatter), 0.95)))
+
+
+def _gaps(late_s: FloatArray, places: list[int], span: tuple[int, int], around: int, least_s: float) -> list[int]:
+    """Where samples are later than those before, for good: the surest place, and those on both sides of it."""
+    sides = {
+        at: (late_s[max(span[0], at - around) : at], late_s[at : min(span[1], at + around)])
+        for at in places
+        if span[0] < at < span[1]
+    }
+    sure = {
+        at: float(after.mean() - before.mean())
+        for at, (before, after) in sides.items()
+        if np.median(after) - np.median(before) > least_s
+    }
+    if not sure:
+        return []
+    at = max(sure, key=lambda place: sure[place])
+    return [
+        *_gaps(late_s, places, (span[0], at), around, least_s),
+        at,
+        *_gaps(late_s, places, (at, span[1]), around, least_s),
+    ]
+
+
+def _jitter_s(late_s: FloatArray, around: int) -> float:
+    """The SD of times about those near them, whatever gaps there are [s]."""
+    whole = late_s[: len(late_s) // around * around].reshape(-1, around)
+    return 1.48 * float(np.median(np.abs(whole - np.median(whole, axis=1, keepdims=True)))) if len(whole) else 0.0
+
+
+def _period_s(times_s: FloatArray, nominal_s: float) -> float:
+    """The time from one sample to the next, by a line through all of them; the nominal one if they are few."""
+    if times_s[-1] - times_s[0] < _ENOUGH_S:
+        return nominal_s
+    index = np.arange(len(times_s)) - (len(times_s) - 1) / 2
+    return float(index @ (times_s - times_s.mean()) / (index @ index))

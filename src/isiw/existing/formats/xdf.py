@@ -1,0 +1,89 @@
+"""XDF of LabRecorder (Lab Streaming Layer): streams with clock offsets, of which those with texts are markers."""
+
+from __future__ import annotations
+
+import gzip
+from collections.abc import Iterator, Mapping
+from contextlib import nullcontext
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from isiw.existing.formats.contents import Contents, Track, events_of
+from isiw.existing.formats.stamps import clocked
+from isiw.existing.layout import Layout
+from isiw.files import opened
+from isiw.text.named_code import library
+from isiw.types import FloatArray
+
+_SCATTER_S = 2e-3
+
+
+def read(path: Path, _layout: Layout) -> Contents:
+    """The channels and markers of all streams, on one clock; gaps are found here, since pyxdf smooths them away."""
+    load = library("pyxdf", "import").load_xdf
+    with opened(path) as plain, gzip.open(plain) if path.suffix.casefold() == ".xdfz" else nullcontext(plain) as file:
+        streams, _ = load(file, dejitter_timestamps=False, verbose=False)
+    streams = [stream for stream in streams if len(stream["time_stamps"])]
+    begun_s = min((float(stream["time_stamps"][0]) for stream in streams), default=0.0)
+    hosts = {_said(stream["info"], "hostname") for stream in streams}
+    tracks, rows, notes = list[Track](), list[tuple[str, float, float]](), list[str]()
+    for stream in streams:
+        name, times_s = _said(stream["info"], "name"), np.asarray(stream["time_stamps"]) - begun_s
+        if len(hosts) > 1 and not len(stream.get("clock_times", ())):
+            notes.append(f"The stream {name} has no clock offsets, and another computer recorded beside it.")
+        if _is_of_markers(stream):
+            rows += [(_text(one), at, 0.0) for one, at in zip(stream["time_series"], times_s.tolist(), strict=True)]
+            continue
+        of_stream = clocked(times_s, float(_said(stream["info"], "nominal_srate")) or None, f"the stream {name}")
+        if of_stream.scatter_s > _SCATTER_S:
+            notes.append(f"The times of the stream {name} scatter by {1e3 * of_stream.scatter_s:.1f} ms.")
+        values = np.asarray(stream["time_series"])
+        for channel, (label, unit, kind) in enumerate(_channels(stream, name, values.shape[1])):
+            tracks.append(
+                Track(label, of_stream.rate_hz, of_stream.stretches, partial(_part, values, channel), unit, kind)
+            )
+    twice = {track.name for track in tracks if [one.name for one in tracks].count(track.name) > 1}
+    if twice:
+        notes.append(f"Several channels are called {', '.join(sorted(twice))}.")
+    return Contents(path.name, tuple(tracks), events_of(sorted(rows, key=lambda row: row[1])), notes=tuple(notes))
+
+
+def _part(values: Any, channel: int, first: int, last: int) -> FloatArray:
+    return np.asarray(values[first:last, channel], dtype=np.float64)
+
+
+def _is_of_markers(stream: Mapping[str, Any]) -> bool:
+    """True for texts, and for numbers that come at no rate."""
+    texts = _said(stream["info"], "channel_format") == "string"
+    return texts or (float(_said(stream["info"], "nominal_srate") or 0.0) == 0.0 and "marker" in _kind(stream))
+
+
+def _kind(stream: Mapping[str, Any]) -> str:
+    return _said(stream["info"], "type").casefold()
+
+
+def _said(info: Mapping[str, Any] | None, key: str) -> str:
+    """What the description of a stream says, whose every entry is a list."""
+    value = (info or {}).get(key)
+    value = value[0] if isinstance(value, list) and value else value
+    return "" if value is None or isinstance(value, list | dict) else str(value)
+
+
+def _text(marker: Any) -> str:
+    """What a marker says; a whole number has no decimal sign."""
+    first = marker[0] if len(marker) == 1 else " ".join(map(str, marker))
+    return first if isinstance(first, str) else f"{float(first):g}"
+
+
+def _channels(stream: Mapping[str, Any], name: str, count: int) -> Iterator[tuple[str, str, str]]:
+    """The label, unit and type of each channel of a stream."""
+    described = (stream["info"].get("desc") or [None])[0] or {}
+    inner = (described.get("channels") or [None])[0] or {}
+    each = inner.get("channel") or []
+    for channel in range(count):
+        said = each[channel] if channel < len(each) else None
+        label = _said(said, "label") or (name if count == 1 else f"{name} {channel + 1}")
+        yield label, _said(said, "unit"), (_said(said, "type") or _kind(stream)).casefold()

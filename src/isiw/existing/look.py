@@ -1,0 +1,219 @@
+"""A look into a file before it is analysed: what is in it, the command that would read it, and what is missing."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import permutations
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from isiw.errors import IsiwError
+from isiw.existing import formats
+from isiw.existing.answer import Answer
+from isiw.existing.apart import read_apart
+from isiw.existing.delivered import Delivered
+from isiw.existing.formats.contents import Contents, Track
+from isiw.existing.frames import named
+from isiw.existing.layout import Layout
+from isiw.existing.limits import ReadingLimits
+from isiw.existing.markers import marked
+from isiw.existing.reading import contents_in, people_of_contents
+from isiw.existing.tables import Columns
+from isiw.plots.sweeps import sweeps_figure
+from isiw.text.sanitize import command, counted
+from isiw.types import FloatArray, Reference
+
+SWEEPS: Final = 3
+"""So many sweeps are drawn."""
+
+_MOST: Final = 30
+"""So many channels, events and columns are listed one by one."""
+
+_TRIGGER: Final = 0.02
+"""The largest share of a channel of triggers that is neither near its lowest nor near its highest value."""
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """What is in a file.
+
+    Args:
+        lines: its channels, events, or columns, one a line.
+        command: the command that would analyse it, as far as it can be known.
+        missing: what is still to be said; empty if nothing is.
+        figure: the first sweeps, with what would be measured; None if there are none.
+    """
+
+    lines: tuple[str, ...]
+    command: str
+    missing: str
+    figure: Figure | None
+
+    def __str__(self) -> str:
+        said = [*self.lines, f"Proposed: {self.command}", f"Missing: {self.missing}" if self.missing else ""]
+        return "\n".join(line for line in said if line)
+
+
+def look(
+    path: str | Path,
+    layout: Layout | None = None,
+    *,
+    limits: ReadingLimits | None = None,
+    also: Sequence[str | Path] = (),
+) -> Look:
+    """Look into a table or a recording.
+
+    Args:
+        path: the file.
+        layout: how it is laid out, as far as that is known.
+        limits: the most that is read.
+        also: files elsewhere that it may refer to.
+
+    Raises:
+        InvalidValueError: a format that is not known, or a file that cannot be read.
+        ConfigError: a library is not installed.
+    """
+    people, said = read_apart(Path(path), layout or Layout(), "", limits or ReadingLimits(), also, look=True)
+    sweeps = [sweeps_figure(one.trials, one.sweeps, one.signals.mep_window_ms, SWEEPS) for one in people[:1]]
+    return Look(tuple(said["lines"]), said["command"], said["missing"], *(sweeps or [None]))
+
+
+def seen_in(path: Path, layout: Layout, limits: ReadingLimits, on_rows: Callable[[int], object]) -> Answer:
+    """The people in a file, as far as they can be read, and what is said of it, found by this process."""
+    contents = contents_in(path, layout, limits, on_rows)
+    triggers = {} if len(contents.events) else dict(_triggers(contents))
+    proposed = _with_markers(contents, triggers, layout)
+    people, missing = list[Delivered](), ""
+    try:
+        known = replace(proposed, reference=proposed.reference or _reference(contents))
+        people = people_of_contents(contents, path, known, "")
+    except IsiwError as error:
+        missing = f"{error}"
+    if proposed.reference is None:
+        proposed = replace(proposed, reference=_reference(contents))
+        missing = f"{missing} Do ISIs count from the impact (or electrical pulse), or the valve?".strip()
+    heading = f"{path.name}: {formats.format_of(path).name}"
+    lines = [heading, *(_of_recording(contents, triggers) if contents.tracks else _of_table(contents, proposed))]
+    for one in people[:_MOST]:
+        count = sum(trial.told for trial in one.trials)
+        lines.append(f"{one.subject or 'unnamed'}: {counted(len(one.trials), 'trial')}, of which {count} count")
+    notes = dict.fromkeys(note for one in people for note in one.notes)
+    return Answer(people[:1], {"lines": [*lines, *notes], "command": _command(path, proposed), "missing": missing})
+
+
+def _reference(contents: Contents) -> Reference:
+    """The reference that is proposed: the valve, if its command is marked and no tap is."""
+    empty = Layout()
+    return (
+        "valve" if marked(contents.events, "valve", empty) and not marked(contents.events, "tap", empty) else "impact"
+    )
+
+
+def _of_recording(contents: Contents, triggers: Mapping[str, FloatArray]) -> Iterator[str]:
+    for track in contents.tracks[:_MOST]:
+        said = ", ".join(filter(None, [track.unit or "no unit", f"{track.rate_hz:.6g} Hz", track.kind, _gaps(track)]))
+        trigger = f"; a trigger? {_times(triggers[track.name])}" if track.name in triggers else ""
+        yield f"  channel {track.name!r}: {said}{trigger}"
+    if len(contents.tracks) > _MOST:
+        yield f"  and {counted(len(contents.tracks) - _MOST, 'other channel')}"
+    names = dict.fromkeys(map(str, contents.events["name"]))
+    for name in [*names][:_MOST]:
+        yield f"  event {name!r}: {_times(_at(contents, name))}"
+    if len(names) > _MOST:
+        yield f"  and {counted(len(names) - _MOST, 'other name', 'other names')} of events"
+    if not names and not triggers:
+        yield "  no events"
+
+
+def _gaps(track: Track) -> str:
+    """How long a channel lasts, and where it has gaps."""
+    lasts_s = sum(stretch.samples for stretch in track.stretches) / track.rate_hz
+    if len(track.stretches) == 1:
+        return f"{lasts_s:.1f} s"
+    return f"{lasts_s:.1f} s in {len(track.stretches)} parts, the second from {track.stretches[1].start_s:.1f} s on"
+
+
+def _times(at_s: FloatArray) -> str:
+    said = f"{len(at_s)} times"
+    if len(at_s) < 2:
+        return f"once, at {at_s[0]:.3f} s" if len(at_s) else "never"
+    apart_s = np.diff(np.sort(at_s))
+    return f"{said}, {np.median(apart_s):.3g} s apart ({apart_s.min():.3g} to {apart_s.max():.3g})"
+
+
+def _at(contents: Contents, name: str) -> FloatArray:
+    events = contents.events
+    return np.sort(events.loc[events["name"].astype(str) == name, "onset"].to_numpy(dtype=np.float64))
+
+
+def _triggers(contents: Contents) -> Iterator[tuple[str, FloatArray]]:
+    """Channels of two levels, by when they leave the one at which they mostly are [s]."""
+    for track in contents.tracks:
+        if track.kind != "emg" and (first := next(track.pieces(), None)) is not None and len(first[2]):
+            values = first[2]
+            low, high = values.min(), values.max()
+            between = (values > low + 0.1 * (high - low)) & (values < high - 0.1 * (high - low))
+            if high > low and between.mean() < _TRIGGER and len(at_s := track.onsets_s()) > 1:
+                yield track.name, np.asarray(at_s)
+
+
+def _with_markers(contents: Contents, triggers: Mapping[str, FloatArray], layout: Layout) -> Layout:
+    """A layout that says which events, or which triggers, mark tap and pulse, if one kind follows the other."""
+    if not contents.tracks or (contents.trials is not None and contents.pulse_at_s is not None):
+        return layout
+    key = "valve" if (layout.reference or _reference(contents)) == "valve" else "tap"
+    if all(marked(contents.events, one, layout) or one in layout.channels for one in (key, "pulse")):
+        return layout
+    times = triggers or {name: _at(contents, name) for name in dict.fromkeys(map(str, contents.events["name"]))}
+    few = {
+        name: at_s for name, at_s in times.items() if len(at_s) > 1 and not re.match("bad|sweep", name, re.IGNORECASE)
+    }
+    follows = {
+        (one, other): _share(few[one], few[other], layout.longest_isi_ms / 1e3)
+        for one, other in permutations([*few][:_MOST], 2)
+    }
+    pair = max(follows, key=lambda both: follows[both], default=None)
+    if pair is None or follows[pair] < 0.5:
+        return layout
+    said = dict(zip((key, "pulse"), pair, strict=True))
+    return layout.saying(channels=said) if triggers else layout.saying(markers=said)
+
+
+def _share(taps_s: FloatArray, pulses_s: FloatArray, longest_s: float) -> float:
+    """The share of events that follow another within the longest ISI."""
+    after_s = pulses_s - taps_s[np.maximum(np.searchsorted(taps_s, pulses_s, side="right") - 1, 0)]
+    return float(((after_s >= 0) & (after_s <= longest_s)).mean())
+
+
+def _of_table(contents: Contents, layout: Layout) -> Iterator[str]:
+    frame = named(contents.trials)
+    try:
+        found = Columns.found(frame, replace(layout, units=layout.units or ("ms", "mV")), contents.source)
+        held = {column.name.partition(" (")[0]: key for key, column in found.of.items()}
+    except IsiwError:
+        held = {}
+    for place, name in enumerate(frame.columns[:_MOST]):
+        cells = frame.iloc[:, place]
+        kinds = list(dict.fromkeys(map(str, cells.tolist())))
+        some = ", ".join(kinds[:4]) + (f" … ({len(kinds)} different)" if len(kinds) > 4 else "")
+        key = held.get(str(name), held.get(str(name).partition(" (")[0]))
+        yield f"  column {str(name)!r}{f', the {key}' if key else ''}: {some}"
+    yield f"  {counted(len(frame), 'row')}"
+
+
+def _command(path: Path, layout: Layout) -> str:
+    """The command line that says a layout."""
+    words = ["analyse", str(path)]
+    for option, value in (("reference", layout.reference), ("alone", layout.alone), ("decimal", layout.decimal),
+                          ("sheet", layout.sheet), ("unmarked", layout.unmarked)):  # fmt: skip
+        words += [f"--{option}", value] if value is not None else []
+    for option, pairs in (("column", layout.columns), ("where", layout.where), ("marker", layout.markers),
+                          ("channel", layout.channels)):  # fmt: skip
+        words += [word for key, name in pairs.items() for word in (f"--{option}", f"{key}={name}")]
+    words += [word for unit in layout.units for word in ("--unit", unit)]
+    return command(*words, "-o", f"{path.stem}.mcap")

@@ -1,0 +1,181 @@
+"""Events of a recording that mark stimuli: which pulse belongs to which tap, and which came alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
+
+import numpy as np
+
+from isiw.errors import InvalidValueError
+from isiw.existing.cells import plain, says_alone
+from isiw.existing.layout import Layout
+from isiw.lazy import pd
+from isiw.text.sanitize import counted
+from isiw.types import FloatArray
+
+_KNOWN: Final[Mapping[str, tuple[str, ...]]] = {
+    "pulse": ("tms", "pulse", "tmspulse", "magneticpulse"),
+    "tap": ("tap", "impact", "hit", "electricalpulse", "conditioning", "pns"),
+    "valve": ("valve", "valvecommand"),
+    "alone": ("tmsalone", "tmsonly", "singlepulse", "pulsealone", "unconditioned"),
+}
+"""What events are called that need not be named, without blanks."""
+
+_WHAT: Final = {
+    "pulse": "the pulse of TMS",
+    "tap": "the tap (its impact) or the electrical pulse",
+    "valve": "the valve command",
+}
+
+_TWICE_S: Final = 3e-3
+"""One trigger that is found twice within so short a time is one, and the first edge is when it was."""
+
+_SAME_PULSE_S: Final = 20e-3
+"""An event of a pulse alone marks the pulse that is marked within so short a time."""
+
+_EARLY_S: Final = 20e-3
+"""A pulse that comes before a tap by at most so much was meant to follow it, and is TMS before the impact."""
+
+
+@dataclass(frozen=True)
+class Pulse:
+    """A pulse by its events: when [s], how long after the tap, and what the file says of it."""
+
+    at_s: float
+    isi_s: float | None = None  # None where no tap is known
+    alone: bool = False  # as the file says
+    lost: bool = False  # a tap came, and it is not known when
+    sweep_s: tuple[float, float] | None = None  # where the file has a sweep of its own
+    said: Mapping[str, Any] = field(default_factory=dict)
+
+
+def marked(events: pd.DataFrame, key: str, layout: Layout) -> list[float]:
+    """When the events of a key came, if there are any [s]."""
+    names = _fitting(events, key, layout)
+    return [] if not names else events.loc[events["name"].astype(str).isin(names), "onset"].tolist()
+
+
+def _names(events: pd.DataFrame) -> list[str]:
+    return [str(name) for name in dict.fromkeys(events["name"])]
+
+
+def _fitting(events: pd.DataFrame, key: str, layout: Layout) -> list[str]:
+    """The names of the events that mark something."""
+    names = _names(events)
+    if (stated := layout.markers.get(key)) is None:
+        return [name for name in names if _plain(name) in _KNOWN[key]][:1]
+    return [name for name in names if stated == name] or [name for name in names if _plain(stated) == _plain(name)]
+
+
+def _marker(events: pd.DataFrame, key: str, layout: Layout, source: str) -> str | None:
+    """The name of the events that mark something; None if none of them does."""
+    fitting = _fitting(events, key, layout)
+    if key in layout.markers and len(fitting) != 1:
+        what = "several events" if fitting else "no event"
+        expected = f"one of {', '.join(map(repr, _names(events)))}"
+        raise InvalidValueError(f"{source} has {what} of this name", got=layout.markers[key], expected=expected)
+    return fitting[0] if fitting else None
+
+
+def _plain(name: str) -> str:
+    """An event's name without what BrainVision puts before it and between its parts."""
+    return "".join(name.rpartition("/")[2].casefold().split())
+
+
+def _required_markers(events: pd.DataFrame, keys: Iterable[str], layout: Layout, source: str) -> list[str]:
+    """The names of the events that mark several things."""
+    found = {key: _marker(events, key, layout, source) for key in keys}
+    missing = [key for key, name in found.items() if name is None]
+    if missing:
+        names = ", ".join(map(repr, _names(events)))
+        said = " ".join(f"--marker {key}=NAME" for key in missing)
+        triggers = " ".join(f"--channel {key}=NAME" for key in missing)
+        raise InvalidValueError(
+            f"no event of {source} is known to mark {', nor '.join(_WHAT[key] for key in missing)}",
+            got=names or "no events, so that no event was found",
+            remedy=f"Say {said if names else triggers}. isiw analyse FILE --look says what is in the file.",
+        )
+    return [name for name in found.values() if name is not None]
+
+
+def pulses_of(events: pd.DataFrame, key: str, layout: Layout, source: str) -> list[Pulse]:
+    """All pulses, each with the tap, or the valve command, that it belongs to."""
+    pulse_name, origin_name = _required_markers(events, ("pulse", key), layout, source)
+    if origin_name == pulse_name:
+        raise InvalidValueError(
+            f"one event of {source} cannot mark both stimuli", got=pulse_name, remedy=f"Say --marker {key}=NAME."
+        )
+    names = events["name"].astype(str)
+    at_s, origins_s = _sorted(events, names == pulse_name), _once(_sorted(events, names == origin_name))
+    alone_name = _marker(events, "alone", layout, source)
+    alone_s = _sorted(events, names == alone_name) if alone_name not in {None, pulse_name, origin_name} else at_s[:0]
+    more_s = [at for at in alone_s.tolist() if not np.any(np.abs(at_s - at) <= _SAME_PULSE_S)]
+    epochs = events[names == "sweep"]
+    found = [
+        _placed(at, origins_s, epochs, alone=bool(np.any(np.abs(alone_s - at) <= _SAME_PULSE_S)), layout=layout)
+        for at in sorted([*at_s.tolist(), *more_s])
+    ]
+    return _with_the_unmarked(found, layout, source)
+
+
+def _sorted(events: pd.DataFrame, chosen: Any) -> FloatArray:
+    return np.sort(events.loc[chosen, "onset"].to_numpy(dtype=np.float64))
+
+
+def _once(at_s: FloatArray) -> FloatArray:
+    """The first of edges that come so soon after each other that they are of one trigger."""
+    return at_s[np.diff(at_s, prepend=-np.inf) > _TWICE_S]
+
+
+def _placed(at_s: float, origins_s: FloatArray, epochs: pd.DataFrame, *, alone: bool, layout: Layout) -> Pulse:
+    """A pulse with the tap before it, or one shortly after it."""
+    epoch = epochs[(epochs["onset"] <= at_s) & (at_s < epochs["onset"] + epochs["duration"])]
+    said = {str(key): value for key, value in epoch.iloc[0].items()} if len(epoch) else {}
+    sweep_s = (float(said["onset"]), float(said["onset"] + said["duration"])) if said else None
+    if sweep_s is not None:
+        origins_s = origins_s[(origins_s >= sweep_s[0] - 1e-9) & (origins_s < sweep_s[1])]
+    condition = said.get("condition")
+    alone = alone or says_alone(condition, None)
+    isi_s = _isi_s(at_s, origins_s, layout.longest_isi_ms / 1e3)
+    lost = isi_s is None and isinstance(condition, str) and plain(condition) in {"paired", "unknown"}
+    return Pulse(at_s, isi_s, alone, lost, sweep_s, said)
+
+
+def _isi_s(at_s: float, origins_s: FloatArray, longest_s: float) -> float | None:
+    """The time from the last tap to a pulse [s], below 0 if the tap came shortly after it; None if there is none."""
+    before = origins_s[(origins_s <= at_s) & (origins_s >= at_s - longest_s)]
+    after = origins_s[(origins_s > at_s) & (origins_s <= at_s + _EARLY_S)]
+    nearest = before[-1] if len(before) else after[0] if len(after) else None
+    return None if nearest is None else float(at_s - nearest)
+
+
+def _with_the_unmarked(pulses: list[Pulse], layout: Layout, source: str) -> list[Pulse]:
+    """Pulses of which the file says whether a tap came, or the operator does."""
+    for pulse in pulses:
+        if pulse.alone and pulse.isi_s is not None:
+            raise InvalidValueError(
+                f"an event of {source} says TMS alone, and a tap came {1e3 * pulse.isi_s:.0f} ms before the pulse",
+                got=f"at {pulse.at_s:.3f} s",
+                remedy="Are both markers the right ones? Say --marker alone=NAME and --marker tap=NAME.",
+            )
+    paired = [pulse for pulse in pulses if pulse.isi_s is not None]
+    if (early := sum((pulse.isi_s or 0.0) < 0 for pulse in paired)) > 2 and 2 * early > len(paired):
+        raise InvalidValueError(
+            f"most pulses of {source} come before the tap, so that they are probably swapped",
+            got=f"{early} of {len(paired)}",
+            remedy="Say which marker is of the tap and which of the pulse: --marker tap=NAME --marker pulse=NAME.",
+        )
+    unmarked = [pulse for pulse in pulses if pulse.isi_s is None and not (pulse.alone or pulse.lost)]
+    if not unmarked or not paired:
+        return pulses
+    if layout.unmarked is None:
+        raise InvalidValueError(
+            f"{counted(len(unmarked), 'pulse')} of {len(pulses)} in {source} have no tap within "
+            f"{layout.longest_isi_ms:g} ms before them, and nothing says whether none came or its marker is missing",
+            got=f"the first at {unmarked[0].at_s:.3f} s",
+            remedy="Say --unmarked alone if they are TMS alone, or --unmarked lost to leave them out; or name the "
+            "events that mark TMS alone: --marker alone=NAME.",
+        )
+    return [replace(one, lost=layout.unmarked == "lost") if one in unmarked else one for one in pulses]

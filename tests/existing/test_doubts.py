@@ -1,0 +1,275 @@
+"""Files that are not what they look like, in forms that labs have: each is read right, or asked about in a sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import mne
+import numpy as np
+import pandas as pd
+import pytest
+import scipy.io
+
+from existing.test_recordings import (
+    ISIS_MS,
+    KNOWN,
+    NAMES,
+    RATE_HZ,
+    as_brainvision,
+    as_edf,
+    epochs,
+    raw,
+    recording,
+    require_as_written,
+)
+from existing.test_waves import EMG_MV
+from isiw.errors import IsiwError
+from isiw.existing.layout import Layout
+from isiw.existing.reading import read_people
+
+IMPACT = Layout(reference="impact")
+ISIS = np.repeat(np.arange(20.0, 181.0, 20.0), 4)
+
+
+def table(**more: Any) -> pd.DataFrame:
+    """36 pairs, in an order of their own."""
+    rng = np.random.default_rng(4)
+    order = rng.permutation(len(ISIS))
+    cells = {key: np.asarray(value)[order] if len(value) == len(ISIS) else value for key, value in more.items()}
+    return pd.DataFrame({"isi_ms": ISIS[order], "mep_mv": rng.uniform(0.1, 1.0, len(ISIS)).round(4), **cells})
+
+
+def of(kinds: list[str]) -> list[str]:
+    return (kinds * len(ISIS))[: len(ISIS)]
+
+
+def long(column: str, kinds: list[str], *, blocks: bool = False) -> pd.DataFrame:
+    """The rows of each of several kinds, one below the other or beside each other."""
+    parts = pd.concat([table().assign(**{column: kind}) for kind in kinds])
+    return (parts if blocks else parts.sort_index(kind="stable")).reset_index(drop=True)
+
+
+def renamed(**names: str) -> pd.DataFrame:
+    return table().rename(columns=names)
+
+
+def means(name: str, **beside: Any) -> pd.DataFrame:
+    made = pd.DataFrame({"isi_ms": np.unique(ISIS), name: np.linspace(0.1, 0.9, 9)})
+    return made.assign(**beside)
+
+
+ASKED: dict[str, tuple[pd.DataFrame, dict[str, Any], str]] = {
+    "two muscles side by side": (long("muscle", ["FCR", "FDI"]), {}, "'muscle'.*--where \"muscle=FCR\""),
+    "two muscles one after the other": (long("channel", ["APB", "ADM"], blocks=True), {}, "'channel'.*APB, ADM"),
+    "people under another name": (long("Kürzel", ["AB", "CD", "EF"]), {}, '--column "subject=Kürzel"'),
+    "people by numbers": (long("Vpn-Code", ["1", "2", "3", "4"]), {}, "'Vpn-Code'.*1, 2, 3 and 1 other"),
+    "sides": (table(hand=of(["left", "right"])), {}, "'hand'"),
+    "coils in blocks": (long("coil", ["D70", "B65"], blocks=True), {}, "'coil'"),
+    "conditions at each ISI": (table(condition=of(["rest", "active"])), {}, "'condition'.*(rest, active|active, rest)"),
+    "means with their SDs": (means("mep_mv", SD=0.1, N=8), {}, "means of several trials.*beside 'SD'"),
+    "means with standard errors alone": (means("MEP (mV)", **{"s.e.m.": 0.1, "SEM": 0.1}), {}, "means of several"),
+    "means by their name": (renamed(mep_mv="avg_mep_mv"), {"columns": {"mep": "avg_mep_mv"}}, "means of several"),
+    "per cent with a unit": (renamed(mep_mv="MEP %"), {"columns": {"mep": "MEP %"}, "units": ("mV",)},
+                             "relative to others"),
+    "normalised": (renamed(mep_mv="norm mep"), {"columns": {"mep": "norm mep"}, "units": ("mV",)}, "relative"),
+    "logarithms": (renamed(mep_mv="log10 MEP"), {"columns": {"mep": "log10 MEP"}, "units": ("mV",)}, "got 'log10'"),
+    "numbers of samples": (table().assign(isi_ms=np.linspace(810, 1900, 36)), {}, "longer than those of paired"),
+    "a code NA among numbers": (long("subject", ["P01", "NA", "P02"]), {}, "may be a code, or stand for none"),
+    "a value that is not there": (long("muscle", ["FCR", "FDI"]), {"where": {"muscle": "APB"}}, "one of FCR, FDI"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ASKED)
+@pytest.mark.parametrize("suffix", [".csv", ".xlsx"])
+def test_a_table_that_is_not_of_single_trials_is_asked_about(kind: str, suffix: str, tmp_path: Path) -> None:
+    frame, said, expected = ASKED[kind]
+    path = tmp_path / f"P01{suffix}"
+    if suffix == ".csv":
+        frame.to_csv(path, index=False, sep=";")
+    else:
+        frame.to_excel(path, index=False)
+    with pytest.raises(IsiwError, match=expected) as refused:
+        read_people(path, Layout(**{"reference": "impact", **said}))
+    assert len(str(refused.value)) < 500
+
+
+def test_what_was_asked_about_can_be_said() -> None:
+    both = long("muscle", ["FCR", "FDI"])
+    (person,) = read_people(both, IMPACT.saying(where={"muscle": "FDI"}))
+    assert len(person.trials) == 36
+    (person,) = read_people(both, IMPACT.saying(where={"muscle": "*"}))
+    assert len(person.trials) == 72
+    people = read_people(long("Kürzel", ["AB", "CD"]), IMPACT.saying(columns={"subject": "Kürzel"}))
+    assert [one.subject for one in people] == ["AB", "CD"]
+    (person,) = read_people(table().assign(isi_ms=np.linspace(810, 1900, 36)), Layout("impact", longest_isi_ms=2000.0))
+    assert person.space().high_ms == 1900
+
+
+@pytest.mark.parametrize(
+    "beside",
+    [
+        {"latency_ms": np.linspace(18, 24, 36).round(1)},
+        {"response": np.where((ISIS > 60) & (ISIS < 140), "yes", "no")},
+        {"comment": np.where(np.arange(36) % 11 == 0, "cough", "")},
+        {"experimenter": np.full(36, "EK")},
+    ],
+    ids=lambda beside: next(iter(beside)),
+)
+def test_a_column_that_tells_nothing_apart_at_each_isi_is_named_and_no_more(beside: dict[str, Any]) -> None:
+    made = table(**beside)
+    (person,) = read_people(made, IMPACT)
+    assert person.unused == tuple(beside)
+
+
+def test_a_person_may_be_called_na() -> None:
+    people = read_people(long("subject", ["AB", "NA", "KL"]), IMPACT)
+    assert [one.subject for one in people] == ["AB", "NA", "KL"]
+    (person,) = read_people(long("subject", ["NA"]), IMPACT)
+    assert person.subject == "NA"
+
+
+def test_a_german_workbook_is_read_at_once(tmp_path: Path) -> None:
+    made = pd.DataFrame(
+        {
+            "Proband": "AB", "Nr.": range(1, 5), "Intervall (ms)": [10, "nur TMS", 40, 80],
+            "MEP-Amplitude (mV)": ["0,1", "0,12", "0,5", "0,7"], "verworfen": ["nein", "nein", "ja", "nein"],
+        }
+    )  # fmt: skip
+    with pd.ExcelWriter(tmp_path / "Daten.xlsx") as book:
+        pd.DataFrame({"Studie": ["Klopfen"], "Leitung": ["EK"]}).to_excel(book, sheet_name="Angaben", index=False)
+        made.to_excel(book, sheet_name="Messung", index=False, startrow=1)
+    (person,) = read_people(tmp_path / "Daten.xlsx", IMPACT)
+    assert person.subject == "AB"
+    assert [trial.isi_ms for trial in person.trials] == [10, None, 40, 80]
+    assert [trial.told for trial in person.trials] == [True, True, False, True]
+    with pd.ExcelWriter(tmp_path / "Daten.xlsx") as book:
+        for name in ("A", "B"):
+            made.rename(columns={"Intervall (ms)": "dt"}).to_excel(book, sheet_name=name, index=False)
+    with pytest.raises(IsiwError, match=r"no sheet .*A \(Proband, Nr\., dt.*--sheet NAME"):
+        read_people(tmp_path / "Daten.xlsx", IMPACT)
+    pd.DataFrame([["", ""], [1, 2]]).to_excel(tmp_path / "leer.xlsx", index=False, header=False)
+    with pytest.raises(IsiwError, match="got 'no names'"):
+        read_people(tmp_path / "leer.xlsx", IMPACT)
+
+
+def with_events(change: Callable[[list[tuple[float, str]]], list[tuple[float, str]]]) -> Any:
+    made = raw()
+    rows = change(sorted(recording()[1]))
+    return made.set_annotations(mne.Annotations([at for at, _ in rows], 0.0, [name for _, name in rows]))
+
+
+def test_pulses_without_a_tap_among_pairs_are_asked_about_and_are_what_is_said() -> None:
+    asking = Layout(reference="impact", markers=NAMES, channels={"emg": "FCR"})
+    with pytest.raises(IsiwError, match=r"1 pulse of 6 .*--unmarked alone .*--unmarked lost"):
+        read_people(raw(), asking)
+    missing = with_events(lambda rows: rows[:2] + rows[3:])  # the second tap's marker
+    with pytest.raises(IsiwError, match="2 pulses of 6"):
+        read_people(missing, asking)
+    (person,) = read_people(missing, asking.saying(unmarked="lost"))
+    assert [str(trial.reason or "") for trial in person.trials] == ["", "no impact", "", "", "", "no impact"]
+    require_as_written(read_people(raw(), asking.saying(unmarked="alone"))[0])
+    said = with_events(lambda rows: [*rows[:-1], (rows[-1][0], "TMS alone")])
+    require_as_written(read_people(said, asking)[0])
+    with pytest.raises(IsiwError, match="says TMS alone, and a tap came 30 ms before"):
+        read_people(with_events(lambda rows: [*rows, (rows[1][0], "TMS alone")]), asking)
+
+
+def test_a_pulse_just_before_the_tap_is_a_mistrial_in_a_recording_as_in_a_table() -> None:
+    early = with_events(lambda rows: [(rows[1][0] + 0.002, rows[0][1]), *rows[1:]])
+    (person,) = read_people(early, KNOWN)
+    (other,) = read_people(pd.DataFrame({"isi_ms": [-2.0, 60, 90], "mep_mv": [0.4, 0.9, 1.6]}), IMPACT)
+    for one in (person, other):
+        assert str(one.trials[0].reason) == "TMS before impact"
+        assert one.trials[0].isi_ms == pytest.approx(-2.0)
+
+
+@pytest.mark.parametrize("later_s", [0.0005, 0.0019])
+def test_a_trigger_of_the_tap_that_is_found_twice_is_one(later_s: float) -> None:
+    twice = with_events(
+        lambda rows: sorted([*rows, *((at + later_s, name) for at, name in rows if name == NAMES["tap"])])
+    )
+    (person,) = read_people(twice, KNOWN)
+    require_as_written(person)
+
+
+def test_an_annotation_of_bad_data_leaves_the_events_of_a_stim_channel(tmp_path: Path) -> None:
+    emg_mv, stimuli = recording()
+    stim = np.zeros_like(emg_mv)
+    for at_s, name in stimuli:
+        stim[round(at_s * RATE_HZ)] = int(name[-1])
+    made = mne.io.RawArray(np.array([1e-3 * emg_mv, stim]), mne.create_info(["FCR", "STI"], RATE_HZ, ["emg", "stim"]))
+    made.set_annotations(mne.Annotations([12.5], [0.5], ["BAD_movement"]))
+    made.save(tmp_path / "P01_raw.fif")
+    layout = Layout(reference="impact", markers={"tap": "1", "pulse": "2"}, unmarked="alone")
+    require_as_written(read_people(tmp_path / "P01_raw.fif", layout)[0])
+
+
+@pytest.mark.parametrize("unit", ["mv", "microV", "nV"])
+def test_a_unit_of_brainvision_is_read_as_the_header_writes_it(unit: str, tmp_path: Path) -> None:
+    path = as_brainvision(tmp_path)
+    factor = {"mv": 1e3, "nV": 1e-3}.get(unit, 1.0)
+    text = path.read_text(encoding="utf-8").replace(",0.001,µV", f",{0.001 / factor:g},{unit}")
+    assert unit in text
+    path.write_text(text, encoding="utf-8")
+    require_as_written(read_people(path, KNOWN)[0])
+
+
+def eeglab(path: Path, scale: float, *more: dict[str, Any], cut: slice = slice(0)) -> Path:
+    emg = scale * EMG_MV
+    stimuli: list[dict[str, Any]] = [{"type": name, "latency": 1 + round(at * RATE_HZ)} for at, name in recording()[1]]
+    kept = np.ones(len(emg), dtype=bool)
+    kept[cut] = False
+    for one in stimuli:
+        one["latency"] = float(one["latency"] - (~kept[: int(one["latency"])]).sum())
+    eeg = {"data": emg[None, kept], "srate": RATE_HZ, "nbchan": 1.0, "pnts": float(kept.sum()), "trials": 1.0}
+    events = [{"duration": 0.0, **one} for one in (*stimuli, *more)]
+    scipy.io.savemat(path / "P01.set", {"EEG": {**eeg, "event": events, "chanlocs": [{"labels": "FCR"}] * 1}})
+    return path / "P01.set"
+
+
+def test_a_stated_unit_is_that_of_the_numbers_of_an_eeglab_file(tmp_path: Path) -> None:
+    path = eeglab(tmp_path, 1.0)
+    with pytest.raises(IsiwError, match="--unit mV"):
+        read_people(path, KNOWN)
+    require_as_written(read_people(path, KNOWN.saying(units=("mV",)))[0])
+    (person,) = read_people(eeglab(tmp_path, 1e3), KNOWN)
+    require_as_written(person)
+    assert "µV are usual" in person.notes[0]
+
+
+def test_what_was_cut_out_of_an_eeglab_file_is_a_gap(tmp_path: Path) -> None:
+    gap = slice(8400, 10000)  # 0.1 s after a tap of another kind, up to 2.5 s
+    boundary = {"type": "boundary", "latency": 8400.5, "duration": 1600.0}
+    require_as_written(read_people(eeglab(tmp_path, 1e3, boundary, cut=gap), KNOWN)[0])
+
+
+def test_a_stated_unit_is_used_or_refused() -> None:
+    with pytest.raises(IsiwError, match=r"cannot be in mV.*say --unit V"):
+        read_people(raw(), KNOWN.saying(units=("mV",)))
+    (person,) = read_people(raw(1e3), KNOWN.saying(units=("mV",)))
+    require_as_written(person)
+
+
+def test_epochs_about_the_tap_are_cut_at_the_pulse() -> None:
+    whole = raw()
+    found, ids = mne.events_from_annotations(whole, regexp=NAMES["tap"])
+    held = pd.DataFrame({"isi_ms": ISIS_MS})
+    made = mne.Epochs(whole, found, ids, -0.3, 0.3, baseline=None, preload=True, metadata=held)
+    (person,) = read_people(made, KNOWN)
+    (other,) = read_people(epochs(), KNOWN)
+    assert [trial.mep_mv for trial in person.trials] == pytest.approx(
+        [trial.mep_mv for trial in other.trials][:5], rel=0.01
+    )
+
+
+def test_rectified_emg_is_said(tmp_path: Path) -> None:
+    made = raw()
+    made.apply_function(np.abs, picks="all")
+    (person,) = read_people(made, KNOWN)
+    assert "as if it was rectified" in person.notes[0]
+    made = raw()
+    made.apply_function(lambda values: values + 2e-3, picks="all")  # an offset is none
+    assert read_people(made, KNOWN)[0].notes == ()
+    assert read_people(as_edf(tmp_path), KNOWN)[0].notes == ()

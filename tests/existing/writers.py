@@ -1,0 +1,253 @@
+"""One recording in the formats of other programs, each written by that format's own library.
+
+Where none writes it, it is written here, from the structure that its readers know: XDF, .acq and .smr.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import struct
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pandas as pd
+import pynwb
+import pyreadstat
+import scipy.io
+from bioread import headers as bh
+from neo.rawio import spike2rawio
+
+from existing.test_recordings import ISIS_MS, MEPS_MV, NAMES, RATE_HZ, as_edf, epochs, recording
+
+WORDS = {NAMES["tap"]: "tap", NAMES["pulse"]: "TMS"}
+
+
+def named_events() -> list[tuple[float, str]]:
+    return [(at_s, WORDS[name]) for at_s, name in sorted(recording()[1])]
+
+
+def chunk(tag: int, content: bytes) -> bytes:
+    return b"\x04" + struct.pack("<IH", len(content) + 2, tag) + content
+
+
+def header(number: int, name: str, kind: str, form: str, rate_hz: float, channels: str = "") -> bytes:
+    info = f"<info><name>{name}</name><type>{kind}</type><channel_count>1</channel_count><nominal_srate>{rate_hz:g}"
+    info += f"</nominal_srate><channel_format>{form}</channel_format><hostname>rig</hostname>"
+    text = f'<?xml version="1.0"?>{info}<desc>{channels}</desc></info>'
+    return chunk(2, struct.pack("<I", number) + text.encode())
+
+
+def as_xdf(path: Path, *, gap_s: float = 0.0, jitter_s: float = 0.0, offset_s: float = 0.0) -> Path:
+    """A stream of EMG in chunks of 32 samples, and one of markers, whose clock is behind by an offset.
+
+    Args:
+        path: the folder.
+        gap_s: how much was not recorded, from 3.2 s on.
+        jitter_s: SD of the time of a chunk.
+        offset_s: of the clock of the markers.
+    """
+    (emg_mv, _), rng = recording(), np.random.default_rng(2)
+    labels = "<channels><channel><label>FCR</label><unit>microvolts</unit><type>EMG</type></channel></channels>"
+    parts = [b"XDF:", chunk(1, b"<?xml version='1.0'?><info><version>1.0</version></info>")]
+    parts.append(header(1, "Amplifier", "EMG", "float32", RATE_HZ, labels))
+    parts.append(header(2, "Markers", "Markers", "string", 0.0))
+    times_s = 1000.0 + np.arange(len(emg_mv)) / RATE_HZ
+    for first in range(0, len(emg_mv), 32):
+        kept = [n for n in range(first, min(first + 32, len(emg_mv))) if not 0 <= times_s[n] - 1003.2 < gap_s]
+        if kept:  # the first sample has a time, and the others follow it at the rate of the stream
+            late_s = jitter_s * rng.standard_normal()
+            values = np.zeros(len(kept) - 1, [("stamp", "u1"), ("value", "<f4")])
+            values["value"] = 1e3 * emg_mv[kept[1:]]
+            samples = b"\x08" + struct.pack("<df", times_s[kept[0]] + late_s, 1e3 * emg_mv[kept[0]]) + values.tobytes()
+            parts.append(chunk(3, struct.pack("<IBI", 1, 4, len(kept)) + samples))
+    for at_s, name in named_events():
+        content = struct.pack("<Bd", 8, 1000.0 - offset_s + at_s) + b"\x01" + bytes([len(name)]) + name.encode()
+        parts.append(chunk(3, struct.pack("<IBB", 2, 1, 1) + content))
+    for number, behind_s in ((1, 0.0), (2, offset_s)):
+        parts += [chunk(4, struct.pack("<Idd", number, at_s, behind_s)) for at_s in np.linspace(1000, 1014, 8)]
+        parts.append(chunk(6, struct.pack("<I", number) + b"<?xml version='1.0'?><info></info>"))
+    (path / "P01.xdf").write_bytes(b"".join(parts))
+    return path / "P01.xdf"
+
+
+def filled(kind: Any, revision: int = 38, **values: Any) -> bytes:
+    """A header of AcqKnowledge 3.7."""
+    held = kind.for_revision(revision, "<")._struct_class()  # noqa: SLF001 - bioread writes no files
+    for key, value in values.items():
+        setattr(held, key, value)
+    return bytes(held)
+
+
+def as_acq(path: Path) -> Path:
+    """EMG in whole numbers with a scale and an offset, an empty channel, and event markers."""
+    digital = np.round((1e3 * recording()[0] - 7.0) / 0.05).astype("<i2")  # µV
+    items = b""
+    for at_s, name in named_events():
+        text = name.encode() + b"\0"
+        items += filled(bh.MarkerItemHeader, lSample=round(at_s * RATE_HZ), nTextLength=len(text) - 1) + text
+    size = {"lChanHeaderLen": len(filled(bh.ChannelHeader)), "nVarSampleDivider": 1, "lBufLength": len(digital)}
+    graph = {"lVersion": 38, "lExtItemHeaderLen": len(filled(bh.GraphHeader)), "nChannels": 2}
+    parts = [
+        filled(bh.GraphHeader, dSampleTime=1000 / RATE_HZ, **graph),
+        filled(bh.ChannelHeader, szCommentText=b"FCR", szUnitsText=b"uV", dAmplScale=0.05, dAmplOffset=7.0, **size),
+        filled(bh.ChannelHeader, szCommentText=b"ECG", szUnitsText=b"mV", dAmplScale=1.0, **size),
+        filled(bh.ForeignHeader, nLength=4),
+        2 * filled(bh.ChannelDTypeHeader, nSize=2, nType=2),
+        np.stack([digital, 0 * digital], axis=1).tobytes(),
+        filled(bh.MarkerHeader, lLength=len(items) + 8, lMarkers=len(named_events())) + items,
+        filled(bh.JournalHeader, tag=(0x44, 0x33, 0x22, 0x11)),
+    ]
+    (path / "P01.acq").write_bytes(b"".join(parts))
+    return path / "P01.acq"
+
+
+def as_smr(path: Path, *, paused: bool = False) -> Path:
+    """A waveform in blocks of whole numbers, a level of the tap, and events of the pulse; ticks are 10 µs."""
+    digital = np.round(1e3 * recording()[0] / (1.25 / 6553.6 * 1e3) - 0.5).astype("<i2")
+    ticks = {word: [round(1e5 * at_s) for at_s, name in named_events() if name == word] for word in WORDS.values()}
+    wave = [(25 * first, digital[first : first + 8000]) for first in range(0, len(digital), 8000)]
+    wave = [
+        each for number, each in enumerate(wave) if not (paused and number == 1)
+    ]  # from 2 to 4 s, no stimulus but one
+    level = np.array([[at, at + 500] for at in ticks["tap"]], "<i4").ravel()  # rises, and falls after 5 ms
+    channels = {
+        ("FCR", 1): [(at, at + 25 * (len(values) - 1), values) for at, values in wave],
+        ("tap", 4): [(level[0], level[-1], level)],
+        ("TMS", 3): [(ticks["TMS"][0], ticks["TMS"][-1], np.array(ticks["TMS"], "<i4"))],
+    }
+    content, heads = bytearray(512 * 4), b""
+    for number, ((title, kind), blocks) in enumerate(channels.items()):
+        first = len(content) // 512
+        for place, (begin, end, values) in enumerate(blocks):
+            length = -(-(20 + values.nbytes) // 512)
+            after = len(content) // 512 + length if place + 1 < len(blocks) else -1
+            block = struct.pack("<iiiihh", -1, after, begin, end, number + 1, len(values)) + values.tobytes()
+            content += block.ljust(512 * length, b"\0")
+        said = {"firstblock": first, "lastblock": -1, "blocks": len(blocks), "l_chan_dvd": 25, "kind": kind,
+                "title": bytes([len(title)]) + title.encode()}  # fmt: skip
+        head = np.zeros(1, np.dtype(spike2rawio.channelHeaderDesciption1))
+        for key, value in said.items():
+            head[key] = value
+        more = struct.pack("<ff6sh", 1.25, 0.000095, b"\x02mV", 0) if kind == 1 else struct.pack("<BB", 1, 0)
+        heads += (head.tobytes() + more).ljust(140, b"\0")
+    top = np.zeros(1, np.dtype(spike2rawio.headerDescription))
+    for key, value in {"system_id": 9, "us_per_time": 10, "channels": 3, "dtime_base": 1e-6}.items():
+        top[key] = value
+    content[: 512 + len(heads)] = top.tobytes().ljust(512, b"\0") + heads
+    (path / "P01.smr").write_bytes(content)
+    return path / "P01.smr"
+
+
+def as_nwb(path: Path, *, stamped: bool = False) -> Path:
+    """A series in µV that is stored in another scale, an annotation for each stimulus, and a series beside it."""
+    file = pynwb.NWBFile(
+        session_description="paired stimulation",
+        identifier="P01",
+        session_start_time=dt.datetime(2026, 1, 31, tzinfo=dt.UTC),
+    )
+    emg_mv, _ = recording()
+    times: Any = (
+        {"timestamps": 5.0 + np.arange(len(emg_mv)) / RATE_HZ} if stamped else {"rate": RATE_HZ, "starting_time": 5.0}
+    )
+    data = np.round((emg_mv - 0.01) * 5e3).astype(np.int16)
+    file.add_acquisition(
+        pynwb.TimeSeries(name="EMG FCR", data=data, unit="volts", conversion=2e-7, offset=1e-5, **times)
+    )
+    file.add_acquisition(pynwb.TimeSeries(name="force", data=0 * data, unit="N", rate=RATE_HZ))
+    for word in WORDS.values():
+        table = pynwb.event.EventsTable(name=word, description="when it came")
+        for at_s, name in named_events():
+            if name == word:
+                table.add_event(timestamp=5.0 + at_s)
+        file.add_events_table(table)
+    with pynwb.NWBHDF5IO(path / "P01.nwb", "w") as held:
+        held.write(file)
+    return path / "P01.nwb"
+
+
+def as_eeglab_epochs(path: Path) -> Path:
+    """Epochs about the pulse in EEGLAB's structure, each with the events within it."""
+    emg_mv, stimuli = recording()
+    firsts = [round((at_s - 0.3) * RATE_HZ) for at_s, name in stimuli if name == NAMES["pulse"]]
+    length = round(0.4 * RATE_HZ)
+    within = [
+        {"type": name, "latency": n * length + round(at_s * RATE_HZ) - first + 1.0, "epoch": n + 1.0}
+        for n, first in enumerate(firsts)
+        for at_s, name in stimuli
+        if 0 <= at_s * RATE_HZ - first < length
+    ]
+    data = 1e3 * np.stack([emg_mv[first : first + length] for first in firsts], axis=1)[None]
+    eeg = {"data": np.concatenate([0 * data, data]), "srate": RATE_HZ, "nbchan": 2.0, "pnts": float(length),
+           "xmin": -0.3, "trials": float(len(firsts)), "event": within,
+           "chanlocs": [{"labels": "Cz"}, {"labels": "FCR"}]}  # fmt: skip
+    scipy.io.savemat(path / "P01.set", {"EEG": eeg})
+    return path / "P01.set"
+
+
+def as_fif_epochs(path: Path) -> Path:
+    """Epochs about the pulse without metadata, whose annotations say what came when."""
+    made = epochs()
+    made.metadata = None
+    made.save(path / "P01-epo.fif")
+    return path / "P01-epo.fif"
+
+
+def without_records(path: Path, *left_out: int) -> Path:
+    """An EDF+ file of which some records were not recorded, as EDF+D has it."""
+    content = path.read_bytes()
+    bdf = content[:1] == b"\xff"
+    head, records = int(content[184:192]), int(content[236:244])
+    size = (len(content) - head) // records
+    kept = b"".join(content[head + n * size :][:size] for n in range(records) if n not in left_out)
+    said = b"BDF+D" if bdf else b"EDF+D"
+    count = str(records - len(left_out)).ljust(8).encode()
+    path.write_bytes(content[:192] + said + content[197:236] + count + content[244:head] + kept)
+    return path
+
+
+RECORDINGS: Mapping[str, Callable[[Path], Path]] = {
+    "XDF": as_xdf,
+    "XDF with jitter": lambda path: as_xdf(path, jitter_s=0.004),
+    "XDF with two clocks": lambda path: as_xdf(path, offset_s=2.5),
+    "AcqKnowledge": as_acq,
+    "Spike2": as_smr,
+    "NWB": as_nwb,
+    "NWB with timestamps": lambda path: as_nwb(path, stamped=True),
+    "epochs of EEGLAB": as_eeglab_epochs,
+    "epochs of FIF without metadata": as_fif_epochs,
+    "EDF in mv": lambda path: as_edf(path, "mv", 1.0),
+    "EDF in microV": lambda path: as_edf(path, "microV", 1e3),
+    "EDF in nV": lambda path: as_edf(path, "nV", 1e6),
+    "BDF in uv": lambda path: as_edf(path, "uv", 1e3, bdf=True),
+}
+
+
+def as_matlab_73(path: Path, **arrays: Any) -> Path:
+    """Arrays as MATLAB 7.3 has them: HDF5 behind 512 bytes, with each dimension's order turned round."""
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, array in arrays.items():
+            held = file.create_dataset(name, data=np.atleast_2d(np.asarray(array, dtype=float)).T)
+            held.attrs["MATLAB_class"] = np.bytes_("double")
+    content = bytearray(path.read_bytes())
+    content[:128] = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM"
+    path.write_bytes(content)
+    return path
+
+
+def as_statistics(path: Path) -> Path:
+    """A table with labels of columns, which have the units, and of a value."""
+    frame = pd.DataFrame({"isi": [*ISIS_MS, -1.0], "mep": [1e3 * mep for mep in (*MEPS_MV, 0.3)]})
+    said: dict[str, Any] = {
+        "column_labels": ["Interval (ms)", "Peak to peak (µV)"],
+        "variable_value_labels": {"isi": {-1.0: "single"}},
+    }
+    if path.suffix == ".dta":
+        frame["isi"] = frame["isi"].astype(int)
+        said["variable_value_labels"] = {"isi": {-1: "single"}}
+        pyreadstat.write_dta(frame, str(path), **said)
+    else:
+        pyreadstat.write_sav(frame, str(path), **said)
+    return path
