@@ -186,7 +186,7 @@ def sync_folder(folder: Path) -> None:
             raise
         if (place := os.path.realpath(folder)) not in _said:
             _said.add(place)
-            why = f"The disk of {folder} cannot sync a folder ({error.strerror}), as some network disks. It is used."
+            why = f"The disk of {place} cannot sync a folder ({error.strerror}), as some network disks. It is used."
             warn(f"{why} After a power cut the newest log there may have its name from before.", DiskWarning)
 
 

@@ -43,7 +43,7 @@ def client_of(folder: Path, **rules: Any) -> Iterator[httpx.Client]:
         thread.start()
         port = listener.getsockname()[1]
         try:
-            with httpx.Client(base_url=f"http://127.0.0.1:{port}", headers=BEARER, timeout=30.0) as client:
+            with httpx.Client(base_url=f"http://127.0.0.1:{port}", headers=BEARER, timeout=120.0) as client:
                 yield client
         finally:
             server.should_exit = True

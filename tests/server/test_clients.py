@@ -47,7 +47,7 @@ def test_two_clients_that_name_the_same_trial_are_not_both_given_it(
     pulses: list[float] = []
 
     def loop(who: str | None) -> None:
-        with httpx.Client(base_url=client.base_url, headers=BEARER, timeout=30.0) as own:
+        with httpx.Client(base_url=client.base_url, headers=BEARER, timeout=120.0) as own:
             for trial in range(3):
                 response = asked(own, session, trial, who)
                 if response.status_code == 200:
@@ -142,7 +142,7 @@ def test_a_session_that_was_closed_is_resumed_by_any_client(client: httpx.Client
 
 @pytest.mark.slow
 def test_the_key_outlives_a_server_that_is_killed(tmp_path: Path) -> None:
-    with server(tmp_path) as (_, url), httpx.Client(base_url=url, headers=BEARER, timeout=30.0) as client:
+    with server(tmp_path) as (_, url), httpx.Client(base_url=url, headers=BEARER, timeout=120.0) as client:
         session = created(client, client="A")
         done(asked(client, session, 0, "A"))
     with client_of(tmp_path) as client:

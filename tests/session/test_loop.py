@@ -74,7 +74,7 @@ def test_the_intent_is_on_disk_before_the_device_is_called(log: Path) -> None:
 
     def answer(stimulus: Stimulus) -> Measurement | Sweep:
         last = instance(Intent, read_session(log).history[-1])
-        assert last == Intent(trial=stimulus.trial, isi_ms=stimulus.isi_ms, t_s=last.t_s)
+        assert last == Intent.of(stimulus, last.t_s, boot_id=last.boot_id, boot_s=last.boot_s)
         return Measurement(0.1, stimulus.isi_ms)
 
     device.answer = answer

@@ -154,7 +154,7 @@ def exclude(path: str | Path, trial: int, reason: str) -> None:
         DamagedLogError: the log's end is missing; resume the session first.
         InvalidValueError: no such trial, or one that counts for nothing anyway.
     """
-    _judge(path, lambda trials, events: exclusion(trials, trial, reason, events))
+    _judge(path, lambda trials, events: exclusion(trials, trial, reason, events=events))
 
 
 def include(path: str | Path, trial: int) -> None:
