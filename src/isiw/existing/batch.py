@@ -101,8 +101,7 @@ def _read(source: Path, way: Way) -> Iterator[Person]:
             remedy="ISIs of one cannot be compared with those of the other: correct one of them.",
         )
     people = read_people(source, layout, subject=way.subject)
-    with opened(source) as file:
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
+    digest = _sha256(source)
     for delivered in people:
         visit = replace(way.visit, day=delivered.visit.day or way.visit.day)
         simulated = way.simulated or delivered.simulated
@@ -116,6 +115,15 @@ def _read(source: Path, way: Way) -> Iterator[Person]:
         }
         as_logged = json.loads(json.dumps(made_of))  # a log knows no tuples
         yield Person(replace(delivered, visit=visit, simulated=simulated), None, as_logged)
+
+
+def _sha256(source: Path) -> str:
+    """The hash of a file, which may be larger than the memory."""
+    digest = hashlib.sha256()
+    with opened(source) as file:
+        while block := file.read(2**20):
+            digest.update(block)
+    return digest.hexdigest()
 
 
 def _paths(people: Sequence[Delivered], output: str | Path | None) -> list[Path | None]:
