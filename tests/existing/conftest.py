@@ -2,22 +2,35 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
-from isiw.existing import Delivered, Layout, ReadingLimits, reading
+from isiw.existing import Layout, ReadingLimits, reading
+from isiw.existing.answer import Answer
+
+looking = importlib.import_module("isiw.existing.look")  # the module; isiw.existing.look is its function
 
 
 def _read_here(
-    path: Path, layout: Layout, subject: str, limits: ReadingLimits, also: Sequence[str | Path] = ()
-) -> list[Delivered]:
+    path: Path,
+    layout: Layout,
+    subject: str,
+    limits: ReadingLimits,
+    also: Sequence[str | Path] = (),
+    *,
+    look: bool = False,
+) -> Answer:
     assert not also
-    return reading.people_in(path, layout, subject, limits)
+    if look:
+        return looking.seen_in(path, layout, limits, lambda _rows: None)
+    return Answer(reading.people_in(path, layout, subject, limits), {})
 
 
 @pytest.fixture(autouse=True)
 def read_here(monkeypatch: pytest.MonkeyPatch) -> None:
     """In the place of `read_apart`; tests of that process have a fixture of this name that does nothing."""
-    monkeypatch.setattr(reading, "read_apart", _read_here)
+    for module in (reading, looking):
+        monkeypatch.setattr(module, "read_apart", _read_here)

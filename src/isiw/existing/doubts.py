@@ -62,7 +62,7 @@ def require_single_trials(mep: str, isis: Sequence[object], names: Sequence[str]
         source: the table in words.
     """
     others = [name for name in names if name != mep]
-    spreads = [name for name in others if set(_words(name)) & _SPREADS and "isi" not in _words(name)]
+    spreads = [name for name in others if re.sub("mep|amplitude|of", "", letters(name)) in _SPREADS]
     numbers = [name for name in others if letters(name) in _NUMBERS]
     said = set(_words(mep)) & _MEANS
     once = len(isis) > 2 and len(set(isis)) == len(isis)

@@ -26,7 +26,7 @@ _SAME: Final = 1.5
 def read(path: Path, _layout: Layout) -> Contents:
     """The contents of a file that MNE reads."""
     mne = library("mne", "import")
-    if re.search(r"epo\.fif(\.gz)?$", path.name):
+    if re.search(r"\.fif(\.gz)?$", path.name) and re.search(r"epo(chs)?\b", path.name):
         return of_epochs(mne.read_epochs(path, verbose="ERROR"), path.name)
     return of_raw(mne.io.read_raw(path, verbose="ERROR"), path.name, bids_events(path))
 
@@ -43,7 +43,8 @@ def of_epochs(epochs: Any, source: str = "the epochs") -> Contents:
     data = {index: epochs.get_data(picks=[index], verbose="ERROR")[:, 0] for index in range(len(epochs.ch_names))}
     length, count = len(epochs.times), len(epochs)
     stretches = tuple(Stretch(n * length, length, n * APART_S) for n in range(count))
-    tracks = tuple(_tracks(epochs, stretches, lambda index: partial(_of_sweeps, data[index].ravel())))
+    flat = {index: values.ravel() for index, values in data.items()}
+    tracks = tuple(_tracks(epochs, stretches, lambda index: lambda first, last: flat[index][first:last]))
     if epochs.metadata is not None:
         return Contents(source, tracks, _zeros(epochs), epochs.metadata, -float(epochs.tmin), empty_is_alone=True)
     noted = [
@@ -78,10 +79,6 @@ def _tracks(held: Any, stretches: tuple[Stretch, ...], reader: Any) -> Iterator[
 def _values(raw: Any, index: int, first: int, last: int) -> FloatArray:
     values: FloatArray = raw.get_data(picks=[index], start=first, stop=last, verbose="ERROR")[0]
     return values
-
-
-def _of_sweeps(values: FloatArray, first: int, last: int) -> FloatArray:
-    return values[first:last]
 
 
 def _divided(read: Any, scale: float, first: int, last: int) -> FloatArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import gzip
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
@@ -21,11 +21,11 @@ from isiw.types import FloatArray
 _SCATTER_S = 2e-3
 
 
-def read(path: Path, _layout: Layout) -> Contents:
+def read(path: Path, layout: Layout) -> Contents:
     """The channels and markers of all streams, on one clock; gaps are found here, since pyxdf smooths them away."""
     load = library("pyxdf", "import").load_xdf
     with opened(path) as plain, gzip.open(plain) if path.suffix.casefold() == ".xdfz" else nullcontext(plain) as file:
-        streams, _ = load(file, dejitter_timestamps=False, verbose=False)
+        streams, _ = load(file, on_chunk=partial(_needed, layout), dejitter_timestamps=False, verbose=False)
     streams = [stream for stream in streams if len(stream["time_stamps"])]
     begun_s = min((float(stream["time_stamps"][0]) for stream in streams), default=0.0)
     hosts = {_said(stream["info"], "hostname") for stream in streams}
@@ -41,7 +41,7 @@ def read(path: Path, _layout: Layout) -> Contents:
         if of_stream.scatter_s > _SCATTER_S:
             notes.append(f"The times of the stream {name} scatter by {1e3 * of_stream.scatter_s:.1f} ms.")
         values = np.asarray(stream["time_series"])
-        for channel, (label, unit, kind) in enumerate(_channels(stream, name, values.shape[1])):
+        for channel, (label, unit, kind) in enumerate(_kept(stream, layout)):
             tracks.append(
                 Track(label, of_stream.rate_hz, of_stream.stretches, partial(_part, values, channel), unit, kind)
             )
@@ -49,6 +49,20 @@ def read(path: Path, _layout: Layout) -> Contents:
     if twice:
         notes.append(f"Several channels are called {', '.join(sorted(twice))}.")
     return Contents(path.name, tuple(tracks), events_of(sorted(rows, key=lambda row: row[1])), notes=tuple(notes))
+
+
+def _needed(layout: Layout, values: Any, times_s: Any, stream: Any, _number: int) -> tuple[Any, Any, Any]:
+    """Of a piece of a stream the channels that are needed, so that a long one fits into the memory."""
+    if isinstance(values, np.ndarray):
+        every = _channels({"info": stream["info"]})
+        values = values[:, [every.index(channel) for channel in _kept({"info": stream["info"]}, layout)]]
+    return values, times_s, stream
+
+
+def _kept(stream: Mapping[str, Any], layout: Layout) -> list[tuple[str, str, str]]:
+    """The channels that the layout names, or all of a stream that has none of them."""
+    every = _channels(stream)
+    return [channel for channel in every if channel[0] in layout.channels.values()] or every
 
 
 def _part(values: Any, channel: int, first: int, last: int) -> FloatArray:
@@ -78,12 +92,14 @@ def _text(marker: Any) -> str:
     return first if isinstance(first, str) else f"{float(first):g}"
 
 
-def _channels(stream: Mapping[str, Any], name: str, count: int) -> Iterator[tuple[str, str, str]]:
+def _channels(stream: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     """The label, unit and type of each channel of a stream."""
-    described = (stream["info"].get("desc") or [None])[0] or {}
+    info, name = stream["info"], _said(stream["info"], "name")
+    described = (info.get("desc") or [None])[0] or {}
     inner = (described.get("channels") or [None])[0] or {}
-    each = inner.get("channel") or []
+    each, count, found = inner.get("channel") or [], int(_said(info, "channel_count")), []
     for channel in range(count):
         said = each[channel] if channel < len(each) else None
         label = _said(said, "label") or (name if count == 1 else f"{name} {channel + 1}")
-        yield label, _said(said, "unit"), (_said(said, "type") or _kind(stream)).casefold()
+        found.append((label, _said(said, "unit"), (_said(said, "type") or _kind(stream)).casefold()))
+    return found
