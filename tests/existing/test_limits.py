@@ -128,10 +128,11 @@ def test_what_the_process_hands_back_is_what_was_read(tmp_path: Path) -> None:
     channel = Channel(np.array([0.1, np.nan, -2.0]), 4000.0, "mV", -5.0)
     one = Delivered(TrialTable(trials), "impact", subject="é/1", visit=Visit(day=2), sweeps={1: {"emg": channel}},
                     blocks={1: "b"}, unused=("note",))  # fmt: skip
-    write_people(tmp_path, [one, one], {"P01.csv": "0" * 64})
+    write_people(tmp_path, [one, one], {"P01.csv": "0" * 64}, {"lines": ["a channel"]})
     answer = read_answer(tmp_path)
-    assert isinstance(answer, list)
-    for read in answer:
+    assert isinstance(answer, Answer)
+    assert answer.said == {"lines": ["a channel"]}
+    for read in answer.people:
         assert (read.trials, read.subject, read.visit, read.blocks, read.unused) == (
             one.trials, one.subject, one.visit, one.blocks, one.unused,
         )  # fmt: skip
