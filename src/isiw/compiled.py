@@ -112,7 +112,7 @@ def _compiled(function: F, fastmath: set[str], **more: bool | str) -> F:
 if AVAILABLE:
     from numba.core.caching import FunctionCache, IndexDataCacheFile
 
-    class _Files(IndexDataCacheFile):  # type: ignore[misc] # Numba has no types
+    class _Files(IndexDataCacheFile):
         """The files of a loop, each with a checksum behind it: machine code of other bytes may end the process."""
 
         def _save_data(self, name: str, data: object) -> None:
@@ -126,7 +126,7 @@ if AVAILABLE:
                 raise ValueError(name)
             return super()._load_data(name)  # which reads up to the checksum
 
-    class _Kept(FunctionCache):  # type: ignore[misc] # see above
+    class _Kept(FunctionCache):
         """The cache of a loop: where a file of it cannot be used, the loop is compiled, and kept again."""
 
         def __init__(self, function: Callable[..., Any]) -> None:

@@ -25,7 +25,8 @@ def _read_here(
 ) -> Answer:
     assert not also
     if look:
-        return looking.seen_in(path, layout, limits, lambda _rows: None)
+        seen: Answer = looking.seen_in(path, layout, limits, lambda _rows: None)
+        return seen
     return Answer(reading.people_in(path, layout, subject, limits), {})
 
 

@@ -14,7 +14,7 @@ import pytest
 
 from isiw.errors import InvalidValueError
 from isiw.existing import Delivered, Layout, ReadingLimits, read_people, reading
-from isiw.existing.answer import read_answer, write_error, write_people
+from isiw.existing.answer import Answer, read_answer, write_error, write_people
 from isiw.existing.gate import Gate, require_no_links
 from isiw.existing.layout import letters
 from isiw.existing.limits import LARGEST_FACTOR
