@@ -81,13 +81,13 @@ def filled(kind: Any, revision: int = 38, **values: Any) -> bytes:
     return bytes(held)
 
 
-def as_acq(path: Path) -> Path:
-    """EMG in whole numbers with a scale and an offset, an empty channel, and event markers."""
+def as_acq(path: Path, *, before: int = 0) -> Path:
+    """EMG in whole numbers with a scale and an offset, an empty channel, and event markers, from some samples on."""
     digital = np.round((1e3 * recording()[0] - 7.0) / 0.05).astype("<i2")  # µV
-    items = b""
-    for at_s, name in named_events():
+    marks, items = [(0.0, "Segment 1"), (2.0, "Segment 2"), *named_events()], b""  # at 2 s it was stopped, and appended
+    for at_s, name in marks:
         text = name.encode() + b"\0"
-        items += filled(bh.MarkerItemHeader, lSample=round(at_s * RATE_HZ), nTextLength=len(text) - 1) + text
+        items += filled(bh.MarkerItemHeader, lSample=round(at_s * RATE_HZ) - before, nTextLength=len(text) - 1) + text
     size = {"lChanHeaderLen": len(filled(bh.ChannelHeader)), "nVarSampleDivider": 1, "lBufLength": len(digital)}
     graph = {"lVersion": 38, "lExtItemHeaderLen": len(filled(bh.GraphHeader)), "nChannels": 2}
     parts = [
@@ -97,7 +97,7 @@ def as_acq(path: Path) -> Path:
         filled(bh.ForeignHeader, nLength=4),
         2 * filled(bh.ChannelDTypeHeader, nSize=2, nType=2),
         np.stack([digital, 0 * digital], axis=1).tobytes(),
-        filled(bh.MarkerHeader, lLength=len(items) + 8, lMarkers=len(named_events())) + items,
+        filled(bh.MarkerHeader, lLength=len(items) + 8, lMarkers=len(marks)) + items,
         filled(bh.JournalHeader, tag=(0x44, 0x33, 0x22, 0x11)),
     ]
     (path / "P01.acq").write_bytes(b"".join(parts))
@@ -213,6 +213,7 @@ RECORDINGS: Mapping[str, Callable[[Path], Path]] = {
     "XDF with jitter": lambda path: as_xdf(path, jitter_s=0.004),
     "XDF with two clocks": lambda path: as_xdf(path, offset_s=2.5),
     "AcqKnowledge": as_acq,
+    "AcqKnowledge whose numbers of samples begin below 0": lambda path: as_acq(path, before=34304),
     "Spike2": as_smr,
     "NWB": as_nwb,
     "NWB with timestamps": lambda path: as_nwb(path, stamped=True),

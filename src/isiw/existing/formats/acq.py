@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, Final
@@ -14,8 +15,11 @@ from isiw.files import opened
 from isiw.text.named_code import library
 from isiw.types import FloatArray
 
-_APPENDED: Final = "apnd"
-"""The type of a marker where recording was stopped, and continued later."""
+_SEGMENT: Final = re.compile(r"segment \d+", re.IGNORECASE)
+"""What a marker says where recording began, or was continued later."""
+
+_TURNS: Final = 2**32
+"""Numbers of samples below 0 are read as if so many were added."""
 
 
 def read(path: Path, _layout: Layout) -> Contents:
@@ -24,8 +28,10 @@ def read(path: Path, _layout: Layout) -> Contents:
     with opened(path) as file:
         found = reader.read_headers(file)
     held, base_hz = found.datafile, float(found.samples_per_second)
-    marks = [one for one in found.event_markers or () if one.sample_index is not None]
-    cuts_s = sorted(one.sample_index / base_hz for one in marks if one.type_code == _APPENDED and one.sample_index > 0)
+    marks = [(_signed(one), one) for one in found.event_markers or () if one.sample_index is not None]
+    begun = min((at for at, one in marks if _SEGMENT.fullmatch(one.text.strip())), default=0)
+    placed_s = [((at - min(begun, 0)) / base_hz, one) for at, one in marks]
+    cuts_s = sorted(at for at, one in placed_s if _SEGMENT.fullmatch(one.text.strip()) and at > 0)
 
     @cache
     def numbers(channel: int) -> Any:
@@ -38,11 +44,16 @@ def read(path: Path, _layout: Layout) -> Contents:
         stretches = tuple(_between(cuts_s, rate_hz, int(channel.point_count)))
         tracks.append(Track(channel.name.strip(), rate_hz, stretches, partial(_part, numbers, index), channel.units))
     rows = [
-        (one.text.strip() or str(one.type), _moved(one.sample_index / base_hz, cuts_s), 0.0)
-        for one in marks
-        if one.type_code != _APPENDED
+        (one.text.strip() or str(one.type).replace("None", "marker"), _moved(at, cuts_s), 0.0)
+        for at, one in placed_s
+        if not _SEGMENT.fullmatch(one.text.strip())
     ]
     return Contents(path.name, tuple(tracks), events_of(rows))
+
+
+def _signed(marker: Any) -> int:
+    at = int(marker.sample_index)
+    return at - _TURNS if at >= _TURNS // 2 else at
 
 
 def _part(numbers: Any, index: int, first: int, last: int) -> FloatArray:

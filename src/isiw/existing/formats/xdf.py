@@ -39,7 +39,9 @@ def read(path: Path, layout: Layout) -> Contents:
             continue
         of_stream = clocked(times_s, float(_said(stream["info"], "nominal_srate")) or None, f"the stream {name}")
         if of_stream.scatter_s > _SCATTER_S:
-            notes.append(f"The times of the stream {name} scatter by {1e3 * of_stream.scatter_s:.1f} ms.")
+            notes.append(
+                f"The times of the stream {name} scatter by {1e3 * of_stream.scatter_s:.1f} ms: MEPs may lie elsewhere."
+            )
         values = np.asarray(stream["time_series"])
         for channel, (label, unit, kind) in enumerate(_kept(stream, layout)):
             tracks.append(
