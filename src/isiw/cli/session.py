@@ -20,7 +20,7 @@ from isiw.cli.console import (
     free_beside,
     log_exists,
     show,
-    show_paragraph,
+    show_statement,
 )
 from isiw.text.sanitize import command
 
@@ -152,7 +152,8 @@ def _run_to_the_end(session: Session, config: Path | None, *, live: bool, resume
         raise
     record = isiw.read_session(result.log)
     truth = isiw.config.resume.truth_of(record)
-    show_paragraph(f"\n{isiw.report.final_statement(record, config)}")
+    show("")
+    show_statement(isiw.report.final_statement(record, config))
     if truth.known:
         show(isiw.report.words.truth_sentence(record, truth.window))
     show(f"log:     {result.log}")

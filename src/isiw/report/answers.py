@@ -11,6 +11,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from isiw import sentences
 from isiw.dissertation.profiles import best_fit, normality, profile_fits
 from isiw.dissertation.regression import curve_masks
 from isiw.dissertation.response_counts import TrialsByIsi, by_isi, count_trials
@@ -19,7 +20,7 @@ from isiw.findings import Kind
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import EstimateRecord, Event, EventKind
 from isiw.report.tables import lost_rows
-from isiw.report.words import counts_sentence, finding_sentences
+from isiw.report.words import counts_sentence
 from isiw.signals.limits import contradicts_its_times, timed_isi_ms
 from isiw.text.sanitize import counted
 from isiw.trials import Trial
@@ -169,10 +170,10 @@ class MethodAnswer(NamedTuple):
 
 def method_answers(record: SessionRecord) -> list[MethodAnswer]:
     """The estimate of isiw, the dissertation's rule on mean MEPs, response counts, and the form of the profile."""
-    trials = by_isi(record.table)
+    trials, last, space = by_isi(record.table), record.estimates[-1], record.header.space
     estimate = MethodAnswer(
         "isiw's estimate",
-        " ".join(finding_sentences(record)[:2]),
+        f"{sentences.finding(last, record.header.stimulus, space)} {sentences.edges(last, space)}".strip(),
         "Single trials at any ISIs, in their order; TMS alone helps, and is not needed.",
         "Anything reliable about people and noise that its prior does not allow for (docs/model.md).",
     )

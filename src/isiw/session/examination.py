@@ -293,7 +293,7 @@ def learn(strategy: Strategy, trial: Trial) -> None:
     elif trial.counts and trial.isi_ms is not None:  # a tap alone with an amplitude
         strategy.learn_tap(trial.isi_ms, trial.mep_mv)
     elif trial.is_control:
-        strategy.count_control()
+        strategy.count_control(trial.mep_mv if trial.tap_alone and trial.counts else None)
     elif trial.excluded and trial.reason is None:
         strategy.count_excluded()
     else:
