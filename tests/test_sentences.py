@@ -190,8 +190,8 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
             sentences.changed("grew", 1e-5),
             (
                 "The amplitudes grew during the session by more than the ISIs explain (Kendall's test among near "
-                "ISIs, p = 1e-05), and a window may be due to that. Was the intensity changed, did the coil move, or did "
-                "the person tire?"
+                "ISIs, p = 1e-05), and a window may be due to that. Was the intensity changed, did the coil move, or "
+                "did the person tire?"
             ),
         ),
         (sentences.at_rest(None, None), f"In no trial was the EMG after the pulse larger than at rest. {_LOOK}"),

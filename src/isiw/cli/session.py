@@ -140,7 +140,7 @@ def _run_to_the_end(session: Session, config: Path | None, *, live: bool, resume
         )
     before, ours = len(session.trials), resumed or not log_exists(session.log_path)
     try:
-        with errors_reported(_INTERRUPTED), _shown_live(session) if live else nullcontext():
+        with errors_reported(_INTERRUPTED), _shown_live(session, config) if live else nullcontext():
             session.require_effect()
             show(f"log: {session.log_path}")
             result = session.run(progress=True)
@@ -171,9 +171,9 @@ def _run_to_the_end(session: Session, config: Path | None, *, live: bool, resume
 
 
 @contextmanager
-def _shown_live(session: Session) -> Iterator[None]:
+def _shown_live(session: Session, config: Path | None) -> Iterator[None]:
     """Within, the session has a page in the browser."""
-    with isiw.watch(session) as page:
+    with isiw.watch(session, config=config) as page:
         show(f"live page: {page.url}", style="bold")
         yield
 
