@@ -71,14 +71,16 @@ def _timing(record: SessionRecord) -> Answer:
     if not any(errors_ms) and not any(confirmed):
         times = f"{record.header.stimulus.pulse} or {record.header.stimulus.hit} time"
         detail = f"The device reports every ISI exactly as commanded, and no {times} to check it against."
-        answer = _verdict(record, len(rejected), 0) if rejected else "as the device says"
+        answer = _verdict(record, len(rejected), 0) if rejected else "not known: exactly 0 off in all trials"
         return Answer(question, answer, f"{detail} {_listed(rejected)}")
     tolerance_ms = record.header.signals.tolerance_ms(space)
     sizes = f"{statistics.median(errors_ms):.1f} ms (median), at most {max(errors_ms):.1f} ms"
     others = _not_for(record, _OF_TIMING)
     contradicted = [trial.index for trial in others if contradicts_its_times(trial, space)]
     off = sum(abs(trial.isi_error_ms or 0.0) > tolerance_ms or trial.index in contradicted for trial in others)
-    detail = f"Trials that count are off by {sizes}; {tolerance_ms:g} ms are tolerated. {_listed(rejected)}"
+    exactly = "Exactly 0 off in all trials that count, as of a rig that reports its command"
+    off_by = f"Trials that count are off by {sizes}" if any(errors_ms) else exactly
+    detail = f"{off_by}; {tolerance_ms:g} ms are tolerated. {_listed(rejected)}"
     if contradicted:
         detail += f" The times of {_events(record)} contradict the ISI in {_few(contradicted)}."
     return Answer(question, _verdict(record, len(rejected) + off, _known(record, measured=any(errors_ms))), detail)

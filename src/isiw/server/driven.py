@@ -15,6 +15,7 @@ from isiw.log.reader import SessionRecord
 from isiw.server.answers import AskAnswer, EstimateAnswer, Refusal, SessionAnswer, TrialAnswer, failed
 from isiw.server.requests import AskRequest, ExcludeRequest, MistrialRequest, NoteRequest, TellRequest
 from isiw.session.recorder import Recorder
+from isiw.session.state import state_of
 from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.trials import Status, Trial
 
@@ -83,6 +84,7 @@ class DrivenSession:
         return SessionAnswer(
             id=self.name,
             open=True,
+            state=state_of(begun=True, running=True, paused=False, rests=self.recorder.rests, fault=False),
             subject=self.subject,
             trials=len(trials),
             told=len(trials.told),

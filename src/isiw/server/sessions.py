@@ -16,11 +16,13 @@ from isiw.files import made_folder
 from isiw.log.durable import log_exists, log_of, part_of
 from isiw.log.headers import SERVED_KEY
 from isiw.log.reader import SessionRecord, read_session
+from isiw.log.schema import Event
 from isiw.server.answers import EstimateAnswer, Refusal, SessionAnswer, SessionEntry, TrialRow
 from isiw.server.driven import DrivenSession, not_open
 from isiw.server.requests import NAME, CreateRequest
 from isiw.session.replay import strategy_of
 from isiw.session.resume import open_session
+from isiw.session.state import state_of
 from isiw.session.terminal import alarm
 from isiw.strategy.catalogue import known_settings, make_strategy
 
@@ -206,6 +208,13 @@ def _stood(name: str, record: SessionRecord) -> SessionAnswer:
     return SessionAnswer(
         id=name,
         open=False,
+        state=state_of(
+            begun=bool(len(record.history)),
+            running=False,
+            paused=False,
+            rests=False,
+            fault=any(isinstance(last, Event) and last.kind == "fault" for last in record.history[-1:]),
+        ),
         subject=record.header.subject,
         trials=len(record.table),
         told=len(record.table.told),

@@ -122,7 +122,7 @@ class Session(Judging):
     @property
     def readiness(self) -> Readiness | None:
         """The device's state before the last stimulus, as it reported it; None if it reported none yet."""
-        return self._rig.limited.readiness
+        return self._rig.limited.last_readiness
 
     def follow(self, follower: Follower) -> None:
         """Let somebody look on; before `run`. If there is no terminal, who looks on decides about pauses.
