@@ -65,6 +65,7 @@ QUICK: Final[Mapping[str, str]] = {
     "reduction.redraw": "--out OUT",
     "replayed": "--people 2 --sessions 1",
     "rules_as_printed": "--people 20 --out OUT",
+    "said": "--share 0.01 --seed 1 --folder OUT",
     "same_asks": "--sessions 1 --stimuli 10 --strategies default nr",
     "sampler record": "--people 2 --trials 20 --particles 500 --out OUT",
     "server": "--number 10",

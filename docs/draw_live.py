@@ -47,10 +47,10 @@ def main() -> None:
         with isiw.watch(session) as page:
             shown = browser.new_page(viewport={"width": 1280, "height": 900})
             shown.goto(page.url)
-            shown.get_by_text("The session has not begun.").wait_for()
+            shown.get_by_text("NOT BEGUN").wait_for()
             runs = threading.Thread(target=session.run)
             runs.start()
-            shown.get_by_text("Paused: Time to look at the coil.").wait_for(timeout=120_000)
+            shown.get_by_text("Time to look at the coil.", exact=True).first.wait_for(timeout=120_000)
             shown.get_by_text(f"Sweep of trial {PAUSE_AFTER}").wait_for()
             for scheme, name in (("light", "live.png"), ("dark", "live-dark.png")):
                 shown.emulate_media(color_scheme=scheme)

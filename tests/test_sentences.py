@@ -45,14 +45,14 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
     [
         (
             sentences.finding(SURE, TAP, SPACE),
-            "The tap enhances the MEP at ISIs of 30–160 ms after the impact (probability of a window: 0.98).",
+            "The tap enhances the MEP at ISIs of 30–160 ms after the impact (probability 0.98).",
         ),
         (
             sentences.finding(PROBABLE, STIMULI["electrical"], SPACE),
             (
                 "The electrical pulse probably enhances the MEP, but at which ISIs is not known "
                 "well; the best guess is "
-                "30–160 ms after the electrical pulse (probability of a window: 0.80)."
+                "30–160 ms after the electrical pulse (probability 0.80)."
             ),
         ),
         (sentences.finding(NONE, TAP, SPACE), "No window was found (probability of a window: 0.02)."),
@@ -79,7 +79,7 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
         (
             sentences.edges(SURE, SPACE),
             (
-                "It starts before 34 ms and ends between 150 and 171 ms, each with 90 % probability. "
+                "Start before 34 ms, end 150–171 ms (90 % each). "
                 "Given a window, it "
                 "starts before the range with probability 0.10."
             ),
@@ -87,16 +87,29 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
         (
             sentences.edges(PROBABLE, SPACE),
             (
-                "If there is a window, it starts before 34 ms and ends "
-                "between 150 and 171 ms, each with 90 % probability. "
+                "If there is a window, start before 34 ms, end 150–171 ms (90 % each). "
                 "Given a window, it starts before the range with probability 0.10, it has more than one segment with "
                 "probability 0.25."
             ),
         ),
         (sentences.edges(NONE, SPACE), ""),
+        (sentences.tap_likely(SURE, TAP), ""),
+        (sentences.tap_unmeasured(SURE, TAP), ""),
+        (
+            sentences.tap_unmeasured(Estimate(**FOUND, tap_may_explain=True), TAP),
+            "Deliver the tap alone at these ISIs next time ([protocol] tap_alone); the muscle may answer it.",
+        ),
+        (sentences.tap_unmeasured(Estimate(**FOUND, tap_may_explain=True, tap_is_likely=True), TAP), ""),
+        (
+            sentences.tap_likely(Estimate(**FOUND, tap_may_explain=True, tap_is_likely=True), TAP),
+            (
+                "The tap alone evokes as much at these ISIs: the window is probably the muscle's response to the tap "
+                "itself, and not the MEP."
+            ),
+        ),
         (
             sentences.best_isi(SURE),
-            "The largest MEP is expected at 90 ms, with 90 % probability between 80 and 101 ms.",
+            "The largest MEP is expected at 90 ms (90 %: 80–101 ms).",
         ),
         (sentences.best_isi(NONE), ""),
         (
@@ -109,7 +122,7 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
         ),
         (
             sentences.expected_f1(PROBABLE),
-            "The expected F1 of this result is 0.40 (1 is the true window, 0 no overlap).",
+            "Expected F1: 0.40 (1 is the true window).",
         ),
         (
             sentences.unusual(Estimate(probability=0.5, unusual={"noise": 0.95, "drift": 0.1})),
@@ -176,9 +189,9 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
         (
             sentences.changed("grew", 1e-5),
             (
-                "The amplitudes grew during the session, within the window and outside it (Kendall's "
-                "test, p = 1e-05), and a "
-                "window may be due to that. Was the intensity changed, did the coil move, or did the person tire?"
+                "The amplitudes grew during the session by more than the ISIs explain (Kendall's test among near "
+                "ISIs, p = 1e-05), and a window may be due to that. Was the intensity changed, did the coil move, or "
+                "did the person tire?"
             ),
         ),
         (sentences.at_rest(None, None), f"In no trial was the EMG after the pulse larger than at rest. {_LOOK}"),

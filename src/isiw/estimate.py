@@ -102,6 +102,7 @@ class WindowEstimate(Checked):
         beforehand: probability of a window before the first trial; None if it is not known.
         tap_may_explain: whether the tap's own response may be what is larger within the window, as nobody knows what
             the tap alone does there, or it evokes as much.
+        tap_is_likely: whether it was measured what the tap alone does there, and it evokes as much.
 
     Raises:
         InvalidValueError: a probability outside 0–1, or a window or a depression reported against it.
@@ -133,6 +134,7 @@ class WindowEstimate(Checked):
     time_alone: WorkedOut[float | None] = field(default=WorkedOut("time_alone", None))
     beforehand: float | None = None
     tap_may_explain: bool = False
+    tap_is_likely: bool = False
 
     def noting(self, **facts: Any) -> WindowEstimate:
         """The same with other facts; what is still to be worked out remains so."""
@@ -302,7 +304,15 @@ class Reported(BaseModel):
     band_high_mv: Numbers = ()
 
 
-_SAME: Final = ("probability", "expected_f1", "depressed_probability", "change", "beforehand", "tap_may_explain")
+_SAME: Final = (
+    "probability",
+    "expected_f1",
+    "depressed_probability",
+    "change",
+    "beforehand",
+    "tap_may_explain",
+    "tap_is_likely",
+)
 """Figures that an estimate with samples has by the same names."""
 
 
@@ -314,7 +324,8 @@ class Estimate(Reported):
     the largest enhancement that is excluded with 90 % probability. `depressed_ms` are the segments in which the tap
     depresses the MEP, and `depressed_probability` is that there are any; None if nobody looked for them. `change` is
     what probably changed during the session, whatever the ISI. `beforehand` is the probability of a window before the
-    first trial. `tap_may_explain` says whether the tap's own response may be what is larger within the window.
+    first trial. `tap_may_explain` says whether the tap's own response may be what is larger within the window, and
+    `tap_is_likely` that the tap alone was measured there and evokes as much.
     """
 
     start_beyond: float | None = None
@@ -328,6 +339,7 @@ class Estimate(Reported):
     change: Change | None = None
     beforehand: float | None = None
     tap_may_explain: bool = False
+    tap_is_likely: bool = False
 
     @classmethod
     def of(cls, estimate: WindowEstimate, **more: Any) -> Self:

@@ -60,13 +60,13 @@ def interval_cell(edge: Edge) -> str:
 
 
 def _between(edge: Edge, space: DesignSpace) -> str:
-    """The same for after "starts" or "ends"."""
+    """The same in a sentence."""
     low, high = edge.low_ms or 0.0, edge.high_ms or 0.0
     if math.isinf(low) and math.isinf(high):
         return f"before {space.low_ms:g} ms" if low < 0 else f"after {space.high_ms:g} ms"
     if math.isinf(low):
         return f"before {high:.0f} ms"
-    return f"after {low:.0f} ms" if math.isinf(high) else f"between {low:.0f} and {high:.0f} ms"
+    return f"after {low:.0f} ms" if math.isinf(high) else f"{low:.0f}–{high:.0f} ms"
 
 
 def in_short(estimate: Estimate) -> str:
@@ -98,8 +98,9 @@ def _chance(estimate: Estimate) -> str:
     said, factor = "", bayes_factor(estimate.probability, estimate.beforehand)
     if factor is not None:
         size = "above 100" if factor > 100 else "below 0.01" if factor < 0.01 else f"{factor:.2g}"
-        said = f"; Bayes factor {size}"
-    return f" (probability of a window: {estimate.probability:.2f}{said})"
+        said = f", Bayes factor {size}"
+    of = "probability" if estimate.window is not None and not is_guess(estimate) else "probability of a window:"
+    return f" ({of} {estimate.probability:.2f}{said})"
 
 
 def summary(estimate: Estimate) -> str:
@@ -115,18 +116,24 @@ def summary(estimate: Estimate) -> str:
         lines.append(f"Depressed: {estimate.depressed or nothing} (probability of it: {depressed:.2f})")
     if estimate.change is not None and estimate.change.is_sure:
         lines.append(f"{at_a_trial(estimate.change, estimate.change.trial)}.")
-    return "\n".join((*lines, *filter(None, (tap_unknown(estimate),))))
+    return "\n".join((*lines, *filter(None, (tap_likely(estimate), tap_unmeasured(estimate)))))
 
 
-def tap_unknown(estimate: Estimate, first: StimulusWords = _EITHER) -> str:
-    """That the first stimulus's own response may be what is larger within a window."""
-    if not estimate.tap_may_explain:
+def tap_likely(estimate: Estimate, first: StimulusWords = _EITHER) -> str:
+    """That the first stimulus's own response is probably what is larger within a window, as it was measured there."""
+    if not (estimate.tap_may_explain and estimate.tap_is_likely):
         return ""
     return (
-        f"The {first.alone} was not measured within this window, or its response there is as large. So the window may "
-        f"be the muscle's response to the {first.name} itself, and not the MEP. In the next session deliver "
-        f"the {first.name} alone there (in a configuration: [protocol] tap_alone)."
+        f"The {first.alone} evokes as much at these ISIs: the window is probably the muscle's response to the "
+        f"{first.name} itself, and not the MEP."
     )
+
+
+def tap_unmeasured(estimate: Estimate, first: StimulusWords = _EITHER) -> str:
+    """The way to learn the first stimulus's own response within a window, if it was not measured."""
+    if not estimate.tap_may_explain or estimate.tap_is_likely:
+        return ""
+    return f"Deliver the {first.alone} at these ISIs next time ([protocol] tap_alone); the muscle may answer it."
 
 
 def at_a_trial(change: Change, trial: int | None) -> str:
@@ -189,8 +196,8 @@ def edges(estimate: Estimate, space: DesignSpace) -> str:
     start, end = estimate.start, estimate.end
     if estimate.window is None or not (start.is_known and end.is_known):
         return ""
-    given = "It" if _is_sure(estimate) else "If there is a window, it"
-    said = f"{given} starts {_between(start, space)} and ends {_between(end, space)}, each with 90 % probability."
+    given = "Start" if _is_sure(estimate) else "If there is a window, start"
+    said = f"{given} {_between(start, space)}, end {_between(end, space)} (90 % each)."
     unusual = {
         "starts before the range": start.beyond,
         "ends beyond the range": end.beyond,
@@ -206,8 +213,8 @@ def best_isi(estimate: Estimate) -> str:
     if estimate.window is None or best is None:
         return ""
     given = "The" if _is_sure(estimate) else "If there is a window, the"
-    interval = f"between {best.low_ms:.0f} and {best.high_ms:.0f} ms"
-    return f"{given} largest MEP is expected at {best.isi_ms:.0f} ms, with 90 % probability {interval}."
+    interval = f"{best.low_ms:.0f}–{best.high_ms:.0f} ms"
+    return f"{given} largest MEP is expected at {best.isi_ms:.0f} ms (90 %: {interval})."
 
 
 def _is_sure(estimate: Estimate) -> bool:
@@ -233,7 +240,7 @@ def _figure(value: float) -> str:
 def expected_f1(estimate: Estimate) -> str:
     """The expected F1 of the reported decision."""
     f1 = estimate.expected_f1
-    return "" if f1 is None else f"The expected F1 of this result is {f1:.2f} (1 is the true window, 0 no overlap)."
+    return "" if f1 is None else f"Expected F1: {f1:.2f} (1 is the true window)."
 
 
 def unusual(estimate: Estimate) -> str:
@@ -306,7 +313,7 @@ def not_larger(medians_uv: tuple[float, float], p: float | None = None) -> str:
 def changed(word: str, p: float) -> str:
     """That amplitudes "grew" or "shrank" from trial to trial, whatever the ISI."""
     return (
-        f"The amplitudes {word} during the session, within the window and outside it (Kendall's test, "
+        f"The amplitudes {word} during the session by more than the ISIs explain (Kendall's test among near ISIs, "
         f"p = {p:.1g}), and a window may be due to that. Was the intensity changed, did the coil move, or did "
         "the person tire?"
     )

@@ -15,7 +15,7 @@ import typer
 from cli.conftest import COMMAND, Command
 from isiw import __version__
 from isiw.cli import console
-from isiw.cli.console import INTERRUPTED, errors_reported, show_paragraph, working
+from isiw.cli.console import INTERRUPTED, errors_reported, show_statement, working
 
 
 def test_a_pipe_gets_lines_while_a_command_is_at_work(
@@ -96,11 +96,11 @@ def test_a_paragraph_is_as_wide_as_the_terminal_and_its_command_is_in_one_piece(
         "The session is not over, as three trials in a row were lost; resume with:",
         "isiw resume P07.mcap a.toml",
     )
-    show_paragraph(f"{said} {way_on}")
+    show_statement(f"{said} {way_on}")
     assert capsys.readouterr().out == f"{said} {way_on}\n"  # of a pipe nobody knows how wide it is
     monkeypatch.setenv("FORCE_COLOR", "1")
     monkeypatch.setenv("COLUMNS", "24")
-    show_paragraph(f"{said} {way_on}")
+    show_statement(f"{said} {way_on}")
     *lines, last = re.sub(r"\x1b\[[0-9;]*m", "", capsys.readouterr().out).splitlines()
     assert max(map(len, lines)) <= 24
     assert " ".join(line.strip() for line in lines) == said

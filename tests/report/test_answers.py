@@ -81,7 +81,7 @@ def test_a_tense_muscle_is_not_at_rest_where_the_trial_was_lost_for_another_reas
 
 def test_a_device_that_only_repeats_what_was_wanted_is_not_taken_for_exact(record: SessionRecord) -> None:
     _, said, detail = answer(record, "timing")
-    assert said == "as the device says"
+    assert said == "not known: exactly 0 off in all trials"
     assert "no pulse or hit time to check it against" in detail
 
 
@@ -91,7 +91,9 @@ def test_an_isi_exactly_as_wanted_is_right_where_the_times_confirm_it(record: Se
         answer(with_history(record, [timed, trial(1)]), "timing").answer == "yes, in all trials that show it (1 of 2)"
     )
     untimed = trial(0, t_hit_ms=100.0, t_tms_ms=150.0)  # the space counts from the valve
-    assert answer(with_history(record, [untimed, trial(1)]), "timing").answer == "as the device says"
+    assert (
+        answer(with_history(record, [untimed, trial(1)]), "timing").answer == "not known: exactly 0 off in all trials"
+    )
 
 
 def test_an_isi_that_its_times_contradict_is_not_right_where_nobody_rejected_it(record: SessionRecord) -> None:

@@ -14,6 +14,7 @@ from isiw.findings import TOO_FEW
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import EstimateRecord
 from isiw.report.drawn import MOST_NEAR, MOST_WHOLE, drawn
+from isiw.report.words import final_statement
 from isiw.trials import Channel
 from known import known
 from report.sessions import pulsed, tapped
@@ -111,9 +112,20 @@ def test_what_changed_during_the_session_is_said_with_what_was_found(tmp_path: P
     record = tapped(tmp_path / "s.mcap", trials=6)
     change = Change("amplitudes", 0.97, 4.6, 3.1, 6.7, 2)
     last = record.estimates[-1].model_copy(update={"change": change})
-    found = drawn(replace(record, history=(*record.history[:-1], last)))["beliefs"][last.trial]["found"]
-    assert "Amplitudes rose ×4.6" in found
-    assert "Amplitudes" not in drawn(record)["beliefs"][last.trial]["found"]
+    against = drawn(replace(record, history=(*record.history[:-1], last)))["beliefs"][last.trial]["against"]
+    assert [text for text in against if "Amplitudes rose ×4.6" in text]
+    assert not [text for text in drawn(record)["beliefs"][last.trial]["against"] if "Amplitudes" in text]
+
+
+def test_what_nobody_knows_of_the_tap_is_said_beside_the_window_as_in_the_final_statement(tmp_path: Path) -> None:
+    record = tapped(tmp_path / "s.mcap", trials=6)
+    last = record.estimates[-1]
+    for facts, words in (({}, "Deliver the tap alone"), ({"tap_is_likely": True}, "The tap alone evokes as much")):
+        told = last.model_copy(update={"tap_may_explain": True, **facts})
+        unknown = replace(record, history=(*record.history[:-1], told))
+        (said,) = drawn(unknown)["beliefs"][last.trial]["against"]
+        assert said.startswith(words)
+        assert said[1:] in final_statement(unknown)
 
 
 def test_scores_and_prediction_are_the_logs_and_old_logs_have_none(record: SessionRecord) -> None:

@@ -60,9 +60,6 @@ def test_amplitudes_that_change_with_time_whatever_the_isi_are_told(factor: floa
     ]
     said = changed_with_time(WINDOW, session)
     assert said is None if word is None else f"The amplitudes {word} during the session" in str(said)
-    contrary = 1e-5 if factor < 1 else -1e-5
-    inside_only = [t if 90 < (t.isi_ms or 0) < 150 else replace(t, mep_mv=0.05 + contrary * t.index) for t in session]
-    assert changed_with_time(WINDOW, inside_only) is None
     assert changed_with_time(None, session) is None
     assert changed_with_time(WINDOW, session[:4]) is None
 
@@ -76,8 +73,28 @@ def test_the_rank_tests_say_what_scipy_says(decimals: int) -> None:
         p = scipy.stats.mannwhitneyu(inside, outside, alternative="greater").pvalue
         assert p_of_larger(inside.tolist(), outside.tolist()) == pytest.approx(p, abs=0.015)
         rising = (outside + rng.uniform(-0.1, 0.1) * np.arange(len(outside))).round(decimals)
-        p = scipy.stats.kendalltau(np.arange(len(rising)), rising, alternative="greater").pvalue
-        assert scipy.stats.norm.sf(growth(rising)) == pytest.approx(p, abs=0.015 if p < 0.05 else 0.06)
+        found = scipy.stats.kendalltau(np.arange(len(rising)), rising, alternative="greater", method="asymptotic")
+        p = found.pvalue
+        assert scipy.stats.norm.sf(growth(rising)) == pytest.approx(p, abs=0.005)
+
+
+@pytest.mark.parametrize(("factor", "word"), [(1.0, None), (0.97, "shrank")])
+def test_amplitudes_that_are_smaller_since_isis_move_to_the_edges_have_not_shrunk(
+    factor: float, word: str | None
+) -> None:
+    rng = np.random.default_rng(6)
+    away_ms = np.linspace(0, 60, 60) * rng.choice((-1, 1), 60)
+    isis_ms = 120 + away_ms
+    usual_mv = 0.02 + 0.3 * np.exp(-0.5 * (away_ms / 25) ** 2)
+    meps_mv = usual_mv * factor ** np.arange(60) * np.exp(0.4 * rng.standard_normal(60))
+    session = [
+        Trial(k, Status.ACCEPTED, float(isi), isi_ms=float(isi), mep_mv=float(mep))
+        for k, (isi, mep) in enumerate(zip(isis_ms, meps_mv, strict=True))
+    ]
+    order = np.argsort(isis_ms)
+    said = changed_with_time(WINDOW, session, (isis_ms[order].tolist(), usual_mv[order].tolist()))
+    assert said is None if word is None else f"The amplitudes {word} during the session" in str(said)
+    assert growth(meps_mv) < -3  # as if they had, were it not for the ISIs
 
 
 def test_nothing_is_larger_where_everything_is_equal() -> None:

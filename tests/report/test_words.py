@@ -41,8 +41,8 @@ def with_estimate(record: SessionRecord, **changes: Any) -> SessionRecord:
 def test_the_statement_has_window_intervals_counts_and_reason(record: SessionRecord) -> None:
     assert final_statement(record) == (
         "The tap probably enhances the MEP at ISIs of 33–93 ms after the valve command "
-        "(probability of a window: 0.90; Bayes factor 9). "
-        "If there is a window, it starts between 28 and 38 ms and ends after 150 ms, each with 90 % probability. "
+        "(probability 0.90, Bayes factor 9).\n"
+        "If there is a window, start 28–38 ms, end after 150 ms (90 % each). "
         "Given a window, it ends beyond the range with probability 0.67. "
         "4 pairs of stimuli were delivered; 3 count; mistrials: 1 background activity. "
         "The budget of 4 stimuli is used up."
@@ -52,10 +52,10 @@ def test_the_statement_has_window_intervals_counts_and_reason(record: SessionRec
 @pytest.mark.parametrize(
     ("low", "high", "words"),
     [
-        (-math.inf, -math.inf, "starts before 0 ms"),
-        (-math.inf, 12.0, "starts before 12 ms"),
-        (12.0, math.inf, "starts after 12 ms"),
-        (math.inf, math.inf, "starts after 200 ms"),
+        (-math.inf, -math.inf, "start before 0 ms"),
+        (-math.inf, 12.0, "start before 12 ms"),
+        (12.0, math.inf, "start after 12 ms"),
+        (math.inf, math.inf, "start after 200 ms"),
     ],
 )
 def test_an_edge_beyond_the_range_is_said_in_words(record: SessionRecord, low: float, high: float, words: str) -> None:
@@ -111,10 +111,10 @@ def test_an_unusual_window_is_said_with_its_probability_once_it_is_worth_saying(
 @pytest.mark.parametrize(
     ("probability", "said"),
     [
-        (0.05, "No window was found (probability of a window: 0.05; Bayes factor 0.053). 4 pairs"),
+        (0.05, "No window was found (probability of a window: 0.05, Bayes factor 0.053).\n4 pairs"),
         (
             0.07,
-            "It is undecided whether there is a window (probability of a window: 0.07; Bayes factor 0.075). 4 pairs",
+            "It is undecided whether there is a window (probability of a window: 0.07, Bayes factor 0.075).\n4 pairs",
         ),
     ],
 )
@@ -129,7 +129,7 @@ def test_no_window_is_a_finding_once_it_has_95_percent(
     [
         ((), "The method has no answer yet: it has not measured enough for one."),
         ((0.0, 10.0), "The scan of ISIs is not finished: of 0–200 ms it has measured 0–10 ms"),
-        ((0.0, 100.0, 200.0), "No window was found. 4 pairs"),
+        ((0.0, 100.0, 200.0), "No window was found.\n4 pairs"),
     ],
 )
 def test_a_method_without_a_probability_says_what_it_has_measured(
@@ -143,15 +143,15 @@ def test_isis_that_are_expected_to_be_wrong_are_a_guess(record: SessionRecord) -
     said = final_statement(with_estimate(record, probability=0.69, expected_f1=0.4, beforehand=None))
     assert said.startswith(
         "The tap probably enhances the MEP, but at which ISIs is not known well; the best guess is 33–93 ms after the "
-        "valve command (probability of a window: 0.69)."
+        "valve command (probability 0.69)."
     )
 
 
 @pytest.mark.parametrize(
     ("probability", "beforehand", "said"),
     [
-        (0.6, 0.69, "It is undecided whether there is a window (probability of a window: 0.60; Bayes factor 0.67): "),
-        (0.86, 0.69, "It is undecided whether there is a window (probability of a window: 0.86; Bayes factor 2.8): "),
+        (0.6, 0.69, "It is undecided whether there is a window (probability of a window: 0.60, Bayes factor 0.67): "),
+        (0.86, 0.69, "It is undecided whether there is a window (probability of a window: 0.86, Bayes factor 2.8): "),
         (0.88, 0.69, "The tap probably enhances the MEP at ISIs of 33–93 ms"),
         (0.6, 0.2, "The tap probably enhances the MEP at ISIs of 33–93 ms"),
         (0.96, 0.97, "The tap enhances the MEP at ISIs of 33–93 ms"),
@@ -166,7 +166,7 @@ def test_a_window_that_trials_hardly_speak_for_is_undecided(
 
 
 def test_a_strategy_that_was_not_told_the_stated_intensity_is_named(record: SessionRecord) -> None:
-    said = "The strategy does not know the intensity, and assumes about 90 % of RMT."
+    said = "Do: state the intensity to the strategy next time, which assumes about 90 % of RMT"
     visit = Visit(intensity_pct_rmt=110.0)
 
     def statement(**settings: Any) -> str:
@@ -174,7 +174,7 @@ def test_a_strategy_that_was_not_told_the_stated_intensity_is_named(record: Sess
         header = record.header.model_copy(update={"visit": visit, "strategy": recipe})
         return final_statement(replace(record, header=header))
 
-    assert f"{said} Next time: make_strategy(..., intensity_pct_rmt=110)." in statement()
+    assert f"{said}: make_strategy(..., intensity_pct_rmt=110)." in statement()
     assert said not in statement(intensity_pct_rmt=110.0)
 
 
@@ -201,7 +201,7 @@ def test_without_a_window_the_largest_enhancement_that_is_excluded_is_said(
 
 
 def test_the_best_isi_is_said_with_its_interval_where_there_is_a_window(record: SessionRecord) -> None:
-    said = "The largest MEP is expected at 64 ms, with 90 % probability between 51 and 78 ms."
+    said = "The largest MEP is expected at 64 ms (90 %: 51–78 ms)."
     best = {"best_isi_ms": (64.2, 51.0, 77.6)}
     assert said in final_statement(with_estimate(record, probability=0.97, **best))
     unsure = final_statement(with_estimate(record, probability=0.59, **best))
@@ -210,7 +210,7 @@ def test_the_best_isi_is_said_with_its_interval_where_there_is_a_window(record: 
 
 
 def test_the_expected_f1_is_said(record: SessionRecord) -> None:
-    assert "The expected F1 of this result is 0.84 (1 is" in final_statement(with_estimate(record, expected_f1=0.841))
+    assert "Expected F1: 0.84 (1 is" in final_statement(with_estimate(record, expected_f1=0.841))
 
 
 def run_by(record: SessionRecord, name: str, *, delay_ms: tuple[float, float] | None, **settings: Any) -> SessionRecord:
@@ -220,7 +220,7 @@ def run_by(record: SessionRecord, name: str, *, delay_ms: tuple[float, float] | 
 
 
 def test_a_hit_delay_that_nobody_stated_is_said_to_have_cost_stimuli(record: SessionRecord) -> None:
-    said = "The device does not state its hit delay (DeviceInfo.hit_delay_ms); stating it usually saves stimuli."
+    said = "Do: state the device's hit delay (DeviceInfo.hit_delay_ms), which usually saves stimuli."
     unstated = run_by(record, "default", delay_ms=None)
     assert said in final_statement(unstated)
     wave = Channel(np.zeros(10), 1000.0, "m/s^2")
@@ -230,7 +230,7 @@ def test_a_hit_delay_that_nobody_stated_is_said_to_have_cost_stimuli(record: Ses
 
 def test_a_hit_delay_that_only_the_device_was_told_is_said_to_have_cost_stimuli(record: SessionRecord) -> None:
     said = final_statement(run_by(record, "default", delay_ms=(150.0, 5.0)))
-    assert "does not know the device's hit delay" in said
+    assert "state the device's hit delay to the strategy" in said
     assert "make_strategy(..., hit_delay_ms=(150, 5))" in said
 
 
@@ -250,7 +250,7 @@ def test_that_what_comes_first_can_be_stated_is_said_if_no_window_is_named(
     run = with_estimate(run_by(record, "default", delay_ms=None, **settings), **found)
     space = replace(run.header.space, reference=reference)
     statement = final_statement(replace(run, header=run.header.model_copy(update={"space": space})))
-    assert ('State what comes first (conditioning = "tap" or "electrical")' in statement) == said
+    assert ('Do: state what comes first (conditioning = "tap" or "electrical")' in statement) == said
 
 
 @pytest.mark.parametrize(("name", "said"), [("gp-straddle", True), ("default", False), ("", False)])
@@ -328,9 +328,10 @@ def test_where_no_estimate_can_be_read_it_is_said_what_was_given_and_what_is_los
 def test_a_log_of_which_a_header_is_left_says_how_many_pulses_it_asks_for(record: SessionRecord) -> None:
     cut = type(record)(record.path, record.header, (), ("It was cut off.",), False, end_lost=True)
     assert final_statement(cut).startswith(
-        "No trial can be read, and the log is damaged. The end of the log is missing."
+        "No trial can be read, and the log is damaged.\nDo: find out, with the stimulator's counter"
     )
     assert "--lost-pulses" in final_statement(cut)
+    assert "\nWarning: The end of the log is missing." in final_statement(cut)
 
 
 def test_the_truth_is_compared_by_f1(record: SessionRecord) -> None:

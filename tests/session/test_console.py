@@ -10,7 +10,7 @@ import pytest
 
 from isiw.errors import InvalidValueError, LogError
 from isiw.session.console import OperatorConsole
-from isiw.session.steps import Asking
+from isiw.session.pausing import Asking
 from isiw.trials import Status, Trial, TrialTable
 
 

@@ -15,9 +15,10 @@ from isiw.log.reader import read_session
 from isiw.log.schema import Intent, Record
 from isiw.session.interrupts import Interrupts
 from isiw.session.loop import Session
+from isiw.session.pausing import Asking
 from isiw.session.rig import Safeguards
 from isiw.session.sink import SessionUpdate, Sink
-from isiw.session.steps import Asking, pace_s
+from isiw.session.steps import pace_s
 from isiw.trials import Trial
 from isiw.visit import VisitProtocol
 from known import known
@@ -125,7 +126,7 @@ def test_a_question_is_answered_with_no_once_the_session_is_to_end(*, answers_fi
     def nobody() -> bool:
         if answers_first:
             asking.answer(goes_on=True)
-        asking.over = True
+        asking.stop()
         return False
 
     assert asking.wait(nobody) is False
@@ -135,7 +136,7 @@ def test_a_question_is_answered_with_no_once_the_session_is_to_end(*, answers_fi
 def test_only_the_question_that_is_asked_is_answered() -> None:
     asking = Asking()
     first, second = 1, 2
-    asking.number = second
+    assert [asking.begin() for _ in range(2)] == [first, second]
 
     def nobody() -> bool:
         with pytest.raises(InvalidValueError, match="paused again since"):

@@ -15,6 +15,7 @@ from isiw.session.resume import open_session
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.course import Outcome, Outcomes, found_step_mv
 from isiw.strategy.strategy import Strategy
+from isiw.trials import Status, Trial
 from isiw.window import Window
 from known import known
 
@@ -118,21 +119,21 @@ def test_a_window_that_the_tap_could_explain_is_reported_with_that_sentence() ->
     for isi_ms, mep_mv in pulses:
         one.learn(isi_ms, mep_mv)
     assert one.estimate().window is not None
-    assert "its response there is as large" in f"{one.estimate()}"
+    assert "Deliver the tap or electrical pulse alone at these ISIs next time" in f"{one.estimate()}"
 
 
 def test_a_late_window_or_one_at_isis_whose_taps_are_known_has_no_such_sentence() -> None:
     told = Outcomes("impact")
     for isi_ms in ISIS_MS:
         told = told.after(Outcome(isi_ms, 0.1))
-    assert told.tap_may_explain(Window(10.0, 70.0))
-    assert not told.tap_may_explain(Window(150.0, 250.0))
-    assert not told.tap_may_explain(None)
+    assert told.about_the_tap(Window(10.0, 70.0))["tap_may_explain"]
+    assert not told.about_the_tap(Window(150.0, 250.0))["tap_may_explain"]
+    assert not told.about_the_tap(None)["tap_may_explain"]
     for isi_ms in (10.0, 30.0, 50.0, 70.0):
         told = told.after_tap(isi_ms, 0.01)
-    assert not told.tap_may_explain(Window(10.0, 70.0))
+    assert not told.about_the_tap(Window(10.0, 70.0))["tap_may_explain"]
     known_part = Outcomes("impact").after(Outcome(20.0, 0.1, tap_mv=0.0))
-    assert not known_part.tap_may_explain(Window(10.0, 70.0))
+    assert not known_part.about_the_tap(Window(10.0, 70.0))["tap_may_explain"]
 
 
 def test_a_window_whose_amplitudes_a_few_taps_alone_match_has_that_sentence_too() -> None:
@@ -143,7 +144,23 @@ def test_a_window_whose_amplitudes_a_few_taps_alone_match_has_that_sentence_too(
             told = told.after_tap(isi_ms, tap_mv)
         for isi_ms in (20.0, 25.0, 35.0, 40.0):
             told = told.after(Outcome(isi_ms, mep_mv))
-        assert told.tap_may_explain(Window(15.0, 45.0)) is explained
+        assert told.about_the_tap(Window(15.0, 45.0)) == {"tap_may_explain": explained, "tap_is_likely": explained}
+
+
+@pytest.mark.parametrize(("tap_mv", "likely"), [(0.0, False), (0.12, True)])
+def test_taps_alone_that_were_measured_at_no_isi_tell_whether_a_window_may_be_the_taps(
+    tap_mv: float, *, likely: bool
+) -> None:
+    window, told = (
+        Window(10.0, 70.0),
+        Outcomes("impact").of(
+            Trial(k, Status.ACCEPTED, isi_ms, isi_ms=isi_ms, mep_mv=0.1 if isi_ms <= 70 else 0.01)
+            for k, isi_ms in enumerate(ISIS_MS)
+        ),
+    )
+    assert told.about_the_tap(window) == {"tap_may_explain": True, "tap_is_likely": False}
+    told = told.of(Trial(k, Status.ACCEPTED, None, mep_mv=tap_mv, tap_alone=True) for k in range(13))
+    assert told.about_the_tap(window) == {"tap_may_explain": likely, "tap_is_likely": likely}
 
 
 @pytest.mark.parametrize("wrong", [(None, 0.1), (20.0, None), (20.0, -0.1), (math.nan, 0.1)])

@@ -46,15 +46,17 @@ def show(text: str, *, style: str | None = None, stderr: bool = False) -> None:
     Console(stderr=stderr, highlight=False, soft_wrap=True, emoji=False).print(plain(text), style=style, markup=False)
 
 
-def show_paragraph(text: str) -> None:
-    """Print a paragraph as wide as the terminal; a command at its end has a line of its own, to be copied."""
-    said, found, way_on = text.rpartition(": isiw ")
+def show_statement(text: str) -> None:
+    """Print a statement line by line, as wide as the terminal; a command at a line's end has one, to be copied."""
     console = Console(highlight=False, emoji=False)
-    if not (found and console.is_terminal):
-        said, found, way_on = text, "", ""
-    console.print(plain(said + found[:1]), style="bold", markup=False, soft_wrap=not console.is_terminal)
-    if found:
-        show(f"isiw {way_on}", style="bold")
+    for number, line in enumerate(text.split("\n")):
+        said, found, way_on = line.rpartition(": isiw ")
+        if not (found and console.is_terminal):
+            said, found, way_on = line, "", ""
+        style = "yellow" if line.startswith("Warning: ") else "bold" if not number or line.startswith("Do: ") else None
+        console.print(plain(said + found[:1]), style=style, markup=False, soft_wrap=not console.is_terminal)
+        if found:
+            show(f"isiw {way_on}", style="bold")
 
 
 @contextmanager

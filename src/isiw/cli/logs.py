@@ -20,7 +20,7 @@ from isiw.cli.console import (
     free_beside,
     say_unread,
     show,
-    show_paragraph,
+    show_statement,
     working,
 )
 from isiw.text.sanitize import command, counted
@@ -48,7 +48,7 @@ def show_log(
         _list("trials", [isiw.session.aligned(row) for row in isiw.report.words.trial_rows(record)], whole=whole)
         events = [(e, "no trial" if e.trial is None else f"trial {e.trial}") for e in record.events]
         _list("events", [f"{event.kind} ({when}): {event.text}" for event, when in events], whole=whole)
-        show_paragraph(isiw.report.final_statement(record))
+        show_statement(isiw.report.final_statement(record))
         exit_if_damaged(record.losses)
 
 
@@ -137,7 +137,7 @@ def estimate(log: Log) -> None:
             record = isiw.read_session(log)
         else:
             show("No trial was excluded or included since the last estimate.")
-        show_paragraph(isiw.report.final_statement(record))
+        show_statement(isiw.report.final_statement(record))
         exit_if_damaged(record.losses)
 
 

@@ -20,7 +20,7 @@ from isiw.cli.console import (
     free_beside,
     log_exists,
     show,
-    show_paragraph,
+    show_statement,
 )
 from isiw.text.sanitize import command
 
@@ -140,7 +140,7 @@ def _run_to_the_end(session: Session, config: Path | None, *, live: bool, resume
         )
     before, ours = len(session.trials), resumed or not log_exists(session.log_path)
     try:
-        with errors_reported(_INTERRUPTED), _shown_live(session) if live else nullcontext():
+        with errors_reported(_INTERRUPTED), _shown_live(session, config) if live else nullcontext():
             session.require_effect()
             show(f"log: {session.log_path}")
             result = session.run(progress=True)
@@ -152,7 +152,8 @@ def _run_to_the_end(session: Session, config: Path | None, *, live: bool, resume
         raise
     record = isiw.read_session(result.log)
     truth = isiw.config.resume.truth_of(record)
-    show_paragraph(f"\n{isiw.report.final_statement(record, config)}")
+    show("")
+    show_statement(isiw.report.final_statement(record, config))
     if truth.known:
         show(isiw.report.words.truth_sentence(record, truth.window))
     show(f"log:     {result.log}")
@@ -170,9 +171,9 @@ def _run_to_the_end(session: Session, config: Path | None, *, live: bool, resume
 
 
 @contextmanager
-def _shown_live(session: Session) -> Iterator[None]:
+def _shown_live(session: Session, config: Path | None) -> Iterator[None]:
     """Within, the session has a page in the browser."""
-    with isiw.watch(session) as page:
+    with isiw.watch(session, config=config) as page:
         show(f"live page: {page.url}", style="bold")
         yield
 

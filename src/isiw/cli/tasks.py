@@ -44,9 +44,12 @@ def check(
     with errors_reported("Interrupted: the device is disarmed."):
         settings = isiw.config.load_config(config)
         isiw.config.session.require_device(settings, config)
-        device, space = isiw.config.device_for(settings), settings.design()
+        device, space, said = isiw.config.device_for(settings), settings.design(), ""
         if not (yes or device.describe().simulated):
-            typer.confirm("The check stimulates. Is the coil on a phantom?", abort=True)
+            iti_s = max(settings.limits.min_iti_s, isiw.config.limits_for(settings).iti_s)
+            said = isiw.testing.devices.announcement(device, iti_s)
+            show(said)
+            typer.confirm("Is the coil on a phantom?", abort=True)
         try:
             isiw.testing.check_device(
                 lambda: isiw.config.device_for(settings),
@@ -55,7 +58,7 @@ def check(
                 limits=isiw.config.limits_for(settings),
                 timeout_s=settings.timeout_s,
                 signals=settings.signals,
-                say=show,
+                say=lambda text: None if text == said else show(text),
             )
         except AssertionError as broken:
             show(f"{broken}", style="red", stderr=True)

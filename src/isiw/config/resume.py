@@ -204,10 +204,11 @@ def after_error(session: Session, config: Path | None, error: BaseException | No
         seen = command("show", session.log_path)
         return [f"The session is over, and its log is complete. See what was found with: {seen}"]
     limited = config is not None and isinstance(error, LimitExceededError)
+    about = session.fault.about_the_trial if session.fault is not None else ""
     safe = "The session ended early. Its log is safe" if delivered else "No stimulus was delivered. The log is kept"
     way_on = f"{safe}; resume with: {continued_by(session.log_path, session.header, config, changed=limited)}"
     limits = f"The limits are under [limits] in {config}; they are read again when the session is resumed."
-    return [limits, way_on] if limited else [way_on]
+    return [*([about] if about else []), *([limits, way_on] if limited else [way_on])]
 
 
 def after_end(session: Session, config: Path | None, *, delivered: bool) -> str | None:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 
 from isiw.devices.clock import ROUNDING_S, Clock, Pacing, VirtualClock
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import Answer, Device, DeviceInfo, readiness_of, require_staged
+from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, readiness_of, require_staged
 from isiw.errors import DeviceError, LimitExceededError, NotDelivered
 from isiw.trials import Stimulus
 
@@ -69,6 +69,7 @@ class LimitedDevice:
         self._pacing = Pacing(self._limits, clock, earlier_s)
         self.wait_s, self.ahead_s = self._pacing.wait_s, self._pacing.ahead_s
         self._staged = False
+        self.last_readiness: Readiness | None = None
         self._one_at_a_time = threading.Lock()
 
     @property
@@ -93,7 +94,7 @@ class LimitedDevice:
                 expected=f"at least {self._limits.iti_s:g} s between stimuli, and the rests of the limits",
                 remedy="This stimulus was not delivered. Sleep for wait_s() first.",
             )
-        state = readiness_of(self._device)
+        state = self.last_readiness = readiness_of(self._device)
         if not state.ready:
             raise NotDelivered(
                 f"the device is not ready: {state.reason or 'it does not say why'}",

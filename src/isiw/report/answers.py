@@ -11,6 +11,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from isiw import sentences
 from isiw.dissertation.profiles import best_fit, normality, profile_fits
 from isiw.dissertation.regression import curve_masks
 from isiw.dissertation.response_counts import TrialsByIsi, by_isi, count_trials
@@ -19,7 +20,7 @@ from isiw.findings import Kind
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import EstimateRecord, Event, EventKind
 from isiw.report.tables import lost_rows
-from isiw.report.words import counts_sentence, finding_sentences
+from isiw.report.words import counts_sentence
 from isiw.signals.limits import contradicts_its_times, timed_isi_ms
 from isiw.text.sanitize import counted
 from isiw.trials import Trial
@@ -76,14 +77,16 @@ def _timing(record: SessionRecord) -> Answer:
     if not any(errors_ms) and not any(confirmed):
         times = f"{record.header.stimulus.pulse} or {record.header.stimulus.hit} time"
         detail = f"The device reports every ISI exactly as commanded, and no {times} to check it against."
-        answer = _verdict(record, len(rejected), 0) if rejected else "as the device says"
+        answer = _verdict(record, len(rejected), 0) if rejected else "not known: exactly 0 off in all trials"
         return Answer(question, answer, f"{detail} {_listed(rejected)}")
     tolerance_ms = record.header.signals.tolerance_ms(space)
     sizes = f"{statistics.median(errors_ms):.1f} ms (median), at most {max(errors_ms):.1f} ms"
     others = _not_for(record, _OF_TIMING)
     contradicted = [trial.index for trial in others if contradicts_its_times(trial, space)]
     off = sum(abs(trial.isi_error_ms or 0.0) > tolerance_ms or trial.index in contradicted for trial in others)
-    detail = f"Trials that count are off by {sizes}; {tolerance_ms:g} ms are tolerated. {_listed(rejected)}"
+    exactly = "Exactly 0 off in all trials that count, as of a rig that reports its command"
+    off_by = f"Trials that count are off by {sizes}" if any(errors_ms) else exactly
+    detail = f"{off_by}; {tolerance_ms:g} ms are tolerated. {_listed(rejected)}"
     if contradicted:
         detail += f" The times of {_events(record)} contradict the ISI in {_few(contradicted)}."
     return Answer(question, _verdict(record, len(rejected) + off, _known(record, measured=any(errors_ms))), detail)
@@ -175,10 +178,10 @@ class MethodAnswer(NamedTuple):
 
 def method_answers(record: SessionRecord) -> list[MethodAnswer]:
     """The estimate of isiw, the dissertation's rule on mean MEPs, response counts, and the form of the profile."""
-    trials = by_isi(record.table)
+    trials, last, space = by_isi(record.table), record.estimates[-1], record.header.space
     estimate = MethodAnswer(
         "isiw's estimate",
-        " ".join(finding_sentences(record)[:2]),
+        f"{sentences.finding(last, record.header.stimulus, space)} {sentences.edges(last, space)}".strip(),
         "Single trials at any ISIs, in their order; TMS alone helps, and is not needed.",
         "Anything reliable about people and noise that its prior does not allow for (docs/model.md).",
     )

@@ -12,8 +12,8 @@ from isiw.findings import lacking
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import EstimateRecord
 from isiw.report.tables import trial_row
-from isiw.sentences import finding
-from isiw.session.examination import change_found
+from isiw.report.words import answer_and_warnings
+from isiw.sentences import tap_unmeasured
 from isiw.signals.limits import EMG_UNITS_MV
 from isiw.text import plain
 from isiw.trials import Channel, Trial
@@ -86,9 +86,7 @@ def _belief(record: SessionRecord, estimate: EstimateRecord) -> dict[str, Any]:
     pairs = sum(trial.isi_ms is not None for trial in _known_by(record, estimate.trial))
     nothing = lacking(pairs, silent=record.is_silent, in_doubt=record.in_doubt)
     window = estimate.window if nothing is None else None
-    found = f"{nothing or finding(estimate, record.header.stimulus, record.header.space)}"
-    if nothing is None and (changed := change_found(estimate.change, _known_by(record, estimate.trial))):
-        found += f" {changed}"
+    said = [f"{nothing}"] if nothing is not None else _said(record, estimate)
     kept = slice(None, None, max(1, math.ceil(len(estimate.grid_ms) / MOST_ISIS)))
     bands = {
         "profile": estimate.profile_mv,
@@ -98,7 +96,8 @@ def _belief(record: SessionRecord, estimate: EstimateRecord) -> dict[str, Any]:
         "predictedHigh": estimate.predicted_high_mv,
     }
     return {
-        "found": found,
+        "found": said[0],
+        "against": said[1:],
         "window": [list(segment) for segment in window.segments] if window else [],
         "start": _drawn_edge(estimate.start),
         "end": _drawn_edge(estimate.end),
@@ -111,6 +110,13 @@ def _belief(record: SessionRecord, estimate: EstimateRecord) -> dict[str, Any]:
         "isiMs": [_number(isi_ms) for isi_ms in estimate.grid_ms[kept]],
         **{name: _rounded(1e3 * np.asarray(values)[kept], FINE) for name, values in bands.items()},
     }
+
+
+def _said(record: SessionRecord, estimate: EstimateRecord) -> list[str]:
+    """The answer of an estimate, and warnings and what is not known of the tap, as the final statement says them."""
+    said = answer_and_warnings(estimate, record.header, _known_by(record, estimate.trial))
+    unmeasured = tap_unmeasured(estimate, record.header.stimulus)
+    return [*(one.text for one in said), *([unmeasured] if unmeasured else [])]
 
 
 def _known_by(record: SessionRecord, number: int) -> list[Trial]:

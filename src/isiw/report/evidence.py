@@ -6,8 +6,7 @@ import math
 import statistics
 from collections import Counter
 from collections.abc import Sequence
-from types import MappingProxyType
-from typing import Final
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -25,10 +24,17 @@ NOT_CLEARLY = 0.05
 """From this p-value of a one-sided rank test on, MEPs are not clearly larger, which is said where the method itself
 says nothing of its certainty. From one half on they are not larger at all."""
 
-BY_CHANCE, IN_EACH = 0.00135, 0.05
-"""A change with time is said below this p-value, three standard errors, and below the other one on each side."""
+BY_CHANCE: Final = 0.0035
+"""A change with time is said below this p-value in either direction, which is 2.7 standard errors."""
 
-CHANGES: Final = MappingProxyType({"grew": 1.0, "shrank": -1.0})
+NEAR_MS: Final = 15.0
+"""Pairs of trials tell of a change with weights by the distance of their ISIs, of this SD [ms]."""
+
+LEAST_MV: Final = 0.001
+"""Amplitudes below are not told apart [mV]."""
+
+Expected: TypeAlias = tuple[Sequence[float], Sequence[float]]
+"""ISIs [ms], and the MEP that is expected at each [mV]."""
 
 ENOUGH_TO_STAND_OUT = 10
 
@@ -73,32 +79,52 @@ def p_of_larger(inside: Sequence[float], outside: Sequence[float]) -> float:
     return _beyond((above_mean - 0.5) / error) if error else 1.0
 
 
-def changed_with_time(window: Window | None, trials: Sequence[Trial]) -> str | None:
+def changed_with_time(window: Window | None, trials: Sequence[Trial], expected: Expected | None = None) -> str | None:
     """That amplitudes grew or shrank from trial to trial, whatever the ISI; None if they did not clearly.
 
-    A window can be found in that alone, as ISIs are not asked in random order. Kendall's test of amplitude against
-    order, within and outside the window, combined by Stouffer's method.
+    A window can be found in that alone, as ISIs are not asked in random order: from the middle of a window they move to
+    its edges. So amplitudes are set against those that are expected at their ISIs, and among near ISIs alone.
+
+    Args:
+        window: the reported window.
+        trials: the trials that count, in their order.
+        expected: ISIs [ms] and the MEP that is expected at each [mV], if the method has them.
     """
     if window is None:
         return None
     strata = _inside_and_outside(window, trials)
     if min(len(set(meps_mv)) for meps_mv in strata) < ENOUGH_ON_EACH_SIDE:
         return None
-    n = np.array([len(meps_mv) for meps_mv in strata])
-    for word, sign in CHANGES.items():
-        found = np.array([growth(sign * np.array(meps_mv)) for meps_mv in strata])
-        p = _beyond(float(np.sqrt(n) @ found) / math.sqrt(n.sum()))
-        if p < BY_CHANCE and _beyond(float(found.min())) < IN_EACH:
-            return sentences.changed(word, p)
-    return None
+    isi_ms, mep_mv = np.array(_placed(trials)).T
+    usual_mv = None if expected is None else np.interp(isi_ms, *np.asarray(expected))
+    near = np.exp(-0.5 * (np.subtract.outer(isi_ms, isi_ms) / NEAR_MS) ** 2)
+    found = growth(mep_mv, usual_mv, near)
+    p = _beyond(abs(found))
+    return sentences.changed("grew" if found > 0 else "shrank", p) if p < BY_CHANCE else None
 
 
-def growth(meps_mv: ArrayLike) -> float:
-    """Kendall's statistic of amplitude against order [standard errors], corrected for ties and for continuity."""
-    tied, n = _tied(meps_mv), np.size(meps_mv)
-    larger_later = float(np.triu(np.sign(np.subtract.outer(meps_mv, meps_mv)).T).sum())
-    variance = (n * (n - 1) * (2 * n + 5) - float((tied * (tied - 1) * (2 * tied + 5)).sum())) / 18
-    return (larger_later - 1) / math.sqrt(variance)
+def growth(meps_mv: ArrayLike, usual_mv: ArrayLike | None = None, weights: ArrayLike = 1.0) -> float:
+    """Kendall's statistic of amplitude against order [standard errors], in which each pair of trials has a weight.
+
+    Its variance, without any growth, is that of its projection on single trials and of what is left, a third of the
+    squared weights each; of equal weights that is Kendall's own. Ties lower it by their share of all triples.
+
+    Args:
+        meps_mv: amplitudes in their order [mV], shape (n,).
+        usual_mv: what is usual at their ISIs [mV], shape (n,), which they are divided by; None if not known.
+        weights: how much each pair of trials counts, shape (n, n).
+    """
+    sizes = scaled = np.asarray(meps_mv, float)
+    if usual_mv is not None:
+        scaled = np.maximum(sizes, LEAST_MV) / np.maximum(usual_mv, LEAST_MV)
+    n = sizes.size
+    larger = np.sign(np.subtract.outer(scaled, scaled)).T * (np.subtract.outer(sizes, sizes) != 0)
+    later = np.sign(np.subtract.outer(np.arange(n), np.arange(n))).T
+    each = np.broadcast_to(weights, (n, n)) * later
+    tied = _tied(scaled)
+    untied = 1.0 - float((tied**3 - tied).sum()) / (n**3 - n)
+    variance = untied * float((each.sum(axis=0) ** 2).sum() + np.triu(each**2, 1).sum()) / 3
+    return float((np.triu(each, 1) * larger).sum()) / math.sqrt(variance) if variance > 0 else 0.0
 
 
 def _tied(values: ArrayLike) -> FloatArray:
@@ -135,9 +161,14 @@ def no_comparison(window: Window | None, trials: Sequence[Trial]) -> str | None:
     return sentences.few_outside(len(outside), len(outside) + len(inside), alone)
 
 
+def _placed(trials: Sequence[Trial]) -> list[tuple[float, float]]:
+    """ISI [ms] and MEP [mV] of the pairs among some trials."""
+    return [(t.isi_ms, t.mep_mv) for t in trials if t.isi_ms is not None and t.mep_mv is not None]
+
+
 def _inside_and_outside(window: Window, trials: Sequence[Trial]) -> tuple[list[float], list[float]]:
     """The MEPs of pairs inside and outside a window [mV]."""
-    placed = [(t.isi_ms, t.mep_mv) for t in trials if t.isi_ms is not None and t.mep_mv is not None]
+    placed = _placed(trials)
     is_inside = window.mask([isi_ms for isi_ms, _ in placed])
     inside = [mep_mv for (_, mep_mv), within in zip(placed, is_inside, strict=True) if within]
     outside = [mep_mv for (_, mep_mv), within in zip(placed, is_inside, strict=True) if not within]

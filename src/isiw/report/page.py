@@ -29,7 +29,7 @@ from isiw.report.tables import (
     settings_facts,
     trial_row,
 )
-from isiw.report.words import finding_sentences, fit_sentence
+from isiw.report.words import fit_sentence, statement
 from isiw.sentences import JUDGED_SINCE
 from isiw.text import plain
 from isiw.text.named_code import library
@@ -37,6 +37,9 @@ from isiw.window import Window
 
 _ASSETS: Final = resources.files("isiw.report") / "assets"
 _SUFFIXES: Final = {".html", ".htm"}
+
+_SAID_ABOVE: Final = {"end lost", "judged since"}
+"""Sentences of the statement that the state of the log says already."""
 
 
 def save_report(
@@ -75,7 +78,7 @@ def report_page(record: SessionRecord, *, truth: Window | None = None) -> str:
         "subject": record.header.subject or "an unnamed subject",
         "states": _states(record),
         "losses": (*record.told_unread, *record.losses),
-        "findings": finding_sentences(record),
+        "statement": [said for said in statement(record) if said.name not in _SAID_ABOVE],
         "fit": fit_sentence(record),
         "answers": answers(record),
         "methods": method_answers(record) if record.rests_on_data else [],

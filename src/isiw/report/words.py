@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from enum import StrEnum
 from pathlib import Path
+from typing import NamedTuple
 
 from isiw import sentences
+from isiw.estimate import Estimate
 from isiw.findings import Kind
+from isiw.log.headers import Header
 from isiw.log.kinds import continued_by
 from isiw.log.reader import SessionRecord, require_records
 from isiw.metrics import f1
 from isiw.report.evidence import changed_with_time, contradiction, no_comparison, nothing_measured, nothing_stood_out
 from isiw.session.examination import change_found
 from isiw.strategy.catalogue import known_settings, list_strategies
-from isiw.strategy.stopping import OF_THE_WINDOW
+from isiw.strategy.stopping import OF_THE_WINDOW, StopKind
 from isiw.text.sanitize import command, counted
 from isiw.text.stimuli import TAP, StimulusWords
 from isiw.trials import Trial
@@ -24,8 +28,25 @@ TRIAL_HEADINGS = ("trial", "commanded", "outcome", "realised")
 """The columns of `trial_rows`."""
 
 
+class Role(StrEnum):
+    """The part of a sentence in a statement."""
+
+    ANSWER = "answer"
+    DO = "do"
+    WARNING = "warning"
+    DETAIL = "detail"
+
+
+class Said(NamedTuple):
+    """A sentence of a statement: its name, its part, and its words."""
+
+    name: str
+    role: Role
+    text: str
+
+
 def final_statement(record: SessionRecord, config: Path | None = None) -> str:
-    """The result of a session, in a few sentences.
+    """The result of a session: the answer on one line, what to do on one at most, warnings, and then details.
 
     Args:
         record: the session.
@@ -35,59 +56,113 @@ def final_statement(record: SessionRecord, config: Path | None = None) -> str:
         InvalidValueError: no record of a session.
     """
     require_records((record,))
+    return in_lines(statement(record, config))
+
+
+def in_lines(said: Sequence[Said]) -> str:
+    """Sentences as they are printed: the answer, "Do:" and each warning on a line of its own, details together."""
+
+    def of(role: Role) -> list[str]:
+        return [one.text for one in said if one.role is role]
+
+    do = [f"Do: {text[0].lower()}{text[1:]}" for text in of(Role.DO)]
+    warnings = [f"Warning: {text}" for text in of(Role.WARNING)]
+    return "\n".join(filter(None, (" ".join(of(Role.ANSWER)), *do, *warnings, " ".join(of(Role.DETAIL)))))
+
+
+def statement(record: SessionRecord, config: Path | None = None) -> list[Said]:
+    """The sentences about a session; the first thing to do is what is to be done, any other a detail."""
     last = record.estimates[-1] if record.estimates else None
-    way_on = continued_by(record.path, record.header, config, end_lost=record.end_lost)
-    said = finding_sentences(record)
-    if last is not None:
-        said += [
-            counts_sentence(record),
-            fit_sentence(record),
-            _unstated_hit_delay(record),
-            _unstated_intensity(record),
-            _unstated_stimulus(record),
-            _expects_a_tap(record),
-            last.reason if record.rests_on_data or last.stop_kind not in OF_THE_WINDOW else "",
-        ]
+    said, todo = findings(record), _todo(record, config)
     if record.end_lost:
-        said.append(
-            "The end of the log is missing. Find out, with the stimulator's counter, the number N of pulses that isiw "
-            f"show does not list; then resume with: {way_on}"
-        )
+        said.append(Said("end lost", Role.WARNING, "The end of the log is missing."))
+    if last is not None:
+        expects = _expects_a_tap(record)
+        reason = last.reason if record.rests_on_data or last.stop_kind not in OF_THE_WINDOW else ""
+        said += [
+            Said("expects a tap", Role.WARNING, expects),
+            Said("judged since", Role.WARNING, sentences.JUDGED_SINCE if record.is_judged_since else ""),
+            Said("counts", Role.DETAIL, counts_sentence(record)),
+            Said("fit", Role.DETAIL, fit_sentence(record)),
+            Said("reason", Role.DETAIL, "" if last.stop and last.stop_kind is StopKind.ABSENT else reason),
+        ]
+    return _kept([*said, *(Said(name, Role.DETAIL if k else Role.DO, text) for k, (name, text) in enumerate(todo))])
+
+
+def _kept(said: Iterable[Said]) -> list[Said]:
+    return [one for one in said if one.text]
+
+
+def _todo(record: SessionRecord, config: Path | None) -> list[tuple[str, str]]:
+    """Names and words of what there is to do, the most urgent first."""
+    way_on = continued_by(record.path, record.header, config, end_lost=record.end_lost)
+    last = record.estimates[-1] if record.estimates else None
+    todo = []
+    if record.end_lost:
+        count = "Find out, with the stimulator's counter, the number N of pulses that isiw show does not list"
+        todo.append(("lost pulses", f"{count}; then resume with: {way_on}"))
     elif last is not None and not last.stop:
-        said.append(f"The session is not over; resume with: {way_on}")
-    if last is not None and record.is_judged_since:
-        said.append(sentences.JUDGED_SINCE)
-    return " ".join(sentence for sentence in said if sentence)
+        todo.append(("resume", f"Resume the session, which is not over, with: {way_on}"))
+    if last is not None:
+        nothing = nothing_measured(record) is not None
+        todo += [
+            ("stimulus", _unstated_stimulus(record)),
+            ("intensity", _unstated_intensity(record)),
+            ("tap alone", "" if nothing else sentences.tap_unmeasured(last, record.header.stimulus)),
+            ("hit delay", _unstated_hit_delay(record)),
+        ]
+    return [(name, text) for name, text in todo if text]
+
+
+def findings(record: SessionRecord) -> list[Said]:
+    """The answer about the window, what speaks against it, and how sure it is."""
+    if not record.estimates:
+        nothing = sentences.nothing_estimated(len(record.table), record.given, damaged=bool(record.losses))
+        return [Said("nothing", Role.ANSWER, nothing)]
+    if (nothing_was := nothing_measured(record)) is not None:
+        return [Said("nothing", Role.ANSWER, nothing_was)]
+    space, estimate, told = record.header.space, record.estimates[-1], record.table.told
+    # Of a change the last estimate says more than a doubt on the way.
+    doubts = [event for event in record.events if event.kind == "doubt" and event.finding is not Kind.CHANGED]
+    sought_ms = record.header.signals.mep_window_ms if "emg" in record.header.device.channels else None
+    return _kept(
+        [
+            *answer_and_warnings(estimate, record.header, told),
+            Said("at rest", Role.WARNING, nothing_stood_out(told, sought_ms) or ""),
+            *(Said("doubt", Role.WARNING, sentences.doubt(event.trial, event.text)) for event in doubts),
+            Said("edges", Role.DETAIL, sentences.edges(estimate, space)),
+            Said("best ISI", Role.DETAIL, sentences.best_isi(estimate)),
+            Said("excluded", Role.DETAIL, sentences.excluded(estimate)),
+            Said("expected F1", Role.DETAIL, sentences.expected_f1(estimate)),
+            Said("depression", Role.DETAIL, _depression(record)),
+            Said("unusual", Role.DETAIL, sentences.unusual(estimate)),
+        ]
+    )
+
+
+def answer_and_warnings(estimate: Estimate, header: Header, told: Sequence[Trial]) -> list[Said]:
+    """The answer of an estimate, and what the trials that it rests on, and the tap, say against it."""
+    window, first = estimate.window, header.stimulus
+    expected = (estimate.grid_ms, estimate.profile_mv) if estimate.profile_mv else None
+    against = {
+        "tap": sentences.tap_likely(estimate, first),
+        "contradiction": contradiction(window, told, without_probability=estimate.probability is None),
+        "few outside": no_comparison(window, told),
+        "changed with time": changed_with_time(window, told, expected),
+        "change": f"{changed}" if (changed := change_found(estimate.change, told)) else "",
+    }
+    answer = Said("answer", Role.ANSWER, sentences.finding(estimate, first, header.space))
+    return [answer, *(Said(name, Role.WARNING, text) for name, text in against.items() if text)]
+
+
+def _depression(record: SessionRecord) -> str:
+    header = record.header
+    return sentences.depression(record.estimates[-1], header.stimulus.name, header.visit.intensity_pct_rmt)
 
 
 def finding_sentences(record: SessionRecord) -> list[str]:
-    """Sentences about the window, and how sure it is."""
-    if not record.estimates:
-        return [sentences.nothing_estimated(len(record.table), record.given, damaged=bool(record.losses))]
-    space, nothing, estimate = record.header.space, nothing_measured(record), record.estimates[-1]
-    if nothing is not None:
-        return [nothing]
-    told, first, window = record.table.told, record.header.stimulus, estimate.window
-    sought_ms = record.header.signals.mep_window_ms if "emg" in record.header.device.channels else None
-    # Of a change the last estimate says more than a doubt on the way.
-    doubts = [event for event in record.events if event.kind == "doubt" and event.finding is not Kind.CHANGED]
-    said = [
-        sentences.finding(estimate, first, space),
-        sentences.edges(estimate, space),
-        sentences.tap_unknown(estimate, first),
-        contradiction(window, told, without_probability=estimate.probability is None),
-        no_comparison(window, told),
-        changed_with_time(window, told),
-        f"{changed}" if (changed := change_found(estimate.change, told)) else "",
-        nothing_stood_out(told, sought_ms),
-        *(sentences.doubt(event.trial, event.text) for event in doubts),
-        sentences.best_isi(estimate),
-        sentences.excluded(estimate),
-        sentences.expected_f1(estimate),
-        sentences.depression(estimate, first.name, record.header.visit.intensity_pct_rmt),
-        sentences.unusual(estimate),
-    ]
-    return [sentence for sentence in said if sentence]
+    """The same as words alone."""
+    return [one.text for one in findings(record)]
 
 
 def counts_sentence(record: SessionRecord) -> str:
@@ -116,12 +191,11 @@ def _unstated_hit_delay(record: SessionRecord) -> str:
         return ""
     if (stated_ms := header.device.hit_delay_ms) is not None:
         call = f"make_strategy(..., hit_delay_ms=({stated_ms[0]:g}, {stated_ms[1]:g}))"
-        said = "The strategy does not know the device's hit delay; stating it usually saves stimuli."
-        return f"{said} Next time: {call}."
-    said = "The device does not state its hit delay (DeviceInfo.hit_delay_ms); stating it usually saves stimuli."
+        return f"State the device's hit delay to the strategy next time, which usually saves stimuli: {call}."
+    said = "State the device's hit delay (DeviceInfo.hit_delay_ms), which usually saves stimuli"
     if not any(name == "acceleration" for _, name in record.waveforms):
-        return said
-    return f"{said} {command('timing', record.path)} measures it."
+        return f"{said}."
+    return f"{said}. {command('timing', record.path)} measures it."
 
 
 def _unstated_intensity(record: SessionRecord) -> str:
@@ -130,7 +204,7 @@ def _unstated_intensity(record: SessionRecord) -> str:
     if stated_pct is None or not _lacks(record, "intensity_pct_rmt"):
         return ""
     call = f"make_strategy(..., intensity_pct_rmt={stated_pct:g})"
-    return f"The strategy does not know the intensity, and assumes about 90 % of RMT. Next time: {call}."
+    return f"State the intensity to the strategy next time, which assumes about 90 % of RMT: {call}."
 
 
 def _unstated_stimulus(record: SessionRecord) -> str:

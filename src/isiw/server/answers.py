@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from isiw.errors import IsiwError, LimitExceededError, LogError, RequestError, error_text
 from isiw.estimate import Estimate, Reported
 from isiw.findings import Kind
+from isiw.session.state import State
 from isiw.strategy.stopping import StopDecision
 from isiw.text import plain
 from isiw.trials import Status, Trial
@@ -126,6 +127,7 @@ class SessionAnswer(OkAnswer):
 
     id: str
     open: bool = Field(description="Whether it is open; otherwise it has to be resumed.")
+    state: State = Field(description="Its state, in the words of the live page and the terminal.")
     subject: str
     trials: int = Field(description="How many have an outcome; the next one has this number.")
     told: int = Field(description="How many of these count.")

@@ -25,6 +25,7 @@ from isiw.server.requests import (
     TellRequest,
 )
 from isiw.session.recorder import Recorder
+from isiw.session.state import state_of
 from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.trials import Status, Trial
 
@@ -94,6 +95,7 @@ class DrivenSession:
         return SessionAnswer(
             id=self.name,
             open=True,
+            state=state_of(begun=True, running=True, paused=False, rests=self.recorder.rests, fault=False),
             subject=self.subject,
             trials=len(trials),
             told=len(trials.told),

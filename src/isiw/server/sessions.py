@@ -16,12 +16,14 @@ from isiw.files import made_folder, twin
 from isiw.log.durable import log_exists, log_of, part_of
 from isiw.log.headers import SERVED_KEY
 from isiw.log.reader import SessionRecord, read_session
+from isiw.log.schema import Event
 from isiw.server.answers import EstimateAnswer, Refusal, SessionAnswer, SessionEntry, TrialRow
 from isiw.server.clients import logged_client, require_free
 from isiw.server.driven import DrivenSession, not_open
 from isiw.server.requests import NAME, CreateRequest, ResumeRequest
 from isiw.session.replay import strategy_of
 from isiw.session.resume import open_session
+from isiw.session.state import state_of
 from isiw.session.terminal import alarm
 from isiw.strategy.catalogue import known_settings, make_strategy
 
@@ -225,6 +227,13 @@ def _stood(name: str, record: SessionRecord) -> SessionAnswer:
     return SessionAnswer(
         id=name,
         open=False,
+        state=state_of(
+            begun=bool(len(record.history)),
+            running=False,
+            paused=False,
+            rests=False,
+            fault=any(isinstance(last, Event) and last.kind == "fault" for last in record.history[-1:]),
+        ),
         subject=record.header.subject,
         trials=len(record.table),
         told=len(record.table.told),

@@ -26,9 +26,10 @@ from isiw.log.schema import Event, Record, now
 from isiw.log.writer import LogWriter
 from isiw.session.console import OperatorConsole
 from isiw.session.examination import WindowExamination, examination_of
+from isiw.session.pausing import Pausing
 from isiw.session.rig import Rig, Safeguards, require_matching
 from isiw.session.sink import SessionUpdate, Sink
-from isiw.session.steps import Pausing, Steps
+from isiw.session.steps import Steps
 from isiw.signals.limits import SignalLimits
 from isiw.signals.tap import TapResponses
 from isiw.signals.watch import Watch

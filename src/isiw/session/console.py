@@ -18,8 +18,9 @@ from isiw.errors import InvalidValueError, LogError, error_text
 from isiw.estimate import WindowEstimate
 from isiw.log.headers import Header
 from isiw.sentences import asked, interval_cell, outcome
+from isiw.session.pausing import Asking
 from isiw.session.sink import SessionUpdate
-from isiw.session.steps import Asking
+from isiw.session.state import State
 from isiw.session.terminal import COLUMNS, ERASED, ESCAPE, Keys, Screen, columns, folded, is_terminal
 from isiw.text import plain
 from isiw.text.stimuli import TAP, StimulusWords
@@ -181,7 +182,10 @@ class OperatorConsole:
 
     def goes_on(self, reason: str) -> bool:
         """Wait for the key that says whether a paused session goes on."""
-        self.screen.say(f"{reason} The device is disarmed. r continues, q ends the session; it can be resumed later.")
+        self.screen.say(
+            f"{State.PAUSED}: {reason} The device is disarmed. r continues, q ends the session; it can be resumed "
+            "later."
+        )
         if self.shown is not None and self.shown != (last := self._session.trials[-1].index):
             self.shown = last
             self.screen.say(
@@ -230,8 +234,9 @@ class OperatorConsole:
     def _decide(self, key: str) -> None:
         try:
             self.asking.answer(goes_on=key == "r")
-        except InvalidValueError:
-            self.screen.say("The session is not paused; p pauses it.")
+        except InvalidValueError as error:
+            said = f"{error}" if self.asking.asked else "The session is not paused; p pauses it."
+            self.screen.say(said)
 
     def _judge(self, say: Callable[..., None], outcome: str, *reason: str) -> None:
         if not self._session.trials:

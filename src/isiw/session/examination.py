@@ -147,8 +147,10 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
     def log_failure(self, error: BaseException) -> None:
         """Log what ends a session before its time."""
         if error is not self._refusal:
-            text = "Interrupted by the operator." if isinstance(error, KeyboardInterrupt) else error_text(error)
-            self.event("limit" if isinstance(error, LimitExceededError) else "fault", text)
+            if isinstance(error, KeyboardInterrupt):  # a wish of the operator, and no fault
+                self.event("pause", "Interrupted by the operator.")
+            else:
+                self.event("limit" if isinstance(error, LimitExceededError) else "fault", error_text(error))
 
     def intend(self, intent: Intent, fallback: str | None = None) -> bool:
         """Put on disk what is about to be delivered; False, and nothing is, if a trial was judged since the ask."""
@@ -308,7 +310,7 @@ def learn(strategy: Strategy, trial: Trial) -> None:
     elif trial.counts and trial.isi_ms is not None:  # a tap alone with an amplitude
         strategy.learn_tap(trial.isi_ms, trial.mep_mv)
     elif trial.is_control:
-        strategy.count_control()
+        strategy.count_control(trial.mep_mv if trial.tap_alone and trial.counts else None)
     elif trial.excluded and trial.reason is None:
         strategy.count_excluded()
     else:

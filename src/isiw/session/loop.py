@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Unpack
 
-from isiw.devices.protocol import Device
+from isiw.devices.protocol import Device, Readiness
 from isiw.errors import ClockWarning, NotDelivered, warn
 from isiw.log.headers import Header
 from isiw.log.pulses import earlier_pulse_ages
@@ -18,9 +18,11 @@ from isiw.log.writer import LogWriter
 from isiw.session.assembly import Earlier, Options, assembled, require_fitting, require_untold
 from isiw.session.console import OperatorConsole, Table
 from isiw.session.judging import Judging
+from isiw.session.pausing import Pause
 from isiw.session.rehearsal import rehearse
-from isiw.session.sink import Follower, SessionResult
-from isiw.session.steps import Pause, ended, paused
+from isiw.session.sink import Follower, SessionResult, Wait
+from isiw.session.state import Fault, State, state_of
+from isiw.session.steps import ended, paused
 from isiw.session.terminal import goes_on, is_terminal, somebody_there
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
@@ -73,6 +75,7 @@ class Session(Judging):
         self._limits, self._safeguards = parts.limits, parts.safeguards
         self._sink, self._rig, self._examination, self._steps = parts.sink, parts.rig, parts.examination, parts.steps
         self._asking, self._pausing = self._console.asking, parts.pausing
+        self._fault: Fault | None = None
 
     @property
     def header(self) -> Header:
@@ -89,6 +92,38 @@ class Session(Judging):
     def pause_waiting(self) -> Pause | None:
         """The pause that `paused` tells the reason of, with its number."""
         return self._pausing.waiting
+
+    @property
+    def state(self) -> State:
+        """The state of the session, in the word that people read."""
+        wait = self.wait
+        return state_of(
+            begun=self._rig.staged_once or bool(self._earlier.first_records) or self._fault is not None,
+            running=self.running,
+            paused=self.pause_waiting is not None,
+            rests=wait is not None and wait.rests,
+            fault=self._fault is not None,
+        )
+
+    @property
+    def armed(self) -> bool:
+        """True if the device is armed, or being armed or disarmed."""
+        return self._rig.is_armed
+
+    @property
+    def fault(self) -> Fault | None:
+        """What ended the session, if a fault did."""
+        return self._fault
+
+    @property
+    def wait(self) -> Wait | None:
+        """The wait for the next stimulus; None if there is none."""
+        return self._sink.wait
+
+    @property
+    def readiness(self) -> Readiness | None:
+        """The device's state before the last stimulus, as it reported it; None if it reported none yet."""
+        return self._rig.limited.last_readiness
 
     def follow(self, follower: Follower) -> None:
         """Let somebody look on; before `run`. If there is no terminal, who looks on decides about pauses.
@@ -147,6 +182,8 @@ class Session(Judging):
             except BaseException as error:
                 self._examination.log_faults()
                 self._examination.log_failure(error)
+                if not isinstance(error, KeyboardInterrupt):
+                    self._fault = self._steps.fault_of(error)
                 if not (self._rig.staged_once or self._earlier.first_records):
                     log.discard()
                 raise

@@ -130,6 +130,11 @@ class Recorder(Recording[Trial], Judging):
             return 0.0
         return self._pacing.wait_s(self._protocol.interval_s(len(self.trials), self._seed))
 
+    @property
+    def rests(self) -> bool:
+        """True if the protocol has a rest before the next trial, and it is not over."""
+        return self._protocol.rests_before(len(self.trials)) and self.wait_s() > 0
+
     def ask(self, deadline_s: float | None = None) -> float:
         """The next ISI [ms], the same until its outcome; on disk as about to be delivered before this returns.
 

@@ -125,7 +125,7 @@ class Rig:
     ) -> None:
         stuck = "The session does not react. The device is disarmed."
         self.interrupts = Interrupts(self.disarm, lambda: end_process(stuck, sink.writer, INTERRUPTED), away)
-        self.staged_once = False
+        self.staged_once = self.is_armed = False
         self._raw, self._limits, self._safeguards, self._sink = device, limits, safeguards, sink
         self._waits_for_nobody = waits_for_nobody
         self._punctual = PunctualDevice(
@@ -175,6 +175,7 @@ class Rig:
 
     def stage(self) -> None:
         """Get ready and arm."""
+        self.is_armed = True  # before it is, so that nobody takes it for disarmed who looks meanwhile
         with self.interrupts.allowed():
             self.limited.stage()
         self.staged_once = True
@@ -185,6 +186,7 @@ class Rig:
             self.limited.stop()
         except StillArmedError as error:
             self._end_armed(error)
+        self.is_armed = False
 
     def late_answer(self) -> Answer | None:
         """The answer to a delivery after its deadline; None if nothing comes as long as `stop` may take."""

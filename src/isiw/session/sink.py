@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Final, NamedTuple, Protocol
 
 from isiw.errors import InvalidValueError, error_text
 from isiw.estimate import WindowEstimate
@@ -59,6 +60,17 @@ class SessionResult:
         return f"{self.estimate}\nTrials: {self.trials}\nEnded: {self.decision.reason}\nLog: {self.log}"
 
 
+class Wait(NamedTuple):
+    """A wait for the next stimulus: when it ends, of a monotonic clock [s], and whether it is a rest."""
+
+    until_s: float
+    rests: bool
+
+
+_SAME_S: Final = 0.5
+"""A wait whose end moves by less is the same one [s]: of its clock only naps are known."""
+
+
 class Follower(Protocol):
     """Somebody who looks on. Each call has to return at once; `logged` comes from several threads."""
 
@@ -90,6 +102,7 @@ class Sink:
         self.followers: list[Follower] = []
         self.writer = log
         self._screen: _Screen | None = None
+        self.wait: Wait | None = None
         self.faults: deque[str] = deque()
         """Faults that were overcome, in whichever thread, and are not in the log yet."""
 
@@ -131,8 +144,11 @@ class Sink:
         if self.on_trial is not None:
             self.on_trial(update)
 
-    def waiting(self, left_s: float | None, text: str = "") -> None:
-        """The session waits for its next stimulus; no longer, if nothing is left [s]."""
+    def waiting(self, left_s: float | None, text: str = "", *, rests: bool = False) -> None:
+        """The session waits for its next stimulus, perhaps at rest; no longer, if nothing is left [s]."""
+        was, is_now = self.wait, None if left_s is None else Wait(time.monotonic() + left_s, rests)
+        if was is None or is_now is None or was.rests != rests or abs(was.until_s - is_now.until_s) > _SAME_S:
+            self.wait = is_now
         if self._screen is not None:
             self._screen.waiting(left_s, text)
 

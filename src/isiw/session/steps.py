@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import itertools
 import statistics
-import threading
-import time
 from collections import deque
-from collections.abc import Callable, Iterable
-from typing import Final, NamedTuple
+from collections.abc import Iterable
+from typing import Final
 
 from isiw.devices.protocol import Answer
-from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, LimitExceededError, NotDelivered, error_text
-from isiw.findings import Finding, Kind
+from isiw.errors import DeviceError, DeviceTimeoutError, IsiwError, LimitExceededError, NotDelivered, error_text
+from isiw.findings import Finding
 from isiw.log.headers import Header
 from isiw.log.schema import Event, Intent, Waveform
 from isiw.session.examination import WindowExamination
 from isiw.session.own_response import LONGER, OwnResponse
+from isiw.session.pausing import Pausing
 from isiw.session.rig import Rig
 from isiw.session.sink import SessionUpdate, Sink
+from isiw.session.state import Fault
 from isiw.signals.judgement import judge, judge_measurement
 from isiw.signals.tap import TapResponses
 from isiw.signals.watch import Watch
@@ -27,114 +27,6 @@ from isiw.strategy.strategy import Strategy
 from isiw.text.sanitize import shown
 from isiw.trials import Measurement, Stimulus, Sweep, Trial
 from isiw.visit import Control
-
-_INTERRUPTED = "Interrupted by the operator."
-
-
-class Pause(NamedTuple):
-    """A pause that waits to be decided: its number in the session, from 1, and why."""
-
-    number: int
-    reason: str
-
-
-class Pausing:
-    """The reasons to pause a session, and how it goes on."""
-
-    def __init__(self, rig: Rig, examination: WindowExamination, asking: Asking) -> None:
-        self._rig, self._examination, self._asking = rig, examination, asking
-        self.reason: str | None = None
-        self.kind: Kind | None = None
-        self.waiting: Pause | None = None
-
-    @property
-    def due(self) -> bool:
-        """True if the session is to pause before the next stimulus."""
-        return self.reason is not None or self._rig.interrupts.heard
-
-    def now(self, reason: str) -> None:
-        """Disarm, and pause before the next stimulus; from any thread."""
-        self.reason, self.kind = reason, None
-        self._rig.disarm()
-
-    def end(self, reason: str) -> None:
-        """Disarm, and end before the next stimulus, whatever is answered to a pause; from any thread."""
-        self._asking.over = True
-        self.now(reason)
-
-    def until_decided(self, decide: Callable[[str], bool]) -> str | None:
-        """Pause until somebody says that the session goes on; if nobody does, the reason that it ends with."""
-        rig, interrupts = self._rig, self._rig.interrupts
-        rig.disarm()
-        self._examination.log_faults()
-        interrupts.acknowledge()
-        if interrupts.ending:
-            raise KeyboardInterrupt
-        reason, kind, self.reason, self.kind = self.reason or _INTERRUPTED, self.kind, None, None
-        self._examination.event("pause", reason, finding=kind, durable=True)
-        if not self._goes_on(reason, decide):
-            if interrupts.heard:
-                raise KeyboardInterrupt
-            if self.reason is not None:  # what somebody said meanwhile
-                reason, self.reason = self.reason, None
-                self._examination.event("pause", reason)
-            return reason
-        interrupts.settle()
-        self._examination.event("pause", "The operator continued.")
-        if not self.due:
-            rig.stage()
-        return None
-
-    def _goes_on(self, reason: str, decide: Callable[[str], bool]) -> bool:
-        if self._asking.over:
-            return False
-        self._asking.number += 1
-        self.waiting = Pause(self._asking.number, reason)
-        try:
-            return self._rig.interrupts.freely(decide, reason) is True and not self._asking.over
-        finally:
-            self.waiting = None
-
-
-_POLL_S: Final = 0.05
-
-
-class Asking:
-    """A question that is answered from another thread: by a key, or a button. No is never taken back.
-
-    Once it is `over`, this question and all that follow are answered with no.
-    """
-
-    def __init__(self) -> None:
-        self.asked = self.over = False
-        self.number = 0
-        self._answer: bool | None = None
-        self._lock = threading.Lock()
-
-    def wait(self, nobody: Callable[[], bool]) -> bool:
-        """Wait for an answer; where nobody is left who could give one, it is no."""
-        with self._lock:  # an answer that came too late for the last question is none to this one
-            self._answer, self.asked = None, True
-        try:
-            while self._answer is None and not self.over and not nobody():
-                time.sleep(_POLL_S)
-        finally:
-            with self._lock:
-                self.asked = False
-        return bool(self._answer) and not self.over
-
-    def answer(self, *, goes_on: bool, number: int | None = None) -> None:
-        """Answer the question of this number, or whichever is asked; from any thread."""
-        with self._lock:
-            if not self.asked or (goes_on and (self.over or self._answer is False)):
-                raise InvalidValueError("the session does not wait for an answer", remedy="Pause it first.")
-            if number not in {None, self.number}:
-                raise InvalidValueError(
-                    "the session has paused again since", got=number, expected=f"pause {self.number}",
-                    remedy="Read why it is paused now, then answer that pause.",
-                )  # fmt: skip
-            self._answer = goes_on
-
 
 _LAST: Final = 20
 
@@ -178,6 +70,7 @@ class Steps:
         self._examination, self._rig, self._sink, self._pausing = examination, rig, sink, pausing
         self._watch, self._header, self._backoffs_s = watch, header, backoffs_s
         self._own_response = OwnResponse(examination, header, taps)
+        self._at: tuple[int, bool] | None = None  # the trial that is delivered, and whether its pulse may have come
         self._ends_s, self._freely = deque[float](maxlen=_LAST + 1), rig.interrupts.freely
 
     @property
@@ -214,6 +107,12 @@ class Steps:
         self._own_response.correct()
         if self._examination.conclude(self._decision, self._next_isi_ms) is None:
             self._examination.log_belief(self._decision, self._next_isi_ms)
+
+    def fault_of(self, error: BaseException) -> Fault:
+        """What an error that ends the session was, and in which trial."""
+        got = f" ({shown(error.got)})" if isinstance(error, IsiwError) and error.got is not None else ""
+        what = f"{error.what}{got}" if isinstance(error, IsiwError) else error_text(error)
+        return Fault(what) if self._at is None else Fault(what, *self._at)
 
     def seen(self) -> None:
         """A person has seen the reason of a pause, and the session goes on."""
@@ -293,7 +192,8 @@ class Steps:
         interval_s = self._header.protocol.interval_s(number, self._header.seed)
         try:
             while not self._disturbed and (wait_s := self._rig.limited.wait_s(interval_s)) > 0:
-                self._sink.waiting(wait_s, f"Rest after {number} trials" if rests else "Next stimulus")
+                text = f"Rest after {number} trials" if rests else "Next stimulus"
+                self._sink.waiting(wait_s, text, rests=rests)
                 self._rig.clock.sleep_s(min(wait_s, _NAP_S))
         finally:
             self._sink.waiting(None)
@@ -304,6 +204,7 @@ class Steps:
 
     def _deliver(self, stimulus: Stimulus, fallback: str | None) -> None:
         """Deliver a pair of stimuli or a control trial, unless a trial was judged since it was asked for."""
+        self._at = stimulus.trial, False
         try:
             self._freely(self._rig.limited.check, stimulus)  # before anything is logged of it
         except NotDelivered as error:
@@ -316,6 +217,7 @@ class Steps:
         try:
             self._sink.log.require_in_place()
             trial = Trial.unknown(stimulus)  # from here on it may have been given, whatever fails
+            self._at = stimulus.trial, True
             answer = self._answer(stimulus)
             trial = self._judged(stimulus, answer)
             if isinstance(answer, Sweep):
@@ -324,7 +226,7 @@ class Steps:
             doubt = self._watch.doubts.new
         except Exception as error:
             if trial is None or isinstance(error, _NOTHING_GIVEN):
-                trial = None
+                trial, self._at = None, (stimulus.trial, False)
                 self._examination.log_refusal("refused", error, stimulus.trial)
                 raise
             if not self._pausing.due:
@@ -338,6 +240,7 @@ class Steps:
                 self._own_response.correct()
             self._examination.log_faults()
             self._sink.log.sync()
+        self._at = None
 
     def _answer(self, stimulus: Stimulus) -> Answer:
         """The answer to a stimulus; its waveforms are logged, also if it comes too late."""

@@ -178,7 +178,7 @@ class TapResponses:
         """Whether a window rests on trials whose part of the tap's response few sweeps, or none, have shown."""
         if window is None or any(trial.tap_alone for trial in trials.trials[-TAP_EVERY + 1 :]):
             return False
-        inside = (trial.index for trial in trials.told if trial.isi_ms is not None and _inside(window, trial.isi_ms))
+        inside = (trial.index for trial in trials.told if trial.isi_ms is not None and is_inside(window, trial.isi_ms))
         own = (self.windows[number] for number in inside if number in self.windows)
         lefts = (self._left(each) for each in own if self._count(each.since_hit_ms) < ENOUGH_SHOWN)
         return any(left is None or left.mean_mv > 0 for left in lefts)
@@ -191,7 +191,7 @@ class TapResponses:
         unknown_ms = [
             trial.isi_ms
             for trial in trials.told
-            if window is not None and trial.isi_ms is not None and _inside(window, trial.isi_ms)
+            if window is not None and trial.isi_ms is not None and is_inside(window, trial.isi_ms)
             if (own := self.windows.get(trial.index)) is not None and not self._is_known(own)
         ]
         if not unknown_ms:
@@ -376,13 +376,14 @@ def meets_response(isi_ms: float, reference: str, mep_window_ms: tuple[float, fl
     return -mep_window_ms[1] <= from_hit_ms <= TAP_MS - mep_window_ms[0]
 
 
-def may_be_the_taps(window: Window | None, unknown_ms: Iterable[float], known_ms: Iterable[float]) -> bool:
-    """Whether what the tap alone does is unknown at most of the ISIs within a window at which that matters."""
-    if window is None:
-        return False
-    unknown, known = (sum(_inside(window, isi_ms) for isi_ms in isis_ms) for isis_ms in (unknown_ms, known_ms))
-    return unknown > known
+def taps_anywhere(sizes_mv: Sequence[float], least_mv: float) -> TapsAlone | None:
+    """The same of taps alone whose amplitudes [mV] are the largest at any time; None for too few."""
+    if len(sizes_mv) < LEAST_SHOWN:
+        return None
+    excess = np.asarray(sizes_mv) - least_mv
+    return TapsAlone(float(excess.mean()), float(excess.std()), len(sizes_mv))
 
 
-def _inside(window: Window, isi_ms: float) -> bool:
+def is_inside(window: Window, isi_ms: float) -> bool:
+    """Whether an ISI [ms] is within a segment of a window."""
     return any(start <= isi_ms <= end for start, end in window.segments)

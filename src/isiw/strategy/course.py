@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
@@ -26,7 +27,7 @@ from isiw.models.protocol import (
     ProposesIsi,
     ResponseModel,
 )
-from isiw.signals.tap import TapsAlone, may_be_the_taps, meets_response, taps_near
+from isiw.signals.tap import TapsAlone, is_inside, meets_response, taps_anywhere, taps_near
 from isiw.strategy.choice import Choice, Cost, best_choices, evenly_spaced
 from isiw.strategy.stopping import Progress, StopDecision, StoppingRule, looks_back
 from isiw.trials import Trial
@@ -98,6 +99,8 @@ class Outcome(Checked):
 class Outcomes:
     """All outcomes so far: of pulses, and ISI [ms] and amplitude [mV] of taps alone; changes by pulses before.
 
+    Of taps alone that were measured at no ISI the amplitude is the largest at any time; they only say whether a window
+    may be the tap's own response.
     Pulses whose ISI is `doubted`, by their numbers, are no observations.
     """
 
@@ -105,6 +108,7 @@ class Outcomes:
     stated_step_mv: float | None = None
     pulses: tuple[Outcome, ...] = ()
     taps: tuple[tuple[float, float], ...] = ()
+    taps_anywhere_mv: tuple[float, ...] = ()
     changes: tuple[int, ...] = ()
     doubted: frozenset[int] = frozenset()
 
@@ -114,7 +118,7 @@ class Outcomes:
         for trial in trials:
             if trial.told:
                 outcomes = outcomes.after(Outcome.of(trial))
-            elif trial.counts and trial.isi_ms is not None and trial.mep_mv is not None:
+            elif trial.counts and trial.mep_mv is not None:
                 outcomes = outcomes.after_tap(trial.isi_ms, trial.mep_mv)
         return outcomes
 
@@ -122,8 +126,10 @@ class Outcomes:
         """The same after one more pulse."""
         return replace(self, pulses=(*self.pulses, outcome))
 
-    def after_tap(self, isi_ms: float, mep_mv: float) -> Outcomes:
+    def after_tap(self, isi_ms: float | None, mep_mv: float) -> Outcomes:
         """The same after one more tap alone."""
+        if isi_ms is None:
+            return replace(self, taps_anywhere_mv=(*self.taps_anywhere_mv, mep_mv))
         return replace(self, taps=(*self.taps, (isi_ms, mep_mv)))
 
     def changing(self) -> Outcomes:
@@ -182,21 +188,22 @@ class Outcomes:
         sizes_mv = [mep_mv for _, mep_mv in self.taps] + [one.mep_mv for one in self.pulses if one.mep_mv]
         return min(sizes_mv, default=0.0)
 
-    def _may_be_the_taps(self, one: Outcome) -> bool:
-        """True if the tap may be all that an amplitude shows: it is not known what it evokes, or it evokes as much."""
+    def _of_the_tap(self, one: Outcome) -> bool | None:
+        """Whether the tap alone evokes as much as an amplitude shows; None if nobody knows what it evokes."""
         if one.isi_ms is None or one.tap_mv is not None:
             return False
-        alone = self._alone_at(one.isi_ms)
+        alone = self._alone_at(one.isi_ms) or taps_anywhere(self.taps_anywhere_mv, self._least_mv)
         if alone is None or one.mep_mv is None:
-            return alone is None
+            return None if alone is None else False
         return SEEN_MV < one.mep_mv - self._least_mv <= alone.most_mv
 
-    def tap_may_explain(self, window: Window | None) -> bool:
-        """True if the tap's own response could be what is larger within a window."""
+    def about_the_tap(self, window: Window | None) -> dict[str, bool]:
+        """Whether the tap's own response may be what is larger within a window, and whether that is likely."""
         met = [one for one in self.pulses if one.isi_ms is not None and meets_response(one.isi_ms, self.reference)]
-        sorts = [(one.isi_ms or 0.0, self._may_be_the_taps(one)) for one in met]
-        open_ms, known_ms = ([isi_ms for isi_ms, may_be in sorts if may_be is yes] for yes in (True, False))
-        return may_be_the_taps(window, open_ms, known_ms)
+        inside = [one for one in met if window is not None and is_inside(window, one.isi_ms or 0.0)]
+        counts = Counter(self._of_the_tap(one) for one in inside)
+        may_explain = counts[None] + counts[True] > counts[False]
+        return {"tap_may_explain": may_explain, "tap_is_likely": may_explain and counts[True] > counts[False]}
 
 
 def found_step_mv(amplitudes_mv: Sequence[float]) -> float:

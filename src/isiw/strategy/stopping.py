@@ -158,11 +158,9 @@ class CredibleWidth(Checked):
         # An edge that lies beyond the range for certain is an answer: its interval has no width.
         widths = [0.0 if low == high else high - low for low, high in intervals]
         probability = progress.estimate.probability or 0.0
-        start, end = (f"is known to {x:.0f} ms" if math.isfinite(x) else "is still unknown" for x in widths)
-        end = end.removeprefix("is known ") if all(map(math.isfinite, widths)) else end
-        weighs = progress.estimate.hypothesis_samples is not None
-        intervals_of = "intervals that span those of each plausible kind of noise" if weighs else "intervals"
-        edges = f"its start {start} and its end {end} ({100 * self.level:.0f} % {intervals_of})"
+        start, end = (f"known to {x:.0f} ms" if math.isfinite(x) else "still unknown" for x in widths)
+        end = end.removeprefix("known ") if all(map(math.isfinite, widths)) else end
+        edges = f"start {start}, end {end} ({100 * self.level:.0f} % intervals)"
         if max(widths) > self.width_ms:
             ends = f"The session ends when both edges of the window are known to {self.width_ms:g} ms"
             return StopKind.KNOWN.go_on(f"{ends}; {edges}.")

@@ -368,15 +368,15 @@ class Strategy:
         self._mistrials += 1
         self._lost = 0
 
-    def count_control(self) -> None:
-        """Count a control trial from which nothing is learnt: a tap alone, or TMS alone that was lost."""
+    def count_control(self, tap_mv: float | None = None) -> None:
+        """Count a control trial that teaches nothing of a window; `tap_mv` is what a tap alone evoked, at any time."""
         self._controls += 1
+        self._outcomes = self._outcomes if tap_mv is None else self._outcomes.after_tap(None, tap_mv)
 
     def estimate(self) -> WindowEstimate:
         """The present estimate of the window."""
         estimate = self._course.estimate()
-        if self._outcomes.tap_may_explain(estimate.window):
-            estimate = estimate.noting(tap_may_explain=True)
+        estimate = estimate.noting(**self._outcomes.about_the_tap(estimate.window))
         estimate = estimate.noting(silent=True) if self._is_silent else estimate
         return estimate.doubted() if self.in_doubt else estimate
 

@@ -58,6 +58,7 @@ def device_table(info: DeviceInfo, deliveries: Sequence[Delivery], limits: Signa
             ("background EMG", _background(trials, limits)),
             ("impact found", _impacts(deliveries)),
             ("realised minus wanted ISI", f"{', '.join(errors)} ms" if errors else "not known"),
+            ("acceleration begins", _deflections(deliveries)),
             ("MEP window", _windows(deliveries, limits)),
             ("amplitudes in it", f"{min(meps_uv):.3g} to {max(meps_uv):.3g} µV" if meps_uv else "none"),
             ("pulse artefact", artefact),
@@ -81,6 +82,48 @@ def _impacts(deliveries: Sequence[Delivery]) -> str:
     if not sought:
         return "given by the device, or not needed"
     return f"{sum(trial.t_hit_ms is not None for trial in sought)} of {len(sought)}"
+
+
+DEFLECTED_SD: Final = 6.0
+"""So many SDs of its rest an acceleration leaves where it is deflected."""
+
+
+def deflections_ms(deliveries: Sequence[Delivery]) -> list[float]:
+    """When the acceleration is first deflected after the valve command, of each pair with an impact [ms after it]."""
+    found = []
+    for delivery in deliveries:
+        sweep, trial = delivery.answer, delivery.trial
+        channel = sweep.channels.get("acceleration") if isinstance(sweep, Sweep) else None
+        if channel is None or trial.t_hit_ms is None or trial.t_valve_ms is None:
+            continue
+        valve = round((trial.t_valve_ms - channel.t0_ms) * channel.rate_hz / 1000)
+        rest, since = channel.values[: max(valve, 0)], channel.values[max(valve, 0) :]
+        if rest.size < 2:
+            continue
+        moved = np.flatnonzero(np.abs(since - rest.mean()) > DEFLECTED_SD * rest.std())
+        if moved.size:
+            found.append(trial.t_valve_ms + 1000 * int(moved[0]) / channel.rate_hz - trial.t_hit_ms)
+    return found
+
+
+def _deflections(deliveries: Sequence[Delivery]) -> str:
+    found_ms = deflections_ms(deliveries)
+    if not found_ms:
+        return "not recorded"
+    usual_ms = float(np.median(found_ms))
+    return f"{abs(usual_ms):.1f} ms {'before' if usual_ms <= 0 else 'after'} the impact"
+
+
+def late_deflection(deliveries: Sequence[Delivery]) -> str | None:
+    """The fault if the acceleration begins after the impact, as where the sensor is not on the hammer."""
+    found_ms = deflections_ms(deliveries)
+    usual_ms = float(np.median(found_ms)) if found_ms else 0.0
+    if usual_ms <= NEAR_PULSE_MS:
+        return None
+    return (
+        f"the acceleration is first deflected {usual_ms:.1f} ms after the reported impact, and a hammer moves before "
+        "it hits. Is the accelerometer on the hammer? Are both times on the sweep's own clock?"
+    )
 
 
 def _windows(deliveries: Sequence[Delivery], limits: SignalLimits) -> str:

@@ -31,6 +31,7 @@ from isiw.testing.device_table import (
     artefact_in_window,
     device_table,
     late_artefact,
+    late_deflection,
     wrong_hit_delay,
 )
 from isiw.testing.suites import broken, require
@@ -93,7 +94,7 @@ def _checked(
     _check_description(device, rules.space)
     if virtual and device.describe().simulated:
         pace = replace(pace, clock=VirtualClock())
-    say(_announcement(device, pace))
+    say(announcement(device, max(pace.iti_s, pace.limits.iti_s)))
     deliveries = _check_delivery(device, rules, pace, say)
     if isinstance(device, HasMemory):
         _check_memory(make, rules.space, pace)
@@ -103,17 +104,29 @@ def _checked(
     return table
 
 
-def _announcement(device: Device, pace: CheckPace) -> str:
+def announcement(device: Device, iti_s: float) -> str:
+    """The number of stimuli that a check of a device gives, in words, and how long it takes; nothing is delivered.
+
+    Args:
+        device: the device.
+        iti_s: the time between two stimuli [s].
+    """
     info = device.describe()
     if info.simulated:
         return f"{info.name} is simulated: nothing is delivered to anybody."
     pairs = 8 if isinstance(device, HasMemory) else 3
     alone = ", one magnetic pulse alone and one tap alone" if info.tap_alone else " and one magnetic pulse alone"
-    iti_s = max(pace.iti_s, pace.limits.iti_s)
+    tried = pairs + (2 if info.tap_alone else 1) + REFUSED
     warning = unprotected(info)
-    return f"This check stimulates: {pairs} pairs{alone}, {iti_s:g} s apart. Keep the coil on a phantom." + (
-        f" {warning}" if warning else ""
+    return (
+        f"This check stimulates: {pairs} pairs{alone}, {iti_s:g} s apart. It then arms and disarms the device, which "
+        f"must refuse {REFUSED} stimuli more; in all about {tried * iti_s:.0f} s. Keep the coil on a phantom."
+        f"{f' {warning}' if warning else ''}"
     )
+
+
+REFUSED: Final = 6
+"""So many stimuli are tried while the device is disarmed, which must refuse them."""
 
 
 @dataclass(frozen=True)
@@ -135,6 +148,7 @@ def _check_delivery(device: Device, rules: _Rules, pace: CheckPace, say: Callabl
     guarded = Guarded(device, pace)
     with guarded.exclusive():
         guarded.require_stop()
+        say("Disarmed: a stimulus must be refused before the device is armed.")
         with guarded.armed(kept_disarmed=True):
             guarded.require_refusal("before stage()")
         with guarded.armed():
@@ -144,11 +158,13 @@ def _check_delivery(device: Device, rules: _Rules, pace: CheckPace, say: Callabl
             stimuli = [Stimulus(trial, isi_ms) for trial, isi_ms in enumerate(isis_ms)]
             stimuli += [Stimulus(4, None, tap_alone=True)] if guarded.info.tap_alone else []
             for stimulus in stimuli:
+                say(f"Armed: {_named(stimulus)} comes next.")
                 answer, took_s = guarded.deliver(stimulus)
                 trial = _checked_answer(guarded.info, stimulus, answer, rules)
                 deliveries.append(Delivery(stimulus, answer, trial, took_s))
             if guarded.info.if_isiw_dies is not None:
                 say(_disarmed_if_isiw_dies(device, guarded.info))
+            say("Disarmed: stimuli must be refused after stop() and unstage(), five times.")
             for _ in range(2):
                 guarded.disarm()
                 guarded.require_refusal("after stop()")
@@ -232,6 +248,8 @@ def _require_usable(deliveries: Sequence[Delivery], rules: _Rules, *, real: bool
     said = [f"{n} of {len(deliveries)} trials would be rejected: {texts[kind]}" for kind, n in lost.items()] + said
     told = [Told(delivery.trial.mep_mv) for delivery in deliveries if delivery.trial.mep_mv is not None]
     said += [f"{doubt}" for doubt in findings(Evidence(told=told)) if doubt.kind is not Kind.EQUAL][:1]
+    if (late := late_deflection(deliveries)) is not None:
+        said.append(late)
     artefact = (artefact_in_window(deliveries, rules.limits) or late_artefact(deliveries)) if real else None
     if artefact is not None:
         said.append(artefact)

@@ -38,9 +38,9 @@ def page(browser: Any, watched: Watched) -> Iterator[Page]:
     page.on("pageerror", lambda error: said.append(str(error)))
     page.on("request", lambda request: asked.append(request.url))
     page.goto(watched.page.url)
-    page.get_by_text("The session has not begun.").wait_for()
+    shows(page, "#state", "NOT BEGUN")
     watched.start(trials=3)
-    shows(page, "#last", "2: ")
+    shows(page, "#last-more", "trial 2,")
     yield page
     page.close()
     assert said == []
@@ -56,7 +56,7 @@ def shows(page: Page, selector: str, text: str) -> None:
 def begin_trial_3(page: Page, watched: Watched) -> None:
     """Let trial 3 be given where no test before has: workers of pytest share the tests of this module between them."""
     watched.clock.let = 4
-    shows(page, "#last", "3: ")
+    shows(page, "#last-more", "trial 3,")
 
 
 def drawn(page: Page, script: str) -> Any:
@@ -75,22 +75,22 @@ def test_what_is_drawn_are_the_logs_numbers(page: Page, watched: Watched) -> Non
     estimate = record.estimates[-1]
     marks = drawn(page, "layout.shapes.filter(shape => shape.line.dash === 'dash')")
     assert [mark["x0"] for mark in marks] == [estimate.next_isi_ms]
-    assert page.inner_text("#left") == f"at most {TRIALS - 3}"
+    assert page.inner_text("#left") == f"{TRIALS - 3}"
     assert estimate.reason in page.inner_text("#reason")
     pulses = page.evaluate(
         "() => document.getElementById('sweep').layout.shapes.filter(s => s.line.dash === 'solid').map(s => s.x0)"
     )
-    assert set(pulses) == {record.table[-1].t_tms_ms}
+    assert set(pulses) == {0}
 
 
 def test_hostile_names_and_notes_are_text(page: Page, watched: Watched) -> None:
-    assert page.inner_text("h1") == f"Session of {plain(HOSTILE)}"
+    assert page.inner_text("#title") == f"Session of {plain(HOSTILE)}"
     page.fill("#note", "<img src=x onerror=alert(1)>")
     page.get_by_label("Note").press("Enter")
     shows(page, "#done", "The note is in the log.")
     shows(page, "#events", "<img src=x onerror=alert(1)>")
     assert page.locator("main b, main img").count() == 0
-    assert page.title() == f"Session of {plain(HOSTILE)}"
+    assert page.title() == f"RUNS: session of {plain(HOSTILE)}"
     assert watched.events[-1] == ("note", "<img src=x onerror=alert(1)>")
 
 
@@ -99,32 +99,39 @@ def test_a_new_trial_appears_by_itself(page: Page, watched: Watched) -> None:
     assert page.inner_text("#sweep-title") == "Sweep of trial 3"
 
 
+def tabbed(page: Page, name: str) -> None:
+    """Press Tab until an element has the focus."""
+    for _ in range(40):
+        if page.evaluate("document.activeElement.id") == name:
+            return
+        page.keyboard.press("Tab")
+    pytest.fail(f"Tab does not come to {name}")
+
+
 def test_the_session_is_operated_by_keyboard_alone(page: Page, watched: Watched) -> None:
     begin_trial_3(page, watched)
-    for _ in range(20):
-        if page.evaluate("document.activeElement.id") == "pause":
-            break
-        page.keyboard.press("Tab")
+    tabbed(page, "pause")
     page.keyboard.press("Enter")
-    shows(page, "#phase", "Paused: Paused on the live page. The device is disarmed.")
-    assert page.evaluate("document.activeElement.id") == "resume"
-    page.keyboard.press("Tab")
+    shows(page, "#state", "PAUSED")
+    assert page.inner_text("#line") == "Paused on the live page."
+    assert page.evaluate("document.activeElement.id") == "pause"
+    tabbed(page, "exclude")
     page.keyboard.press("Enter")
-    shows(page, "#exclude", "Count trial 3 again")
+    shows(page, "#exclude", "Count it again")
     page.keyboard.press("Enter")
-    shows(page, "#exclude", "Exclude the last trial")
+    shows(page, "#exclude", "Exclude the last")
     page.locator("#resume").press("Enter")
-    shows(page, "#phase", "The session runs.")
+    shows(page, "#state", "RUNS")
     assert [kind for kind, _ in watched.events[-4:]] == ["pause", "exclusion", "inclusion", "pause"]
 
 
 def test_the_page_loaded_again_and_a_second_one_show_the_same(page: Page, watched: Watched, browser: Any) -> None:
     begin_trial_3(page, watched)
     page.reload()
-    shows(page, "#last", "3: ")
+    shows(page, "#last-more", "trial 3,")
     second = browser.new_page()
     second.goto(watched.page.url)
-    shows(second, "#last", "3: ")
+    shows(second, "#last-more", "trial 3,")
     assert second.inner_text("#found") == page.inner_text("#found")
     second.close()
 
@@ -132,9 +139,9 @@ def test_the_page_loaded_again_and_a_second_one_show_the_same(page: Page, watche
 def test_without_the_token_nothing_is_shown(watched: Watched, browser: Any) -> None:
     stranger = browser.new_page()
     stranger.goto(str(watched.client.base_url))
-    shows(stranger, "#trouble", "Open that one.")
+    shows(stranger, "#line", "Open that one.")
     assert "P07" not in stranger.inner_text("body")
-    assert not stranger.locator("#operate").is_visible()
+    assert stranger.get_attribute("#stop", "aria-disabled") == "true"
     stranger.close()
 
 
@@ -151,19 +158,18 @@ def test_the_page_passes_axe_and_its_picture_is_kept(
     assert picture.stat().st_size > 50_000
 
 
-def test_an_operator_has_all_of_it_on_one_screen(page: Page, tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_an_operator_has_all_that_matters_on_one_screen(page: Page, tmp_path_factory: pytest.TempPathFactory) -> None:
     page.set_viewport_size({"width": 1280, "height": 900})
     page.locator("#sweep .main-svg").first.wait_for()
     page.evaluate("scrollTo(0, 0)")  # a test before this one on the same worker may have scrolled down
     boxes: dict[str, Any] = {
-        name: page.locator(name).bounding_box() or {}
-        for name in ("#phase", "#operate", "#found", "#reason", ".answers", "#belief", "#sweep")
+        name: page.locator(name).bounding_box() or {} for name in ("#bar", "#operate", "#values", "#belief")
     }
     assert {name: box for name, box in boxes.items() if box["y"] < 0 or box["y"] + box["height"] > 900} == {}
-    window, swept = boxes["#belief"], boxes["#sweep"]
+    window, swept = boxes["#belief"], page.locator("#sweep").bounding_box() or {}
     assert window["y"] == swept["y"]
     assert window["x"] + window["width"] <= swept["x"]
-    assert min(window["height"], swept["height"]) > 350
+    assert min(window["height"], swept["height"]) > 240
     page.screenshot(path=screenshots(tmp_path_factory) / "live-1280.png")
     page.set_viewport_size({"width": 1000, "height": 900})
 
@@ -179,12 +185,9 @@ def test_on_a_narrow_screen_nothing_overflows_and_all_is_legible(
     page.set_viewport_size({"width": 1000, "height": 900})
 
 
-def test_stopping_asks_again_and_the_end_is_told(page: Page, watched: Watched) -> None:
+def test_stop_ends_the_session_at_once_and_the_end_is_told(page: Page, watched: Watched) -> None:
     page.click("#stop")
-    page.click("#stop-not")
-    page.click("#stop")
-    page.click("#stop-sure")
-    shows(page, "#phase", "The session has ended.")
-    assert not page.locator("#operate").is_visible()
+    shows(page, "#state", "ENDED")
+    assert page.get_attribute("#stop", "aria-disabled") == "true"
     watched.finish()
     assert watched.events[-1] == ("pause", "Ended on the live page.")

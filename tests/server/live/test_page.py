@@ -96,7 +96,7 @@ def test_what_is_shown_is_what_the_log_holds(watched: Watched) -> None:
         shown = next(state for state in news if "2" in state["drawn"]["beliefs"] and state["left"] == 3)
     record = watched.record
     (belief,) = shown["drawn"]["beliefs"].values()
-    assert shown["phase"] == "running"
+    assert shown["state"] == "RUNS"
     assert shown["subject"] == plain(HOSTILE)
     assert [trial["isiMs"] for trial in shown["drawn"]["trials"]] == [trial.isi_ms for trial in record.table]
     assert belief["nextMs"] == record.estimates[-1].next_isi_ms
@@ -152,7 +152,7 @@ def test_a_pause_is_shown_without_what_terminals_obey(watched: Watched) -> None:
     with watched.viewer() as news:
         watched.start()
         watched.session.pause("The device said \x1b[2J.")
-        pause = next(state["pause"] for state in news if state["phase"] == "paused")
+        pause = next(state["pause"] for state in news if state["state"] == "PAUSED")
         assert pause == {"number": 1, "reason": "The device said ."}
         done(watched.press("resume", pause=1))
         watched.until(lambda: watched.session.paused is None)
@@ -162,7 +162,7 @@ def test_going_on_after_an_earlier_pause_does_not_answer_a_later_one_for_the_sam
     with watched.viewer() as news:
         watched.start()
         done(watched.press("pause"))
-        first = next(state["pause"] for state in news if state["phase"] == "paused")
+        first = next(state["pause"] for state in news if state["state"] == "PAUSED")
         done(watched.press("resume", pause=first["number"]))
         watched.until(lambda: watched.session.paused is None)
         done(watched.press("pause"))
@@ -188,11 +188,11 @@ def test_what_cannot_be_done_is_said(watched: Watched) -> None:
 
 def test_the_end_is_shown_and_ends_the_updates(watched: Watched) -> None:
     with watched.viewer() as news:
-        assert next(news)["phase"] == "waiting"
+        assert next(news)["state"] == "NOT BEGUN"
         watched.start()
         watched.finish()
         *_, last = news
-    assert last["phase"] == "over"
+    assert (last["state"], last["over"], last["armed"]) == ("ENDED", True, False)
     assert len(last["drawn"]["trials"]) == 6
 
 
@@ -204,13 +204,13 @@ def test_a_session_that_has_run_is_not_said_to_have_not_begun_while_its_log_is_c
 
     def closing(log: LogWriter) -> None:
         with watched.viewer() as news:
-            phases.append(next(state["phase"] for state in news if state["phase"] != "running"))
+            phases.append(next(state["state"] for state in news if state["state"] != "RUNS"))
         close(log)
 
     monkeypatch.setattr(LogWriter, "close", closing)
     watched.start()
     watched.finish()
-    assert phases == ["ending"]
+    assert phases == ["ENDED"]
 
 
 def test_where_nobody_looks_on_and_there_is_no_terminal_a_pause_ends_the_session(watched: Watched) -> None:
@@ -232,7 +232,7 @@ def test_viewers_that_never_read_or_vanish_do_not_hold_a_session_up(
         watched.finish()
         assert watched.events == []
         with watched.viewer() as news:
-            assert next(news)["phase"] == "over"
+            assert next(news)["state"] == "ENDED"
         watched.page.close()
         silent.close()
     assert len(watched.record.table) == 20

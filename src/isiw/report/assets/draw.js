@@ -158,9 +158,10 @@ const draw = (() => {
 
   function sweepMarks(trial, index, mepWindow) {
     const at = { tms: trial.tmsMs, hit: trial.hitMs, valve: trial.valveMs };
-    const lines = Object.entries(at).filter(([, x]) => x !== null).map(([name, x]) => mark(x, index, name));
+    const zero = trial.tmsMs ?? 0;
+    const lines = Object.entries(at).filter(([, x]) => x !== null).map(([name, x]) => mark(x - zero, index, name));
     if (trial.tmsMs === null) return lines;
-    const [low, high] = mepWindow.map((edge) => trial.tmsMs + edge);
+    const [low, high] = mepWindow;
     return [...lines, {
       type: "rect", x0: low, x1: high, xref: `x${index || ""}`, yref: `y${index || ""} domain`, y0: 0, y1: 1,
       fillcolor: colour("green"), opacity: 0.18, line: { width: 0 }, layer: "below",
@@ -186,13 +187,13 @@ const draw = (() => {
     const share = 1 / (waves.length + 1); // the first, the EMG near the pulse, is twice as high
     waves.forEach((wave, k) => {
       const index = k ? k + 1 : "";
-      const x = wave.values.map((_, n) => wave.t0 + n * wave.step);
+      const x = wave.values.map((_, n) => wave.t0 + n * wave.step - (trial.tmsMs ?? 0)); // 0 at the pulse
       const [top, height] = k ? [1 - (k + 1) * share, share] : [1, 2 * share];
       traces.push({
         x, y: wave.values, xaxis: `x${index}`, yaxis: `y${index}`, mode: "lines", showlegend: false,
         line: { width: 1, color: colour("ink") }, hovertemplate: "%{x:.1f} ms: %{y:.3g}<extra></extra>",
       });
-      axes[`xaxis${index}`] = axis(k === waves.length - 1 ? "time of the sweep [ms]" : "",
+      axes[`xaxis${index}`] = axis(k === waves.length - 1 ? trial.tmsMs === null ? "time of the sweep [ms]" : "time after the pulse [ms]" : "",
         { range: [x[0], x[x.length - 1]], anchor: `y${index}` });
       axes[`yaxis${index}`] = axis("", { domain: [top - height + 0.3 * share, top], anchor: `x${index}`, ...(wave.axis && { range: wave.axis }) });
       annotations.push({

@@ -20,7 +20,7 @@
       element("told-belief").textContent = "The log holds no estimate after this trial.";
       return;
     }
-    element("told-belief").textContent = `Estimate after it: ${belief.found} ${belief.reason}`;
+    element("told-belief").textContent = `Estimate after it: ${[belief.found, ...belief.against, belief.reason].join(" ")}`;
   }
 
   const reasons = {

@@ -3,54 +3,46 @@
 (() => {
   const token = location.hash.slice(1);
   const element = (id) => document.getElementById(id);
-  const SILENT_MS = 8000; // the server says something every two seconds
   const AGAIN_MS = 1000;
-  let shown = null;
+  let news = null;
+  let heardAt = null; // when something was heard last; null while there is no connection
+  let newsAt = 0; // when the news came that are shown
   let swept = null; // the trial whose sweep is drawn
+  let shown = null; // what the panel shows
 
-  // ---- words
+  const said = (id, text) => { if (element(id).textContent !== text) element(id).textContent = text; };
 
-  const ms = (value) => `${Math.round(value * 10) / 10} ms`;
-  const said = (id, text) => { element(id).textContent = text; };
+  // ---- the panel, which shows what `panel.view` says
 
-  function duration(seconds) {
-    const whole = Math.round(seconds);
-    return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, "0")} min`;
+  function show() {
+    const now = performance.now();
+    const connected = heardAt !== null && now - heardAt < panel.SILENT_MS;
+    shown = panel.view(news, connected, now - newsAt);
+    const { bar, buttons, values } = shown;
+    element("bar").dataset.state = bar.state;
+    said("state", bar.state);
+    said("count", bar.count);
+    said("line", bar.line);
+    said("more", bar.more);
+    element("lamp").dataset.armed = bar.armed ?? "";
+    said("lamp", bar.armed === null ? "armed: not known" : bar.armed ? (news?.unprotected ? `ARMED: ${news.unprotected}` : "ARMED") : "not armed");
+    for (const [id, works] of Object.entries(buttons)) element(id).setAttribute("aria-disabled", String(!works));
+    element("log").setAttribute("aria-disabled", String(!buttons.note));
+    document.body.classList.toggle("stale", bar.state === "NO CONNECTION");
+    said("exclude", shown.exclude);
+    if (!values) return;
+    for (const id of ["last", "background", "left", "coil", "intensity", "next"]) said(id, values[id]);
+    for (const id of ["last", "background", "left"]) said(`${id}-more`, values[`${id}More`]);
+    element("background").classList.toggle("loud", values.loud);
+    document.title = `${bar.state}: session of ${news.subject}`;
   }
 
-  const phases = {
-    waiting: "The session has not begun.", running: "The session runs.", ending: "The session ends.",
-    over: "The session has ended. This page shows its last state.",
-  };
-
-  function tellPhase() {
-    const { phase, pause, unprotected } = shown;
-    element("phase").dataset.phase = phase;
-    const running = phase === "running" && unprotected ? ` ${unprotected}` : "";
-    said("phase", phase === "paused" ? `Paused: ${pause.reason} The device is disarmed.` : `${phases[phase]}${running}`);
-  }
-
-  function tellLast(trial) {
-    said("last", trial ? `${trial.number}: ${trial.outcome}` : "none yet");
-    const realised = trial && trial.realised !== "–" ? `, realised ${trial.realised}` : "";
-    said("last-more", trial ? `commanded ${trial.asked}${realised}` : "");
-  }
-
-  function tellNext(belief, last) {
-    const isOld = last && belief && Number(shown.beliefOf) < last.number;
-    if (isOld) said("next", shown.phase === "running" ? "being chosen" : "–");
-    else if (belief && belief.stop) said("next", "nothing");
-    else said("next", belief && belief.nextMs !== null ? ms(belief.nextMs) : "–");
-    const more = belief && belief.stop ? "the session stops" : belief && belief.nextMs === null ? "a control trial" : "";
-    said("next-more", isOld ? "" : more);
-  }
-
-  function tellLeft() {
-    const { left, leftS, delivered, most } = shown;
-    said("left", left === null ? "–" : `at most ${left}`);
-    said("left-more", left === null || leftS === null ? "known after two trials" : `about ${duration(leftS)} at the pace so far`);
-    said("delivered", String(delivered));
-    said("delivered-more", `of at most ${most}, mistrials and control trials included`);
+  function showStrip() {
+    element("strip").replaceChildren(...shown.strip.map(({ number, kind, outcome, share }) => {
+      const bar = Object.assign(document.createElement("span"), { className: kind, title: `trial ${number}: ${outcome}` });
+      bar.style.setProperty("--share", share);
+      return bar;
+    }));
   }
 
   function row(cells, headed) {
@@ -62,42 +54,16 @@
     return line;
   }
 
-  function tellTables() {
-    element("events").replaceChildren(...shown.events.map(([trial, kind, text]) => row([trial ?? "–", kind, text])).reverse());
-    element("facts").replaceChildren(...shown.facts.map((fact) => row(fact, true)));
-  }
-
-  // ---- all of it
-
-  function showButtons(last) {
-    const { phase } = shown;
-    const focused = document.activeElement;
-    element("operate").hidden = !["running", "paused"].includes(phase);
-    element("pause").hidden = phase === "paused";
-    element("resume").hidden = phase !== "paused";
-    if (focused?.hidden) element(phase === "paused" ? "resume" : "pause").focus(); // the button that was pressed is gone
-    element("exclude").disabled = !last || last.kind === "mistrial";
-    said("exclude", last && last.kind === "excluded" ? `Count trial ${last.number} again` : "Exclude the last trial");
-  }
-
-  function show() {
-    const { trials, beliefs } = shown.drawn;
-    const last = trials.at(-1);
-    const [number, belief] = Object.entries(beliefs)[0] ?? [null, null];
-    shown.beliefOf = number;
-    document.title = `${shown.phase === "paused" ? "Paused: " : ""}Session of ${shown.subject}`;
-    said("title", `Session of ${shown.subject}`);
-    said("dotted", shown.drawn.dotted);
-    tellPhase();
+  function showWords() {
+    const [belief] = Object.values(news.drawn.beliefs);
+    said("title", `Session of ${news.subject}`);
+    said("dotted", news.drawn.dotted);
     said("found", belief ? belief.found : "Nothing is known yet.");
     said("reason", belief ? belief.reason : "");
-    tellLast(last);
-    tellNext(belief, last);
-    tellLeft();
-    tellTables();
-    showButtons(last);
-    element("now").hidden = element("more").hidden = false;
-    later(picture);
+    element("against").replaceChildren(...(belief ? belief.against : []).map((textContent) => (
+      Object.assign(document.createElement("p"), { className: "warning", textContent }))));
+    element("events").replaceChildren(...news.events.map(([trial, kind, text]) => row([trial ?? "–", kind, text])).reverse());
+    element("facts").replaceChildren(...news.facts.map((fact) => row(fact, true)));
   }
 
   // Words are painted first. Where news come faster than pictures, only the latest are drawn.
@@ -108,30 +74,28 @@
   }
 
   function picture() {
-    const last = shown.drawn.trials.at(-1);
-    const [belief] = Object.values(shown.drawn.beliefs);
-    if (last || belief) draw.belief("belief", shown.drawn, belief, last ? last.number : -1);
+    const last = news.drawn.trials.at(-1);
+    const [belief] = Object.values(news.drawn.beliefs);
+    if (last || belief) draw.belief("belief", news.drawn, belief, last ? last.number : -1);
     if (swept !== (last ? last.number : -1)) later(() => {
       swept = last ? last.number : -1;
       said("sweep-title", last ? `Sweep of trial ${last.number}` : "Last sweep");
-      draw.sweep("sweep", shown.drawn, last, last ? "There are no waveforms of this trial." : "There was no trial yet.");
+      draw.sweep("sweep", news.drawn, last, last ? "There are no waveforms of this trial." : "There was no trial yet.");
     });
   }
 
-  function repaint() {
-    swept = null;
-    if (shown) show();
+  function take(sent) {
+    news = sent;
+    newsAt = performance.now();
+    show();
+    showStrip();
+    showWords();
+    later(picture);
   }
 
   // ---- the server
 
   const headers = { Authorization: `Bearer ${token}` };
-
-  function trouble(text) {
-    element("trouble").hidden = !text;
-    said("trouble", text);
-    document.body.classList.toggle("stale", Boolean(text));
-  }
 
   async function send(call, body, words) {
     said("done", "");
@@ -148,85 +112,98 @@
     }
   }
 
-  async function* events(reader, alive) {
+  async function* events(reader) {
     const decoder = new TextDecoder();
     for (let text = ""; ;) {
       const { value, done } = await reader.read();
       if (done) return;
-      alive();
+      heardAt = performance.now();
       const parts = (text + decoder.decode(value, { stream: true })).split("\n\n");
       text = parts.pop();
-      const news = parts.filter((part) => part.startsWith("data: "));
-      if (news.length) yield JSON.parse(news.at(-1).slice(6)); // only the latest matters
+      const sent = parts.filter((part) => part.startsWith("data: "));
+      if (sent.length) yield JSON.parse(sent.at(-1).slice(6)); // only the latest matters
     }
   }
 
   async function follow() {
     const given = new AbortController();
-    let timer = 0;
-    const alive = () => {
-      clearTimeout(timer);
-      timer = setTimeout(() => given.abort(), SILENT_MS);
-    };
-    alive();
+    const begunAt = performance.now();
+    const listening = setInterval(() => { // a connection that is silent is given up
+      if (performance.now() - Math.max(begunAt, heardAt ?? 0) >= panel.SILENT_MS) given.abort();
+    }, AGAIN_MS / 2);
     try {
       const answer = await fetch("updates", { headers, signal: given.signal, cache: "no-store" });
       if (answer.status === 401) throw new Error("401");
-      for await (const news of events(answer.body.getReader(), alive)) {
-        shown = news;
-        trouble("");
-        show();
-      }
+      for await (const sent of events(answer.body.getReader())) take(sent);
     } finally {
-      clearTimeout(timer);
+      clearInterval(listening);
     }
   }
 
   async function followOn() {
-    while (!shown || shown.phase !== "over") {
+    while (!(news && news.over)) {
       try {
         await follow();
       } catch (error) {
         if (error.message === "401") {
-          trouble("The address of this page is not the one that isiw printed. Open that one.");
+          clearInterval(ticking);
+          said("line", "The address of this page is not the one that isiw printed. Open that one.");
           return;
         }
       }
-      if (shown && shown.phase === "over") return;
-      trouble(shown ? "No connection to the session: what is shown is old, and the buttons do nothing." : "The session cannot be reached.");
+      if (news && news.over) return;
+      heardAt = null;
+      show();
       await new Promise((resolve) => { setTimeout(resolve, AGAIN_MS); });
     }
   }
 
-  function askStop(asks) {
-    element("stop").hidden = asks;
-    element("stop-sure").hidden = element("stop-not").hidden = !asks;
-    element(asks ? "stop-sure" : "stop").focus();
+  // ---- what is pressed
+
+  const acts = {
+    pause: () => send("pause", {}, "The device is disarmed; the session pauses."),
+    resume: () => send("resume", { pause: news.pause.number }, "The session continues."),
+    stop: () => send("stop", {}, "The device is disarmed; the session ends, and can be resumed later."),
+    exclude: () => {
+      const { number, kind } = news.drawn.trials.at(-1);
+      if (kind === "excluded") send("include", { trial: number }, `Trial ${number} counts again.`);
+      else send("exclude", { trial: number }, `Trial ${number} is excluded.`);
+    },
+    note: () => log("note", "The note is in the log."),
+    change: () => log("change", "The change is in the log; MEPs may differ from here on."),
+  };
+
+  async function log(kind, words) {
+    const text = element("note").value.trim();
+    if (!text) element("note").focus();
+    else if (await send(kind, { text }, words)) element("note").value = "";
   }
 
-  element("pause").addEventListener("click", () => send("pause", {}, "The device is disarmed; the session pauses."));
-  element("resume").addEventListener("click", () => send("resume", { pause: shown.pause.number }, "The session continues."));
-  element("stop").addEventListener("click", () => askStop(true));
-  element("stop-not").addEventListener("click", () => askStop(false));
-  element("stop-sure").addEventListener("click", () => send("stop", {}, "The device is disarmed; the session ends before another stimulus."));
-  element("exclude").addEventListener("click", () => {
-    const { number, kind } = shown.drawn.trials.at(-1);
-    if (kind === "excluded") send("include", { trial: number }, `Trial ${number} counts again.`);
-    else send("exclude", { trial: number }, `Trial ${number} is excluded.`);
-  });
-  async function log(kind, said) {
-    const text = element("note").value.trim();
-    if (text && await send(kind, { text }, said)) element("note").value = "";
+  function act(name) {
+    if (shown && shown.buttons[name]) acts[name]();
   }
+
+  for (const name of ["pause", "resume", "stop", "exclude", "change"]) element(name).addEventListener("click", () => act(name));
   element("remark").addEventListener("submit", (event) => {
     event.preventDefault();
-    log("note", "The note is in the log.");
+    act("note");
+  });
+  document.addEventListener("keydown", (event) => {
+    const isTyping = event.target.matches("input");
+    if (event.repeat && event.target.matches("button")) event.preventDefault(); // a held Enter is one press
+    const name = panel.pressed(event, shown ? shown.bar.state : "", isTyping);
+    if (!name) return;
+    event.preventDefault();
+    if (name !== "exclude" || (event.key.toLowerCase() === "u") === (shown.exclude === "Count it again")) act(name);
   });
   const resized = new ResizeObserver((seen) => {
     for (const { target } of seen) if (target.classList.contains("js-plotly-plot")) Plotly.Plots.resize(target);
   });
   for (const id of ["belief", "sweep"]) resized.observe(element(id)); // words above them may take another line
-  element("change").addEventListener("click", () => log("change", "The change is in the log; MEPs may differ from here on."));
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", repaint);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+    swept = null;
+    if (news) take(news);
+  });
+  const ticking = setInterval(show, 250);
   followOn();
 })();

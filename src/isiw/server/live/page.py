@@ -9,6 +9,7 @@ import threading
 from collections.abc import AsyncIterator
 from functools import cache
 from importlib import resources
+from pathlib import Path
 from typing import Annotated, Final, Self
 
 from fastapi import APIRouter, Depends, FastAPI, Request, Response
@@ -28,7 +29,7 @@ from isiw.session.loop import Session
 GLANCE_S, MOST_S = 0.05, 0.5
 """The time between two looks for news, and the longest if none is put together for a while [s]."""
 
-QUIET_S: Final = 2.0
+QUIET_S: Final = 1.0
 """After so long without news, the page hears that the session is still there [s]."""
 
 BY_PAGE: Final = "on the live page"
@@ -37,6 +38,7 @@ FILES: Final = {
     "/": ("text/html", lambda: _asset("isiw.server", "live.html")),
     "/page.css": ("text/css", lambda: _asset("isiw.report", "page.css")),
     "/live.css": ("text/css", lambda: _asset("isiw.server", "live.css")),
+    "/panel.js": ("text/javascript", lambda: _asset("isiw.server", "panel.js")),
     "/draw.js": ("text/javascript", lambda: _asset("isiw.report", "draw.js")),
     "/live.js": ("text/javascript", lambda: _asset("isiw.server", "live.js")),
     "/plotly.js": ("text/javascript", get_plotlyjs),
@@ -189,19 +191,20 @@ class LivePage:
     Args:
         session: the session.
         port: the port; 0 for any that is free.
+        config: the configuration that it runs with, for the command that resumes it.
     """
 
-    def __init__(self, session: Session, port: int) -> None:
-        self._view, token = View(session), new_token()
+    def __init__(self, session: Session, port: int, config: Path | None = None) -> None:
+        self._view, token = View(session, config), new_token()
         rules = Rules(token, open_paths=frozenset(FILES), urgent_paths=URGENT)
         app = FastAPI(title="isiw", version=isiw.__version__, docs_url=None, redoc_url=None, openapi_url=None)
         app.state.session, app.state.view = session, self._view
         app.include_router(router)
         guarded(app, rules)
-        config = settings_of(app, rules, log_level="critical")  # the screen is the operator's
+        settings = settings_of(app, rules, log_level="critical")  # the screen is the operator's
         self._listener = listening(_ADDRESS, port)
         self.url = f"http://{_ADDRESS}:{self._listener.getsockname()[1]}/#{token}"
-        self._server = Server(config)
+        self._server = Server(settings)
         self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()), name="isiw live page", daemon=True)
         session.follow(self._view)
         self._thread.start()
@@ -226,7 +229,7 @@ class LivePage:
         self._listener.close()
 
 
-def watch(session: Session, *, port: int = 0) -> LivePage:
+def watch(session: Session, *, port: int = 0, config: str | Path | None = None) -> LivePage:
     """Show a session in the browser while it runs: `with isiw.watch(session) as page: print(page.url); session.run()`.
 
     The page is served to this computer alone, from now until it is closed. Its address holds a token that is good for
@@ -235,9 +238,10 @@ def watch(session: Session, *, port: int = 0) -> LivePage:
     Args:
         session: a session that does not run yet.
         port: the port; 0 for any that is free.
+        config: the configuration that it runs with, for the command that resumes it.
 
     Raises:
         ConfigError: the libraries of `isiw[serve]` are not installed, or the port is taken.
         InvalidValueError: no port.
     """
-    return LivePage(session, whole("port", port, least=0, most=65535))
+    return LivePage(session, whole("port", port, least=0, most=65535), None if config is None else Path(config))

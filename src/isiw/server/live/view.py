@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import itertools
 import json
+import math
 import time
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from isiw.devices.protocol import unprotected
+from isiw.devices.protocol import Readiness, unprotected
+from isiw.log.kinds import continued_by
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import EstimateRecord, Event, Intent, Record, Waveform
 from isiw.report.drawn import drawn
 from isiw.report.tables import first_facts
 from isiw.session.loop import Session
 from isiw.session.sink import SessionUpdate
-from isiw.session.steps import Pause
+from isiw.session.state import SENTENCES, State
 from isiw.text import plain
 from isiw.trials import Trial
 
@@ -44,8 +47,8 @@ class Shown(NamedTuple):
 class View:
     """Keeps one session's last sweep, estimate and events; its threads call the follower's methods."""
 
-    def __init__(self, session: Session) -> None:
-        self._session = session
+    def __init__(self, session: Session, config: Path | None = None) -> None:
+        self._session, self._config = session, config
         self._estimate: EstimateRecord | None = None
         self._events: deque[Event] = deque(maxlen=MOST_EVENTS)
         self._coming: dict[tuple[int, str], Waveform] = {}
@@ -53,15 +56,13 @@ class View:
         self._update: SessionUpdate | None = None
         self._numbers = itertools.count(1)
         self._news = self._viewers = 0
-        self._has_begun = False
         self._seen_s: float | None = None
-        self._shown, self._next_s = Shown(None, ""), 0.0
+        self._shown, self._rest, self._next_s = Shown(None, ""), Shown(None, ""), 0.0
         self._facts = [(fact.name, plain(fact.value)) for fact in first_facts(self._record())]
         self.over = False
 
     def logged(self, record: Record, channel_name: str | None) -> None:
         """Keep what was logged."""
-        self._has_begun = True
         if isinstance(record, Waveform):
             self._coming[record.trial, channel_name or ""] = record
             return
@@ -103,12 +104,15 @@ class View:
         self._seen_s = time.monotonic()
 
     def shown(self) -> Shown:
-        """The contents of the page now; put together once for all who look, and not too often."""
-        state = (self._news, self._session.pause_waiting, self._session.running, self.over)
-        if state != self._shown.state and (self.over or time.monotonic() >= self._next_s):
+        """The contents of the page now, put together once for all: the state at once, the rest not too often."""
+        one = self._session
+        state, rest = (one.pause_waiting, one.state, one.armed, one.wait, self.over), (self._news, self.over)
+        if rest != self._rest.state and (self.over or time.monotonic() >= self._next_s):
             begun_s = time.thread_time()
-            self._shown = Shown(state, json.dumps(self._contents(), allow_nan=False, separators=(",", ":")))
+            self._rest = Shown(rest, _json(self._contents()))
             self._next_s = time.monotonic() + max(UPDATE_S, (time.thread_time() - begun_s) / SHARE)
+        if (now := (state, self._rest.state)) != self._shown.state:
+            self._shown = Shown(now, f"{_json(self._bar())[:-1]},{self._rest.json[1:]}")
         return self._shown
 
     @property
@@ -116,11 +120,32 @@ class View:
         """The time in which nothing new is put together [s]."""
         return self._next_s - time.monotonic()
 
-    def _contents(self) -> dict[str, Any]:
-        record, update, pause = self._record(), self._update, self._session.pause_waiting
+    def _bar(self) -> dict[str, Any]:
+        """The state of the session, which nobody waits for."""
+        one = self._session
+        state, pause, wait = one.state, one.pause_waiting, one.wait
+        if state is State.PAUSED and pause is None:  # it was decided just now
+            state = State.RUNS
         return {
-            "phase": self._phase(pause),
+            "state": state,
+            "sentence": SENTENCES[state],
+            "over": self.over,
+            "armed": one.armed,
             "pause": None if pause is None else {"number": pause.number, "reason": plain(pause.reason)},
+            "fault": self._fault(),
+            "waitS": None if wait is None else round(max(0.0, wait.until_s - time.monotonic()), 1),
+        }
+
+    def _contents(self) -> dict[str, Any]:
+        record, update = self._record(), self._update
+        last = record.table[-1] if len(record.table) else None
+        limit_uv = record.header.signals.most_background_uv
+        readiness = self._session.readiness or Readiness()
+        return {
+            "backgroundUv": None if last is None else last.background_rms_uv,
+            "limitUv": limit_uv if math.isfinite(limit_uv) else None,
+            "coilC": readiness.coil_c,
+            "intensityPct": readiness.intensity_pct_mso,
             "subject": plain(record.header.subject) or "an unnamed subject",
             "facts": self._facts,
             "unprotected": plain(unprotected(record.header.device) or ""),
@@ -132,14 +157,14 @@ class View:
             "events": [[event.trial, event.kind, plain(event.text)] for event in tuple(self._events)],
         }
 
-    def _phase(self, pause: Pause | None) -> str:
-        if self.over:
-            return "over"
-        if pause is not None:
-            return "paused"
-        if self._session.running:
-            return "running"
-        return "ending" if self._has_begun else "waiting"
+    def _fault(self) -> dict[str, str] | None:
+        """What ended the session, if a fault did: what is to be done first."""
+        if (fault := self._session.fault) is None:
+            return None
+        way_on = continued_by(self._session.log_path, self._session.header, self._config)
+        do = f"See that the stimulator is disarmed. Then resume with: {way_on}"
+        what = f"{fault.what[:1].upper()}{fault.what[1:]}. {fault.about_the_trial}".strip()
+        return {"do": plain(do), "what": plain(what)}
 
     def _record(self) -> SessionRecord:
         """The session as a log would tell it that had the last estimate and the last sweep alone."""
@@ -152,3 +177,7 @@ class View:
             losses=(),
             finished=False,
         )
+
+
+def _json(contents: dict[str, Any]) -> str:
+    return json.dumps(contents, allow_nan=False, separators=(",", ":"))

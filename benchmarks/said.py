@@ -1,0 +1,193 @@
+"""How often each sentence is said of sessions in which nothing is wrong, and whether a change of amplitudes is seen.
+
+    python -m benchmarks.said --folder said --only first     # each half within ten minutes of one processor core
+    python -m benchmarks.said --folder said > benchmarks/results/said.md
+
+Sessions of the default with simulated people run until the default stops, as `isiw run` runs them but without a log on
+the disk. The people of `RIGHT` are steady and their rigs right, so that every warning is a false one; those of
+`CHANGED` change during the session. Sessions are kept in a folder as they finish, and the sentences are made of them
+afterwards. Reported people have seeds from 10,000 on; seeds below 1,000 are for work.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import statistics
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import numpy as np
+import pandas as pd
+import scipy.stats
+import torch
+import typer
+
+import isiw
+from benchmarks.provenance import command_of, made_with
+from benchmarks.quick import understood
+from isiw.devices.simulated import SimulatedPerson
+from isiw.log.reader import SessionRecord
+from isiw.log.schema import EstimateRecord, Event
+from isiw.report.evidence import changed_with_time
+from isiw.report.words import Role, Said, in_lines, statement
+from isiw.session import examination
+from isiw.session.loop import Session
+from isiw.signals.rig import Evidence, told_of
+from isiw.signals.watch import Doubts, findings
+from isiw.subjects.cohorts import person_of
+from isiw.trials import Status, Trial, TrialTable
+from isiw.window import Window
+
+RIGHT: Final = {
+    "recruitment": 300, "gaussian": 200, "nonresponder": 100, "weak": 100, "late": 100, "plateau": 100,
+    "kim11-measured": 100,
+}  # fmt: skip
+CHANGED: Final = {"ramp": 80, "step": 80}
+"""How many people of each cohort, of a thousand right sessions."""
+
+MOST_WORDS: Final = 90
+
+
+def session(cohort: str, seed: int) -> dict[str, Any]:
+    """One session until it stops: its trials, its last estimate, and what was doubtful on the way."""
+    subject, space = person_of(cohort, 0, seed), isiw.VALVE_SPACE
+    responder, strategy = (
+        subject.begin(seed),
+        isiw.make_strategy(space=space, seed=seed, hit_delay_ms=subject.stated_hit_delay_ms),
+    )
+    trials, doubts, raised = TrialTable(), Doubts(), list[tuple[int, str]]()
+    while not strategy.decision().stop:
+        asked_ms = strategy.ask()
+        outcome = responder.respond(asked_ms, space.reference)
+        trial = Trial(len(trials), Status.ACCEPTED, asked_ms, isi_ms=outcome.isi_ms, mep_mv=outcome.mep_mv)
+        trials = trials.appended(trial)
+        examination.learn(strategy, trial)
+        doubts = doubts.after(findings(Evidence(told=told_of(trials), detection_limit_mv=strategy.detection_limit_mv)))
+        raised += [] if doubts.new is None else [(trial.index, f"{doubts.new}")]
+    last = EstimateRecord.after(len(trials) - 1, strategy.estimate(), strategy.decision(), None)
+    return {
+        "cohort": cohort,
+        "seed": seed,
+        "isi_ms": [trial.isi_ms for trial in trials],
+        "mep_mv": [trial.mep_mv for trial in trials],
+        "estimate": last.model_dump_json(),
+        "doubts": raised,
+    }
+
+
+def record_of(kept: dict[str, Any], like: SessionRecord) -> SessionRecord:
+    """A kept session as its log would hold it, with the header of another one."""
+    pairs = enumerate(zip(kept["isi_ms"], kept["mep_mv"], strict=True))
+    trials = [Trial(k, Status.ACCEPTED, isi_ms, isi_ms=isi_ms, mep_mv=mep_mv) for k, (isi_ms, mep_mv) in pairs]
+    events = [Event(kind="doubt", trial=trial, text=text) for trial, text in kept["doubts"]]
+    estimate = EstimateRecord.model_validate_json(kept["estimate"])
+    return SessionRecord(like.path, like.header, (*trials, *events, estimate), losses=(), finished=True)
+
+
+def empty_record(folder: Path) -> SessionRecord:
+    """A session of `isiw run` before its first trial."""
+    person = SimulatedPerson(lambda _: None, "valve")  # type: ignore[arg-type, return-value]  # nobody is stimulated
+    strategy = isiw.make_strategy(seed=0, hit_delay_ms=(150.0, 5.0))
+    opened = Session(isiw.SimulatedDevice(person), strategy, log=folder / "none.mcap")
+        isiw.SimulatedDevice(person), isiw.make_strategy(seed=0, hit_delay_ms=(150.0, 5.0)), log=folder / "none.mcap"
+    )
+    return SessionRecord(opened.log_path, opened.header, (), losses=(), finished=True)
+
+
+def run_all(folder: Path, seed: int, share: float, part: str) -> Iterator[dict[str, Any]]:
+    """All sessions, of which those that are kept are not run again."""
+    folder.mkdir(parents=True, exist_ok=True)
+    wanted = [(cohort, seed + k) for cohort, n in (RIGHT | CHANGED).items() for k in range(math.ceil(share * n))]
+    halves = {"all": wanted, "first": wanted[::2], "second": wanted[1::2]}
+    for cohort, number in halves[part]:
+        file = folder / f"{cohort}-{number}.json"
+        if not file.is_file():
+            file.write_text(json.dumps(session(cohort, number)), encoding="utf-8")
+        yield json.loads(file.read_text(encoding="utf-8"))
+
+
+def changed_before(window: Window | None, trials: TrialTable) -> bool:
+    """Whether the test that there was before says a change: Kendall's on each side of the window, whatever the ISIs."""
+    pairs = [(trial.isi_ms or 0.0, trial.mep_mv or 0.0) for trial in trials]
+    if window is None:
+        return False
+    inside = window.mask([isi_ms for isi_ms, _ in pairs])
+    sides = [
+        np.array([mep for (_, mep), within in zip(pairs, inside, strict=True) if within == side]) for side in (1, 0)
+    ]
+    if min(len(set(side.tolist())) for side in sides) < 4:
+        return False
+    found = np.array([_before(side) for side in sides])
+    n = np.array([len(side) for side in sides])
+    both, beyond = abs(float(np.sqrt(n) @ found)) / math.sqrt(n.sum()), scipy.stats.norm.sf
+    return bool(beyond(both) < 0.00135 and (found[0] > 0) == (found[1] > 0) and beyond(abs(found).min()) < 0.05)
+
+
+def _before(meps_mv: np.ndarray[Any, Any]) -> float:
+    tau = scipy.stats.kendalltau(np.arange(len(meps_mv)), meps_mv, method="asymptotic")
+    return float(math.copysign(scipy.stats.norm.isf(tau.pvalue / 2), tau.statistic))
+
+
+def bound(count: int, n: int) -> float:
+    """The upper end of the exact 95 % interval of a share."""
+    return float(scipy.stats.beta.ppf(0.975, count + 1, n - count)) if count < n else 1.0
+
+
+def row(name: str, count: int, n: int) -> dict[str, object]:
+    """A row of a table of rates."""
+    return {"what": name, "sessions": count, "of": n, "rate": f"{count / n:.1%}", "at most": f"{bound(count, n):.1%}"}
+
+
+def words(said: list[Said]) -> int:
+    """How many words a statement has."""
+    return len(in_lines(said).split())
+
+
+def main(
+    seed: Annotated[int, typer.Option(help="Seed of the first person of each cohort.")] = 10_000,
+    share: Annotated[float, typer.Option(help="Share of the people of each cohort who are run.")] = 1.0,
+    folder: Annotated[Path, typer.Option(help="Where sessions are kept.")] = Path("said"),
+    only: Annotated[str, typer.Option(help="first or second half, which are run and not reported; or all.")] = "all",
+) -> None:
+    """Run the sessions that are not there yet, and print how often each sentence was said."""
+    torch.set_num_threads(1)
+    like, all_said = empty_record(folder), list[tuple[str, list[Said], bool, bool]]()
+    for kept in run_all(folder, seed, share, only):
+        if only == "all":
+            record = record_of(kept, like)
+            estimate, told = record.estimates[-1], record.table.told
+            expected = (estimate.grid_ms, estimate.profile_mv) if estimate.profile_mv else None
+            now = changed_with_time(estimate.window, told, expected) is not None
+            all_said.append((kept["cohort"], statement(record), now, changed_before(estimate.window, record.table)))
+    if only != "all":
+        return
+    right = [one for one in all_said if one[0] in RIGHT]
+    n, lengths = len(right), [words(said) for _, said, _, _ in right]
+    print("# What is said of sessions in which nothing is wrong\n")
+    print(f"- command: `{command_of('said')}`; {made_with('torch', 'numba')}")
+    print(f"- {n} sessions of {', '.join(RIGHT)}; `at most` is the upper end of the exact 95 % interval\n")
+    counts = Counter(name for _, said, _, _ in right for name in {(f"{one.role}", one.name) for one in said})
+    roles = [f"{role}" for role in Role]
+    ordered = sorted(counts.items(), key=lambda one: (roles.index(one[0][0]), -one[1]))
+    rows = [row(": ".join(name), count, n) for name, count in ordered]
+    warned = sum(any(one.role is Role.WARNING for one in said) for _, said, _, _ in right)
+    rows.append(row("any warning", warned, n))
+    rows.append(row(f"at most {MOST_WORDS} words", sum(length <= MOST_WORDS for length in lengths), n))
+    print(pd.DataFrame(rows).to_markdown(index=False))
+    print(f"\nWords: {statistics.median(lengths):.0f} (median), {max(lengths)} at most.\n")
+    print("Amplitudes are said to have grown or shrunk, by the test now and by the one before:\n")
+    rows = []
+    for name, cohorts in (("right", tuple(RIGHT)), *((cohort, (cohort,)) for cohort in CHANGED)):
+        some = [one for one in all_said if one[0] in cohorts]
+        rows += [
+            row(f"{name}, {test}", sum(one[k] for one in some), len(some)) for test, k in (("now", 2), ("before", 3))
+        ]
+    print(pd.DataFrame(rows).to_markdown(index=False))
+
+
+if __name__ == "__main__":
+    understood("said")
+    typer.run(main)

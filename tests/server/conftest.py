@@ -1,0 +1,14 @@
+"""What the tests of servers are handed."""
+
+from __future__ import annotations
+
+import pytest
+
+from isiw.session import pausing
+
+
+@pytest.fixture(autouse=True)
+def no_second_between_presses(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Continue counts at once, but for tests that are about the second that it needs."""
+    if request.node.get_closest_marker("needs_a_second") is None:
+        monkeypatch.setattr(pausing, "SEPARATE_S", 0.0)
