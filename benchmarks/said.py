@@ -92,8 +92,6 @@ def empty_record(folder: Path) -> SessionRecord:
     person = SimulatedPerson(lambda _: None, "valve")  # type: ignore[arg-type, return-value]  # nobody is stimulated
     strategy = isiw.make_strategy(seed=0, hit_delay_ms=(150.0, 5.0))
     opened = Session(isiw.SimulatedDevice(person), strategy, log=folder / "none.mcap")
-        isiw.SimulatedDevice(person), isiw.make_strategy(seed=0, hit_delay_ms=(150.0, 5.0)), log=folder / "none.mcap"
-    )
     return SessionRecord(opened.log_path, opened.header, (), losses=(), finished=True)
 
 
