@@ -304,15 +304,8 @@ class Reported(BaseModel):
     band_high_mv: Numbers = ()
 
 
-_SAME: Final = (
-    "probability",
-    "expected_f1",
-    "depressed_probability",
-    "change",
-    "beforehand",
-    "tap_may_explain",
-    "tap_is_likely",
-)
+_SAME: Final = ("probability", "expected_f1", "depressed_probability", "change", "beforehand", "tap_may_explain",
+                "tap_is_likely")  # fmt: skip
 """Figures that an estimate with samples has by the same names."""
 
 

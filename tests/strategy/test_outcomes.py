@@ -13,7 +13,7 @@ from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.session.resume import open_session
 from isiw.strategy.catalogue import make_strategy
-from isiw.strategy.course import Outcome, Outcomes, found_step_mv
+from isiw.strategy.outcomes import Outcome, Outcomes, found_step_mv
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Status, Trial
 from isiw.window import Window

@@ -47,7 +47,7 @@ def check(
         device, space, said = isiw.config.device_for(settings), settings.design(), ""
         if not (yes or device.describe().simulated):
             iti_s = max(settings.limits.min_iti_s, isiw.config.limits_for(settings).iti_s)
-            said = isiw.testing.devices.announcement(device, iti_s)
+            said = isiw.testing.device_table.announcement(device, iti_s)
             show(said)
             typer.confirm("Is the coil on a phantom?", abort=True)
         try:

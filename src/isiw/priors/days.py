@@ -25,7 +25,7 @@ from isiw.models.particles.places import MOST_APART_MS
 from isiw.models.particles.prior import Prior
 from isiw.models.protocol import Tensor
 from isiw.priors.population import Component, beside, columns, floor, gain, mixed, mixed_shares, muscle, place
-from isiw.strategy.course import Outcomes
+from isiw.strategy.outcomes import Outcomes
 from isiw.text.sanitize import command
 from isiw.types import FloatArray
 from isiw.visit import MOST_APART_PCT_RMT

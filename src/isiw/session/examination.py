@@ -19,7 +19,7 @@ from isiw.log.schema import EstimateRecord, Event, EventKind, Intent, Record
 from isiw.log.verdicts import changed_after, doubted_by, excluded_by, is_logged, or_remark, under_all
 from isiw.session.sink import Sink
 from isiw.strategy.choice import candidate_isis
-from isiw.strategy.course import details_of
+from isiw.strategy.outcomes import details_of
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Trial, TrialTable

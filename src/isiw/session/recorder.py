@@ -26,7 +26,7 @@ from isiw.signals.limits import isi_far, require_plausible, require_plausible_ra
 from isiw.signals.reported import unconfirmed
 from isiw.signals.rig import REMEDIES, Evidence, told_of
 from isiw.signals.watch import Doubts, findings
-from isiw.strategy.course import Outcome
+from isiw.strategy.outcomes import Outcome
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Status, Stimulus, Trial, TrialTable

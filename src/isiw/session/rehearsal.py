@@ -11,7 +11,7 @@ from typing import Final
 from isiw.acquisition.information import Alternating
 from isiw.models.protocol import Rehearses
 from isiw.session.examination import estimate_record
-from isiw.strategy.course import Details
+from isiw.strategy.outcomes import Details
 from isiw.strategy.stopping import Budget
 from isiw.strategy.strategy import Strategy
 

@@ -12,7 +12,7 @@ from isiw.signals.limits import isi_far
 from isiw.signals.reported import doubtful_from, is_far, unconfirmed
 from isiw.signals.rig import Evidence, Told
 from isiw.signals.watch import Doubts, findings
-from isiw.strategy.course import Outcome
+from isiw.strategy.outcomes import Outcome
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,8 @@ from isiw.models.protocol import Posterior, PredictsMeps, ReportsTrouble, Respon
 from isiw.signals.limits import require_plausible, require_plausible_range
 from isiw.signals.watch import is_silent
 from isiw.strategy.choice import Asked, Choice, Cost, instead_of_lost
-from isiw.strategy.course import Details, Method, Outcome, Outcomes
+from isiw.strategy.course import Method
+from isiw.strategy.outcomes import Details, Outcome, Outcomes
 from isiw.strategy.reported import Reported
 from isiw.strategy.settings.common import Recipe
 from isiw.strategy.stopping import StopDecision, StoppingRule, for_lack, stimuli_left
@@ -355,8 +356,7 @@ class Strategy:
 
     def count_mistrial(self) -> None:
         """Count a delivered stimulus without an outcome: it uses up budget, and its ISI is repeated at most twice."""
-        self._mistrials += 1
-        self._lost += 1
+        self._mistrials, self._lost = self._mistrials + 1, self._lost + 1
         choice = None if self.choice is None else replace(self.choice, by="again")
         self._asked = replace(self._asked, choice=choice)
         other = instead_of_lost(self.space, self._lost, self._course.told + self._mistrials)

@@ -22,7 +22,8 @@ from isiw.models.protocol import Observation, Posterior, ReportsTrouble, Tensor
 from isiw.signals import wrong_isi
 from isiw.strategy.catalogue import known_settings, make_strategy
 from isiw.strategy.choice import Choice, instead_of_lost
-from isiw.strategy.course import Course, Method, Outcome, Outcomes
+from isiw.strategy.course import Course, Method
+from isiw.strategy.outcomes import Outcome, Outcomes
 from isiw.strategy.stopping import StopDecision, stimuli_left
 from isiw.strategy.strategy import Strategy
 from isiw.studies.execution import one_torch_thread

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from isiw.devices.protocol import Answer, DeviceInfo
+from isiw.devices.protocol import Answer, Device, DeviceInfo, HasMemory, unprotected
 from isiw.findings import Kind
 from isiw.signals.limits import EMG_UNITS_MV, SignalLimits
 from isiw.signals.rig import EVOKED_SPAN_MS, steepest_edge, tap_span_ms
@@ -24,6 +24,10 @@ ALIKE_MS = 8.0
 
 NEAR_PULSE_MS = 3.0
 """How far from the reported pulse its artefact's steepest edge may be."""
+
+
+REFUSED: Final = 6
+"""So many stimuli are tried while the device is disarmed, which must refuse them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,3 +242,24 @@ def _at_rest_mv(delivery: Delivery, signals: SignalLimits) -> float | None:
     edges = range(0, min(max(end, 0), emg.values.size) + 1, max(length, 1))
     ranges = [float(np.ptp(emg.values[first:last])) for first, last in itertools.pairwise(edges)]
     return EMG_UNITS_MV[emg.unit] * float(np.median(ranges)) if ranges else None
+
+
+def announcement(device: Device, iti_s: float) -> str:
+    """The number of stimuli that a check of a device gives, in words, and how long it takes; nothing is delivered.
+
+    Args:
+        device: the device.
+        iti_s: the time between two stimuli [s].
+    """
+    info = device.describe()
+    if info.simulated:
+        return f"{info.name} is simulated: nothing is delivered to anybody."
+    pairs = 8 if isinstance(device, HasMemory) else 3
+    alone = ", one magnetic pulse alone and one tap alone" if info.tap_alone else " and one magnetic pulse alone"
+    tried = pairs + (2 if info.tap_alone else 1) + REFUSED
+    warning = unprotected(info)
+    return (
+        f"This check stimulates: {pairs} pairs{alone}, {iti_s:g} s apart. It then arms and disarms the device, which "
+        f"must refuse {REFUSED} stimuli more; in all about {tried * iti_s:.0f} s. Keep the coil on a phantom."
+        f"{f' {warning}' if warning else ''}"
+    )

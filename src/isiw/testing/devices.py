@@ -15,7 +15,7 @@ from isiw.design import DesignSpace
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.deadlines import PunctualDevice
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import Answer, Device, DeviceInfo, DiesArmed, HasMemory, Readiness, readiness_of, unprotected
+from isiw.devices.protocol import Answer, Device, DeviceInfo, DiesArmed, HasMemory, Readiness, readiness_of
 from isiw.errors import DeviceError, DeviceTimeoutError, IsiwError, NotDelivered, StillArmedError, error_text
 from isiw.findings import Kind
 from isiw.log.schema import waveform_topic
@@ -28,6 +28,7 @@ from isiw.testing.device_table import (
     OF_TIMING,
     Delivery,
     DeviceTable,
+    announcement,
     artefact_in_window,
     device_table,
     late_artefact,
@@ -102,31 +103,6 @@ def _checked(
     say(str(table))
     _require_usable(deliveries, rules, real=not device.describe().simulated)
     return table
-
-
-def announcement(device: Device, iti_s: float) -> str:
-    """The number of stimuli that a check of a device gives, in words, and how long it takes; nothing is delivered.
-
-    Args:
-        device: the device.
-        iti_s: the time between two stimuli [s].
-    """
-    info = device.describe()
-    if info.simulated:
-        return f"{info.name} is simulated: nothing is delivered to anybody."
-    pairs = 8 if isinstance(device, HasMemory) else 3
-    alone = ", one magnetic pulse alone and one tap alone" if info.tap_alone else " and one magnetic pulse alone"
-    tried = pairs + (2 if info.tap_alone else 1) + REFUSED
-    warning = unprotected(info)
-    return (
-        f"This check stimulates: {pairs} pairs{alone}, {iti_s:g} s apart. It then arms and disarms the device, which "
-        f"must refuse {REFUSED} stimuli more; in all about {tried * iti_s:.0f} s. Keep the coil on a phantom."
-        f"{f' {warning}' if warning else ''}"
-    )
-
-
-REFUSED: Final = 6
-"""So many stimuli are tried while the device is disarmed, which must refuse them."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,210 @@
+"""The outcomes of trials, as a strategy keeps them, and the observations that a model learns from them."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Final, TypedDict
+
+import numpy as np
+
+from isiw.change import MOST_NOTED
+from isiw.checks import Amplitude, AmplitudeInterval, Checked, Flag, NonNegative
+from isiw.errors import InvalidValueError
+from isiw.models.protocol import (
+    Observation,
+)
+from isiw.signals.tap import TapsAlone, is_inside, meets_response, taps_anywhere, taps_near
+from isiw.trials import Trial
+from isiw.types import Reference
+from isiw.window import Window
+
+STEPS_MV: Final = (0.1, 0.05, 0.025, 0.02, 0.01, 0.005, 0.002)
+"""Steps of converters and displays that are looked for, the largest first [mV]; finer ones matter to nobody."""
+
+FINEST_MV: Final = 0.001
+"""To this, amplitudes may be rounded anyway [mV]."""
+
+BY_CHANCE, LEAST_DIFFERENT = 1e-6, 3
+"""A step is found if all amplitudes would be its multiples by chance less often than this; of so many that differ."""
+
+NEAR_A_STEP: Final = 1e-6
+"""An amplitude is a multiple of a step if it is as near to one, in steps."""
+
+
+class Details(TypedDict, total=False):
+    """Details of an outcome besides its amplitude; see `Strategy.tell`."""
+
+    response: bool | None
+    isi_sd_ms: float
+    mep_sd_mv: float
+    mep_interval_mv: tuple[float, float] | None
+    tap_mv: float | None
+
+
+def details_of(trial: Trial) -> Details:
+    """The details of a trial's outcome besides ISI and amplitude."""
+    return {
+        "isi_sd_ms": trial.isi_sd_ms,
+        "mep_sd_mv": trial.mep_sd_mv,
+        "mep_interval_mv": trial.mep_interval_mv,
+        "tap_mv": trial.tap_mv,
+    }
+
+
+SEEN_MV: Final = 0.01
+"""An amplitude so much above the smallest shows something [mV]."""
+
+
+@dataclass(frozen=True)
+class Outcome(Checked):
+    """The outcome of one pulse; see `Strategy.tell`."""
+
+    isi_ms: float | None
+    mep_mv: Amplitude | None = None
+    response: Flag | None = None
+    isi_sd_ms: NonNegative = 0.0
+    mep_sd_mv: NonNegative = 0.0
+    mep_interval_mv: AmplitudeInterval | None = None
+    tap_mv: NonNegative | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        told = self.mep_mv, self.mep_interval_mv, self.response
+        if sum(value is not None for value in told) != 1:
+            raise InvalidValueError("tell needs one of mep_mv, mep_interval_mv and response", got=told)
+
+    @classmethod
+    def of(cls, trial: Trial) -> Outcome:
+        """The outcome of a trial that was judged before."""
+        return cls(trial.isi_ms, None if trial.mep_interval_mv else trial.mep_mv, **details_of(trial))
+
+
+@dataclass(frozen=True)
+class Outcomes:
+    """All outcomes so far: of pulses, and ISI [ms] and amplitude [mV] of taps alone; changes by pulses before.
+
+    Of taps alone that were measured at no ISI the amplitude is the largest at any time; they only say whether a window
+    may be the tap's own response.
+    Pulses whose ISI is `doubted`, by their numbers, are no observations.
+    """
+
+    reference: Reference
+    stated_step_mv: float | None = None
+    pulses: tuple[Outcome, ...] = ()
+    taps: tuple[tuple[float, float], ...] = ()
+    taps_anywhere_mv: tuple[float, ...] = ()
+    changes: tuple[int, ...] = ()
+    doubted: frozenset[int] = frozenset()
+
+    def of(self, trials: Iterable[Trial]) -> Outcomes:
+        """The same after some trials of a session."""
+        outcomes = self
+        for trial in trials:
+            if trial.told:
+                outcomes = outcomes.after(Outcome.of(trial))
+            elif trial.counts and trial.mep_mv is not None:
+                outcomes = outcomes.after_tap(trial.isi_ms, trial.mep_mv)
+        return outcomes
+
+    def after(self, outcome: Outcome) -> Outcomes:
+        """The same after one more pulse."""
+        return replace(self, pulses=(*self.pulses, outcome))
+
+    def after_tap(self, isi_ms: float | None, mep_mv: float) -> Outcomes:
+        """The same after one more tap alone."""
+        if isi_ms is None:
+            return replace(self, taps_anywhere_mv=(*self.taps_anywhere_mv, mep_mv))
+        return replace(self, taps=(*self.taps, (isi_ms, mep_mv)))
+
+    def changing(self) -> Outcomes:
+        """The same if something changes now: several notes at one trial are one change, and `MOST_NOTED` are learnt."""
+        known = len(self.pulses) in self.changes or len(self.changes) >= MOST_NOTED
+        return self if known else replace(self, changes=(*self.changes, len(self.pulses)))
+
+    @cached_property
+    def step_mv(self) -> float:
+        """The step that amplitudes are multiples of [mV]; 0 if there is none."""
+        if self.stated_step_mv is not None:
+            return self.stated_step_mv
+        return found_step_mv([one.mep_mv for one in self.pulses if one.mep_mv is not None])
+
+    @property
+    def observations(self) -> tuple[Observation | None, ...]:
+        """The observations of all pulses, as they are understood now; None if something changed there."""
+        told: list[Observation | None] = []
+        for number, one in enumerate((*self.pulses, None)):
+            told += [None] * self.changes.count(number)
+            told += [] if one is None or number in self.doubted else [self.observation(one)]
+        return tuple(told)
+
+    def observation(self, outcome: Outcome) -> Observation:
+        """The observation that a model learns from an outcome."""
+        low_mv, high_mv = outcome.mep_mv, math.nan
+        if outcome.mep_interval_mv is not None:
+            low_mv, high_mv = outcome.mep_interval_mv
+        elif self.step_mv and outcome.mep_mv is not None:
+            low_mv, high_mv = max(0.0, outcome.mep_mv - self.step_mv / 2), outcome.mep_mv + self.step_mv / 2
+        mean_mv, sd_mv, log_sd = self._tap_mv(outcome) or (0.0, 0.0, 0.0)
+        sd_mv = math.hypot(sd_mv, outcome.mep_sd_mv)
+        return Observation.of(
+            [outcome.isi_ms],
+            [low_mv],
+            [outcome.isi_sd_ms],
+            [outcome.response],
+            None if math.isnan(high_mv) else [high_mv],
+            [(mean_mv, sd_mv, log_sd)] if mean_mv or sd_mv else None,
+        )
+
+    def _tap_mv(self, outcome: Outcome) -> tuple[float, float, float] | None:
+        """Mean and SD of the tap's own part of an amplitude [mV], and the SD of its log mean; None if it is unknown."""
+        if outcome.isi_ms is None or outcome.tap_mv is not None:
+            return outcome.tap_mv or 0.0, 0.0, 0.0
+        alone = self._alone_at(outcome.isi_ms)
+        return None if alone is None else (alone.mean_mv, alone.sd_mv, alone.log_sd)
+
+    def _alone_at(self, isi_ms: float) -> TapsAlone | None:
+        """The evidence of taps alone near an ISI; None if there are too few."""
+        return taps_near(self.taps, isi_ms, self._least_mv) if self.taps else None
+
+    @cached_property
+    def _least_mv(self) -> float:
+        """The smallest amplitude of all, also of taps alone [mV]."""
+        sizes_mv = [mep_mv for _, mep_mv in self.taps] + [one.mep_mv for one in self.pulses if one.mep_mv]
+        return min(sizes_mv, default=0.0)
+
+    def _of_the_tap(self, one: Outcome) -> bool | None:
+        """Whether the tap alone evokes as much as an amplitude shows; None if nobody knows what it evokes."""
+        if one.isi_ms is None or one.tap_mv is not None:
+            return False
+        alone = self._alone_at(one.isi_ms) or taps_anywhere(self.taps_anywhere_mv, self._least_mv)
+        if alone is None or one.mep_mv is None:
+            return None if alone is None else False
+        return SEEN_MV < one.mep_mv - self._least_mv <= alone.most_mv
+
+    def about_the_tap(self, window: Window | None) -> dict[str, bool]:
+        """Whether the tap's own response may be what is larger within a window, and whether that is likely."""
+        met = [one for one in self.pulses if one.isi_ms is not None and meets_response(one.isi_ms, self.reference)]
+        inside = [one for one in met if window is not None and is_inside(window, one.isi_ms or 0.0)]
+        counts = Counter(self._of_the_tap(one) for one in inside)
+        may_explain = counts[None] + counts[True] > counts[False]
+        return {"tap_may_explain": may_explain, "tap_is_likely": may_explain and counts[True] > counts[False]}
+
+
+def found_step_mv(amplitudes_mv: Sequence[float]) -> float:
+    """The largest step that all of some amplitudes are multiples of, unless by chance [mV]; 0 if there is none."""
+    sizes = np.asarray(amplitudes_mv)
+    if len(set(amplitudes_mv)) < LEAST_DIFFERENT:
+        return 0.0
+    for step_mv in STEPS_MV:
+        newest = amplitudes_mv[-1] / step_mv
+        if abs(newest - round(newest)) >= NEAR_A_STEP:  # most often, so that no other has to be looked at
+            continue
+        by_chance = np.count_nonzero(sizes) * math.log(FINEST_MV / step_mv)
+        multiples = sizes / step_mv
+        if by_chance < math.log(BY_CHANCE) and bool((np.abs(multiples - multiples.round()) < NEAR_A_STEP).all()):
+            return step_mv
+    return 0.0
