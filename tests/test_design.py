@@ -143,7 +143,7 @@ def test_a_list_with_an_isi_beyond_a_minute_is_refused_in_words(listed: list[flo
 
 
 @pytest.mark.parametrize("wrong", [{"high_ms": 1e308, "step_ms": 1e308}, {"tolerance_ms": 1e300}])
-def test_a_step_or_a_tolerance_beyond_a_minute_is_refused_in_words(wrong: dict[str, float]) -> None:
+def test_a_step_or_a_tolerance_beyond_a_minute_is_refused_in_words(wrong: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError, match="no ISI of a design space is so long"):
         DesignSpace(**{"low_ms": 0.0, "high_ms": 500.0, **wrong}, reference="impact")
 

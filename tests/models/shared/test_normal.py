@@ -71,8 +71,8 @@ def masses(low: Any, high: Any, found: Any) -> None:
 
 def test_loops_have_the_probability_between_two_ends_wherever_its_log_is_taken() -> None:
     rng = np.random.default_rng(1)
-    low = rng.uniform(-60.0, 60.0, 300) * rng.random(300) ** 2
-    low, high = (x.astype(np.float32) for x in (low, low + 10.0 ** rng.uniform(-2.0, 2.0, 300)))
+    from_sd = rng.uniform(-60.0, 60.0, 300) * rng.random(300) ** 2
+    low, high = (x.astype(np.float32) for x in (from_sd, from_sd + 10.0 ** rng.uniform(-2.0, 2.0, 300)))
     found = np.empty_like(low)
     masses(low, high, found)
     expected = [max(exact(float(a), float(b)), math.log(LEAST_MASS)) for a, b in zip(low, high, strict=True)]
