@@ -104,7 +104,7 @@ def test_existing_trials_that_were_not_asked_for_are_not_doubted() -> None:
 
 
 @pytest.mark.parametrize(
-    "rig", [lambda isi_ms: isi_ms + 8, lambda isi_ms: 10 * (isi_ms // 10), lambda isi_ms: isi_ms - 12], ids=str
+    "rig", [lambda isi_ms: isi_ms + 8, lambda isi_ms: 10 * (isi_ms // 10), lambda isi_ms: isi_ms - 12]
 )
 def test_a_rig_with_a_delay_or_coarse_steps_is_not_doubted(rig: Callable[[float], float]) -> None:
     strategy = a_strategy()
