@@ -71,7 +71,7 @@ def test_a_resumed_session_asks_what_an_uninterrupted_one_would_have(
     assert [trial.commanded_isi_ms for trial in result.trials] == uninterrupted
     record = read_session(interrupted)
     assert record.table == result.trials
-    assert [event.kind for event in record.events] == ["fault", "resume"]
+    assert [event.kind for event in record.events] == ["pause", "resume"]
 
 
 def test_resuming_twice_is_no_different(interrupted: Path, uninterrupted: list[float | None]) -> None:

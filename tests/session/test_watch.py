@@ -95,7 +95,7 @@ def test_mistrials_that_use_up_the_budget_are_no_finding(log: Path, space: Desig
 
 def test_two_trials_are_too_few_to_speak_of_a_window(log: Path) -> None:
     Session(ScriptedDevice(), scripted_strategy(2), log=log).run()
-    said = "Too little was measured to speak of a window: 2 pairs of stimuli count, of 2 trials. "
+    said = "Too little was measured to speak of a window: 2 pairs of stimuli count, of 2 trials.\n"
     assert final_statement(read_session(log)).startswith(said)
 
 
