@@ -43,6 +43,7 @@ from benchmarks.simulated_board import (
     pairs_of,
     sealed,
 )
+from isiw.trials import Status
 
 __all__ = ["NoisySession", "killed_while_delivering", "session_with_noise"]
 
@@ -248,7 +249,8 @@ def session(address: str, log: Path, pairs: int, seed: int) -> isiw.Session:
     limits = isiw.Limits.of_space(SPACE, min_iti_s=1.2e-3 * LEAST_MS, max_pulses=pairs)
     options: dict[str, Any] = {"limits": limits, "timeout_s": TIMEOUT_S, "safeguards": GUARDS}
     if log.exists():
-        return isiw.resume(log, device, strategy(pairs, seed), **options)
+        resumed: isiw.Session = isiw.resume(log, device, strategy(pairs, seed), **options)
+        return resumed
     return isiw.Session(device, strategy(pairs, seed), log=log, **options)
 
 
@@ -268,7 +270,7 @@ def compared(pairs: list[tuple[Edge, Edge]], trials: list[isiw.Trial]) -> tuple[
         asked_ms = trial.commanded_isi_ms
         if given and asked_ms is not None and abs(given[0] - asked_ms) < 0.01:
             given.pop(0)
-        elif trial.is_accepted:
+        elif trial.status is Status.ACCEPTED:
             wrong += 1
     return len(given), wrong
 
@@ -277,9 +279,9 @@ def report(arguments: argparse.Namespace) -> Iterator[str]:
     """The lines of the result."""
     with tempfile.TemporaryDirectory() as name:
         folder, began_s = Path(name), time.monotonic()
-        exact = exactness(folder, arguments.pairs, arguments.seed)
-        ended = endings(folder, arguments.times)
         noisy = session_with_noise(folder, folder, arguments.noisy_pairs, arguments.seed)
+        ended = endings(folder, arguments.times)
+        exact = exactness(folder, arguments.pairs, arguments.seed)
         spent_s = time.monotonic() - began_s
     yield from ("# The Arduino's machine code in simavr", "", f"- command: `{command_of('arduino')}`")
     yield f"- {made_with('numpy', 'pyserial')}; avr-gcc and simavr of Debian"

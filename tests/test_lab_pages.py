@@ -82,3 +82,11 @@ def test_what_has_not_run_on_hardware_says_so() -> None:
 @pytest.mark.parametrize("name", PICTURES)
 def test_every_wiring_is_drawn(name: str) -> None:
     assert (IMAGES / f"wiring_{name}.svg").read_text("utf-8").count("<!--") > 5
+
+
+def test_the_figures_of_the_arduinos_page_are_those_of_its_result() -> None:
+    result = (PAGES.parents[1] / "benchmarks" / "results" / "arduino.md").read_text("utf-8")
+    rows = re.findall(r"^\|.*\|$", result, flags=re.MULTILINE)
+    page = (PAGES / "arduino.md").read_text("utf-8")
+    assert len(rows) > 15
+    assert [row for row in rows if row not in page] == []
