@@ -126,7 +126,7 @@ def in_small(picture: Any) -> Any:
 
 def test_buttons_are_large_and_have_places_of_their_own(browser: Any, stage: Staged) -> None:
     page = opened(browser, stage, 400)
-    found = [page.locator(f"#{name}").bounding_box() or {} for name in ("pause", "resume", "stop")]
+    found: list[Any] = [page.locator(f"#{name}").bounding_box() or {} for name in ("pause", "resume", "stop")]
     assert min(min(box["height"], box["width"]) for box in found) >= 44
     assert all(one["x"] + one["width"] <= other["x"] for one, other in itertools.pairwise(found))
     red, green, blue = page.evaluate(
