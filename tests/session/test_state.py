@@ -83,7 +83,7 @@ def test_a_fault_is_told_from_an_end_with_its_trial_and_whether_the_pulse_may_ha
 
 
 def test_an_interrupt_is_no_fault_of_the_session_nor_of_its_log(log: Path) -> None:
-    def interrupted(stimulus: Stimulus) -> Measurement:
+    def interrupted(_: Stimulus) -> Measurement:
         raise KeyboardInterrupt
 
     session, _ = seen_by(ScriptedDevice(interrupted), log)
