@@ -17,7 +17,7 @@ from isiw.log.reader import read_session
 def test_where_the_page_cannot_be_opened_nothing_else_is_said_than_why(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def watch(_: object, _config: object) -> None:
+    def watch(_: object, **_more: object) -> None:
         raise ConfigError("the libraries are not installed")
 
     monkeypatch.setattr(isiw, "watch", watch, raising=False)

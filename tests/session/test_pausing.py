@@ -24,8 +24,8 @@ WHAT: Final = ("pause", "continue", "continue for the pause that is shown", "sto
 PRESSES: Final = st.lists(
     st.tuples(st.sampled_from(WHAT), st.sampled_from((0.0, 0.03, 0.5, 0.999, 1.0, 1.5)), st.integers(0, 1)), max_size=30
 )
-HELD: Final = st.tuples(st.sampled_from(WHAT[:3]), st.integers(0, 1)).map(lambda held: [(held[0], 0.03, held[1])] * 60)
-SEQUENCES: Final = st.lists(st.one_of(PRESSES, HELD), max_size=4).map(lambda parts: list(itertools.chain(*parts)))
+HELD: Final = st.tuples(st.sampled_from(WHAT[:3]), st.integers(0, 1)).map(lambda held: [(held[0], 0.03, held[1])] * 40)
+SEQUENCES: Final = st.lists(st.one_of(PRESSES, HELD), max_size=3).map(lambda parts: list(itertools.chain(*parts)))
 
 
 @dataclass

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from isiw.devices.protocol import Answer
 from isiw.errors import DeviceError
 from isiw.log.reader import read_session
 from isiw.session.loop import Session
@@ -46,10 +48,13 @@ def seen_by(device: ScriptedDevice, log: Path, *, ends: bool = False) -> tuple[S
         device, scripted_strategy(3), log=log, safeguards=Safeguards(on_pause=on_pause),
         on_trial=lambda update: session.pause("A look.") if update.trial.index == 1 else None,
     )  # fmt: skip
-    answer = device.deliver
-    device.deliver = lambda stimulus, timeout_s: (  # type: ignore[method-assign]
-        seen.append((session.state, session.armed)) or answer(stimulus, timeout_s)
-    )
+    answer: Callable[[Stimulus, float], Answer] = device.deliver
+
+    def delivering(stimulus: Stimulus, timeout_s: float) -> Answer:
+        seen.append((session.state, session.armed))
+        return answer(stimulus, timeout_s)
+
+    device.deliver = delivering  # type: ignore[method-assign]
     seen.append((session.state, session.armed))
     return session, seen
 
@@ -78,7 +83,7 @@ def test_a_fault_is_told_from_an_end_with_its_trial_and_whether_the_pulse_may_ha
 
 
 def test_an_interrupt_is_no_fault_of_the_session_nor_of_its_log(log: Path) -> None:
-    def interrupted(_stimulus: Stimulus) -> Measurement:
+    def interrupted(_: Stimulus) -> Measurement:
         raise KeyboardInterrupt
 
     session, _ = seen_by(ScriptedDevice(interrupted), log)

@@ -102,7 +102,7 @@ def _todo(record: SessionRecord, config: Path | None) -> list[tuple[str, str]]:
         count = "Find out, with the stimulator's counter, the number N of pulses that isiw show does not list"
         todo.append(("lost pulses", f"{count}; then resume with: {way_on}"))
     elif last is not None and not last.stop:
-        todo.append(("resume", f"Resume the session, which is not over, with: {way_on}"))
+        todo.append(("resume", f"Resume with: {way_on}"))
     if last is not None:
         nothing = nothing_measured(record) is not None
         todo += [

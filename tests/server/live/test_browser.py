@@ -166,7 +166,8 @@ def test_an_operator_has_all_that_matters_on_one_screen(page: Page, tmp_path_fac
         name: page.locator(name).bounding_box() or {} for name in ("#bar", "#operate", "#values", "#belief")
     }
     assert {name: box for name, box in boxes.items() if box["y"] < 0 or box["y"] + box["height"] > 900} == {}
-    window, swept = boxes["#belief"], page.locator("#sweep").bounding_box() or {}
+    window: Any = boxes["#belief"]
+    swept: Any = page.locator("#sweep").bounding_box()
     assert window["y"] == swept["y"]
     assert window["x"] + window["width"] <= swept["x"]
     assert min(window["height"], swept["height"]) > 240
