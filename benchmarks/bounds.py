@@ -84,6 +84,8 @@ def _step(session: isiw.Recorder, kind: str, rng: np.random.Generator) -> None:
         session.tell(float(rng.choice(session.strategy.space.grid_ms)), mep_mv, pulse=False)
     else:
         isi_ms = session.ask() + float(rng.normal(0.0, 1.0))
+        if session.strategy.space.reference == "impact":  # before it there is no pair
+            isi_ms = max(isi_ms, 0.0)
         if kind == "lost":
             session.mistrial("background activity")
         elif kind == "interval":

@@ -32,6 +32,7 @@ QUICK: Final[Mapping[str, str]] = {
     "before_and_now run": "--cohorts gaussian --people 4 --out OUT",
     "before_and_now speed": "--laps 1",
     "before_and_now stops": "--out OUT",
+    "bounds": "--sessions 20",
     "calibration": "--replications 4 --trials 5 --people 1 --out OUT",
     "deaths": "--kills 9 --out OUT",
     "dissertation": "--few --out OUT",

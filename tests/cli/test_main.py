@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -62,12 +63,18 @@ def test_an_error_is_a_message_and_exit_code_1(isiw: Command, arguments: list[st
 def test_help_and_import_load_no_torch_and_are_fast() -> None:
     check = "import sys, isiw.cli; assert not {'torch', 'matplotlib', 'pandas', 'pydantic'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", check], check=True)  # noqa: S603
+    one_command = [sys.executable, "-c", "import typer; typer.run(lambda: None)", "--help"]
+    spent_s, least_s = (min(_processor_s(command) for _ in range(2)) for command in ([*COMMAND, "--help"], one_command))
+    assert spent_s < 2.5 * least_s
+
+
+def _processor_s(command: Sequence[str]) -> float:
+    """The time that a command takes on the processor, which does not depend on what else the machine is doing [s]."""
     begin = os.times()
-    done = subprocess.run([*COMMAND, "--help"], check=True, capture_output=True, text=True)  # noqa: S603
+    done = subprocess.run(command, check=True, capture_output=True, text=True)  # noqa: S603
     end = os.times()
-    assert "resume" in done.stdout
-    # Time on the processor, which does not depend on what else the machine is doing.
-    assert (end.children_user - begin.children_user) + (end.children_system - begin.children_system) < 0.5
+    assert "--help" in done.stdout
+    return (end.children_user - begin.children_user) + (end.children_system - begin.children_system)
 
 
 def test_what_the_operating_system_refuses_is_a_message(isiw: Command, log: Path, tmp_path: Path) -> None:

@@ -526,7 +526,7 @@ def test_more_changes_than_are_learnt_are_remarks_and_somebody_is_told_once(log:
         session.note_change("the coil moved 3", key="c3")
         learnt = tuple(range(1, MOST_NOTED + 1))
         assert instance(RememberingPosterior, session.strategy.posterior).changes == learnt
-        with pytest.raises(InvalidValueError, match="Give each note and each change a key of its own"):
+        with pytest.raises(InvalidValueError, match="Give each note, change, exclusion and inclusion a key of its own"):
             session.note("the coil moved 22", key="c22")
     assert len(said) == 1
     assert "20 changes were noted, and no more are learnt" in said[0]

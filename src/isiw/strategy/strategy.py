@@ -365,8 +365,7 @@ class Strategy:
 
     def count_excluded(self) -> None:
         """Count a delivered stimulus whose outcome an operator excluded: it uses up budget, and was not lost."""
-        self._mistrials += 1
-        self._lost = 0
+        self._mistrials, self._lost = self._mistrials + 1, 0
 
     def count_control(self, tap_mv: float | None = None) -> None:
         """Count a control trial that teaches nothing of a window; `tap_mv` is what a tap alone evoked, at any time."""
@@ -376,7 +375,8 @@ class Strategy:
     def estimate(self) -> WindowEstimate:
         """The present estimate of the window."""
         estimate = self._course.estimate()
-        estimate = estimate.noting(**self._outcomes.about_the_tap(estimate.window))
+        tap = self._outcomes.about_the_tap(estimate.window)
+        estimate = estimate.noting(**tap) if any(tap.values()) else estimate
         estimate = estimate.noting(silent=True) if self._is_silent else estimate
         return estimate.doubted() if self.in_doubt else estimate
 
