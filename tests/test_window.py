@@ -184,7 +184,7 @@ def test_an_estimate_is_printed_with_its_probability_medians_and_intervals() -> 
     edges_ms = np.array([[-math.inf, 150.0], [30.0, 160.0], [34.0, math.inf]])
     estimate = WindowEstimate(0.876, Window(31.6, 158.0), 30.0, 160.0, edge_samples_ms=edges_ms)
     assert str(estimate).splitlines() == [
-        "Window: 31.6–158 ms (probability of a window: 0.88)",
+        "Window: 31.6–158 ms (probability 0.88)",
         "Start: 30 ms, 90 % interval before the range to 34 ms",
         "End: 160 ms, 90 % interval 150 ms to beyond the range",
     ]
