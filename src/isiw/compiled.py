@@ -112,7 +112,7 @@ def _compiled(function: F, fastmath: set[str], **more: bool | str) -> F:
 if AVAILABLE:
     from numba.core.caching import FunctionCache, IndexDataCacheFile
 
-    class _Files(IndexDataCacheFile):
+    class _Files(IndexDataCacheFile):  # type: ignore[misc] # Numba has no types
         """The files of a loop, each with a checksum behind it: machine code of other bytes may end the process."""
 
         def _save_data(self, name: str, data: object) -> None:
@@ -126,13 +126,13 @@ if AVAILABLE:
                 raise ValueError(name)
             return super()._load_data(name)  # which reads up to the checksum
 
-    class _Kept(FunctionCache):
+    class _Kept(FunctionCache):  # type: ignore[misc] # see above
         """The cache of a loop: where a file of it cannot be used, the loop is compiled, and kept again."""
 
         def __init__(self, function: Callable[..., Any]) -> None:
             super().__init__(function)
-            one = self._cache_file
-            self._cache_file = _Files(self._cache_path, self._impl.filename_base, one._source_stamp)  # noqa: SLF001
+            stamp = self._impl.locator.get_source_stamp()
+            self._cache_file: Any = _Files(self._cache_path, self._impl.filename_base, stamp)
 
         def load_overload(self, signature: Any, target: Any) -> Any:
             try:
