@@ -135,9 +135,9 @@ def workbook(path: Path, rows: bytes) -> Path:
 BIG = {
     "a giant count in MATLAB": ("P.mat", MATLAB + struct.pack("<14I", 14, 48, 6, 8, 6, 0, 5, 8, 2**31 - 1, 2**31 - 1,
                                                               1, 1, 97, 9), "the file is no table"),
-    "a giant count in EDF": ("P.edf", edf(99_999_999, 99_999_999), "P.edf|the recording cannot be read"),
+    "a giant count in EDF": ("P.edf", edf(99_999_999, 99_999_999), "P.edf|the file has no records of signals"),
     "quotes that do not end": ("P.csv", (HEAD + '"' + ROWS * 200).encode(), "P.csv"),
-    "random bytes": ("P.fif", bytes(range(256)) * 40, "the recording cannot be read"),
+    "random bytes": ("P.fif", bytes(range(256)) * 40, "the file cannot be read as FIF"),
     "an empty file": ("P.xlsx", b"", "this is no workbook"),
     "half a workbook": ("P.xlsx", b"PK\x03\x04" + bytes(200), "the file is no table"),
     "NUL": ("P.csv", HEAD.encode() + bytes(2000), "the file is no text"),

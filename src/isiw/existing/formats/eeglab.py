@@ -61,7 +61,8 @@ def _values(eeg: Mapping[str, Any], path: Path, channel: int, first: int, last: 
     """Numbers of a channel, which are in this file, or in one beside it."""
     count, data = int(eeg["nbchan"]), eeg["data"]
     if isinstance(data, str):
-        with opened(path.with_name(Path(data.replace("\\", "/")).name)) as file:
+        beside = path.with_name(Path(data.replace("\\", "/")).name)  # a folder of another computer is not meant
+        with opened(beside if beside.exists() else path.parent / data) as file:
             file.seek(4 * count * first)
             return (
                 np.frombuffer(file.read(4 * count * (last - first)), "<f4")
