@@ -43,6 +43,7 @@ from benchmarks.simulated_board import (
     pairs_of,
     sealed,
 )
+from isiw.log.durable import log_exists
 from isiw.trials import Status
 
 __all__ = ["NoisySession", "killed_while_delivering", "session_with_noise"]
@@ -222,7 +223,7 @@ def session_with_noise(folder: Path, place: Path, pairs: int, seed: int) -> Nois
 
 def known(log: Path) -> int:
     """How many trials a log has."""
-    return len(isiw.read_session(log).table) if log.exists() else 0
+    return len(isiw.read_session(log).table) if log_exists(log) else 0
 
 
 def run_once(running: Board, address: str, log: Path, pairs: int, seed: int, troubles: list[tuple[int, str]]) -> None:
@@ -248,7 +249,7 @@ def session(address: str, log: Path, pairs: int, seed: int) -> isiw.Session:
     device = device_of_the_page(address, LEAST_MS / 1e3)
     limits = isiw.Limits.of_space(SPACE, min_iti_s=1.2e-3 * LEAST_MS, max_pulses=pairs)
     options: dict[str, Any] = {"limits": limits, "timeout_s": TIMEOUT_S, "safeguards": GUARDS}
-    if log.exists():
+    if log_exists(log):
         resumed: isiw.Session = isiw.resume(log, device, strategy(pairs, seed), **options)
         return resumed
     return isiw.Session(device, strategy(pairs, seed), log=log, **options)
@@ -263,16 +264,25 @@ def stimuli(edges: list[Edge]) -> list[float]:
 
 
 def compared(pairs: list[tuple[Edge, Edge]], trials: list[isiw.Trial]) -> tuple[int, int]:
-    """How many pairs the log does not know, and how many of its accepted trials were not given at the pins."""
+    """How many pairs the log does not know, and how many of its accepted trials were not given at the pins.
+
+    Both are in the order of time. A trial whose outcome is not known may have been given or not, and is asked for again
+    at the same ISI, so that of all ways to put them side by side the one with the fewest faults is taken.
+    """
     given = [1e3 * (trigger.cycle - valve.cycle) / HZ for valve, trigger in pairs]
-    wrong = 0
-    for trial in trials:
-        asked_ms = trial.commanded_isi_ms
-        if given and asked_ms is not None and abs(given[0] - asked_ms) < 0.01:
-            given.pop(0)
-        elif trial.status is Status.ACCEPTED:
-            wrong += 1
-    return len(given), wrong
+    after = [(left, 0) for left in range(len(given), -1, -1)]  # faults from each pair on, once no trial is left
+    for trial in reversed(trials):
+        asked_ms, skipped = trial.commanded_isi_ms, int(trial.status is Status.ACCEPTED)
+        here = [(0, 0)] * len(after)
+        for first in range(len(given), -1, -1):
+            ways = [(after[first][0], after[first][1] + skipped)]
+            if first < len(given):
+                ways.append((here[first + 1][0] + 1, here[first + 1][1]))
+                if asked_ms is not None and abs(given[first] - asked_ms) < 0.01:
+                    ways.append(after[first + 1])
+            here[first] = min(ways, key=sum)
+        after = here
+    return after[0]
 
 
 def report(arguments: argparse.Namespace) -> Iterator[str]:

@@ -57,7 +57,7 @@ def port(running: Board) -> Iterator[Port]:
         yield port
 
 
-@pytest.mark.parametrize("isi_ms", [0.0, 47.0])
+@pytest.mark.parametrize("isi_ms", [pytest.param(0.0, marks=pytest.mark.slow), 47.0])
 def test_the_trigger_comes_the_isi_after_the_valve_and_both_are_as_long_as_they_should(
     isi_ms: float, device: Any, running: Board
 ) -> None:
@@ -77,6 +77,7 @@ def test_the_heard_isi_is_the_first_edge_whatever_artefact_comes_after_the_trigg
     assert device.deliver(Stimulus(0, 20.0), TIMEOUT_S).isi_ms == pytest.approx(20.0, abs=0.016)
 
 
+@pytest.mark.slow
 def test_without_its_wire_the_board_has_heard_no_trigger(device: Any, running: Board) -> None:
     running.order("j")
     with pytest.raises(DeviceError, match="no trigger at pin 8"):
@@ -87,12 +88,17 @@ def test_without_its_wire_the_board_has_heard_no_trigger(device: Any, running: B
     "said",
     [
         sealed("5 DISARM").replace(b"ARM", b"ARN"),
-        b"5 DISARM\n",
-        sealed("5 DANCE"),
-        sealed("DISARM"),
-        b"9" * 200 + b"\n",
-        b"\x00\xff{\x1b[\n",
-        sealed("5 SET x"),
+        *(
+            pytest.param(said, marks=pytest.mark.slow)
+            for said in (
+                b"5 DISARM\n",
+                sealed("5 DANCE"),
+                sealed("DISARM"),
+                b"9" * 200 + b"\n",
+                b"\x00\xff{\x1b[\n",
+                sealed("5 SET x"),
+            )
+        ),
     ],
 )
 def test_whatever_is_not_understood_disarms(said: bytes, port: Port, running: Board) -> None:
@@ -102,6 +108,7 @@ def test_whatever_is_not_understood_disarms(said: bytes, port: Port, running: Bo
     assert running.rises("trigger") == []
 
 
+@pytest.mark.slow
 def test_silence_disarms_and_a_sign_of_life_keeps_it_armed(port: Port, running: Board) -> None:
     port.ask("1 ARM", "1 ARMED")
     armed_ms = running.clock_ms
@@ -160,6 +167,7 @@ def test_an_interlock_that_opens_ends_a_stimulus_and_stays_open_until_it_is_ackn
     assert running.rises("trigger") == []
 
 
+@pytest.mark.slow
 def test_an_interlock_that_was_open_is_acknowledged_by_staging_again_alone(device: Any, running: Board) -> None:
     running.order("o")
     wait_ms(running, 5)
@@ -170,6 +178,7 @@ def test_an_interlock_that_was_open_is_acknowledged_by_staging_again_alone(devic
     device.deliver(Stimulus(0, 20.0), TIMEOUT_S)
 
 
+@pytest.mark.slow
 def test_a_reset_lets_go_of_both_pins_and_forgets_what_was_armed(port: Port, running: Board) -> None:
     port.ask("1 SET 400000", "1 OK")
     port.ask("2 ARM", "2 ARMED")
@@ -182,6 +191,7 @@ def test_a_reset_lets_go_of_both_pins_and_forgets_what_was_armed(port: Port, run
     assert len(running.rises("valve")) == 1
 
 
+@pytest.mark.slow
 def test_a_program_that_is_stuck_is_reset_by_the_watchdog_and_gives_nothing_before_somebody_has_seen_it(
     port: Port, running: Board
 ) -> None:
@@ -197,6 +207,7 @@ def test_a_program_that_is_stuck_is_reset_by_the_watchdog_and_gives_nothing_befo
     assert running.rises("trigger") == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("constants", "refusal"),
     [
@@ -218,6 +229,7 @@ def test_the_board_has_limits_of_its_own(constants: dict[str, int], refusal: str
         assert len(running.rises("trigger")) == 1
 
 
+@pytest.mark.slow
 def test_isiw_refuses_a_board_with_other_limits_than_its_configuration_states(running: Board) -> None:
     with pytest.raises(DeviceError, match="another shortest_iti_s"):
         device_of_the_page(running.address, 2.0).stage()
@@ -225,6 +237,7 @@ def test_isiw_refuses_a_board_with_other_limits_than_its_configuration_states(ru
         device_of_the_page(running.address, 0.0, 7).stage()
 
 
+@pytest.mark.slow
 def test_the_example_of_the_page_conforms_on_the_machine_code_also_when_isiw_dies(running: Board) -> None:
     said: list[str] = []
     make = partial(device_of_the_page, running.address, 0.0)
