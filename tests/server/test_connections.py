@@ -118,7 +118,7 @@ def test_a_body_that_is_not_wanted_does_not_hold_a_connection(tmp_path: Path) ->
 
 def test_too_many_connections_with_the_token_are_told_so_in_json(tmp_path: Path) -> None:
     with client_of(tmp_path, most_known=2) as client:
-        others = [httpx.Client(base_url=client.base_url, headers=BEARER) for _ in range(3)]
+        others = [httpx.Client(base_url=client.base_url, headers=BEARER, timeout=120.0) for _ in range(3)]
         with ExitStack() as stack:
             for other in others:
                 stack.enter_context(other)
@@ -207,7 +207,7 @@ def test_handshakes_that_are_never_finished_keep_nobody_out(tmp_path: Path) -> N
         hello = b"\x16\x03\x01\x02\x00\x01\x00"  # of 512 bytes that never come
         strangers = stack.enter_context(held(port, 205, hello))
         context = ssl.create_default_context(cafile=str(certificate))
-        with httpx.Client(base_url=url, headers=BEARER, verify=context) as client:
+        with httpx.Client(base_url=url, headers=BEARER, verify=context, timeout=120.0) as client:
             begun_s = time.monotonic()
             done(client.get("/sessions"))
             assert time.monotonic() - begun_s < IN_TIME_S

@@ -25,7 +25,7 @@ OPENSSL = shutil.which("openssl") or ""
 
 
 def client_at(url: str) -> httpx.Client:
-    return httpx.Client(base_url=url, headers=BEARER, timeout=30.0)
+    return httpx.Client(base_url=url, headers=BEARER, timeout=120.0)
 
 
 @pytest.mark.slow
@@ -150,7 +150,7 @@ def test_with_a_certificate_it_is_served_by_tls_alone(tmp_path: Path) -> None:
     with server(tmp_path / "logs", "--certificate", str(certificate), "--key", str(key)) as (_, url):
         assert url.startswith("https://")
         context = ssl.create_default_context(cafile=str(certificate))
-        with httpx.Client(base_url=url, headers=BEARER, verify=context) as client:
+        with httpx.Client(base_url=url, headers=BEARER, verify=context, timeout=120.0) as client:
             told(client, created(client), 1)
         with pytest.raises(httpx.TransportError):
             httpx.get(url.replace("https", "http"))
