@@ -23,6 +23,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from benchmarks.server_tries import FILES, TOKEN, Served
+from isiw.session.pausing import SEPARATE_S
 
 HALF = b"GET /sessions HTTP/1.1\r\nX: "
 BACK_S = 1.0
@@ -128,6 +129,7 @@ def operated_meanwhile(folder: Path, number: int, pauses: int) -> tuple[list[flo
 
 
 def _goes_on(port: int, token: str, pause: int) -> bool:
+    time.sleep(1.1 * SEPARATE_S)  # sooner it would be taken for a key that is held
     return math.isfinite(answered_s(port, token, "POST", "/resume", json.dumps({"pause": pause}).encode()))
 
 
