@@ -13,7 +13,7 @@ SURE_OF_A_CHANGE: Final = 0.9
 
 
 MOST_NOTED: Final = 20
-"""So many changes that somebody noted are learnt in a session, several at one trial as one; more are remarks."""
+"""At most so many noted changes are learnt in a session, several at one trial as one; more are remarks."""
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from pathlib import Path
 from typing import Any, Final
 
 from isiw.errors import InvalidValueError
-from isiw.existing import formats
 from isiw.existing.delivered import Delivered, anywhere, renumbered
 from isiw.existing.doubts import is_rectified, require_short
 from isiw.existing.formats.contents import Contents, Track
@@ -40,11 +38,6 @@ class Recording:
     events: pd.DataFrame
     source: str
     notes: tuple[str, ...] = ()
-
-
-def read_recording(path: Path, layout: Layout, subject: str) -> Delivered:
-    """The trials of a recording of one person."""
-    return of_contents(formats.read(path, layout), layout, subject)
 
 
 def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:

@@ -194,7 +194,7 @@ def change(trials: TrialTable, what: str, key: str | None = None) -> Event:
 
 
 def changed_after(events: Iterable[Event]) -> list[int]:
-    """The trials after which somebody noted a change, each once."""
+    """The trials after which a change was noted, each once."""
     return list(dict.fromkeys(event.trial for event in events if event.kind == CHANGE and event.trial is not None))
 
 
