@@ -1,4 +1,4 @@
-"""From a model's prior to the tables that kernels know it by."""
+"""From a model's prior to the tables that the engine knows it by."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 
 from isiw.design import DesignSpace
 from isiw.lazy import torch
-from isiw.models.particles.kernels.target import MEANINGS, Tables
 from isiw.models.particles.mixture import Mixture
 from isiw.models.particles.moves import PART_PROBABILITY
 from isiw.models.protocol import Tensor
 from isiw.models.shared.start import StartPrior
+from isiw.native.engine import MEANINGS, Tables
 
 _NOT_REACHED: Final = 2.0
 """No uniform draw is above it."""
@@ -62,7 +62,6 @@ def prior_tables(
     made: dict[str, Any] = {
         name: value.numpy() if isinstance(value, torch.Tensor) else value for name, value in moves.items()
     }
-    made |= {"touched": np.add.reduceat(made["shifted"], law["first"], axis=-1)}
     made |= {"changed": int(np.searchsorted(law["first"], where[27]))}
     made |= {"parts": _edges(PART_PROBABILITY, len(PART_PROBABILITY))}
     made |= {"jumps": _edges(moves["jumps"], len(moves["jumps"]))}

@@ -1,0 +1,4 @@
+"""The compiled engine: the law of particles over arrays, and what ISIs are scored by.
+
+Its C sources are in `source`; `isiw.native.library` loads what was built of them, `isiw.native.engine` calls it.
+"""
