@@ -265,7 +265,6 @@ class ResponseModel(Protocol):
         """
 
 
-
 def profile_of(model: object) -> Any:
     """The law of the profile that a model's prior expects; None for a model without one."""
     return getattr(getattr(model, "prior", None), "profile", None)

@@ -26,6 +26,9 @@ MEANINGS: Final = 32
 _LAST_KINDS: Final = np.array([3, 4, 1, 1, 4])
 """The last of each."""
 
+LANES: Final = 16
+"""Components of mixtures are padded to whole vectors of any processor."""
+
 UNKNOWN: Final = np.float32(1e30)
 """In place of the log density of a block that was not worked out yet."""
 
@@ -39,12 +42,14 @@ class Tables(NamedTuple):
     spreads: FloatArray  # usual SD of each latent, (d,)
     first: IntArray  # latent of each block, (k,)
     size: IntArray  # how many latents it has, (k,)
-    components: IntArray  # of its mixture, (k,); 0 for a start, negative for start and width that may be those of a place
+    components: (
+        IntArray  # of its mixture, (k,); 0 for a start, negative for start and width that may be those of a place
+    )
     log_shares: FloatArray  # of the components, less the logs of their SDs, (k, c)
     below: FloatArray  # sums of the shares of earlier components, from the second on, (k, c)
-    means: FloatArray  # of the latents in each component, (c, d)
-    sds: FloatArray  # likewise, (c, d)
-    per_sds: FloatArray  # 1 / SD, as dividers are slow, (c, d)
+    means: FloatArray  # of the latents in each component, (d, c)
+    sds: FloatArray  # likewise, (d, c)
+    per_sds: FloatArray  # 1 / SD, as dividers are slow, (d, c)
     start_ms: FloatArray  # knots of the density of a start, evenly spaced, (s,)
     density: FloatArray  # at the knots, (s,)
     quantiles: FloatArray  # probability of an earlier start, at the knots, (s,)
@@ -67,7 +72,7 @@ class _Struct(ctypes.Structure):
     """`Tables` of engine.h."""
 
     _fields_ = [
-        *((name, ctypes.c_int64) for name in ("latents", "blocks", "most_components", "knots", "place_count")),
+        *((name, ctypes.c_int64) for name in ("latents", "blocks", "width", "knots", "place_count")),
         *((name, ctypes.c_int64) for name in ("states", "part_count", "jump_count", "kind_values")),
         *((name, ctypes.c_void_p) for name in Tables._fields[: Tables._fields.index("place_share")]),
         ("place_share", ctypes.c_float),
@@ -88,14 +93,14 @@ class Law:
     """
 
     def __init__(self, tables: Tables) -> None:
-        blocks, latents, (most, _), knots = len(tables.first), len(tables.spreads), tables.means.shape, tables.start_ms
+        blocks, (latents, width), knots = len(tables.first), tables.means.shape, tables.start_ms
         (states, parts, _), jumps, (_, values) = tables.shifted.shape, len(tables.jumps) + 1, tables.kinds.shape
         shapes: dict[str, tuple[np.dtype[Any], tuple[int, ...]]] = {
             "at": (_i, (MEANINGS,)),
             "spreads": (_f, (latents,)),
             **dict.fromkeys(("first", "size", "components"), (_i, (blocks,))),
-            **dict.fromkeys(("log_shares", "below"), (_f, (blocks, most))),
-            **dict.fromkeys(("means", "sds", "per_sds"), (_f, (most, latents))),
+            **dict.fromkeys(("log_shares", "below"), (_f, (blocks, width))),
+            **dict.fromkeys(("means", "sds", "per_sds"), (_f, (latents, width))),
             **dict.fromkeys(("start_ms", "density", "quantiles"), (_f, (len(knots),))),
             "places": (_f, (len(tables.places), 5)),
             "place_below": (_f, (len(tables.places),)),
@@ -111,7 +116,7 @@ class Law:
         self._arrays = {
             name: np.array(getattr(tables, name), dtype=dtype, order="C") for name, (dtype, _) in shapes.items()
         }
-        sizes = {"latents": latents, "blocks": blocks, "most_components": most, "knots": len(knots)}
+        sizes = {"latents": latents, "blocks": blocks, "width": width, "knots": len(knots)}
         sizes |= {"place_count": len(tables.places), "states": states, "part_count": parts, "jump_count": jumps}
         self._struct = _Struct(
             **sizes,
@@ -121,19 +126,19 @@ class Law:
             changed=tables.changed,
             **{name: _address(self._arrays[name], dtype, *shape) for name, (dtype, shape) in shapes.items()},
         )
-        self.latents, self.blocks, self._states = latents, blocks, states
-        self._require_indices(most, knots=len(knots), changed=tables.changed)
+        self.latents, self.blocks, self._last = latents, blocks, np.minimum(_LAST_KINDS, [3, 4, 1, 1, values])
+        self._require_indices(width, knots=len(knots), changed=tables.changed)
 
-    def _require_indices(self, most: int, *, knots: int, changed: int) -> None:
+    def _require_indices(self, width: int, *, knots: int, changed: int) -> None:
         """Check what the engine reads arrays at."""
         first, size, components, at = (self._arrays[name] for name in ("first", "size", "components", "at"))
         within = (first >= 0).all() and (size >= 1).all() and (first + size <= self.latents).all()
-        within = within and (np.abs(components) <= most).all() and ((at >= 0) & (at <= self.latents)).all()
+        within = within and (np.abs(components) <= width).all() and ((at >= 0) & (at <= self.latents)).all()
         # A start and width of a place are the first two latents; a change, where there is one, is two blocks.
         within = within and (first[components < 0] == 0).all() and (size[components < 0] == 2).all()
         if self._arrays["renewed"][:, -1].any():
             within = within and 0 <= changed < self.blocks - 1
-        if not within or knots < 2:
+        if not within or knots < 2 or width % LANES or (_LAST_KINDS @ self._arrays["state_of"]) >= self._struct.states:
             raise ValueError("the tables of a prior point beyond themselves")
 
     @cached_property
@@ -202,10 +207,8 @@ class Law:
 
     def _require_particles(self, values: FloatArray, kinds: IntArray) -> tuple[int, int]:
         people, particles, latents = values.shape
-        last = kinds.reshape(-1, KINDS).max(axis=0, initial=0)
-        within = kinds.shape == (people, particles, KINDS) and kinds.min(initial=0) >= 0 and (last <= _LAST_KINDS).all()
-        within = within and last[-1] <= self._struct.kind_values and last @ self._arrays["state_of"] < self._states
-        if not within or latents != self.latents:
+        within = latents == self.latents and kinds.shape == (people, particles, KINDS)
+        if not within or ((kinds < 0) | (kinds > self._last)).any():
             raise ValueError("these are no particles of this prior")
         return people, particles
 
@@ -261,7 +264,16 @@ def rows_between(fields: FloatArray, table: FloatArray, levels: FloatArray) -> F
     found = np.empty((*levels.shape, outcomes), dtype=_f)
     of = fields.shape[:2]
     arrays = _address(table, _f, *of, _rows(rows), outcomes), _address(levels, _f, *of, isis)
-    call("rows_between", _samples(fields), rows, isis, outcomes, _fields(fields), *arrays, _address(found, _f, *found.shape))
+    call(
+        "rows_between",
+        _samples(fields),
+        rows,
+        isis,
+        outcomes,
+        _fields(fields),
+        *arrays,
+        _address(found, _f, *found.shape),
+    )
     return found
 
 

@@ -10,15 +10,15 @@ in between. Single precision; indices are 64 bits. Arrays lie in C order: (b, p,
 
 /* What is known of a model's prior and of its moves; see `isiw.models.particles.target.Tables`. */
 typedef struct {
-    int64_t latents, blocks, most_components, knots, place_count, states, part_count, jump_count, kind_values;
+    int64_t latents, blocks, width, knots, place_count, states, part_count, jump_count, kind_values;
     const int64_t *at;         /* of the latent of each meaning; `latents` where the model has none, (MEANINGS,) */
     const float *spreads;      /* usual SD of each latent, (latents,) */
     const int64_t *first;      /* latent of each block, (blocks,) */
     const int64_t *size;       /* how many latents it has, (blocks,) */
     const int64_t *components; /* of its mixture, (blocks,); 0 for a start, negative for start and width with places */
-    const float *log_shares;   /* of the components, less the logs of their SDs, (blocks, most_components) */
+    const float *log_shares;   /* of the components, less the logs of their SDs, (blocks, width): whole lanes */
     const float *below;        /* sums of the shares of earlier components, from the second on, likewise */
-    const float *means;        /* of the latents in each component, (most_components, latents) */
+    const float *means;        /* of the latents in each component, (latents, width) */
     const float *sds;          /* likewise */
     const float *per_sds;      /* 1 / SD, as dividers are slow */
     const float *start_ms;     /* knots of the density of a start, evenly spaced, (knots,) */

@@ -26,7 +26,6 @@ typedef struct {
     const float *steps; /* of the mean log MEP at each trial, see `steps_of`, (count + 1,) */
     int64_t count;      /* of trials */
     float *redrawn;     /* room for latents that are drawn again, (latents,) */
-    float *parts;       /* room for the parts of a density */
 } Chain;
 
 /* The step of the amplitudes at the trial before which a change comes. */
@@ -37,10 +36,10 @@ static double step_at(const Chain *chain, double after) {
 
 /* Log density of when something changes, and of by how much. */
 INLINE float log_when(const Chain *chain, const float *z) {
-    return log_block(chain->tables, chain->tables->changed, z, chain->parts);
+    return log_block(chain->tables, chain->tables->changed, z);
 }
 INLINE float log_size(const Chain *chain, const float *z) {
-    return log_block(chain->tables, chain->tables->changed + 1, z, chain->parts);
+    return log_block(chain->tables, chain->tables->changed + 1, z);
 }
 
 INLINE const float *change_edges(const Tables *tables) { return tables->kinds + OF_CHANGE * tables->kind_values; }
@@ -144,8 +143,8 @@ static double shift(const Chain *chain, uint64_t *dice, const float *theirs, int
             touched |= moves[latent];
         found[block] = UNKNOWN;
         if (!touched) continue;
-        if (densities[block] == UNKNOWN) densities[block] = log_block(tables, block, old, chain->parts);
-        found[block] = log_block(tables, block, z, chain->parts);
+        if (densities[block] == UNKNOWN) densities[block] = log_block(tables, block, old);
+        found[block] = log_block(tables, block, z);
         ratio += (double)found[block] - densities[block];
     }
     return ratio;
@@ -254,12 +253,12 @@ static int sweeps(const Tables *tables, int64_t people, int64_t particles, int64
         .fields = malloc(each * FIELDS * sizeof(float)), .after = malloc(each * sizeof(float)),
         .ratio = malloc(each * sizeof(double)), .kinds = malloc(each * KINDS * sizeof(int64_t)),
         .dice = malloc(each * sizeof(uint64_t)), .jumped = malloc(each), .wanted = malloc(each)};
-    float *redrawn = malloc((size_t)latents * sizeof *redrawn), *parts = malloc(parts_size(tables));
+    float *redrawn = malloc((size_t)latents * sizeof *redrawn);
     int there = trials && to.z && to.found && to.fields && to.after && to.ratio && to.kinds && to.dice && to.jumped &&
-                to.wanted && redrawn && parts;
+                to.wanted && redrawn;
     for (int64_t person = 0; there && person < people; person++) {
         int shares = trials_of(columns + person * count * COLUMNS, count, trials);
-        Chain chain = {tables, steps + person * (count + 1), count, redrawn, parts};
+        Chain chain = {tables, steps + person * (count + 1), count, redrawn};
         int64_t at = person * particles;
         State state = {values + at * latents, log_likelihood + at, densities + at * blocks, counts + 4 * person,
                        kinds + at * KINDS};
@@ -270,7 +269,7 @@ static int sweeps(const Tables *tables, int64_t people, int64_t particles, int64
         }
     }
     free(trials), free(to.z), free(to.found), free(to.fields), free(to.after), free(to.ratio), free(to.kinds);
-    free(to.dice), free(to.jumped), free(to.wanted), free(redrawn), free(parts);
+    free(to.dice), free(to.jumped), free(to.wanted), free(redrawn);
     return there ? 0 : -1;
 }
 

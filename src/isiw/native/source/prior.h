@@ -96,48 +96,50 @@ static float start_at(const Tables *tables, float quantile) {
     return tables->start_ms[low] + share * (tables->start_ms[high] - tables->start_ms[low]);
 }
 
-/* Log of the sum of the exponentials of some parts, and of those of places. */
-INLINE float log_sum(const float *parts, int64_t count) {
-    float most = parts[0], sum = 0.0f;
-    if (count == 1) return most;
-    for (int64_t k = 1; k < count; k++) most = most_1(most, parts[k]);
-    for (int64_t k = 0; k < count; k++) sum += exp_1(parts[k] - most);
-    return most + log_1(sum);
+/* Log of a sum of exponentials that grows. */
+typedef struct {
+    float most, sum;
+} LogSum;
+
+/* Add the exponentials of the first lanes. */
+INLINE void add_logs(LogSum *to, Reals parts, int64_t count) {
+    float most = to->most;
+    for (int lane = 0; lane < count; lane++) most = most_1(most, parts[lane]);
+    Reals shares = exp_v(parts - most);
+    to->sum *= exp_1(to->most - most), to->most = most;
+    for (int lane = 0; lane < count; lane++) to->sum += shares[lane];
 }
 
-/* Log density of the latents of a block but for a constant; -inf where there can be none. Parts is room for one number
-a component and place. */
-static float log_block(const Tables *tables, int64_t block, const float *z, float *parts) {
+/* Log density of the latents of a block but for a constant; -inf where there can be none. The components of its mixture
+are lanes. */
+static float log_block(const Tables *tables, int64_t block, const float *z) {
     int64_t first = tables->first[block], size = tables->size[block], components = tables->components[block];
-    int64_t count = components < 0 ? -components : components, places = components < 0 ? tables->place_count : 0;
+    int64_t count = components < 0 ? -components : components, width = tables->width;
     float anywhere = 0.0f;
     if (components <= 0) { /* a start, and with places its width */
         float density = start_density(tables, z[first]);
         anywhere = density == 0.0f ? NEVER : log_1(density);
         first++, size = components < 0 ? 1 : 0;
     }
-    parts[0] = anywhere;
-    for (int64_t k = 0; k < count; k++) {
-        const float *mean = tables->means + k * tables->latents, *per_sd = tables->per_sds + k * tables->latents;
-        float squares = 0.0f;
+    LogSum sum = {NEVER, 0.0f};
+    for (int64_t k = 0; k < count; k += LANES) {
+        Reals squares = all(0.0f);
         for (int64_t latent = first; latent < first + size; latent++) {
-            float distance = (z[latent] - mean[latent]) * per_sd[latent];
+            Reals distance = z[latent] - loaded(tables->means + latent * width + k, LANES);
+            distance *= loaded(tables->per_sds + latent * width + k, LANES);
             squares += distance * distance;
         }
-        parts[k] = tables->log_shares[block * tables->most_components + k] - 0.5f * squares + anywhere;
+        Reals parts = loaded(tables->log_shares + block * width + k, LANES) - 0.5f * squares + anywhere;
+        if (count == 1 && components > 0) return parts[0];
+        add_logs(&sum, parts, count - k < LANES ? count - k : LANES);
     }
-    for (int64_t place = 0; place < places; place++) {
+    if (components == 0) return anywhere > NEVER * 0.5f ? anywhere : -INFINITY;
+    for (int64_t place = 0; components < 0 && place < tables->place_count; place++) {
         const float *law = tables->places + 5 * place;
         float a = (z[0] - law[1]) / law[2], b = (z[1] - law[3]) / law[4];
-        parts[count + place] = law[0] - 0.5f * (a * a + b * b);
+        add_logs(&sum, all(law[0] - 0.5f * (a * a + b * b)), 1);
     }
-    float found = log_sum(parts, count + places > 0 ? count + places : 1);
-    return found > NEVER * 0.5f ? found : -INFINITY;
-}
-
-/* Room for the parts of a density of any block. */
-INLINE size_t parts_size(const Tables *tables) {
-    return (size_t)(tables->most_components + tables->place_count + 1) * sizeof(float);
+    return sum.most > NEVER * 0.5f ? sum.most + log_1(sum.sum) : -INFINITY;
 }
 
 /* Draw the latents of a block from the prior. */
@@ -156,10 +158,9 @@ static void draw_block(const Tables *tables, int64_t block, uint64_t *dice, floa
         z[first] = start_at(tables, uniform(dice));
         first++, size--;
     }
-    int64_t most = tables->most_components;
-    int64_t component = which(uniform(dice), tables->below + block * most, most);
+    int64_t component = which(uniform(dice), tables->below + block * tables->width, tables->width);
     for (int64_t latent = first; latent < first + size; latent++) {
-        int64_t at = component * tables->latents + latent;
+        int64_t at = latent * tables->width + component;
         z[latent] = tables->means[at] + tables->sds[at] * normal(dice);
     }
 }
@@ -191,8 +192,6 @@ static int is_weighed(const Tables *tables, int64_t block, const int64_t *kinds)
 static int log_usual(const Tables *tables, int64_t people, int64_t particles, const float *values, const int64_t *kinds,
                      const float *densities, float *found) {
     const float *edges = tables->kinds + OF_CHANGE * tables->kind_values;
-    float *parts = malloc(parts_size(tables));
-    if (!parts) return -1;
     for (int64_t i = 0; i < people * particles; i++) {
         int64_t change = kinds[i * KINDS + OF_CHANGE];
         float share = (change < tables->kind_values ? least_1(edges[change], 1.0f) : 1.0f) - (change ? edges[change - 1] : 0.0f);
@@ -200,11 +199,10 @@ static int log_usual(const Tables *tables, int64_t people, int64_t particles, co
         for (int64_t block = 0; block < tables->blocks; block++) {
             if (!is_weighed(tables, block, kinds + i * KINDS)) continue;
             float known = densities[i * tables->blocks + block];
-            sum += known == UNKNOWN ? log_block(tables, block, values + i * tables->latents, parts) : known;
+            sum += known == UNKNOWN ? log_block(tables, block, values + i * tables->latents) : known;
         }
         found[i] = sum;
     }
-    free(parts);
     return 0;
 }
 
