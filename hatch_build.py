@@ -23,7 +23,6 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
@@ -118,7 +117,6 @@ def compiler() -> list[str] | None:
     return found or zig()
 
 
-@cache
 def installed() -> list[str] | None:
     """The C compiler of this computer; None if there is none that works."""
     named = os.environ.get("CC")
@@ -170,7 +168,9 @@ def compiled(command: list[str], source: Path, made: Path, more: Sequence[str]) 
 
 def linked(command: list[str], objects: Sequence[Path], made: Path) -> subprocess.CompletedProcess[str]:
     """Make a library of compiled sources."""
-    more = [] if wanted().macos or sanitized() else ["-s"]
+    more = [] if sanitized() or (wanted().macos and not is_zig(command)) else ["-s"]  # Apple's linker knows no -s
+    if wanted().macos:
+        more.append(f"-Wl,-install_name,{made.name}")  # or it would have the path of this computer
     if wanted().windows and not is_zig(command):
         more.append("-static-libgcc")
     return run([*command, *flags(command), "-shared", *more, *map(str, objects), "-o", str(made), "-lm"])
@@ -210,6 +210,12 @@ const char isiw_sources[] = "{}";
 """
 
 
+def asked_for() -> list[str]:
+    """What the build needs besides hatchling: zig, if it has to compile and there is no compiler."""
+    ready = "ISIW_TARGET" not in os.environ and (is_current(NATIVE / here().file) or installed())
+    return [] if ready else [ZIG]
+
+
 def is_current(library: Path) -> bool:
     """Whether a library was made of these sources, with these flags."""
     return library.is_file() and stamp().encode() in library.read_bytes()
@@ -228,7 +234,7 @@ def build(library: Path) -> None:
         )
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        os.environ.setdefault("ZIG_GLOBAL_CACHE_DIR", str(folder / "zig"))
+        os.environ.setdefault("ZIG_GLOBAL_CACHE_DIR", str(folder / "zig"))  # so that nothing stays behind
         (folder / "stamp.c").write_text(STAMP.format(stamp()), "utf-8")
         jobs = [(SOURCES / "dispatch.c", "dispatch", []), (folder / "stamp.c", "stamp", [])]
         for level, its_flags in LEVELS[wanted().machine].items():
@@ -239,8 +245,6 @@ def build(library: Path) -> None:
                 require(made)
         require(linked(command, [folder / f"{job[1]}.o" for job in jobs], folder / library.name))
         put(folder / library.name, library)
-        if os.environ["ZIG_GLOBAL_CACHE_DIR"].startswith(name):
-            del os.environ["ZIG_GLOBAL_CACHE_DIR"]
 
 
 def require(made: subprocess.CompletedProcess[str]) -> None:
@@ -268,13 +272,14 @@ def get_build_hook() -> type:
     class Engine(BuildHookInterface[Any]):
         """Puts the library into wheels, or beside the sources of an editable install."""
 
+        folder: tempfile.TemporaryDirectory[str] | None = None
+
         def dependencies(self) -> list[str]:
-            if "ISIW_TARGET" not in os.environ and (is_current(NATIVE / here().file) or installed()):
-                return []
-            return [ZIG]
+            return asked_for()
 
         def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-            target, library = wanted(), NATIVE / wanted().file
+            target = wanted()
+            library = NATIVE / target.file
             if "ISIW_TARGET" in os.environ:
                 self.folder = tempfile.TemporaryDirectory()  # until the wheel is made
                 library = Path(self.folder.name, target.file)
@@ -285,6 +290,10 @@ def get_build_hook() -> type:
                 # A library that the compiler of this computer made is for this computer: its C library may be too new.
                 own = not target.macos and not target.windows and "ISIW_TARGET" not in os.environ
                 build_data["tag"] = f"py3-none-{f'linux_{target.machine}' if own else target.tag}"
+
+        def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:  # noqa: ARG002 - hatchling's
+            if self.folder is not None:
+                self.folder.cleanup()
 
     return Engine
 

@@ -44,6 +44,7 @@ def make(target: Target, folder: Path) -> Path:
     os.environ["ISIW_TARGET"] = target.name
     (wheel,) = WheelBuilder(str(hatch_build.ROOT)).build(directory=str(folder), versions=["standard"])
     if found := faults(Path(wheel), target):
+        Path(wheel).unlink()
         raise SystemExit(f"{wheel}: {'; '.join(found)}")
     return Path(wheel)
 
@@ -82,6 +83,8 @@ def faults_of_library(content: bytes, target: Target) -> list[str]:
     digest = runpy.run_path(str(hatch_build.NATIVE / "sources.py"))["digest"](hatch_build.SOURCES)
     if f"isiw-sources:{digest}:".encode() not in content:
         found.append("its library was made of other sources")
+    if str(hatch_build.ROOT).encode() in content:
+        found.append("its library names folders of this computer")
     return found
 
 
