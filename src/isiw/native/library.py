@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from isiw.errors import InvalidValueError, IsiwError
+from isiw.native.stamp import require_built_of
 
 LEVELS: Final = ("x86-64-v4", "x86-64-v3", "x86-64-v2", "base")
 """What the library is compiled for, the fastest first: AVX-512, AVX2, SSE4.2, and processors that are no x86."""
@@ -110,11 +111,13 @@ def _found(name: str) -> Any:
 def _library() -> ctypes.CDLL:
     file = Path(__file__).with_name(_FILE)
     try:
-        return ctypes.CDLL(str(file))
+        loaded = ctypes.CDLL(str(file))
     except OSError as error:
         raise IsiwError(
             "the compiled engine cannot be loaded",
             got=str(error),
-            expected=f"{_FILE} beside {Path(__file__).name}",
-            remedy="Install isiw again with pip: pip install --force-reinstall --no-deps isiw; in a checkout, pip install -e .",
+            expected=str(file),
+            remedy="Install isiw again; in a checkout: pip install -e .",
         ) from error
+    require_built_of(loaded, file.with_name("source"))
+    return loaded
