@@ -18,7 +18,8 @@ LEVELS: Final = ("x86-64-v4", "x86-64-v3", "x86-64-v2", "base")
 VERSION: Final = 4
 """Of the engine: it grows if the same draws come to other numbers."""
 
-_FILE: Final = {"Darwin": "_engine.dylib", "Windows": "_engine.dll"}.get(platform.system(), "_engine.so")
+_FILES: Final = {"Darwin": "_engine.dylib", "Windows": "_engine.dll"}
+_PATH: Final = Path(__file__).with_name(_FILES.get(platform.system(), "_engine.so.1"))
 _WANTED: Final = "ISIW_LEVEL"
 
 _KINDS: Final = {"n": ctypes.c_int64, "s": ctypes.c_int32, "a": ctypes.c_void_p}
@@ -109,15 +110,14 @@ def _found(name: str) -> Any:
 
 @cache
 def _library() -> ctypes.CDLL:
-    file = Path(__file__).with_name(_FILE)
     try:
-        loaded = ctypes.CDLL(str(file))
+        loaded = ctypes.CDLL(str(_PATH))
     except OSError as error:
         raise IsiwError(
             "the compiled engine cannot be loaded",
             got=str(error),
-            expected=str(file),
+            expected=str(_PATH),
             remedy="Install isiw again; in a checkout: pip install -e .",
         ) from error
-    require_built_of(loaded, file.with_name("source"))
+    require_built_of(loaded, Path(__file__).with_name("source"))
     return loaded

@@ -9,7 +9,7 @@ INLINE REAL NAME(exp2_within)(REAL x) { /* within 126 of 0 */
     REAL power = 0.0013400429f + f * 0.0001546976f;
     power = 0.0555032721f + f * (0.0096184373f + f * power);
     power = 1.0f + f * (0.6931472067f + f * (0.2402264923f + f * power));
-    return NAME(float_of)(NAME(bits_of)(power) + (NAME(bits_of)(shifted) << 23));
+    return NAME(float_of)(NAME(bits_of)(power) + NAME(to_exponent)(NAME(bits_of)(shifted)));
 }
 
 /* Power of 2; beyond 126 as at 126. */
@@ -29,7 +29,7 @@ INLINE REAL NAME(bell)(REAL z) {
 INLINE REAL NAME(log)(REAL x) {
     WHOLE bits = NAME(bits_of)(NAME(most)(x, (REAL){0} + 1.1754944e-38f));
     WHOLE exponent = (bits - 0x3F3504F3) >> 23;
-    REAL m = NAME(float_of)(bits - (exponent << 23)) - 1.0f; /* from the root of 1/2 to that of 2, less 1 */
+    REAL m = NAME(float_of)(bits - NAME(to_exponent)(exponent)) - 1.0f; /* from the root of 1/2 to that of 2, less 1 */
     REAL tail = -1.2420140846e-1f + m * (1.1676998740e-1f + m * (-1.1514610310e-1f + m * 7.0376836292e-2f));
     tail = 2.0000714765e-1f + m * (-1.6668057665e-1f + m * (1.4249322787e-1f + m * tail));
     tail = 3.3333331174e-1f + m * (-2.4999993993e-1f + m * tail);

@@ -24,6 +24,7 @@ enum { LANES = 4 };
 
 typedef float Reals __attribute__((vector_size(4 * LANES)));
 typedef int32_t Wholes __attribute__((vector_size(4 * LANES)));
+typedef uint32_t Naturals __attribute__((vector_size(4 * LANES)));
 
 #define INLINE static inline __attribute__((always_inline))
 
@@ -31,6 +32,8 @@ INLINE Reals all(float x) { return x - (Reals){0}; }
 
 INLINE Wholes bits_of_v(Reals x) { return (Wholes)x; }
 INLINE Reals float_of_v(Wholes bits) { return (Reals)bits; }
+INLINE Wholes to_exponent_v(Wholes number) { return (Wholes)((Naturals)number << 23); }
+INLINE int32_t to_exponent_1(int32_t number) { return (int32_t)((uint32_t)number << 23); }
 INLINE int32_t bits_of_1(float x) {
     int32_t bits;
     memcpy(&bits, &x, sizeof bits);
