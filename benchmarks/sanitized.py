@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Final
 
 import hatch_build
+
 from isiw.native import library
 
 ROOT: Final = Path(hatch_build.__file__).parent
@@ -43,7 +44,8 @@ def run(arguments: Sequence[str | Path], folder: Path) -> subprocess.CompletedPr
         folder: where the library is compiled, or kept from before.
     """
     command = compiler()
-    assert command is not None
+    if command is None:
+        raise SystemExit("There is no compiler with sanitizers here: install gcc.")
     made = folder / hatch_build.here().file
     environment = os.environ | {"ISIW_SANITIZE": "1", "CC": command, "PYTHONPATH": f"{ROOT / 'src'}:{ROOT}"}
     build = "import sys, pathlib, hatch_build; hatch_build.build(pathlib.Path(sys.argv[1]))"

@@ -16,9 +16,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import WithJsonSchema
 
-__all__ = ["ArrayLike", "BoolArray", "Conditioning", "FloatArray", "IntArray", "Number", "Numbers", "Reference"]
+__all__ = [
+    "ArrayLike",
+    "BoolArray",
+    "Conditioning",
+    "FloatArray",
+    "IntArray",
+    "Number",
+    "Numbers",
+    "Reference",
+    "Singles",
+]
 
 FloatArray: TypeAlias = NDArray[np.float64]
+Singles: TypeAlias = NDArray[np.float32]
+"""Numbers of the compiled engine, in single precision."""
+
 IntArray: TypeAlias = NDArray[np.int64]
 BoolArray: TypeAlias = NDArray[np.bool_]
 

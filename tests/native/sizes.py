@@ -1,4 +1,4 @@
-"""Everything that the engine computes, at sizes around each constant, by a library that checks itself: `python sizes.py`.
+"""All that the engine computes, at sizes around each constant, by a library that checks itself: `python sizes.py`.
 
 It has a process of its own because the sanitizers must be loaded first; see `benchmarks.sanitized`. A function that
 reads or writes beyond an array ends it.

@@ -9,7 +9,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from isiw.native.library import call
-from isiw.types import FloatArray, IntArray
+from isiw.types import IntArray, Singles
 
 FIELDS: Final = 27
 """Of a particle; their names and order are those of `isiw.models.particles.records`."""
@@ -39,32 +39,32 @@ class Tables(NamedTuple):
     """What the engine knows of a model's prior and of its moves."""
 
     at: IntArray  # of the latent of each of `MEANINGS`; d where the model has none, (m,)
-    spreads: FloatArray  # usual SD of each latent, (d,)
+    spreads: Singles  # usual SD of each latent, (d,)
     first: IntArray  # latent of each block, (k,)
     size: IntArray  # how many latents it has, (k,)
     components: (
         IntArray  # of its mixture, (k,); 0 for a start, negative for start and width that may be those of a place
     )
-    log_shares: FloatArray  # of the components, less the logs of their SDs, (k, c)
-    below: FloatArray  # sums of the shares of earlier components, from the second on, (k, c)
-    means: FloatArray  # of the latents in each component, (d, c)
-    sds: FloatArray  # likewise, (d, c)
-    per_sds: FloatArray  # 1 / SD, as dividers are slow, (d, c)
-    start_ms: FloatArray  # knots of the density of a start, evenly spaced, (s,)
-    density: FloatArray  # at the knots, (s,)
-    quantiles: FloatArray  # probability of an earlier start, at the knots, (s,)
-    places: FloatArray  # log share less the logs of the SDs, mean and SD of the start, then of the log width, (l, 5)
-    place_below: FloatArray  # given a place, sums of the shares of earlier ones, (l,)
+    log_shares: Singles  # of the components, less the logs of their SDs, (k, c)
+    below: Singles  # sums of the shares of earlier components, from the second on, (k, c)
+    means: Singles  # of the latents in each component, (d, c)
+    sds: Singles  # likewise, (d, c)
+    per_sds: Singles  # 1 / SD, as dividers are slow, (d, c)
+    start_ms: Singles  # knots of the density of a start, evenly spaced, (s,)
+    density: Singles  # at the knots, (s,)
+    quantiles: Singles  # probability of an earlier start, at the knots, (s,)
+    places: Singles  # log share less the logs of the SDs, mean and SD of the start, then of the log width, (l, 5)
+    place_below: Singles  # given a place, sums of the shares of earlier ones, (l,)
     place_share: float  # probability of all places
     apart: bool  # enhancement and depression may not overlap
     state_of: IntArray  # weights of the kinds in the number of a particle's state, (kinds,)
     shifted: Any  # which latents a difference moves, by state and part, (states, parts, d)
-    parts: FloatArray  # sums of the probabilities of earlier parts, (parts - 1,)
-    jumps: FloatArray  # likewise of earlier jumps, (jumps - 1,)
+    parts: Singles  # sums of the probabilities of earlier parts, (parts - 1,)
+    jumps: Singles  # likewise of earlier jumps, (jumps - 1,)
     redrawn: Any  # which latents each jump draws again, (jumps, d)
     renewed: Any  # which kinds each jump draws again, (jumps, kinds)
     of_profile: Any  # the jump concerns nothing but a profile, which without facilitation means nothing, (jumps,)
-    kinds: FloatArray  # sums of the probabilities of earlier values of each kind, (kinds, v - 1)
+    kinds: Singles  # sums of the probabilities of earlier values of each kind, (kinds, v - 1)
     changed: int  # block of the latent that says when something changes; that of its size is the next
 
 
@@ -145,7 +145,7 @@ class Law:
     def _at(self) -> int:
         return ctypes.addressof(self._struct)
 
-    def meanings(self, values: FloatArray, kinds: IntArray, trials: int) -> FloatArray:
+    def meanings(self, values: Singles, kinds: IntArray, trials: int) -> Singles:
         """Fields of particles after so many trials, or with their changes if it is negative, (b, p, fields)."""
         people, particles = self._require_particles(values, kinds)
         found = np.empty((people, particles, FIELDS), dtype=_f)
@@ -153,7 +153,7 @@ class Law:
         call("meanings", self._at, people, particles, *arrays, trials, _address(found, _f, *found.shape))
         return found
 
-    def log_usual(self, values: FloatArray, kinds: IntArray, densities: FloatArray) -> FloatArray:
+    def log_usual(self, values: Singles, kinds: IntArray, densities: Singles) -> Singles:
         """Log prior density of what ISIs are chosen with another law of, but for a constant, (b, p)."""
         people, particles = self._require_particles(values, kinds)
         found = np.empty((people, particles), dtype=_f)
@@ -165,11 +165,11 @@ class Law:
     def sweeps(
         self,
         numbers: IntArray,
-        columns: FloatArray,
-        steps: FloatArray,
+        columns: Singles,
+        steps: Singles,
         dice: Any,
-        state: tuple[FloatArray, IntArray, FloatArray, FloatArray],
-    ) -> FloatArray:
+        state: tuple[Singles, IntArray, Singles, Singles],
+    ) -> Singles:
         """Move each person's particles so many times (b,), in place; the counts of their moves, (b, 4).
 
         Args:
@@ -205,7 +205,7 @@ class Law:
         )
         return counts
 
-    def _require_particles(self, values: FloatArray, kinds: IntArray) -> tuple[int, int]:
+    def _require_particles(self, values: Singles, kinds: IntArray) -> tuple[int, int]:
         people, particles, latents = values.shape
         within = latents == self.latents and kinds.shape == (people, particles, KINDS)
         if not within or ((kinds < 0) | (kinds > self._last)).any():
@@ -213,7 +213,7 @@ class Law:
         return people, particles
 
 
-def log_likelihoods(fields: FloatArray, columns: FloatArray) -> FloatArray:
+def log_likelihoods(fields: Singles, columns: Singles) -> Singles:
     """Log likelihood of each person's trials (b, n, columns) under each particle (b, p, fields), (b, p)."""
     (people, particles, _), trials = fields.shape, columns.shape[1]
     found = np.empty((people, particles), dtype=_f)
@@ -222,14 +222,14 @@ def log_likelihoods(fields: FloatArray, columns: FloatArray) -> FloatArray:
     return found
 
 
-def table_rows(fields: FloatArray, rows: int) -> FloatArray:
+def table_rows(fields: Singles, rows: int) -> Singles:
     """Facilitations of the rows of tables: squares of equal steps, or equal steps from below 0, (b, s, l)."""
     levels = np.empty((*fields.shape[:2], _rows(rows)), dtype=_f)
     call("table_rows", _samples(fields), rows, _fields(fields), _address(levels, _f, *levels.shape))
     return levels
 
 
-def evoked_means(fields: FloatArray, levels: FloatArray) -> FloatArray:
+def evoked_means(fields: Singles, levels: Singles) -> Singles:
     """Expected MEP above the floor, in floors, at the facilitations (b, s, l), of the same shape."""
     rows, means = levels.shape[2], np.empty(levels.shape, dtype=_f)
     at = _address(levels, _f, *fields.shape[:2], rows)
@@ -237,9 +237,7 @@ def evoked_means(fields: FloatArray, levels: FloatArray) -> FloatArray:
     return means
 
 
-def outcome_tables(
-    fields: FloatArray, levels: FloatArray, order: int, log_mep: FloatArray, widths: FloatArray
-) -> FloatArray:
+def outcome_tables(fields: Singles, levels: Singles, order: int, log_mep: Singles, widths: Singles) -> Singles:
     """Probability of each outcome of the next trial, (b, s, l, y).
 
     Args:
@@ -258,7 +256,7 @@ def outcome_tables(
     return table
 
 
-def rows_between(fields: FloatArray, table: FloatArray, levels: FloatArray) -> FloatArray:
+def rows_between(fields: Singles, table: Singles, levels: Singles) -> Singles:
     """What lies between the rows of tables (b, s, l, y) at facilitations (b, s, t), (b, s, t, y)."""
     rows, outcomes, isis = table.shape[2], table.shape[3], levels.shape[2]
     found = np.empty((*levels.shape, outcomes), dtype=_f)
@@ -277,7 +275,7 @@ def rows_between(fields: FloatArray, table: FloatArray, levels: FloatArray) -> F
     return found
 
 
-def facilitations(fields: FloatArray, isi_ms: FloatArray) -> FloatArray:
+def facilitations(fields: Singles, isi_ms: Singles) -> Singles:
     """Facilitation of each particle at some ISIs [ms] (t,), (b, s, t)."""
     found = np.empty((*fields.shape[:2], len(isi_ms)), dtype=_f)
     at = _address(isi_ms, _f, len(isi_ms))
@@ -285,7 +283,7 @@ def facilitations(fields: FloatArray, isi_ms: FloatArray) -> FloatArray:
     return found
 
 
-def edge_levels(fields: FloatArray, evoked: FloatArray, isi_ms: FloatArray, *, fine: bool) -> FloatArray:
+def edge_levels(fields: Singles, evoked: Singles, isi_ms: Singles, *, fine: bool) -> Singles:
     """Facilitation at each window's edge, 2 where there is no window, (b, s).
 
     Args:
@@ -303,7 +301,7 @@ def edge_levels(fields: FloatArray, evoked: FloatArray, isi_ms: FloatArray, *, f
     return found
 
 
-def window_runs(fields: FloatArray, levels: FloatArray, isi_ms: FloatArray) -> Any:
+def window_runs(fields: Singles, levels: Singles, isi_ms: Singles) -> Any:
     """Which ISIs are in each particle's window, as two runs of indices (first, behind the last), (b, s, 4) int32."""
     runs = np.empty((*levels.shape, 4), dtype=np.int32)
     arrays = _address(levels, _f, *fields.shape[:2]), _address(isi_ms, _f, len(isi_ms))
@@ -312,7 +310,7 @@ def window_runs(fields: FloatArray, levels: FloatArray, isi_ms: FloatArray) -> A
     return runs
 
 
-def entropy_reductions(mass: FloatArray) -> FloatArray:
+def entropy_reductions(mass: Singles) -> Singles:
     """Entropy of the mean of distributions (b, s, t, y) less their mean entropy [nat], (b, t)."""
     people, samples, isis, outcomes = mass.shape
     found = np.empty((people, isis), dtype=_f)
@@ -322,7 +320,7 @@ def entropy_reductions(mass: FloatArray) -> FloatArray:
     return found
 
 
-def variance_reductions(mass: FloatArray, masks: FloatArray) -> FloatArray:
+def variance_reductions(mass: Singles, masks: Singles) -> Singles:
     """Variance of each ISI's membership in windows (b, s, g) less that after an outcome (b, s, t, y), summed, (b, t).
 
     Sampled windows are runs of ISIs, so that what changes from one ISI to the next is summed instead of all of them.
@@ -338,7 +336,7 @@ def variance_reductions(mass: FloatArray, masks: FloatArray) -> FloatArray:
 ELEMENTARY: Final = ("exp", "exp2", "log", "per", "per_root", "between")
 
 
-def elementary(name: str, x: FloatArray, y: FloatArray | None = None) -> FloatArray:
+def elementary(name: str, x: Singles, y: Singles | None = None) -> Singles:
     """One of the elementary functions that the engine is made of, of some numbers (n,); for tests.
 
     `between` is the probability that a standard normal variable is between x and y.
@@ -349,11 +347,11 @@ def elementary(name: str, x: FloatArray, y: FloatArray | None = None) -> FloatAr
     return found
 
 
-def _fields(fields: FloatArray) -> int:
+def _fields(fields: Singles) -> int:
     return _address(fields, _f, *fields.shape[:2], FIELDS)
 
 
-def _samples(fields: FloatArray) -> int:
+def _samples(fields: Singles) -> int:
     return int(fields.shape[0] * fields.shape[1])
 
 

@@ -14,7 +14,6 @@ from typing import Any, Final, NamedTuple, TypedDict
 
 import isiw
 from isiw.checks import deadline, patience, text
-from isiw.native.library import version as engine_version
 from isiw.devices.clock import Clock
 from isiw.devices.limits import USUAL_ITI_S, Limits
 from isiw.devices.protocol import Device
@@ -24,6 +23,7 @@ from isiw.log.headers import Header, StrategyRecipe
 from isiw.log.pulses import Ages
 from isiw.log.schema import Event, Record, now
 from isiw.log.writer import LogWriter
+from isiw.native.library import version as engine_version
 from isiw.session.console import OperatorConsole
 from isiw.session.examination import WindowExamination, examination_of
 from isiw.session.pausing import Pausing

@@ -373,7 +373,7 @@ def test_sweeps_one_by_one_lead_where_sweeps_at_once_do(name: str) -> None:
     target, found = TARGETS[name], list[tuple[Any, ...]]()
     latents = target.prior.sample(1, 300, generator(3), target.space)
     told = history(target.person(latents), 8, generator(4))
-    engine = engine_for("compiled", target)
+    engine = Compiled(target)
     start, law = engine.log_likelihood(latents, told).numpy(), engine.law
     for number, calls in ((6, 1), (1, 6)):
         values, kinds = latents.values.numpy().copy(), latents.kinds.numpy().copy()

@@ -20,7 +20,7 @@ from isiw.models.particles.records import columns_of
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
 from isiw.native.engine import UNKNOWN, Law, log_likelihoods
-from isiw.types import FloatArray, IntArray
+from isiw.types import IntArray, Singles
 
 EngineName: TypeAlias = Literal["compiled", "torch"]
 
@@ -28,7 +28,7 @@ EngineName: TypeAlias = Literal["compiled", "torch"]
 class Engine(Protocol):
     """What particles are weighed and moved by."""
 
-    def meaning(self, latents: Latents, trials: int) -> Person | FloatArray:
+    def meaning(self, latents: Latents, trials: int) -> Person | Singles:
         """What particles mean after so many trials, as torch or as the engine has it."""
 
     def log_likelihood(self, latents: Latents, history: History) -> Tensor:
@@ -94,7 +94,7 @@ class Compiled:
         """The target as the engine has it."""
         return Law(self.target.tables())
 
-    def meaning(self, latents: Latents, trials: int) -> FloatArray:
+    def meaning(self, latents: Latents, trials: int) -> Singles:
         """Fields of particles; see `Engine`."""
         return self.law.meanings(*_arrays(latents), trials)
 
@@ -110,25 +110,27 @@ class Compiled:
         self, numbers: Tensor, latents: Latents, log_likelihood: Tensor, history: History, generator: torch.Generator
     ) -> Moved:
         """Move every particle some times; see `Engine`."""
-        arrays = (*_arrays(latents), log_likelihood.contiguous().numpy(), self._log_blocks(latents))
-        values, kinds, found, log_blocks = state = tuple(array.copy() for array in arrays)
+        values, kinds = _arrays(latents)
+        found, log_blocks = log_likelihood.contiguous().numpy(), self._log_blocks(latents)
+        state = values.copy(), kinds.copy(), found.copy(), log_blocks.copy()
         dice = torch.randint(2**63 - 1, (len(found),), generator=generator).numpy().view(np.uint64)
         counts = self.law.sweeps(numbers.numpy(), columns_of(history), steps_of(history), dice, state)
         shifts, shifted, jumps, jumped = torch.from_numpy(counts).T
+        values, kinds, found, log_blocks = state
         moved = Latents(*(torch.from_numpy(array) for array in (values, kinds, log_blocks)))
         return Moved(moved, torch.from_numpy(found), shifted / shifts, jumped / jumps)
 
-    def _log_blocks(self, latents: Latents) -> FloatArray:
+    def _log_blocks(self, latents: Latents) -> Singles:
         if latents.log_blocks is None:
             return np.full((*latents.values.shape[:2], self.law.blocks), UNKNOWN)
-        log_blocks: FloatArray = latents.log_blocks.contiguous().numpy()
+        log_blocks: Singles = latents.log_blocks.contiguous().numpy()
         return log_blocks
 
 
-def _arrays(latents: Latents) -> tuple[FloatArray, IntArray]:
+def _arrays(latents: Latents) -> tuple[Singles, IntArray]:
     return latents.values.contiguous().numpy(), latents.kinds.contiguous().numpy()
 
 
-def log_likelihood_of(fields: FloatArray, history: History) -> Tensor:
+def log_likelihood_of(fields: Singles, history: History) -> Tensor:
     """Log likelihood of a history under each of some particles as the engine has them, shape (b, p)."""
     return torch.from_numpy(log_likelihoods(fields, columns_of(history)))

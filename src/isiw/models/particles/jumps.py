@@ -14,8 +14,8 @@ import numpy as np
 
 from isiw.design import DesignSpace
 from isiw.lazy import torch
-from isiw.models.particles.changes import ChangeKind
 from isiw.models.particles.building import prior_tables
+from isiw.models.particles.changes import ChangeKind
 from isiw.models.particles.latents import (
     KINDS,
     LATENTS,

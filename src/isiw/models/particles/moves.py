@@ -20,7 +20,7 @@ from isiw.models.particles.prior import Person
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
 from isiw.native.engine import Tables
-from isiw.types import FloatArray
+from isiw.types import Singles
 
 JUMP_PROBABILITY = 0.4
 PART_PROBABILITY = (0.25, 0.30, 0.25, 0.20)
@@ -159,7 +159,7 @@ class Mover:
         return torch.rand(like.shape, generator=self.generator, dtype=like.dtype, device=like.device)
 
 
-def steps_of(history: History) -> FloatArray:
+def steps_of(history: History) -> Singles:
     """By how much the mean log MEP is larger from each trial on than before it, and 0 for all and none, (b, n + 1)."""
     log_mep, high = history.log_mep.cpu().numpy(), history.log_mep_high.cpu().numpy()
     log_mep = np.where(np.isfinite(log_mep), log_mep, np.where(np.isfinite(high), high, 0.0))
@@ -167,6 +167,6 @@ def steps_of(history: History) -> FloatArray:
     before, count = np.zeros((people, trials + 1), dtype=np.float32), np.arange(trials + 1)
     before[:, 1:] = log_mep.cumsum(-1, dtype=float)
     later, earlier = (np.maximum(n, 1).astype(np.float32) for n in (trials - count, count))
-    steps: FloatArray = (before[:, -1:] - before) / later - before / earlier
+    steps: Singles = (before[:, -1:] - before) / later - before / earlier
     steps[:, 0] = steps[:, -1] = 0.0
     return steps

@@ -14,7 +14,7 @@ from isiw.models.protocol import Tensor
 from isiw.models.shared.tables import LEVELS, OUTCOMES, interpolated
 from isiw.models.windows import Runs, grid_of, least_excess_mv
 from isiw.native import engine
-from isiw.types import FloatArray, IntArray
+from isiw.types import IntArray, Singles
 
 FINE_MS = 1.0
 """Between the points of such a grid facilitation hardly changes."""
@@ -55,16 +55,16 @@ class PersonSample(TabledSample):
         """Sampled windows as 0 or 1, shape (b, s, t)."""
         if self.records is None:
             return reaches(self.person.shape, self.edge_level, isi_ms).to(torch.float32)
-        return torch.from_numpy(_masks_of(self._pairs(isi_ms), len(isi_ms)))
+        return torch.from_numpy(_masks_of(self._pairs(self.records, isi_ms), len(isi_ms)))
 
     def runs(self, isi_ms: Tensor, person: int = 0) -> Runs:
         """Sampled windows of one person, as runs of some ascending ISIs [ms] (t,)."""
         if self.records is None:
             return Runs.of_masks(self.window_masks(isi_ms)[person])
-        return Runs.of_pairs(self._pairs(isi_ms)[person], len(isi_ms))
+        return Runs.of_pairs(self._pairs(self.records, isi_ms)[person], len(isi_ms))
 
-    def _pairs(self, isi_ms: Tensor) -> IntArray:
-        edges: IntArray = engine.window_runs(self.records, self.edge_level.numpy(), isi_ms.contiguous().numpy())
+    def _pairs(self, records: Singles, isi_ms: Tensor) -> IntArray:
+        edges: IntArray = engine.window_runs(records, self.edge_level.numpy(), isi_ms.contiguous().numpy())
         return edges
 
     def baselines_mv(self) -> Tensor:
@@ -83,8 +83,8 @@ class PersonSample(TabledSample):
         return torch.exp(low + place * (high - low))
 
 
-def _masks_of(runs: IntArray, points: int) -> FloatArray:
+def _masks_of(runs: IntArray, points: int) -> Singles:
     """Windows as 0 or 1 (b, s, t) from their runs (b, s, 4) on so many ISIs."""
     at, firsts, behinds = np.arange(points), runs[..., ::2, np.newaxis], runs[..., 1::2, np.newaxis]
-    masks: FloatArray = ((firsts <= at) & (at < behinds)).any(-2).astype(np.float32)
-    return masks
+    inside = (firsts <= at) & (at < behinds)
+    return np.any(inside, axis=-2).astype(np.float32)

@@ -1,7 +1,7 @@
 """Plain arrays that the engine works on: fields of each particle, and columns of each trial.
 
-The fields of a particle hold what its latents mean (`Person`); the columns of a trial what was told of it, and what else
-bears on its amplitude, neutral where nobody knows better.
+The fields of a particle hold what its latents mean (`Person`); the columns of a trial what was told of it, and what
+else bears on its amplitude, neutral where nobody knows better.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from isiw.models.particles.shapes import Shape
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
 from isiw.native.engine import FIELDS
-from isiw.types import FloatArray
+from isiw.types import Singles
 
 NOISE, SHAPE, PRESENT, START, WIDTH, FORM, LOG_FLOOR, FLOOR_SD, LOG_RATIO, SPREAD, OUTPUT_SD = range(11)
 BOOST, REST, ONSET, MOST, LEAST, DRIFT, STARTLED, SLOPE, LOW_START, LOW_WIDTH, DEPTH = range(11, 22)
 CHANGED, STEP, STEP_DRIVE, FADING, STEP_SCALE = range(22, FIELDS)
 
 
-def person_of(records: FloatArray) -> Person:
+def person_of(records: Singles) -> Person:
     """What particles mean, as views of their fields (b, p, fields)."""
     column = torch.from_numpy(records).unbind(-1)
     shape = Shape(column[SHAPE], column[START], column[WIDTH], column[FORM])
@@ -33,7 +33,7 @@ def person_of(records: FloatArray) -> Person:
     return Person(shape, response, column[PRESENT] > 0, Depression(low, column[DEPTH], column[DEPTH] > 0))
 
 
-def people_of(person: Person) -> FloatArray:
+def people_of(person: Person) -> Singles:
     """Particles as fields, shape (b, p, fields)."""
     shape, response = person.shape, person.response
     low = person.depression
@@ -53,11 +53,11 @@ def _change_of(change: Change, response: Response) -> tuple[Tensor, ...]:
     return change.after, change.log_gain, response.slope * change.shift_pct_rmt, change.fading, change.log_scale
 
 
-def columns_of(history: History) -> FloatArray:
+def columns_of(history: History) -> Singles:
     """A history as an array, shape (b, n, columns)."""
     return _plain(torch.cat((torch.stack(history.columns, dim=-1), history.around), dim=-1))
 
 
-def _plain(values: Tensor) -> FloatArray:
-    array: FloatArray = values.detach().contiguous().numpy()
+def _plain(values: Tensor) -> Singles:
+    array: Singles = values.detach().contiguous().numpy()
     return array

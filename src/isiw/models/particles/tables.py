@@ -16,14 +16,14 @@ from isiw.models.particles.records import LOG_FLOOR, person_of
 from isiw.models.protocol import Tensor
 from isiw.models.shared.tables import LEVELS, OUTCOMES, interpolated, table_levels
 from isiw.native import engine
-from isiw.types import FloatArray
+from isiw.types import Singles
 
 
 @dataclass(frozen=True, eq=False)
 class TabledSample:
     """What equally weighted particles say about the next MEP."""
 
-    particles: Person | FloatArray  # what they mean, fields of shape (b, s), or their fields as the engine has them
+    particles: Person | Singles  # what they mean, fields of shape (b, s), or their fields as the engine has them
     space: DesignSpace  # in whose range windows are looked for
     order: int = 0  # how many trials came before the next one
 
@@ -33,7 +33,7 @@ class TabledSample:
         return person_of(self.particles) if isinstance(self.particles, np.ndarray) else self.particles
 
     @property
-    def records(self) -> FloatArray | None:
+    def records(self) -> Singles | None:
         """The particles as the engine has them; None where torch computes."""
         return self.particles if isinstance(self.particles, np.ndarray) else None
 
