@@ -86,5 +86,4 @@ class PersonSample(TabledSample):
 def _masks_of(runs: IntArray, points: int) -> Singles:
     """Windows as 0 or 1 (b, s, t) from their runs (b, s, 4) on so many ISIs."""
     at, firsts, behinds = np.arange(points), runs[..., ::2, np.newaxis], runs[..., 1::2, np.newaxis]
-    inside = (firsts <= at) & (at < behinds)
-    return np.any(inside, axis=-2).astype(np.float32)
+    return np.asarray(((firsts <= at) & (at < behinds)).any(-2), dtype=np.float32)
