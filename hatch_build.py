@@ -73,11 +73,12 @@ class Target(NamedTuple):
 
 
 OLDEST_GLIBC = (2, 17)
+# A file that ends in .so would be a module of Python to those who look for some.
 TARGETS = {
     target.name: target
     for target in (
-        Target("linux-x86_64", "x86_64", "_engine.so", "x86_64-linux-gnu.2.17", "manylinux_2_17_x86_64"),
-        Target("linux-aarch64", "aarch64", "_engine.so", "aarch64-linux-gnu.2.17", "manylinux_2_17_aarch64"),
+        Target("linux-x86_64", "x86_64", "_engine.so.1", "x86_64-linux-gnu.2.17", "manylinux_2_17_x86_64"),
+        Target("linux-aarch64", "aarch64", "_engine.so.1", "aarch64-linux-gnu.2.17", "manylinux_2_17_aarch64"),
         Target("macos-x86_64", "x86_64", "_engine.dylib", "x86_64-macos.11.0", "macosx_11_0_x86_64"),
         Target("macos-arm64", "aarch64", "_engine.dylib", "aarch64-macos.11.0", "macosx_11_0_arm64"),
         Target("windows-x86_64", "x86_64", "_engine.dll", "x86_64-windows-gnu", "win_amd64"),

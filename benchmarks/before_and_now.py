@@ -190,7 +190,7 @@ def _print_ratios(before: Path, now: Path, laps: int, spent_s: Callable[[Path, i
         spent = {source: spent_s(source, number) for source in order}
         rows.append((number, spent[before], spent[now], spent[before] / spent[now]))
     print(f"- command: `{command_of('before_and_now')}`")
-    print(f"- {made_with('torch', 'numba')}; {platform.machine()}, one thread")
+    print(f"- {made_with('torch')}; {platform.machine()}, one thread")
     print(f"- processor time of {what}\n")
     headings = ["seed", "before_s", "now_s", "ratio"]
     print(pd.DataFrame(rows, columns=headings).to_markdown(index=False, floatfmt=(".0f", ".2f", ".2f", ".2f")))
@@ -223,7 +223,7 @@ def session(
         for what, old, new in zip(("60 trials [s]", "99th percentile [ms]"), spent[before], spent[now], strict=True):
             rows.append({"": what, "seed": number, "before": old, "now": new, "ratio": old / new})
     print(f"- command: `{command_of('before_and_now')}`")
-    print(f"- {made_with('torch', 'numba')}; {platform.machine()}, one thread")
+    print(f"- {made_with('torch')}; {platform.machine()}, one thread")
     print(
         "- processor time of a person of `recruitment`, in a process that has run ten trials before: 60 trials with a"
     )

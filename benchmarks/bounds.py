@@ -1,41 +1,35 @@
-"""Does any compiled loop read or write beyond an array? Random sessions with the bounds of all loops checked.
+"""Does the engine read or write beyond an array? Random sessions with a library that checks itself.
 
     python -m benchmarks.bounds > benchmarks/results/bounds.md
 
 Each session has another space, number of particles and length, and is a random mix of all that a session of a lab's
 own loop may have: amplitudes, censored ones, intervals, uncertain ISIs, TMS alone, taps alone, lost trials, notes of
-changes, and trials that are excluded. The loops are compiled with `NUMBA_BOUNDSCHECK=1`, into a cache of their own; one
-that leaves an array raises an IndexError.
+changes, and trials that are excluded. The engine is compiled with the sanitizers for addresses and for undefined
+behaviour; whatever they find ends the process. `--part` plays the sessions of one process.
 """
 
 from __future__ import annotations
 
 import argparse
 import collections
-import os
-import subprocess
-import sys
+import json
 import tempfile
-import time
 import warnings
 from pathlib import Path
 
 import numpy as np
+import torch
 
 import isiw
+from benchmarks import sanitized
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
 
-CHECKED = {
-    "NUMBA_BOUNDSCHECK": "1",
-    "NUMBA_OPT": "1",
-    "OMP_NUM_THREADS": "1",
-    "NUMBA_CACHE_DIR": str(Path(tempfile.gettempdir()) / "isiw-bounds-checked"),
-}
-"""The environment in which bounds are checked."""
-
 STRATEGIES = ("default", "default", "default", "particles-window", "supra-threshold")
 MOST_STEPS = 18
+TOGETHER = 250
+"""So many sessions have a process."""
+
 KINDS = ("amplitude", "censored", "interval", "uncertain ISI", "TMS alone", "tap alone", "lost", "change", "excluded")
 WEIGHTS = (8, 2, 2, 1, 2, 2, 1, 2, 1)
 
@@ -94,36 +88,52 @@ def _step(session: isiw.Recorder, kind: str, rng: np.random.Generator) -> None:
             session.tell(isi_ms, 0.0 if kind == "censored" else mep_mv, isi_sd_ms=3.0 * (kind == "uncertain ISI"))
 
 
-def main() -> None:
-    """Play many random sessions with bounds checked, and say what went wrong."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--sessions", type=int, default=2000)
-    parser.add_argument("--seed", type=int, default=0, help="of the first one")
-    options = parser.parse_args()
-    if os.environ.get("NUMBA_BOUNDSCHECK") != "1":
-        again = [sys.executable, "-m", "benchmarks.bounds", *sys.argv[1:]]
-        ended = subprocess.run(again, env=os.environ | CHECKED, check=False)  # noqa: S603 - this script
-        raise SystemExit(ended.returncode)
+def part(first: int, sessions: int) -> None:
+    """Play sessions with the library that checks itself, and print how many there were of each of `KINDS`."""
+    sanitized.take()
+    torch.set_num_threads(1)
     warnings.simplefilter("ignore")
     counts, wrong = collections.Counter[str](), dict[int, str]()
     with tempfile.TemporaryDirectory() as folder:
-        played(options.seed + options.sessions, Path(folder))  # which compiles the loops
-        began_s = time.process_time()
-        for seed in range(options.seed, options.seed + options.sessions):
+        for seed in range(first, first + sessions):
             try:
                 counts += played(seed, Path(folder))
             except Exception as error:  # noqa: BLE001 - which is what is looked for
                 wrong[seed] = f"{type(error).__name__}: {error}"
-        spent_s = time.process_time() - began_s
+    print(json.dumps([counts, wrong]))
+
+
+def main() -> None:
+    """Play many random sessions, and say what went wrong."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sessions", type=int, default=2000)
+    parser.add_argument("--seed", type=int, default=0, help="of the first one")
+    parser.add_argument("--part", action="store_true", help="in this process")
+    options = parser.parse_args()
+    if options.part:
+        part(options.seed, options.sessions)
+        return
+    counts, wrong = collections.Counter[str](), dict[str, str]()
+    with tempfile.TemporaryDirectory() as folder:
+        for seed in range(options.seed, options.seed + options.sessions, TOGETHER):
+            some = min(TOGETHER, options.seed + options.sessions - seed)
+            arguments = ["-m", "benchmarks.bounds", "--part", "--seed", str(seed), "--sessions", str(some)]
+            ended = sanitized.run(arguments, Path(folder))
+            if ended.returncode:
+                wrong[f"{seed} to {seed + some - 1}"] = ended.stderr[-2000:]
+                continue
+            played_by_kind, refused = json.loads(ended.stdout.splitlines()[-1])
+            counts += collections.Counter(played_by_kind)
+            wrong |= refused
     print(f"- command: `{command_of('bounds')}`")
-    print(f"- {made_with('numba', 'numpy', 'torch')}, seeds {options.seed} to {options.seed + options.sessions - 1}\n")
-    print(f"{options.sessions:,} random sessions with bounds checked, {spent_s / options.sessions:.2f} s each:\n")
+    print(f"- {made_with('numpy', 'torch')}, seeds {options.seed} to {options.seed + options.sessions - 1}\n")
+    print(f"{options.sessions:,} random sessions with a library that checks itself:\n")
     print("| of which | number |\n|---|---|")
     for kind in KINDS:
         print(f"| {kind} | {counts[kind]:,} |")
-    print(f"| **sessions that an error ended** | **{len(wrong):,}** |")
-    for seed, error in list(wrong.items())[:20]:
-        print(f"\nSeed {seed}: {error}")
+    print(f"| **sessions, or sets of them, that an error ended** | **{len(wrong):,}** |")
+    for which, error in list(wrong.items())[:20]:
+        print(f"\nSeed {which}: {error}")
     raise SystemExit(bool(wrong))
 
 

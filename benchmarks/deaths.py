@@ -204,7 +204,7 @@ def main() -> None:
         "# Deaths",
         "",
         f"- command: `{command_of('deaths')}`",
-        f"- {made_with('mcap', 'numba', 'numpy')}",
+        f"- {made_with('mcap', 'numpy')}",
         f"- seeds {arguments.seed} to {last}, {(time.monotonic() - began_s) / 60:.1f} minutes",
         "",
         "Every device was disarmed, every stimulus that it gave is in the log, every session was resumed to its end.",

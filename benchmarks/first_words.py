@@ -159,7 +159,7 @@ def main() -> None:
     parser.add_argument("--only", nargs="*", default=None, help="begin of the commands to list; all are run")
     chosen = parser.parse_args()
     print("# Processor time until a command's first words\n")
-    print(f"`{command_of('first_words')}`; {made_with('torch', 'numba')}; a session of {chosen.trials} pairs.")
+    print(f"`{command_of('first_words')}`; {made_with('torch')}; a session of {chosen.trials} pairs.")
     print(f"In seconds of processor time; ** marks what is silent for more than {MOST_S:g} s.\n")
     print("| command | until the first words | these | longest silence | in all |\n|---|---|---|---|---|")
     folder = Path(tempfile.mkdtemp())

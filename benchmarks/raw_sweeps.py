@@ -310,7 +310,7 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=math.inf, help="begin with no person after this time")
     parser.add_argument("--out", type=Path)
     asked = parser.parse_args()
-    lines = [command_of("raw_sweeps"), made_with("numpy", "numba")]
+    lines = [command_of("raw_sweeps"), made_with("numpy")]
     for line in PARTS[asked.part](asked.people, asked.seed, asked.minutes):
         lines.append(line)
         print(line, flush=True)

@@ -165,7 +165,7 @@ def main(
     right = [one for one in all_said if one[0] in RIGHT]
     n, lengths = len(right), [words(said) for _, said, _, _ in right]
     print("# What is said of sessions in which nothing is wrong\n")
-    print(f"- command: `{command_of('said')}`; {made_with('torch', 'numba')}")
+    print(f"- command: `{command_of('said')}`; {made_with('torch')}")
     print(f"- {n} sessions of {', '.join(RIGHT)}; `at most` is the upper end of the exact 95 % interval\n")
     counts = Counter(name for _, said, _, _ in right for name in {(f"{one.role}", one.name) for one in said})
     roles = [f"{role}" for role in Role]

@@ -115,7 +115,7 @@ def compare(
             wrong = {WRONG: at[WRONG].mean(), f"{WRONG}, yardstick": at[f"{WRONG}_yardstick"].mean()}
             rows.append({"cohort": name, "trial": trial} | apart | wrong | {"s a session": spent_s})
     print(f"- command: `{command_of('sampler')}`")
-    print(f"- {made_with('torch', 'numba')}\n")
+    print(f"- {made_with('torch')}\n")
     print(pd.DataFrame(rows).to_markdown(index=False, floatfmt=".3f"))
 
 

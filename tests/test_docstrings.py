@@ -18,7 +18,7 @@ def modules(*, rooms: bool) -> Iterator[ModuleType]:
     """The packages, whose exports are the public face, or all the other modules."""
     yield isiw
     for found in pkgutil.walk_packages(isiw.__path__, "isiw."):
-        if found.ispkg == rooms and found.name != "isiw.native._engine":  # a library by its name alone is a module
+        if found.ispkg == rooms:
             yield importlib.import_module(found.name)
 
 

@@ -24,14 +24,13 @@ OWN = {"isiw.cli", "isiw.text"}
 
 def public() -> set[str]:
     """Full names of what packages export, and of what the plain modules that `isiw` exports define."""
-    found = pkgutil.walk_packages(isiw.__path__, "isiw.")
-    rooms = [isiw, *(importlib.import_module(room.name) for room in found if room.ispkg)]
+    rooms = [isiw, *(importlib.import_module(room.name) for room in pkgutil.walk_packages(isiw.__path__, "isiw."))]
     modules = [thing for name in dir(isiw) if inspect.ismodule(thing := getattr(isiw, name))]
     plain = [module for module in modules if not hasattr(module, "__path__")]
     return {f"{module.__name__}.{name}" for module in plain for name in api.exported(module)} | {
         f"{room.__name__}.{name}"
         for room in rooms
-        if room.__name__ not in OWN
+        if hasattr(room, "__path__") and room.__name__ not in OWN
         for name in getattr(room, "__all__", ())
         if not inspect.ismodule(getattr(room, name))
     }

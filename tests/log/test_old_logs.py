@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 import isiw
-from isiw.compiled import version
 from isiw.errors import OtherVersionsWarning
 from isiw.findings import Kind
+from isiw.native.library import version
 from isiw.plots import save_session_plot
 from isiw.report import final_statement
 from isiw.session.replay import strategy_of

@@ -25,7 +25,7 @@ def nothing_here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.delenv("ISIW_TARGET", raising=False)
     monkeypatch.setattr(hatch_build, "zig", lambda: None)
-    return tmp_path / "_engine.so"
+    return tmp_path / "_engine.so.1"
 
 
 def sources(folder: Path) -> Path:
@@ -124,13 +124,13 @@ def test_a_library_for_linux_is_judged_by_its_format_and_by_what_it_needs(conten
 def test_a_wheel_is_refused_for_its_tag_for_sources_and_without_a_library(tmp_path: Path) -> None:
     wheel = tmp_path / f"isiw-0.1.0-py3-none-{LINUX.tag}.whl"
     files = {"isiw-0.1.0.dist-info/WHEEL": f"Root-Is-Purelib: false\nTag: py3-none-{LINUX.tag}\n".encode()}
-    assert judged(wheel, files | {"isiw/native/_engine.so": stamped(GOOD)}) == []
-    assert "expected isiw/native/_engine.so alone" in judged(wheel, files)[0]
-    assert judged(wheel, files | {"isiw/native/_engine.so": stamped(GOOD), "isiw/native/source/level.c": b""}) == [
+    assert judged(wheel, files | {"isiw/native/_engine.so.1": stamped(GOOD)}) == []
+    assert "expected isiw/native/_engine.so.1 alone" in judged(wheel, files)[0]
+    assert judged(wheel, files | {"isiw/native/_engine.so.1": stamped(GOOD), "isiw/native/source/level.c": b""}) == [
         "it holds isiw/native/source/level.c, a source"
     ]
     any_tag = {"isiw-0.1.0.dist-info/WHEEL": b"Root-Is-Purelib: true\nTag: py3-none-any\n"}
-    assert judged(wheel, any_tag | {"isiw/native/_engine.so": stamped(GOOD)}) == [
+    assert judged(wheel, any_tag | {"isiw/native/_engine.so.1": stamped(GOOD)}) == [
         f"it has not the tag py3-none-{LINUX.tag}",
         "it says to be pure Python",
     ]

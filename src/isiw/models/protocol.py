@@ -265,14 +265,6 @@ class ResponseModel(Protocol):
         """
 
 
-@runtime_checkable
-class Rehearses(Protocol):
-    """Capability of a model: it computes with compiled code, which a session loads before its first stimulus."""
-
-    def in_brief(self) -> ResponseModel:
-        """The same model with so little to compute that a session of it takes no time."""
-
-
 def profile_of(model: object) -> Any:
     """The law of the profile that a model's prior expects; None for a model without one."""
     return getattr(getattr(model, "prior", None), "profile", None)

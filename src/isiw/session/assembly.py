@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple, TypedDict
 
 import isiw
 from isiw.checks import deadline, patience, text
-from isiw.compiled import version as engine_version
+from isiw.native.library import version as engine_version
 from isiw.devices.clock import Clock
 from isiw.devices.limits import USUAL_ITI_S, Limits
 from isiw.devices.protocol import Device

@@ -19,7 +19,6 @@ from isiw.session.assembly import Earlier, Options, assembled, require_fitting, 
 from isiw.session.console import OperatorConsole, Table
 from isiw.session.judging import Judging
 from isiw.session.pausing import Pause
-from isiw.session.rehearsal import rehearse
 from isiw.session.sink import Follower, SessionResult, Wait
 from isiw.session.state import Fault, State, state_of
 from isiw.session.steps import ended, paused
@@ -162,7 +161,6 @@ class Session(Judging):
     def _run(self, *, progress: bool | None, keys: bool) -> SessionResult:
         require_untold(self.strategy, len(self.trials))
         self.require_effect()
-        rehearse(self.strategy)
         earlier_s, sink = self._earlier_s(), self._sink
         shown = sink.on_trial is None and is_terminal(sys.stdout) if progress is None else progress
         table = Table(self._console, self._header, sink.faults, shown=shown)

@@ -32,7 +32,6 @@ from isiw.session.assembly import (
 from isiw.session.examination import estimate_record
 from isiw.session.loop import Session
 from isiw.session.recorder import Recorder
-from isiw.session.rehearsal import rehearse
 from isiw.session.replay import require_as_real, require_same_person, taken_up
 from isiw.session.threshold import ThresholdRecorder, resume_threshold
 from isiw.signals.limits import SignalLimits
@@ -88,7 +87,6 @@ def open_session(
         return _own_loop_resumed(salvaged, read_salvaged(salvaged), strategy, changes, options)
     header = _header(strategy, **stated)
     require_fitting(strategy, header)
-    rehearse(strategy)
     clock, on_doubt = options.get("clock") or MonotonicClock(), options.get("on_doubt")
     return Recorder(strategy, LogWriter.create(path, header), header, clock, on_doubt=on_doubt)
 
@@ -131,7 +129,6 @@ def _own_loop_resumed(
     header = _header(strategy, **details).model_copy(update=dict(earlier.kept))
     if "visit" in changes:
         header.visit.require_intensity(header.strategy.settings.get("intensity_pct_rmt"))
-    rehearse(strategy)
     writer = earlier.open_log(header)
     for first in earlier.first_records:
         writer.append(first)

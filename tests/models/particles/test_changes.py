@@ -26,7 +26,7 @@ from isiw.strategy.stopping import ExpectedF1, Progress
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.responses import RecruitmentResponse
 from known import known
-from models.particles.test_kernels import generator, history, in_double
+from models.particles.test_engine import generator, history, in_double
 
 TARGET = WindowTarget(Prior(), VALVE_SPACE)
 KINDS = {kind.name: kind for kind in ChangeKind}

@@ -15,7 +15,7 @@ from isiw.models.particles import ParticleModel
 from isiw.models.particles.likelihood import total_log_likelihood
 from isiw.models.protocol import Observation
 from isiw.strategy.catalogue import make_strategy
-from models.particles.test_kernels import TARGETS, generator, history, in_double
+from models.particles.test_engine import TARGETS, generator, history, in_double
 
 DEVICE = "cuda"
 

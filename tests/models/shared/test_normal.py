@@ -1,10 +1,8 @@
-"""Logarithms of normal probabilities against mpmath, over all that priors reach, in torch and in compiled loops."""
+"""Logarithms of normal probabilities against mpmath, over all that priors reach, in torch and in the engine."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
-
 import mpmath
 import numpy as np
 import pytest
@@ -12,17 +10,16 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from isiw import compiled
 from isiw.design import DesignSpace
 from isiw.models.particles.engine import Compiled
 from isiw.models.particles.jumps import WindowTarget
-from isiw.models.particles.kernels import likelihood
 from isiw.models.particles.likelihood import total_log_likelihood
 from isiw.models.particles.noise import LEAST_MASS
 from isiw.models.particles.prior import Prior
 from isiw.models.shared.history import History
 from isiw.models.shared.normal import between, log_between
 from isiw.models.shared.start import Span, StartPrior
+from isiw.native.engine import elementary
 
 FURTHEST = 200.0
 """No MEP is further from what a particle expects [SD]: 1 µV to 30 mV are ten units of the log, .05 is a small SD."""
@@ -63,18 +60,11 @@ def test_the_gradient_of_the_log_of_a_probability_is_finite_in_both_tails() -> N
     assert bool(slope.isfinite().all())
 
 
-@compiled.kernel
-def masses(low: Any, high: Any, found: Any) -> None:
-    for i in range(len(low)):
-        found[i] = likelihood._between(low[i], high[i])  # noqa: SLF001 - the loop of it
-
-
-def test_loops_have_the_probability_between_two_ends_wherever_its_log_is_taken() -> None:
+def test_the_engine_has_the_probability_between_two_ends_wherever_its_log_is_taken() -> None:
     rng = np.random.default_rng(1)
     ends = rng.uniform(-60.0, 60.0, 300) * rng.random(300) ** 2
     low, high = (x.astype(np.float32) for x in (ends, ends + 10.0 ** rng.uniform(-2.0, 2.0, 300)))
-    found = np.empty_like(low)
-    masses(low, high, found)
+    found = elementary("between", low, high)
     expected = [max(exact(float(a), float(b)), math.log(LEAST_MASS)) for a, b in zip(low, high, strict=True)]
     np.testing.assert_allclose(np.log(np.maximum(found, LEAST_MASS)), expected, atol=1e-3)
 

@@ -1,4 +1,4 @@
-"""Who computes with particles: torch, or compiled loops on one processor; both have the same law.
+"""Who computes with particles: torch, or the compiled engine on one processor; both have the same law.
 
 The same seed leads to other draws with each, so that a log states which it was.
 """
@@ -11,18 +11,15 @@ from typing import Literal, Protocol, TypeAlias
 
 import numpy as np
 
-from isiw.compiled import AVAILABLE, first_of
 from isiw.lazy import torch
-from isiw.models.particles.kernels.likelihood import likelihoods, room_for
-from isiw.models.particles.kernels.moves import UNKNOWN, log_usual, records, scratch_for, sweeps
-from isiw.models.particles.kernels.records import columns_of, trial_records
-from isiw.models.particles.kernels.target import KINDS, Tables
 from isiw.models.particles.latents import Latents
 from isiw.models.particles.likelihood import total_log_likelihood
 from isiw.models.particles.moves import Moved, Mover, Target, steps_of
 from isiw.models.particles.prior import Person
+from isiw.models.particles.records import columns_of
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
+from isiw.native.engine import UNKNOWN, Law, log_likelihoods
 from isiw.types import FloatArray, IntArray
 
 EngineName: TypeAlias = Literal["compiled", "torch"]
@@ -32,7 +29,7 @@ class Engine(Protocol):
     """What particles are weighed and moved by."""
 
     def meaning(self, latents: Latents, trials: int) -> Person | FloatArray:
-        """What particles mean after so many trials, as torch or as kernels have it."""
+        """What particles mean after so many trials, as torch or as the engine has it."""
 
     def log_likelihood(self, latents: Latents, history: History) -> Tensor:
         """Log likelihood of a history under each particle, shape (b, p)."""
@@ -47,15 +44,15 @@ class Engine(Protocol):
 
 
 def engine_for(name: EngineName, target: Target, device: str = "cpu") -> Engine:
-    """The engine that is wanted, where it can be had; else torch."""
-    if name == "torch" or not AVAILABLE or device != "cpu":
+    """The engine that is wanted; torch alone computes on other devices than the CPU."""
+    if name == "torch" or device != "cpu":
         return TorchEngine(target)
     return Compiled(target)
 
 
 @dataclass(frozen=True)
 class TorchEngine:
-    """Torch, on any device: what the kernels are tested against."""
+    """Torch, on any device: what the compiled engine is tested against."""
 
     target: Target
 
@@ -88,63 +85,50 @@ class TorchEngine:
 
 @dataclass(frozen=True)
 class Compiled:
-    """Compiled loops on one processor."""
+    """The compiled engine, on one processor."""
 
     target: Target
 
     @cached_property
-    def tables(self) -> Tables:
-        """What the kernels know of the target."""
-        return self.target.tables()
+    def law(self) -> Law:
+        """The target as the engine has it."""
+        return Law(self.target.tables())
 
     def meaning(self, latents: Latents, trials: int) -> FloatArray:
-        """Records of particles; see `Engine`."""
-        with first_of("view of particles"):
-            particles: FloatArray = records(self.tables, *self._arrays(latents), trials)
-        return particles
+        """Fields of particles; see `Engine`."""
+        return self.law.meanings(*_arrays(latents), trials)
 
     def log_likelihood(self, latents: Latents, history: History) -> Tensor:
         """Log likelihood of a history under each particle; see `Engine`."""
-        with first_of("view of particles"):
-            return log_likelihood_of(records(self.tables, *self._arrays(latents), -1), history)
+        return log_likelihood_of(self.meaning(latents, -1), history)
 
     def log_usual(self, latents: Latents) -> Tensor:
         """Log prior density of what ISIs are chosen with another law of; see `Engine`."""
-        found, (parts, *_) = np.empty(latents.values.shape[:2], dtype=np.float32), scratch_for(self.tables)
-        with first_of("prior"):
-            log_usual(self.tables, *self._arrays(latents), self._log_blocks(latents), parts, found)
-        return torch.from_numpy(found)
+        return torch.from_numpy(self.law.log_usual(*_arrays(latents), self._log_blocks(latents)))
 
     def sweeps(
         self, numbers: Tensor, latents: Latents, log_likelihood: Tensor, history: History, generator: torch.Generator
     ) -> Moved:
         """Move every particle some times; see `Engine`."""
-        people = len(log_likelihood)
-        values, kinds, log_blocks = (array.copy() for array in (*self._arrays(latents), self._log_blocks(latents)))
-        found, steps = log_likelihood.numpy().copy(), steps_of(history)
-        dice = torch.randint(2**63 - 1, (people, 1), generator=generator).numpy().view(np.uint64)
-        counts = np.zeros((people, 4), dtype=np.float32)
-        with first_of("moves"):
-            told, state = trial_records(columns_of(history)), (values, kinds, found, log_blocks, np.zeros(KINDS, int))
-            rooms = room_for(told[0]), scratch_for(self.tables)
-            sweeps(numbers.numpy(), self.tables, told, steps, state, dice, rooms, counts)
+        arrays = (*_arrays(latents), log_likelihood.contiguous().numpy(), self._log_blocks(latents))
+        values, kinds, found, log_blocks = state = tuple(array.copy() for array in arrays)
+        dice = torch.randint(2**63 - 1, (len(found),), generator=generator).numpy().view(np.uint64)
+        counts = self.law.sweeps(numbers.numpy(), columns_of(history), steps_of(history), dice, state)
         shifts, shifted, jumps, jumped = torch.from_numpy(counts).T
         moved = Latents(*(torch.from_numpy(array) for array in (values, kinds, log_blocks)))
         return Moved(moved, torch.from_numpy(found), shifted / shifts, jumped / jumps)
 
-    def _arrays(self, latents: Latents) -> tuple[FloatArray, IntArray]:
-        return latents.values.contiguous().numpy(), latents.kinds.contiguous().numpy()
-
     def _log_blocks(self, latents: Latents) -> FloatArray:
         if latents.log_blocks is None:
-            return np.full((*latents.values.shape[:2], len(self.tables.first)), UNKNOWN)
-        log_blocks: FloatArray = latents.log_blocks.numpy()
+            return np.full((*latents.values.shape[:2], self.law.blocks), UNKNOWN)
+        log_blocks: FloatArray = latents.log_blocks.contiguous().numpy()
         return log_blocks
 
 
-def log_likelihood_of(particles: FloatArray, history: History) -> Tensor:
-    """Log likelihood of a history under each of some particles as kernels have them, shape (b, p)."""
-    found = np.empty(particles.shape[:2], dtype=np.float32)
-    trials, sizes = trial_records(columns_of(history))
-    likelihoods(particles, trials, sizes, room_for(trials), found)
-    return torch.from_numpy(found)
+def _arrays(latents: Latents) -> tuple[FloatArray, IntArray]:
+    return latents.values.contiguous().numpy(), latents.kinds.contiguous().numpy()
+
+
+def log_likelihood_of(fields: FloatArray, history: History) -> Tensor:
+    """Log likelihood of a history under each of some particles as the engine has them, shape (b, p)."""
+    return torch.from_numpy(log_likelihoods(fields, columns_of(history)))

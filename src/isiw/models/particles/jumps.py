@@ -15,8 +15,7 @@ import numpy as np
 from isiw.design import DesignSpace
 from isiw.lazy import torch
 from isiw.models.particles.changes import ChangeKind
-from isiw.models.particles.kernels.building import prior_tables
-from isiw.models.particles.kernels.target import Tables
+from isiw.models.particles.building import prior_tables
 from isiw.models.particles.latents import (
     KINDS,
     LATENTS,
@@ -32,6 +31,7 @@ from isiw.models.particles.moves import A_LITTLE, ANOTHER_KIND, NEARLY, OF_STEPS
 from isiw.models.particles.noise import NoiseKind
 from isiw.models.particles.prior import Person, Prior
 from isiw.models.protocol import Tensor
+from isiw.native.engine import Tables
 
 JUMPS: Final = {
     "form": 0.09,
@@ -86,7 +86,7 @@ class WindowTarget:
         return self.prior.person(latents)
 
     def tables(self) -> Tables:
-        """What kernels know of the prior and of what moves may do."""
+        """What the engine knows of the prior and of what moves may do."""
         profile = self.prior.profile
         joint = profile.joint(self.space)
         change, present, noise = torch.meshgrid(
@@ -95,7 +95,7 @@ class WindowTarget:
         used = used_by(noise.flatten(), present.flatten().bool(), change.flatten())
         moves = {
             "apart": False,
-            "states": np.array([0, 1, len(NoiseKind), 0, 2 * len(NoiseKind)]),
+            "state_of": np.array([0, 1, len(NoiseKind), 0, 2 * len(NoiseKind)]),
             "shifted": _shifted(torch.device("cpu")) & used.unsqueeze(1),
             "jumps": tuple(JUMPS.values()),
             "redrawn": _redrawn(torch.device("cpu")),

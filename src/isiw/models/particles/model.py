@@ -27,7 +27,7 @@ from isiw.models.particles.noise import draw_log_mep, log_gain, recruits
 from isiw.models.particles.posterior import SwarmPosterior
 from isiw.models.particles.predictions import PersonSample
 from isiw.models.particles.prior import Prior
-from isiw.models.particles.swarm import IN_BRIEF, Moving, Swarm
+from isiw.models.particles.swarm import Moving, Swarm
 from isiw.models.protocol import Observation, PriorPerson
 from isiw.models.shared.tables import NOTED, SIMULATED, step_generator
 from isiw.models.windows import EXCLUDED_AT, SampledHypotheses, SampledProfiles, grid_of, profile_grid, sampled_estimate
@@ -54,8 +54,7 @@ class ParticleModel(Checked):
         unusual_kept: the part of their probability that unusual starts and widths of the window, intensities, drifts
             and changes keep where the next ISI is chosen; the reported estimate keeps all of it.
         device: torch device.
-        engine: `"compiled"` loops on the CPU, or `"torch"`, which stands in where there are none; the same seed asks
-            other ISIs with each.
+        engine: `"compiled"` on the CPU, or `"torch"`; the same seed asks other ISIs with each.
 
     Raises:
         InvalidValueError: fewer than two particles or more than a memory holds, or an invalid number.
@@ -86,10 +85,6 @@ class ParticleModel(Checked):
         self.prior.profile.require_space(space)
         latents = self.prior.sample(people, self.particles, step_generator(self.device, seed, 0), space)
         return ParticlePosterior(self, space, seed, Swarm.of(latents), *_engines(self, space))
-
-    def in_brief(self) -> ParticleModel:
-        """The same model with few particles; see `Rehearses`."""
-        return replace(self, particles=IN_BRIEF, thinned=IN_BRIEF)
 
     def update(self, posterior: ParticlePosterior, observation: Observation) -> ParticlePosterior:
         """The posterior after one more trial."""

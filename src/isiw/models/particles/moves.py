@@ -13,13 +13,13 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from isiw.lazy import torch
-from isiw.models.particles.kernels.target import Tables
 from isiw.models.particles.latents import Latents
 from isiw.models.particles.likelihood import total_log_likelihood
 from isiw.models.particles.mixture import drawn
 from isiw.models.particles.prior import Person
 from isiw.models.protocol import Tensor
 from isiw.models.shared.history import History
+from isiw.native.engine import Tables
 from isiw.types import FloatArray
 
 JUMP_PROBABILITY = 0.4
@@ -54,7 +54,7 @@ class Target(Protocol):
         """What particles mean."""
 
     def tables(self) -> Tables:
-        """What kernels know of the prior and of what moves may do."""
+        """What the engine knows of the prior and of what moves may do."""
 
     def log_prior(self, latents: Latents) -> Tensor:
         """Log prior density of their latents but for a constant, shape (b, p)."""

@@ -5,14 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from isiw.lazy import torch
-from isiw.models.particles.kernels import windows as compiled
 from isiw.models.particles.shapes import facilitation, highest_facilitation, reaches
 from isiw.models.particles.tables import TabledSample, cell_ends, log_ends
 from isiw.models.protocol import Tensor
 from isiw.models.shared.tables import LEVELS, OUTCOMES, interpolated
 from isiw.models.windows import Runs, grid_of, least_excess_mv
-from isiw.types import IntArray
+from isiw.native import engine
+from isiw.types import FloatArray, IntArray
 
 FINE_MS = 1.0
 """Between the points of such a grid facilitation hardly changes."""
@@ -38,7 +40,7 @@ class PersonSample(TabledSample):
         """Facilitation at a window's edge by the least-excess rule; above 1 where there is no window, shape (b, s)."""
         if self.records is not None:
             fine = self.space.step_ms <= FINE_MS
-            found = compiled.edge_levels(self.records, self._evoked.numpy(), self._grid_ms.numpy(), fine=fine)
+            found = engine.edge_levels(self.records, self._evoked.numpy(), self._grid_ms.numpy(), fine=fine)
             return torch.from_numpy(found)
         excess_mv = self.person.response.log_floor.exp().unsqueeze(-1) * (self._evoked - self._evoked[..., :1])
         peak_mv = interpolated(excess_mv.unsqueeze(-1), self._highest.unsqueeze(-1))[..., 0, 0]
@@ -53,7 +55,7 @@ class PersonSample(TabledSample):
         """Sampled windows as 0 or 1, shape (b, s, t)."""
         if self.records is None:
             return reaches(self.person.shape, self.edge_level, isi_ms).to(torch.float32)
-        return torch.from_numpy(compiled.masks_of(self._pairs(isi_ms), len(isi_ms)))
+        return torch.from_numpy(_masks_of(self._pairs(isi_ms), len(isi_ms)))
 
     def runs(self, isi_ms: Tensor, person: int = 0) -> Runs:
         """Sampled windows of one person, as runs of some ascending ISIs [ms] (t,)."""
@@ -62,7 +64,7 @@ class PersonSample(TabledSample):
         return Runs.of_pairs(self._pairs(isi_ms)[person], len(isi_ms))
 
     def _pairs(self, isi_ms: Tensor) -> IntArray:
-        edges: IntArray = compiled.window_runs(self.records, self.edge_level.numpy(), isi_ms.contiguous().numpy())
+        edges: IntArray = engine.window_runs(self.records, self.edge_level.numpy(), isi_ms.contiguous().numpy())
         return edges
 
     def baselines_mv(self) -> Tensor:
@@ -79,3 +81,10 @@ class PersonSample(TabledSample):
         place = torch.lerp(ends[right - 1], ends[right], (wanted - less) / (more - less).clamp_min(1e-12))
         low, high = (end[:, None, None] for end in log_ends(self._log_floor, self._evoked))
         return torch.exp(low + place * (high - low))
+
+
+def _masks_of(runs: IntArray, points: int) -> FloatArray:
+    """Windows as 0 or 1 (b, s, t) from their runs (b, s, 4) on so many ISIs."""
+    at, firsts, behinds = np.arange(points), runs[..., ::2, np.newaxis], runs[..., 1::2, np.newaxis]
+    masks: FloatArray = ((firsts <= at) & (at < behinds)).any(-2).astype(np.float32)
+    return masks

@@ -33,9 +33,6 @@ LEAST_ESS = 0.01
 LEAST_ACCEPTED = 0.05
 """Share of the shifts that must be accepted for the particles to explore the posterior."""
 
-IN_BRIEF = 16
-"""So many particles are enough to call everything that is computed with particles."""
-
 LEAST_DISTINCT = 0.4
 """Share of the particles that must differ from each other after the moves."""
 

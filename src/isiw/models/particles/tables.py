@@ -1,4 +1,4 @@
-"""Tables by facilitation, from which a sample's predictions are interpolated: by torch, or by compiled loops."""
+"""Tables by facilitation, from which a sample's predictions are interpolated: by torch, or by the engine."""
 
 from __future__ import annotations
 
@@ -7,16 +7,15 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from isiw.compiled import first_of
 from isiw.design import DesignSpace
 from isiw.lazy import torch
-from isiw.models.particles.kernels import predictions as compiled
-from isiw.models.particles.kernels.records import LOG_FLOOR, person_of
 from isiw.models.particles.likelihood import in_pieces, levels
 from isiw.models.particles.noise import NODES, evoked_mean, log_gain, outcome_density
 from isiw.models.particles.prior import Person
+from isiw.models.particles.records import LOG_FLOOR, person_of
 from isiw.models.protocol import Tensor
 from isiw.models.shared.tables import LEVELS, OUTCOMES, interpolated, table_levels
+from isiw.native import engine
 from isiw.types import FloatArray
 
 
@@ -24,7 +23,7 @@ from isiw.types import FloatArray
 class TabledSample:
     """What equally weighted particles say about the next MEP."""
 
-    particles: Person | FloatArray  # what they mean, fields of shape (b, s), or their records as kernels have them
+    particles: Person | FloatArray  # what they mean, fields of shape (b, s), or their fields as the engine has them
     space: DesignSpace  # in whose range windows are looked for
     order: int = 0  # how many trials came before the next one
 
@@ -35,7 +34,7 @@ class TabledSample:
 
     @property
     def records(self) -> FloatArray | None:
-        """The particles as kernels have them; None where torch computes."""
+        """The particles as the engine has them; None where torch computes."""
         return self.particles if isinstance(self.particles, np.ndarray) else None
 
     def expected_mep_mv(self, isi_ms: Tensor) -> Tensor:
@@ -73,7 +72,7 @@ class TabledSample:
     def _rows(self) -> Tensor:
         """Facilitations of the rows, from the deepest depression to the largest enhancement, shape (b, 1 or s, l)."""
         if self.records is not None:
-            return torch.from_numpy(compiled.table_rows(self.records, LEVELS))
+            return torch.from_numpy(engine.table_rows(self.records, LEVELS))
         people, device = len(self.person.present), self.person.present.device
         if self._depth is None:
             return table_levels(device).expand(people, 1, -1)
@@ -83,15 +82,13 @@ class TabledSample:
     def _evoked(self) -> Tensor:
         """Expected MEP above the floor in each row, in floors, shape (b, s, l)."""
         if self.records is not None:
-            return torch.from_numpy(compiled.evoked_means(self.records, self._rows.numpy()))
+            return torch.from_numpy(engine.evoked_means(self.records, self._rows.numpy()))
         return evoked_mean(self.person.response, self._rows)
 
     def _at(self, table: Tensor, level: Tensor) -> Tensor:
         """What lies between the rows of a table."""
         if self.records is not None:
-            found = np.empty((*level.shape, table.shape[-1]), dtype=np.float32)
-            compiled.rows_between(self.records, table.numpy(), level.numpy(), found)
-            return torch.from_numpy(found)
+            return torch.from_numpy(engine.rows_between(self.records, table.contiguous().numpy(), level.numpy()))
         if self._depth is None:
             return interpolated(table, level)
         # `interpolated` has its rows at the squares of equal steps.
@@ -100,7 +97,7 @@ class TabledSample:
     def _levels(self, isi_ms: Tensor) -> Tensor:
         """Facilitation of each particle at some ISIs [ms] (t,), shape (b, s, t)."""
         if self.records is not None:
-            return torch.from_numpy(compiled.facilitation_rows(self.records, isi_ms.contiguous().numpy()))
+            return torch.from_numpy(engine.facilitations(self.records, isi_ms.contiguous().numpy()))
         return levels(self.person, isi_ms.unsqueeze(0))
 
     @cached_property
@@ -110,11 +107,8 @@ class TabledSample:
         middle, width = _cells(low.device)
         log_mep = low.unsqueeze(-1) + middle * (high - low).unsqueeze(-1)
         if self.records is not None:
-            with first_of("predictions"):
-                rows, cells = self._rows.numpy(), (log_mep.numpy(), width.numpy())
-                table = np.empty((*rows.shape, OUTCOMES), dtype=np.float32)
-                compiled.outcome_tables(self.records, rows, self.order, *cells, table)
-            return torch.from_numpy(table)
+            cells = log_mep.numpy(), width.numpy()
+            return torch.from_numpy(engine.outcome_tables(self.records, self._rows.numpy(), self.order, *cells))
         response = self.person.response
         gain = log_gain(response, torch.full_like(response.drift, self.order).unsqueeze(-1)).squeeze(-1)
         response = response._replace(log_ratio=response.log_ratio + gain)

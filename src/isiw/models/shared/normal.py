@@ -1,7 +1,7 @@
 """The normal distribution function between two ends, exact in either tail, and its logarithm.
 
 `torch.special.ndtr` has no lower tail: in double precision it is 0 at -10, where 7.6e-24 is right. Wherever a logarithm
-or a ratio is taken of such a probability, it comes from here; loops have `ndtr` of `isiw.compiled` and its like.
+or a ratio is taken of such a probability, it comes from here; the compiled engine has its like.
 """
 
 from __future__ import annotations

@@ -1,4 +1,9 @@
-/* Placeholder: picks the level for this processor. */
+/* Picks the engine for this processor. */
+
+#include <stddef.h>
+#include <string.h>
+
+#include "engine.h"
 
 #if defined(_WIN32)
 #define EXPORTED __declspec(dllexport)
@@ -6,29 +11,28 @@
 #define EXPORTED __attribute__((visibility("default")))
 #endif
 
-EXPORTED int isiw_level(void);
-EXPORTED double isiw_sum(const double *values, long long count);
+#if defined(__x86_64__) || defined(_M_X64)
+const Engine *isiw_engine_v2(void);
+const Engine *isiw_engine_v3(void);
+const Engine *isiw_engine_v4(void);
 
-#if defined(__x86_64__)
-double isiw_sum_v2(const double *values, long long count);
-double isiw_sum_v3(const double *values, long long count);
-double isiw_sum_v4(const double *values, long long count);
-
-int isiw_level(void) {
+static const Engine *engine_of(const char *level) {
     __builtin_cpu_init();
-    return __builtin_cpu_supports("avx512vl") ? 4 : __builtin_cpu_supports("avx2") ? 3 : 2;
-}
-
-double isiw_sum(const double *values, long long count) {
-    int level = isiw_level();
-    return level == 4   ? isiw_sum_v4(values, count)
-           : level == 3 ? isiw_sum_v3(values, count)
-                        : isiw_sum_v2(values, count);
+    int v2 = __builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt");
+    int v3 = v2 && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi2");
+    int v4 = v3 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
+             __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl");
+    if (strcmp(level, "x86-64-v4") == 0) return v4 ? isiw_engine_v4() : NULL;
+    if (strcmp(level, "x86-64-v3") == 0) return v3 ? isiw_engine_v3() : NULL;
+    if (strcmp(level, "x86-64-v2") == 0) return v2 ? isiw_engine_v2() : NULL;
+    return NULL;
 }
 #else
-double isiw_sum_base(const double *values, long long count);
+const Engine *isiw_engine_base(void);
 
-int isiw_level(void) { return 1; }
-
-double isiw_sum(const double *values, long long count) { return isiw_sum_base(values, count); }
+static const Engine *engine_of(const char *level) { return strcmp(level, "base") == 0 ? isiw_engine_base() : NULL; }
 #endif
+
+/* The engine of a level, by its name; NULL where this processor does not have it, or there is no such level. */
+EXPORTED const Engine *isiw_engine(const char *level);
+EXPORTED const Engine *isiw_engine(const char *level) { return engine_of(level); }

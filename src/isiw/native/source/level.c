@@ -1,12 +1,39 @@
-/* Placeholder: a sum, compiled once for each level of the processor. */
+/* The engine at one level of the processor: compiled once for each, with a name of its own (ISIW_LEVEL). */
+
+#include "engine.h"
+#include "information.h"
+#include "likelihood.h"
+#include "moves.h"
+#include "predictions.h"
+#include "prior.h"
+#include "windows.h"
+
+static int elementary(int32_t number, int64_t count, const float *x, const float *y, float *found) {
+    for (int64_t i = 0; i < count; i += LANES) {
+        Reals some = loaded(x + i, count - i), result;
+        switch (number) {
+        case 0: result = exp_v(some); break;
+        case 1: result = exp2_v(some); break;
+        case 2: result = log_v(some); break;
+        case 3: result = per_v(some); break;
+        case 4: result = per_root_v(some); break;
+        default: result = normal_between(some, loaded(y + i, count - i)); break;
+        }
+        stored(result, found + i, count - i);
+    }
+    return 0;
+}
 
 #define JOINED(a, b) a##b
-#define NAMED(level) JOINED(isiw_sum_, level)
+#define NAMED(level) JOINED(isiw_engine_, level)
 
-double NAMED(ISIW_LEVEL)(const double *values, long long count);
+const Engine *NAMED(ISIW_LEVEL)(void);
 
-double NAMED(ISIW_LEVEL)(const double *values, long long count) {
-    double sum = 0;
-    for (long long i = 0; i < count; i++) sum += values[i];
-    return sum;
+const Engine *NAMED(ISIW_LEVEL)(void) {
+    static const Engine engine = {
+        likelihoods,   meanings,      log_usual,   sweeps,      table_rows,         evoked_means,        outcome_tables,
+        rows_between,  facilitations, edge_levels, window_runs, entropy_reductions, variance_reductions, elementary,
+    };
+    fill_nodes();
+    return &engine;
 }

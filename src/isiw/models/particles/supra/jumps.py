@@ -10,8 +10,7 @@ import numpy as np
 
 from isiw.design import DesignSpace
 from isiw.lazy import torch
-from isiw.models.particles.kernels.building import prior_tables
-from isiw.models.particles.kernels.target import Tables
+from isiw.models.particles.building import prior_tables
 from isiw.models.particles.latents import LATENTS as DEFAULT_LATENTS
 from isiw.models.particles.latents import Latents
 from isiw.models.particles.mixture import drawn
@@ -19,6 +18,7 @@ from isiw.models.particles.noise import NoiseKind
 from isiw.models.particles.prior import Person
 from isiw.models.particles.supra.prior import BLOCKS, LATENTS, SupraPrior
 from isiw.models.protocol import Tensor
+from isiw.native.engine import Tables
 
 JUMPS: Final = {
     "enhanced": 0.2,
@@ -45,7 +45,7 @@ _PLACES_AND_SIZES: Final = (*REDRAWN["both places"], "log_floor_mv", "log_ceilin
 
 _OF_A_DEPRESSION: Final = ("depressed_start_ms", "depressed_log_width_ms", "depressed_log_shift")
 _AS_THE_DEFAULT: Final = tuple("log_shift" if n == "log_boost" else n for n in (*DEFAULT_LATENTS, *_OF_A_DEPRESSION))
-"""What the kernels know latents by, in their order."""
+"""What the engine knows latents by, in their order."""
 
 
 @dataclass(frozen=True)
@@ -65,14 +65,14 @@ class SupraTarget:
         return self.prior.person(latents)
 
     def tables(self) -> Tables:
-        """What kernels know of the prior and of what moves may do."""
+        """What the engine knows of the prior and of what moves may do."""
         cpu, prior = torch.device("cpu"), self.prior
         of_enhanced, of_depressed = (_latents(*BLOCKS[name], device=cpu) for name in ("enhanced", "depressed"))
         there = ((False, False), (True, False), (False, True), (True, True))
         used = torch.stack([(~of_enhanced | up) & (~of_depressed | down) for up, down in there])
         moves = {
             "apart": True,
-            "states": np.array([0, 0, 1, 2, 0]),
+            "state_of": np.array([0, 0, 1, 2, 0]),
             "shifted": _shifted(cpu) & used.unsqueeze(1),
             "jumps": tuple(JUMPS.values()),
             "redrawn": _redrawn(cpu),

@@ -18,7 +18,7 @@ from isiw.models.particles.posterior import SwarmPosterior
 from isiw.models.particles.supra.jumps import SupraTarget
 from isiw.models.particles.supra.predictions import SupraSample
 from isiw.models.particles.supra.prior import SupraPrior
-from isiw.models.particles.swarm import IN_BRIEF, Moving, Swarm
+from isiw.models.particles.swarm import Moving, Swarm
 from isiw.models.protocol import Observation, Tensor
 from isiw.models.shared.tables import step_generator
 from isiw.models.windows import Runs, SampledProfiles, best_window, grid_of, profile_grid, sampled_estimate
@@ -35,7 +35,7 @@ class SupraModel(Checked):
         moves: how often particles move, and when they are resampled.
         detection_limit_mv: an amplitude of 0 lies below this [mV].
         response_threshold_mv: a response that was seen lies above this [mV].
-        engine: `"compiled"` loops, or `"torch"`, which stands in where there are none.
+        engine: `"compiled"`, or `"torch"`.
     """
 
     prior: SupraPrior = field(default_factory=SupraPrior)
@@ -51,10 +51,6 @@ class SupraModel(Checked):
         latents = self.prior.sample(people, self.particles, step_generator("cpu", seed, 0), space)
         engine = engine_for(self.engine, SupraTarget(self.prior, space))
         return SupraPosterior(self, space, seed, Swarm.of(latents), engine)
-
-    def in_brief(self) -> SupraModel:
-        """The same model with few particles; see `Rehearses`."""
-        return replace(self, particles=IN_BRIEF, thinned=IN_BRIEF)
 
     def update(self, posterior: SupraPosterior, observation: Observation) -> SupraPosterior:
         """The posterior after one more trial."""

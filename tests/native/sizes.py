@@ -1,7 +1,7 @@
-"""Every compiled loop at sizes around each constant, with its bounds checked: `NUMBA_BOUNDSCHECK=1 python bounded.py`.
+"""Everything that the engine computes, at sizes around each constant, by a library that checks itself: `python sizes.py`.
 
-It has a process of its own because Numba checks bounds in loops that were compiled so. A loop that reads or writes
-beyond an array ends it with an IndexError.
+It has a process of its own because the sanitizers must be loaded first; see `benchmarks.sanitized`. A function that
+reads or writes beyond an array ends it.
 """
 
 from __future__ import annotations
@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from isiw.acquisition.information import entropy_reductions, variance_reductions
-from isiw.compiled import AVAILABLE, kernel
+from benchmarks import sanitized
 from isiw.design import DesignSpace
 from isiw.models.particles.changes import ChangePrior
 from isiw.models.particles.engine import Compiled
@@ -30,6 +29,7 @@ from isiw.models.particles.supra.predictions import SupraSample
 from isiw.models.particles.supra.prior import SupraPrior
 from isiw.models.shared.history import Circumstances, History
 from isiw.models.shared.scales import Scale
+from isiw.native.engine import entropy_reductions, variance_reductions
 
 TRIALS = (0, 1, 2, 15, 16, 17, 63, 64, 65, 127, 128, 129, 257)
 PARTICLES = (2, 3, 15, 16, 17, 65)
@@ -37,12 +37,6 @@ ISIS = (2, 3, 15, 16, 17, 23, 24, 25, 63, 64, 65)
 COMPONENTS = (1, 15, 16, 17, 63, 64, 65, 130)
 SPACE = DesignSpace(0, 300, reference="impact")
 FAR_MS = 5000.0
-
-
-@kernel
-def beyond(values: Any) -> None:
-    for i in range(len(values) + 1):
-        values[i] = 1.0
 
 
 def history(trials: int, seed: int, particular: str = "") -> History:
@@ -101,13 +95,6 @@ def with_places(number: int) -> Prior:
 
 def main() -> None:
     """Compute at all sizes."""
-    assert AVAILABLE
-    try:
-        beyond(np.zeros(3))
-    except IndexError:
-        pass
-    else:
-        raise AssertionError("bounds are not checked: set NUMBA_BOUNDSCHECK=1")
     target, supra = WindowTarget(Prior(), SPACE), SupraTarget(SupraPrior(), SPACE)
     for trials in TRIALS:
         for number, particular in enumerate(("points", "mixed", "known")):
@@ -135,4 +122,5 @@ def spaces(numbers: Sequence[int]) -> list[DesignSpace]:
 if __name__ == "__main__":
     warnings.simplefilter("ignore")
     torch.set_num_threads(1)
+    sanitized.take()
     main()

@@ -1,4 +1,4 @@
-"""From a model's prior to the tables that kernels know it by."""
+"""From a model's prior to the tables that the engine knows it by."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 
 from isiw.design import DesignSpace
 from isiw.lazy import torch
-from isiw.models.particles.kernels.target import MEANINGS, Tables
 from isiw.models.particles.mixture import Mixture
 from isiw.models.particles.moves import PART_PROBABILITY
 from isiw.models.protocol import Tensor
 from isiw.models.shared.start import StartPrior
+from isiw.native.engine import LANES, MEANINGS, Tables
 
 _NOT_REACHED: Final = 2.0
 """No uniform draw is above it."""
@@ -36,16 +36,17 @@ def prior_tables(
 ) -> Tables:
     """The tables of a prior."""
     latents, most = len(spreads), max(len(mixture.shares) for mixture in mixtures)
+    width = -(-most // LANES) * LANES
     sizes = [mixture.means.shape[-1] for mixture in mixtures]
     first = [*range(starts), *(starts + np.cumsum([0, *sizes[:-1]]))]
     size, components = [1] * starts + sizes, [0] * starts + [len(mixture.shares) for mixture in mixtures]
-    log_shares, below = (np.full((len(first), most), filled, dtype=np.float32) for filled in (_NO_SHARE, _NOT_REACHED))
-    means, sds = np.zeros((most, latents), dtype=np.float32), np.ones((most, latents), dtype=np.float32)
+    log_shares, below = (np.full((len(first), width), filled, dtype=np.float32) for filled in (_NO_SHARE, _NOT_REACHED))
+    means, sds = np.zeros((latents, width), dtype=np.float32), np.ones((latents, width), dtype=np.float32)
     for block, mixture in enumerate(mixtures, start=starts):
         count, span = components[block], slice(first[block], first[block] + size[block])
         log_shares[block, :count] = (mixture.shares.log() - mixture.sds.log().sum(-1)).numpy()
         below[block, : count - 1] = mixture.shares.cumsum(-1).numpy()[:-1]
-        means[:count, span], sds[:count, span] = mixture.means.numpy(), mixture.sds.numpy()
+        means[span, :count], sds[span, :count] = mixture.means.numpy().T, mixture.sds.numpy().T
     if places is not None:
         # Start and width are one block: anywhere, or in one of the places; only here do the constants matter.
         log_shares[1] += math.log1p(-places[0]) - 0.5 * math.log(2.0 * math.pi)
@@ -62,7 +63,6 @@ def prior_tables(
     made: dict[str, Any] = {
         name: value.numpy() if isinstance(value, torch.Tensor) else value for name, value in moves.items()
     }
-    made |= {"touched": np.add.reduceat(made["shifted"], law["first"], axis=-1)}
     made |= {"changed": int(np.searchsorted(law["first"], where[27]))}
     made |= {"parts": _edges(PART_PROBABILITY, len(PART_PROBABILITY))}
     made |= {"jumps": _edges(moves["jumps"], len(moves["jumps"]))}

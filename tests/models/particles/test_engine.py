@@ -7,18 +7,13 @@ from typing import Any, get_args
 
 import numpy as np
 import pytest
-import scipy.special
 import torch
 
-from isiw import compiled
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.models.particles import ParticleModel
 from isiw.models.particles.changes import Change
 from isiw.models.particles.engine import Compiled, EngineName, TorchEngine, engine_for, log_likelihood_of
 from isiw.models.particles.jumps import WindowTarget
-from isiw.models.particles.kernels.likelihood import room_for
-from isiw.models.particles.kernels.moves import UNKNOWN, scratch_for, sweeps
-from isiw.models.particles.kernels.records import columns_of, people_of, trial_records
 from isiw.models.particles.latents import Latents
 from isiw.models.particles.likelihood import total_log_likelihood
 from isiw.models.particles.moves import steps_of
@@ -27,6 +22,7 @@ from isiw.models.particles.places import Place
 from isiw.models.particles.predictions import PersonSample
 from isiw.models.particles.prior import Depression, Person, Prior
 from isiw.models.particles.profile import ProfilePrior
+from isiw.models.particles.records import columns_of, people_of
 from isiw.models.particles.shapes import Shape
 from isiw.models.particles.supra.jumps import SupraTarget
 from isiw.models.particles.supra.predictions import SupraSample
@@ -34,6 +30,7 @@ from isiw.models.particles.supra.prior import SupraPrior
 from isiw.models.protocol import Observation
 from isiw.models.shared.history import Circumstances, History
 from isiw.models.shared.scales import Scale
+from isiw.native.engine import UNKNOWN, elementary
 
 PLACES = ProfilePrior(
     places=(Place(0.5, Scale(230.0, 12.0), Scale(80.0, 0.3)), Place(0.2, Scale(90.0, 9.0), Scale(60.0, 0.2)))
@@ -217,13 +214,6 @@ def test_people_of_a_batch_have_the_likelihood_that_each_has_alone() -> None:
         assert torch.equal(engine.log_likelihood(part, alone), together[one])
 
 
-def test_without_kernels_torch_computes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("isiw.models.particles.engine.AVAILABLE", False)
-    posterior = ParticleModel(particles=50).begin(VALVE_SPACE, 0)
-    assert isinstance(posterior.engine, TorchEngine)
-    assert isinstance(engine_for("torch", TARGETS["default"]), TorchEngine)
-
-
 def test_both_engines_of_one_seed_come_to_the_same_belief_in_different_ways() -> None:
     trials = [(100.0, 0.01), (230.0, 0.2), (260.0, 0.25), (400.0, 0.012), (330.0, 0.01), (210.0, 0.15)]
     posteriors = []
@@ -367,22 +357,14 @@ def test_a_known_part_is_added_to_floor_and_response(sd_mv: float) -> None:
         assert got.item() == pytest.approx((mep_mv < end_mv).mean(), abs=0.06)
 
 
-@compiled.kernel
-def written(function: Any, x: Any, found: Any) -> None:
-    for i in range(len(x)):
-        found[i] = function(x[i])
-
-
 def test_the_elementary_functions_are_those_of_numpy() -> None:
     x = np.linspace(-30.0, 30.0, 401).astype(np.float32)
-    positive, got = np.exp(x), np.empty_like(x)
-    for ours, theirs in ((compiled.exp, np.exp), (compiled.exp2, np.exp2)):
-        written(ours, x, got)
-        np.testing.assert_allclose(got, theirs(x.astype(float)), rtol=3e-6)
-    written(compiled.log, positive, got)
-    np.testing.assert_allclose(got, np.log(positive.astype(float)), rtol=2e-6, atol=1e-7)
-    written(compiled.ndtr, x, got)
-    np.testing.assert_allclose(got, scipy.special.ndtr(x.astype(float)), rtol=2e-5, atol=1e-18)
+    positive = np.exp(x)
+    np.testing.assert_allclose(elementary("exp", x), np.exp(x.astype(float)), rtol=3e-6)
+    np.testing.assert_allclose(elementary("exp2", x), np.exp2(x.astype(float)), rtol=3e-6)
+    np.testing.assert_allclose(elementary("log", positive), np.log(positive.astype(float)), rtol=2e-6, atol=1e-7)
+    np.testing.assert_allclose(elementary("per", positive), 1.0 / positive.astype(float), rtol=2e-6)
+    np.testing.assert_allclose(elementary("per_root", positive), positive.astype(float) ** -0.5, rtol=2e-6)
 
 
 @pytest.mark.parametrize("name", TARGETS)
@@ -391,16 +373,14 @@ def test_sweeps_one_by_one_lead_where_sweeps_at_once_do(name: str) -> None:
     target, found = TARGETS[name], list[tuple[Any, ...]]()
     latents = target.prior.sample(1, 300, generator(3), target.space)
     told = history(target.person(latents), 8, generator(4))
-    tables, start = target.tables(), engine_for("compiled", target).log_likelihood(latents, told).numpy()
+    engine = engine_for("compiled", target)
+    start, law = engine.log_likelihood(latents, told).numpy(), engine.law
     for number, calls in ((6, 1), (1, 6)):
         values, kinds = latents.values.numpy().copy(), latents.kinds.numpy().copy()
-        log_likelihood, dice = start.copy(), np.full((1, 1), 7, dtype=np.uint64)
-        counts, trials, steps = np.zeros((1, 4), dtype=np.float32), trial_records(columns_of(told)), steps_of(told)
-        rooms = room_for(trials[0]), scratch_for(tables)
+        log_likelihood, dice, counts = start.copy(), np.full(1, 7, dtype=np.uint64), np.zeros((1, 4), dtype=np.float32)
         for _ in range(calls):
-            densities = np.full((1, 300, len(tables.first)), UNKNOWN)
-            state = values, kinds, log_likelihood, densities, np.zeros(5, dtype=int)
-            sweeps(np.array([number]), tables, trials, steps, state, dice, rooms, counts)
+            state = values, kinds, log_likelihood, np.full((1, 300, law.blocks), UNKNOWN)
+            counts += law.sweeps(np.array([number]), columns_of(told), steps_of(told), dice, state)
         found.append((values, kinds, log_likelihood, counts))
     for together, one_by_one in zip(*found, strict=True):
         np.testing.assert_array_equal(together, one_by_one)

@@ -1,1 +1,0 @@
-"""Compiled loops over particles: what `noise`, `shapes`, `moves` and `predictions` say in torch, for one processor."""

@@ -1,0 +1,370 @@
+"""Calls of the compiled engine on arrays, whose sizes are checked here: what it writes stays within them."""
+
+from __future__ import annotations
+
+import ctypes
+from functools import cached_property
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from isiw.native.library import call
+from isiw.types import FloatArray, IntArray
+
+FIELDS: Final = 27
+"""Of a particle; their names and order are those of `isiw.models.particles.records`."""
+
+COLUMNS: Final = 11
+"""Of a trial, likewise."""
+
+KINDS: Final = 5
+"""Of a particle: its profile's shape, its noise, whether there is an enhancement, and a depression, and its change."""
+
+MEANINGS: Final = 32
+"""Latents that mean anything: those of the default in their order, then three of a depression."""
+
+_LAST_KINDS: Final = np.array([3, 4, 1, 1, 4])
+"""The last of each."""
+
+LANES: Final = 16
+"""Components of mixtures are padded to whole vectors of any processor."""
+
+UNKNOWN: Final = np.float32(1e30)
+"""In place of the log density of a block that was not worked out yet."""
+
+_f, _i, _b = np.dtype(np.float32), np.dtype(np.int64), np.dtype(np.bool_)
+
+
+class Tables(NamedTuple):
+    """What the engine knows of a model's prior and of its moves."""
+
+    at: IntArray  # of the latent of each of `MEANINGS`; d where the model has none, (m,)
+    spreads: FloatArray  # usual SD of each latent, (d,)
+    first: IntArray  # latent of each block, (k,)
+    size: IntArray  # how many latents it has, (k,)
+    components: (
+        IntArray  # of its mixture, (k,); 0 for a start, negative for start and width that may be those of a place
+    )
+    log_shares: FloatArray  # of the components, less the logs of their SDs, (k, c)
+    below: FloatArray  # sums of the shares of earlier components, from the second on, (k, c)
+    means: FloatArray  # of the latents in each component, (d, c)
+    sds: FloatArray  # likewise, (d, c)
+    per_sds: FloatArray  # 1 / SD, as dividers are slow, (d, c)
+    start_ms: FloatArray  # knots of the density of a start, evenly spaced, (s,)
+    density: FloatArray  # at the knots, (s,)
+    quantiles: FloatArray  # probability of an earlier start, at the knots, (s,)
+    places: FloatArray  # log share less the logs of the SDs, mean and SD of the start, then of the log width, (l, 5)
+    place_below: FloatArray  # given a place, sums of the shares of earlier ones, (l,)
+    place_share: float  # probability of all places
+    apart: bool  # enhancement and depression may not overlap
+    state_of: IntArray  # weights of the kinds in the number of a particle's state, (kinds,)
+    shifted: Any  # which latents a difference moves, by state and part, (states, parts, d)
+    parts: FloatArray  # sums of the probabilities of earlier parts, (parts - 1,)
+    jumps: FloatArray  # likewise of earlier jumps, (jumps - 1,)
+    redrawn: Any  # which latents each jump draws again, (jumps, d)
+    renewed: Any  # which kinds each jump draws again, (jumps, kinds)
+    of_profile: Any  # the jump concerns nothing but a profile, which without facilitation means nothing, (jumps,)
+    kinds: FloatArray  # sums of the probabilities of earlier values of each kind, (kinds, v - 1)
+    changed: int  # block of the latent that says when something changes; that of its size is the next
+
+
+class _Struct(ctypes.Structure):
+    """`Tables` of engine.h."""
+
+    _fields_ = [
+        *((name, ctypes.c_int64) for name in ("latents", "blocks", "width", "knots", "place_count")),
+        *((name, ctypes.c_int64) for name in ("states", "part_count", "jump_count", "kind_values")),
+        *((name, ctypes.c_void_p) for name in Tables._fields[: Tables._fields.index("place_share")]),
+        ("place_share", ctypes.c_float),
+        ("apart", ctypes.c_int32),
+        *((name, ctypes.c_void_p) for name in Tables._fields[Tables._fields.index("state_of") : -1]),
+        ("changed", ctypes.c_int64),
+    ]
+
+
+class Law:
+    """A model's prior and its moves, as the engine has them.
+
+    Args:
+        tables: what is known of both.
+
+    Raises:
+        ValueError: tables that do not fit each other.
+    """
+
+    def __init__(self, tables: Tables) -> None:
+        blocks, (latents, width), knots = len(tables.first), tables.means.shape, tables.start_ms
+        (states, parts, _), jumps, (_, values) = tables.shifted.shape, len(tables.jumps) + 1, tables.kinds.shape
+        shapes: dict[str, tuple[np.dtype[Any], tuple[int, ...]]] = {
+            "at": (_i, (MEANINGS,)),
+            "spreads": (_f, (latents,)),
+            **dict.fromkeys(("first", "size", "components"), (_i, (blocks,))),
+            **dict.fromkeys(("log_shares", "below"), (_f, (blocks, width))),
+            **dict.fromkeys(("means", "sds", "per_sds"), (_f, (latents, width))),
+            **dict.fromkeys(("start_ms", "density", "quantiles"), (_f, (len(knots),))),
+            "places": (_f, (len(tables.places), 5)),
+            "place_below": (_f, (len(tables.places),)),
+            "state_of": (_i, (KINDS,)),
+            "shifted": (_b, (states, parts, latents)),
+            "parts": (_f, (parts - 1,)),
+            "jumps": (_f, (jumps - 1,)),
+            "redrawn": (_b, (jumps, latents)),
+            "renewed": (_b, (jumps, KINDS)),
+            "of_profile": (_b, (jumps,)),
+            "kinds": (_f, (KINDS, values)),
+        }
+        self._arrays = {
+            name: np.array(getattr(tables, name), dtype=dtype, order="C") for name, (dtype, _) in shapes.items()
+        }
+        sizes = {"latents": latents, "blocks": blocks, "width": width, "knots": len(knots)}
+        sizes |= {"place_count": len(tables.places), "states": states, "part_count": parts, "jump_count": jumps}
+        self._struct = _Struct(
+            **sizes,
+            kind_values=values,
+            place_share=tables.place_share,
+            apart=tables.apart,
+            changed=tables.changed,
+            **{name: _address(self._arrays[name], dtype, *shape) for name, (dtype, shape) in shapes.items()},
+        )
+        self.latents, self.blocks, self._last = latents, blocks, np.minimum(_LAST_KINDS, [3, 4, 1, 1, values])
+        self._require_indices(width, knots=len(knots), changed=tables.changed)
+
+    def _require_indices(self, width: int, *, knots: int, changed: int) -> None:
+        """Check what the engine reads arrays at."""
+        first, size, components, at = (self._arrays[name] for name in ("first", "size", "components", "at"))
+        within = (first >= 0).all() and (size >= 1).all() and (first + size <= self.latents).all()
+        within = within and (np.abs(components) <= width).all() and ((at >= 0) & (at <= self.latents)).all()
+        # A start and width of a place are the first two latents; a change, where there is one, is two blocks.
+        within = within and (first[components < 0] == 0).all() and (size[components < 0] == 2).all()
+        if self._arrays["renewed"][:, -1].any():
+            within = within and 0 <= changed < self.blocks - 1
+        if not within or knots < 2 or width % LANES or (_LAST_KINDS @ self._arrays["state_of"]) >= self._struct.states:
+            raise ValueError("the tables of a prior point beyond themselves")
+
+    @cached_property
+    def _at(self) -> int:
+        return ctypes.addressof(self._struct)
+
+    def meanings(self, values: FloatArray, kinds: IntArray, trials: int) -> FloatArray:
+        """Fields of particles after so many trials, or with their changes if it is negative, (b, p, fields)."""
+        people, particles = self._require_particles(values, kinds)
+        found = np.empty((people, particles, FIELDS), dtype=_f)
+        arrays = _address(values, _f, *values.shape), _address(kinds, _i, *kinds.shape)
+        call("meanings", self._at, people, particles, *arrays, trials, _address(found, _f, *found.shape))
+        return found
+
+    def log_usual(self, values: FloatArray, kinds: IntArray, densities: FloatArray) -> FloatArray:
+        """Log prior density of what ISIs are chosen with another law of, but for a constant, (b, p)."""
+        people, particles = self._require_particles(values, kinds)
+        found = np.empty((people, particles), dtype=_f)
+        arrays = _address(values, _f, *values.shape), _address(kinds, _i, *kinds.shape)
+        known = _address(densities, _f, people, particles, self.blocks)
+        call("log_usual", self._at, people, particles, *arrays, known, _address(found, _f, people, particles))
+        return found
+
+    def sweeps(
+        self,
+        numbers: IntArray,
+        columns: FloatArray,
+        steps: FloatArray,
+        dice: Any,
+        state: tuple[FloatArray, IntArray, FloatArray, FloatArray],
+    ) -> FloatArray:
+        """Move each person's particles so many times (b,), in place; the counts of their moves, (b, 4).
+
+        Args:
+            numbers: how often each person's particles move, (b,).
+            columns: the trials, (b, n, columns).
+            steps: of the mean log MEP at each trial, (b, n + 1).
+            dice: seeds, which move on, (b,) whole numbers of 64 bits without a sign.
+            state: latents, kinds, log likelihood and log densities of blocks of the particles, which change.
+
+        Returns:
+            Shifts, those that were accepted, jumps, and those that were accepted, (b, 4).
+        """
+        values, kinds, log_likelihood, densities = state
+        people, particles = self._require_particles(values, kinds)
+        trials, counts = columns.shape[1], np.zeros((people, 4), dtype=_f)
+        if particles < 2:
+            raise ValueError("particles move by differences of others")
+        call(
+            "sweeps",
+            self._at,
+            people,
+            particles,
+            trials,
+            _address(numbers, _i, people),
+            _address(columns, _f, people, trials, COLUMNS),
+            _address(steps, _f, people, trials + 1),
+            _address(dice, np.dtype(np.uint64), people),
+            _address(values, _f, *values.shape),
+            _address(kinds, _i, *kinds.shape),
+            _address(log_likelihood, _f, people, particles),
+            _address(densities, _f, people, particles, self.blocks),
+            _address(counts, _f, people, 4),
+        )
+        return counts
+
+    def _require_particles(self, values: FloatArray, kinds: IntArray) -> tuple[int, int]:
+        people, particles, latents = values.shape
+        within = latents == self.latents and kinds.shape == (people, particles, KINDS)
+        if not within or ((kinds < 0) | (kinds > self._last)).any():
+            raise ValueError("these are no particles of this prior")
+        return people, particles
+
+
+def log_likelihoods(fields: FloatArray, columns: FloatArray) -> FloatArray:
+    """Log likelihood of each person's trials (b, n, columns) under each particle (b, p, fields), (b, p)."""
+    (people, particles, _), trials = fields.shape, columns.shape[1]
+    found = np.empty((people, particles), dtype=_f)
+    told = _address(columns, _f, people, trials, COLUMNS)
+    call("likelihoods", people, particles, trials, _fields(fields), told, _address(found, _f, *found.shape))
+    return found
+
+
+def table_rows(fields: FloatArray, rows: int) -> FloatArray:
+    """Facilitations of the rows of tables: squares of equal steps, or equal steps from below 0, (b, s, l)."""
+    levels = np.empty((*fields.shape[:2], _rows(rows)), dtype=_f)
+    call("table_rows", _samples(fields), rows, _fields(fields), _address(levels, _f, *levels.shape))
+    return levels
+
+
+def evoked_means(fields: FloatArray, levels: FloatArray) -> FloatArray:
+    """Expected MEP above the floor, in floors, at the facilitations (b, s, l), of the same shape."""
+    rows, means = levels.shape[2], np.empty(levels.shape, dtype=_f)
+    at = _address(levels, _f, *fields.shape[:2], rows)
+    call("evoked_means", _samples(fields), rows, _fields(fields), at, _address(means, _f, *means.shape))
+    return means
+
+
+def outcome_tables(
+    fields: FloatArray, levels: FloatArray, order: int, log_mep: FloatArray, widths: FloatArray
+) -> FloatArray:
+    """Probability of each outcome of the next trial, (b, s, l, y).
+
+    Args:
+        fields: the particles, (b, s, fields).
+        levels: facilitations of the rows, (b, s, l).
+        order: how many trials came before.
+        log_mep: middles of the outcomes, log mV, (b, y).
+        widths: of the outcomes, in any unit, (y,).
+    """
+    (people, samples, rows), outcomes = levels.shape, len(widths)
+    table = np.empty((people, samples, rows, outcomes), dtype=_f)
+    cells = _address(log_mep, _f, people, outcomes), _address(widths, _f, outcomes)
+    at = _address(levels, _f, *fields.shape[:2], rows)
+    found = _address(table, _f, *table.shape)
+    call("outcome_tables", people, samples, rows, outcomes, order, _fields(fields), at, *cells, found)
+    return table
+
+
+def rows_between(fields: FloatArray, table: FloatArray, levels: FloatArray) -> FloatArray:
+    """What lies between the rows of tables (b, s, l, y) at facilitations (b, s, t), (b, s, t, y)."""
+    rows, outcomes, isis = table.shape[2], table.shape[3], levels.shape[2]
+    found = np.empty((*levels.shape, outcomes), dtype=_f)
+    of = fields.shape[:2]
+    arrays = _address(table, _f, *of, _rows(rows), outcomes), _address(levels, _f, *of, isis)
+    call(
+        "rows_between",
+        _samples(fields),
+        rows,
+        isis,
+        outcomes,
+        _fields(fields),
+        *arrays,
+        _address(found, _f, *found.shape),
+    )
+    return found
+
+
+def facilitations(fields: FloatArray, isi_ms: FloatArray) -> FloatArray:
+    """Facilitation of each particle at some ISIs [ms] (t,), (b, s, t)."""
+    found = np.empty((*fields.shape[:2], len(isi_ms)), dtype=_f)
+    at = _address(isi_ms, _f, len(isi_ms))
+    call("facilitations", _samples(fields), len(isi_ms), _fields(fields), at, _address(found, _f, *found.shape))
+    return found
+
+
+def edge_levels(fields: FloatArray, evoked: FloatArray, isi_ms: FloatArray, *, fine: bool) -> FloatArray:
+    """Facilitation at each window's edge, 2 where there is no window, (b, s).
+
+    Args:
+        fields: the particles, (b, s, fields).
+        evoked: expected MEPs above the floor in the rows, in floors, (b, s, l).
+        isi_ms: ascending ISIs [ms], (t,).
+        fine: whether the largest facilitation is that of all of their range, not of these ISIs alone.
+    """
+    rows, found = evoked.shape[2], np.empty(fields.shape[:2], dtype=_f)
+    if not len(isi_ms):
+        raise ValueError("windows are looked for at some ISIs")
+    arrays = _address(evoked, _f, *fields.shape[:2], _rows(rows)), _address(isi_ms, _f, len(isi_ms))
+    at = _address(found, _f, *found.shape)
+    call("edge_levels", _samples(fields), rows, len(isi_ms), fine, _fields(fields), *arrays, at)
+    return found
+
+
+def window_runs(fields: FloatArray, levels: FloatArray, isi_ms: FloatArray) -> Any:
+    """Which ISIs are in each particle's window, as two runs of indices (first, behind the last), (b, s, 4) int32."""
+    runs = np.empty((*levels.shape, 4), dtype=np.int32)
+    arrays = _address(levels, _f, *fields.shape[:2]), _address(isi_ms, _f, len(isi_ms))
+    at = _address(runs, runs.dtype, *runs.shape)
+    call("window_runs", _samples(fields), len(isi_ms), _fields(fields), *arrays, at)
+    return runs
+
+
+def entropy_reductions(mass: FloatArray) -> FloatArray:
+    """Entropy of the mean of distributions (b, s, t, y) less their mean entropy [nat], (b, t)."""
+    people, samples, isis, outcomes = mass.shape
+    found = np.empty((people, isis), dtype=_f)
+    for given, to in zip(mass, found, strict=True):
+        arrays = _address(given, _f, samples, isis, outcomes), _address(to, _f, isis)
+        call("entropy_reductions", samples, isis, outcomes, *arrays)
+    return found
+
+
+def variance_reductions(mass: FloatArray, masks: FloatArray) -> FloatArray:
+    """Variance of each ISI's membership in windows (b, s, g) less that after an outcome (b, s, t, y), summed, (b, t).
+
+    Sampled windows are runs of ISIs, so that what changes from one ISI to the next is summed instead of all of them.
+    """
+    (people, samples, isis, outcomes), points = mass.shape, masks.shape[2]
+    found = np.empty((people, isis), dtype=_f)
+    for given, inside, to in zip(mass, masks, found, strict=True):
+        arrays = _address(given, _f, samples, isis, outcomes), _address(inside, _f, samples, points)
+        call("variance_reductions", samples, isis, outcomes, points, *arrays, _address(to, _f, isis))
+    return found
+
+
+ELEMENTARY: Final = ("exp", "exp2", "log", "per", "per_root", "between")
+
+
+def elementary(name: str, x: FloatArray, y: FloatArray | None = None) -> FloatArray:
+    """One of the elementary functions that the engine is made of, of some numbers (n,); for tests.
+
+    `between` is the probability that a standard normal variable is between x and y.
+    """
+    found = np.empty(len(x), dtype=_f)
+    arrays = (_address(array, _f, len(x)) for array in (x, x if y is None else y, found))
+    call("elementary", ELEMENTARY.index(name), len(x), *arrays)
+    return found
+
+
+def _fields(fields: FloatArray) -> int:
+    return _address(fields, _f, *fields.shape[:2], FIELDS)
+
+
+def _samples(fields: FloatArray) -> int:
+    return int(fields.shape[0] * fields.shape[1])
+
+
+def _rows(rows: int) -> int:
+    if rows < 2:
+        raise ValueError("a table has two rows or more")
+    return rows
+
+
+def _address(array: Any, dtype: np.dtype[Any], *shape: int) -> int:
+    """Where an array begins, if it is what the engine takes it for: C reads and writes all of the shape."""
+    if array.dtype != dtype or array.shape != shape or not array.flags.c_contiguous:
+        raise ValueError(f"the engine needs {dtype} {shape} side by side, not {array.dtype} {array.shape}")
+    return int(array.__array_interface__["data"][0])

@@ -1,0 +1,123 @@
+"""The library of compiled code: which level of it this processor gets, and its functions."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import platform
+from functools import cache
+from pathlib import Path
+from typing import Any, Final
+
+from isiw.errors import InvalidValueError, IsiwError
+from isiw.native.stamp import require_built_of
+
+LEVELS: Final = ("x86-64-v4", "x86-64-v3", "x86-64-v2", "base")
+"""What the library is compiled for, the fastest first: AVX-512, AVX2, SSE4.2, and processors that are no x86."""
+
+VERSION: Final = 4
+"""Of the engine: it grows if the same draws come to other numbers."""
+
+_FILES: Final = {"Darwin": "_engine.dylib", "Windows": "_engine.dll"}
+_PATH: Final = Path(__file__).with_name(_FILES.get(platform.system(), "_engine.so.1"))
+_WANTED: Final = "ISIW_LEVEL"
+
+_KINDS: Final = {"n": ctypes.c_int64, "s": ctypes.c_int32, "a": ctypes.c_void_p}
+_SIGNATURES: Final = {
+    "likelihoods": "nnnaaa",
+    "meanings": "annaana",
+    "log_usual": "annaaaa",
+    "sweeps": "annnaaaaaaaaa",
+    "table_rows": "nnaa",
+    "evoked_means": "nnaaa",
+    "outcome_tables": "nnnnnaaaaa",
+    "rows_between": "nnnnaaaa",
+    "facilitations": "nnaaa",
+    "edge_levels": "nnnsaaaa",
+    "window_runs": "nnaaaa",
+    "entropy_reductions": "nnnaa",
+    "variance_reductions": "nnnnaaa",
+    "elementary": "snaaa",
+}
+"""The functions in the order of `Engine` in engine.h, and what they take: numbers of 64 and 32 bits, and arrays."""
+
+
+class _Functions(ctypes.Structure):
+    """The functions of one level."""
+
+    _fields_ = [
+        (name, ctypes.CFUNCTYPE(ctypes.c_int, *(_KINDS[sort] for sort in sorts))) for name, sorts in _SIGNATURES.items()
+    ]
+
+
+@cache
+def level() -> str:
+    """The level of the processor that the engine computes at: the best that it has.
+
+    The environment variable ISIW_LEVEL asks for a lower one, so that a session of another computer can be repeated bit
+    for bit.
+
+    Raises:
+        InvalidValueError: the processor does not have the level that is asked for.
+        IsiwError: there is no compiled engine for this computer.
+    """
+    wanted = os.environ.get(_WANTED)
+    there = [name for name in LEVELS if _found(name)]
+    if wanted is not None and wanted not in there:
+        raise InvalidValueError(
+            "this processor does not have the level of the environment variable ISIW_LEVEL",
+            got=wanted,
+            expected=f"one of {', '.join(there)}",
+            remedy="Leave it out to use the best level.",
+        )
+    if not there:
+        raise IsiwError(
+            "isiw was not compiled for this processor",
+            got=platform.machine(),
+            expected="an x86-64 of the years since 2009, or an aarch64",
+            remedy="Install isiw from its sources on this computer, or use another one.",
+        )
+    return there[0] if wanted is None else wanted
+
+
+def version() -> str:
+    """The version of the engine, and its level; two computers with both alike ask the same ISIs."""
+    return f"{VERSION}, {level()}"
+
+
+def call(name: str, *arguments: object) -> None:
+    """Call a function of the engine with numbers and addresses of arrays.
+
+    Raises:
+        MemoryError: there is not enough for what it needs in between.
+    """
+    if _functions(name)(*arguments):
+        raise MemoryError(f"there is no memory for {name}")
+
+
+@cache
+def _functions(name: str) -> Any:
+    return getattr(_found(level())[0], name)
+
+
+@cache
+def _found(name: str) -> Any:
+    """The functions of a level, behind a pointer that is false where the processor does not have it."""
+    engine = _library().isiw_engine
+    engine.argtypes, engine.restype = [ctypes.c_char_p], ctypes.POINTER(_Functions)
+    return engine(name.encode())
+
+
+@cache
+def _library() -> ctypes.CDLL:
+    try:
+        loaded = ctypes.CDLL(str(_PATH))
+    except OSError as error:
+        raise IsiwError(
+            "the compiled engine cannot be loaded",
+            got=str(error),
+            expected=str(_PATH),
+            remedy="Install isiw again; in a checkout: pip install -e .",
+        ) from error
+    require_built_of(loaded, Path(__file__).with_name("source"))
+    return loaded

@@ -1,0 +1,85 @@
+/* What Python calls: the law of particles over arrays. Sizes come with the arrays, and Python checks them before.
+
+Every function writes into the arrays that it is given, and returns 0, or -1 where there is no memory for what it needs
+in between. Single precision; indices are 64 bits. Arrays lie in C order: (b, p, d) are people, particles, latents. */
+
+#ifndef ISIW_ENGINE_H
+#define ISIW_ENGINE_H
+
+#include <stdint.h>
+
+/* What is known of a model's prior and of its moves; see `isiw.models.particles.target.Tables`. */
+typedef struct {
+    int64_t latents, blocks, width, knots, place_count, states, part_count, jump_count, kind_values;
+    const int64_t *at;         /* of the latent of each meaning; `latents` where the model has none, (MEANINGS,) */
+    const float *spreads;      /* usual SD of each latent, (latents,) */
+    const int64_t *first;      /* latent of each block, (blocks,) */
+    const int64_t *size;       /* how many latents it has, (blocks,) */
+    const int64_t *components; /* of its mixture, (blocks,); 0 for a start, negative for start and width with places */
+    const float *log_shares;   /* of the components, less the logs of their SDs, (blocks, width): whole lanes */
+    const float *below;        /* sums of the shares of earlier components, from the second on, likewise */
+    const float *means;        /* of the latents in each component, (latents, width) */
+    const float *sds;          /* likewise */
+    const float *per_sds;      /* 1 / SD, as dividers are slow */
+    const float *start_ms;     /* knots of the density of a start, evenly spaced, (knots,) */
+    const float *density;      /* at the knots */
+    const float *quantiles;    /* probability of an earlier start, at the knots */
+    const float *places;       /* log share less logs of SDs, mean and SD of start, then of log width, (place_count, 5) */
+    const float *place_below;  /* sums of the shares of earlier places, (place_count,) */
+    float place_share;         /* probability of all places */
+    int32_t apart;             /* enhancement and depression may not overlap */
+    const int64_t *state_of;   /* weights of the kinds in the number of a particle's state, (KINDS,) */
+    const uint8_t *shifted;    /* which latents a difference moves, (states, part_count, latents) */
+    const float *parts;        /* sums of the probabilities of earlier parts, (part_count - 1,) */
+    const float *jumps;        /* likewise of earlier jumps, (jump_count - 1,) */
+    const uint8_t *redrawn;    /* which latents each jump draws again, (jump_count, latents) */
+    const uint8_t *renewed;    /* which kinds each jump draws again, (jump_count, KINDS) */
+    const uint8_t *of_profile; /* the jump concerns nothing but a profile, (jump_count,) */
+    const float *kinds;        /* sums of the probabilities of earlier values of each kind, (KINDS, kind_values) */
+    int64_t changed;           /* block of the latent that says when something changes; that of its size is the next */
+} Tables;
+
+typedef struct {
+    /* The log likelihood of each person's trials (b, n, COLUMNS) under each particle (b, p, FIELDS), (b, p). */
+    int (*likelihoods)(int64_t people, int64_t particles, int64_t trials, const float *fields, const float *columns,
+                       float *found);
+    /* What particles mean after so many trials, or with their changes if it is negative, (b, p, FIELDS). */
+    int (*meanings)(const Tables *tables, int64_t people, int64_t particles, const float *values, const int64_t *kinds,
+                    int64_t trials, float *fields);
+    /* The log prior density of what ISIs are chosen with another law of, but for a constant, (b, p). */
+    int (*log_usual)(const Tables *tables, int64_t people, int64_t particles, const float *values, const int64_t *kinds,
+                     const float *densities, float *found);
+    /* Each person's particles moved so many times, in place; counts are shifts, accepted ones, jumps, accepted ones. */
+    int (*sweeps)(const Tables *tables, int64_t people, int64_t particles, int64_t trials, const int64_t *numbers,
+                  const float *columns, const float *steps, uint64_t *dice, float *values, int64_t *kinds,
+                  float *log_likelihood, float *densities, float *counts);
+    /* Facilitations of the rows of tables, (b, s, rows). */
+    int (*table_rows)(int64_t samples, int64_t rows, const float *fields, float *levels);
+    /* Expected MEPs above the floor, in floors, at the facilitations (b, s, rows). */
+    int (*evoked_means)(int64_t samples, int64_t rows, const float *fields, const float *levels, float *means);
+    /* The probability of each outcome of the next trial, after so many, at the facilitations, (b, s, rows, y). */
+    int (*outcome_tables)(int64_t people, int64_t samples, int64_t rows, int64_t outcomes, int64_t order,
+                          const float *fields, const float *levels, const float *log_mep, const float *widths,
+                          float *table);
+    /* What lies between the rows of tables (b, s, rows, y) at other facilitations (b, s, t), (b, s, t, y). */
+    int (*rows_between)(int64_t samples, int64_t rows, int64_t isis, int64_t outcomes, const float *fields,
+                        const float *table, const float *levels, float *found);
+    /* Facilitations at some ISIs (t,), (b, s, t). */
+    int (*facilitations)(int64_t samples, int64_t isis, const float *fields, const float *isi_ms, float *found);
+    /* Facilitation at each window's edge, 2 where there is no window, (b, s). */
+    int (*edge_levels)(int64_t samples, int64_t rows, int64_t isis, int32_t fine, const float *fields,
+                       const float *evoked, const float *isi_ms, float *found);
+    /* Windows as two runs of indices of ISIs: first, behind the last, (b, s, 4). */
+    int (*window_runs)(int64_t samples, int64_t isis, const float *fields, const float *levels, const float *isi_ms,
+                       int32_t *runs);
+    /* Entropy of the mean of distributions (s, t, y) less their mean entropy, (t,). */
+    int (*entropy_reductions)(int64_t samples, int64_t isis, int64_t outcomes, const float *mass, float *found);
+    /* Variance of each point's probability of membership in windows (s, g), less that expected after an outcome, (t,). */
+    int (*variance_reductions)(int64_t samples, int64_t isis, int64_t outcomes, int64_t points, const float *mass,
+                               const float *masks, float *found);
+    /* Elementary functions, for tests: exp, exp2, log, 1 / x, 1 / root x, and the probability that a standard normal
+    variable is between x and y, number 0 to 5. */
+    int (*elementary)(int32_t number, int64_t count, const float *x, const float *y, float *found);
+} Engine;
+
+#endif

@@ -1,0 +1,276 @@
+/* Markov chain moves of particles that leave the posterior of the trials so far unchanged.
+
+Half of the particles move at a time: by differences within the other half, or by a jump that draws some of their kinds
+and latents again. A move is accepted with probability min(1, exp(likelihood ratio + prior ratio + ratio of proposals))
+(Hastings, Biometrika 57, 1970). */
+
+#ifndef ISIW_MOVES_H
+#define ISIW_MOVES_H
+
+#include "likelihood.h"
+#include "prior.h"
+
+#define JUMPS 0.4f        /* how often a move is a jump */
+#define WHOLE_DIFFERENCE 0.1f /* how often a difference is added as it is, which leads from mode to mode */
+#define BLUR 0.02f        /* SD of what is added to a difference, as a share of the usual SD of each latent */
+#define RECENT 0.8f       /* how often the trial of another change is proposed among those so far */
+#define NEARLY 2.0f       /* SDs of the moves of a change: by how many trials, */
+#define A_LITTLE 0.3f     /* and at most by what size */
+#define OF_STEPS 0.7f     /* how often a size is proposed near the step of the amplitudes at its trial, */
+#define STEP_SD 0.3f      /* and how near, natural log */
+#define ANOTHER_KIND 0.25f /* how often a change that moves a little becomes one of another kind */
+
+/* What the moves of a person have in common. */
+typedef struct {
+    const Tables *tables;
+    const float *steps; /* of the mean log MEP at each trial, see `steps_of`, (count + 1,) */
+    int64_t count;      /* of trials */
+    float *redrawn;     /* room for latents that are drawn again, (latents,) */
+} Chain;
+
+/* The step of the amplitudes at the trial before which a change comes. */
+static double step_at(const Chain *chain, double after) {
+    double place = fmin(ceil(after), (double)chain->count);
+    return chain->steps[place > 0.0 ? (int64_t)place : 0];
+}
+
+/* Log density of when something changes, and of by how much. */
+INLINE float log_when(const Chain *chain, const float *z) {
+    return log_block(chain->tables, chain->tables->changed, z);
+}
+INLINE float log_size(const Chain *chain, const float *z) {
+    return log_block(chain->tables, chain->tables->changed + 1, z);
+}
+
+INLINE const float *change_edges(const Tables *tables) { return tables->kinds + OF_CHANGE * tables->kind_values; }
+
+/* Log of the prior of a change, or of none, by how other_change proposes it: p(change) / q(change). */
+static double favour(const Chain *chain, const float *z, int64_t kind) {
+    const Tables *tables = chain->tables;
+    double none = change_edges(tables)[0], span = fmax(1.0, (double)chain->count), recent = 0.0;
+    if (kind == NO_CHANGE) return log(2.0 * none);
+    float log_after = z[tables->at[LOG_CHANGED_AFTER]], size = z[tables->at[CHANGE_SIZE]];
+    double after = exp(log_after);
+    if (after < span) {
+        double apart = (size - step_at(chain, after)) / STEP_SD;
+        double near = exp(-0.5 * apart * apart - log(STEP_SD) - log_size(chain, z));
+        /* densities of mixtures lack the constant 1 / root of 2 pi, that of a trial among those so far has none */
+        recent = exp(log_after - log(span) - log_when(chain, z)) * 2.5066282746310002;
+        recent *= 1.0 - OF_STEPS + OF_STEPS * near;
+    }
+    return log((1.0 - none) / (RECENT * recent + 1.0 - RECENT));
+}
+
+/* Move a change a little, or to another trial; the log ratio of prior to proposal. */
+static double moved_change(const Chain *chain, uint64_t *dice, float *z, int64_t *kinds) {
+    const Tables *tables = chain->tables;
+    float *when = z + tables->at[LOG_CHANGED_AFTER], *size = z + tables->at[CHANGE_SIZE];
+    double span = fmax(1.0, (double)chain->count), after = exp(*when);
+    /* by the density of the trial, not of its log */
+    double before = (double)log_when(chain, z) + log_size(chain, z) - *when;
+    if (uniform(dice) < 0.5f)
+        after = after < span ? span * uniform(dice) : after;
+    else
+        after += NEARLY * normal(dice);
+    if (after <= 0.0) return -INFINITY;
+    float share = uniform(dice), none = change_edges(tables)[0];
+    *when = (float)log(after), *size += A_LITTLE * share * share * normal(dice);
+    if (uniform(dice) < ANOTHER_KIND)
+        kinds[OF_CHANGE] = which(none + (1.0f - none) * uniform(dice), change_edges(tables), tables->kind_values);
+    return (double)log_when(chain, z) + log_size(chain, z) - *when - before;
+}
+
+/* Let a particle have another change, or none; the log ratio of prior to proposal. */
+static double other_change(const Chain *chain, uint64_t *dice, float *z, int64_t *kinds) {
+    const Tables *tables = chain->tables;
+    double span = fmax(1.0, (double)chain->count), before = favour(chain, z, kinds[OF_CHANGE]);
+    float none = change_edges(tables)[0];
+    float *when = z + tables->at[LOG_CHANGED_AFTER], *size = z + tables->at[CHANGE_SIZE];
+    draw_block(tables, tables->changed, dice, z);
+    draw_block(tables, tables->changed + 1, dice, z);
+    int another = uniform(dice) >= 0.5f;
+    float quantile = none + (1.0f - none) * uniform(dice);
+    kinds[OF_CHANGE] = another ? which(quantile, change_edges(tables), tables->kind_values) : NO_CHANGE;
+    if (kinds[OF_CHANGE] != NO_CHANGE && uniform(dice) < RECENT) {
+        double after = fmax(span * uniform(dice), 1e-3);
+        *when = (float)log(after);
+        if (uniform(dice) < OF_STEPS) *size = (float)step_at(chain, after) + STEP_SD * normal(dice);
+    }
+    return favour(chain, z, kinds[OF_CHANGE]) - before;
+}
+
+/* Draw some latents and kinds of a particle again: which jump it is, and the log ratio of prior to proposal. What is
+drawn from the prior cancels. */
+static int64_t jump(const Chain *chain, uint64_t *dice, float *z, int64_t *kinds, double *ratio) {
+    const Tables *tables = chain->tables;
+    int64_t number = which(uniform(dice), tables->jumps, tables->jump_count - 1);
+    const uint8_t *redrawn = tables->redrawn + number * tables->latents, *renewed = tables->renewed + number * KINDS;
+    for (int64_t block = 0; block < tables->blocks; block++) {
+        int64_t first = tables->first[block], behind = first + tables->size[block];
+        int wanted = 0;
+        for (int64_t latent = first; latent < behind; latent++) wanted |= redrawn[latent];
+        if (!wanted) continue;
+        draw_block(tables, block, dice, chain->redrawn);
+        for (int64_t latent = first; latent < behind; latent++)
+            if (redrawn[latent]) z[latent] = chain->redrawn[latent];
+    }
+    for (int kind = 0; kind < OF_CHANGE; kind++)
+        if (renewed[kind])
+            kinds[kind] = which(uniform(dice), tables->kinds + kind * tables->kind_values, tables->kind_values);
+    *ratio = 0.0;
+    if (renewed[OF_CHANGE]) {
+        int moves = kinds[OF_CHANGE] != NO_CHANGE && uniform(dice) < 0.5f;
+        *ratio = moves ? moved_change(chain, dice, z, kinds) : other_change(chain, dice, z, kinds);
+    }
+    return number;
+}
+
+/* Add a scaled difference of two of the others (ter Braak, Stat. Comput. 16, 2006); log of the ratio of prior densities.
+Log densities of blocks are kept: UNKNOWN in found where a block does not move. */
+static double shift(const Chain *chain, uint64_t *dice, const float *theirs, int64_t others, const uint8_t *moves,
+                    const float *old, float *z, float *densities, float *found) {
+    const Tables *tables = chain->tables;
+    int64_t latents = tables->latents;
+    const float *one = theirs + latents * one_of(dice, others), *other = theirs + latents * one_of(dice, others);
+    float scale = uniform(dice) < WHOLE_DIFFERENCE ? 1.0f : 0.15f + 0.7f * uniform(dice);
+    double ratio = 0.0;
+    for (int64_t latent = 0; latent < latents; latent++)
+        if (moves[latent])
+            z[latent] += scale * (one[latent] - other[latent]) + BLUR * tables->spreads[latent] * blur(dice);
+    for (int64_t block = 0; block < tables->blocks; block++) {
+        int touched = 0;
+        for (int64_t latent = tables->first[block]; latent < tables->first[block] + tables->size[block]; latent++)
+            touched |= moves[latent];
+        found[block] = UNKNOWN;
+        if (!touched) continue;
+        if (densities[block] == UNKNOWN) densities[block] = log_block(tables, block, old);
+        found[block] = log_block(tables, block, z);
+        ratio += (double)found[block] - densities[block];
+    }
+    return ratio;
+}
+
+/* Whether enhancement and depression overlap. */
+static int overlap(const Tables *tables, const float *z) {
+    const int64_t *at = tables->at;
+    float start = z[at[START_MS]], low = z[at[LOW_START_MS]];
+    return start + exp_1(z[at[LOG_WIDTH_MS]]) > low && low + exp_1(z[at[LOW_LOG_WIDTH_MS]]) > start;
+}
+
+/* Where the particles of a half may move to. */
+typedef struct {
+    float *z;         /* (half, latents + 1): the last is 0, for latents that a model does not have */
+    float *found;     /* log densities of blocks, (half, blocks) */
+    float *fields;    /* what it means, (half, FIELDS) */
+    float *after;     /* its log likelihood, (half,) */
+    double *ratio;    /* of prior densities and proposals, natural log */
+    int64_t *kinds;   /* (half, KINDS) */
+    uint64_t *dice;   /* streams of draws */
+    uint8_t *jumped;  /* whether it is a jump */
+    uint8_t *wanted;  /* whether its likelihood must be worked out */
+} Proposals;
+
+static void propose(const Chain *chain, const Proposals *to, int64_t i, const float *old, const int64_t *kinds,
+                    float *densities, const float *theirs, int64_t others, float log_likelihood) {
+    const Tables *tables = chain->tables;
+    float *z = to->z + i * (tables->latents + 1), *found = to->found + i * tables->blocks;
+    int64_t *chosen = to->kinds + i * KINDS, state = 0;
+    uint64_t *dice = to->dice + i;
+    memcpy(z, old, (size_t)tables->latents * sizeof *z);
+    z[tables->latents] = 0.0f;
+    for (int kind = 0; kind < KINDS; kind++) chosen[kind] = kinds[kind], state += tables->state_of[kind] * kinds[kind];
+    int same = 1;
+    to->jumped[i] = uniform(dice) < JUMPS;
+    to->ratio[i] = 0.0;
+    if (to->jumped[i]) {
+        int64_t number = jump(chain, dice, z, chosen, to->ratio + i);
+        same = tables->of_profile[number] && !kinds[OF_PRESENT] && !chosen[OF_PRESENT];
+    } else {
+        int64_t part = which(uniform(dice), tables->parts, tables->part_count - 1);
+        const uint8_t *moves = tables->shifted + (state * tables->part_count + part) * tables->latents;
+        for (int64_t latent = 0; latent < tables->latents; latent++) same &= !moves[latent];
+        if (same)
+            for (int64_t block = 0; block < tables->blocks; block++) found[block] = UNKNOWN;
+        else
+            to->ratio[i] = shift(chain, dice, theirs, others, moves, old, z, densities, found);
+    }
+    if (tables->apart && overlap(tables, z)) to->ratio[i] = -INFINITY;
+    to->after[i] = log_likelihood;
+    to->wanted[i] = to->ratio[i] > -INFINITY && !same;
+    if (to->wanted[i]) meaning_of(tables, z, chosen, to->fields + i * FIELDS);
+}
+
+/* The particles of a person, in place. */
+typedef struct {
+    float *values, *log_likelihood, *densities, *counts;
+    int64_t *kinds;
+} State;
+
+static void accept(const Tables *tables, const Proposals *to, int64_t i, State *state, int64_t particle) {
+    float *log_likelihood = state->log_likelihood + particle, *densities = state->densities + particle * tables->blocks;
+    int sort = to->jumped[i] ? 2 : 0;
+    state->counts[sort] += 1.0f;
+    double ratio = (double)to->after[i] - *log_likelihood + to->ratio[i];
+    if (!(log(fmax(uniform(to->dice + i), 1e-30f)) < ratio)) return;
+    state->counts[sort + 1] += 1.0f;
+    *log_likelihood = to->after[i];
+    memcpy(state->values + particle * tables->latents, to->z + i * (tables->latents + 1),
+           (size_t)tables->latents * sizeof(float));
+    memcpy(state->kinds + particle * KINDS, to->kinds + i * KINDS, KINDS * sizeof(int64_t));
+    for (int64_t block = 0; block < tables->blocks; block++) {
+        float found = to->found[i * tables->blocks + block];
+        if (to->jumped[i])
+            densities[block] = UNKNOWN;
+        else if (found != UNKNOWN)
+            densities[block] = found;
+    }
+}
+
+/* Move the particles first to behind by differences within those from theirs on. */
+static void move_half(const Chain *chain, const Proposals *to, const Trial *trials, int shares, State *state,
+                      uint64_t sweep, int64_t first, int64_t behind, int64_t theirs, int64_t others) {
+    const Tables *tables = chain->tables;
+    int64_t latents = tables->latents, size = behind - first;
+    for (int64_t i = 0; i < size; i++) {
+        int64_t particle = first + i;
+        to->dice[i] = stream_of(sweep, particle);
+        propose(chain, to, i, state->values + particle * latents, state->kinds + particle * KINDS,
+                state->densities + particle * tables->blocks, state->values + theirs * latents, others,
+                state->log_likelihood[particle]);
+    }
+    person_likelihood(to->fields, size, to->wanted, trials, chain->count, shares, to->after);
+    for (int64_t i = 0; i < size; i++) accept(tables, to, i, state, first + i);
+}
+
+static int sweeps(const Tables *tables, int64_t people, int64_t particles, int64_t count, const int64_t *numbers,
+                  const float *columns, const float *steps, uint64_t *dice, float *values, int64_t *kinds,
+                  float *log_likelihood, float *densities, float *counts) {
+    int64_t half = particles / 2, most = particles - half, latents = tables->latents, blocks = tables->blocks;
+    size_t each = (size_t)most;
+    Trial *trials = malloc((size_t)(count + 1) * sizeof *trials);
+    Proposals to = {
+        .z = malloc(each * (size_t)(latents + 1) * sizeof(float)), .found = malloc(each * (size_t)blocks * sizeof(float)),
+        .fields = malloc(each * FIELDS * sizeof(float)), .after = malloc(each * sizeof(float)),
+        .ratio = malloc(each * sizeof(double)), .kinds = malloc(each * KINDS * sizeof(int64_t)),
+        .dice = malloc(each * sizeof(uint64_t)), .jumped = malloc(each), .wanted = malloc(each)};
+    float *redrawn = malloc((size_t)latents * sizeof *redrawn);
+    int there = trials && to.z && to.found && to.fields && to.after && to.ratio && to.kinds && to.dice && to.jumped &&
+                to.wanted && redrawn;
+    for (int64_t person = 0; there && person < people; person++) {
+        int shares = trials_of(columns + person * count * COLUMNS, count, trials);
+        Chain chain = {tables, steps + person * (count + 1), count, redrawn};
+        int64_t at = person * particles;
+        State state = {values + at * latents, log_likelihood + at, densities + at * blocks, counts + 4 * person,
+                       kinds + at * KINDS};
+        for (int64_t sweep = 0; sweep < numbers[person]; sweep++) {
+            uint64_t stream = random_bits(dice + person);
+            move_half(&chain, &to, trials, shares, &state, stream, 0, half, half, most);
+            move_half(&chain, &to, trials, shares, &state, stream, half, particles, 0, half);
+        }
+    }
+    free(trials), free(to.z), free(to.found), free(to.fields), free(to.after), free(to.ratio), free(to.kinds);
+    free(to.dice), free(to.jumped), free(to.wanted), free(redrawn);
+    return there ? 0 : -1;
+}
+
+#endif

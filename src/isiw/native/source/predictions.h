@@ -1,0 +1,147 @@
+/* What particles predict: expected MEPs, and the distribution of the next one, in tables by facilitation.
+
+Here the lanes are the rows of a table, or the outcomes. */
+
+#ifndef ISIW_PREDICTIONS_H
+#define ISIW_PREDICTIONS_H
+
+#include "likelihood.h"
+
+/* Facilitations of the rows: squares of equal steps, or equal steps from the deepest depression. */
+static int table_rows(int64_t samples, int64_t rows, const float *fields, float *levels) {
+    for (int64_t i = 0; i < samples; i++) {
+        float depth = fields[i * FIELDS + DEPTH];
+        for (int64_t row = 0; row < rows; row++) {
+            float share = (float)row / (float)(rows - 1);
+            levels[i * rows + row] = depth > 0.0f ? share * (1.0f + depth) - depth : share * share;
+        }
+    }
+    return 0;
+}
+
+/* Where a facilitation lies among the rows of a table. */
+INLINE float position_of(float level, float depth, int64_t rows) {
+    float share = depth > 0.0f ? (level + depth) / (1.0f + depth) : root_1(least_1(most_1(level, 0.0f), 1.0f));
+    return least_1(most_1(share, 0.0f), 1.0f) * (float)(rows - 1);
+}
+
+/* The row below a position; no number is no row either. */
+INLINE int64_t row_below(float position, int64_t rows) {
+    if (!(position > 0.0f)) return 0;
+    return position < (float)(rows - 2) ? (int64_t)position : rows - 2;
+}
+
+/* Probability of a response at facilitations. */
+INLINE Reals responses(const float *fields, Reals level) {
+    level = most_v(level, all(0.0f));
+    if (fields[NOISE] == MISSING) return fields[MOST] * root_v(level);
+    if (fields[NOISE] == ALL_OR_NONE) return fields[LEAST] + (fields[MOST] - fields[LEAST]) * level;
+    return all(1.0f);
+}
+
+/* Expected MEPs above the floor: nodes that have all of the variance of the noise are enough for an expectation. */
+static int evoked_means(int64_t samples, int64_t rows, const float *fields, const float *levels, float *means) {
+    for (int64_t i = 0; i < samples; i++) {
+        const float *one = fields + i * FIELDS;
+        int curved = is_curved(one), whole = one[NOISE] == ALL_OR_NONE;
+        float ratio = exp_1(one[LOG_RATIO]);
+        if (curved) ratio *= exp_1(0.5f * one[OUTPUT_SD] * one[OUTPUT_SD]) / (1.0f - one[ONSET]);
+        for (int64_t row = 0; row < rows; row += LANES) {
+            Reals level = loaded(levels + i * rows + row, rows - row), mean = whole ? all(1.0f) : level;
+            if (curved) {
+                mean = all(0.0f);
+                for (int q = 0; q < NODES; q++) {
+                    Reals drive = one[REST] + one[SPREAD] * node_at[q] * (float)(1.0 / ON_NODES) + one[BOOST] * level;
+                    Reals over = per_v(1.0f + exp_v(-drive)) - one[ONSET];
+                    mean += node_weight[q] * most_v(over, all(0.0f));
+                }
+            }
+            stored(mean * ratio * responses(one, level), means + i * rows + row, rows - row);
+        }
+    }
+    return 0;
+}
+
+/* A particle's log-normal at each node and row: means and inverse SDs, (NODES, rows) each. */
+static void components_of(const float *fields, float gain, const float *levels, int64_t rows, float *means, float *sds) {
+    Particles particle = alike(fields);
+    int curved = is_curved(fields), rectified = fields[ONSET] > 0.0f, whole = fields[NOISE] == ALL_OR_NONE;
+    Curve curve = curve_of(&particle, curved);
+    Situation made = {.start = particle.of[ONSET], .known = all(0.0f), .responds = all(1.0f),
+                      .floor_variance = particle.of[FLOOR_SD] * particle.of[FLOOR_SD],
+                      .output = curved ? particle.of[OUTPUT_SD] * particle.of[OUTPUT_SD] : all(0.0f),
+                      .scale = exp_v(particle.of[LOG_RATIO] + (gain + (curved ? 0.0f : FAR_BELOW)))};
+    for (int64_t row = 0; row < rows; row += LANES) {
+        Reals level = loaded(levels + row, rows - row);
+        made.drive = curved  ? particle.of[REST] + particle.of[BOOST] * level
+                     : whole ? all(0.0f)
+                             : log_v(most_v(level, all(1e-9f)));
+        for (int first = 0; first < NODES; first += TOGETHER_NODES) {
+            Reals mean[TOGETHER_NODES], inverse_sd[TOGETHER_NODES];
+            components(&made, curve.at + first, curve.between + first, rectified, mean, inverse_sd);
+            for (int q = 0; q < TOGETHER_NODES; q++) {
+                stored(mean[q], means + (first + q) * rows + row, rows - row);
+                stored(inverse_sd[q], sds + (first + q) * rows + row, rows - row);
+            }
+        }
+    }
+}
+
+/* Probabilities of outcomes (y,) by their log MEPs and widths in one row. */
+static void outcomes_of(const float *fields, float responds, const float *means, const float *sds, int64_t rows,
+                        const float *log_mep, const float *widths, int64_t outcomes, float *found) {
+    float silent_sd = 1.0f / fields[FLOOR_SD];
+    for (int64_t y = 0; y < outcomes; y += LANES) {
+        Reals over = loaded(log_mep + y, outcomes - y) - fields[LOG_FLOOR], evoked = all(0.0f);
+        for (int first = 0; first < NODES; first += TOGETHER_NODES) {
+            const float *mean = means + first * rows, *sd = sds + first * rows;
+            Reals bell[TOGETHER_NODES];
+            EACH_NODE bell[q] = bell_v((over - mean[q * rows]) * sd[q * rows]);
+            EACH_NODE evoked += node_weight[first + q] * sd[q * rows] * bell[q];
+        }
+        Reals silent = silent_sd * bell_v(over * silent_sd);
+        Reals outlier = pick((over > LOG_2) & (over < LOG_200), all(OUTLIER_DENSITY), all(0.0f)) + 1e-6f;
+        Reals mixed = responds * evoked + (1.0f - responds) * silent;
+        Reals mass = (1.0f - OUTLIERS) * ROOT_PER_TURN * mixed + OUTLIERS * outlier;
+        stored(mass * loaded(widths + y, outcomes - y), found + y, outcomes - y);
+    }
+    float per_sum = 1.0f / total(found, outcomes);
+    for (int64_t y = 0; y < outcomes; y++) found[y] *= per_sum;
+}
+
+static int outcome_tables(int64_t people, int64_t samples, int64_t rows, int64_t outcomes, int64_t order,
+                          const float *fields, const float *levels, const float *log_mep, const float *widths,
+                          float *table) {
+    float startle, relaxed, *room = malloc((size_t)(2 * NODES * rows + 1) * sizeof *room);
+    if (!room) return -1;
+    gain_of((float)order, &startle, &relaxed);
+    for (int64_t i = 0; i < people * samples; i++) {
+        const float *one = fields + i * FIELDS, *rows_of = levels + i * rows;
+        components_of(one, one[DRIFT] * relaxed + one[STARTLED] * startle, rows_of, rows, room, room + NODES * rows);
+        for (int64_t row = 0; row < rows; row++)
+            outcomes_of(one, responses(one, all(rows_of[row]))[0], room + row, room + NODES * rows + row, rows,
+                        log_mep + i / samples * outcomes, widths, outcomes, table + (i * rows + row) * outcomes);
+    }
+    free(room);
+    return 0;
+}
+
+static int rows_between(int64_t samples, int64_t rows, int64_t isis, int64_t outcomes, const float *fields,
+                        const float *table, const float *levels, float *found) {
+    for (int64_t i = 0; i < samples; i++)
+        for (int64_t t = 0; t < isis; t++) {
+            float position = position_of(levels[i * isis + t], fields[i * FIELDS + DEPTH], rows);
+            int64_t row = row_below(position, rows);
+            const float *first = table + (i * rows + row) * outcomes, *second = first + outcomes;
+            float share = position - (float)row, *blend = found + (i * isis + t) * outcomes;
+            for (int64_t y = 0; y < outcomes; y++) blend[y] = first[y] + share * (second[y] - first[y]);
+        }
+    return 0;
+}
+
+static int facilitations(int64_t samples, int64_t isis, const float *fields, const float *isi_ms, float *found) {
+    for (int64_t i = 0; i < samples; i++) facilitations_at(fields + i * FIELDS, isi_ms, isis, found + i * isis);
+    return 0;
+}
+
+#endif

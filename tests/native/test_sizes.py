@@ -1,0 +1,39 @@
+"""The engine stays within its arrays and does nothing undefined, which the sanitizers of a compiler see."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from benchmarks import sanitized
+
+BEYOND = """
+import numpy as np
+from benchmarks import sanitized
+from isiw.native import engine, library
+sanitized.take()
+fields, levels = (np.zeros(size, dtype=np.float32) for size in (engine.FIELDS, 23))
+library.call("table_rows", 1, 24, *(array.__array_interface__["data"][0] for array in (fields, levels)))
+"""
+
+pytestmark = pytest.mark.skipif(sanitized.compiler() is None, reason="no compiler with sanitizers here")
+
+
+@pytest.fixture
+def folder(pytestconfig: pytest.Config) -> Path:
+    """Where the library is kept from run to run: compiling it takes some seconds."""
+    cache = pytestconfig.cache
+    assert cache is not None
+    return cache.mkdir("sanitized")
+
+
+def test_nothing_leaves_its_arrays_at_sizes_around_each_constant(folder: Path) -> None:
+    ended = sanitized.run([Path(__file__).with_name("sizes.py")], folder)
+    assert ended.returncode == 0, ended.stderr
+
+
+def test_whoever_leaves_an_array_is_noticed(folder: Path) -> None:
+    ended = sanitized.run(["-c", BEYOND], folder)
+    assert ended.returncode != 0
+    assert "AddressSanitizer: heap-buffer-overflow" in ended.stderr
