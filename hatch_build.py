@@ -192,6 +192,12 @@ def sanitized() -> bool:
     return os.environ.get("ISIW_SANITIZE", "0") not in {"", "0"}
 
 
+def levels() -> dict[str, list[str]]:
+    """The levels to compile, with their flags; with checks of itself one, which nearly every computer has."""
+    every = LEVELS[wanted().machine]
+    return {"v3": every["v3"]} if sanitized() and "v3" in every else every
+
+
 def stamp() -> str:
     """What a library states of how it was made: the digest of its sources, and that of everything else."""
     named = [os.environ.get(name) for name in ("CC", "ISIW_CFLAGS")]
@@ -237,8 +243,9 @@ def build(library: Path) -> None:
         folder = Path(name)
         os.environ.setdefault("ZIG_GLOBAL_CACHE_DIR", str(folder / "zig"))  # so that nothing stays behind
         (folder / "stamp.c").write_text(STAMP.format(stamp()), "utf-8")
-        jobs = [(SOURCES / "dispatch.c", "dispatch", []), (folder / "stamp.c", "stamp", [])]
-        for level, its_flags in LEVELS[wanted().machine].items():
+        known = [f"-DISIW_HAS_{level}" for level in levels()]
+        jobs = [(SOURCES / "dispatch.c", "dispatch", known), (folder / "stamp.c", "stamp", [])]
+        for level, its_flags in levels().items():
             jobs.append((SOURCES / "level.c", level, [f"-DISIW_LEVEL={level}", *its_flags]))
         with ThreadPoolExecutor() as workers:
             done = workers.map(lambda job: compiled(command, job[0], folder / f"{job[1]}.o", job[2]), jobs)

@@ -51,6 +51,7 @@ def run(arguments: Sequence[str | Path], folder: Path) -> subprocess.CompletedPr
     build = "import sys, pathlib, hatch_build; hatch_build.build(pathlib.Path(sys.argv[1]))"
     subprocess.run([sys.executable, "-c", build, made], env=environment, check=True)  # noqa: S603 - this repository's
     environment |= {TAKEN: str(made), "LD_PRELOAD": str(_allocator(command)), "ASAN_OPTIONS": "detect_leaks=0"}
+    environment |= {"PYTHONMALLOC": "malloc"}  # or small arrays come from memory that the sanitizers do not see
     return subprocess.run(  # noqa: S603 - scripts of this repository
         [sys.executable, *arguments], env=environment, capture_output=True, text=True, check=False
     )
