@@ -17,6 +17,7 @@ from existing.writers import (
     RECORDINGS,
     WORDS,
     as_matlab_73,
+    as_nwb,
     as_smr,
     as_statistics,
     as_xdf,
@@ -45,6 +46,13 @@ def test_a_recording_of_each_format_is_read_back(kind: str, tmp_path: Path) -> N
     if kind.startswith("NWB"):
         layout = layout.saying(channels={"emg": "EMG FCR"})
     require_as_written(read(RECORDINGS[kind](tmp_path), layout))
+
+
+@pytest.mark.parametrize("write", [as_xdf, as_nwb])
+def test_triggers_that_are_numbers_at_times_of_their_own_are_events(write: Any, tmp_path: Path) -> None:
+    channels = {"emg": "FCR" if write is as_xdf else "EMG FCR"}
+    layout = Layout(reference="impact", channels=channels, markers={"tap": "1", "pulse": "2"}, unmarked="alone")
+    require_as_written(read(write(tmp_path, codes=True), layout))
 
 
 def require_without(person: Delivered, lost: set[int]) -> None:
@@ -112,6 +120,9 @@ def test_a_table_of_spss_or_stata_has_the_units_and_words_of_its_labels(suffix: 
         require_as_written(read(tmp_path / "P01.zsav"))
     else:
         require_as_written(read(as_statistics(tmp_path / f"P01{suffix}")))
+    as_statistics(tmp_path / f"P02{suffix.replace('z', '')}", "Peak to peak (% of control)")
+    with pytest.raises(IsiwError, match="relative to others"):
+        read(tmp_path / f"P02{suffix.replace('z', '')}", NAMED.saying(units=("uV",)))
 
 
 @pytest.mark.parametrize(

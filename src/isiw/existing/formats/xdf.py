@@ -72,9 +72,10 @@ def _part(values: Any, channel: int, first: int, last: int) -> FloatArray:
 
 
 def _is_of_markers(stream: Mapping[str, Any]) -> bool:
-    """True for texts, and for numbers that come at no rate."""
-    texts = _said(stream["info"], "channel_format") == "string"
-    return texts or (float(_said(stream["info"], "nominal_srate") or 0.0) == 0.0 and "marker" in _kind(stream))
+    """True for texts, and for numbers that come at no rate: whole ones, or of a type that says so."""
+    form = _said(stream["info"], "channel_format")
+    coded = form.startswith("int") or any(word in _kind(stream) for word in ("marker", "trig", "ttl", "stim", "event"))
+    return form == "string" or (float(_said(stream["info"], "nominal_srate") or 0.0) == 0.0 and coded)
 
 
 def _kind(stream: Mapping[str, Any]) -> str:
