@@ -5,7 +5,8 @@
 A recording of 8 channels at 5,000 Hz is written in a temporary folder, in pieces, in several formats, with a tap and a
 pulse every 6 s. Another process reads its trials, one for each format, by one of its own: the time of the processor is
 that of both, and so is the memory, the most of each added up, the imports of Python and of the format's library
-included; of the table, until nothing is left but to estimate. Needs the extras import, import-nwb and test, and about 4 GB of disk.
+included; of the table, until nothing is left but to estimate. Needs the extras import, import-nwb and test, and about
+4 GB of disk.
 """
 
 from __future__ import annotations
@@ -247,7 +248,8 @@ def main() -> None:
         one = measured(as_table(Path(folder), arguments.rows))
     print(
         f"\nA table of {arguments.rows:,} rows and {one['people']:,.0f} people: {one['cpu_s']:.1f} s of the processor, "
-        f"{one['clock_s']:.1f} s by the clock of a computer that did other things besides, and {one['mb']:.0f} MB until nothing is left but to estimate, imports included."
+        f"{one['clock_s']:.1f} s by the clock of a computer that did other things besides, and {one['mb']:.0f} MB "
+        "until nothing is left but to estimate, imports included."
     )
 
 

@@ -12,6 +12,7 @@ import re
 from bisect import bisect_right
 from collections.abc import Iterator
 from contextlib import suppress
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,10 +21,12 @@ import numpy as np
 from isiw.files import opened
 from isiw.types import FloatArray
 
-_BOUNDARY: Final = bytes.fromhex("43a546dccbf5410fb30ed5467383cbe4")
+BOUNDARY: Final = bytes.fromhex("43a546dccbf5410fb30ed5467383cbe4")
 _TYPES: Final = {"float32": "<f4", "double64": "<f8", "int8": "<i1", "int16": "<i2", "int32": "<i4", "int64": "<i8"}
 _HEADER, _SAMPLES, _FOOTER = 2, 3, 6
 _LATE_S: Final = 1e-3
+_MOST: Final = 2**31
+"""A chunk that is longer [bytes] is damaged."""
 
 
 class Numbers:
@@ -44,20 +47,19 @@ class Numbers:
         times_s = (known_s[since] + self.period_s * (np.arange(count + 1) - since))[1:]
         late = np.flatnonzero(np.abs(np.diff(times_s) - self.period_s) > _LATE_S) + 1
         chosen = np.unique([0, *late, count - 1])
+        self.last_s = float(times_s[-1])
         self.index += (self.firsts[-1] + chosen).tolist()
         self.times_s += times_s[chosen].tolist()
-        self.last_s = float(times_s[-1])
         self.places.append((at, len(raw), count))
         self.firsts.append(self.firsts[-1] + count)
 
     def _placed(self, raw: bytes, count: int) -> tuple[Any, FloatArray]:
         """Where the numbers of each sample are in a chunk [bytes], and the times of those that have one [s]."""
         bare, number = 1 + self.width, np.arange(count)
-        if len(raw) == count * bare + 8 and raw[0]:
+        if len(raw) == count * bare + 8 and raw[0]:  # the first has a time, and the others follow
             begins, stamped = 9 + bare * number, number[:1]
-        elif len(raw) in {count * bare, count * (bare + 8)}:
-            stamped = number[: count if len(raw) > count * bare else 0]
-            begins = (1 + number * bare) + 8 * (number + 1) * bool(len(stamped))
+        elif len(raw) == count * (bare + 8):
+            begins, stamped = 9 + (bare + 8) * number, number
         else:
             found, at = list[int](), 0
             for _ in range(count):
@@ -65,14 +67,13 @@ class Numbers:
                 at = found[-1] + self.width
             begins = np.array(found)
             stamped = np.flatnonzero(np.diff(begins, prepend=-self.width) > bare)
-        bytes_ = np.frombuffer(raw, np.uint8)
         stamps = np.full(count, np.nan)
-        stamps[stamped] = bytes_[(begins[stamped] - 8)[:, None] + np.arange(8)].view("<f8").ravel()
+        stamps[stamped] = _picked(raw, begins[stamped] - 8, "<f8")
         return begins, stamps
 
     def read(self, channel: int, first: int, last: int) -> FloatArray:
         """The numbers of a channel from one sample to before another."""
-        found, size = [np.empty(0)], self.type.itemsize
+        found = [np.empty(0)]
         with _opened(self.path) as file:
             for n in range(bisect_right(self.firsts, first) - 1, len(self.places)):
                 if self.firsts[n] >= last:
@@ -81,9 +82,14 @@ class Numbers:
                 file.seek(at)
                 raw = file.read(length)
                 begins = self._placed(raw, count)[0][max(0, first - self.firsts[n]) : last - self.firsts[n]]
-                picked = np.frombuffer(raw, np.uint8)[begins[:, None] + channel * size + np.arange(size)]
-                found.append(picked.view(self.type).ravel().astype(np.float64))
+                found.append(_picked(raw, begins + channel * self.type.itemsize, self.type))
         return np.concatenate(found)
+
+
+def _picked(raw: bytes, begins: Any, kind: Any) -> FloatArray:
+    """The numbers that begin at some bytes."""
+    places = begins[:, None] + np.arange(np.dtype(kind).itemsize)
+    return np.frombuffer(raw, np.uint8)[places].view(kind).ravel().astype(np.float64)
 
 
 def shortened(path: Path) -> tuple[dict[int, Numbers], io.BytesIO]:
@@ -91,11 +97,7 @@ def shortened(path: Path) -> tuple[dict[int, Numbers], io.BytesIO]:
     held, rest, ends = dict[int, Numbers](), [b"XDF:"], dict[int, bytes]()
     for at, tag, content in _chunks(path):
         stream = int.from_bytes(content[:4], "little")
-        if (
-            tag == _HEADER
-            and _of(content, "channel_format") in _TYPES
-            and float(_of(content, "nominal_srate") or 0) > 0
-        ):
+        if tag == _HEADER and _of(content, "channel_format") in _TYPES and float(_of(content, "nominal_srate") or 0):
             held[stream] = Numbers(path, content)
         if tag == _SAMPLES and stream in held:
             begin = 5 + content[4]
@@ -126,14 +128,14 @@ def _chunks(path: Path) -> Iterator[tuple[int, int, bytes]]:
         while (size := file.read(1)) != b"":
             length = int.from_bytes(file.read(size[0]), "little") if size[0] in {1, 4, 8} else 0
             at = file.tell()
-            content = file.read(length)
+            content = file.read(length if length < _MOST else 0)
             if 2 <= length == len(content):
                 yield at + 2, int.from_bytes(content[:2], "little"), content[2:]
                 continue
             file.seek(at)
-            if (found := file.read().find(_BOUNDARY)) < 0:
+            if (found := file.read().find(BOUNDARY)) < 0:
                 return
-            file.seek(at + found + len(_BOUNDARY))
+            file.seek(at + found + len(BOUNDARY))
 
 
 def _chunk(tag: int, content: bytes) -> bytes:
@@ -147,7 +149,10 @@ def _of(said: bytes, key: str) -> str:
 
 
 def _opened(path: Path) -> Any:
-    if path.suffix.casefold() != ".xdfz":
-        return opened(path)
+    return io.BytesIO(_unpacked(path)) if path.suffix.casefold() == ".xdfz" else opened(path)
+
+
+@lru_cache(maxsize=1)
+def _unpacked(path: Path) -> bytes:
     with opened(path) as packed:
-        return io.BytesIO(gzip.decompress(packed.read()))
+        return gzip.decompress(packed.read())
