@@ -24,7 +24,6 @@ from isiw.text.named_code import library
 
 TEXTS: Final = {".csv", ".tsv", ".txt", ".dat", ".tab"}
 WORKBOOKS: Final = {".xlsx", ".xlsm"}
-SUFFIXES: Final = TEXTS | WORKBOOKS | {".parquet", ".mat"}
 
 _LINES: Final = 100
 """Within so many lines the columns' names are sought."""

@@ -43,7 +43,8 @@ def read(path: Path, layout: Layout) -> Contents:
     for key, name in layout.channels.items():
         if key != "events" and name not in {track.name for track in tracks}:
             values = _numbers(frame, name, layout, source)
-            tracks.append(_track(name, rate_hz, stretches, values, "stim" if key in MARKERS else ""))
+            unit, kind = unit_said(name, EMG_UNITS) or "", "stim" if key in MARKERS else ""
+            tracks.append(Track.of_values(name, rate_hz, stretches, values, unit, kind))
     rows = []
     for at, text in enumerate(frame[layout.channels["events"]].tolist() if "events" in layout.channels else ()):
         if not is_missing(text):
@@ -52,12 +53,6 @@ def read(path: Path, layout: Layout) -> Contents:
     if len(blocks) > 1:
         rows += [("sweep", one.start_s, one.samples / rate_hz) for one in stretches]
     return Contents(source, tuple(tracks), events_of(rows))
-
-
-def _track(name: str, rate_hz: float, stretches: tuple[Stretch, ...], values: FloatArray, kind: str) -> Track:
-    return Track(
-        name, rate_hz, stretches, lambda first, last: values[first:last], unit_said(name, EMG_UNITS) or "", kind
-    )
 
 
 def required(layout: Layout, key: Literal["rate_hz", "pulse_at_ms"], what: str) -> float:

@@ -51,16 +51,22 @@ class Track:
     kind: str = ""
 
     @classmethod
-    def whole(cls, name: str, rate_hz: float, values: FloatArray, unit: str = "", start_s: float = 0.0) -> Track:
-        """A channel in memory without gaps."""
-        return cls(name, rate_hz, (Stretch(0, len(values), start_s),), lambda first, last: values[first:last], unit)
+    def of_values(
+        cls, name: str, rate_hz: float, stretches: Iterable[Stretch], values: Any, unit: str, kind: str = ""
+    ) -> Track:
+        """A channel in memory."""
+
+        def part(first: int, last: int) -> FloatArray:
+            return np.asarray(values[first:last], dtype=np.float64)
+
+        return cls(name, rate_hz, tuple(stretches), part, unit, kind)
 
     @classmethod
     def of_sweeps(cls, name: str, rate_hz: float, sweeps: FloatArray, unit: str, kind: str = "") -> Track:
         """A channel of sweeps of one length, shape (n, w)."""
-        values, length = np.ascontiguousarray(sweeps).ravel(), sweeps.shape[1]
-        stretches = tuple(Stretch(n * length, length, n * APART_S) for n in range(len(sweeps)))
-        return cls(name, rate_hz, stretches, lambda first, last: values[first:last], unit, kind)
+        length = sweeps.shape[1]
+        stretches = [Stretch(n * length, length, n * APART_S) for n in range(len(sweeps))]
+        return cls.of_values(name, rate_hz, stretches, np.ascontiguousarray(sweeps).ravel(), unit, kind)
 
     def at(self, time_s: float) -> Stretch | None:
         """The stretch that a time is in; None in a gap."""
