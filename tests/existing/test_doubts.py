@@ -89,6 +89,8 @@ ASKED: dict[str, tuple[pd.DataFrame, dict[str, Any], str]] = {
     "an ISI of -1": (table().assign(isi_ms=np.where(ISIS > 20, ISIS, -1.0)), {}, "--alone -1 if they are TMS alone"),
     "an ISI of 999": (table().assign(isi_ms=np.where(ISIS > 20, ISIS, 999.0)), {}, "4 rows .* have the ISI 999 ms"),
     "muscles as blocks": (long("block", ["FCR", "FDI"]), {}, 'comes back after another block.*--where "block=FCR"'),
+    "a row a muscle, which nothing says": (long("x", ["", ""]).drop(columns="x"), {}, "come 2 times each, as if"),
+    "muscles below each other": (pd.concat([table().assign(isi_ms=ISIS + np.linspace(0, 1, 36))] * 2), {}, "2 times"),
     "a few rows of another coil": (table(coil=of(["sham", *["real"] * 7])), {}, "'coil'"),
     "a few rows a person": (table(code=of([f"VP{n}" for n in range(9)])), {}, "'code'.*and 6 others"),
     "what recordings have": (table(), {"markers": {"pulse": "TMS"}}, "is a table, and has no use for markers"),

@@ -7,6 +7,7 @@ import re
 import statistics
 from collections import Counter
 from collections.abc import Sequence
+from itertools import groupby
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -40,6 +41,8 @@ _RELATIVE: Final = re.compile(
 _ROWS_A_WORD: Final = 4
 _ROWS_A_NUMBER: Final = 6
 """With fewer rows for each of its words or numbers a column does not tell kinds of trials from each other."""
+_FEWEST: Final = 12
+"""In a table with fewer rows ISIs may come again by chance."""
 _SHARED: Final = 0.8
 _ONE_SIDED: Final = 8.0
 """A sweep with an MEP that rises from its median by so many times what it falls below it has one half only."""
@@ -154,6 +157,25 @@ def require_isis(columns: Columns, rows: Sequence[int], layout: Layout) -> None:
                 expected="what an ISI is, and what is TMS alone",
                 remedy=f"Say --alone {odd / isi.factor:g} if they are TMS alone; if they are pairs, say --alone never.",
             )
+
+
+def require_one_row_each(columns: Columns, rows: Sequence[int], layout: Layout) -> None:
+    """Raise if the ISIs come twice as if each trial had a row a muscle: one after the other, or all of them again."""
+    texts = [columns["isi"].text(row) for row in rows]
+    if "order" in columns.of or layout.where or len(texts) < _FEWEST:
+        return
+    runs = [len([*each]) for _, each in groupby(texts)]
+    times, half = math.gcd(*runs), len(texts) // 2
+    pairs = [row for row in rows if not columns.tms_alone(row, layout.alone)]
+    whole = all(round(columns["isi"].number(row) or 0.0, 3).is_integer() for row in pairs)
+    again = texts[:half] == texts[half:] and not whole  # realised ISIs do not come again
+    if (times > 1 and len(runs) > len({*texts})) or (again and len({*texts}) > 2):
+        raise InvalidValueError(
+            f"the ISIs of {columns['isi'].of} come {times if times > 1 else 2} times each, as if there was a row for "
+            "each of several muscles",
+            got=", ".join(texts[: 2 * max(times, 2)]),
+            remedy="Leave one row for each trial; if each row is one, number them in a column called trial.",
+        )
 
 
 def require_one_kind(columns: Columns, rows: Sequence[int], layout: Layout, source: str) -> None:

@@ -17,7 +17,7 @@ from isiw.existing import formats, frames, recordings, tables
 from isiw.existing.apart import read_apart
 from isiw.existing.dates import dates_of, latest_of, times_of
 from isiw.existing.delivered import Delivered, anywhere, read_log, renumbered
-from isiw.existing.doubts import ALL, require_codes, require_isis, require_one_kind, require_short
+from isiw.existing.doubts import ALL, require_codes, require_isis, require_one_kind, require_one_row_each, require_short
 from isiw.existing.formats import mne_files
 from isiw.existing.formats.contents import Contents
 from isiw.existing.layout import Layout
@@ -188,6 +188,7 @@ def _person(
             if blocks[n] and blocks[n] in {blocks[earlier] for earlier in begun if earlier < n}:
                 remedy = f'If it tells muscles apart, say --where "{name}={blocks[n]}", or --where "{name}={ALL}".'
                 raise columns["block"].refused(rows[n], "comes back after another block", remedy)
+    require_one_row_each(columns, rows, layout)
     found = Delivered(
         renumbered(trials),
         reference,
