@@ -150,12 +150,15 @@ def events_of(rows: Iterable[Sequence[Any]]) -> pd.DataFrame:
 
 def with_codes(rows: Sequence[tuple[str, float, float]], tracks: Iterable[Track]) -> pd.DataFrame:
     """Events, and those of channels of codes besides, in the order of their times; one that both have is one."""
-    found = list(rows)
+    found, times_s = list(rows), dict[str, list[float]]()
+    for name, at, _ in rows:
+        times_s.setdefault(name, []).append(at)
     for track in tracks:
-        if track.kind == "stim":
-            for at, code in track.codes():
-                if not any(abs(at - other) * track.rate_hz <= _SAME for name, other, _ in found if name == str(code)):
-                    found.append((str(code), at, 0.0))
+        for at, code in track.codes() if track.kind == "stim" else ():
+            known = times_s.setdefault(str(code), [])
+            if not any(abs(at - other) * track.rate_hz <= _SAME for other in known):
+                known.append(at)
+                found.append((str(code), at, 0.0))
     return events_of(sorted(found, key=lambda row: row[1]))
 
 
