@@ -238,7 +238,7 @@ def unit_said(name: str, known: Mapping[str, float]) -> str | None:
         raise InvalidValueError(
             f"the column {name!r} says two units", got=" and ".join(found), remedy="Leave the right one in its name."
         )
-    return (found or usual or [None])[-1]
+    return next(reversed(found or usual), None)
 
 
 def required_unit(what: str, column: Column, layout: Layout, known: Mapping[str, float]) -> str:

@@ -89,7 +89,8 @@ class Numbers:
 def _picked(raw: bytes, begins: Any, kind: Any) -> FloatArray:
     """The numbers that begin at some bytes."""
     places = begins[:, None] + np.arange(np.dtype(kind).itemsize)
-    return np.frombuffer(raw, np.uint8)[places].view(kind).ravel().astype(np.float64)
+    values: FloatArray = np.frombuffer(raw, np.uint8)[places].view(kind).ravel().astype(np.float64)
+    return values
 
 
 def shortened(path: Path) -> tuple[dict[int, Numbers], io.BytesIO]:
