@@ -166,9 +166,11 @@ def require_one_row_each(columns: Columns, rows: Sequence[int], layout: Layout) 
         return
     runs = [len([*each]) for _, each in groupby(texts)]
     times, half = math.gcd(*runs), len(texts) // 2
-    pairs = [row for row in rows if not columns.tms_alone(row, layout.alone)]
-    whole = all(round(columns["isi"].number(row) or 0.0, 3).is_integer() for row in pairs)
-    again = texts[:half] == texts[half:] and not whole  # realised ISIs do not come again
+    again = texts[:half] == texts[half:] and not all(  # realised ISIs do not come again
+        round(columns["isi"].number(row) or 0.0, 3).is_integer()
+        for row in rows
+        if not columns.tms_alone(row, layout.alone)
+    )
     if (times > 1 and len(runs) > len({*texts})) or (again and len({*texts}) > 2):
         raise InvalidValueError(
             f"the ISIs of {columns['isi'].of} come {times if times > 1 else 2} times each, as if there was a row for "
