@@ -115,6 +115,10 @@ def test_a_matrix_of_matlab_is_found_or_asked_about(tmp_path: Path) -> None:
         ({"sweep": sweeps}, "no such array"),
         ({"sweeps": sweeps[:, :, None] + np.zeros(2)}, "3 × 100 × 2 samples"),
         ({"sweeps": sweeps, "fs": 2000.0}, "'fs' of P01.mat says"),
+        (
+            {"sweeps": sweeps, "t": np.arange(100) / 4000 - 0.005},
+            "where 't' of P01.mat is 0; got '10 ms'; expected '?5 ms",
+        ),
     ):
         scipy.io.savemat(path, {"isi_ms": [10.0, 20.0, 30.0], **arrays})
         with pytest.raises(InvalidValueError, match=asked):

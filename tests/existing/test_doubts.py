@@ -24,7 +24,7 @@ from existing.test_recordings import (
     recording,
     require_as_written,
 )
-from existing.test_waves import EMG_MV
+from existing.test_waves import EMG_MV, lines, trigger
 from isiw.errors import IsiwError
 from isiw.existing.layout import Layout
 from isiw.existing.reading import read_people
@@ -77,6 +77,23 @@ ASKED: dict[str, tuple[pd.DataFrame, dict[str, Any], str]] = {
     "logarithms": (renamed(mep_mv="log10 MEP"), {"columns": {"mep": "log10 MEP"}, "units": ("mV",)}, "got 'log10'"),
     "numbers of samples": (table().assign(isi_ms=np.linspace(810, 1900, 36)), {}, "longer than those of paired"),
     "a code NA among numbers": (long("subject", ["P01", "NA", "P02"]), {}, "may be a code, or stand for none"),
+    "means of each person with SDs": (pd.concat([means("mep_mv", sd=0.1).assign(subject=one) for one in "ABCDE"]), {},
+                                      "means of several trials.*beside 'sd'"),
+    "means beside how many they are of": (means("mep_mv", n_averaged=10), {}, "beside 'n_averaged'"),
+    "means with limits of their confidence": (means("mep_mv", ci_lower=0.1, ci_upper=2.0), {}, "beside 'ci_lower'"),
+    "means in one word": (renamed(mep_mv="mepmean"), {"columns": {"mep": "mepmean"}, "units": ("mV",)}, "means of"),
+    **{name: (renamed(mep_mv=name), {"columns": {"mep": name}, "units": ("uV",)}, "relative")
+       for name in ("MEPnorm", "zMEP", "MEP (a.u.)", "MEP/control", "mep_x_baseline", "MEP fold change", "MEP_Mmax")},
+    "two units": (table().rename(columns={"mep_mv": "mep_mv (µV)"}), {}, "says two units; got 'uV and mV'"),
+    "an ISI of 0 in many rows": (table().assign(isi_ms=np.where(ISIS > 60, ISIS, 0.0)), {}, "--alone 0 if they are"),
+    "an ISI of -1": (table().assign(isi_ms=np.where(ISIS > 20, ISIS, -1.0)), {}, "--alone -1 if they are TMS alone"),
+    "an ISI of 999": (table().assign(isi_ms=np.where(ISIS > 20, ISIS, 999.0)), {}, "4 rows .* have the ISI 999 ms"),
+    "muscles as blocks": (long("block", ["FCR", "FDI"]), {}, 'comes back after another block.*--where "block=FCR"'),
+    "a row a muscle, which nothing says": (long("x", ["", ""]).drop(columns="x"), {}, "come 2 times each, as if"),
+    "muscles below each other": (pd.concat([table().assign(isi_ms=ISIS + np.linspace(0, 1, 36))] * 2), {}, "2 times"),
+    "a few rows of another coil": (table(coil=of(["sham", *["real"] * 7])), {}, "'coil'"),
+    "a few rows a person": (table(code=of([f"VP{n}" for n in range(9)])), {}, "'code'.*and 6 others"),
+    "what recordings have": (table(), {"markers": {"pulse": "TMS"}}, "is a table, and has no use for markers"),
     "a value that is not there": (long("muscle", ["FCR", "FDI"]), {"where": {"muscle": "APB"}}, "one of FCR, FDI"),
 }  # fmt: skip
 
@@ -96,6 +113,9 @@ def test_a_table_that_is_not_of_single_trials_is_asked_about(kind: str, suffix: 
 
 
 def test_what_was_asked_about_can_be_said() -> None:
+    for odd, mark, alone in ((999.0, "999", 4), (999.0, "never", 0)):
+        (person,) = read_people(table().assign(isi_ms=np.where(ISIS > 20, ISIS, odd)), IMPACT.saying(alone=mark))
+        assert sum(trial.isi_ms is None for trial in person.trials) == alone
     both = long("muscle", ["FCR", "FDI"])
     (person,) = read_people(both, IMPACT.saying(where={"muscle": "FDI"}))
     assert len(person.trials) == 36
@@ -273,3 +293,93 @@ def test_rectified_emg_is_said(tmp_path: Path) -> None:
     made.apply_function(lambda values: values + 2e-3, picks="all")  # an offset is none
     assert read_people(made, KNOWN)[0].notes == ()
     assert read_people(as_edf(tmp_path), KNOWN)[0].notes == ()
+
+
+def test_numbers_that_excel_shows_in_per_cent_are_relative(tmp_path: Path) -> None:
+    with pd.ExcelWriter(tmp_path / "P01.xlsx", engine="openpyxl") as book:
+        renamed(mep_mv="MEP").to_excel(book, index=False)
+        for cells in book.book.active.iter_rows(min_row=2, min_col=2):
+            cells[0].number_format = "0.0%"
+    with pytest.raises(IsiwError, match=r"'MEP \(%\)' are relative"):
+        read_people(tmp_path / "P01.xlsx", IMPACT.saying(units=("mV",)))
+
+
+def test_events_of_two_names_that_may_mark_the_pulse_are_asked_about() -> None:
+    words = {NAMES["tap"]: "tap", NAMES["pulse"]: "TMS"}
+    two = with_events(
+        lambda rows: [(at, words[name] if at < 6 or name == NAMES["tap"] else "Pulse") for at, name in rows]
+    )
+    with pytest.raises(IsiwError, match="events of 2 names in the recording may mark the pulse"):
+        read_people(two, Layout(reference="impact", channels={"emg": "FCR"}, unmarked="alone"))
+
+
+@pytest.mark.parametrize(("marks", "later_s", "says"), [("tap", 0.008, "2 taps"), ("pulse", 0.15, "have one tap")])
+def test_a_second_tap_or_pulse_is_asked_about(marks: str, later_s: float, says: str) -> None:
+    twice = with_events(lambda rows: [*rows, *((at + later_s, name) for at, name in rows if name == NAMES[marks])])
+    with pytest.raises(IsiwError, match=says):
+        read_people(twice, KNOWN)
+
+
+def test_codes_of_triggers_that_overlap_are_told_apart_in_fif_and_in_bdf(tmp_path: Path) -> None:
+    emg_mv, stimuli = recording()
+    codes = np.zeros(len(emg_mv))
+    for at_s, name in stimuli:
+        codes[round(at_s * RATE_HZ) :][:200] += int(name[-1])  # for 50 ms, and ISIs are from 30 ms on
+    made = mne.io.RawArray(np.array([1e-3 * emg_mv, codes]), mne.create_info(["FCR", "STI"], RATE_HZ, ["emg", "stim"]))
+    layout = Layout(reference="impact", markers={"tap": "1", "pulse": "2"}, channels={"emg": "FCR"}, unmarked="alone")
+    require_as_written(read_people(made, layout)[0])
+    longer = as_status(tmp_path, np.tile([1e3 * emg_mv, codes], 20))  # than one piece
+    (person,) = read_people(longer, layout)
+    assert [trial.isi_ms for trial in person.trials] == pytest.approx([*ISIS_MS, None] * 20, abs=0.3)
+
+
+def as_status(path: Path, values: np.ndarray) -> Path:
+    """A BDF file as BioSemi writes it: EMG [µV], and codes in the lower bits of a channel called Status."""
+    count = values.shape[1] // int(RATE_HZ)
+    said: list[list[Any]] = [
+        ["FCR", "Status"],
+        ["", ""],
+        ["uV", "Boolean"],
+        [-8000, -8388608],
+        [8000, 8388607],
+        [-8388608] * 2,
+    ]
+    said += [[8388607] * 2, ["", ""], [int(RATE_HZ)] * 2, ["", ""]]
+    sizes = [16, 80, 8, 8, 8, 8, 8, 80, 8, 32]
+    top = [("BIOSEMI", 7), ("", 80), ("", 80), ("01.01.26", 8), ("10.00.00", 8), (768, 8), ("24BIT", 44), (count, 8)]
+    top += [(1, 8), (2, 4), *((one, size) for each, size in zip(said, sizes, strict=True) for one in each)]
+    digital = np.stack([np.round((values[0] + 8000) * (16777215 / 16000) - 8388608), values[1] + 65536]).astype("<i4")
+    records = digital[:, : count * int(RATE_HZ)].reshape(2, count, -1).swapaxes(0, 1)
+    packed = np.ascontiguousarray(records).view(np.uint8).reshape(-1, 4)[:, :3].tobytes()
+    (path / "P01.bdf").write_bytes(b"\xff" + "".join(str(one).ljust(size) for one, size in top).encode() + packed)
+    return path / "P01.bdf"
+
+
+def test_a_trigger_whose_level_turns_at_each_stimulus_is_asked_about() -> None:
+    emg_mv, stimuli = recording()
+    turns = np.zeros_like(emg_mv)
+    for at_s, name in stimuli:
+        if name == NAMES["pulse"]:
+            turns[round(at_s * RATE_HZ) :] = 5.0 - turns[-1]
+    held = mne.io.RawArray(np.array([1e-3 * emg_mv, turns]), mne.create_info(["FCR", "TTL"], RATE_HZ, "emg"))
+    with pytest.raises(IsiwError, match="which of its edges are stimuli"):
+        read_people(held, Layout(reference="impact", channels={"emg": "FCR", "pulse": "TTL"}))
+
+
+@pytest.mark.parametrize("change", [lambda emg: np.abs(emg) - 0.02, lambda emg: -np.abs(emg)])
+def test_rectified_emg_is_noticed_at_any_level_and_upside_down(change: Callable[[np.ndarray], np.ndarray]) -> None:
+    made = raw()
+    made.apply_function(lambda values: 1e-3 * change(1e3 * values), picks="all")
+    assert "as if it was rectified" in read_people(made, KNOWN)[0].notes[0]
+
+
+def test_a_pause_in_a_column_of_times_is_a_gap(tmp_path: Path) -> None:
+    rows = lines(EMG_MV, trigger("tap"), trigger("pulse")).splitlines(keepends=True)
+    (tmp_path / "P01.txt").write_text("".join([*rows[:12040], *rows[12120:]]))  # 20 ms after the second tap
+    said: dict[str, Any] = {"names": ("time", "EMG", "Hammer", "TMS"), "separator": "\t", "units": ("mV",)}
+    channels = {"emg": "EMG", "tap": "Hammer", "pulse": "TMS"}
+    layout = Layout(reference="impact", rate_hz=RATE_HZ, channels=channels, unmarked="alone", **said)
+    (person,) = read_people(tmp_path / "P01.txt", layout)
+    assert [trial.isi_ms for trial in person.trials] == pytest.approx([*ISIS_MS, None], abs=1000 / RATE_HZ)
+    with pytest.raises(IsiwError, match=r"'time' of P01\.txt says; got '2000 Hz'; expected 4000 Hz"):
+        read_people(tmp_path / "P01.txt", layout.saying(rate_hz=2000.0))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gzip
 import json
+import struct
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,21 +13,27 @@ from typing import Any
 import mne
 import numpy as np
 import pytest
+import pyxdf
 
 from existing.test_recordings import ISIS_MS, KNOWN, MEPS_MV, RATE_HZ, as_edf, recording, require_as_written
 from existing.writers import (
     RECORDINGS,
     WORDS,
     as_matlab_73,
+    as_nwb,
     as_smr,
     as_statistics,
     as_xdf,
+    chunk,
+    header,
     named_events,
     without_records,
 )
 from isiw.errors import IsiwError
 from isiw.existing.delivered import Delivered
+from isiw.existing.formats import xdf
 from isiw.existing.formats.stamps import clocked
+from isiw.existing.formats.xdf_chunks import BOUNDARY
 from isiw.existing.layout import Layout
 from isiw.existing.reading import read_people
 
@@ -47,6 +55,13 @@ def test_a_recording_of_each_format_is_read_back(kind: str, tmp_path: Path) -> N
     require_as_written(read(RECORDINGS[kind](tmp_path), layout))
 
 
+@pytest.mark.parametrize("write", [as_xdf, as_nwb])
+def test_triggers_that_are_numbers_at_times_of_their_own_are_events(write: Any, tmp_path: Path) -> None:
+    channels = {"emg": "FCR" if write is as_xdf else "EMG FCR"}
+    layout = Layout(reference="impact", channels=channels, markers={"tap": "1", "pulse": "2"}, unmarked="alone")
+    require_as_written(read(write(tmp_path, codes=True), layout))
+
+
 def require_without(person: Delivered, lost: set[int]) -> None:
     """All are right but some, of which nothing was recorded."""
     for number, trial in enumerate(person.trials):
@@ -65,6 +80,29 @@ def test_a_pause_in_an_edf_or_bdf_file_is_a_gap_and_what_follows_stays_at_its_ti
 def test_an_edf_file_of_triggered_sweeps_has_all_of_them(tmp_path: Path) -> None:
     halves = {half for half in range(28) if half % 4 not in {1, 2}}  # stimuli come at 1, 3, 5 s …
     require_as_written(read(without_records(as_edf(tmp_path, record_s=0.5), *halves), KNOWN))
+
+
+@pytest.mark.parametrize("suffix", [".xdf", ".xdfz"])
+def test_samples_of_xdf_are_those_of_pyxdf_whichever_of_them_have_a_time(suffix: str, tmp_path: Path) -> None:
+    rng, number = np.random.default_rng(3), 0
+    parts = [b"XDF:", header(1, "Amplifier", "EMG", "int16", 100.0)]
+    for stamped in ({0}, {*range(20)}, set(), {0, 7, 8}, {5}, {0}):
+        samples = b""
+        for place in range(20):
+            time = struct.pack("<Bd", 8, 50.0 + (number + place) / 100) if place in stamped else b"\0"
+            samples += time + struct.pack("<h", int(rng.integers(-9999, 9999)))
+        parts.append(chunk(3, struct.pack("<IBB", 1, 1, 20) + samples))
+        parts.append(chunk(3, struct.pack("<IBB", 1, 1, 0)))
+        number += 20
+    whole = b"".join([*parts[:-4], b"\x05" * 9, chunk(5, BOUNDARY), *parts[-4:]])  # damaged in between
+    path = tmp_path / f"P01{suffix}"
+    path.write_bytes(gzip.compress(whole[:-30]) if suffix == ".xdfz" else whole[:-30])  # and cut off
+    (stream,), _ = pyxdf.load_xdf(path, dejitter_timestamps=False)
+    (track,) = xdf.read(path, Layout()).tracks
+    values = stream["time_series"][:, 0]
+    assert track.read(0, len(values)).tolist() == values.tolist()
+    assert track.read(33, 58).tolist() == values[33:58].tolist()
+    assert (track.stretches[0].samples, len(values)) == (100, 100)
 
 
 @pytest.mark.parametrize("gap_s", [0.02, 0.3, 0.9])
@@ -112,6 +150,9 @@ def test_a_table_of_spss_or_stata_has_the_units_and_words_of_its_labels(suffix: 
         require_as_written(read(tmp_path / "P01.zsav"))
     else:
         require_as_written(read(as_statistics(tmp_path / f"P01{suffix}")))
+    as_statistics(tmp_path / f"P02{suffix.replace('z', '')}", "Peak to peak (% of control)")
+    with pytest.raises(IsiwError, match="relative to others"):
+        read(tmp_path / f"P02{suffix.replace('z', '')}", NAMED.saying(units=("uV",)))
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from isiw.existing import Delivered, Layout, ReadingLimits, read_people, reading
 from isiw.existing.answer import Answer, read_answer, write_error, write_people
 from isiw.existing.gate import Gate, require_no_links
 from isiw.existing.layout import letters
-from isiw.existing.limits import LARGEST_FACTOR
+from isiw.existing.limits import LARGEST_FACTOR, seconds_for
 from isiw.existing.tables import Columns, unit_said
 from isiw.text.sanitize import read_number
 from isiw.text.toml_files import DoubledKeyError, once_each
@@ -202,3 +202,11 @@ def test_a_file_of_hdf5_with_parts_in_other_files_is_refused(kind: str, tmp_path
             file.create_virtual_dataset("EEG", view)
     with pytest.raises(InvalidValueError, match=r"P\.set refers to other files.*EEG"):
         require_no_links(tmp_path / "P.set")
+
+
+def test_samples_beside_a_header_count_for_how_long_it_may_take(tmp_path: Path) -> None:
+    header, samples = tmp_path / "P01.vhdr", tmp_path / "P01.eeg"
+    header.write_bytes(b"Brain Vision")
+    alone_s = seconds_for(ReadingLimits(), header, table=False)
+    samples.write_bytes(bytes(8_000_000))
+    assert seconds_for(ReadingLimits(), header, table=False) == pytest.approx(alone_s + 2.0)

@@ -40,7 +40,9 @@ def header(number: int, name: str, kind: str, form: str, rate_hz: float, channel
     return chunk(2, struct.pack("<I", number) + text.encode())
 
 
-def as_xdf(path: Path, *, gap_s: float = 0.0, jitter_s: float = 0.0, offset_s: float = 0.0) -> Path:
+def as_xdf(
+    path: Path, *, gap_s: float = 0.0, jitter_s: float = 0.0, offset_s: float = 0.0, codes: bool = False
+) -> Path:
     """A stream of EMG in chunks of 32 samples, and one of markers, whose clock is behind by an offset.
 
     Args:
@@ -48,12 +50,13 @@ def as_xdf(path: Path, *, gap_s: float = 0.0, jitter_s: float = 0.0, offset_s: f
         gap_s: how much was not recorded, from 3.2 s on.
         jitter_s: SD of the time of a chunk.
         offset_s: of the clock of the markers.
+        codes: whether these are numbers, in a stream of triggers.
     """
     (emg_mv, _), rng = recording(), np.random.default_rng(2)
     labels = "<channels><channel><label>FCR</label><unit>microvolts</unit><type>EMG</type></channel></channels>"
     parts = [b"XDF:", chunk(1, b"<?xml version='1.0'?><info><version>1.0</version></info>")]
     parts.append(header(1, "Amplifier", "EMG", "float32", RATE_HZ, labels))
-    parts.append(header(2, "Markers", "Markers", "string", 0.0))
+    parts.append(header(2, "Box", "TTL", "int16", 0.0) if codes else header(2, "Markers", "Markers", "string", 0.0))
     times_s = 1000.0 + np.arange(len(emg_mv)) / RATE_HZ
     for first in range(0, len(emg_mv), 32):
         kept = [n for n in range(first, min(first + 32, len(emg_mv))) if not 0 <= times_s[n] - 1003.2 < gap_s]
@@ -64,7 +67,8 @@ def as_xdf(path: Path, *, gap_s: float = 0.0, jitter_s: float = 0.0, offset_s: f
             samples = b"\x08" + struct.pack("<df", times_s[kept[0]] + late_s, 1e3 * emg_mv[kept[0]]) + values.tobytes()
             parts.append(chunk(3, struct.pack("<IBI", 1, 4, len(kept)) + samples))
     for at_s, name in named_events():
-        content = struct.pack("<Bd", 8, 1000.0 - offset_s + at_s) + b"\x01" + bytes([len(name)]) + name.encode()
+        said = struct.pack("<h", 1 + (name == "TMS")) if codes else b"\x01" + bytes([len(name)]) + name.encode()
+        content = struct.pack("<Bd", 8, 1000.0 - offset_s + at_s) + said
         parts.append(chunk(3, struct.pack("<IBB", 2, 1, 1) + content))
     for number, behind_s in ((1, 0.0), (2, offset_s)):
         parts += [chunk(4, struct.pack("<Idd", number, at_s, behind_s)) for at_s in np.linspace(1000, 1014, 8)]
@@ -141,7 +145,7 @@ def as_smr(path: Path, *, paused: bool = False) -> Path:
     return path / "P01.smr"
 
 
-def as_nwb(path: Path, *, stamped: bool = False) -> Path:
+def as_nwb(path: Path, *, stamped: bool = False, codes: bool = False) -> Path:
     """A series in µV that is stored in another scale, an annotation for each stimulus, and a series beside it."""
     file = pynwb.NWBFile(
         session_description="paired stimulation",
@@ -157,14 +161,19 @@ def as_nwb(path: Path, *, stamped: bool = False) -> Path:
         pynwb.TimeSeries(name="EMG FCR", data=data, unit="volts", conversion=2e-7, offset=1e-5, **times)
     )
     file.add_acquisition(pynwb.TimeSeries(name="force", data=0 * data, unit="N", rate=RATE_HZ))
-    for word in WORDS.values():
+    if codes:
+        held: Any = {"data": [1 + (name == "TMS") for _, name in named_events()], "unit": "n/a"}
+        file.add_acquisition(
+            pynwb.TimeSeries(name="TTL", timestamps=[5.0 + at_s for at_s, _ in named_events()], **held)
+        )
+    for word in () if codes else WORDS.values():
         table = pynwb.event.EventsTable(name=word, description="when it came")
         for at_s, name in named_events():
             if name == word:
                 table.add_event(timestamp=5.0 + at_s)
         file.add_events_table(table)
-    with pynwb.NWBHDF5IO(path / "P01.nwb", "w") as held:
-        held.write(file)
+    with pynwb.NWBHDF5IO(path / "P01.nwb", "w") as target:
+        target.write(file)
     return path / "P01.nwb"
 
 
@@ -238,11 +247,11 @@ def as_matlab_73(path: Path, **arrays: Any) -> Path:
     return path
 
 
-def as_statistics(path: Path) -> Path:
+def as_statistics(path: Path, label: str = "Peak to peak (µV)") -> Path:
     """A table with labels of columns, which have the units, and of a value."""
     frame = pd.DataFrame({"isi": [*ISIS_MS, -1.0], "mep": [1e3 * mep for mep in (*MEPS_MV, 0.3)]})
     said: dict[str, Any] = {
-        "column_labels": ["Interval (ms)", "Peak to peak (µV)"],
+        "column_labels": ["Interval (ms)", label],
         "variable_value_labels": {"isi": {-1.0: "single"}},
     }
     if path.suffix == ".dta":

@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from numbers import Real
 from typing import Any, Final
 
@@ -36,6 +37,9 @@ _GROUPED: Final = {
 _NUMBER_BEFORE: Final = re.compile(r"^[-+\d.,\s]*(e[-+]?\d+)?\s*")
 _BLANKS: Final = re.compile(r"(?<=\d)[ '\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}](?=\d{3})")
 
+_MANY: Final = 2**16
+"""So many texts are remembered: in a long table most cells are like others."""
+
 
 def is_missing(cell: Any) -> bool:
     """True if a cell holds nothing."""
@@ -44,6 +48,7 @@ def is_missing(cell: Any) -> bool:
     return cell is None or type(cell).__name__ in {"NAType", "NaTType"} or cell != cell  # noqa: PLR0124 - NaN
 
 
+@lru_cache(_MANY)
 def _value(text: str, decimal: str) -> float:
     """The number that a text is; NaN if it is none."""
     text = _BLANKS.sub("", text.strip().replace("\N{MINUS SIGN}", "-"))
@@ -70,6 +75,7 @@ def says_alone(cell: Any, mark: str | None) -> bool:
     return isinstance(cell, str) and plain(cell) in ALONE
 
 
+@lru_cache(_MANY)
 def plain(text: str) -> str:
     """A text in lower case, with blanks for hyphens and underscores."""
     return " ".join(re.split(r"[\s_-]+", text.strip().casefold()))

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
 import re
 import statistics
 from collections import Counter
 from collections.abc import Sequence
+from itertools import groupby
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from isiw.errors import InvalidValueError
+from isiw.existing.cells import Column
 from isiw.existing.layout import Layout, letters
+from isiw.lazy import pd
 from isiw.text.sanitize import counted
 from isiw.types import FloatArray
 
@@ -21,58 +25,76 @@ if TYPE_CHECKING:
 ALL: Final = "*"
 """What `where` says of a column whose values are to be analysed together."""
 
-_MEANS: Final = frozenset({"mean", "means", "average", "avg", "median", "mittel", "mittelwert", "grandmean", "moyenne"})
+_MEANS: Final = re.compile("means?|average|avg|median|mittel(wert)?|moyenne")
 _SPREADS: Final = frozenset({"sd", "std", "stdev", "stddev", "se", "sem", "stderr", "cv", "sds", "stdabw",
                              "standarddeviation", "standarderror", "ci", "iqr", "var"})  # fmt: skip
-_NUMBERS: Final = frozenset({"n", "count", "ntrials", "trials", "ntrial", "nobs", "nsweeps", "sweeps", "anzahl"})
+_BESIDE: Final = frozenset({"mep", "amplitude", "of", "lower", "upper", "low", "high", "mv", "uv", "v", "95"})
+"""Words that may stand beside those of spreads."""
+_NUMBERS: Final = frozenset({"n", "count", "ntrials", "trials", "ntrial", "nobs", "nsweeps", "sweeps", "anzahl", "nmep",
+                             "nmeps", "naveraged", "averaged", "numberoftrials"})  # fmt: skip
+_BASES: Final = "(control|base|baseline|mean|unconditioned|kontrolle)"
 _RELATIVE: Final = re.compile(
-    r"%|\bper ?cent|\bpct\b|prozent|\bratio\b|\bnorm(ed|alis\w*|aliz\w*)?\b|\brel(ative|ativ)?\b|\bz[ -]?score|"
-    r"\blog\d*\b",
-    re.IGNORECASE,
+    r"%|\bper ?c(ent)?|\bpct\b|prozent|\bratio\b|quotient|\bnorm(ed|alis\w*|aliz\w*|iert)?\b|\brel(ative|ativ)?\b|"
+    r"\bz\b|\bz ?scores?|\blog\d*\b|\bln\b|\bsqrt\b|\ba ?\. ?u\b|\barb|\bfold\b|\bchange\b|\bdelta\b|[δΔ]|\bdiff|"
+    rf"\bfa[ck]tor\b|facilitation|inhibition|m ?max\b|([/÷]|\b(x|times|div|by|vs)\b) ?{_BASES}\b"
 )
-_ROWS_A_KIND: Final = 6
-"""With fewer rows for each of its values a column does not tell kinds of trials from each other."""
+_ROWS_A_WORD: Final = 4
+_ROWS_A_NUMBER: Final = 6
+"""With fewer rows for each of its words or numbers a column does not tell kinds of trials from each other."""
+_FEWEST: Final = 12
+"""In a table with fewer rows ISIs may come again by chance."""
 _SHARED: Final = 0.8
 _ONE_SIDED: Final = 8.0
 """A sweep with an MEP that rises from its median by so many times what it falls below it has one half only."""
 
 
-def _words(name: str) -> list[str]:
-    return re.findall(r"[^\W_]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).casefold())
+def _words(name: str) -> str:
+    """A name in lower case, its words apart."""
+    apart = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name.replace("_", " ")).casefold()
+    return re.sub("mep(?!s)", " mep ", apart)
+
+
+def doubtful_words(text: str) -> list[str]:
+    """What a text has of amplitudes that are relative to others, or means."""
+    return [found[0] for pattern in (_RELATIVE, _MEANS) if (found := pattern.search(_words(text)))]
 
 
 def require_absolute(name: str, source: str) -> None:
     """Raise if a column's name says that its amplitudes are relative to others, whatever unit is stated."""
-    if found := _RELATIVE.search(name.replace("_", " ")):
+    if found := _RELATIVE.search(_words(name)):
         raise InvalidValueError(
             f"the amplitudes of {source} in the column {name!r} are relative to others",
-            got=found[0],
+            got=found[0].strip(),
             expected="peak-to-peak amplitudes in mV, µV or V",
             remedy="Name the column that holds these: --column mep=NAME.",
         )
 
 
-def require_single_trials(mep: str, isis: Sequence[object], names: Sequence[str], source: str) -> None:
-    """Raise if rows are means of several trials: their column says so, or their SDs are beside them.
-
-    Args:
-        mep: the name of the column of the amplitudes.
-        isis: the ISIs, as texts or numbers.
-        names: the names of all columns.
-        source: the table in words.
-    """
-    others = [name for name in names if name != mep]
-    spreads = [name for name in others if re.sub("mep|amplitude|of", "", letters(name)) in _SPREADS]
+def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, source: str) -> None:
+    """Raise if rows are means of several trials: their column says so, or their SDs or numbers are beside them."""
+    others = {str(name): frame.iloc[:, place].tolist() for place, name in enumerate(frame.columns) if name != mep.name}
+    spreads = [
+        name for name in others if (words := {*re.findall(r"\w+", _words(name))} - _BESIDE) and words <= _SPREADS
+    ]
     numbers = [name for name in others if letters(name) in _NUMBERS]
-    said = set(_words(mep)) & _MEANS
-    once = len(isis) > 2 and len(set(isis)) == len(isis)
-    if said or (spreads and (numbers or once)):
+    counted_in = [name for name in numbers if _are_counts(Column(name, others[name]))]
+    kinds = [cells for name, cells in others.items() if name != isi.name and 3 * len({*map(str, cells)}) <= len(cells)]
+    rows = list(zip(map(str, isi.cells), *(map(str, cells) for cells in kinds), strict=True))
+    once = len(rows) > 2 and len({*rows}) == len(rows)
+    if _MEANS.search(_words(mep.name)) or (spreads and (numbers or once)) or (counted_in and once):
+        beside = (spreads or counted_in)[:1]
         raise InvalidValueError(
-            f"the rows of {source} are means of several trials, by the column {mep!r}"
-            + (f" beside {spreads[0]!r}" if spreads else ""),
+            f"the rows of {source} are means of several trials, by the column {mep.name!r}"
+            + "".join(f" beside {name!r}" for name in beside),
             expected="a row for each trial, since the scatter of single trials says how sure a window is",
             remedy="Export the single trials; if these are, rename the column.",
         )
+
+
+def _are_counts(column: Column) -> bool:
+    """True if a column has numbers of trials: whole ones from 2 on, few of which differ."""
+    texts = {column.text(row) for row in range(len(column.cells))}
+    return 2 * len(texts) <= len(column.cells) and all(text.isdigit() and int(text) > 1 for text in texts)
 
 
 def require_short(isis_ms: Sequence[float], layout: Layout, source: str) -> None:
@@ -89,17 +111,18 @@ def require_short(isis_ms: Sequence[float], layout: Layout, source: str) -> None
 
 
 def is_rectified(sweeps: Sequence[FloatArray]) -> list[str]:
-    """A sentence, if EMG has no negative half: it only ever rises from its level at rest."""
+    """A sentence, if EMG has one half only: it rises from its level at rest, or falls, whatever that level is."""
     known = [sweep for sweep in sweeps if sweep.size and np.isfinite(sweep).all()]
     largest = sorted(known, key=lambda sweep: float(np.ptp(sweep)))[len(known) // 2 :]
     one_sided = [
-        sweep.min() >= 0 and sweep.max() - np.median(sweep) > _ONE_SIDED * (np.median(sweep) - sweep.min())
+        max(halves) > _ONE_SIDED * min(halves)
         for sweep in largest
+        if (halves := (sweep.max() - np.median(sweep), np.median(sweep) - sweep.min()))
     ]
     if not known or sum(one_sided) < _SHARED * len(largest):
         return []
-    said = "The EMG has no negative half, as if it was rectified: amplitudes are then about half of those from peak to"
-    return [f"{said} peak. Choose the channel that was not rectified, if there is one."]
+    said = "The EMG has no negative half, or no other, as if it was rectified: amplitudes are about half of those from"
+    return [f"{said} peak to peak. Choose the channel that was not rectified, if there is one."]
 
 
 def require_codes(texts: Sequence[str], rows: Sequence[int], columns: Columns) -> None:
@@ -116,6 +139,47 @@ def require_codes(texts: Sequence[str], rows: Sequence[int], columns: Columns) -
             raise columns.of["subject"].refused(rows[first], "may be a code, or stand for none", remedy)
 
 
+def require_isis(columns: Columns, rows: Sequence[int], layout: Layout) -> None:
+    """Raise if one number among the ISIs is so frequent, or so far from the others, that it may stand for TMS alone."""
+    isi = columns["isi"]
+    isis_ms = [isi.number(row) for row in rows if not columns.tms_alone(row, layout.alone)]
+    if layout.alone is not None or len(isis_ms) < len(rows):
+        return
+    times = Counter(isi_ms for isi_ms in isis_ms if isi_ms is not None)
+    for odd in {min(times, default=0.0), max(times, default=0.0)}:
+        others = {isi_ms: count for isi_ms, count in times.items() if isi_ms != odd}
+        if times[odd] < 3 or len(others) < 2:
+            continue
+        frequent = odd <= 0 and times[odd] >= 2 * max(others.values())
+        if frequent or odd in {-1, -9, -99, -999, 99, 999} or odd > max(499.0, 2 * max(others)):
+            raise InvalidValueError(
+                f"{times[odd]} rows of {isi.of} have the ISI {odd:g} ms, which may stand for TMS alone",
+                expected="what an ISI is, and what is TMS alone",
+                remedy=f"Say --alone {odd / isi.factor:g} if they are TMS alone; if they are pairs, say --alone never.",
+            )
+
+
+def require_one_row_each(columns: Columns, rows: Sequence[int], layout: Layout) -> None:
+    """Raise if the ISIs come twice as if each trial had a row a muscle: one after the other, or all of them again."""
+    texts = [columns["isi"].text(row) for row in rows]
+    if "order" in columns.of or layout.where or len(texts) < _FEWEST:
+        return
+    runs = [len([*each]) for _, each in groupby(texts)]
+    times, half = math.gcd(*runs), len(texts) // 2
+    again = texts[:half] == texts[half:] and not all(  # realised ISIs do not come again
+        round(columns["isi"].number(row) or 0.0, 3).is_integer()
+        for row in rows
+        if not columns.tms_alone(row, layout.alone)
+    )
+    if (times > 1 and len(runs) > len({*texts})) or (again and len({*texts}) > 2):
+        raise InvalidValueError(
+            f"the ISIs of {columns['isi'].of} come {times if times > 1 else 2} times each, as if there was a row for "
+            "each of several muscles",
+            got=", ".join(texts[: 2 * max(times, 2)]),
+            remedy="Leave one row for each trial; if each row is one, number them in a column called trial.",
+        )
+
+
 def require_one_kind(columns: Columns, rows: Sequence[int], layout: Layout, source: str) -> None:
     """Raise if an unused column has several values at each ISI, as one of muscles, people, sides or conditions has."""
     isi = columns["isi"]
@@ -126,12 +190,18 @@ def require_one_kind(columns: Columns, rows: Sequence[int], layout: Layout, sour
         if name in layout.where:
             continue
         texts = [text for row in by_isi if (text := column.text(row))]
-        kinds = Counter(texts)
-        if not 2 <= len(kinds) <= len(by_isi) / _ROWS_A_KIND or len(texts) < 0.8 * len(by_isi):
+        are_words = not any(text.replace(".", "").lstrip("-").isdigit() for text in texts)
+        every = Counter(texts)
+        kinds = {text: count for text, count in every.items() if count >= _ROWS_A_WORD or not are_words}
+        if len(kinds) < 2 or sum(kinds.values()) < _SHARED * len(by_isi):
             continue
-        size = min(4 * len(kinds), len(texts) // 2)
+        if not are_words and len(kinds) > len(by_isi) / _ROWS_A_NUMBER:
+            continue
+        usual = min(kinds.values()) if are_words else len(texts) / len(kinds)
+        size = min(math.ceil(4 * len(texts) / usual), len(texts) // 2)
         bins = [texts[first : first + size] for first in range(0, len(texts) - size + 1, size)]
-        if sum(len({*each}) == len(kinds) for each in bins) >= _SHARED * len(bins):
+        shares = [len(kinds.keys() & {*each}) / len(kinds) for each in bins]
+        if sum(shares if are_words else (share == 1 for share in shares)) >= _SHARED * len(bins):
             few = ", ".join(list(kinds)[:3]) + (f" and {counted(len(kinds) - 3, 'other')}" if len(kinds) > 3 else "")
             raise InvalidValueError(
                 f"the column {name!r} of {source} has several values at each ISI, and nothing is read of it",

@@ -8,6 +8,7 @@ import warnings
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from itertools import islice, zip_longest
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -23,7 +24,6 @@ from isiw.text.named_code import library
 
 TEXTS: Final = {".csv", ".tsv", ".txt", ".dat", ".tab"}
 WORKBOOKS: Final = {".xlsx", ".xlsm"}
-SUFFIXES: Final = TEXTS | WORKBOOKS | {".parquet", ".mat"}
 
 _LINES: Final = 100
 """Within so many lines the columns' names are sought."""
@@ -217,7 +217,15 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
             got="; ".join(heads),
             remedy="Say --sheet NAME, and --column isi=NAME --column mep=NAME.",
         )
-    return _table(sheets[(with_trials or filled or list(sheets))[0]], layout)
+    chosen = (with_trials or filled or list(sheets))[0]
+    rows = sheets[chosen]
+    for cells in islice(book.book[chosen].iter_rows(), _LINES) if rows else ():
+        shown = [isinstance(cell.value, int | float) and "%" in str(cell.number_format) for cell in cells]
+        if any(shown):  # Excel shows 1.2 as 120 %
+            rows[0] = [f"{name} (%)" if in_per_cent else name
+                       for name, in_per_cent in zip_longest(rows[0], shown[: len(rows[0])])]  # fmt: skip
+            break
+    return _table(rows, layout)
 
 
 def _from_names(rows: list[list[Any]], layout: Layout) -> list[list[Any]]:

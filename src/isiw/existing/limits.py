@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import math
 import os
 import zipfile
@@ -82,7 +83,9 @@ class ReadingLimits(Checked):
 
 def seconds_for(limits: ReadingLimits, path: Path, *, table: bool, rows: int = 0) -> float:
     """The processor time for one file, of which so many rows are known [s]."""
-    size = path.stat().st_size if path.is_file() else 0
+    parts = path.rglob("*") if path.is_dir() else path.parent.glob(f"{glob.escape(path.stem)}*")
+    whole = [path] if table else parts  # BrainVision has its samples beside it
+    size = sum(part.stat().st_size for part in whole if part.is_file())
     return limits.seconds + size / _BYTES_PER_S[table] + rows / _ROWS_PER_S
 
 

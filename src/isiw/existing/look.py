@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import permutations
 from pathlib import Path
@@ -139,11 +140,10 @@ def _gaps(track: Track) -> str:
 
 
 def _times(at_s: FloatArray) -> str:
-    said = f"{len(at_s)} times"
     if len(at_s) < 2:
         return f"once, at {at_s[0]:.3f} s" if len(at_s) else "never"
     apart_s = np.diff(np.sort(at_s))
-    return f"{said}, {np.median(apart_s):.3g} s apart ({apart_s.min():.3g} to {apart_s.max():.3g})"
+    return f"{len(at_s)} times, {np.median(apart_s):.3g} s apart ({apart_s.min():.3g} to {apart_s.max():.3g})"
 
 
 def _at(contents: Contents, name: str) -> FloatArray:
@@ -158,8 +158,9 @@ def _triggers(contents: Contents) -> Iterator[tuple[str, FloatArray]]:
             values = first[2]
             low, high = values.min(), values.max()
             between = (values > low + 0.1 * (high - low)) & (values < high - 0.1 * (high - low))
-            if high > low and between.mean() < _TRIGGER and len(at_s := track.onsets_s()) > 1:
-                yield track.name, np.asarray(at_s)
+            with suppress(IsiwError):  # of levels of which neither is rest
+                if high > low and between.mean() < _TRIGGER and len(at_s := track.onsets_s()) > 1:
+                    yield track.name, np.asarray(at_s)
 
 
 def _with_markers(contents: Contents, triggers: Mapping[str, FloatArray], layout: Layout) -> Layout:

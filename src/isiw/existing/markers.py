@@ -27,6 +27,7 @@ _WHAT: Final = {
     "pulse": "the pulse of TMS",
     "tap": "the tap (its impact) or the electrical pulse",
     "valve": "the valve command",
+    "alone": "TMS alone",
 }
 
 _TWICE_S: Final = 3e-3
@@ -64,8 +65,10 @@ def _names(events: pd.DataFrame) -> list[str]:
 def _fitting(events: pd.DataFrame, key: str, layout: Layout) -> list[str]:
     """The names of the events that mark something."""
     names = _names(events)
+    if key in layout.channels:
+        return [key]
     if (stated := layout.markers.get(key)) is None:
-        return [name for name in names if _plain(name) in _KNOWN[key]][:1]
+        return [name for name in names if _plain(name) in _KNOWN[key]]
     return [name for name in names if stated == name] or [name for name in names if _plain(stated) == _plain(name)]
 
 
@@ -76,6 +79,12 @@ def _marker(events: pd.DataFrame, key: str, layout: Layout, source: str) -> str 
         what = "several events" if fitting else "no event"
         expected = f"one of {', '.join(map(repr, _names(events)))}"
         raise InvalidValueError(f"{source} has {what} of this name", got=layout.markers[key], expected=expected)
+    if len(fitting) > 1:
+        raise InvalidValueError(
+            f"events of {len(fitting)} names in {source} may mark {_WHAT[key]}",
+            got=", ".join(fitting),
+            remedy=f'Say --marker "{key}={fitting[0]}", or give all that mark it one name.',
+        )
     return fitting[0] if fitting else None
 
 
@@ -102,6 +111,8 @@ def _required_markers(events: pd.DataFrame, keys: Iterable[str], layout: Layout,
 
 def pulses_of(events: pd.DataFrame, key: str, layout: Layout, source: str) -> list[Pulse]:
     """All pulses, each with the tap, or the valve command, that it belongs to."""
+    for stated in layout.markers:
+        _marker(events, stated, layout, source)
     pulse_name, origin_name = _required_markers(events, ("pulse", key), layout, source)
     if origin_name == pulse_name:
         raise InvalidValueError(
@@ -117,7 +128,26 @@ def pulses_of(events: pd.DataFrame, key: str, layout: Layout, source: str) -> li
         _placed(at, origins_s, epochs, alone=bool(np.any(np.abs(alone_s - at) <= _SAME_PULSE_S)), layout=layout)
         for at in sorted([*at_s.tolist(), *more_s])
     ]
+    _require_one_each(found, origins_s, layout, source)
     return _with_the_unmarked(found, layout, source)
+
+
+def _require_one_each(pulses: list[Pulse], origins_s: FloatArray, layout: Layout, source: str) -> None:
+    """Raise if a tap has two pulses after it, or a pulse two taps before it."""
+    came_s = [None if pulse.isi_s is None else round(pulse.at_s - pulse.isi_s, 9) for pulse in pulses]
+    last_s = -np.inf
+    for number, pulse in enumerate(pulses):
+        begin_s = max(pulse.at_s - layout.longest_isi_ms / 1e3, last_s)
+        taps = int(((origins_s > begin_s) & (origins_s <= pulse.at_s)).sum())
+        shared = number > 0 and came_s[number] is not None and came_s[number] == came_s[number - 1]
+        if taps > 1 or shared:
+            raise InvalidValueError(
+                f"two pulses of {source} have one tap" if shared else f"{taps} taps of {source} come before one pulse",
+                got=f"at {pulse.at_s:.3f} s",
+                expected=f"one of each within {layout.longest_isi_ms:g} ms",
+                remedy="Leave out the events that mark no stimulus, such as a second edge, or give them another name.",
+            )
+        last_s = pulse.at_s + _EARLY_S
 
 
 def _sorted(events: pd.DataFrame, chosen: Any) -> FloatArray:

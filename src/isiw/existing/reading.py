@@ -17,7 +17,7 @@ from isiw.existing import formats, frames, recordings, tables
 from isiw.existing.apart import read_apart
 from isiw.existing.dates import dates_of, latest_of, times_of
 from isiw.existing.delivered import Delivered, anywhere, read_log, renumbered
-from isiw.existing.doubts import require_codes, require_one_kind, require_short
+from isiw.existing.doubts import ALL, require_codes, require_isis, require_one_kind, require_one_row_each, require_short
 from isiw.existing.formats import mne_files
 from isiw.existing.formats.contents import Contents
 from isiw.existing.layout import Layout
@@ -90,9 +90,25 @@ def contents_in(path: Path, layout: Layout, limits: ReadingLimits, on_rows: Call
 
 def people_of_contents(contents: Contents, path: Path, layout: Layout, subject: str) -> list[Delivered]:
     """The people whose trials are in what a file holds; who has no code is called as the file is."""
+    _require_used(contents, path, layout)
     if contents.tracks:
         return [recordings.of_contents(contents, layout, subject or path.stem)]
     return people_of(frames.named(contents.trials), layout, path.name, subject or path.stem)
+
+
+def _require_used(contents: Contents, path: Path, layout: Layout) -> None:
+    """Raise if something is stated that a file of this kind has no use for."""
+    unused = ["markers", "rate_hz", "pulse_at_ms", "mep_window_ms"]
+    if contents.tracks:
+        unused = [] if contents.trials is not None else ["where", "alone", "pulse_at_ms"]
+        unused += [] if contents.trials is not None or formats.format_of(path).is_table else ["columns"]
+    for name in unused if path.suffix.lower() in frames.WORKBOOKS else [*unused, "sheet"]:
+        if getattr(layout, name) not in (None, {}):
+            raise InvalidValueError(
+                f"{path.name} is {'a recording' if contents.tracks else 'a table'}, and has no use for {name}",
+                got=getattr(layout, name),
+                remedy="Leave it out, or choose the file that it belongs to.",
+            )
 
 
 def _in_memory(source: Any, layout: Layout, subject: str) -> list[Delivered]:
@@ -162,9 +178,17 @@ def _person(
     _require_ascending(columns, rows)
     columns.require_said(rows, layout.alone)
     require_one_kind(columns, rows, layout, columns["isi"].of)
+    require_isis(columns, rows, layout)
     space, signals = anywhere(reference), SignalLimits()
     trials = [_trial(columns, row, number, layout, space, signals) for number, row in enumerate(rows)]
     blocks = [columns["block"].text(row) for row in rows]
+    begun = [n for n, block in enumerate(blocks) if not n or block != blocks[n - 1]]
+    if (name := columns["block"].name) not in layout.where:
+        for n in begun:
+            if blocks[n] and blocks[n] in {blocks[earlier] for earlier in begun if earlier < n}:
+                remedy = f'If it tells muscles apart, say --where "{name}={blocks[n]}", or --where "{name}={ALL}".'
+                raise columns["block"].refused(rows[n], "comes back after another block", remedy)
+    require_one_row_each(columns, rows, layout)
     found = Delivered(
         renumbered(trials),
         reference,
@@ -172,7 +196,7 @@ def _person(
         source=columns["isi"].of,
         units=columns.units,
         unused=columns.unused,
-        blocks={n: block for n, block in enumerate(blocks) if n and block != blocks[n - 1]},
+        blocks={n: blocks[n] for n in begun if n},
     )
     require_short([trial.isi_ms for trial in trials if trial.isi_ms is not None], layout, columns["isi"].of)
     return found

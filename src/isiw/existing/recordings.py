@@ -10,6 +10,7 @@ from typing import Any, Final
 from isiw.errors import InvalidValueError
 from isiw.existing.delivered import Delivered, anywhere, renumbered
 from isiw.existing.doubts import is_rectified, require_short
+from isiw.existing.formats.columns import require_rate
 from isiw.existing.formats.contents import Contents, Track
 from isiw.existing.frames import named
 from isiw.existing.layout import EMG_UNITS, MARKERS, UNIT_WORDS, Layout
@@ -53,6 +54,11 @@ def recording_of(contents: Contents, layout: Layout) -> Recording:
     tracks = {"emg": track_of(contents, "emg", layout)}
     if "acceleration" in layout.channels:
         tracks["acceleration"] = track_of(contents, "acceleration", layout)
+    for key, name in layout.channels.items():
+        if key != "events":
+            require_one("channel", contents.source, name, [track.name for track in contents.tracks])
+    if layout.rate_hz is not None:
+        require_rate(layout.rate_hz, tracks["emg"].rate_hz, contents.source)
     rows = []
     for key in MARKERS:
         if key in layout.channels:

@@ -122,7 +122,7 @@ class Columns:
         if "subject" in columns:
             columns["subject"] = replace(columns["subject"], of_codes=True)
         if "mep" in columns:
-            require_single_trials(columns["mep"].name, columns["isi"].cells, names, source)
+            require_single_trials(columns["mep"], columns["isi"], frame, source)
         beside = {
             name: Column(name, frame.iloc[:, place].tolist(), of=source)
             for place, name in enumerate(names)
@@ -182,6 +182,8 @@ def require_one(kind: str, source: str, stated: str, names: Iterable[object], re
 def _named(key: str, names: list[str], layout: Layout, source: str) -> str | None:
     """The column that holds something; None if there is none."""
     if (stated := layout.columns.get(key)) is not None:
+        if stated not in names:  # what stands below it, or is its label, was added to it
+            stated = next((name for name in names if name.partition(" (")[0] == stated), stated)
         require_one("column", source, stated, names)
         return stated
     free = [(name, letters(name)) for name in names if name not in layout.columns.values()]
@@ -224,10 +226,19 @@ def _numbers_rows(column: Column | None) -> bool:
 
 
 def unit_said(name: str, known: Mapping[str, float]) -> str | None:
-    """The unit that a column's name says, of those of one quantity."""
-    words = [*re.findall(r"[\[(]([^][()]*)[\])]", name), *re.findall(r"[^\W_]+", name)[1:]]
-    told = [unit for word in words if (unit := UNIT_WORDS.get(word.strip().casefold(), "")) in known]
-    return told[-1] if told else None
+    """The unit that a column's name says, of those of one quantity.
+
+    Raises:
+        InvalidValueError: it says two, such as one beside it, in the line below it or in its cells.
+    """
+    inside, bare = re.findall(r"[\[(]([^][()]*)[\])]", name), re.findall(r"[^\W_]+", re.sub(r"[\[(].*", "", name))[1:]
+    found, usual = ([unit for word in words if (unit := UNIT_WORDS.get(word.strip().casefold(), "")) in known]
+                    for words in ([*inside, *bare[-1:]], bare))  # fmt: skip
+    if len({*found}) > 1:
+        raise InvalidValueError(
+            f"the column {name!r} says two units", got=" and ".join(found), remedy="Leave the right one in its name."
+        )
+    return next(reversed(found or usual), None)
 
 
 def required_unit(what: str, column: Column, layout: Layout, known: Mapping[str, float]) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import json
-from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -13,7 +12,6 @@ import numpy as np
 from isiw.errors import ConfigError
 from isiw.existing.formats.contents import APART_S, Contents, Stretch, Track, events_of
 from isiw.existing.layout import Layout
-from isiw.types import FloatArray
 
 _FRAME: Final = 0x7FFE
 """BioSig's type of an event where a new frame begins."""
@@ -39,7 +37,7 @@ def read(path: Path, _layout: Layout) -> Contents:
         for n, (first, end) in enumerate(zip(firsts, [*firsts[1:], count], strict=True))
     ]
     tracks = [
-        Track(one["Label"], rate_hz, tuple(frames), partial(_part, values, index), one.get("PhysicalUnit", ""))
+        Track.of_values(one["Label"], rate_hz, frames, values[:, index], one.get("PhysicalUnit", ""))
         for index, one in enumerate(said["CHANNEL"][: values.shape[1]])
     ]
     rows = [("sweep", frame.start_s, frame.samples / rate_hz) for frame in frames if len(frames) > 1]
@@ -48,7 +46,3 @@ def read(path: Path, _layout: Layout) -> Contents:
             frame = next(frame for frame in reversed(frames) if frame.first <= at * rate_hz + 0.5)
             rows.append((str(one.get("Description") or kind), frame.start_s + at - frame.first / rate_hz, 0.0))
     return Contents(path.name, tuple(tracks), events_of(rows))
-
-
-def _part(values: FloatArray, index: int, first: int, last: int) -> FloatArray:
-    return np.asarray(values[first:last, index], dtype=np.float64)

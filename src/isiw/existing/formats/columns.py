@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from isiw.existing.layout import EMG_UNITS, ISI_UNITS_MS, MARKERS, Layout
 from isiw.existing.tables import require_one, unit_said
 from isiw.lazy import pd
 from isiw.types import FloatArray
+
+_FEW: Final = 0.01
+"""With a larger share of steps that are longer than usual, times have no pauses but are rounded."""
 
 
 def read(path: Path, layout: Layout) -> Contents:
@@ -29,29 +32,27 @@ def read(path: Path, layout: Layout) -> Contents:
         require_one("column", source, name, frame, remedy)
     breaks = frame.iloc[:, 0].astype(str).str.endswith("=").to_numpy()
     frame, block = frame[~breaks], np.cumsum(breaks)[~breaks]
-    _require_clock(frame[block == block[:1]], layout, rate_hz, source)
-    starts = np.flatnonzero(np.diff(block, prepend=-1)).tolist()
-    ends = [*starts[1:], len(block)]
-    stretches = tuple(Stretch(at, end - at, n * APART_S) for n, (at, end) in enumerate(zip(starts, ends, strict=True)))
+    pauses_s = _pauses_s(frame[block == block[:1]], layout, rate_hz, source)
+    blocks = np.flatnonzero(np.diff(block, prepend=-1)).tolist()
+    starts_s = {at: n * APART_S for n, at in enumerate(blocks)}
+    if len(blocks) == 1:
+        starts_s |= {at: at / rate_hz + sum(pauses_s[one] for one in pauses_s if one <= at) for at in pauses_s}
+    ends = [*list(starts_s)[1:], len(block)]
+    stretches = tuple(Stretch(at, end - at, own_s) for (at, own_s), end in zip(starts_s.items(), ends, strict=True))
     tracks = list[Track]()
     for key, name in layout.channels.items():
         if key != "events" and name not in {track.name for track in tracks}:
             values = _numbers(frame, name, layout, source)
-            tracks.append(_track(name, rate_hz, stretches, values, "stim" if key in MARKERS else ""))
+            unit, kind = unit_said(name, EMG_UNITS) or "", "stim" if key in MARKERS else ""
+            tracks.append(Track.of_values(name, rate_hz, stretches, values, unit, kind))
     rows = []
     for at, text in enumerate(frame[layout.channels["events"]].tolist() if "events" in layout.channels else ()):
         if not is_missing(text):
             stretch = next(one for one in reversed(stretches) if one.first <= at)
             rows.append((str(text).lstrip("#* "), stretch.start_s + (at - stretch.first) / rate_hz, 0.0))
-    if len(stretches) > 1:
+    if len(blocks) > 1:
         rows += [("sweep", one.start_s, one.samples / rate_hz) for one in stretches]
     return Contents(source, tuple(tracks), events_of(rows))
-
-
-def _track(name: str, rate_hz: float, stretches: tuple[Stretch, ...], values: FloatArray, kind: str) -> Track:
-    return Track(
-        name, rate_hz, stretches, lambda first, last: values[first:last], unit_said(name, EMG_UNITS) or "", kind
-    )
 
 
 def required(layout: Layout, key: Literal["rate_hz", "pulse_at_ms"], what: str) -> float:
@@ -73,26 +74,35 @@ def require_rate(stated_hz: float, found_hz: float, where: str) -> None:
         )
 
 
-def _require_clock(frame: pd.DataFrame, layout: Layout, rate_hz: float, source: str) -> None:
-    """Raise if a column of times says another sampling rate than the layout."""
+def _pauses_s(frame: pd.DataFrame, layout: Layout, rate_hz: float, source: str) -> dict[int, float]:
+    """How long recording paused before some samples, by a column of times; raise if it says another sampling rate."""
+    found = dict[int, float]()
     for name in sorted({*frame.columns} - {*layout.channels.values()}):
-        cells = frame.iloc[:, list(frame.columns).index(name)]
-        if (clock_hz := _clock_hz(cells, name, rate_hz)) is not None:
-            require_rate(rate_hz, clock_hz, f"the column {name!r} of {source}")
+        if (clock := clock_of(frame.iloc[:, list(frame.columns).index(name)], name, rate_hz)) is not None:
+            require_rate(rate_hz, clock[0], f"the column {name!r} of {source}")
+            found = found or clock[1]
+    return found
 
 
-def _clock_hz(cells: pd.Series, name: str, rate_hz: float) -> float | None:
-    """The sampling rate that a column of times says; None if it is no such column, or of numbers of samples."""
+def clock_of(cells: pd.Series, name: str, rate_hz: float) -> tuple[float, dict[int, float]] | None:
+    """The rate that times of samples say, and how long pauses were before some [s]; None if they are no such times."""
     times = pd.to_numeric(cells.astype(str).str.replace(",", "."), errors="coerce").to_numpy(dtype=np.float64)
-    step = (times[-1] - times[0]) / (len(times) - 1) if len(times) > 2 else 0.0
-    even = times[0] + step * np.arange(len(times))
-    if not step > 0 or not np.all(np.abs(times - even) <= 1.01 * step):  # they may be rounded
+    steps = np.diff(times)
+    usual = float(np.median(steps)) if len(steps) > 1 else 0.0
+    late = np.flatnonzero(steps > 1.5 * usual)
+    if not 0 < len(late) < _FEW * len(steps):
+        late = late[:0]
+    over = steps[late] - usual
+    steps[late] = usual
+    step = float(steps.mean()) if len(steps) > 1 else 0.0
+    if not step > 0 or not np.all(np.abs(np.cumsum(steps - step)) <= 1.01 * step):  # they may be rounded
         return None
     unit = unit_said(name, ISI_UNITS_MS)
-    rates = [1e3 / (step * per_ms) for known, per_ms in ISI_UNITS_MS.items() if unit in {None, known}]
     if unit is None and math.isclose(step, 1.0, rel_tol=1e-6):
         return None
-    return min(rates, key=lambda rate: abs(math.log(rate / rate_hz)))
+    rates = [1e3 / (step * per_ms) for known, per_ms in ISI_UNITS_MS.items() if unit in {None, known}]
+    found_hz = min(rates, key=lambda rate: abs(math.log(rate / rate_hz)))
+    return found_hz, dict(zip((late + 1).tolist(), (over / step / found_hz).tolist(), strict=True))
 
 
 def _numbers(frame: pd.DataFrame, name: str, layout: Layout, source: str) -> FloatArray:

@@ -8,6 +8,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from isiw.errors import InvalidValueError
 from isiw.lazy import pd
 from isiw.types import FloatArray
 
@@ -16,6 +17,9 @@ PIECE: Final = 2**20
 
 APART_S: Final = 100.0
 """Sweeps without a time of their own, and what a pause of unknown length separates, are so far apart."""
+
+_SAME: Final = 1.5
+"""An event of a channel of codes is one that is noted, too, if both have one name, and so many samples between them."""
 
 
 class Stretch(NamedTuple):
@@ -47,16 +51,22 @@ class Track:
     kind: str = ""
 
     @classmethod
-    def whole(cls, name: str, rate_hz: float, values: FloatArray, unit: str = "", start_s: float = 0.0) -> Track:
-        """A channel in memory without gaps."""
-        return cls(name, rate_hz, (Stretch(0, len(values), start_s),), lambda first, last: values[first:last], unit)
+    def of_values(
+        cls, name: str, rate_hz: float, stretches: Iterable[Stretch], values: Any, unit: str, kind: str = ""
+    ) -> Track:
+        """A channel in memory."""
+
+        def part(first: int, last: int) -> FloatArray:
+            return np.asarray(values[first:last], dtype=np.float64)
+
+        return cls(name, rate_hz, tuple(stretches), part, unit, kind)
 
     @classmethod
     def of_sweeps(cls, name: str, rate_hz: float, sweeps: FloatArray, unit: str, kind: str = "") -> Track:
         """A channel of sweeps of one length, shape (n, w)."""
-        values, length = np.ascontiguousarray(sweeps).ravel(), sweeps.shape[1]
-        stretches = tuple(Stretch(n * length, length, n * APART_S) for n in range(len(sweeps)))
-        return cls(name, rate_hz, stretches, lambda first, last: values[first:last], unit, kind)
+        length = sweeps.shape[1]
+        stretches = [Stretch(n * length, length, n * APART_S) for n in range(len(sweeps))]
+        return cls.of_values(name, rate_hz, stretches, np.ascontiguousarray(sweeps).ravel(), unit, kind)
 
     def at(self, time_s: float) -> Stretch | None:
         """The stretch that a time is in; None in a gap."""
@@ -81,7 +91,11 @@ class Track:
                 yield stretch, begin, self.read(stretch.first + begin, stretch.first + end)
 
     def onsets_s(self) -> list[float]:
-        """When a trigger leaves the level at which it mostly is [s]."""
+        """When a trigger leaves the level at which it mostly is [s].
+
+        Raises:
+            InvalidValueError: it is as long at one level as at the other, so that either edge may be a stimulus.
+        """
         ends = [(values.min(), values.max()) for _, _, values in self.pieces()]
         middle = (min(low for low, _ in ends) + max(high for _, high in ends)) / 2 if ends else 0.0
         rises, falls, high = list[float](), list[float](), 0
@@ -91,18 +105,35 @@ class Track:
             turns = np.diff(above.astype(np.int8), prepend=np.int8((values[0] if before is None else before) > middle))
             for times, turn in ((rises, 1), (falls, -1)):
                 times += [stretch.start_s + (begin + int(at)) / self.rate_hz for at in np.flatnonzero(turns == turn)]
+        spans_s = np.diff(sorted([*rises, *falls]))
+        if len(spans_s) > 2 and 0.5 < np.median(spans_s[0::2]) / np.median(spans_s[1::2]) < 2:
+            raise InvalidValueError(
+                f"the trigger {self.name!r} is about as long at one level as at the other, so that it cannot be known "
+                "which of its edges are stimuli",
+                got=f"{len(rises)} edges up and {len(falls)} down",
+                remedy="Export events in its place, or a trigger that is short for each stimulus.",
+            )
         return falls if 2 * high > sum(stretch.samples for stretch in self.stretches) else rises
 
     def codes(self) -> list[tuple[float, int]]:
-        """When a channel of codes rises, as a trigger does [s], and to which code."""
-        found = list[tuple[float, int]]()
-        for stretch, begin, values, before in self._with_last():
+        """When a channel of codes rises, as a trigger does [s], and to which code.
+
+        One that rises while another lasts adds its bits to it: where these bits have come alone, they are the code.
+        """
+        found = list[tuple[float, int, int]]()
+        for stretch, begin, values, last in self._with_last():
             codes = np.rint(values).astype(np.int64)
-            rises = np.diff(codes, prepend=codes[0] if before is None else round(before)) > 0
+            steps = np.diff(codes, prepend=codes[0] if last is None else round(last))
             found += [
-                (stretch.start_s + (begin + int(at)) / self.rate_hz, int(codes[at])) for at in np.flatnonzero(rises)
+                (stretch.start_s + (begin + int(at)) / self.rate_hz, int(codes[at]), int(codes[at] - steps[at]))
+                for at in np.flatnonzero(steps > 0)
             ]
-        return [(at, code) for at, code in found if code > 0]
+        alone = {code for _, code, before in found if before == 0}
+        return [
+            (at, code ^ before if before & code == before and code not in alone and code ^ before in alone else code)
+            for at, code, before in found
+            if code > 0
+        ]
 
     def _with_last(self) -> Iterator[tuple[Stretch, int, FloatArray, float | None]]:
         """The numbers of all stretches, some at a time, and the last number before them in the same stretch."""
@@ -115,6 +146,20 @@ class Track:
 def events_of(rows: Iterable[Sequence[Any]]) -> pd.DataFrame:
     """Events as a table: what each is called, when it was [s], and how long it lasted [s]."""
     return pd.DataFrame([tuple(row) for row in rows], columns=["name", "onset", "duration"])
+
+
+def with_codes(rows: Sequence[tuple[str, float, float]], tracks: Iterable[Track]) -> pd.DataFrame:
+    """Events, and those of channels of codes besides, in the order of their times; one that both have is one."""
+    found, times_s = list(rows), dict[str, list[float]]()
+    for name, at, _ in rows:
+        times_s.setdefault(name, []).append(at)
+    for track in tracks:
+        for at, code in track.codes() if track.kind == "stim" else ():
+            known = times_s.setdefault(str(code), [])
+            if not any(abs(at - other) * track.rate_hz <= _SAME for other in known):
+                known.append(at)
+                found.append((str(code), at, 0.0))
+    return events_of(sorted(found, key=lambda row: row[1]))
 
 
 @dataclass(frozen=True, eq=False)

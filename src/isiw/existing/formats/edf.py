@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Final
 
 from isiw.existing.formats.beside import bids_events
-from isiw.existing.formats.contents import Contents, Stretch, Track, events_of
-from isiw.existing.formats.edf_records import Header, header_of, is_status, text_of
+from isiw.existing.formats.contents import Contents, Stretch, Track, with_codes
+from isiw.existing.formats.edf_records import Header, header_of, text_of
 from isiw.existing.layout import Layout
 
 _ROUNDED_S: Final = 1e-3
@@ -32,13 +32,12 @@ def read(path: Path, _layout: Layout) -> Contents:
     for signal, label in enumerate(labels):
         if signal not in noted and header.counts[signal]:
             rate_hz = header.counts[signal] / header.record_s
-            kind = "stim" if is_status(label) else "emg" if label.casefold().startswith("emg") else ""
+            kind = "stim" if header.is_status(signal) else "emg" if label.casefold().startswith("emg") else ""
             stretches = tuple(_stretches(starts, header, header.counts[signal]))
             unit = header.fields["unit"][signal]
             tracks.append(Track(label, rate_hz, stretches, partial(header.samples, signal), unit, kind))
-    found = events_of(sorted(events, key=lambda row: row[1]))
     beside = bids_events(path)
-    return Contents(path.name, tuple(tracks), found if beside is None else beside)
+    return Contents(path.name, tuple(tracks), with_codes(events, tracks) if beside is None else beside)
 
 
 def _annotations(header: Header, signal: int) -> Iterator[list[tuple[float, float, str]]]:

@@ -51,18 +51,17 @@ class Header(NamedTuple):
         else:
             triples = np.frombuffer(raw, np.uint8).reshape(-1, 3)
             digital = np.pad(triples, ((0, 0), (1, 0))).copy().view("<i4").ravel() / 256.0
-        if is_status(self.fields["label"][signal]):  # of which the lower bits are the triggers
+        digital = digital[first - begin * count : last - begin * count]
+        if self.is_status(signal):  # of which the lower bits are the triggers
             return (digital.astype(np.int64) & 0xFFFF).astype(np.float64)
         least, most, lowest, highest = (
             float(self.fields[key][signal]) for key in ("least", "most", "lowest", "highest")
         )
-        scaled = (digital - lowest) * ((most - least) / (highest - lowest)) + least
-        return scaled[first - begin * count : last - begin * count]
+        return (digital - lowest) * ((most - least) / (highest - lowest)) + least
 
-
-def is_status(label: str) -> bool:
-    """True of the signal in which BDF has triggers."""
-    return label.casefold() in {"status", "trigger"}
+    def is_status(self, signal: int) -> bool:
+        """True of the signal in which BDF has the codes of triggers."""
+        return self.width == 3 and self.fields["label"][signal].casefold() in {"status", "trigger"}
 
 
 def header_of(path: Path) -> Header:

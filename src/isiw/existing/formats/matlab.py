@@ -47,6 +47,23 @@ def _sweeps(arrays: Mapping[str, Any], layout: Layout, source: str) -> Contents:
     for other, array in arrays.items():
         if array.size == 1 and letters(other) in _RATES and array.dtype.kind in "fiu":
             columns.require_rate(rate_hz, float(array.item()), f"{other!r} of {source}")
+        if array.size == sweeps.size // count != count:
+            _require_zero(other, array.ravel(), rate_hz, pulse_at_ms, source)
     unit = tables.unit_said(name, EMG_UNITS) or ""
     track = Track.of_sweeps(name, rate_hz, sweeps if sweeps.shape[0] == count else sweeps.T, unit)
     return Contents(source, (track,), trials=pd.DataFrame(beside), pulse_at_s=pulse_at_ms / 1e3)
+
+
+def _require_zero(name: str, times: Any, rate_hz: float, pulse_at_ms: float, source: str) -> None:
+    """Raise if times of a sweep's samples say another rate than the layout, or are 0 elsewhere than at the pulse."""
+    if (clock := columns.clock_of(pd.Series(times), name, rate_hz)) is None:
+        return
+    columns.require_rate(rate_hz, clock[0], f"{name!r} of {source}")
+    zero_ms = 1e3 / clock[0] * -times[0] * (len(times) - 1) / (times[-1] - times[0])
+    if zero_ms > 0 and abs(zero_ms - pulse_at_ms) > 1.5e3 / rate_hz:
+        raise InvalidValueError(
+            f"the pulse does not come where {name!r} of {source} is 0",
+            got=f"{pulse_at_ms:g} ms",
+            expected=f"{zero_ms:g} ms after the first sample",
+            remedy="Correct pulse_at_ms in the layout; if it is right, leave that vector out of the file.",
+        )

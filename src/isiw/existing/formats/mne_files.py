@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from isiw.errors import InvalidValueError
 from isiw.existing.formats.beside import bids_events
-from isiw.existing.formats.contents import APART_S, Contents, Stretch, Track, events_of
+from isiw.existing.formats.contents import APART_S, Contents, Stretch, Track, events_of, with_codes
 from isiw.existing.layout import Layout
 from isiw.lazy import pd
 from isiw.text.named_code import library
@@ -18,9 +18,6 @@ from isiw.types import FloatArray
 
 _SCALES_V: Final = {"V": 1.0, "mV": 1e-3, "µV": 1e-6, "uV": 1e-6, "nV": 1e-9}
 """The units that MNE knows, in V; numbers in others it leaves as they are."""
-
-_SAME: Final = 1.5
-"""An event of a stim channel is one that is annotated if both have one name, and so many samples between them."""
 
 
 def read(path: Path, _layout: Layout) -> Contents:
@@ -112,10 +109,4 @@ def _events(raw: Any, tracks: tuple[Track, ...]) -> pd.DataFrame:
         return at_s - begins + own
 
     rows = [(name, moved(at), long) for (at, name), long in zip(_annotations(raw), lasts, strict=True)]
-    for track in tracks:
-        if track.kind == "stim":
-            for at, code in track.codes():
-                known = (abs(at - other) * rate_hz <= _SAME for name, other, _ in rows if name == str(code))
-                if not any(known):
-                    rows.append((str(code), at, 0.0))
-    return events_of(sorted(rows, key=lambda row: row[1]))
+    return with_codes(rows, tracks)

@@ -32,7 +32,10 @@ def read(path: Path, _layout: Layout) -> Contents:
         elif isinstance(one, pynwb.core.DynamicTable) and "timestamp" in one.colnames:
             rows += _stamped(one)
         elif isinstance(one, pynwb.TimeSeries) and getattr(one.data, "ndim", np.ndim(one.data)) in {1, 2}:
-            tracks += _channels(one, held)
+            if (codes := _codes(one)) is None:
+                tracks += _channels(one, held)
+            else:
+                rows += codes
     events = pd.concat([events_of(rows), *(_intervals(table) for table in tables)], ignore_index=True)
     trials = next((table for table in tables if not tracks and len(table)), None)
     return Contents(path.name, tuple(tracks), events.sort_values("onset", ignore_index=True), trials)
@@ -56,6 +59,19 @@ def _channels(series: Any, held: Any) -> Iterator[Track]:
         place = channel if count else None
         part = partial(_part, series, held, place, factor, float(series.offset or 0.0))
         yield Track(name, rate_hz, stretches, part, str(series.unit or ""), "emg" if "emg" in name.casefold() else "")
+
+
+def _codes(series: Any) -> list[tuple[str, float, float]] | None:
+    """What a series of whole numbers at times without a rate says, as triggers do; None if it is none."""
+    if series.timestamps is None or np.asarray(series.data[:1]).dtype.kind not in "iu" or len(series.data.shape) > 1:
+        return None
+    times_s = np.asarray(series.timestamps[:], dtype=np.float64)
+    steps_s = np.diff(times_s)
+    if (
+        len(steps_s) > 1 and np.quantile(np.abs(steps_s / np.median(steps_s) - 1), 0.9) < 0.1
+    ):  # samples, that come evenly
+        return None
+    return [(f"{code}", at, 0.0) for code, at in zip(series.data[:].tolist(), times_s.tolist(), strict=True)]
 
 
 def _part(

@@ -8,7 +8,7 @@ import numpy as np
 
 from isiw.errors import InvalidValueError
 from isiw.existing.formats.contents import Stretch
-from isiw.types import FloatArray
+from isiw.types import FloatArray, IntArray
 
 _GAP_S: Final = 2.5e-3
 """Samples that come later than expected by so much, and stay so, come after a gap; those that do not, jitter."""
@@ -25,35 +25,42 @@ class Clocked(NamedTuple):
     scatter_s: float
 
 
-def clocked(times_s: FloatArray, nominal_hz: float | None, what: str) -> Clocked:
+def clocked(
+    times_s: FloatArray, nominal_hz: float | None, what: str, index: IntArray | None = None, samples: int = 0
+) -> Clocked:
     """Times of samples as stretches without a gap; what is left out is jitter.
 
     A gap is found whatever its length, and no stretch is stretched over it.
 
     Args:
-        times_s: when each sample was taken [s], shape (n,).
+        times_s: when each sample was taken [s], shape (n,), or each of those that are known.
         nominal_hz: the rate that is stated; None for that of the times.
         what: whose samples these are, for messages.
+        index: which samples these are, if they are not all, ascending, shape (n,).
+        samples: how many there are in all, if these are not all.
     """
-    steps_s = np.diff(times_s)
+    index = np.arange(len(times_s)) if index is None else index
+    ahead = np.diff(index)
+    steps_s = np.diff(times_s) / ahead
     if len(times_s) < 3 or not np.isfinite(times_s).all() or not np.median(steps_s) > 0:
         raise InvalidValueError(f"the times of the samples of {what} do not ascend", got=f"{len(times_s)} samples")
     nominal_s = 1.0 / nominal_hz if nominal_hz else float(np.median(steps_s))
-    late_s = times_s - np.arange(len(times_s)) * nominal_s
-    around = max(3, round(_AROUND_S / nominal_s))
+    late_s = times_s - index * nominal_s
+    around = max(3, round(_AROUND_S / (nominal_s * float(ahead.mean()))))
     least_s = max(_GAP_S, 1.5 * nominal_s, 2.0 * _jitter_s(late_s, around))
-    late = (np.flatnonzero(steps_s > nominal_s + 0.8 * least_s) + 1).tolist()
+    late = (np.flatnonzero(np.diff(late_s) > 0.8 * least_s) + 1).tolist()
     begins = [0, *_gaps(late_s, late, (0, len(times_s)), around, least_s)]
     ends = [*begins[1:], len(times_s)]
-    spans = list(zip(begins, ends, strict=True))
-    longest = max(spans, key=lambda span: span[1] - span[0])
-    period_s = _period_s(times_s[slice(*longest)], nominal_s)
+    spans = [slice(*span) for span in zip(begins, ends, strict=True)]
+    longest = max(spans, key=lambda span: index[span.stop - 1] - index[span.start])
+    period_s = _period_s(times_s[longest], index[longest], nominal_s)
     stretches, scatter = [], list[FloatArray]()
-    for begin, end in spans:
-        even_s = period_s * np.arange(end - begin)
-        start_s = float(np.median(times_s[begin:end] - even_s))
-        stretches.append(Stretch(begin, end - begin, start_s))
-        scatter.append(np.abs(times_s[begin:end] - even_s - start_s))
+    for span, last in zip(spans, [*index[begins[1:]].tolist(), samples or len(times_s)], strict=True):
+        first = int(index[span.start])
+        even_s = period_s * (index[span] - first)
+        start_s = float(np.median(times_s[span] - even_s))
+        stretches.append(Stretch(first, last - first, start_s))
+        scatter.append(np.abs(times_s[span] - even_s - start_s))
     return Clocked(1.0 / period_s, tuple(stretches), float(np.quantile(np.concatenate(scatter), 0.95)))
 
 
@@ -85,9 +92,9 @@ def _jitter_s(late_s: FloatArray, around: int) -> float:
     return 1.48 * float(np.median(np.abs(whole - np.median(whole, axis=1, keepdims=True)))) if len(whole) else 0.0
 
 
-def _period_s(times_s: FloatArray, nominal_s: float) -> float:
+def _period_s(times_s: FloatArray, index: IntArray, nominal_s: float) -> float:
     """The time from one sample to the next, by a line through all of them; the nominal one if they are few."""
     if times_s[-1] - times_s[0] < _ENOUGH_S:
         return nominal_s
-    index = np.arange(len(times_s)) - (len(times_s) - 1) / 2
-    return float(index @ (times_s - times_s.mean()) / (index @ index))
+    centred = index - index.mean()
+    return float(centred @ (times_s - times_s.mean()) / (centred @ centred))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -54,7 +53,7 @@ def smrx(path: Path, _layout: Layout) -> Contents:
                 parts, first = [*parts, values], first + len(values)
                 at = held.FirstTime(channel, at + len(values) * step, end)
             whole, unit = np.concatenate(parts) if parts else np.empty(0), held.GetChannelUnits(channel)
-            tracks.append(Track(title, 1 / (step * tick_s), tuple(stretches), partial(_part, whole), unit))
+            tracks.append(Track.of_values(title, 1 / (step * tick_s), stretches, whole, unit))
         elif kind in _EVENTS:
             rows += [(title, at * tick_s, 0.0) for at in held.ReadEvents(channel, 2**20, 0)]
         elif kind in _MARKS:
@@ -71,14 +70,10 @@ def adicht(path: Path, _layout: Layout) -> Contents:
     for channel in held.channels:
         parts = [np.asarray(channel.get_data(n + 1), dtype=np.float64) for n in range(channel.n_records)]
         firsts = np.cumsum([0, *map(len, parts)]).tolist()
-        stretches = tuple(Stretch(firsts[n], len(part), n * APART_S) for n, part in enumerate(parts) if len(part))
+        stretches = [Stretch(firsts[n], len(part), n * APART_S) for n, part in enumerate(parts) if len(part)]
         units = {unit for unit in channel.units if unit}
         unit = units.pop() if len(units) == 1 else ""
-        tracks.append(Track(channel.name, float(channel.fs[0]), stretches, partial(_part, np.concatenate(parts)), unit))
+        tracks.append(Track.of_values(channel.name, float(channel.fs[0]), stretches, np.concatenate(parts), unit))
     for n, record in enumerate(held.records):
         rows += [(one.text, n * APART_S + float(one.time), 0.0) for one in record.comments]
     return Contents(path.name, tuple(tracks), events_of(rows))
-
-
-def _part(values: FloatArray, first: int, last: int) -> FloatArray:
-    return values[first:last]

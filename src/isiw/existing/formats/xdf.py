@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import gzip
 from collections.abc import Mapping
-from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,19 +11,18 @@ import numpy as np
 
 from isiw.existing.formats.contents import Contents, Track, events_of
 from isiw.existing.formats.stamps import clocked
+from isiw.existing.formats.xdf_chunks import shortened
 from isiw.existing.layout import Layout
-from isiw.files import opened
 from isiw.text.named_code import library
-from isiw.types import FloatArray
 
 _SCATTER_S = 2e-3
 
 
-def read(path: Path, layout: Layout) -> Contents:
+def read(path: Path, _layout: Layout) -> Contents:
     """The channels and markers of all streams, on one clock; gaps are found here, since pyxdf smooths them away."""
     load = library("pyxdf", "import").load_xdf
-    with opened(path) as plain, gzip.open(plain) if path.suffix.casefold() == ".xdfz" else nullcontext(plain) as file:
-        streams, _ = load(file, on_chunk=partial(_needed, layout), dejitter_timestamps=False, verbose=False)
+    numbers, shorter = shortened(path)
+    streams, _ = load(shorter, dejitter_timestamps=False, verbose=False)
     streams = [stream for stream in streams if len(stream["time_stamps"])]
     begun_s = min((float(stream["time_stamps"][0]) for stream in streams), default=0.0)
     hosts = {_said(stream["info"], "hostname") for stream in streams}
@@ -37,44 +34,28 @@ def read(path: Path, layout: Layout) -> Contents:
         if _is_of_markers(stream):
             rows += [(_text(one), at, 0.0) for one, at in zip(stream["time_series"], times_s.tolist(), strict=True)]
             continue
-        of_stream = clocked(times_s, float(_said(stream["info"], "nominal_srate")) or None, f"the stream {name}")
+        if (held := numbers.get(stream["info"]["stream_id"])) is None:
+            continue  # numbers at no rate, which no EMG has
+        index = np.asarray(held.index[: len(times_s)])
+        of_stream = clocked(times_s, 1.0 / held.period_s, f"the stream {name}", index, held.firsts[-1])
         if of_stream.scatter_s > _SCATTER_S:
             notes.append(
                 f"The times of the stream {name} scatter by {1e3 * of_stream.scatter_s:.1f} ms: MEPs may lie elsewhere."
             )
-        values = np.asarray(stream["time_series"])
-        for channel, (label, unit, kind) in enumerate(_kept(stream, layout)):
-            tracks.append(
-                Track(label, of_stream.rate_hz, of_stream.stretches, partial(_part, values, channel), unit, kind)
-            )
+        for channel, (label, unit, kind) in enumerate(_channels(stream)):
+            part = partial(held.read, channel)
+            tracks.append(Track(label, of_stream.rate_hz, of_stream.stretches, part, unit, kind))
     twice = {track.name for track in tracks if [one.name for one in tracks].count(track.name) > 1}
     if twice:
         notes.append(f"Several channels are called {', '.join(sorted(twice))}.")
     return Contents(path.name, tuple(tracks), events_of(sorted(rows, key=lambda row: row[1])), notes=tuple(notes))
 
 
-def _needed(layout: Layout, values: Any, times_s: Any, stream: Any, _number: int) -> tuple[Any, Any, Any]:
-    """Of a piece of a stream the channels that are needed, so that a long one fits into the memory."""
-    if isinstance(values, np.ndarray):
-        every = _channels({"info": stream["info"]})
-        values = values[:, [every.index(channel) for channel in _kept({"info": stream["info"]}, layout)]]
-    return values, times_s, stream
-
-
-def _kept(stream: Mapping[str, Any], layout: Layout) -> list[tuple[str, str, str]]:
-    """The channels that the layout names, or all of a stream that has none of them."""
-    every = _channels(stream)
-    return [channel for channel in every if channel[0] in layout.channels.values()] or every
-
-
-def _part(values: Any, channel: int, first: int, last: int) -> FloatArray:
-    return np.asarray(values[first:last, channel], dtype=np.float64)
-
-
 def _is_of_markers(stream: Mapping[str, Any]) -> bool:
-    """True for texts, and for numbers that come at no rate."""
-    texts = _said(stream["info"], "channel_format") == "string"
-    return texts or (float(_said(stream["info"], "nominal_srate") or 0.0) == 0.0 and "marker" in _kind(stream))
+    """True for texts, and for numbers that come at no rate: whole ones, or of a type that says so."""
+    form = _said(stream["info"], "channel_format")
+    coded = form.startswith("int") or any(word in _kind(stream) for word in ("marker", "trig", "ttl", "stim", "event"))
+    return form == "string" or (float(_said(stream["info"], "nominal_srate") or 0.0) == 0.0 and coded)
 
 
 def _kind(stream: Mapping[str, Any]) -> str:
