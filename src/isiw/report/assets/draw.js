@@ -24,7 +24,7 @@ const draw = (() => {
       .flatMap((belief) => [...belief.low, ...belief.high, ...belief.predictedLow, ...belief.predictedHigh])];
     const positive = sizes.filter((size) => size !== null && size >= 1);
     const lowest = positive.reduce((least, size) => Math.min(least, size), 10) * 0.8;
-    return [lowest, positive.reduce((most, size) => Math.max(most, size), 100) * 1.3];
+    return [lowest, positive.reduce((most, size) => Math.max(most, size), 100) * 1.8]; // a whole mark, below the bars
   }
 
   const line = (x, y, name, style, more = {}) => ({ x, y, name, mode: "lines", line: style, hoverinfo: "skip", ...more });
