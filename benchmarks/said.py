@@ -50,7 +50,7 @@ RIGHT: Final = {
     "kim11-measured": 100,
 }  # fmt: skip
 SQUARED: Final = " squared"
-CHANGED: Final = {"ramp": 200, "step": 200, f"ramp{SQUARED}": 200, f"step{SQUARED}": 200}
+CHANGED: Final = {"ramp": 200, "step": 120, f"ramp{SQUARED}": 200, f"step{SQUARED}": 200}
 """How many people of each cohort, of a thousand right sessions."""
 
 QUARTERS: Final = 4
