@@ -47,7 +47,7 @@ def main() -> None:
         with isiw.watch(session) as page:
             shown = browser.new_page(viewport={"width": 1280, "height": 900})
             shown.goto(page.url)
-            shown.get_by_text("NOT BEGUN").wait_for()
+            shown.get_by_text("NOT BEGUN", exact=True).wait_for()
             runs = threading.Thread(target=session.run)
             runs.start()
             shown.get_by_text("Time to look at the coil.", exact=True).first.wait_for(timeout=120_000)

@@ -78,17 +78,13 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
         (sentences.finding(SWEPT, TAP, DesignSpace(10, 20, reference="impact")), "No window was found."),
         (
             sentences.edges(SURE, SPACE),
-            (
-                "Start before 34 ms, end 150–171 ms (90 % each). "
-                "Given a window, it "
-                "starts before the range with probability 0.10."
-            ),
+            ("Start before 34 ms, end 150–171 ms (90 % each). It starts before the range with probability 0.10."),
         ),
         (
             sentences.edges(PROBABLE, SPACE),
             (
                 "If there is a window, start before 34 ms, end 150–171 ms (90 % each). "
-                "Given a window, it starts before the range with probability 0.10, it has more than one segment with "
+                "Given a window, it starts before the range with probability 0.10 and has more than one segment with "
                 "probability 0.25."
             ),
         ),
@@ -97,7 +93,7 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
         (sentences.tap_unmeasured(SURE, TAP), ""),
         (
             sentences.tap_unmeasured(Estimate(**FOUND, tap_may_explain=True), TAP),
-            "Deliver the tap alone at these ISIs next time ([protocol] tap_alone); the muscle may answer it.",
+            "Deliver the tap alone at these ISIs too ([protocol] tap_alone); the muscle may answer it.",
         ),
         (sentences.tap_unmeasured(Estimate(**FOUND, tap_may_explain=True, tap_is_likely=True), TAP), ""),
         (
@@ -109,7 +105,7 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
         ),
         (
             sentences.best_isi(SURE),
-            "The largest MEP is expected at 90 ms (90 %: 80–101 ms).",
+            "Largest MEP at 90 ms (90 %: 80–101 ms).",
         ),
         (sentences.best_isi(NONE), ""),
         (
@@ -122,7 +118,7 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
         ),
         (
             sentences.expected_f1(PROBABLE),
-            "Expected F1: 0.40 (1 is the true window).",
+            "Expected F1: 0.40 (1: exact).",
         ),
         (
             sentences.unusual(Estimate(probability=0.5, unusual={"noise": 0.95, "drift": 0.1})),
@@ -206,19 +202,16 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
         (
             sentences.few_outside(1, 9, 0),
             (
-                "The baseline is poorly measured: 1 of 9 pairs are "
-                "outside, and the number of "
-                "pulses of TMS alone was 0. In the next session add TMS alone (in a configuration: "
-                "[protocol] tms_alone), or "
-                "widen the range of ISIs."
+                "The baseline is poorly measured (1 of 9 pairs outside the window, 0 pulses of TMS alone): add TMS "
+                "alone next time ([protocol] tms_alone), or widen the range of ISIs."
             ),
         ),
         (
             counts([PAIR, PAIR, TMS, replace(PAIR, excluded=True), LOST]),
             "5 stimuli were delivered: 4 pairs and 1 pulse of TMS alone; 3 count; mistrials: 1 no impact; 1 excluded.",
         ),
-        (counts([PAIR]), "1 pair of stimuli was delivered; 1 counts."),
-        (counts([]), "0 pairs of stimuli were delivered; 0 count."),
+        (counts([PAIR]), "1 pair was delivered; 1 counts."),
+        (counts([]), "0 pairs were delivered; 0 count."),
         (counts([TMS]), "1 stimulus was delivered: 1 pulse of TMS alone; 1 counts."),
         (
             counts([*[PAIR] * 20, *[ALONE] * 2, *[TMS] * 2]),

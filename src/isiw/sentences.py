@@ -133,7 +133,7 @@ def tap_unmeasured(estimate: Estimate, first: StimulusWords = _EITHER) -> str:
     """The way to learn the first stimulus's own response within a window, if it was not measured."""
     if not estimate.tap_may_explain or estimate.tap_is_likely:
         return ""
-    return f"Deliver the {first.alone} at these ISIs next time ([protocol] tap_alone); the muscle may answer it."
+    return f"Deliver the {first.alone} at these ISIs too ([protocol] tap_alone); the muscle may answer it."
 
 
 def at_a_trial(change: Change, trial: int | None) -> str:
@@ -161,7 +161,7 @@ def finding(estimate: Estimate, first: StimulusWords, space: DesignSpace) -> str
     if window is None:
         return f"No window was found{chance}." if rules_out(probability) else f"{undecided}."
     if is_guess(estimate):
-        return f"{undecided}: the trials are weak evidence for one. If there is, the best guess is {window} {after}."
+        return f"{undecided}; the best guess is {window} {after}."
     enhances = f"The {first.name} {'' if probability >= SURE else 'probably '}enhances the MEP"
     isis = f"{window} {after}{chance}"
     if estimate.expected_f1 is not None and estimate.expected_f1 < A_GUESS:
@@ -203,8 +203,9 @@ def edges(estimate: Estimate, space: DesignSpace) -> str:
         "ends beyond the range": end.beyond,
         "has more than one segment": estimate.split,
     }
-    more = [f"it {what} with probability {p:.2f}" for what, p in unusual.items() if p is not None and p >= WORTH_SAYING]
-    return f"{said} Given a window, {', '.join(more)}." if more else said
+    more = [f"{what} with probability {p:.2f}" for what, p in unusual.items() if p is not None and p >= WORTH_SAYING]
+    it = "It" if _is_sure(estimate) else "Given a window, it"
+    return f"{said} {it} {' and '.join(more)}." if more else said
 
 
 def best_isi(estimate: Estimate) -> str:
@@ -212,9 +213,8 @@ def best_isi(estimate: Estimate) -> str:
     best = estimate.best_isi
     if estimate.window is None or best is None:
         return ""
-    given = "The" if _is_sure(estimate) else "If there is a window, the"
-    interval = f"{best.low_ms:.0f}–{best.high_ms:.0f} ms"
-    return f"{given} largest MEP is expected at {best.isi_ms:.0f} ms (90 %: {interval})."
+    largest = "Largest" if _is_sure(estimate) else "Given a window, largest"
+    return f"{largest} MEP at {best.isi_ms:.0f} ms (90 %: {best.low_ms:.0f}–{best.high_ms:.0f} ms)."
 
 
 def _is_sure(estimate: Estimate) -> bool:
@@ -240,7 +240,7 @@ def _figure(value: float) -> str:
 def expected_f1(estimate: Estimate) -> str:
     """The expected F1 of the reported decision."""
     f1 = estimate.expected_f1
-    return "" if f1 is None else f"Expected F1: {f1:.2f} (1 is the true window)."
+    return "" if f1 is None else f"Expected F1: {f1:.2f} (1: exact)."
 
 
 def unusual(estimate: Estimate) -> str:
@@ -331,11 +331,9 @@ def at_rest(window_ms: tuple[float, float] | None, since: int | None) -> str:
 
 def few_outside(outside: int, pairs: int, alone: int) -> str:
     """That hardly a trial shows the MEP outside a reported window."""
-    return (
-        f"The baseline is poorly measured: {outside} of {pairs} pairs are outside, "
-        f"and the number of pulses of TMS alone was {alone}. In the next session add TMS alone (in a configuration: "
-        "[protocol] tms_alone), or widen the range of ISIs."
-    )
+    measured = f"{outside} of {pairs} pairs outside the window, {counted(alone, 'pulse')} of TMS alone"
+    remedy = "add TMS alone next time ([protocol] tms_alone), or widen the range of ISIs"
+    return f"The baseline is poorly measured ({measured}): {remedy}."
 
 
 def fit(troubled: int, trials: int) -> str:

@@ -24,7 +24,7 @@ def test_run_ends_with_a_statement_a_log_and_a_picture(isiw: Command, short: Pat
     assert log.with_suffix(".png").stat().st_size > 5000
     for part in (
         "probability of a window",
-        "3 pairs of stimuli were delivered",
+        "3 pairs were delivered",
         "in fact",
         log.name,
         log.stem + ".png",

@@ -25,13 +25,15 @@ from isiw.devices.robot.tapper import Tapper, TapperSettings
 from isiw.devices.simulated import RecordedPerson, RecordedTrials, Recordings, SimulatedDevice, SimulatedPerson
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, LimitExceededError, NotDelivered
 from isiw.session.rig import exclusive
+from isiw.signals.impact import impact_time
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.subject import Response
 from isiw.testing import check_device
+from isiw.testing.device_table import Delivery, deflections_ms, late_deflection
 from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial, TrialTable
 from isiw.types import Reference
 from known import instance, known
-from wrong_rigs import NAMED, WRONG, rig
+from wrong_rigs import NAMED, WRONG, WrongRig, rig
 from wrong_rigs import SPACE as RIG_SPACE
 
 
@@ -331,6 +333,50 @@ def test_a_right_rig_passes_with_a_table_of_what_was_found() -> None:
     assert "ms from the pulse" in rows["pulse artefact"]
     assert "emg in mV" in rows["units"]
     assert rows["judged"] == "accepted, accepted, accepted, accepted, accepted"
+
+
+def test_a_hammer_that_moves_before_it_hits_is_a_row_of_the_table() -> None:
+    row = dict(check_device(rig, DesignSpace(20, 320, reference="impact")).rows)["acceleration begins"]
+    assert re.fullmatch(r"\d+\.\d ms before the impact", row)
+
+
+def beginning(late_ms: float, hit_ms: float = 180.0) -> Delivery:
+    """A pair whose acceleration is first deflected so long after its impact."""
+    values = 0.01 * np.resize([1.0, -1.0], 600)
+    values[round(2 * (hit_ms + late_ms)) :] += 1.0
+    sweep = Sweep({"acceleration": Channel(values, 2000.0, "g")}, t_valve_ms=50.0, t_hit_ms=hit_ms, t_tms_ms=200.0)
+    trial = Trial(0, Status.ACCEPTED, 20.0, isi_ms=20.0, mep_mv=0.1, t_valve_ms=50.0, t_hit_ms=hit_ms, t_tms_ms=200.0)
+    return Delivery(Stimulus(0, 20.0), sweep, trial, took_s=0.1)
+
+
+def test_an_acceleration_that_begins_after_the_impact_is_a_fault_with_its_milliseconds() -> None:
+    deliveries = [beginning(late_ms) for late_ms in (6.5, 7.0, 30.0)]
+    assert deflections_ms(deliveries) == pytest.approx([6.5, 7.0, 30.0])
+    fault = known(late_deflection(deliveries))
+    assert "is first deflected 7.0 ms after the reported impact" in fault
+    assert fault.endswith("Is the accelerometer on the hammer? Are both times on the sweep's own clock?")
+
+
+def test_an_acceleration_that_begins_before_the_impact_or_is_not_recorded_is_none() -> None:
+    moves, at_the_impact = [beginning(-12.0)] * 3, [beginning(2.0)] * 3
+    measured = Delivery(
+        Stimulus(0, 20.0), Measurement(0.1, 20.0), Trial(0, Status.ACCEPTED, 20.0, mep_mv=0.1), took_s=0.1
+    )
+    assert [late_deflection(found) for found in (moves, at_the_impact, [measured], [])] == [None] * 4
+
+
+def test_a_check_fails_where_the_accelerometer_is_not_on_the_hammer() -> None:
+    def elsewhere(sweep: Sweep) -> Sweep:
+        acceleration = sweep.channels["acceleration"]
+        if sweep.t_valve_ms is None:
+            return sweep
+        hit_ms = impact_time(acceleration.values, acceleration.rate_hz, after_ms=sweep.t_valve_ms - acceleration.t0_ms)
+        late = np.roll(acceleration.values, round(0.1 * acceleration.rate_hz))
+        channels = {**sweep.channels, "acceleration": dataclasses.replace(acceleration, values=late)}
+        return dataclasses.replace(sweep, channels=channels, t_hit_ms=known(hit_ms) + acceleration.t0_ms)
+
+    with pytest.raises(AssertionError, match="Is the accelerometer on the hammer"):
+        check_device(lambda: SimulatedDevice(WrongRig(elsewhere)), RIG_SPACE)
 
 
 def test_the_suite_finds_a_rig_that_gives_a_pulse_with_a_tap_alone(space: DesignSpace) -> None:

@@ -44,7 +44,7 @@ def test_the_statement_has_window_intervals_counts_and_reason(record: SessionRec
         "(probability 0.90, Bayes factor 9).\n"
         "If there is a window, start 28–38 ms, end after 150 ms (90 % each). "
         "Given a window, it ends beyond the range with probability 0.67. "
-        "4 pairs of stimuli were delivered; 3 count; mistrials: 1 background activity. "
+        "4 pairs were delivered; 3 count; mistrials: 1 background activity. "
         "The budget of 4 stimuli is used up."
     )
 
@@ -105,7 +105,7 @@ def test_control_trials_are_named_after_the_stimulus_that_was_given(record: Sess
 
 def test_an_unusual_window_is_said_with_its_probability_once_it_is_worth_saying(record: SessionRecord) -> None:
     statement = final_statement(with_estimate(record, start_beyond=0.25, end_beyond=0.0, split=0.6))
-    assert "before the range with probability 0.25, it has more than one segment with probability 0.60" in statement
+    assert "before the range with probability 0.25 and has more than one segment with probability 0.60" in statement
 
 
 @pytest.mark.parametrize(
@@ -147,11 +147,14 @@ def test_isis_that_are_expected_to_be_wrong_are_a_guess(record: SessionRecord) -
     )
 
 
+_UNDECIDED = "It is undecided whether there is a window"
+
+
 @pytest.mark.parametrize(
     ("probability", "beforehand", "said"),
     [
-        (0.6, 0.69, "It is undecided whether there is a window (probability of a window: 0.60, Bayes factor 0.67): "),
-        (0.86, 0.69, "It is undecided whether there is a window (probability of a window: 0.86, Bayes factor 2.8): "),
+        (0.6, 0.69, f"{_UNDECIDED} (probability of a window: 0.60, Bayes factor 0.67); the best guess is 33–93 ms"),
+        (0.86, 0.69, f"{_UNDECIDED} (probability of a window: 0.86, Bayes factor 2.8); the best guess is 33–93 ms"),
         (0.88, 0.69, "The tap probably enhances the MEP at ISIs of 33–93 ms"),
         (0.6, 0.2, "The tap probably enhances the MEP at ISIs of 33–93 ms"),
         (0.96, 0.97, "The tap enhances the MEP at ISIs of 33–93 ms"),
@@ -201,16 +204,16 @@ def test_without_a_window_the_largest_enhancement_that_is_excluded_is_said(
 
 
 def test_the_best_isi_is_said_with_its_interval_where_there_is_a_window(record: SessionRecord) -> None:
-    said = "The largest MEP is expected at 64 ms (90 %: 51–78 ms)."
+    said = "Largest MEP at 64 ms (90 %: 51–78 ms)."
     best = {"best_isi_ms": (64.2, 51.0, 77.6)}
     assert said in final_statement(with_estimate(record, probability=0.97, **best))
     unsure = final_statement(with_estimate(record, probability=0.59, **best))
-    assert f"If there is a window, the{said.removeprefix('The')}" in unsure
-    assert "The largest MEP" not in final_statement(with_estimate(record, segments_ms=(), probability=0.02, **best))
+    assert f"Given a window, l{said.removeprefix('L')}" in unsure
+    assert "argest MEP" not in final_statement(with_estimate(record, segments_ms=(), probability=0.02, **best))
 
 
 def test_the_expected_f1_is_said(record: SessionRecord) -> None:
-    assert "Expected F1: 0.84 (1 is" in final_statement(with_estimate(record, expected_f1=0.841))
+    assert "Expected F1: 0.84 (1: exact)." in final_statement(with_estimate(record, expected_f1=0.841))
 
 
 def run_by(record: SessionRecord, name: str, *, delay_ms: tuple[float, float] | None, **settings: Any) -> SessionRecord:
@@ -361,3 +364,18 @@ def test_a_stimulus_without_an_outcome_has_a_row_too(record: SessionRecord) -> N
     last = len(record.table)
     rows = trial_rows(replace(record, history=(*record.history, Intent(trial=last, isi_ms=70.0))))
     assert rows[-1] == (str(last), "70 ms", "mistrial: outcome unknown", "–")
+
+
+def test_a_usual_statement_has_at_most_90_words(tmp_path: Path) -> None:
+    device = ScriptedDevice(lambda s: Measurement(0.05 + 0.01 * s.trial, s.isi_ms))
+    Session(device, scripted_strategy(4), log=tmp_path / "s.mcap").run()
+    found: dict[str, Any] = {"end_high_ms": 180.0, "end_beyond": 0.0, "best_isi_ms": (64.2, 51.0, 77.6)}
+    found |= {"expected_f1": 0.853, "tap_may_explain": True}
+    ends = "Another 10 stimuli would add little: the last 10 added less than 0.02 to the expected F1."
+    record = read_session(tmp_path / "s.mcap")
+    usual = with_estimate(record, **found, probability=0.99, reason=ends, stop_kind=StopKind.SMALL_GAIN)
+    undecided = with_estimate(record, **found, probability=0.6, beforehand=0.69)
+    for statement in (final_statement(usual), final_statement(undecided)):
+        assert len(statement.split()) <= 90
+        for part in ("Do: deliver the tap alone", "(90 % each)", "argest MEP at 64 ms", "Expected F1: 0.85", "4 count"):
+            assert part in statement

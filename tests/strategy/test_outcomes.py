@@ -119,7 +119,7 @@ def test_a_window_that_the_tap_could_explain_is_reported_with_that_sentence() ->
     for isi_ms, mep_mv in pulses:
         one.learn(isi_ms, mep_mv)
     assert one.estimate().window is not None
-    assert "Deliver the tap or electrical pulse alone at these ISIs next time" in f"{one.estimate()}"
+    assert "Deliver the tap or electrical pulse alone at these ISIs too" in f"{one.estimate()}"
 
 
 def test_a_late_window_or_one_at_isis_whose_taps_are_known_has_no_such_sentence() -> None:

@@ -269,7 +269,7 @@ def _delivered(delivered: Sequence[Trial], first: StimulusWords) -> str:
     taps = sum(trial.commanded_isi_ms is None and trial.tap_alone for trial in delivered)
     pulses = sum(trial.is_control and not trial.tap_alone for trial in delivered)
     if pairs == len(delivered):
-        return counted(pairs, "pair of stimuli was delivered", "pairs of stimuli were delivered")
+        return counted(pairs, "pair was delivered", "pairs were delivered")
     kinds = {
         counted(pairs, "pair"): pairs,
         counted(taps, first.alone, f"{first.name}s alone"): taps,

@@ -233,12 +233,13 @@ class SmallGain(Checked):
             return StopKind.SMALL_GAIN.go_on(f"It is too early to say what {self.last} more stimuli would add.")
         gained = now.expected_f1 - before
         size = f"less than {self.gain:g}" if gained < self.gain else f"{gained:.2f}"
-        added = f"the last {self.last} stimuli added {size} to the expected F1"
+        added = f"added {size} to the expected F1"
         small = self.gain > 0 and gained < self.gain and now.probability >= self.min_probability
         if small and progress.told >= self.min_told:
-            reason = f"Another {self.last} stimuli would add little: {added}, now {now.expected_f1:.2f}."
+            reason = f"Another {self.last} stimuli would add little: the last {self.last} {added}."
             return _stop_unless_by_time(StopKind.SMALL_GAIN, now, reason)
-        reason = f"Too early to stop: {added}, and a window has probability {now.probability:.2f}."
+        since = f"the last {self.last} stimuli {added}"
+        reason = f"Too early to stop: {since}, and a window has probability {now.probability:.2f}."
         return StopKind.SMALL_GAIN.go_on(reason)
 
 

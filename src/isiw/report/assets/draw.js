@@ -24,7 +24,7 @@ const draw = (() => {
       .flatMap((belief) => [...belief.low, ...belief.high, ...belief.predictedLow, ...belief.predictedHigh])];
     const positive = sizes.filter((size) => size !== null && size >= 1);
     const lowest = positive.reduce((least, size) => Math.min(least, size), 10) * 0.8;
-    return [lowest, positive.reduce((most, size) => Math.max(most, size), 100) * 1.3];
+    return [lowest, positive.reduce((most, size) => Math.max(most, size), 100) * 1.8]; // a whole mark, below the bars
   }
 
   const line = (x, y, name, style, more = {}) => ({ x, y, name, mode: "lines", line: style, hoverinfo: "skip", ...more });
@@ -194,8 +194,10 @@ const draw = (() => {
         line: { width: 1, color: colour("ink") }, hovertemplate: "%{x:.1f} ms: %{y:.3g}<extra></extra>",
       });
       axes[`xaxis${index}`] = axis(k === waves.length - 1 ? trial.tmsMs === null ? "time of the sweep [ms]" : "time after the pulse [ms]" : "",
-        { range: [x[0], x[x.length - 1]], anchor: `y${index}` });
-      axes[`yaxis${index}`] = axis("", { domain: [top - height + 0.3 * share, top], anchor: `x${index}`, ...(wave.axis && { range: wave.axis }) });
+        { range: [x[0], x[x.length - 1]], anchor: `y${index}`, showticklabels: !k || k === waves.length - 1 });
+      const gap = (k ? 0.15 : 0.6) * share; // the first has its own times below it, the others those of the last
+      const ticks = k ? { nticks: 3 } : {};
+      axes[`yaxis${index}`] = axis("", { domain: [top - height + gap, top], anchor: `x${index}`, ...ticks, ...(wave.axis && { range: wave.axis }) });
       annotations.push({
         text: `${markup(wave.name)} [${markup(wave.unit)}]`, showarrow: false, bgcolor: colour("paper"), opacity: 0.85,
         x: 0, xref: "paper", xanchor: "left", xshift: 4, y: 1, yref: `y${index} domain`, yanchor: "top",
