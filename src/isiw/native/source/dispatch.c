@@ -12,16 +12,39 @@
 #endif
 
 #if defined(__x86_64__) || defined(_M_X64)
+#include <cpuid.h>
+
+#define LZCNT (1u << 5) /* which compilers name differently */
+
 const Engine *isiw_engine_v2(void);
 const Engine *isiw_engine_v3(void);
 const Engine *isiw_engine_v4(void);
 
+/* Which registers the operating system keeps for each thread: bits 1 and 2 are those of AVX, 5 to 7 those of AVX-512. */
+static unsigned kept_registers(void) {
+    unsigned low, high;
+    __asm__ volatile("xgetbv" : "=a"(low), "=d"(high) : "c"(0));
+    return low;
+}
+
+static int has(unsigned found, unsigned bits) { return (found & bits) == bits; }
+
+/* The highest level of the processor, 0 below x86-64-v2. Asked of the processor itself: what __builtin_cpu_supports reads
+is not filled in where zig links the library. */
+static int highest(void) {
+    unsigned eax, ebx, ecx, edx, extended, features;
+    if (!__get_cpuid(1, &eax, &ebx, &ecx, &edx)) return 0;
+    if (!has(ecx, bit_SSE3 | bit_SSSE3 | bit_SSE4_1 | bit_SSE4_2 | bit_POPCNT | bit_CMPXCHG16B)) return 0;
+    unsigned kept = has(ecx, bit_OSXSAVE) ? kept_registers() : 0;
+    int avx = has(kept, 0x6) && has(ecx, bit_AVX | bit_FMA | bit_F16C | bit_MOVBE);
+    if (!avx || !__get_cpuid_count(7, 0, &eax, &features, &ecx, &edx)) return 2;
+    if (!__get_cpuid(0x80000001, &eax, &ebx, &extended, &edx)) return 2;
+    if (!has(features, bit_AVX2 | bit_BMI | bit_BMI2) || !has(extended, LZCNT)) return 2;
+    return has(kept, 0xe6) && has(features, bit_AVX512F | bit_AVX512BW | bit_AVX512CD | bit_AVX512DQ | bit_AVX512VL) ? 4 : 3;
+}
+
 static const Engine *engine_of(const char *level) {
-    __builtin_cpu_init();
-    int v2 = __builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt");
-    int v3 = v2 && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi2");
-    int v4 = v3 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
-             __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl");
+    int most = highest(), v2 = most >= 2, v3 = most >= 3, v4 = most >= 4;
     if (strcmp(level, "x86-64-v4") == 0) return v4 ? isiw_engine_v4() : NULL;
     if (strcmp(level, "x86-64-v3") == 0) return v3 ? isiw_engine_v3() : NULL;
     if (strcmp(level, "x86-64-v2") == 0) return v2 ? isiw_engine_v2() : NULL;
