@@ -17,26 +17,49 @@ const Engine *isiw_engine_base(void);
 
 static const Engine *engine_of(const char *level) { return strcmp(level, "base") == 0 ? isiw_engine_base() : NULL; }
 #else
+#include <cpuid.h>
+
+#define LZCNT (1u << 5) /* which compilers name differently */
+
 const Engine *isiw_engine_v2(void);
 const Engine *isiw_engine_v3(void);
 const Engine *isiw_engine_v4(void);
 
+/* Which registers the operating system keeps for each thread: bits 1 and 2 are those of AVX, 5 to 7 those of AVX-512. */
+static unsigned kept_registers(void) {
+    unsigned low, high;
+    __asm__ volatile("xgetbv" : "=a"(low), "=d"(high) : "c"(0));
+    return low;
+}
+
+static int has(unsigned found, unsigned bits) { return (found & bits) == bits; }
+
+/* The highest level of the processor, 0 below x86-64-v2. Asked of the processor itself: what __builtin_cpu_supports reads
+is not filled in where zig links the library. */
+static int highest(void) {
+    unsigned eax, ebx, ecx, edx, extended, features;
+    if (!__get_cpuid(1, &eax, &ebx, &ecx, &edx)) return 0;
+    if (!has(ecx, bit_SSE3 | bit_SSSE3 | bit_SSE4_1 | bit_SSE4_2 | bit_POPCNT | bit_CMPXCHG16B)) return 0;
+    unsigned kept = has(ecx, bit_OSXSAVE) ? kept_registers() : 0;
+    int avx = has(kept, 0x6) && has(ecx, bit_AVX | bit_FMA | bit_F16C | bit_MOVBE);
+    if (!avx || !__get_cpuid_count(7, 0, &eax, &features, &ecx, &edx)) return 2;
+    if (!__get_cpuid(0x80000001, &eax, &ebx, &extended, &edx)) return 2;
+    if (!has(features, bit_AVX2 | bit_BMI | bit_BMI2) || !has(extended, LZCNT)) return 2;
+    return has(kept, 0xe6) && has(features, bit_AVX512F | bit_AVX512BW | bit_AVX512CD | bit_AVX512DQ | bit_AVX512VL) ? 4 : 3;
+}
+
 static const Engine *engine_of(const char *level) {
-    __builtin_cpu_init();
-    int v2 = __builtin_cpu_supports("sse4.2") && __builtin_cpu_supports("popcnt");
-    int v3 = v2 && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi2");
-    int v4 = v3 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
-             __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl");
+    int most = highest();
 #if defined(ISIW_HAS_v4)
-    if (v4 && strcmp(level, "x86-64-v4") == 0) return isiw_engine_v4();
+    if (most >= 4 && strcmp(level, "x86-64-v4") == 0) return isiw_engine_v4();
 #endif
 #if defined(ISIW_HAS_v3)
-    if (v3 && strcmp(level, "x86-64-v3") == 0) return isiw_engine_v3();
+    if (most >= 3 && strcmp(level, "x86-64-v3") == 0) return isiw_engine_v3();
 #endif
 #if defined(ISIW_HAS_v2)
-    if (v2 && strcmp(level, "x86-64-v2") == 0) return isiw_engine_v2();
+    if (most >= 2 && strcmp(level, "x86-64-v2") == 0) return isiw_engine_v2();
 #endif
-    return (void)v4, NULL;
+    return NULL;
 }
 #endif
 
