@@ -173,7 +173,7 @@ def require_table(limits: ReadingLimits, frame: pd.DataFrame, source: str) -> No
     for name, cells in frame.items():
         if pd.api.types.is_numeric_dtype(cells):
             continue
-        longest = max((len(cell) for cell in cells if isinstance(cell, str | bytes)), default=0)
+        longest = max((len(cell) for cell in cells.tolist() if isinstance(cell, str | bytes)), default=0)
         if longest > limits.cell_length:
             raise passed(
                 source,
