@@ -79,6 +79,17 @@ def test_each_limit_of_a_table_is_in_its_message_with_the_option_that_raises_it(
     assert said in str(caught.value)
 
 
+def test_names_of_columns_that_nobody_reads_are_handed_back_once_for_all_people(tmp_path: Path) -> None:
+    table = TrialTable((Trial(0, Status.ACCEPTED, 10.0, isi_ms=10.0, mep_mv=0.3),))
+    unused = tuple(f"{number}{'n' * 1000}" for number in range(20))
+    people = [Delivered(table, "impact", subject=f"P{number}", unused=unused) for number in range(50)]
+    write_people(tmp_path, people, {})
+    assert (tmp_path / "answer.json").stat().st_size < 100_000
+    read = read_answer(tmp_path)
+    assert isinstance(read, Answer)
+    assert [one.unused for one in read.people] == [unused] * 50
+
+
 def test_a_row_without_isi_and_amplitude_is_no_trial_for_the_limits(tmp_path: Path) -> None:
     (tmp_path / "P01.csv").write_text(HEAD + ROWS + ",\n" * 150)
     (person,) = read_people(tmp_path / "P01.csv", IMPACT, limits=SMALL)

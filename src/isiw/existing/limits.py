@@ -76,7 +76,7 @@ class ReadingLimits(Checked):
     lines: Count = 1_000_000
     rows: Count = 250_000
     columns: Count = 2_000
-    cells: Count = 5_000_000
+    cells: Count = 2_000_000
     visits: Count = 5_000
     trials: Count = 20_000
     name_length: Count = 1_000
