@@ -44,6 +44,9 @@ MOST_DELAY_MS = 10_000.0
 MOST_MEP_MV = 1000.0
 """More than any amplifier of EMG gives [mV]: their inputs take some hundred millivolts to either side at most."""
 
+MOST_TRIALS = 100_000
+"""More than any session delivers; a record of a later trial makes no sense."""
+
 MOST_OF_A_KIND = 100_000
 """Of trials, particles, samples or anything else that a setting counts; more would fill the memory."""
 

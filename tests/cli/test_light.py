@@ -48,3 +48,13 @@ def test_a_command_that_learns_nothing_needs_no_library_that_learns(
     ended = subprocess.run(started, cwd=tmp_path, capture_output=True, text=True, check=False)  # noqa: S603 - our own
 
     assert ended.returncode == 0, ended.stderr
+
+
+@pytest.mark.slow
+def test_a_file_is_refused_before_anything_that_analyses_it_is_loaded(tmp_path: Path) -> None:
+    (tmp_path / "P01.csv").write_text("isi_ms,mep_mv\n10,.3\n20,x\n")
+    absent = LEARNING | TABLES | {"scipy", "numba", "mne"}
+    started = [sys.executable, "-c", WITHOUT.format(absent=absent), "analyse", "P01.csv", "--reference", "impact"]
+    ended = subprocess.run(started, cwd=tmp_path, capture_output=True, text=True, check=False)  # noqa: S603 - our own
+
+    assert "row 2 of the column 'mep_mv'" in ended.stderr

@@ -17,7 +17,7 @@ from isiw.existing import Delivered, Layout, ReadingLimits, read_people, reading
 from isiw.existing.answer import Answer, read_answer, write_error, write_people
 from isiw.existing.gate import Gate, require_no_links
 from isiw.existing.layout import letters
-from isiw.existing.limits import LARGEST_FACTOR, seconds_for
+from isiw.existing.limits import LARGEST_FACTOR, require_file, seconds_for
 from isiw.existing.tables import Columns, unit_said
 from isiw.text.sanitize import read_number
 from isiw.text.toml_files import DoubledKeyError, once_each
@@ -27,7 +27,10 @@ from isiw.visit import Visit
 IMPACT = Layout(reference="impact")
 HEAD = "isi_ms,mep_mv\n"
 ROWS = "".join(f"{isi},{0.2 + isi / 1000}\n" for isi in range(10, 110, 10))
-SMALL = ReadingLimits(file_mb=1.0, unpacked_mb=1.0, rows=1000, columns=50, cells=2000, name_length=40, cell_length=100)
+SMALL = ReadingLimits(
+    file_mb=1.0, unpacked_mb=1.0, lines=1000, rows=900, columns=50, cells=2000, visits=5, trials=100, name_length=40,
+    cell_length=100,
+)  # fmt: skip
 
 
 def wide(columns: int) -> str:
@@ -43,6 +46,26 @@ def wide(columns: int) -> str:
         (HEAD + ROWS + "\r" * 2000, "has too many lines"),
         (wide(60), "has too many columns; got 62; expected at most 50"),
         (wide(30) + f"10,0.2,{','.join('1' * 30)}\n" * 200, "has too many cells; got 6496; expected at most 2000"),
+        (HEAD + "10,0.2\n" * 950, "has too many rows; got 950; expected at most 900"),
+        (HEAD + "10,0.2\n" * 150, "has too many trials of one person and day; got 150; expected at most 100"),
+        (
+            "isi_ms,mep_mv,date\n" + "10,0.2,2026-01-31\n" * 150,
+            "has too many trials of one person and day; got 150; expected at most 100",
+        ),
+        (
+            "isi_ms,mep_mv,subject\n" + "".join(f"10,0.2,P{number}\n" for number in range(10)),
+            "has too many people and days; got 10; expected at most 5",
+        ),
+        (
+            "isi_ms,mep_mv,day\n" + "".join(f"10,0.2,{number}\n" for number in range(1, 11)),
+            "has too many people and days; got 10; expected at most 5",
+        ),
+        (
+            "isi_ms,mep_mv,date\n" + "".join(f"10,0.2,2026-01-{number}\n" for number in range(11, 21)),
+            "has too many people and days; got 10; expected at most 5",
+        ),
+        ("a" * 1000, "has too long a line for its cells; got '1000 bytes'; expected at most 400 bytes"),
+        ("a " * 100, "has too many columns; got 51; expected at most 50"),
         (f"isi_ms,mep_mv,{'n' * 50}\n10,0.2,1\n", "too long a name of a column; got '50 characters'"),
         (f"isi_ms,mep_mv,note\n10,0.2,{'n' * 200}\n", "too long a text in the column 'note'; got '200 characters'"),
     ],
@@ -56,6 +79,39 @@ def test_each_limit_of_a_table_is_in_its_message_with_the_option_that_raises_it(
     assert said in str(caught.value)
 
 
+def test_names_of_columns_that_nobody_reads_are_handed_back_once_for_all_people(tmp_path: Path) -> None:
+    table = TrialTable((Trial(0, Status.ACCEPTED, 10.0, isi_ms=10.0, mep_mv=0.3),))
+    unused = tuple(f"{number}{'n' * 1000}" for number in range(20))
+    people = [Delivered(table, "impact", subject=f"P{number}", unused=unused) for number in range(50)]
+    write_people(tmp_path, people, {})
+    assert (tmp_path / "answer.json").stat().st_size < 100_000
+    read = read_answer(tmp_path)
+    assert isinstance(read, Answer)
+    assert [one.unused for one in read.people] == [unused] * 50
+
+
+def test_a_row_without_isi_and_amplitude_is_no_trial_for_the_limits(tmp_path: Path) -> None:
+    (tmp_path / "P01.csv").write_text(HEAD + ROWS + ",\n" * 150)
+    (person,) = read_people(tmp_path / "P01.csv", IMPACT, limits=SMALL)
+    assert len(person.trials) == 10
+
+
+@pytest.mark.parametrize("sign", ["\x0b", "\x85", "\u2028"])
+def test_a_cell_may_hold_what_other_programs_take_for_the_end_of_a_line(sign: str, tmp_path: Path) -> None:
+    rows = "".join(f"{isi},0.3,a{sign}b\n" for isi in range(10, 110, 10))
+    (tmp_path / "P01.csv").write_text(f"isi_ms,mep_mv,note\n{rows}", encoding="utf-8", newline="")
+    (person,) = read_people(tmp_path / "P01.csv", IMPACT)
+    assert len(person.trials) == 10
+
+
+def test_blanks_without_end_are_looked_through_once(tmp_path: Path) -> None:
+    (tmp_path / "P01.txt").write_text(" " * 5_000_000)
+    begun = time.process_time()
+    with pytest.raises(InvalidValueError, match="too long a line"):
+        require_file(ReadingLimits(), tmp_path / "P01.txt", text=True)
+    assert time.process_time() - begun < 2
+
+
 def test_a_workbook_that_unpacks_to_too_much_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "P01.xlsx", "w", zipfile.ZIP_DEFLATED) as packed:
         packed.writestr("xl/worksheets/sheet1.xml", bytes(3_000_000))
@@ -67,7 +123,7 @@ def test_larger_limits_multiply_all_and_let_the_same_table_be_read(tmp_path: Pat
     (tmp_path / "P01.csv").write_text(HEAD + ROWS + "\n" * 2000)
     (person,) = read_people(tmp_path / "P01.csv", IMPACT, limits=SMALL.larger(3))
     assert len(person.trials) == 10
-    assert SMALL.larger(2.5).rows == 2500
+    assert SMALL.larger(2.5).lines == 2500
     for factor in (0.5, np.nan, 10 * LARGEST_FACTOR):
         with pytest.raises(InvalidValueError, match="larger"):
             SMALL.larger(factor)

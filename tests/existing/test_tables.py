@@ -304,7 +304,7 @@ BROKEN: dict[str, tuple[str, dict[str, Any], str]] = {
     "a mean at the end": ("trial,isi_ms,mep_mv\n1,10,0.1\n2,20,0.3\nMean,15,0.2\n", {}, "Delete the row"),
     "times that go back": ("time,isi_ms,mep_mv\n09:10,10,0.1\n09:05,20,0.3\n", {}, "not in the order"),
     "a person in some rows only": ("subject,isi_ms,mep_mv\nA,10,0.1\n,20,0.3\n", {}, "into each row"),
-    "two files in one": (HEAD + "10,0.1\n20,0.3\n" + HEAD + "10,0.2\n", {}, "row 3 of the column 'mep_mv'"),
+    "two files in one": (HEAD + "10,0.1\n20,0.3\n" + HEAD + "10,0.2\n", {}, "row 3 of the column 'isi_ms'"),
     "amplitudes in percent": ("isi_ms,MEP (% of baseline)\n10,120\n20,80\n", {}, "relative to others"),
     "milliseconds in a column of seconds": ("isi_s,mep_mv\n10,0.1\n20,0.3\n30,0.2\n", {}, "--unit ms"),
     "millivolts in a column of microvolts": ("isi_ms,mep_uv\n10,0.1\n20,0.3\n30,0.2\n", {}, "--unit mV"),

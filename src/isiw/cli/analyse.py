@@ -103,7 +103,9 @@ def analyse(  # noqa: PLR0913, PLR0917 - an option each
         if look:
             _look_at(files, read, **_reading(larger, also))
             return
-        settings = isiw.config.load_config(config).with_overrides(strategy=strategy, seed=seed)
+        settings = None  # a file is refused before a configuration that nobody gave is loaded
+        if (config, strategy, seed) != (None, None, None):
+            settings = isiw.config.load_config(config).with_overrides(strategy=strategy, seed=seed)
         way = isiw.existing.batch.way_of(settings, read, simulated=simulated, **_reading(larger, also))
         with working(f"Reading {counted(len(files), 'file')}"):
             people = isiw.existing.batch.read_files(files, way, output, only)

@@ -57,7 +57,7 @@ def write_people(
     folder: Path, people: Sequence[Delivered], hashes: Mapping[str, str], said: Mapping[str, Any] = MappingProxyType({})
 ) -> None:
     """Write what was read into a folder."""
-    written, channels = [], []
+    written, channels, unused = [], [], dict[tuple[str, ...], int]()
     with (folder / SAMPLES).open("wb") as samples:
         for number, person in enumerate(people):
             for trial, sweep in person.sweeps.items():
@@ -65,8 +65,9 @@ def write_people(
                     np.ascontiguousarray(channel.values, dtype="<f8").tofile(samples)
                     channels.append([number, trial, name, len(channel.values), channel.rate_hz, channel.unit,
                                      channel.t0_ms])  # fmt: skip
-            written.append(_person().model_construct(**{**vars(person), "files": hashes}).model_dump_json())
-    _write(folder, {"people": written, "channels": channels, "said": dict(said)})
+            own = _person().model_construct(**{**vars(person), "files": hashes, "unused": ()}).model_dump_json()
+            written.append([own, unused.setdefault(person.unused, len(unused))])  # everybody of a table has the same
+    _write(folder, {"people": written, "unused": [*unused], "channels": channels, "said": dict(said)})
 
 
 def write_error(folder: Path, error: BaseException) -> None:
@@ -98,7 +99,11 @@ def read_answer(folder: Path) -> Answer | Mapping[str, Any]:
         raise OSError(*values["system"])
     if "people" not in values:
         return dict(values)
-    people = [Delivered(**dict(_person().model_validate_json(text))) for text in values["people"]]
+    unused = [tuple(names) for names in values["unused"]]
+    people = [
+        Delivered(**{**dict(_person().model_validate_json(text)), "unused": unused[which]})
+        for text, which in values["people"]
+    ]
     return Answer(_with_samples(folder / SAMPLES, people, values["channels"]), values["said"])
 
 

@@ -9,12 +9,11 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from isiw.config.run import RunConfig
+import isiw
 from isiw.design import DesignSpace
 from isiw.errors import ConfigError, InvalidValueError, LogError
-from isiw.existing.analysis import Analysis, analysed
 from isiw.existing.delivered import Delivered, codes_of
 from isiw.existing.gate import hash_of
 from isiw.existing.layout import Layout
@@ -22,9 +21,11 @@ from isiw.existing.limits import ReadingLimits
 from isiw.existing.reading import read_people
 from isiw.files import folded, is_reserved
 from isiw.log.durable import log_exists
-from isiw.log.reader import read_session
-from isiw.strategy.catalogue import make_strategy
 from isiw.visit import Visit
+
+if TYPE_CHECKING:  # a file is read, and perhaps refused, before what analyses it is loaded
+    from isiw.config.run import RunConfig
+    from isiw.existing.analysis import Analysis
 
 ANALYSED_KEY: Final = "isiw_analyse"
 """Where a log keeps from which file and how it was made."""
@@ -59,8 +60,10 @@ class Way:
     also: tuple[Path, ...] = ()  # files elsewhere that recordings may refer to
 
 
-def way_of(config: RunConfig, layout: Layout, *, simulated: bool = False, **reading: Any) -> Way:
-    """Space, strategy, seed and visit of a configuration, by which trials are analysed, and what limits reading."""
+def way_of(config: RunConfig | None, layout: Layout, *, simulated: bool = False, **reading: Any) -> Way:
+    """Space, strategy, seed and visit by which trials are analysed, and what limits reading; None has the defaults."""
+    if config is None:
+        return Way(layout, simulated=simulated, **reading)
     if config.prior is not None or config.after:
         raise ConfigError(
             "an analysis says what the trials themselves tell, and learns from no prior and no earlier session",
@@ -177,7 +180,7 @@ def is_there(person: Person) -> bool:
     """True if the log of a person is there already, of the same file, read and analysed in the same way."""
     if person.log is None or person.refused is not None or not log_exists(person.log):
         return False
-    return read_session(person.log).header.config.get(ANALYSED_KEY) == dict(person.made_of)
+    return isiw.read_session(person.log).header.config.get(ANALYSED_KEY) == dict(person.made_of)
 
 
 def analyse_person(person: Person, way: Way) -> Analysis:
@@ -185,8 +188,8 @@ def analyse_person(person: Person, way: Way) -> Analysis:
     if person.refused is not None:
         raise person.refused
     delivered = person.delivered
-    strategy = make_strategy(way.strategy, way.space or delivered.space(), way.seed, **way.settings)
-    analysis = analysed(delivered, strategy, {ANALYSED_KEY: dict(person.made_of)})
+    strategy = isiw.strategy.make_strategy(way.strategy, way.space or delivered.space(), way.seed, **way.settings)
+    analysis = isiw.existing.analysed(delivered, strategy, {ANALYSED_KEY: dict(person.made_of)})
     if person.log is not None:
         analysis.to_log(person.log)
     return analysis

@@ -128,7 +128,7 @@ class Column:
         cell = self.cells[row]
         if is_missing(cell) and not (self.of_codes and isinstance(cell, str) and cell.strip() in {"NA", "na", "Na"}):
             return ""
-        whole = _float(cell).is_integer()
+        whole = not isinstance(cell, str) and _float(cell).is_integer()
         return str(int(cell)) if whole else str(cell).strip()
 
     def refused(self, row: int, why: str, remedy: str) -> InvalidValueError:

@@ -8,19 +8,22 @@ import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
+import isiw
+from isiw.checks import MOST_TRIALS
 from isiw.design import MOST_ISIS, DesignSpace
 from isiw.errors import InvalidValueError, LogError
 from isiw.existing.layout import EMG_UNITS, ISI_UNITS_MS
 from isiw.findings import AMPLITUDE_MV, Kind
-from isiw.log.reader import SessionRecord, read_session
-from isiw.log.schema import MOST_TRIALS
 from isiw.signals.limits import SignalLimits, implausible_scale
 from isiw.text.sanitize import counted
 from isiw.trials import Channel, Trial, TrialTable
 from isiw.types import Conditioning, Reference
 from isiw.visit import Visit
+
+if TYPE_CHECKING:  # what reads logs takes long to load
+    from isiw.log.reader import SessionRecord
 
 LONGEST_ISI_MS: Final = 5000.0
 """Longer than any interval after which a tap is studied; a larger number is in another unit."""
@@ -158,7 +161,7 @@ def anywhere(reference: Reference) -> DesignSpace:
 
 def read_log(path: str | Path) -> Delivered:
     """The trials of a log, as they count after an operator's verdicts."""
-    record = read_session(path)
+    record = isiw.read_session(path)
     if record.losses:
         raise LogError("the log is damaged, so that trials may be missing", got=str(path), remedy=f"{record.losses[0]}")
     header = record.header

@@ -91,7 +91,7 @@ def _texts(content: bytes, layout: Layout) -> pd.DataFrame:
     text = _decoded(content)
     if "\0" in text:
         raise InvalidValueError("the file is no text, and so no table that can be read", remedy="Is it the right one?")
-    lines = text.splitlines(keepends=True)[layout.skip_lines :]
+    lines = _lines(text)[layout.skip_lines :]
     lines = lines[0 if layout.names else _first(lines, layout) :]
     if lines and lines[0].startswith("#"):  # each part of the file begins so, with names of its own
         ends = (n for n, line in enumerate(lines) if n and line.startswith("#"))
@@ -99,6 +99,12 @@ def _texts(content: bytes, layout: Layout) -> pd.DataFrame:
     lines = [line for line in lines if not line.startswith("# ")]
     separator = layout.separator or _separator(lines[0] if lines else "")
     return _table([row for row in _split(lines, separator) if row], layout)
+
+
+def _lines(text: str) -> list[str]:
+    """The lines of a text; no other sign than the ends of lines ends one, since it may stand in a cell."""
+    *lines, last = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    return [f"{line}\n" for line in lines] + ([last] if last else [])
 
 
 def _first(lines: Sequence[str], layout: Layout) -> int:

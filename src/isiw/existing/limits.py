@@ -5,8 +5,12 @@ from __future__ import annotations
 import glob
 import math
 import os
+import re
 import zipfile
+from collections import Counter
+from collections.abc import Hashable, Iterable
 from dataclasses import dataclass, fields, replace
+from itertools import islice
 from pathlib import Path
 from typing import IO, Final
 
@@ -29,6 +33,12 @@ _ROWS_PER_S: Final = 2e3
 _SIGNS: Final = (b"\t", b";", b",", b"|")
 """What separates the cells of a text."""
 
+_BLANKS: Final = re.compile(rb"\s\S")
+"""Or else blanks do."""
+
+_BYTES_PER_SIGN: Final = 4
+"""A character takes no more."""
+
 _FIRST_LINES: Final = 100
 
 _CHUNK: Final = 2**20
@@ -47,9 +57,12 @@ class ReadingLimits(Checked):
         memory_mb: the memory of the process that reads [MB].
         seconds: its processor time [s], besides a second for each MB of a table, for each 2,000 of its rows, and for
             each 4 MB of a recording.
+        lines: the lines of a text, empty ones, too.
         rows: the rows of a table.
         columns: its columns.
         cells: its cells.
+        visits: the people of a table, each visit of a person counted.
+        trials: the trials of one person at one visit.
         name_length: the length of a column's name [characters].
         cell_length: the length of the text in a cell [characters].
 
@@ -61,9 +74,12 @@ class ReadingLimits(Checked):
     unpacked_mb: Positive = 500.0
     memory_mb: Positive = 700.0
     seconds: Positive = 3.0
-    rows: Count = 1_000_000
+    lines: Count = 1_000_000
+    rows: Count = 250_000
     columns: Count = 2_000
-    cells: Count = 5_000_000
+    cells: Count = 2_000_000
+    visits: Count = 5_000
+    trials: Count = 20_000
     name_length: Count = 1_000
     cell_length: Count = 32_767
 
@@ -130,12 +146,17 @@ def _require_lines(limits: ReadingLimits, source: str, file: IO[bytes]) -> None:
     while chunk := file.read(_CHUNK):
         for end in lines:
             lines[end] += chunk.count(end)
-    if (most := max(lines.values())) > limits.rows:
-        raise passed(source, "has too many lines", most, limits.rows)
+    if (most := max(lines.values())) > limits.lines:
+        raise passed(source, "has too many lines", most, limits.lines)
     file.seek(0)
-    cells = max(1 + max(map(file.readline().count, _SIGNS)) for _ in range(_FIRST_LINES))
-    if cells > limits.columns:
-        raise passed(source, "has too many columns", cells, limits.columns)
+    for _ in range(_FIRST_LINES):
+        line = file.readline()
+        cells = 1 + (max(map(line.count, _SIGNS)) or sum(1 for _ in islice(_BLANKS.finditer(line), limits.columns)))
+        if cells > limits.columns:
+            raise passed(source, "has too many columns", cells, limits.columns)
+        most = _BYTES_PER_SIGN * limits.cell_length * cells
+        if len(line) > most:
+            raise passed(source, "has too long a line for its cells", f"{len(line)} bytes", most, " bytes")
 
 
 def require_table(limits: ReadingLimits, frame: pd.DataFrame, source: str) -> None:
@@ -155,7 +176,7 @@ def require_table(limits: ReadingLimits, frame: pd.DataFrame, source: str) -> No
     for name, cells in frame.items():
         if pd.api.types.is_numeric_dtype(cells):
             continue
-        longest = max((len(cell) for cell in cells if isinstance(cell, str | bytes)), default=0)
+        longest = max((len(cell) for cell in cells.tolist() if isinstance(cell, str | bytes)), default=0)
         if longest > limits.cell_length:
             raise passed(
                 source,
@@ -164,6 +185,23 @@ def require_table(limits: ReadingLimits, frame: pd.DataFrame, source: str) -> No
                 limits.cell_length,
                 " characters",
             )
+
+
+def require_visits(limits: ReadingLimits, source: str, visits: Iterable[Hashable], *, parted: bool = True) -> None:
+    """Raise if a table is of too many visits, or has too many trials of one.
+
+    Args:
+        limits: the most that is read.
+        source: the table in words.
+        visits: of each trial, what differs between people and visits.
+        parted: whether it differs between all visits of a person, so that trials can be counted.
+    """
+    trials = Counter(visits)
+    if len(trials) > limits.visits:
+        raise passed(source, "has too many people and days", len(trials), limits.visits)
+    most = max(trials.values(), default=0)
+    if parted and most > limits.trials:
+        raise passed(source, "has too many trials of one person and day", most, limits.trials)
 
 
 def limit_memory(memory_mb: float) -> None:

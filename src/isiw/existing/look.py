@@ -8,11 +8,11 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import permutations
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from matplotlib.figure import Figure
 
+import isiw
 from isiw.errors import IsiwError
 from isiw.existing import formats
 from isiw.existing.answer import Answer
@@ -25,9 +25,11 @@ from isiw.existing.limits import ReadingLimits
 from isiw.existing.markers import marked
 from isiw.existing.reading import contents_in, people_of_contents
 from isiw.existing.tables import Columns
-from isiw.plots.sweeps import sweeps_figure
 from isiw.text.sanitize import command, counted
 from isiw.types import FloatArray, Reference
+
+if TYPE_CHECKING:  # the process that reads draws nothing
+    from matplotlib.figure import Figure
 
 SWEEPS: Final = 3
 """So many sweeps are drawn."""
@@ -80,7 +82,7 @@ def look(
         ConfigError: a library is not installed.
     """
     people, said = read_apart(Path(path), layout or Layout(), "", limits or ReadingLimits(), also, look=True)
-    sweeps = [sweeps_figure(one.trials, one.sweeps, one.signals.mep_window_ms, SWEEPS) for one in people[:1]]
+    sweeps = [isiw.plots.sweeps_figure(one.trials, one.sweeps, one.signals.mep_window_ms, SWEEPS) for one in people[:1]]
     return Look(tuple(said["lines"]), said["command"], said["missing"], *(sweeps or [None]))
 
 
@@ -92,7 +94,7 @@ def seen_in(path: Path, layout: Layout, limits: ReadingLimits, on_rows: Callable
     people, missing = list[Delivered](), ""
     try:
         known = replace(proposed, reference=proposed.reference or _reference(contents))
-        people = people_of_contents(contents, path, known, "")
+        people = people_of_contents(contents, path, known, "", limits)
     except IsiwError as error:
         missing = f"{error}"
     if proposed.reference is None:

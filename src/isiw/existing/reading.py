@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,13 +15,14 @@ from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.existing import formats, frames, recordings, tables
 from isiw.existing.apart import read_apart
+from isiw.existing.cells import Column, is_missing
 from isiw.existing.dates import dates_of, latest_of, times_of
 from isiw.existing.delivered import Delivered, anywhere, read_log, renumbered
 from isiw.existing.doubts import ALL, require_codes, require_isis, require_one_kind, require_one_row_each, require_short
 from isiw.existing.formats import mne_files
 from isiw.existing.formats.contents import Contents
 from isiw.existing.layout import Layout
-from isiw.existing.limits import ReadingLimits, require_file, require_table
+from isiw.existing.limits import ReadingLimits, require_file, require_table, require_visits
 from isiw.files import is_mcap
 from isiw.findings import Kind
 from isiw.lazy import pd
@@ -75,7 +76,7 @@ def people_in(
     on_rows: Callable[[int], object] = lambda _rows: None,
 ) -> list[Delivered]:
     """The people whose trials a file holds, read by this process, which is informed how many rows a table has."""
-    return people_of_contents(contents_in(path, layout, limits, on_rows), path, layout, subject)
+    return people_of_contents(contents_in(path, layout, limits, on_rows), path, layout, subject, limits)
 
 
 def contents_in(path: Path, layout: Layout, limits: ReadingLimits, on_rows: Callable[[int], object]) -> Contents:
@@ -88,12 +89,14 @@ def contents_in(path: Path, layout: Layout, limits: ReadingLimits, on_rows: Call
     return contents
 
 
-def people_of_contents(contents: Contents, path: Path, layout: Layout, subject: str) -> list[Delivered]:
+def people_of_contents(
+    contents: Contents, path: Path, layout: Layout, subject: str, limits: ReadingLimits
+) -> list[Delivered]:
     """The people whose trials are in what a file holds; who has no code is called as the file is."""
     _require_used(contents, path, layout)
     if contents.tracks:
         return [recordings.of_contents(contents, layout, subject or path.stem)]
-    return people_of(frames.named(contents.trials), layout, path.name, subject or path.stem)
+    return people_of(frames.named(contents.trials), layout, path.name, subject or path.stem, limits)
 
 
 def _require_used(contents: Contents, path: Path, layout: Layout) -> None:
@@ -122,14 +125,19 @@ def _in_memory(source: Any, layout: Layout, subject: str) -> list[Delivered]:
     raise InvalidValueError("this holds no trials", got=source, expected="a path, a DataFrame, or mne.Epochs or Raw")
 
 
-def people_of(frame: pd.DataFrame, layout: Layout, source: str, name: str = "") -> list[Delivered]:
+def people_of(
+    frame: pd.DataFrame, layout: Layout, source: str, name: str = "", limits: ReadingLimits | None = None
+) -> list[Delivered]:
     """The people of a table, in the order in which they come first; who has no code is called as the file is."""
     reference = layout.required_reference(source)
     columns = tables.Columns.found(frame, layout, source)
-    isi, mep = columns["isi"], columns["mep"]
-    rows = [n for n in columns.chosen(layout) if mep.number(n) is not None or isi.text(n) or columns["asked"].text(n)]
+    given = [columns[key].cells for key in ("isi", "mep", "asked")]
+    rows = [n for n in columns.chosen(layout) if not all(is_missing(cells[n]) for cells in given)]
     if not rows:
         raise InvalidValueError(f"{source} has no trials", remedy="Are the right columns named?")
+    if limits is not None:
+        kinds = zip(_kinds(columns["subject"], rows), _kinds(columns["day"], rows), strict=True)
+        require_visits(limits, source, kinds, parted="day" in columns.of or "date" not in columns.of)
     subjects = [columns["subject"].text(row) for row in rows]
     require_codes(subjects, rows, columns)
     if any(subjects) and not all(subjects):
@@ -142,6 +150,8 @@ def people_of(frame: pd.DataFrame, layout: Layout, source: str, name: str = "") 
     visits = [
         (own, subject, day) for subject, theirs in people.items() for day, own in _days(columns, theirs, dates).items()
     ]
+    if limits is not None:
+        require_visits(limits, source, (visit for visit, (own, _, _) in enumerate(visits) for _ in own))
     found = []
     for own, subject, day in sorted(visits, key=lambda visit: visit[0][0]):
         begun = dates[own[0]].isoformat(timespec="microseconds") if own[0] in dates else ""
@@ -149,6 +159,11 @@ def people_of(frame: pd.DataFrame, layout: Layout, source: str, name: str = "") 
         given_by = latest_of([columns["date"].text(row) for row in own], [dates.get(row) for row in own])
         found.append(replace(person, visit=Visit(day=day), created=begun, given_by=given_by))
     return found
+
+
+def _kinds(column: Column, rows: Sequence[int]) -> Iterator[str]:
+    """What tells the cells of some rows from each other, found faster than what they say."""
+    return (cell if isinstance(cell := column.cells[row], str) else column.text(row) for row in rows)
 
 
 def _days(

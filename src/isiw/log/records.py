@@ -15,11 +15,12 @@ from typing import Final, NamedTuple, TypeVar
 
 from pydantic import ValidationError
 
+from isiw.checks import MOST_TRIALS
 from isiw.errors import DamagedLogError, LogError
 from isiw.findings import Kind
 from isiw.log.headers import AnyHeader, Production, first_fault, header_in_parts
 from isiw.log.salvage import Salvage
-from isiw.log.schema import MOST_TRIALS, EstimateRecord, Event, Intent, Message, PulseOutcome, Record, Waveform, decode
+from isiw.log.schema import EstimateRecord, Event, Intent, Message, PulseOutcome, Record, Waveform, decode
 from isiw.log.writer import CONFIGURATION
 from isiw.strategy.stopping import StopKind
 from isiw.text.sanitize import counted

@@ -29,7 +29,7 @@ import numpy as np
 from pydantic import ConfigDict, Field, FiniteFloat, TypeAdapter
 from pydantic_core import PydanticSerializationError
 
-from isiw.checks import MOST_MEP_MV
+from isiw.checks import MOST_MEP_MV, MOST_TRIALS
 from isiw.errors import InvalidValueError, LogError, error_text
 from isiw.estimate import Estimate, WindowEstimate
 from isiw.findings import Kind
@@ -40,9 +40,6 @@ from isiw.strategy.threshold.pulses import ThresholdEstimate
 from isiw.text.toml_files import refuse_doubled
 from isiw.trials import Channel, Stimulus, Trial
 from isiw.types import Numbers
-
-MOST_TRIALS: Final = 100_000
-"""More than any session delivers; a record of a later trial makes no sense."""
 
 TrialNumber: TypeAlias = Annotated[int, Field(ge=0, lt=MOST_TRIALS)]
 

@@ -10,9 +10,10 @@ from fastapi import Request
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
 
+from isiw.checks import MOST_TRIALS
 from isiw.config.sections import LimitsConfig, SpaceConfig, StrategyConfig, VisitConfig, require_together, require_units
 from isiw.errors import IsiwError
-from isiw.log.schema import MOST_TRIALS, TrialNumber
+from isiw.log.schema import TrialNumber
 from isiw.server.answers import Refusal
 from isiw.server.clients import KEY
 from isiw.text.toml_files import (

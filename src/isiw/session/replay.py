@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any, Final, NamedTuple
 
 from isiw.change import MOST_NOTED
-from isiw.checks import whole
+from isiw.checks import MOST_TRIALS, whole
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import ConfigError, DeviceError, InvalidValueError, OtherVersionsWarning, StrategyError, warn
@@ -17,7 +17,7 @@ from isiw.log.kinds import OWN_LOOP
 from isiw.log.pulses import Ages, pulse_ages
 from isiw.log.reader import SessionRecord
 from isiw.log.salvage import Salvage
-from isiw.log.schema import MOST_TRIALS, Event, Intent
+from isiw.log.schema import Event, Intent
 from isiw.log.verdicts import MANY_CHANGES, VERDICTS, changed_after, under
 from isiw.log.writer import LogWriter
 from isiw.session.assembly import BELIEF_VERSION, ENGINE_VERSION, Earlier, versions

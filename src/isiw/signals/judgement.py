@@ -6,7 +6,7 @@ What is wrong with every trial, such as an unknown unit, is an error: repeating 
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -131,9 +131,7 @@ def judge_measurement(
             expected=f"one for the commanded ISI of {stimulus.isi_ms}",
         )
     require_agreement(measurement, stimulus, space)
-    judged = Trial(
-        stimulus.trial, Status.ACCEPTED, stimulus.isi_ms, tap_alone=stimulus.tap_alone, **asdict(measurement)
-    )
+    judged = Trial(stimulus.trial, Status.ACCEPTED, stimulus.isi_ms, tap_alone=stimulus.tap_alone, **vars(measurement))
     wrong = None
     if measurement.isi_ms is not None and stimulus.isi_ms is not None:
         wrong = wrong_isi(measurement.isi_ms, stimulus.isi_ms, space, limits)
