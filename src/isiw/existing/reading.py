@@ -199,10 +199,12 @@ def _person(
     blocks = [columns["block"].text(row) for row in rows]
     begun = [n for n, block in enumerate(blocks) if not n or block != blocks[n - 1]]
     if (name := columns["block"].name) not in layout.where:
+        before = set[str]()
         for n in begun:
-            if blocks[n] and blocks[n] in {blocks[earlier] for earlier in begun if earlier < n}:
+            if blocks[n] and blocks[n] in before:
                 remedy = f'If it tells muscles apart, say --where "{name}={blocks[n]}", or --where "{name}={ALL}".'
                 raise columns["block"].refused(rows[n], "comes back after another block", remedy)
+            before.add(blocks[n])
     require_one_row_each(columns, rows, layout)
     found = Delivered(
         renumbered(trials),
