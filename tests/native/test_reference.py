@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
 import torch
+from hatch_build import SOURCES
 
 from isiw.design import VALVE_SPACE
+from isiw.models.particles import records
 from isiw.models.particles.changes import ChangeKind
 from isiw.models.particles.engine import Compiled
 from isiw.models.particles.jumps import WindowTarget
@@ -16,7 +19,8 @@ from isiw.models.particles.latents import LATENTS, Latents
 from isiw.models.particles.noise import NoiseKind
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.shapes import ShapeKind
-from isiw.native.engine import COLUMNS, log_likelihoods
+from isiw.models.shared.history import Circumstances, History
+from isiw.native.engine import COLUMNS, FIELDS, log_likelihoods
 from native import reference
 
 TARGET = WindowTarget(Prior(), VALVE_SPACE)
@@ -93,3 +97,14 @@ def test_the_engine_has_the_law_of_the_reference() -> None:
 @pytest.mark.slow
 def test_the_engine_has_the_law_of_the_reference_for_ten_thousand_particles() -> None:
     assert furthest(10_000, 2) < 1e-3
+
+
+@pytest.mark.parametrize(("first", "last", "names"), [("NOISE", "FIELDS", "field"), ("ISI", "COLUMNS", "column")])
+def test_fields_and_columns_have_the_order_of_the_c_header(first: str, last: str, names: str) -> None:
+    header = (SOURCES / "people.h").read_text("utf-8")
+    (listed,) = re.findall(rf"enum \{{\n    ({first},.*?)\n    {last}\n", header, re.DOTALL)
+    in_c = re.findall(r"^\s*([A-Z_]+),", listed, re.MULTILINE)
+    if names == "field":
+        assert [getattr(records, name) for name in in_c] == list(range(FIELDS))
+    else:
+        assert len(in_c) == COLUMNS == len(History.empty(1, torch.device("cpu")).columns) + len(Circumstances._fields)

@@ -25,7 +25,7 @@ const Engine *isiw_engine_v2(void);
 const Engine *isiw_engine_v3(void);
 const Engine *isiw_engine_v4(void);
 
-/* Which registers the operating system keeps for each thread: bits 1 and 2 are those of AVX, 5 to 7 those of AVX-512. */
+/* Which registers the operating system keeps for each thread: bits 1 and 2 are of AVX, 5 to 7 of AVX-512. */
 static unsigned kept_registers(void) {
     unsigned low, high;
     __asm__ volatile("xgetbv" : "=a"(low), "=d"(high) : "c"(0));
@@ -34,8 +34,8 @@ static unsigned kept_registers(void) {
 
 static int has(unsigned found, unsigned bits) { return (found & bits) == bits; }
 
-/* The highest level of the processor, 0 below x86-64-v2. Asked of the processor itself: what __builtin_cpu_supports reads
-is not filled in where zig links the library. */
+/* The highest level of the processor, 0 below x86-64-v2. Asked of the processor itself: what __builtin_cpu_supports
+reads is not filled in where zig links the library. */
 static int highest(void) {
     unsigned eax, ebx, ecx, edx, extended, features;
     if (!__get_cpuid(1, &eax, &ebx, &ecx, &edx)) return 0;
@@ -45,7 +45,9 @@ static int highest(void) {
     if (!avx || !__get_cpuid_count(7, 0, &eax, &features, &ecx, &edx)) return 2;
     if (!__get_cpuid(0x80000001, &eax, &ebx, &extended, &edx)) return 2;
     if (!has(features, bit_AVX2 | bit_BMI | bit_BMI2) || !has(extended, LZCNT)) return 2;
-    return has(kept, 0xe6) && has(features, bit_AVX512F | bit_AVX512BW | bit_AVX512CD | bit_AVX512DQ | bit_AVX512VL) ? 4 : 3;
+    return has(kept, 0xe6) && has(features, bit_AVX512F | bit_AVX512BW | bit_AVX512CD | bit_AVX512DQ | bit_AVX512VL)
+               ? 4
+               : 3;
 }
 
 static const Engine *engine_of(const char *level) {

@@ -1,5 +1,5 @@
-/* Random draws by counter: each particle of each sweep has a stream of its own (SplitMix64: Steele et al., OOPSLA 2014),
-so that its draws depend on the seed of its person and on its number, not on who is beside it. */
+/* Random draws by counter: each particle of each sweep has a stream of its own (SplitMix64: Steele et al., OOPSLA
+2014), so that its draws depend on the seed of its person and on its number, not on who is beside it. */
 
 #ifndef ISIW_DRAWS_H
 #define ISIW_DRAWS_H
@@ -15,7 +15,9 @@ INLINE uint64_t mixed(uint64_t z) {
 }
 
 /* Where the stream of a particle begins. */
-INLINE uint64_t stream_of(uint64_t sweep, int64_t particle) { return mixed(sweep + mixed((uint64_t)particle + GOLDEN)); }
+INLINE uint64_t stream_of(uint64_t sweep, int64_t particle) {
+    return mixed(sweep + mixed((uint64_t)particle + GOLDEN));
+}
 
 INLINE uint64_t random_bits(uint64_t *dice) { return mixed(*dice += GOLDEN); }
 
@@ -27,7 +29,8 @@ INLINE float normal(uint64_t *dice) {
     uint64_t bits = random_bits(dice);
     float turned = (float)(bits & 0xFFFFFFFFu) * 0x1p-32f - 0.5f;
     float x = 3.14159265f * turned, square = x * x;
-    float sine = square * (8.3333333e-3f + square * (-1.9841270e-4f + square * (2.7557319e-6f - square * 2.5052108e-8f)));
+    float sine =
+        square * (8.3333333e-3f + square * (-1.9841270e-4f + square * (2.7557319e-6f - square * 2.5052108e-8f)));
     sine = x * (1.0f + square * (-0.16666667f + sine));
     return root_1(-2.0f * log_1(((float)(bits >> 32) + 1.0f) * 0x1p-32f)) * (2.0f * sine * sine - 1.0f);
 }
@@ -40,7 +43,9 @@ INLINE float blur(uint64_t *dice) {
 }
 
 /* One of so many, fewer than 2^32. */
-INLINE int64_t one_of(uint64_t *dice, int64_t count) { return (int64_t)((random_bits(dice) >> 32) * (uint64_t)count >> 32); }
+INLINE int64_t one_of(uint64_t *dice, int64_t count) {
+    return (int64_t)((random_bits(dice) >> 32) * (uint64_t)count >> 32);
+}
 
 /* Which of some alternatives a draw is of, by the sums of the probabilities of earlier ones. */
 INLINE int64_t which(float quantile, const float *edges, int64_t count) {

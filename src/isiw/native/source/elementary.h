@@ -37,8 +37,8 @@ INLINE REAL NAME(log)(REAL x) {
     return m - 0.5f * square + square * m * tail + NAME(whole)(exponent) * 0.6931471805599453f;
 }
 
-/* 1 / x of a positive number, by two steps of Newton's method, as dividers are slow; the constants are those of the least
-largest error, 8.5e-7. */
+/* 1 / x of a positive number, by two steps of Newton's method, as dividers are slow; the constants are those of the
+least largest error, 8.5e-7. */
 INLINE REAL NAME(per)(REAL x) {
     REAL y = NAME(float_of)(0x7EF31F00 - NAME(bits_of)(x));
     y = y * (2.00129833f - x * y);
@@ -53,7 +53,7 @@ INLINE REAL NAME(per_root)(REAL x) {
     return y * (1.50000058f - half * y * y);
 }
 
-/* Probability that a standard normal variable is below -z, for z of at least 0 (Chebyshev fit of erfc, with the tail). */
+/* Probability that a standard normal variable is below -z, for z of at least 0 (Chebyshev fit of erfc and its tail). */
 INLINE REAL NAME(beyond)(REAL z) {
     z = NAME(least)(z, (REAL){0} + 9.0f) * 0.70710678f;
     REAL t = NAME(per)(1.0f + 0.5f * z);

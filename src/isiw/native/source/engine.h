@@ -24,7 +24,7 @@ typedef struct {
     const float *start_ms;     /* knots of the density of a start, evenly spaced, (knots,) */
     const float *density;      /* at the knots */
     const float *quantiles;    /* probability of an earlier start, at the knots */
-    const float *places;       /* log share less logs of SDs, mean and SD of start, then of log width, (place_count, 5) */
+    const float *places; /* log share less logs of SDs, mean and SD of start, then of log width, (place_count, 5) */
     const float *place_below;  /* sums of the shares of earlier places, (place_count,) */
     float place_share;         /* probability of all places */
     int32_t apart;             /* enhancement and depression may not overlap */
@@ -74,7 +74,7 @@ typedef struct {
                        int32_t *runs);
     /* Entropy of the mean of distributions (s, t, y) less their mean entropy, (t,). */
     int (*entropy_reductions)(int64_t samples, int64_t isis, int64_t outcomes, const float *mass, float *found);
-    /* Variance of each point's probability of membership in windows (s, g), less that expected after an outcome, (t,). */
+    /* Variance of each point's membership in windows (s, g), less that expected after an outcome, (t,). */
     int (*variance_reductions)(int64_t samples, int64_t isis, int64_t outcomes, int64_t points, const float *mass,
                                const float *masks, float *found);
     /* Elementary functions, for tests: exp, exp2, log, 1 / x, 1 / root x, and the probability that a standard normal

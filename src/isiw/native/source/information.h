@@ -61,7 +61,7 @@ INLINE void added(float factor, const float *values, int64_t count, float *to) {
         stored(loaded(to + i, count - i) + factor * loaded(values + i, count - i), to + i, count - i);
 }
 
-/* Expected variance that a trial at one candidate explains, of all points, by what changes from one point to the next. */
+/* Expected variance of all points that a trial at one candidate explains, by what changes from point to point. */
 static float explained(const float *mass, int64_t samples, int64_t isis, int64_t outcomes, const Change *changes,
                        int64_t count, const float *mean, int64_t points, float *steps, float *all_of) {
     memset(steps, 0, (size_t)(points * outcomes) * sizeof *steps);
@@ -91,7 +91,8 @@ static int variance_reductions(int64_t samples, int64_t isis, int64_t outcomes, 
         float *mean = room, *all_of = room + points, *steps = all_of + outcomes;
         int64_t count = changes_of(masks, samples, points, changes, mean);
         for (int64_t t = 0; t < isis; t++)
-            found[t] = explained(mass + t * outcomes, samples, isis, outcomes, changes, count, mean, points, steps, all_of);
+            found[t] =
+                explained(mass + t * outcomes, samples, isis, outcomes, changes, count, mean, points, steps, all_of);
     }
     free(changes), free(room);
     return there ? 0 : -1;

@@ -31,8 +31,8 @@ const Engine *NAMED(ISIW_LEVEL)(void);
 
 const Engine *NAMED(ISIW_LEVEL)(void) {
     static const Engine engine = {
-        likelihoods,   meanings,      log_usual,   sweeps,      table_rows,         evoked_means,        outcome_tables,
-        rows_between,  facilitations, edge_levels, window_runs, entropy_reductions, variance_reductions, elementary,
+        likelihoods,  meanings,      log_usual,   sweeps,      table_rows,         evoked_means,        outcome_tables,
+        rows_between, facilitations, edge_levels, window_runs, entropy_reductions, variance_reductions, elementary,
     };
     fill_nodes();
     return &engine;

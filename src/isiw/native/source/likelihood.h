@@ -3,9 +3,9 @@
     mep / floor = floor noise + known part + ratio * gain_n * sigmoid(drive + spread_q) * output noise
 
 with weights w_q of the nodes q of the noise on the input; what lies between two nodes is passed on along the slope of
-the curve, so that each node is a log-normal of matched mean and variance. A recruitment curve has a drive that is linear
-in the facilitation; other kinds of noise are the same formula far below saturation, with the log of the facilitation as
-the drive and log-gamma noise. See docs/explanation and `isiw.models.particles.noise`. */
+the curve, so that each node is a log-normal of matched mean and variance. A recruitment curve has a drive that is
+linear in the facilitation; other kinds of noise are the same formula far below saturation, with the log of the
+facilitation as the drive and log-gamma noise. See docs/model.md. */
 
 #ifndef ISIW_LIKELIHOOD_H
 #define ISIW_LIKELIHOOD_H
@@ -20,15 +20,15 @@ enum { NODES = 8, FACTOR_NODES = 5, GROUPS = 64 };
 #define BETWEEN_NODES (0.4 * 2.0 * NODE_REACH / (NODES - 1)) /* SD of what lies between the nodes */
 #define ON_NODES 0.9548330338069476                          /* SD of the nodes: the root of 1 - BETWEEN_NODES^2 */
 #define FAR_BELOW 15.0f                                      /* how far below saturation noise of constant CV sits */
-#define CORNER 0.05f         /* how much of the variance between nodes rounds the corner at a threshold */
-#define STEEPEST_ROOT 0.2f   /* where the log-gamma noise is steeper, its slope is cut */
-#define OUTLIERS 0.03f       /* probability of artefacts, log-uniform between 2 and 200 floors */
+#define CORNER 0.05f       /* how much of the variance between nodes rounds the corner at a threshold */
+#define STEEPEST_ROOT 0.2f /* where the log-gamma noise is steeper, its slope is cut */
+#define OUTLIERS 0.03f     /* probability of artefacts, log-uniform between 2 and 200 floors */
 #define LOG_2 0.69314718f
 #define LOG_200 5.2983174f
 #define OUTLIER_DENSITY (1.0f / (LOG_200 - LOG_2))
-#define LEAST_MASS 1e-9f     /* no interval of an amplitude is less probable */
+#define LEAST_MASS 1e-9f          /* no interval of an amplitude is less probable */
 #define ROOT_PER_TURN 0.39894228f /* 1 / root of 2 pi */
-#define EVER 40.0f           /* a power of e that stands in for infinity */
+#define EVER 40.0f                /* a power of e that stands in for infinity */
 
 #define FIRST_GROUP_MS (-150.0f)
 #define GROUP_MS 15.0f
@@ -56,8 +56,8 @@ typedef struct {
     Reals between[NODES]; /* variance of what lies between, where the sigmoid is steepest */
 } Curve;
 
-/* Noise of a recruitment curve is normal on the input; of the other kinds it is log-gamma, by Wilson and Hilferty's root
-(PNAS 17, 1931), with its mean at 1. */
+/* Noise of a recruitment curve is normal on the input; of the other kinds it is log-gamma, by Wilson and Hilferty's
+root (PNAS 17, 1931), with its mean at 1. */
 static Curve curve_of(const Particles *particles, int curved) {
     Reals spread = particles->of[SPREAD];
     Curve made;
@@ -262,7 +262,8 @@ static void sharing_likelihood(const Group *group, const Trial *trials, int64_t 
     memset(sums, 0, sizeof sums);
     for (int node = 0; node < FACTOR_NODES; node++)
         for (int64_t i = 0; i < count; i++)
-            sums[node][group_of_isi(trials[i].of[ISI])] += of_trial(group, trials + i, factor_at[node], group->rectified);
+            sums[node][group_of_isi(trials[i].of[ISI])] +=
+                of_trial(group, trials + i, factor_at[node], group->rectified);
     for (int lane = 0; lane < LANES; lane++) found[lane] = 0.0;
     for (int at = 0; at < GROUPS; at++)
         for (int lane = 0; lane < LANES; lane++) {

@@ -10,15 +10,15 @@ and latents again. A move is accepted with probability min(1, exp(likelihood rat
 #include "likelihood.h"
 #include "prior.h"
 
-#define JUMPS 0.4f        /* how often a move is a jump */
+#define JUMPS 0.4f            /* how often a move is a jump */
 #define WHOLE_DIFFERENCE 0.1f /* how often a difference is added as it is, which leads from mode to mode */
-#define BLUR 0.02f        /* SD of what is added to a difference, as a share of the usual SD of each latent */
-#define RECENT 0.8f       /* how often the trial of another change is proposed among those so far */
-#define NEARLY 2.0f       /* SDs of the moves of a change: by how many trials, */
-#define A_LITTLE 0.3f     /* and at most by what size */
-#define OF_STEPS 0.7f     /* how often a size is proposed near the step of the amplitudes at its trial, */
-#define STEP_SD 0.3f      /* and how near, natural log */
-#define ANOTHER_KIND 0.25f /* how often a change that moves a little becomes one of another kind */
+#define BLUR 0.02f            /* SD of what is added to a difference, as a share of the usual SD of each latent */
+#define RECENT 0.8f           /* how often the trial of another change is proposed among those so far */
+#define NEARLY 2.0f           /* SDs of the moves of a change: by how many trials, */
+#define A_LITTLE 0.3f         /* and at most by what size */
+#define OF_STEPS 0.7f         /* how often a size is proposed near the step of the amplitudes at its trial, */
+#define STEP_SD 0.3f          /* and how near, natural log */
+#define ANOTHER_KIND 0.25f    /* how often a change that moves a little becomes one of another kind */
 
 /* What the moves of a person have in common. */
 typedef struct {
@@ -125,8 +125,8 @@ static int64_t jump(const Chain *chain, uint64_t *dice, float *z, int64_t *kinds
     return number;
 }
 
-/* Add a scaled difference of two of the others (ter Braak, Stat. Comput. 16, 2006); log of the ratio of prior densities.
-Log densities of blocks are kept: UNKNOWN in found where a block does not move. */
+/* Add a scaled difference of two of the others (ter Braak, Stat. Comput. 16, 2006); log of the ratio of prior
+densities. Log densities of blocks are kept: UNKNOWN in found where a block does not move. */
 static double shift(const Chain *chain, uint64_t *dice, const float *theirs, int64_t others, const uint8_t *moves,
                     const float *old, float *z, float *densities, float *found) {
     const Tables *tables = chain->tables;
@@ -159,15 +159,15 @@ static int overlap(const Tables *tables, const float *z) {
 
 /* Where the particles of a half may move to. */
 typedef struct {
-    float *z;         /* (half, latents + 1): the last is 0, for latents that a model does not have */
-    float *found;     /* log densities of blocks, (half, blocks) */
-    float *fields;    /* what it means, (half, FIELDS) */
-    float *after;     /* its log likelihood, (half,) */
-    double *ratio;    /* of prior densities and proposals, natural log */
-    int64_t *kinds;   /* (half, KINDS) */
-    uint64_t *dice;   /* streams of draws */
-    uint8_t *jumped;  /* whether it is a jump */
-    uint8_t *wanted;  /* whether its likelihood must be worked out */
+    float *z;        /* (half, latents + 1): the last is 0, for latents that a model does not have */
+    float *found;    /* log densities of blocks, (half, blocks) */
+    float *fields;   /* what it means, (half, FIELDS) */
+    float *after;    /* its log likelihood, (half,) */
+    double *ratio;   /* of prior densities and proposals, natural log */
+    int64_t *kinds;  /* (half, KINDS) */
+    uint64_t *dice;  /* streams of draws */
+    uint8_t *jumped; /* whether it is a jump */
+    uint8_t *wanted; /* whether its likelihood must be worked out */
 } Proposals;
 
 static void propose(const Chain *chain, const Proposals *to, int64_t i, const float *old, const int64_t *kinds,
@@ -248,11 +248,15 @@ static int sweeps(const Tables *tables, int64_t people, int64_t particles, int64
     int64_t half = particles / 2, most = particles - half, latents = tables->latents, blocks = tables->blocks;
     size_t each = (size_t)most;
     Trial *trials = malloc((size_t)(count + 1) * sizeof *trials);
-    Proposals to = {
-        .z = malloc(each * (size_t)(latents + 1) * sizeof(float)), .found = malloc(each * (size_t)blocks * sizeof(float)),
-        .fields = malloc(each * FIELDS * sizeof(float)), .after = malloc(each * sizeof(float)),
-        .ratio = malloc(each * sizeof(double)), .kinds = malloc(each * KINDS * sizeof(int64_t)),
-        .dice = malloc(each * sizeof(uint64_t)), .jumped = malloc(each), .wanted = malloc(each)};
+    Proposals to = {.z = malloc(each * (size_t)(latents + 1) * sizeof(float)),
+                    .found = malloc(each * (size_t)blocks * sizeof(float)),
+                    .fields = malloc(each * FIELDS * sizeof(float)),
+                    .after = malloc(each * sizeof(float)),
+                    .ratio = malloc(each * sizeof(double)),
+                    .kinds = malloc(each * KINDS * sizeof(int64_t)),
+                    .dice = malloc(each * sizeof(uint64_t)),
+                    .jumped = malloc(each),
+                    .wanted = malloc(each)};
     float *redrawn = malloc((size_t)latents * sizeof *redrawn);
     int there = trials && to.z && to.found && to.fields && to.after && to.ratio && to.kinds && to.dice && to.jumped &&
                 to.wanted && redrawn;

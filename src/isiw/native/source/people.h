@@ -8,32 +8,32 @@
 
 /* Fields of a particle: what its latents mean. Logarithms are natural, amplitudes in EMG floors. */
 enum {
-    NOISE,     /* kind of the noise */
-    SHAPE,     /* kind of the profile */
-    PRESENT,   /* 1 where there is an enhancement */
-    START,     /* of the profile's span [ms] */
-    WIDTH,     /* [ms] */
-    FORM,      /* in -1..1 */
-    LOG_FLOOR, /* of the median EMG floor [mV] */
-    FLOOR_SD,  /* log SD of the floor from trial to trial */
-    LOG_RATIO, /* of the largest evoked MEP, or the expected one at the best ISI, over the floor */
-    SPREAD,    /* SD of the noise on the input [logits], or the CV */
-    OUTPUT_SD, /* log SD of the noise on the output */
-    BOOST,     /* shift of the drive at the best ISI [logits] */
-    REST,      /* drive without a tap [logits] */
-    ONSET,     /* the sigmoid at the threshold, 0 where there is none */
-    MOST,      /* probability of a response at the best ISI */
-    LEAST,     /* and without a tap */
-    DRIFT,     /* by how much the log of evoked MEPs will have changed after many trials */
-    STARTLED,  /* how strongly the first trials startle */
-    SLOPE,     /* of the drive by intensity [logits per % RMT] */
-    LOW_START, /* of a depression [ms] */
-    LOW_WIDTH, /* [ms] */
-    DEPTH,     /* in units of the largest facilitation, 0 where there is none */
-    CHANGED,   /* how many trials come before a change */
-    STEP,      /* log of what everything evoked is multiplied by from then on */
+    NOISE,      /* kind of the noise */
+    SHAPE,      /* kind of the profile */
+    PRESENT,    /* 1 where there is an enhancement */
+    START,      /* of the profile's span [ms] */
+    WIDTH,      /* [ms] */
+    FORM,       /* in -1..1 */
+    LOG_FLOOR,  /* of the median EMG floor [mV] */
+    FLOOR_SD,   /* log SD of the floor from trial to trial */
+    LOG_RATIO,  /* of the largest evoked MEP, or the expected one at the best ISI, over the floor */
+    SPREAD,     /* SD of the noise on the input [logits], or the CV */
+    OUTPUT_SD,  /* log SD of the noise on the output */
+    BOOST,      /* shift of the drive at the best ISI [logits] */
+    REST,       /* drive without a tap [logits] */
+    ONSET,      /* the sigmoid at the threshold, 0 where there is none */
+    MOST,       /* probability of a response at the best ISI */
+    LEAST,      /* and without a tap */
+    DRIFT,      /* by how much the log of evoked MEPs will have changed after many trials */
+    STARTLED,   /* how strongly the first trials startle */
+    SLOPE,      /* of the drive by intensity [logits per % RMT] */
+    LOW_START,  /* of a depression [ms] */
+    LOW_WIDTH,  /* [ms] */
+    DEPTH,      /* in units of the largest facilitation, 0 where there is none */
+    CHANGED,    /* how many trials come before a change */
+    STEP,       /* log of what everything evoked is multiplied by from then on */
     STEP_DRIVE, /* by how much the drive grows from then on [logits] */
-    FADING,    /* by how many halves the enhancement fades from trial to trial; negative where it grows */
+    FADING,     /* by how many halves the enhancement fades from trial to trial; negative where it grows */
     STEP_SCALE, /* log of what all amplitudes are multiplied by from then on */
     FIELDS
 };
@@ -54,10 +54,10 @@ enum {
     COLUMNS
 };
 
-enum { CONSTANT_CV, MISSING, RECRUITMENT, ALL_OR_NONE, RECTIFIED };                        /* NoiseKind */
-enum { GAUSSIAN, SKEWED, PLATEAU, TWO_PEAK };                                              /* ShapeKind */
-enum { NO_CHANGE, LEVEL_CHANGE, INTENSITY_CHANGE, ENHANCEMENT_CHANGE, SCALE_CHANGE };      /* ChangeKind */
-enum { OF_SHAPE, OF_NOISE, OF_PRESENT, OF_DEPRESSED, OF_CHANGE, KINDS };                   /* kinds of a particle */
+enum { CONSTANT_CV, MISSING, RECRUITMENT, ALL_OR_NONE, RECTIFIED };                   /* NoiseKind */
+enum { GAUSSIAN, SKEWED, PLATEAU, TWO_PEAK };                                         /* ShapeKind */
+enum { NO_CHANGE, LEVEL_CHANGE, INTENSITY_CHANGE, ENHANCEMENT_CHANGE, SCALE_CHANGE }; /* ChangeKind */
+enum { OF_SHAPE, OF_NOISE, OF_PRESENT, OF_DEPRESSED, OF_CHANGE, KINDS };              /* kinds of a particle */
 
 /* Some particles, a lane each. */
 typedef struct {

@@ -63,11 +63,14 @@ static int evoked_means(int64_t samples, int64_t rows, const float *fields, cons
 }
 
 /* A particle's log-normal at each node and row: means and inverse SDs, (NODES, rows) each. */
-static void components_of(const float *fields, float gain, const float *levels, int64_t rows, float *means, float *sds) {
+static void components_of(const float *fields, float gain, const float *levels, int64_t rows, float *means,
+                          float *sds) {
     Particles particle = alike(fields);
     int curved = is_curved(fields), rectified = fields[ONSET] > 0.0f, whole = fields[NOISE] == ALL_OR_NONE;
     Curve curve = curve_of(&particle, curved);
-    Situation made = {.start = particle.of[ONSET], .known = all(0.0f), .responds = all(1.0f),
+    Situation made = {.start = particle.of[ONSET],
+                      .known = all(0.0f),
+                      .responds = all(1.0f),
                       .floor_variance = particle.of[FLOOR_SD] * particle.of[FLOOR_SD],
                       .output = curved ? particle.of[OUTPUT_SD] * particle.of[OUTPUT_SD] : all(0.0f),
                       .scale = exp_v(particle.of[LOG_RATIO] + (gain + (curved ? 0.0f : FAR_BELOW)))};

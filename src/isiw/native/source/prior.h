@@ -11,18 +11,37 @@
 
 /* Latents by what they mean, in the order of `Tables.at`. A curve and a rectified one have six each, in one order. */
 enum {
-    START_MS, LOG_WIDTH_MS, FORM_SCORE, LOG_FLOOR_MV, LOG_FLOOR_SD, DRIFT_SIZE, STARTUP, LOG_GAIN, LOG_CV, RELIABILITY,
-    SWITCHED_ON, SWITCHED_OFF, LOG_SIZE, LOG_SIZE_CV, CURVE_LATENTS, RECTIFIED_LATENTS = CURVE_LATENTS + 6,
-    LOG_ONSET = RECTIFIED_LATENTS + 6, LOG_CHANGED_AFTER, CHANGE_SIZE, LOW_START_MS, LOW_LOG_WIDTH_MS, LOW_LOG_SHIFT,
+    START_MS,
+    LOG_WIDTH_MS,
+    FORM_SCORE,
+    LOG_FLOOR_MV,
+    LOG_FLOOR_SD,
+    DRIFT_SIZE,
+    STARTUP,
+    LOG_GAIN,
+    LOG_CV,
+    RELIABILITY,
+    SWITCHED_ON,
+    SWITCHED_OFF,
+    LOG_SIZE,
+    LOG_SIZE_CV,
+    CURVE_LATENTS,
+    RECTIFIED_LATENTS = CURVE_LATENTS + 6,
+    LOG_ONSET = RECTIFIED_LATENTS + 6,
+    LOG_CHANGED_AFTER,
+    CHANGE_SIZE,
+    LOW_START_MS,
+    LOW_LOG_WIDTH_MS,
+    LOW_LOG_SHIFT,
     MEANINGS
 };
 enum { LOG_CEILING, LOG_SLOPE, LOG_INPUT_SD, LOG_SIGMA_Y, LOG_BOOST, REST_PCT }; /* of a curve */
 
-#define NEVER (-1e30f)           /* log density of what cannot be */
-#define UNKNOWN 1e30f            /* in place of a log density that was not worked out yet */
-#define MOST_ONSET 0.9f          /* a threshold further up a curve would leave nothing of it */
-#define INTENSITY_PCT 9.0f       /* by how much the intensity changes at a size of 1 [% RMT] */
-#define FADING_HALVES 0.04f      /* by how many halves the enhancement changes from trial to trial at a size of 1 */
+#define NEVER (-1e30f)      /* log density of what cannot be */
+#define UNKNOWN 1e30f       /* in place of a log density that was not worked out yet */
+#define MOST_ONSET 0.9f     /* a threshold further up a curve would leave nothing of it */
+#define INTENSITY_PCT 9.0f  /* by how much the intensity changes at a size of 1 [% RMT] */
+#define FADING_HALVES 0.04f /* by how many halves the enhancement changes from trial to trial at a size of 1 */
 
 /* What latents mean. Those that a model does not have are read as 0, from behind the last: z has room for one more. */
 static void meaning_of(const Tables *tables, const float *z, const int64_t *kinds, float *fields) {
@@ -194,7 +213,8 @@ static int log_usual(const Tables *tables, int64_t people, int64_t particles, co
     const float *edges = tables->kinds + OF_CHANGE * tables->kind_values;
     for (int64_t i = 0; i < people * particles; i++) {
         int64_t change = kinds[i * KINDS + OF_CHANGE];
-        float share = (change < tables->kind_values ? least_1(edges[change], 1.0f) : 1.0f) - (change ? edges[change - 1] : 0.0f);
+        float share =
+            (change < tables->kind_values ? least_1(edges[change], 1.0f) : 1.0f) - (change ? edges[change - 1] : 0.0f);
         float sum = log_1(most_1(share, 1e-30f));
         for (int64_t block = 0; block < tables->blocks; block++) {
             if (!is_weighed(tables, block, kinds + i * KINDS)) continue;

@@ -1,6 +1,7 @@
 /* The facilitation of particles by ISI, in 0-1; negative where the tap depresses.
 
-One peak: exp(-2 d^2), d being the distance from the peak in flanks, so that the span reaches from exp(-2) to exp(-2). */
+One peak: exp(-2 d^2), d being the distance from the peak in flanks, so that the span reaches from exp(-2) to exp(-2).
+*/
 
 #ifndef ISIW_PROFILE_H
 #define ISIW_PROFILE_H
@@ -14,9 +15,7 @@ One peak: exp(-2 d^2), d being the distance from the peak in flanks, so that the
 enum { FURTHEST = 34 }; /* squares of the distance from the peak: behind it facilitation is below 1e-29 */
 
 /* Where a profile of one peak has it, as a share of the span. */
-INLINE float peak_at(const float *fields) {
-    return fields[SHAPE] == SKEWED ? 0.5f + 0.33f * fields[FORM] : 0.5f;
-}
+INLINE float peak_at(const float *fields) { return fields[SHAPE] == SKEWED ? 0.5f + 0.33f * fields[FORM] : 0.5f; }
 
 /* What does not depend on the ISI. */
 typedef struct {

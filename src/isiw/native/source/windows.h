@@ -29,7 +29,8 @@ static float edge_level(const float *fields, const float *evoked, int64_t rows, 
     float peak = evoked[row] + (position - (float)row) * (evoked[row + 1] - evoked[row]) - evoked[0];
     float peak_mv = floor_mv * peak;
     float baseline_mv = floor_mv * (evoked[0] + exp_1(0.5f * fields[FLOOR_SD] * fields[FLOOR_SD]));
-    if (fields[PRESENT] == 0.0f || peak_mv < most_1(MIN_EXCESS_OF_BASELINE * baseline_mv, MIN_EXCESS_MV)) return NOWHERE;
+    if (fields[PRESENT] == 0.0f || peak_mv < most_1(MIN_EXCESS_OF_BASELINE * baseline_mv, MIN_EXCESS_MV))
+        return NOWHERE;
     float least_mv = EDGE_LEVEL * peak_mv;
     while (right < rows - 1 && floor_mv * (evoked[right] - evoked[0]) < least_mv) right++;
     float low_mv = floor_mv * (evoked[right - 1] - evoked[0]), high_mv = floor_mv * (evoked[right] - evoked[0]);
