@@ -59,7 +59,8 @@ def main() -> None:
     before, _, rest = text.partition(MARKS[0])
     _, _, after = rest.partition(MARKS[1])
     truth = isiw.subjects.cohort("recruitment", 1, 2)[0].window(SPACE)
-    said = f"> {analysis}\n\nThe made-up window is {truth}.\n"
+    said = "\n>\n".join(f"> {line}" for line in f"{analysis}".splitlines())
+    said += f"\n\nThe made-up window is {truth}.\n"
     PAGE.write_text(f"{before}{MARKS[0]}{said}{MARKS[1]}{after}", encoding="utf-8")
 
 
