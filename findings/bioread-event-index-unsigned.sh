@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # bioread reads events that lie before time zero of an AcqKnowledge file as billions of samples after it.
 #
-# Expected: the index of an event's sample in the marker items of an .acq file of version 4 and later is a signed long
-#   (BIOPAC Application Note 156 on the file format, as in bioread's own structure for versions before 4).
+# Expected: an event may lie before time zero (AcqKnowledge lets the time axis start anywhere), and its sample is a
+#   signed number, as it is in bioread's own structure of the same field for files of versions before 4.
 # Seen: for files of version 4 and later bioread takes the field for uint32. One of the recordings that bioread publishes
 #   for its own tests (physio-5.0.1-c.acq, compressed, in its source package) has seven such events: its first event is
 #   at 4,294,932,992 (68 years at 2 kHz in 123,787 samples); as int32 it is at -34,304. The same session saved
