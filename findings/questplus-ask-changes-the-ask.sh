@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # questplus: looking at the next stimulus changes it, when it is chosen among the n best.
 #
-# Expected: `next_stim` is a property of the object ("retrieve the stimulus to present next" in its documentation): looked
-#   at twice between two answers it says the same, as it does with the selection method "min_entropy".
+# Expected: `next_stim` is a property, and its docstring speaks of retrieving the stimulus: looked at twice between two
+#   answers it says the same, as it does with the selection method "min_entropy".
 # Seen: with "min_n_entropy" each look draws again from its random generator. Code that logs `q.next_stim`, shows it on
 #   a screen and then sends it to the stimulator has three different stimuli for one trial, and the seed no longer gives the
 #   same session when a line of logging is added.
@@ -11,7 +11,7 @@ set -euo pipefail
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT
 python3 -m venv "$tmp/venv"
-"$tmp/venv/bin/pip" install -q --disable-pip-version-check questplus==2023.1 numpy==2.4.6 scipy==1.17.1 xarray json-tricks
+"$tmp/venv/bin/pip" install -q --disable-pip-version-check questplus==2023.1 numpy==2.4.6 scipy==1.17.1 xarray==2026.9.0 json-tricks==3.17.3
 cd "$tmp"
 "$tmp/venv/bin/python" -W ignore - <<'PY'
 import importlib.metadata as meta
