@@ -43,7 +43,8 @@ for path in ("save2gdf.gdf", "biosig2gdf.gdf"):
         outcome = f"read, {mne.io.read_raw_gdf(path).n_times} samples"
     except AssertionError as error:
         outcome = f"AssertionError({str(error)!r})"
-    print(f"{path}: {head[:8].decode()}, header of {blocks} blocks, {channels} channels (fixed part: {channels + 1} blocks): {outcome}")
+    parts = f"header of {blocks} blocks of which {channels + 1} are for the fixed part and {channels} channels"
+    print(f"{path}: {head[:8].decode()}, {parts}: {outcome}")
     still = still and blocks > channels + 1 and outcome.startswith("AssertionError")
 print("mne", meta.version("mne"), "biosig-tools 2.5.0")
 print("as described" if still else "CHANGED")

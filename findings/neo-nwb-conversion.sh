@@ -27,12 +27,13 @@ def outcome(conversion):
     nwb = pynwb.NWBFile("a session", str(conversion), dt.datetime(2026, 1, 1, tzinfo=dt.timezone.utc))
     stored = np.arange(100, dtype=np.int16)[:, None]
     nwb.add_acquisition(pynwb.TimeSeries(name="emg", data=stored, unit="volts", conversion=conversion, rate=5000.0))
-    with pynwb.NWBHDF5IO("emg.nwb", "w") as io:
+    path = f"{conversion:.5g}.nwb"
+    with pynwb.NWBHDF5IO(path, "w") as io:
         io.write(nwb)
-    problems = len(pynwb.validate(path="emg.nwb"))
+    problems = len(pynwb.validate(path=path))
     try:
-        signal = neo.io.NWBIO("emg.nwb", "r").read_all_blocks()[0].segments[0].analogsignals[0]
-        answer = f"last value {float(signal.rescale('V').magnitude[-1]):.3e} V"
+        signal = neo.io.NWBIO(path, "r").read_all_blocks()[0].segments[0].analogsignals[0]
+        answer = f"last value {float(signal.rescale('V').magnitude.ravel()[-1]):.3e} V"
     except ValueError as error:
         answer = f"ValueError: {error}"
     print(f"conversion {conversion:.5g}: {problems} problems found by pynwb's validator; neo: {answer}")

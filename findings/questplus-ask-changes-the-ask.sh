@@ -11,7 +11,8 @@ set -euo pipefail
 tmp=$(mktemp -d)
 trap 'rm -rf "$tmp"' EXIT
 python3 -m venv "$tmp/venv"
-"$tmp/venv/bin/pip" install -q --disable-pip-version-check questplus==2023.1 numpy==2.4.6 scipy==1.17.1 xarray==2026.9.0 json-tricks==3.17.3
+"$tmp/venv/bin/pip" install -q --disable-pip-version-check \
+    questplus==2023.1 numpy==2.4.6 scipy==1.17.1 xarray==2026.9.0 json-tricks==3.17.3
 cd "$tmp"
 "$tmp/venv/bin/python" -W ignore - <<'PY'
 import importlib.metadata as meta
