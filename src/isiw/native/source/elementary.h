@@ -37,20 +37,22 @@ INLINE REAL NAME(log)(REAL x) {
     return m - 0.5f * square + square * m * tail + NAME(whole)(exponent) * 0.6931471805599453f;
 }
 
-/* 1 / x of a positive number, by two steps of Newton's method, as dividers are slow; the constants are those of the
-least largest error, 8.5e-7. */
+/* 1 / x of a positive number, by Newton's method, as dividers are slow. With two steps, whose error is 8e-7, log
+likelihoods of 60 trials would be .001 nat off. */
 INLINE REAL NAME(per)(REAL x) {
-    REAL y = NAME(float_of)(0x7EF31F00 - NAME(bits_of)(x));
-    y = y * (2.00129833f - x * y);
-    return y * (2.00000084f - x * y);
+    REAL y = NAME(float_of)(0x7EF311C7 - NAME(bits_of)(x));
+    y = y * (2.0f - x * y);
+    y = y * (2.0f - x * y);
+    return y * (2.0f - x * y);
 }
 
-/* 1 / root of a positive number, likewise: 6e-7. */
+/* 1 / root of a positive number, likewise. */
 INLINE REAL NAME(per_root)(REAL x) {
     REAL half = 0.5f * x;
-    REAL y = NAME(float_of)(0x5F376800 - (NAME(bits_of)(x) >> 1));
-    y = y * (1.50087985f - half * y * y);
-    return y * (1.50000058f - half * y * y);
+    REAL y = NAME(float_of)(0x5F3759DF - (NAME(bits_of)(x) >> 1));
+    y = y * (1.5f - half * y * y);
+    y = y * (1.5f - half * y * y);
+    return y * (1.5f - half * y * y);
 }
 
 /* Probability that a standard normal variable is below -z, for z of at least 0 (Chebyshev fit of erfc and its tail). */
