@@ -37,11 +37,12 @@ WEIGHTS = (8, 2, 2, 1, 2, 2, 1, 2, 1)
 def space_of(rng: np.random.Generator) -> isiw.DesignSpace:
     """A random design space: a grid, fine or coarse, or a list of ISIs."""
     reference = ("impact", "valve")[rng.integers(2)]
+    first_ms = 0 if reference == "impact" else -50  # before the impact there is no pair
     if rng.random() < 0.2:
-        isis_ms = rng.choice(np.arange(-20.0, 500.0), size=rng.integers(2, 70), replace=False).tolist()
+        isis_ms = rng.choice(np.arange(float(first_ms), 500.0), size=rng.integers(2, 70), replace=False).tolist()
         return isiw.DesignSpace.of(isis_ms, reference=reference)
     step_ms = float(rng.choice([0.5, 1.0, 2.0, 5.0, 10.0]))
-    low_ms = float(rng.integers(-50, 150))
+    low_ms = float(rng.integers(first_ms, 150))
     return isiw.DesignSpace(low_ms, low_ms + step_ms * int(rng.integers(1, 120)), step_ms, reference=reference)
 
 
