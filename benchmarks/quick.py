@@ -77,7 +77,7 @@ QUICK: Final[Mapping[str, str]] = {
     "steps run": "--people 2 --trials 10 --out OUT",
     "taps_alone": "--people 1",
     "threshold": "--n 4 --spots 1",
-    "throughput": "--single 1 --batches 1 --batch 4 --gpu-batch 4",
+    "throughput": "--single 1 --batches 1 --batch 4",
     "trial_cost": "--trials 60",
     "trial_reduction": "--few --processes 1 --out OUT",
     "trial_way": "",

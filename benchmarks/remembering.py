@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-import torch
+import numpy as np
 
 import isiw
 
@@ -47,9 +47,9 @@ class Wanted:
 
     needs: tuple[type, ...] = ()
 
-    def __call__(self, posterior: Remembering, isi_ms: torch.Tensor) -> torch.Tensor:
+    def __call__(self, posterior: Remembering, isi_ms: np.ndarray) -> np.ndarray:
         """The scores."""
-        return -torch.abs(isi_ms - posterior.wanted_ms)[None]
+        return -np.abs(isi_ms - posterior.wanted_ms)[None]
 
 
 def strategy(trials: int, seed: int) -> isiw.Strategy:

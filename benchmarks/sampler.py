@@ -58,7 +58,7 @@ def said_of(
         if trial in MARKS:
             change = posterior.swarm.latents.change
             stepped = (change != ChangeKind.NONE) & (change != ChangeKind.ENHANCEMENT)
-            of_step = (stepped * posterior.swarm.log_weights.exp()).sum(-1).tolist()
+            of_step = (stepped * np.exp(posterior.swarm.log_weights)).sum(-1).tolist()
             for number, session in enumerate(sessions):
                 estimate = posterior.estimate(number)
                 actual = f1(estimate, session.subject().window(session.space, int(trial)), session.space)

@@ -47,7 +47,8 @@ def run(arguments: Sequence[str | Path], folder: Path) -> subprocess.CompletedPr
     if command is None:
         raise SystemExit("There is no compiler with sanitizers here: install gcc.")
     made = folder / hatch_build.here().file
-    environment = os.environ | {"ISIW_SANITIZE": "1", "CC": command, "PYTHONPATH": f"{ROOT / 'src'}:{ROOT}"}
+    folders = os.pathsep.join(map(str, (ROOT / "src", ROOT, ROOT / "tests")))
+    environment = os.environ | {"ISIW_SANITIZE": "1", "CC": command, "PYTHONPATH": folders}
     build = "import sys, pathlib, hatch_build; hatch_build.build(pathlib.Path(sys.argv[1]))"
     subprocess.run([sys.executable, "-c", build, made], env=environment, check=True)  # noqa: S603 - this repository's
     environment |= {TAKEN: str(made), "LD_PRELOAD": str(_allocator(command)), "ASAN_OPTIONS": "detect_leaks=0"}

@@ -2,13 +2,11 @@
 
     python -m benchmarks.throughput > benchmarks/results/throughput.md
     python -m benchmarks.throughput --law 500 > benchmarks/results/batch_law.md
-    python -m benchmarks.throughput --law 500 --device cuda > benchmarks/results/batch_law_cuda.md
 
 The sessions are those of a study on the `recruitment` cohort in the valve space whose stopping rule is ignored and
 whose estimate is recorded after 10, 20 and 30 trials. The clock starts when twice as many sessions, or batches, are
-finished as there are workers, which have loaded everything by then, and stops at the last one. If there is a GPU it
-runs batches as well. With `--law` nothing is timed: the mean F1 of both engines is compared on so many people, who are
-the same.
+finished as there are workers, which have loaded everything by then, and stops at the last one. With `--law` nothing is
+timed: the mean F1 of both engines is compared on so many people, who are the same.
 """
 
 from __future__ import annotations
@@ -24,7 +22,6 @@ from dataclasses import replace
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import pandas as pd
-import torch
 
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
@@ -57,9 +54,6 @@ def print_throughput(plan: Study, arguments: argparse.Namespace) -> None:
     batched = replace(plan, engine="batched", batch=arguments.batch, people=arguments.batch * arguments.batches)
     measured = [("one at a time", plan, n) for n in (1, arguments.workers)]
     measured += [(f"{arguments.batch} side by side", batched, n) for n in (1, arguments.workers)]
-    if torch.cuda.is_available():
-        gpu = replace(batched, batch=arguments.gpu_batch, people=2 * arguments.gpu_batch, device="cuda")
-        measured.append((f"{arguments.gpu_batch} side by side on {torch.cuda.get_device_name()}", gpu, 1))
     print("| engine | sessions | workers | sessions per second | against one worker |\n|---|---|---|---|---|")
     alone = 0.0
     for engine, study, workers in measured:
@@ -68,14 +62,13 @@ def print_throughput(plan: Study, arguments: argparse.Namespace) -> None:
         print(f"| {engine} | {study.people} | {workers} | {rate:.2f} | {rate / alone:.2f} |", flush=True)
 
 
-def print_law(plan: Study, strategies: Sequence[str], workers: int, device: str) -> None:
-    """Compare the mean F1 of both engines, person by person; batches are on a torch device."""
+def print_law(plan: Study, strategies: Sequence[str], workers: int) -> None:
+    """Compare the mean F1 of both engines, person by person."""
     print("| strategy | trials | F1 one at a time | F1 side by side | difference ± SE |\n|---|---|---|---|---|")
     for name in strategies:
         trials = LAW_TRIALS[name]
         study = replace(plan, strategies=(StudyStrategy(name),), trials=trials, marks=(trials // 2, trials))
-        batched = replace(study, engine="batched", device=device)
-        both = results(study, workers), results(batched, workers if device == "cpu" else 1)
+        both = results(study, workers), results(replace(study, engine="batched"), workers)
         tables = [pd.concat(each, ignore_index=True) for each in both]
         f1 = [table.pivot_table(index="trial", columns="person", values="f1") for table in tables]
         difference = f1[1] - f1[0]
@@ -90,13 +83,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--single", type=int, default=40, help="sessions one at a time")
     parser.add_argument("--batches", type=int, default=4, help="batches")
-    parser.add_argument("--batch", type=int, default=50, help="people side by side on a CPU")
-    parser.add_argument("--gpu-batch", type=int, default=200, help="people side by side on a GPU")
+    parser.add_argument("--batch", type=int, default=50, help="people side by side")
     parser.add_argument("--workers", type=int, default=2, help="as many as there are cores, beside one")
     parser.add_argument("--seed", type=int, default=10_000)
     parser.add_argument("--law", type=int, default=0, help="compare the mean F1 of both engines on so many people")
     parser.add_argument("--strategies", default=",".join(LAW_TRIALS), help="with --law: which, comma-separated")
-    parser.add_argument("--device", default="cpu", help="with --law: the torch device of the batches")
     arguments = parser.parse_args()
     plan = Study(
         (StudyStrategy("default"),),
@@ -109,10 +100,10 @@ def main() -> None:
         batch=arguments.batch,
     )
     print(f"- command: `{command_of('throughput')}`")
-    print(f"- {made_with('torch', 'numpy', 'joblib')}")
-    print(f"- {os.cpu_count()} cores, {platform.machine()}; one torch thread a worker\n")
+    print(f"- {made_with('numpy', 'joblib')}")
+    print(f"- {os.cpu_count()} cores, {platform.machine()}; one thread a worker\n")
     if arguments.law:
-        print_law(plan, arguments.strategies.split(","), arguments.workers, arguments.device)
+        print_law(plan, arguments.strategies.split(","), arguments.workers)
     else:
         print_throughput(plan, arguments)
 

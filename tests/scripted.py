@@ -1,4 +1,4 @@
-"""A strategy without torch models that remembers all it was told, and devices that misbehave on command."""
+"""A strategy without a real model that remembers all it was told, and devices that misbehave on command."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import torch
 
 from isiw.design import DesignSpace
 from isiw.devices.protocol import DeviceInfo
 from isiw.estimate import WindowEstimate
-from isiw.models.protocol import Observation, Tensor
+from isiw.models.protocol import Observation
 from isiw.strategy.stopping import Budget
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Measurement, Stimulus
+from isiw.types import Array
 from isiw.window import Window
 from known import instance
 
@@ -72,7 +72,7 @@ class RememberingModel:
         return RememberingPosterior(space, seed)
 
     def update(self, posterior: RememberingPosterior, observation: Observation) -> RememberingPosterior:
-        alone = bool(observation.isi_ms[0].isnan())
+        alone = math.isnan(observation.isi_ms[0])
         trial = (ALONE_MS if alone else float(observation.isi_ms[0]), float(observation.mep_mv[0]))
         return replace(posterior, told=(*posterior.told, trial))
 
@@ -81,8 +81,9 @@ class RememberingModel:
 class WantedIsi:
     needs: tuple[type, ...] = ()
 
-    def __call__(self, posterior: RememberingPosterior, isi_ms: Tensor) -> Tensor:
-        return -torch.abs(isi_ms - posterior.wanted_ms)[None]
+    def __call__(self, posterior: RememberingPosterior, isi_ms: Array) -> Array:
+        scores: Array = -np.abs(isi_ms - posterior.wanted_ms)[None]
+        return scores
 
 
 class ScriptedDevice:

@@ -10,13 +10,14 @@ Shapes in docstrings use one alphabet throughout:
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import WithJsonSchema
 
 __all__ = [
+    "Array",
     "ArrayLike",
     "BoolArray",
     "Conditioning",
@@ -31,6 +32,9 @@ __all__ = [
 FloatArray: TypeAlias = NDArray[np.float64]
 Singles: TypeAlias = NDArray[np.float32]
 """Numbers of the compiled engine, in single precision."""
+
+Array: TypeAlias = NDArray[np.floating[Any]]
+"""Numbers of either precision: what posteriors answer, and acquisition functions score."""
 
 IntArray: TypeAlias = NDArray[np.int64]
 BoolArray: TypeAlias = NDArray[np.bool_]

@@ -141,7 +141,7 @@ def least_excess_mv(peak_mv: ArrayLike, baseline_mv: ArrayLike, share: float = E
     """The least-excess rule: what the expected MEP at an ISI inside the window exceeds the baseline by, at least [mV].
 
     It is a share of the largest excess. Where that is below 10 % of the baseline or below 2 µV nothing is enhanced, and
-    the least excess is infinite. `isiw.models.windows.least_excess_mv` is the same rule for tensors.
+    the least excess is infinite.
     """
     peak = np.asarray(peak_mv, dtype=float)
     enough_mv = np.maximum(MIN_EXCESS_OF_BASELINE * np.asarray(baseline_mv, dtype=float), MIN_EXCESS_MV)

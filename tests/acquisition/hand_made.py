@@ -7,43 +7,42 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-import torch
 
 from isiw.estimate import WindowEstimate
-from isiw.models.protocol import Tensor
+from isiw.types import Array
 
-Score: TypeAlias = Callable[["HandMadePosterior", Tensor], Tensor]
+Score: TypeAlias = Callable[["HandMadePosterior", Array], Array]
 """Scores ISIs [ms] (shape (t,)) for each person, shape (b, t)."""
 
-ISIS_MS = torch.arange(4.0)
+ISIS_MS = np.arange(4.0)
 
 
 @dataclass(frozen=True)
 class HandMadePosterior:
     """A posterior of given samples: predictions (b, s, t, y), windows and profiles (b, s, t), baselines (b, s)."""
 
-    mass: Tensor
-    masks: Tensor
-    profiles: Tensor
-    baselines: Tensor
+    mass: Array
+    masks: Array
+    profiles: Array
+    baselines: Array
     trials: int = 0
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         raise NotImplementedError(person)
 
-    def outcome_mass(self, isi_ms: Tensor) -> Tensor:
+    def outcome_mass(self, isi_ms: Array) -> Array:
         assert len(isi_ms) == self.mass.shape[2]
         return self.mass
 
-    def window_masks(self, isi_ms: Tensor) -> Tensor:
+    def window_masks(self, isi_ms: Array) -> Array:
         assert len(isi_ms) == self.masks.shape[2]
         return self.masks
 
-    def profiles_mv(self, isi_ms: Tensor) -> Tensor:
+    def profiles_mv(self, isi_ms: Array) -> Array:
         assert len(isi_ms) == self.profiles.shape[2]
         return self.profiles
 
-    def baselines_mv(self) -> Tensor:
+    def baselines_mv(self) -> Array:
         return self.baselines
 
     def of(self, person: int) -> HandMadePosterior:
@@ -59,7 +58,7 @@ def some_posterior(seed: int, people: int = 2, samples: int = 5, isis: int = 4, 
         rng.lognormal(size=(people, samples, isis)),
         0.1 * rng.random((people, samples)),
     )
-    mass, masks, profiles, baselines = (torch.tensor(x, dtype=torch.float32) for x in drawn)
+    mass, masks, profiles, baselines = (x.astype(np.float32) for x in drawn)
     return HandMadePosterior(mass, masks, profiles, baselines)
 
 
@@ -68,7 +67,7 @@ def summed_variance(weights: np.ndarray, values: np.ndarray) -> float:
     return float(np.sum(weights @ values**2 - (weights @ values) ** 2))
 
 
-def expected_gain(mass: Tensor, values: Tensor, loss: Callable[[np.ndarray, np.ndarray], float]) -> np.ndarray:
+def expected_gain(mass: Array, values: Array, loss: Callable[[np.ndarray, np.ndarray], float]) -> np.ndarray:
     """Loss of the samples' weights now, less what is expected of it after the next MEP, shape (b, t).
 
     Args:
@@ -76,7 +75,7 @@ def expected_gain(mass: Tensor, values: Tensor, loss: Callable[[np.ndarray, np.n
         values: of each sample, shape (b, s, g).
         loss: of weights (s,) and values (s, g).
     """
-    m, v = mass.double().numpy(), values.double().numpy()
+    m, v = mass.astype(float), values.astype(float)
     people, samples, isis, outcomes = m.shape
     gain = np.zeros((people, isis))
     for b, t in np.ndindex(people, isis):

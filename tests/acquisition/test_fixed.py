@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -17,10 +16,11 @@ from isiw.acquisition.protocol import AcquisitionFunction, FollowsPlan, best_can
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
-from isiw.models.protocol import ProposesIsi, Tensor
+from isiw.models.protocol import ProposesIsi
+from isiw.types import Array
 
 CANDIDATES = 101
-ISIS_MS = torch.linspace(0.0, 500.0, CANDIDATES)
+ISIS_MS = np.linspace(0.0, 500.0, CANDIDATES, dtype=np.float32)
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ def test_a_design_needs_nothing_of_the_posterior(acquisition: AcquisitionFunctio
 
 @pytest.mark.parametrize("trials", [8, 16, 32])
 def test_the_sobol_order_has_one_isi_in_each_of_as_many_equal_parts(trials: int) -> None:
-    isis_ms = torch.arange(128.0)
+    isis_ms = np.arange(128.0, dtype=np.float32)
     order = [int(SobolIsi(3)(CountingPosterior(trial), isis_ms).argmax()) for trial in range(trials)]
     assert {index * trials // 128 for index in order} == set(range(trials))
 
@@ -98,7 +98,7 @@ def test_the_sweep_stays_at_each_isi_for_its_trials_and_begins_again_at_the_end(
 
 
 def test_a_sweep_stays_at_one_isi_where_its_stops_lie_between_those_of_the_space() -> None:
-    isis_ms = torch.arange(0.0, 40.1, 4.0)
+    isis_ms = np.arange(0.0, 40.1, 4.0, dtype=np.float32)
     order = [int(IncrementalSweep(10.0, 3)(CountingPosterior(trial), isis_ms).argmax()) for trial in range(15)]
     assert [order.count(index) for index in sorted(set(order))] == [3, 3, 3, 3, 3]
 
@@ -124,7 +124,7 @@ def test_a_sweep_comes_to_the_last_isi_of_a_range_of_whole_steps(low_ms: float, 
     stops, sweep = round((high_ms - low_ms) / step_ms) + 1, IncrementalSweep(step_ms, trials_per_isi=1)
     space = DesignSpace(low_ms, high_ms, step_ms=step_ms, reference="impact")
     assert [sweep.planned_isi_ms(space, pairs) for pairs in range(stops)] == space.grid_ms.tolist()
-    isis_ms = torch.tensor(space.grid_ms.tolist())
+    isis_ms = space.grid_ms.astype(np.float32)
     assert [int(sweep(CountingPosterior(trial), isis_ms).argmax()) for trial in range(stops)] == list(range(stops))
 
 
@@ -137,8 +137,8 @@ def test_a_sweep_without_step_or_trials_is_refused(settings: dict[str, Any]) -> 
 class Planner(CountingPosterior):
     """Wants two ISIs."""
 
-    def proposed_isis_ms(self) -> Tensor:
-        return torch.tensor([[253.0, 10.0], [6.0, 400.0]])
+    def proposed_isis_ms(self) -> Array:
+        return np.array([[253.0, 10.0], [6.0, 400.0]])
 
 
 def test_what_the_method_wants_first_is_asked_as_nearly_as_can_be() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import torch
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
@@ -20,7 +19,7 @@ GROUPS = 50
 
 def enumerated(posterior: HandMadePosterior) -> np.ndarray:
     """Expected loss of variance after the best second trial that follows each first outcome."""
-    mass, masks = posterior.mass.double().numpy(), posterior.masks.double().numpy()
+    mass, masks = posterior.mass.astype(float), posterior.masks.astype(float)
 
     def after(weights: np.ndarray, b: int, t: int, depth: int) -> float:
         left = 0.0
@@ -58,8 +57,8 @@ def test_a_second_trial_never_costs(seed: int) -> None:
 def test_candidates_off_the_shortlist_keep_their_own_gain() -> None:
     p = some_posterior(3)
     one, two = WindowGain()(p, ISIS_MS), TwoStep(shortlist=1)(p, ISIS_MS)
-    assert torch.equal(((two - one).abs() > 1e-6).sum(-1), torch.ones(2, dtype=torch.long))
-    assert torch.equal((two - one).argmax(-1), one.argmax(-1))
+    assert (np.abs(two - one) > 1e-6).sum(-1).tolist() == [1, 1]
+    assert (two - one).argmax(-1).tolist() == one.argmax(-1).tolist()
 
 
 @pytest.mark.parametrize("wrong", [{"shortlist": 0}, {"groups": 0}, {"stride": 0}])

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -29,7 +28,7 @@ def variance_of_edges(weights: np.ndarray, masks: np.ndarray) -> float:
 @given(seeds)
 def test_the_profiles_variance_is_that_of_its_samples(seed: int) -> None:
     p = some_posterior(seed)
-    np.testing.assert_allclose(ProfileVariance()(p, ISIS_MS), p.profiles.numpy().var(axis=1), rtol=1e-4)
+    np.testing.assert_allclose(ProfileVariance()(p, ISIS_MS), p.profiles.var(axis=1), rtol=1e-4)
 
 
 @given(seeds)
@@ -48,5 +47,5 @@ def test_the_edges_variance_is_expected_to_fall_by_so_much(seed: int) -> None:
 
 def test_where_no_sample_has_a_window_no_isi_is_better_than_another() -> None:
     p = some_posterior(1)
-    scores = EdgeVariance()(replace(p, masks=torch.zeros_like(p.masks)), ISIS_MS)
+    scores = EdgeVariance()(replace(p, masks=np.zeros_like(p.masks)), ISIS_MS)
     assert scores.tolist() == [[0.0] * 4] * 2

@@ -58,3 +58,42 @@ def test_a_file_is_refused_before_anything_that_analyses_it_is_loaded(tmp_path: 
     ended = subprocess.run(started, cwd=tmp_path, capture_output=True, text=True, check=False)  # noqa: S603 - our own
 
     assert "row 2 of the column 'mep_mv'" in ended.stderr
+
+
+FIRST_SESSION = """
+import sys, isiw
+strategy = isiw.make_strategy()
+for trial in range(6):
+    isi_ms = strategy.ask()
+    strategy.tell(isi_ms, 0.2 if 200 < isi_ms < 280 else 0.012)
+strategy.estimate().probability, strategy.decision
+loaded = {HEAVY} & set(sys.modules)
+assert not loaded, loaded
+"""
+
+FIRST_COMMAND = """
+import sys
+from isiw.cli import app
+try:
+    app()
+finally:
+    loaded = {HEAVY} & set(sys.modules)
+    assert not loaded, loaded
+"""
+
+HEAVY = {"torch", "gpytorch", "botorch", "pyro", "sklearn", "pandas"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("script", "arguments"),
+    [(FIRST_SESSION, ()), (FIRST_COMMAND, ("run",))],
+    ids=["in Python", "the first command of README"],
+)
+def test_a_session_of_the_default_loads_neither_torch_nor_pandas(
+    tmp_path: Path, script: str, arguments: tuple[str, ...]
+) -> None:
+    started = [sys.executable, "-c", script.replace("{HEAVY}", repr(HEAVY)), *arguments]
+    ended = subprocess.run(started, cwd=tmp_path, capture_output=True, text=True, check=False)  # noqa: S603 - our own
+
+    assert ended.returncode == 0, ended.stderr

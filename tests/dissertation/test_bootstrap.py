@@ -70,14 +70,14 @@ def test_a_batch_reaches_to_the_end_of_the_generation_and_no_further() -> None:
 
 def test_the_first_generation_is_uniform_over_the_range() -> None:
     plan = BootstrapFilter(particles=4000, diffusion_ms=0.0).begin(VALVE_SPACE, 1).proposed_isis_ms()[0]
-    assert np.histogram(plan.numpy(), bins=5, range=(-2.5, 502.5))[0] / 4000 == pytest.approx([0.2] * 5, abs=0.03)
+    assert np.histogram(plan, bins=5, range=(-2.5, 502.5))[0] / 4000 == pytest.approx([0.2] * 5, abs=0.03)
 
 
 @pytest.mark.parametrize("space", [VALVE_SPACE, DesignSpace(3.0, 321.0, reference="impact")], ids=["valve", "odd"])
 def test_particles_stay_on_the_lattice_and_in_the_range(space: DesignSpace) -> None:
     posterior = BootstrapFilter(diffusion_ms=60.0).begin(space, 5)
     for _ in range(3):
-        plan = posterior.proposed_isis_ms()[0].numpy()
+        plan = posterior.proposed_isis_ms()[0]
         assert ((plan - space.low_ms) % 5.0 == 0.0).all()
         assert plan.min() >= space.low_ms
         assert plan.max() <= space.high_ms
@@ -112,7 +112,7 @@ def test_without_diffusion_all_particles_go_where_the_only_mep_was() -> None:
 
 def test_the_window_is_the_weighted_mean_of_the_measured_particles_and_75_ms_to_either_side() -> None:
     posterior = STILL.begin(VALVE_SPACE, 4)
-    plan = posterior.proposed_isis_ms()[0].numpy()
+    plan = posterior.proposed_isis_ms()[0]
     meps = 0.01 + bell_mv(plan)
     after = generation(posterior, lambda isi_ms: 0.01 + bell_mv(isi_ms))
     assert after.expectation_ms[0] == pytest.approx((meps * plan).sum() / meps.sum(), abs=1e-4)
@@ -145,14 +145,14 @@ def test_the_window_can_be_the_fits_or_reach_from_the_first_to_the_last_particle
 
 def test_the_spread_is_the_population_sd_of_the_resampled_particles() -> None:
     after = generation(STILL.begin(VALVE_SPACE, 4), lambda isi_ms: 0.01 + bell_mv(isi_ms))
-    assert after.estimate().spread_ms == pytest.approx(np.std(after.proposed_isis_ms()[0].double().numpy()))
+    assert after.estimate().spread_ms == pytest.approx(np.std(after.proposed_isis_ms()[0].astype(float)))
 
 
 def test_diffusion_moves_particles_by_its_sd() -> None:
     model = BootstrapFilter(particles=2000, diffusion_ms=20.0)
     first = STILL.begin(VALVE_SPACE, 4).proposed_isis_ms()[0, 0].item()
     posterior = told(replace(model), [(250.0, 0.1)] * 2000)
-    plan = posterior.proposed_isis_ms()[0].double()
+    plan = posterior.proposed_isis_ms()[0].astype(float)
     assert first % 5.0 == 0.0
     assert plan.mean().item() == pytest.approx(250.0, abs=2.0)
     assert plan.std().item() == pytest.approx(math.sqrt(20.0**2 + 25.0 / 12), rel=0.06)

@@ -7,6 +7,7 @@ import shutil
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -126,15 +127,20 @@ def test_shares_of_a_kind_that_the_log_does_not_name_are_none() -> None:
     assert "all_or_none" in noise
 
 
-def test_a_log_that_names_no_engine_goes_on_with_the_one_there_was(copy: Callable[[str], Path]) -> None:
+@pytest.mark.parametrize("stated", [{}, {"engine": "torch"}, {"engine": "compiled", "device": "cpu"}])
+def test_a_log_of_an_earlier_engine_goes_on_with_the_one_there_is(copy: Callable[[str], Path], stated: Any) -> None:
+    header = isiw.read_session(copy("e31d040-killed.mcap.part")).header
+    recipe = header.strategy.model_copy(update={"settings": header.strategy.settings | stated})
+    settings = strategy_of(header.model_copy(update={"strategy": recipe})).recipe.settings
+    assert settings == strategy_of(header).recipe.settings
+    assert not settings.keys() & {"engine", "device"}
+
+
+def test_the_log_says_which_engine_it_goes_on_with(copy: Callable[[str], Path]) -> None:
     log = copy("e31d040-killed.mcap.part")
-    assert strategy_of(isiw.read_session(log).header).recipe.settings["engine"] == "torch"
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", OtherVersionsWarning)
+    with pytest.warns(OtherVersionsWarning):
         isiw.resume(log, isiw.SimulatedDevice(person("killed"))).run()
-    header = isiw.read_session(log).header
-    assert strategy_of(header).recipe.settings["engine"] == "torch"
-    assert header.versions["engine"] == version()
+    assert isiw.read_session(log).header.versions["engine"] == version()
 
 
 def test_settings_that_this_version_does_not_know_are_as_by_default_and_named() -> None:

@@ -3,7 +3,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-import torch
 
 from isiw.design import DesignSpace
 from isiw.models.windows import Runs, SampledProfiles, best_window, edge_samples, profile_grid, sampled_estimate
@@ -13,11 +12,11 @@ SPACE = DesignSpace(0, 9, reference="impact")
 
 
 def masks(*rows: str) -> Runs:
-    return Runs.of_masks(torch.tensor([[float(c) for c in row] for row in rows]))
+    return Runs.of_masks(np.array([[float(c) for c in row] for row in rows]))
 
 
 def flat(samples: int) -> Callable[[], SampledProfiles]:
-    return lambda: SampledProfiles(torch.ones(samples, 10), torch.ones(samples))
+    return lambda: SampledProfiles(np.ones((samples, 10)), np.ones(samples))
 
 
 def test_certain_membership_is_reported_as_it_is() -> None:
@@ -30,7 +29,7 @@ def test_the_reported_window_has_the_largest_expected_f1_of_all_level_sets() -> 
     rng = np.random.default_rng(0)
     starts, ends = rng.integers(0, 5, 200), rng.integers(5, 10, 200)
     samples = np.array([[float(a <= t <= b) for t in range(10)] for a, b in zip(starts, ends, strict=True)])
-    window, told = best_window(Runs.of_masks(torch.tensor(samples)), SPACE.grid_ms)
+    window, told = best_window(Runs.of_masks(samples), SPACE.grid_ms)
     reported = known(window).mask(SPACE.grid_ms)
 
     def expected_f1(mask: np.ndarray) -> float:
@@ -88,9 +87,9 @@ def test_the_expected_f1_is_that_of_the_decision() -> None:
 
 def test_the_best_isi_is_told_of_samples_that_have_one_and_what_is_excluded_of_all() -> None:
     # Ten samples: peaks of 50 µV at 3 or 4 ms in eight, nothing in two; nine in ten are at most 50 µV.
-    mep_mv = torch.full((10, 10), 0.01)
+    mep_mv = np.full((10, 10), 0.01)
     mep_mv[:5, 3], mep_mv[5:8, 4] = 0.06, 0.06
-    profiles = SampledProfiles(mep_mv, torch.full((10,), 0.01))
+    profiles = SampledProfiles(mep_mv, np.full(10, 0.01))
     estimate = sampled_estimate(masks("0011110000"), lambda: profiles, SPACE)
     assert known(estimate.best_isi) == (3.0, 3.0, 4.0)
     assert known(estimate.largest_excluded).mep_mv == pytest.approx(0.05)
@@ -101,7 +100,7 @@ def test_a_profile_is_reported_up_to_both_ends_of_the_range() -> None:
     for high_ms in (302, 320, 500):
         grid = profile_grid(DesignSpace(0, high_ms, reference="impact"))
         assert (float(grid[0]), float(grid[-1])) == (0, high_ms)
-        assert (grid.diff() > 0).all()
+        assert (np.diff(grid) > 0).all()
 
 
 def test_a_profile_has_no_gaps_that_a_narrow_peak_fits_into_however_wide_the_range() -> None:
@@ -110,5 +109,5 @@ def test_a_profile_has_no_gaps_that_a_narrow_peak_fits_into_however_wide_the_ran
         DesignSpace(0, 600, reference="impact"),
         DesignSpace(0, 2100, 3, reference="impact"),
     ):
-        assert profile_grid(space).diff().max() <= 4.0
+        assert np.diff(profile_grid(space)).max() <= 4.0
     assert len(profile_grid(DesignSpace(0, 400, 10, reference="impact"))) == 41

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-import torch
 
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.models.protocol import Observation
@@ -17,9 +15,7 @@ Trial = tuple[float | None, float]
 
 def observation(isi_ms: Iterable[float | None], mep_mv: Iterable[float]) -> Observation:
     """One trial of each person."""
-    isi = torch.tensor([math.nan if value is None else value for value in isi_ms])
-    mep = torch.tensor(list(mep_mv))
-    return Observation(isi, mep, torch.zeros_like(mep), torch.full_like(mep, math.nan))
+    return Observation.of(list(isi_ms), list(mep_mv))
 
 
 def told(model: Any, trials: Iterable[Trial], space: DesignSpace = VALVE_SPACE, seed: int = 1) -> Any:

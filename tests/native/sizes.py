@@ -8,28 +8,24 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Any
 
 import numpy as np
-import torch
 
 from benchmarks import sanitized
 from isiw.design import DesignSpace
 from isiw.models.particles.changes import ChangePrior
-from isiw.models.particles.engine import Compiled
-from isiw.models.particles.jumps import WindowTarget
 from isiw.models.particles.latents import Latents
 from isiw.models.particles.places import Place
 from isiw.models.particles.predictions import PersonSample
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.profile import ProfilePrior
-from isiw.models.particles.supra.jumps import SupraTarget
 from isiw.models.particles.supra.predictions import SupraSample
 from isiw.models.particles.supra.prior import SupraPrior
-from isiw.models.shared.history import Circumstances, History
+from isiw.models.shared.history import Circumstances, History, neutral
 from isiw.models.shared.scales import Scale
-from isiw.native.engine import entropy_reductions, variance_reductions
+from isiw.models.windows import grid_of
+from isiw.native.engine import Crowd, entropy_reductions, log_likelihoods, variance_reductions
+from native.drawn import Case, seeds
 
 TRIALS = (0, 1, 2, 15, 16, 17, 63, 64, 65, 127, 128, 129, 257)
 PARTICLES = (2, 3, 15, 16, 17, 65)
@@ -41,42 +37,41 @@ FAR_MS = 5000.0
 
 def history(trials: int, seed: int, particular: str = "") -> History:
     """Some trials of a person: points and intervals, TMS alone, uncertain and far ISIs, known parts, other pulses."""
-    rng = np.random.default_rng(seed)
-    isi_ms, low = rng.uniform(-60.0, 500.0, trials), rng.normal(-3.0, 1.0, trials)
-    isi_ms[rng.random(trials) < 0.2] = np.nan
-    isi_ms[rng.random(trials) < 0.1] = FAR_MS
+    rng, made = np.random.default_rng(seed), neutral(trials)
+    made[:, 0], low = rng.uniform(-60.0, 500.0, trials), rng.normal(-3.0, 1.0, trials)
+    made[rng.random(trials) < 0.2, 0] = np.nan
+    made[rng.random(trials) < 0.1, 0] = FAR_MS
     high, sort = low.copy(), rng.integers(4, size=trials) if particular != "points" else np.zeros(trials)
     high[sort == 1] += 0.4
     low[sort == 2] = -np.inf
     high[sort == 3] = np.inf
-    sd_ms = np.where(rng.random(trials) < 0.3, 3.0, 0.0)
-    columns = [torch.tensor(x[None], dtype=torch.float32) for x in (isi_ms, sd_ms, low, high, np.arange(trials))]
-    told = History(*columns)
-    if particular != "known":
-        return told
-    around = torch.tensor(Circumstances(0.05, 0.02, 0.6, 0.1, 5.0, 0.7)).expand(1, trials, -1)
-    return replace(told, circumstances=around)
+    made[:, 1], made[:, 2], made[:, 3] = np.where(rng.random(trials) < 0.3, 3.0, 0.0), low, high
+    if particular == "known":
+        made[:, 5:] = Circumstances(0.05, 0.02, 0.6, 0.1, 5.0, 0.7)
+    return History(made[np.newaxis])
 
 
-def computed(target: Any, particles: int, told: History) -> Latents:
-    """What an engine computes of particles: likelihood, moves, prior and meaning."""
-    engine, draws = Compiled(target), torch.Generator().manual_seed(particles)
-    latents = target.prior.sample(1, particles, draws, target.space)
-    found = engine.log_likelihood(latents, told)
-    moved = engine.sweeps(torch.tensor([2]), latents, found, told, draws).latents
-    moved = engine.sweeps(torch.tensor([1]), moved, found, told, draws).latents  # whose densities of blocks are known
-    engine.log_usual(moved)
-    engine.log_usual(latents)
-    engine.meaning(moved, told.isi_ms.shape[1])
-    return moved
+def computed(case: Case, particles: int, told: History) -> Latents:
+    """What the engine computes of particles: draws, likelihood, weights, moves, prior and meaning."""
+    law, drawn, dice = case.law, case.drawn(particles, particles), seeds(particles)
+    equal, nothing = np.full((1, particles), -np.log(particles)), law.nothing_known(1, particles)
+    state = *drawn, log_likelihoods(case.fields(drawn), told.columns), nothing
+    law.sweeps(np.array([2]), told.columns, dice, state)
+    crowd = Crowd(*drawn, equal, *state[2:])
+    if told.trials:
+        for min_ess in (0.0, 1.0):  # kept, and resampled
+            law.learn(told.columns, min_ess, (1, 2), dice, crowd)
+    law.usual_weights(law, crowd)
+    law.represent(*drawn, crowd.log_weights, particles + 1, told.trials)
+    case.fields(drawn, told.trials)
+    return drawn
 
 
-def predicted(target: Any, sort: type, space: DesignSpace, latents: Latents) -> None:
+def predicted(case: Case, latents: Latents) -> None:
     """What a sample predicts at the ISIs of a space, and how ISIs are scored by it."""
-    target = replace(target, space=space)
-    sample = sort(Compiled(target).meaning(latents, 1), space, 1)
-    isi_ms = torch.as_tensor(space.grid_ms, dtype=torch.float32)
-    mass, masks = sample.outcome_mass(isi_ms).numpy(), sample.window_masks(isi_ms).numpy()
+    sample = (SupraSample if case.supra else PersonSample)(case.fields(latents, 1), case.space, 1)
+    isi_ms = grid_of(case.space)
+    mass, masks = sample.outcome_mass(isi_ms), sample.window_masks(isi_ms)
     entropy_reductions(mass)
     variance_reductions(mass, masks)
     sample.expected_mep_mv(isi_ms)
@@ -95,21 +90,20 @@ def with_places(number: int) -> Prior:
 
 def main() -> None:
     """Compute at all sizes."""
-    target, supra = WindowTarget(Prior(), SPACE), SupraTarget(SupraPrior(), SPACE)
+    usual, supra = Case(Prior(), SPACE), Case(SupraPrior(), SPACE)
     for trials in TRIALS:
         for number, particular in enumerate(("points", "mixed", "known")):
-            computed(target, 4, history(trials, trials + number, particular))
+            computed(usual, 4, history(trials, trials + number, particular))
     for particles in PARTICLES:
-        latents = computed(target, particles, history(9, particles, "known"))
-        predicted(target, PersonSample, SPACE, latents)
+        predicted(usual, computed(usual, particles, history(9, particles, "known")))
         computed(supra, particles, history(9, particles))
-    for each, sort in ((target, PersonSample), (supra, SupraSample)):
-        latents = computed(each, 17, history(9, 1))
+    for case in (usual, supra):
+        latents = computed(case, 17, history(9, 1))
         for space in spaces(ISIS):
-            predicted(each, sort, space, latents)
+            predicted(case._replace(space=space), latents)
     for number in COMPONENTS:
         for prior in (with_components(number), with_places(number)):
-            computed(WindowTarget(prior, SPACE), 8, history(9, number))
+            computed(Case(prior, SPACE), 8, history(9, number))
 
 
 def spaces(numbers: Sequence[int]) -> list[DesignSpace]:
@@ -121,6 +115,5 @@ def spaces(numbers: Sequence[int]) -> list[DesignSpace]:
 
 if __name__ == "__main__":
     warnings.simplefilter("ignore")
-    torch.set_num_threads(1)
     sanitized.take()
     main()

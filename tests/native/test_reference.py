@@ -1,102 +1,192 @@
-"""The engine has the law of the reference in plain NumPy: log likelihoods of random particles and histories."""
+"""The engine has the law of the reference in plain NumPy: log likelihoods, predictions, windows and prior densities."""
 
 from __future__ import annotations
 
-import math
 import re
 
 import numpy as np
 import pytest
-import torch
+import scipy.special
 from hatch_build import SOURCES
 
-from isiw.design import VALVE_SPACE
+from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.models.particles import records
-from isiw.models.particles.changes import ChangeKind
-from isiw.models.particles.engine import Compiled
-from isiw.models.particles.jumps import WindowTarget
-from isiw.models.particles.latents import LATENTS, Latents
-from isiw.models.particles.noise import NoiseKind
+from isiw.models.particles.latents import BLOCKS
+from isiw.models.particles.model import ParticleModel
+from isiw.models.particles.predictions import PersonSample
 from isiw.models.particles.prior import Prior
-from isiw.models.particles.shapes import ShapeKind
-from isiw.models.shared.history import Circumstances, History
-from isiw.native.engine import COLUMNS, FIELDS, log_likelihoods
+from isiw.models.particles.profile import ProfilePrior
+from isiw.models.particles.supra.predictions import SupraSample
+from isiw.models.shared.history import Circumstances
+from isiw.models.shared.tables import LEVELS
+from isiw.native import engine
+from isiw.native.engine import COLUMNS, FIELDS, UNKNOWN, Crowd, log_likelihoods
+from isiw.window import LEAST_DEPRESSED_MV, least_excess_mv
 from native import reference
+from native.drawn import CASES, PLACES, Case, columns, seeds, trials
 
-TARGET = WindowTarget(Prior(), VALVE_SPACE)
-
-
-def particles(number: int, seed: int) -> Latents:
-    """Particles of the prior, all kinds of them as often."""
-    drawn = TARGET.prior.sample(1, number, torch.Generator().manual_seed(seed), VALVE_SPACE)
-    rng = np.random.default_rng(seed)
-    kinds = {"shape": len(ShapeKind), "noise": len(NoiseKind), "present": 2, "change": len(ChangeKind)}
-    return Latents.of(
-        drawn.values, **{k: torch.from_numpy(rng.integers(n, size=(1, number))) for k, n in kinds.items()}
-    )
+ORDERS = (0, 1, 12)
+FEW_MS = np.array([0.0, 40.0, 90.0, 180.0, 233.0, 260.0, 300.0, np.nan], dtype=np.float32)
 
 
-def trials(number: int, rng: np.random.Generator) -> list[reference.Trial]:
-    """Trials with points and intervals, TMS alone, uncertain ISIs, known parts and other pulses."""
-    found = []
-    for order in range(number):
-        low = rng.normal(-3.0, 1.2)
-        high = low + rng.choice([0.0, 0.0, 0.3, math.inf])
-        if rng.random() < 0.1:
-            low, high = -math.inf, low
-        known_mv = rng.choice([0.0, 0.0, 0.03])
-        found.append(
-            reference.Trial(
-                order=order,
-                isi_ms=math.nan if rng.random() < 0.15 else rng.uniform(0.0, 500.0),
-                low=low,
-                high=high,
-                isi_sd_ms=rng.choice([0.0, 3.0]),
-                known_mv=known_mv,
-                known_sd_mv=0.5 * known_mv,
-                log_offset=rng.choice([0.0, 0.2]),
-                shift_pct_rmt=rng.choice([0.0, -5.0]),
-                enhancement=rng.choice([1.0, 0.6]),
-            )
-        )
-    return found
-
-
-def columns(told: list[reference.Trial]) -> np.ndarray:
-    """The trials as the engine has them, (1, n, columns)."""
-    made = np.array(
-        [
-            [
-                *(trial.isi_ms, trial.isi_sd_ms, trial.low, trial.high, trial.order, trial.known_mv, trial.known_sd_mv),
-                *(0.0, trial.log_offset, trial.shift_pct_rmt, trial.enhancement),
-            ]
-            for trial in told
-        ]
-    )
-    return made.astype(np.float32).reshape(1, -1, COLUMNS)
-
-
-def furthest(number: int, seed: int) -> float:
+def furthest(case: Case, number: int, seed: int, known_log_sd: float = 0.0) -> float:
     """By how much log likelihoods of so many particles and as many histories differ, at most [nat]."""
-    drawn, rng, apart = particles(number, seed), np.random.default_rng(seed), 0.0
-    fields = Compiled(TARGET).meaning(drawn, -1)
-    for i in range(number):
-        told, (shape, noise, present, _, change) = trials(int(rng.integers(1, 6)), rng), drawn.kinds[0, i].tolist()
-        one = reference.Particle(
-            dict(zip(LATENTS, drawn.values[0, i].tolist(), strict=True)), shape, noise, present, change
-        )
+    drawn, rng, apart = case.of_all_kinds(number, seed), np.random.default_rng(seed), 0.0
+    fields = case.fields(drawn)
+    for i, particle in enumerate(case.particles(drawn)):
+        told = trials(int(rng.integers(1, 6)), rng, known_log_sd=known_log_sd)
         got = log_likelihoods(fields[:, i : i + 1].copy(), columns(told)).item()
-        apart = max(apart, abs(got - reference.log_likelihood(one, told)))
+        apart = max(apart, abs(got - reference.log_likelihood(particle, told)))
     return apart
 
 
-def test_the_engine_has_the_law_of_the_reference() -> None:
-    assert furthest(150, 1) < 1e-3
+@pytest.mark.parametrize("known_log_sd", [0.0, 0.8])
+@pytest.mark.parametrize("name", CASES)
+def test_the_engine_has_the_law_of_the_reference(name: str, known_log_sd: float) -> None:
+    assert furthest(CASES[name], 60, 1, known_log_sd) < 1e-3
 
 
 @pytest.mark.slow
-def test_the_engine_has_the_law_of_the_reference_for_ten_thousand_particles() -> None:
-    assert furthest(10_000, 2) < 1e-3
+@pytest.mark.parametrize(("name", "number"), [("default", 10_000), ("supra", 3_000)])
+def test_the_engine_has_the_law_of_the_reference_for_ten_thousand_particles(name: str, number: int) -> None:
+    assert furthest(CASES[name], number, 2) < 1e-3
+    assert furthest(CASES[name], number // 10, 3, 0.8) < 1e-3
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_profiles_are_those_of_the_reference(name: str) -> None:
+    case = CASES[name]
+    drawn = case.of_all_kinds(200, 3)
+    found = engine.facilitations(case.fields(drawn), FEW_MS[:-1])[0]
+    expected = [
+        [particle.facilitation(isi_ms) for isi_ms in FEW_MS[:-1].tolist()] for particle in case.particles(drawn)
+    ]
+    np.testing.assert_allclose(found, expected, atol=1e-4)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("name", ["default", "supra"])
+def test_tables_of_predictions_are_those_of_the_reference(name: str, order: int) -> None:
+    case, outcomes = CASES[name], 24
+    drawn, rng = case.of_all_kinds(60, 4), np.random.default_rng(4)
+    fields, particles = case.fields(drawn, order), case.particles(drawn)
+    rows, means = engine.evoked_means(fields, LEVELS)
+    np.testing.assert_allclose(rows[0], [reference.row_levels(one, LEVELS) for one in particles], atol=1e-5)
+    levels = [row.astype(float).tolist() for row in rows[0]]
+    both = list(zip(particles, levels, strict=True))
+    evoked = [[reference.expected_evoked(one, order, at) for at in own] for one, own in both]
+    np.testing.assert_allclose(means[0], evoked, rtol=3e-4, atol=1e-4)
+    log_mep, widths = np.sort(rng.uniform(-7.0, 2.0, (1, outcomes))), rng.random(outcomes)
+    cells = log_mep.astype(np.float32), widths.astype(np.float32)
+    found = engine.outcome_tables(fields, rows, order, *cells)[0]
+    for one, own, masses in zip(particles, levels, found, strict=True):
+        for row in (0, 5, LEVELS - 1):
+            expected = reference.outcome_masses(one, order, own[row], cells[0][0].astype(float), widths)
+            np.testing.assert_allclose(masses[row], expected, atol=1e-4)
+
+
+@pytest.mark.parametrize("name", ["default", "supra"])
+def test_between_the_rows_of_a_table_everything_is_straight(name: str) -> None:
+    case = CASES[name]
+    drawn, rng = case.of_all_kinds(40, 5), np.random.default_rng(5)
+    table = rng.random((1, 40, LEVELS, 3)).astype(np.float32)
+    levels = rng.uniform(-1.0, 1.1, (1, 40, 9)).astype(np.float32)
+    found = engine.rows_between(case.fields(drawn), table, levels)
+    for i, one in enumerate(case.particles(drawn)):
+        rows = reference.row_of(levels[0, i].astype(float), one.depth, LEVELS)
+        expected = [np.interp(rows, np.arange(LEVELS), outcome) for outcome in table[0, i].T]
+        np.testing.assert_allclose(found[0, i].T, expected, atol=1e-4)
+
+
+@pytest.mark.parametrize("space", [VALVE_SPACE, DesignSpace(0, 300, 5, reference="valve")], ids=["fine", "coarse"])
+def test_windows_expected_meps_and_baselines_are_those_of_the_reference(space: DesignSpace) -> None:
+    order, case = 12, CASES["default"]._replace(space=space)
+    drawn = case.of_all_kinds(150, 6)
+    sample, grid_ms = PersonSample(case.fields(drawn, order), space, order), np.array(space.grid_ms)
+    masks, isi_ms = sample.window_masks(grid_ms.astype(np.float32))[0], FEW_MS[:-1]
+    means_mv, baselines_mv = sample.expected_mep_mv(isi_ms)[0], sample.baselines_mv()[0]
+    runs = sample.runs(grid_ms.astype(np.float32))
+    for i, one in enumerate(case.particles(drawn)):
+        rows = reference.row_levels(one, LEVELS)
+        evoked = np.array([reference.expected_evoked(one, order, at) for at in rows])
+        edge = reference.edge_level(one, order, evoked, grid_ms, fine=space.step_ms <= 1)
+        assert sample.edge_level[0, i] == pytest.approx(edge, abs=2e-4)
+        near_ms = slice(None, None, max(1, len(grid_ms) // 60))
+        for isi, inside in zip(grid_ms[near_ms].tolist(), masks[i][near_ms], strict=True):
+            level = one.facilitation(isi)
+            if abs(level - edge) > 1e-3:
+                assert inside == (level >= edge)
+        at = reference.row_of(np.array([one.facilitation(isi) for isi in isi_ms.tolist()]), 0.0, LEVELS)
+        between = np.interp(at, np.arange(LEVELS), evoked)
+        np.testing.assert_allclose(means_mv[i], reference.expected_mep_mv(one, order, between), rtol=5e-4)
+        assert baselines_mv[i] == pytest.approx(reference.expected_mep_mv(one, order, evoked[0]), rel=5e-4)
+    inside = np.zeros(masks.shape)
+    for one_run in zip(runs.sample, runs.first, runs.behind, strict=True):
+        inside[one_run[0], one_run[1] : one_run[2]] = 1.0
+    np.testing.assert_array_equal(inside, masks)
+
+
+def test_predictions_with_a_depression_are_those_of_the_reference() -> None:
+    case, order, isi_ms = CASES["supra"], 3, np.arange(0.0, 201.0, 4.0, dtype=np.float32)
+    drawn = case.of_all_kinds(100, 6)
+    sample, particles = SupraSample(case.fields(drawn, order), case.space, order), case.particles(drawn)
+    levels = [[one.facilitation(isi) for isi in isi_ms.tolist()] for one in particles]
+
+    def mep_mv(one: reference.Particle, at: list[float]) -> list[float]:
+        evoked = [reference.expected_evoked(one, order, level) for level in at]
+        return [reference.expected_mep_mv(one, order, each) for each in evoked]
+
+    expected_mv = np.array([mep_mv(one, own) for one, own in zip(particles, levels, strict=True)])
+    baseline_mv = np.array([mep_mv(one, [0.0]) for one in particles])
+    np.testing.assert_allclose(sample.expected_mep_mv(isi_ms)[0], expected_mv, atol=1e-4, rtol=0.02)
+    np.testing.assert_allclose(sample.baselines_mv()[0], baseline_mv[:, 0], rtol=0.02)
+    grid_ms = np.linspace(0.0, 200.0, 241)
+    range_mv = np.array([mep_mv(one, [one.facilitation(isi) for isi in grid_ms]) for one in particles]) - baseline_mv
+    above = expected_mv - baseline_mv >= least_excess_mv(range_mv.max(-1, keepdims=True), baseline_mv)
+    below = baseline_mv - expected_mv >= least_excess_mv(-range_mv.min(-1, keepdims=True), baseline_mv)
+    below &= baseline_mv >= LEAST_DEPRESSED_MV
+    assert (sample.window_masks(isi_ms)[0] != above).mean() < 0.005  # tables of rows put a few edges one ISI further
+    assert (sample.depressed_masks(isi_ms)[0] != below).mean() < 0.005
+
+
+@pytest.mark.parametrize("profile", [ProfilePrior(), PLACES, ProfilePrior(early=())], ids=["early", "places", "apart"])
+def test_the_usual_is_as_probable_as_by_the_reference_where_isis_are_chosen(profile: ProfilePrior) -> None:
+    model = ParticleModel(Prior(profile))
+    asking, own = (Case(prior, VALVE_SPACE) for prior in (model.prior_where_asking, model.prior))
+    drawn, rng = own.of_all_kinds(120, 8), np.random.default_rng(8)
+    log_weights, nothing = rng.standard_normal((1, 120)), np.zeros((1, 120), dtype=np.float32)
+    found = own.law.usual_weights(asking.law, Crowd(*drawn, log_weights, nothing, own.law.nothing_known(1, 120)))
+    ours, theirs = (
+        np.array([reference.log_usual(case.prior, case.space, one, BLOCKS) for one in case.particles(drawn)])
+        for case in (own, asking)
+    )
+    expected = log_weights[0] + theirs - ours
+    np.testing.assert_allclose(found[0], expected - scipy.special.logsumexp(expected), atol=1e-3, rtol=1e-3)
+
+
+@pytest.mark.parametrize("name", ["default", "places"])
+def test_densities_of_the_priors_blocks_are_those_of_the_reference(name: str) -> None:
+    case = CASES[name]
+    drawn = case.of_all_kinds(120, 9)
+    law, state = case.law, (drawn.values, drawn.kinds, np.zeros((1, 120), dtype=np.float32))
+    kept = law.nothing_known(1, 120)
+    law.sweeps(np.array([4]), np.zeros((1, 0, COLUMNS), dtype=np.float32), seeds(9), (*state, kept))
+    found = case.prior.log_densities(drawn.values, case.space)
+    for block, block_name in enumerate(found):
+        place = block_name == "place"
+        expected = np.array(
+            [
+                reference.log_place(case.prior, case.space, one.z)
+                if place
+                else reference.log_mixture(case.prior.mixtures[block_name], [one.z[n] for n in BLOCKS[block_name]])
+                for one in case.particles(drawn)
+            ]
+        )
+        np.testing.assert_allclose(found[block_name][0], expected, atol=1e-3, rtol=1e-4, err_msg=block_name)
+        known = kept[0, :, block] != UNKNOWN
+        apart = kept[0, known, block] - expected[known]  # the engine leaves a constant out
+        np.testing.assert_allclose(apart, np.median(apart) if known.any() else 0.0, atol=1e-3, err_msg=block_name)
+        assert known.any() == (block_name != "changed"), block_name  # which is drawn again, never moved
 
 
 @pytest.mark.parametrize(("first", "last", "names"), [("NOISE", "FIELDS", "field"), ("ISI", "COLUMNS", "column")])
@@ -107,4 +197,4 @@ def test_fields_and_columns_have_the_order_of_the_c_header(first: str, last: str
     if names == "field":
         assert [getattr(records, name) for name in in_c] == list(range(FIELDS))
     else:
-        assert len(in_c) == COLUMNS == len(History.empty(1, torch.device("cpu")).columns) + len(Circumstances._fields)
+        assert len(in_c) == COLUMNS == 5 + len(Circumstances._fields)

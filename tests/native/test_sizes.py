@@ -13,8 +13,9 @@ import numpy as np
 from benchmarks import sanitized
 from isiw.native import engine, library
 sanitized.take()
-fields, levels = (np.zeros(size, dtype=np.float32) for size in (engine.FIELDS, 23))
-library.call("table_rows", 1, 24, *(array.__array_interface__["data"][0] for array in (fields, levels)))
+sizes = engine.FIELDS, 23, 24
+arrays = [np.zeros(size, dtype=np.float32) for size in sizes]
+library.call("evoked_means", 1, 24, *(array.__array_interface__["data"][0] for array in arrays))
 """
 
 pytestmark = pytest.mark.skipif(sanitized.compiler() is None, reason="no compiler with sanitizers here")

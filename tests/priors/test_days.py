@@ -6,8 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
-import torch
+from scipy.special import softmax
 
 from isiw import priors
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
@@ -19,9 +20,11 @@ from isiw.session.judging import exclude
 from isiw.strategy.catalogue import make_strategy
 from isiw.subjects.responses import GainResponse, PeakProfile
 from isiw.subjects.subject import SimulatedSubject
+from isiw.types import Singles
 from isiw.visit import Visit
 from known import instance, known
 from logs import damage
+from native.drawn import Case
 from priors.logged import gaussian_person, write_log
 
 EARLY_MS, LATE_MS = 20.0, 200.0
@@ -50,8 +53,9 @@ def next_day(first: Any) -> Any:
     return priors.after(first)
 
 
-def starts_ms(prior: Prior) -> torch.Tensor:
-    return prior.sample(1, 20_000, torch.Generator().manual_seed(1), VALVE_SPACE).values[0, :, 0]
+def starts_ms(prior: Prior) -> Singles:
+    start_ms: Singles = Case(prior, VALVE_SPACE).drawn(20_000, 1).of("start_ms")[0]
+    return start_ms
 
 
 def test_another_day_on_a_rig_with_another_hit_delay_is_refused(tmp_path: Path) -> None:
@@ -83,9 +87,8 @@ def test_a_session_without_trials_is_no_day(tmp_path: Path) -> None:
 
 def test_seven_in_ten_windows_are_expected_about_the_first_days(next_day: Any) -> None:
     truth = known(person().window(VALVE_SPACE))
-    near = (starts_ms(next_day) - truth.start_ms).abs() < 40.0
-    usually = (starts_ms(Prior()) - truth.start_ms).abs() < 40.0
-    assert near.float().mean() > 0.6 + 0.25 * usually.float().mean()
+    near, usually = (np.abs(starts_ms(prior) - truth.start_ms) < 40.0 for prior in (next_day, Prior()))
+    assert near.mean() > 0.6 + 0.25 * usually.mean()
     assert next_day.profile.p_place == pytest.approx(0.7)
 
 
@@ -124,8 +127,8 @@ def test_a_window_that_stayed_probably_did_not_move_and_one_elsewhere_did(first:
 def test_whether_a_window_moved_is_judged_with_the_hit_delay_of_the_second_day(first: Any, folder: Path) -> None:
     path = write_log(folder / "stated.mcap", person(EARLY_MS + 60.0), trials=18, seed=3, hit_delay_ms=(180.0, 6.0))
     later = recalled(read_session(path), priors.after(first))
-    weights = (later.swarm.log_weights.exp() * later.swarm.latents.present)[0].double()
-    elsewhere = later.model.prior.log_places(later.swarm.latents.values, later.space)[0].double().softmax(-1)[:, 0]
+    weights = (np.exp(later.swarm.log_weights) * later.swarm.latents.present)[0]
+    elsewhere = softmax(later.model.prior.log_places(later.swarm.latents.values, later.space)[0], axis=-1)[:, 0]
     assert priors.moved(first, read_session(path)) == pytest.approx(float((weights * elsewhere).sum() / weights.sum()))
 
 

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-import torch
 
 from isiw.acquisition.fixed import EvenSpacing
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import StrategyError
-from isiw.models.protocol import Posterior, Tensor
+from isiw.models.protocol import Posterior
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.choice import Choice, best_choices, candidate_isis, evenly_spaced
+from isiw.types import Array
 
 FIVE = DesignSpace(0, 4, reference="impact")
 
@@ -24,10 +24,10 @@ FIVE = DesignSpace(0, 4, reference="impact")
 class Scores:
     """An acquisition function that gives the same scores whatever is believed."""
 
-    values: Tensor
+    values: Array
     needs: tuple[type, ...] = ()
 
-    def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: Posterior, isi_ms: Array) -> Array:
         del posterior, isi_ms
         return self.values
 
@@ -48,7 +48,7 @@ def three() -> Posterior:
     ],
 )
 def test_candidates_are_few_evenly_spaced_and_hold_both_ends(space: DesignSpace) -> None:
-    candidates = candidate_isis(space).double().numpy()
+    candidates = candidate_isis(space).astype(float)
     assert len(candidates) <= 101
     assert (candidates[0], candidates[-1]) == pytest.approx((space.low_ms, space.high_ms))
     steps = np.diff(candidates)
@@ -57,22 +57,22 @@ def test_candidates_are_few_evenly_spaced_and_hold_both_ends(space: DesignSpace)
 
 
 @pytest.mark.parametrize(
-    "scores", [torch.arange(3.0), torch.tensor(1.0), torch.zeros(3, 6), torch.zeros(2, 5), torch.zeros(1, 3, 5)]
+    "scores", [np.arange(3.0), np.array(1.0), np.zeros((3, 6)), np.zeros((2, 5)), np.zeros((1, 3, 5))]
 )
-def test_each_isi_has_a_score(three: Posterior, scores: Tensor) -> None:
+def test_each_isi_has_a_score(three: Posterior, scores: Array) -> None:
     with pytest.raises(StrategyError, match=r"Scores.* shape \(5,\)"):
         best_choices(three, Scores(scores), FIVE, told=2, people=3)
 
 
-@pytest.mark.parametrize("scores", [np.zeros(5), [0.0] * 5, None])
-def test_scores_are_a_tensor(three: Posterior, scores: Any) -> None:
-    with pytest.raises(StrategyError, match=r"got .*a torch tensor"):
+@pytest.mark.parametrize("scores", [None, ["high"] * 5])
+def test_scores_are_numbers(three: Posterior, scores: Any) -> None:
+    with pytest.raises(StrategyError, match=r"numbers of shape \(5,\)"):
         best_choices(three, Scores(scores), FIVE, told=2, people=3)
 
 
 def test_each_person_is_asked_what_scores_best_and_falls_back_alone(three: Posterior) -> None:
     nan = math.nan
-    scores = Scores(torch.tensor([[0.0, 1, 0, 0, 0], [nan, nan, nan, nan, nan], [nan, 0, 0, 0, 2.0]]))
+    scores = Scores(np.array([[0.0, 1, 0, 0, 0], [nan, nan, nan, nan, nan], [nan, 0, 0, 0, 2.0]]))
     first, second, third = best_choices(three, scores, FIVE, told=2, people=3)
     assert (first, third) == (Choice(1.0), Choice(4.0))
     assert second.isi_ms == evenly_spaced(FIVE, 2)

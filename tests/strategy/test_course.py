@@ -5,18 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-import torch
+import numpy as np
 
 from isiw.acquisition.fixed import EvenSpacing, IncrementalSweep
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
 from isiw.dissertation.bootstrap import BootstrapPosterior
 from isiw.dissertation.strategies import Settling
 from isiw.models.particles import ParticlePosterior
-from isiw.models.protocol import Observation, Posterior, Tensor
+from isiw.models.protocol import Observation, Posterior
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.choice import Choice, evenly_spaced
 from isiw.strategy.course import Course, Method
 from isiw.strategy.stopping import Budget
+from isiw.types import Array
 from known import instance
 
 
@@ -66,7 +67,7 @@ def test_isis_are_chosen_as_usual_and_windows_estimated_as_believed() -> None:
     scored = list[Posterior]()
 
     class Recording(EvenSpacing):
-        def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
+        def __call__(self, posterior: Posterior, isi_ms: Array) -> Array:
             scored.append(posterior)
             return super().__call__(posterior, isi_ms)
 
@@ -74,7 +75,7 @@ def test_isis_are_chosen_as_usual_and_windows_estimated_as_believed() -> None:
     assert going.choices
     posterior = instance(ParticlePosterior, going.posterior)
     assert scored == [posterior.as_usual]
-    assert not torch.equal(posterior.as_usual.swarm.log_weights, posterior.swarm.log_weights)
+    assert not np.array_equal(posterior.as_usual.swarm.log_weights, posterior.swarm.log_weights)
     assert going.estimate().probability == posterior.estimate().probability
 
 

@@ -4,14 +4,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Never
 
+import numpy as np
 import pytest
-import torch
 
 import isiw
 from isiw.errors import InvalidValueError
-from isiw.models.protocol import Posterior, Tensor
+from isiw.models.protocol import Posterior
 from isiw.strategy.stopping import Budget
 from isiw.strategy.strategy import Strategy
+from isiw.types import Array
 from known import known
 from scripted import ScriptedDevice, scripted_strategy
 
@@ -24,11 +25,11 @@ class HeldUp:
     needs: tuple[type, ...] = ()
     asked: list[int] = field(default_factory=list)
 
-    def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: Posterior, isi_ms: Array) -> Array:
         del posterior
         self.asked.append(len(isi_ms))
         assert self.go.wait(30)
-        return -torch.abs(isi_ms - 40.0)[None]
+        return -np.abs(isi_ms - 40.0)[None]
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ class Broken:
 
     needs: tuple[type, ...] = ()
 
-    def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Never:
+    def __call__(self, posterior: Posterior, isi_ms: Array) -> Never:
         raise ArithmeticError(f"no scores after {posterior.trials} trials at {len(isi_ms)} ISIs")
 
 

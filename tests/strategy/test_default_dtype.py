@@ -42,7 +42,7 @@ def answers(name: str, *defaults: torch.dtype) -> list[Any]:
     for default, mep_mv in zip(defaults, MEPS_MV, strict=True):
         torch.set_default_dtype(default)
         asked_ms, choice = strategy.ask(), strategy.choice
-        given += [asked_ms, None if choice is None or choice.scores is None else choice.scores.numpy()]
+        given += [asked_ms, None if choice is None or choice.scores is None else choice.scores]
         strategy.learn(asked_ms, mep_mv, isi_sd_ms=1.0)
         strategy.learn(None, 0.01)
         given += astuple(strategy.estimate())

@@ -10,16 +10,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-import torch
 
 from isiw.dissertation.strategies import Settling
-from isiw.errors import InvalidValueError
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy
 from isiw.studies import SimulatedSession, simulate
 from isiw.studies.sessions import Stopping, simulate_batch
 from isiw.subjects.subject import Responder, Response
-from isiw.types import Reference
+from isiw.types import Array, Reference
 from studies.tiny import FEW, timeless
 
 EVERY = ("default", "even", "random", "gp-straddle", "nr", "svmr", "gpr", "pf", "incremental")
@@ -96,10 +94,11 @@ def test_each_person_is_asked_by_a_draw_of_its_own_where_the_acquisition_functio
     assert len(set(map(tuple, together))) == 3
 
 
-def test_a_batch_is_the_same_again_and_other_people_change_it() -> None:
+def test_a_batch_is_the_same_again_and_those_behind_somebody_change_nothing_for_them() -> None:
     rows = [timeless(simulate_batch(sessions("default", people))) for people in (3, 3, 2)]
     pd.testing.assert_frame_equal(rows[0], rows[1])
-    assert not rows[0][rows[0]["person"] < 2].equals(rows[2])
+    first = rows[0][rows[0]["person"] < 2].reset_index(drop=True)
+    pd.testing.assert_frame_equal(first, rows[2].reset_index(drop=True))
 
 
 def test_a_session_that_ends_keeps_its_last_estimate() -> None:
@@ -127,8 +126,8 @@ class NaNForOne:
 
     needs: tuple[type, ...] = ()
 
-    def __call__(self, posterior: Any, isi_ms: torch.Tensor) -> torch.Tensor:
-        scores = torch.zeros((posterior.told.people, len(isi_ms)))
+    def __call__(self, posterior: Any, isi_ms: Array) -> Array:
+        scores = np.zeros((posterior.told.people, len(isi_ms)))
         scores[:, 7] = 1.0
         scores[1:2] = math.nan
         return scores
@@ -142,18 +141,6 @@ def test_a_person_without_a_finite_score_falls_back_alone(monkeypatch: pytest.Mo
     monkeypatch.setattr(SimulatedSession, "player", player)
     rows = simulate_batch(sessions("nr", 3, trials=5))
     assert rows[rows["trial"] == 5]["fallbacks"].tolist() == [0, 5, 0]
-
-
-def test_a_device_reaches_the_models_that_have_one_and_no_others() -> None:
-    with pytest.raises(InvalidValueError, match="got 'xla'"):
-        simulate_batch(sessions("default", 2), device="xla")
-    assert len(simulate_batch(sessions("nr", 2, trials=2), device="xla")) == 2 * 2
-
-
-@pytest.mark.skipif(not torch.cuda.is_available(), reason="no GPU")
-def test_a_batch_on_a_gpu_finds_windows_as_well() -> None:
-    rows = simulate_batch(sessions("default", 8, trials=20, cohort="gaussian", particles=500), device="cuda")
-    assert rows[rows["trial"] == 20]["f1"].mean() > 0.7
 
 
 @pytest.mark.long

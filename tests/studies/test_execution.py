@@ -10,13 +10,36 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import torch
+from threadpoolctl import threadpool_info
 
 from isiw.errors import ConfigError, InvalidValueError
-from isiw.studies.execution import DaskCluster, Failure, Processes, _attempt_alone
+from isiw.studies.execution import DaskCluster, Failure, Processes, _attempt_alone, one_thread
 from known import instance
 from studies.tiny import double, double_or_die, double_or_die_once, process_id
 
 posix = pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
+
+
+def test_one_thread_computes_and_afterwards_as_many_as_before() -> None:
+    torch.set_num_threads(2)
+    try:
+        with one_thread():
+            blas = [library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"]
+            assert (torch.get_num_threads(), set(blas)) == (1, {1})
+        assert torch.get_num_threads() == 2
+    finally:
+        torch.set_num_threads(1)
+
+
+def test_torch_is_not_imported_for_the_sake_of_its_threads_and_begins_with_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(sys.modules, "torch")
+    monkeypatch.setenv("OMP_NUM_THREADS", "3")
+    with one_thread():
+        assert "torch" not in sys.modules
+        assert os.environ["OMP_NUM_THREADS"] == "1"
+    assert "torch" not in sys.modules
+    assert os.environ["OMP_NUM_THREADS"] == "3"
 
 
 @pytest.mark.slow

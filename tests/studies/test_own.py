@@ -32,7 +32,7 @@ class Latest:
         self.towards = towards
 
     def __call__(self, posterior, isi_ms):
-        return -(isi_ms - self.towards).abs()
+        return -abs(isi_ms - self.towards)
 
 
 def acquisition(towards=100.0):

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from typing import Any
 
+import numpy as np
 import pytest
-import torch
 
 from isiw.acquisition.information import MutualInformation
 from isiw.acquisition.protocol import AcquisitionFunction
@@ -18,13 +18,13 @@ from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import StrategyError
 from isiw.estimate import WindowEstimate
 from isiw.models.particles import ParticleModel, ParticlePosterior
-from isiw.models.protocol import Observation, Posterior, ProposesIsi, Tensor
+from isiw.models.protocol import Observation, Posterior, ProposesIsi
 from isiw.strategy.catalogue import list_strategies, make_strategy
 from isiw.strategy.strategy import Strategy
 from isiw.subjects.cohorts import cohort
 from isiw.testing import check_acquisition, check_model, check_strategy
 from isiw.testing.suites import Trials, trials_that_break_things, usual_trials
-from isiw.types import FloatArray
+from isiw.types import Array, FloatArray
 from isiw.window import Window
 from quick import SEARCHED_LITTLE
 
@@ -48,8 +48,7 @@ def particles_after(trials: Trials, people: int = 1) -> ParticlePosterior:
     model = ParticleModel(particles=100)
     posterior = model.begin(VALVE_SPACE, 1, people)
     for isi_ms, mep_mv in trials:
-        columns = (math.nan if isi_ms is None else isi_ms, mep_mv, 0.0, math.nan)
-        posterior = model.update(posterior, Observation(*(torch.full((people,), value) for value in columns)))
+        posterior = model.update(posterior, Observation.of([isi_ms] * people, [mep_mv] * people))
     return posterior
 
 
@@ -124,8 +123,9 @@ class Broken:
             case "counts twice":
                 return self.model.update(after, observation)
             case "depends on chance":
-                by_chance = after.swarm.log_weights + 20 * torch.rand(()) * after.swarm.log_likelihood
-                return replace(after, swarm=replace(after.swarm, log_weights=by_chance))
+                crowd, chance = after.swarm.crowd, 20 * np.random.default_rng().random()
+                by_chance = crowd._replace(log_weights=crowd.log_weights + chance * crowd.log_likelihood)
+                return replace(after, swarm=replace(after.swarm, crowd=by_chance))
             case "forgets the first":
                 return after if after.trials > 1 else posterior
             case "predicts backwards":
@@ -148,26 +148,30 @@ def test_the_suite_finds_a_broken_model(fault: str, promise: str) -> None:
         check_model(lambda: Broken(fault), VALVE_SPACE, order_tolerance_ms=20.0)
 
 
-def flat(_posterior: object, isi_ms: Tensor) -> Tensor:
-    return torch.zeros(len(isi_ms))
+def flat(_posterior: object, isi_ms: Array) -> Array:
+    return np.zeros(len(isi_ms))
 
 
-def undecided(_posterior: object, isi_ms: Tensor) -> Tensor:
-    return torch.full((1, len(isi_ms)), math.nan)
+def undecided(_posterior: object, isi_ms: Array) -> Array:
+    return np.full((1, len(isi_ms)), math.nan)
 
 
-def moody(_posterior: object, isi_ms: Tensor) -> Tensor:
-    return torch.rand(1, len(isi_ms))
+def moody(_posterior: object, isi_ms: Array) -> Array:
+    return np.random.default_rng().random((1, len(isi_ms)))
+
+
+def listed(_posterior: object, isi_ms: Array) -> Any:
+    return [[0.0] * len(isi_ms)]
 
 
 @dataclass(frozen=True)
 class Scoring:
     """An acquisition function of a plain function."""
 
-    score: Callable[[Any, Tensor], Tensor]
+    score: Callable[[Any, Array], Array]
     needs: tuple[type, ...] = ()
 
-    def __call__(self, posterior: object, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: object, isi_ms: Array) -> Array:
         return self.score(posterior, isi_ms)
 
 
@@ -177,6 +181,7 @@ class Scoring:
         (Scoring(flat), "shape"),
         (Scoring(undecided), "finite"),
         (Scoring(moody), "same scores"),
+        (Scoring(listed), "NumPy array"),
         (Scoring(flat, needs=(ProposesIsi,)), "not ProposesIsi"),
         (flat, "says what it needs"),
     ],

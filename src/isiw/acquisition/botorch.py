@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from isiw.lazy import torch
-from isiw.models.protocol import HasBotorchModel, Tensor
+from isiw.models.protocol import HasBotorchModel
+from isiw.types import Array, FloatArray
 
 
 @dataclass(frozen=True)
@@ -22,14 +23,15 @@ class BotorchAcquisition:
         seed: of BoTorch's draws, which disturb nobody else's: equal posteriors have equal scores.
     """
 
-    make: Callable[[Any], Callable[[Tensor], Tensor]]
+    make: Callable[[Any], Callable[[Any], Any]]
     seed: int = 0
     needs: ClassVar[tuple[type, ...]] = (HasBotorchModel,)
 
-    def __call__(self, posterior: HasBotorchModel, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: HasBotorchModel, isi_ms: Array) -> Array:
         """Score the candidate ISIs, one at a time, shape (b, t)."""
-        inputs = isi_ms.double()[:, None, None]
+        inputs = torch.tensor(isi_ms, dtype=torch.double)[:, None, None]
         with torch.no_grad(), torch.random.fork_rng(devices=[]):
             torch.default_generator.manual_seed(self.seed)
             scores = [self.make(posterior.botorch_model(person))(inputs) for person in range(posterior.people)]
-        return torch.stack(scores)
+        found: FloatArray = torch.stack(scores).double().numpy()
+        return found

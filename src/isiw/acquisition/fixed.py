@@ -10,8 +10,9 @@ import numpy as np
 
 from isiw.checks import Checked, Count, Positive
 from isiw.design import DesignSpace
-from isiw.lazy import scipy, torch
-from isiw.models.protocol import Posterior, ProposesIsi, Tensor
+from isiw.lazy import scipy
+from isiw.models.protocol import Posterior, ProposesIsi
+from isiw.types import Array, Singles
 
 _GOLDEN = (5**0.5 - 1) / 2
 
@@ -21,8 +22,8 @@ def golden_index(trial: int, candidates: int) -> int:
     return int((0.5 + trial * _GOLDEN) % 1.0 * candidates)
 
 
-def _only(index: int, isi_ms: Tensor) -> Tensor:
-    scores = torch.zeros((1, len(isi_ms)), dtype=torch.float32, device=isi_ms.device)
+def _only(index: int, isi_ms: Array) -> Singles:
+    scores = np.zeros((1, len(isi_ms)), dtype=np.float32)
     scores[0, index] = 1.0
     return scores
 
@@ -33,7 +34,7 @@ class EvenSpacing:
 
     needs: ClassVar[tuple[type, ...]] = ()
 
-    def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: Posterior, isi_ms: Array) -> Array:
         """Score the ISI whose turn it is 1 and all others 0, shape (1, t)."""
         return _only(golden_index(posterior.trials, len(isi_ms)), isi_ms)
 
@@ -49,7 +50,7 @@ class RandomIsi:
     seed: int = 0
     needs: ClassVar[tuple[type, ...]] = ()
 
-    def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: Posterior, isi_ms: Array) -> Array:
         """Score the ISI drawn for this trial 1 and all others 0, shape (1, t)."""
         rng = np.random.default_rng([self.seed, 1 + posterior.trials])  # [seed, 0] is the stream of seed
         return _only(int(rng.integers(len(isi_ms))), isi_ms)
@@ -66,7 +67,7 @@ class SobolIsi:
     seed: int = 0
     needs: ClassVar[tuple[type, ...]] = ()
 
-    def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: Posterior, isi_ms: Array) -> Array:
         """Score the ISI whose turn it is 1 and all others 0, shape (1, t)."""
         share = float(
             scipy.stats.qmc.Sobol(1, seed=self.seed).random_base2(posterior.trials.bit_length())[posterior.trials, 0]
@@ -94,12 +95,12 @@ class IncrementalSweep(Checked):
         stops_ms = space.stops_ms(self.step_ms)
         return space.snap(float(stops_ms[pairs // self.trials_per_isi % len(stops_ms)]))
 
-    def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: Posterior, isi_ms: Array) -> Array:
         """Score the ISI nearest to the one whose turn it is after so many trials 1 and all others 0, shape (1, t)."""
         # Candidates are in single precision, in which a range may come out a little below a whole number of steps.
         stops = math.floor(float(isi_ms[-1] - isi_ms[0]) / self.step_ms + 1e-4) + 1
         turn = posterior.trials // self.trials_per_isi % stops
-        return _only(int((isi_ms - (isi_ms[0] + turn * self.step_ms)).abs().argmin()), isi_ms)
+        return _only(int(np.abs(isi_ms - (isi_ms[0] + turn * self.step_ms)).argmin()), isi_ms)
 
 
 @dataclass(frozen=True)
@@ -108,6 +109,6 @@ class OwnProposal:
 
     needs: ClassVar[tuple[type, ...]] = (ProposesIsi,)
 
-    def __call__(self, posterior: ProposesIsi, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: ProposesIsi, isi_ms: Array) -> Array:
         """Score ISIs by their distance [ms] from the one it wants, negative, shape (b, t)."""
-        return -(isi_ms - posterior.proposed_isis_ms()[:, :1]).abs()
+        return -np.abs(isi_ms - posterior.proposed_isis_ms()[:, :1])

@@ -6,7 +6,6 @@ Expected improvement on the logarithmic scale [Ament2023], upper confidence boun
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import ClassVar, Final, Protocol
 
@@ -15,8 +14,9 @@ import numpy as np
 from isiw.acquisition.protocol import ForeseesProfiles
 from isiw.acquisition.twostep import lookahead
 from isiw.checks import Checked, NonNegative
-from isiw.lazy import torch
-from isiw.models.protocol import Posterior, PredictsOutcomes, SamplesProfiles, Tensor
+from isiw.lazy import scipy
+from isiw.models.protocol import Posterior, PredictsOutcomes, SamplesProfiles
+from isiw.types import Array
 
 
 class _CountedProfiles(Posterior, SamplesProfiles, Protocol):
@@ -33,15 +33,15 @@ class LogExpectedImprovement:
 
     needs: ClassVar[tuple[type, ...]] = (SamplesProfiles,)
 
-    def __call__(self, posterior: SamplesProfiles, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: SamplesProfiles, isi_ms: Array) -> Array:
         """Log expected improvement of the expected MEP [log mV], shape (b, t)."""
         profiles = posterior.profiles_mv(isi_ms)
-        best = profiles.mean(dim=1).amax(dim=-1)[:, None, None]
-        scale = (SOFTNESS * profiles.std(dim=1, correction=0).amax(dim=-1)).clamp_min(1e-9)[:, None, None]
+        best = profiles.mean(axis=1).max(axis=-1)[:, None, None]
+        scale = np.maximum(SOFTNESS * profiles.std(axis=1).max(axis=-1), 1e-9)[:, None, None]
         steps = (profiles - best) / scale
         # log softplus(x) is x itself far below the hinge, where softplus would underflow.
-        log_hinge = torch.where(steps < -15.0, steps, torch.log(torch.nn.functional.softplus(steps.clamp_min(-15.0))))
-        score: Tensor = torch.logsumexp(log_hinge, dim=1) - math.log(profiles.shape[1]) + scale.squeeze(-1).log()
+        log_hinge = np.where(steps < -15.0, steps, np.log(np.logaddexp(0.0, np.maximum(steps, -15.0))))
+        score: Array = scipy.special.logsumexp(log_hinge, axis=1, b=1.0 / profiles.shape[1]) + np.log(scale[..., 0])
         return score
 
 
@@ -56,10 +56,11 @@ class UpperConfidenceBound(Checked):
     width_sd: NonNegative = 2.0
     needs: ClassVar[tuple[type, ...]] = (SamplesProfiles,)
 
-    def __call__(self, posterior: SamplesProfiles, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: SamplesProfiles, isi_ms: Array) -> Array:
         """The upper bound of the expected MEP [mV], shape (b, t)."""
         profiles = posterior.profiles_mv(isi_ms)
-        return profiles.mean(dim=1) + self.width_sd * profiles.std(dim=1, correction=0)
+        bound: Array = profiles.mean(axis=1) + self.width_sd * profiles.std(axis=1)
+        return bound
 
 
 @dataclass(frozen=True)
@@ -73,12 +74,13 @@ class Thompson:
     seed: int = 0
     needs: ClassVar[tuple[type, ...]] = (SamplesProfiles,)
 
-    def __call__(self, posterior: _CountedProfiles, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: _CountedProfiles, isi_ms: Array) -> Array:
         """The expected MEP under that sample [mV], shape (b, t)."""
         profiles = posterior.profiles_mv(isi_ms)
         people, samples = profiles.shape[:2]
         rng = np.random.default_rng([self.seed, 1 + posterior.trials])  # [seed, 0] is the stream of seed
-        return profiles[torch.arange(people), torch.as_tensor(rng.integers(samples, size=people))]
+        sampled: Array = profiles[np.arange(people), rng.integers(samples, size=people)]
+        return sampled
 
 
 @dataclass(frozen=True)
@@ -87,8 +89,10 @@ class KnowledgeGradient:
 
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesProfiles)
 
-    def __call__(self, posterior: ForeseesProfiles, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: ForeseesProfiles, isi_ms: Array) -> Array:
         """By how much the next MEP is expected to raise the largest posterior mean [mV], shape (b, t)."""
         profiles = posterior.profiles_mv(isi_ms)
         ahead = lookahead(posterior.outcome_mass(isi_ms), profiles)
-        return (ahead.probability * ahead.mean.amax(dim=-1)).sum(-1) - profiles.mean(dim=1).amax(dim=-1, keepdim=True)
+        later = (ahead.probability * ahead.mean.max(axis=-1)).sum(-1)
+        gain: Array = later - profiles.mean(axis=1).max(axis=-1, keepdims=True)
+        return gain

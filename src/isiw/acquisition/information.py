@@ -10,52 +10,49 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, ClassVar, Protocol
 
+import numpy as np
+
 from isiw.acquisition.protocol import ForeseesWindows
-from isiw.acquisition.twostep import expected_variance_reduction
 from isiw.checks import Checked, can, whole
-from isiw.lazy import torch
 from isiw.models.protocol import (
     CountsPairs,
     Posterior,
     PredictsOutcomes,
     SamplesDepression,
     SamplesWindows,
-    Tensor,
 )
 from isiw.native import engine
+from isiw.types import Array, BoolArray, IntArray, Singles
 
 
 class _CountedWindows(Posterior, ForeseesWindows, Protocol):
     """A posterior of windows that predicts the next MEP, and knows how many trials there were."""
 
 
-def _entropy(mass: Tensor) -> Tensor:
-    # `torch.special.entr`, several times as fast: probabilities that are practically 0 add practically nothing.
-    entropy: Tensor = -mass.clamp_min(1e-30).log_().mul_(mass).sum(-1)
+def _entropy(mass: Array) -> Array:
+    # Probabilities that are practically 0 add practically nothing.
+    entropy: Array = -(np.log(np.maximum(mass, 1e-30)) * mass).sum(-1)
     return entropy
 
 
-def _is_for_the_engine(mass: Tensor) -> bool:
-    """True if the engine computes with it: in single precision, on the CPU."""
-    return mass.dtype == torch.float32 and mass.device.type == "cpu"
+def _for_the_engine(values: Array) -> Singles:
+    """The same in single precision, side by side."""
+    return np.ascontiguousarray(values, dtype=np.float32)
 
 
-def _cells(masks: Tensor, cells: int) -> Tensor:
+def _cells(masks: Array, cells: int) -> IntArray:
     """Which cell of starts and ends each sampled window falls into, shape (b, s); 0 is no window."""
-    first, last = masks.argmax(-1), masks.shape[-1] - 1 - masks.flip(-1).argmax(-1)
-    found = masks.any(-1)
+    first, last = masks.argmax(-1), masks.shape[-1] - 1 - masks[..., ::-1].argmax(-1)
+    found: BoolArray = masks.max(-1) > 0
     start, end = (_quantile_cell(edge, found, cells) for edge in (first, last))
-    return torch.where(found, 1 + start * cells + end, 0)
+    return np.where(found, 1 + start * cells + end, 0)
 
 
-def _quantile_cell(edge: Tensor, found: Tensor, cells: int) -> Tensor:
+def _quantile_cell(edge: IntArray, found: BoolArray, cells: int) -> IntArray:
     """Rank of each edge among those of the same person, in equal cells; equal edges share one, shape (b, s)."""
-    below = (edge.unsqueeze(-1) > edge.unsqueeze(-2)) & found.unsqueeze(-2)
-    return (
-        (below.sum(-1) * cells)
-        .div(found.sum(-1, keepdim=True).clamp_min(1), rounding_mode="floor")
-        .clamp_max(cells - 1)
-    )
+    below = (edge[..., None] > edge[..., None, :]) & found[..., None, :]
+    rank: IntArray = below.sum(-1) * cells // np.maximum(found.sum(-1, keepdims=True), 1)
+    return np.minimum(rank, cells - 1)
 
 
 @dataclass(frozen=True)
@@ -64,12 +61,9 @@ class MutualInformation:
 
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes,)
 
-    def __call__(self, posterior: PredictsOutcomes, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: PredictsOutcomes, isi_ms: Array) -> Array:
         """The information [nat], shape (b, t)."""
-        mass = posterior.outcome_mass(isi_ms)
-        if _is_for_the_engine(mass):
-            return torch.from_numpy(engine.entropy_reductions(mass.contiguous().numpy()))
-        return _entropy(mass.mean(dim=1)) - _entropy(mass).mean(dim=1)
+        return engine.entropy_reductions(_for_the_engine(posterior.outcome_mass(isi_ms)))
 
 
 @dataclass(frozen=True)
@@ -87,13 +81,16 @@ class WindowInformation(Checked):
     cells: Annotated[int, partial(whole, least=2)] = 5
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesWindows)
 
-    def __call__(self, posterior: ForeseesWindows, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: ForeseesWindows, isi_ms: Array) -> Array:
         """The information [nat], shape (b, t)."""
         mass, cell = posterior.outcome_mass(isi_ms), _cells(posterior.window_masks(isi_ms), self.cells)
-        members = torch.nn.functional.one_hot(cell, self.cells * self.cells + 1).to(mass.dtype)
-        share = members.mean(dim=1)
-        within = torch.einsum("bsc,bsty->bcty", members, mass) / members.sum(dim=1).clamp_min(1.0)[..., None, None]
-        return _entropy(mass.mean(dim=1)) - torch.einsum("bc,bct->bt", share, _entropy(within))
+        people, samples, candidates, outcomes = mass.shape
+        members = np.eye(self.cells * self.cells + 1, dtype=mass.dtype)[cell]
+        summed = members.swapaxes(1, 2) @ mass.reshape(people, samples, -1)
+        within = summed / np.maximum(members.sum(axis=1), 1.0)[..., None]
+        left = _entropy(within.reshape(people, -1, candidates, outcomes))
+        expected: Array = (members.mean(axis=1)[:, None] @ left)[:, 0]
+        return _entropy(mass.mean(axis=1)) - expected
 
 
 @dataclass(frozen=True)
@@ -102,16 +99,12 @@ class WindowGain:
 
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesWindows)
 
-    def __call__(self, posterior: ForeseesWindows, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: ForeseesWindows, isi_ms: Array) -> Array:
         """Expected reduction of the summed variance of membership, shape (b, t)."""
         masks = posterior.window_masks(isi_ms)
         if can(posterior, SamplesDepression):
-            masks = torch.cat((masks, posterior.depressed_masks(isi_ms)), dim=-1)
-        mass = posterior.outcome_mass(isi_ms)
-        if _is_for_the_engine(mass):
-            inside = masks.to(torch.float32).contiguous().numpy()
-            return torch.from_numpy(engine.variance_reductions(mass.contiguous().numpy(), inside))
-        return expected_variance_reduction(mass, masks)
+            masks = np.concatenate((masks, posterior.depressed_masks(isi_ms)), axis=-1)
+        return engine.variance_reductions(_for_the_engine(posterior.outcome_mass(isi_ms)), _for_the_engine(masks))
 
 
 @dataclass(frozen=True)
@@ -124,7 +117,7 @@ class Alternating:
 
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesWindows)
 
-    def __call__(self, posterior: _CountedWindows, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: _CountedWindows, isi_ms: Array) -> Array:
         """Score the candidate ISIs."""
         pairs = posterior.pairs if can(posterior, CountsPairs) else posterior.trials
         return MutualInformation()(posterior, isi_ms) if pairs % 2 else WindowGain()(posterior, isi_ms)

@@ -10,37 +10,42 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from isiw.acquisition.protocol import ForeseesProfiles
 from isiw.acquisition.twostep import lookahead
 from isiw.checks import Checked, Positive
-from isiw.lazy import torch
-from isiw.models.protocol import PredictsOutcomes, SamplesProfiles, Tensor
+from isiw.lazy import scipy
+from isiw.models.protocol import PredictsOutcomes, SamplesProfiles
+from isiw.types import Array
 from isiw.window import EDGE_LEVEL
 
 _INV_SQRT_2PI = 0.3989422804014327
 
 
-def _margins_mv(posterior: SamplesProfiles, isi_ms: Tensor) -> Tensor:
+def _margins_mv(posterior: SamplesProfiles, isi_ms: Array) -> Array:
     """By how much each sample is above the level of its window's edge [mV], shape (b, s, t)."""
-    excess = posterior.profiles_mv(isi_ms) - posterior.baselines_mv().unsqueeze(-1)
-    return excess - EDGE_LEVEL * excess.amax(dim=-1, keepdim=True).clamp_min(0.0)
+    excess = posterior.profiles_mv(isi_ms) - posterior.baselines_mv()[..., None]
+    margins: Array = excess - EDGE_LEVEL * np.maximum(excess.max(axis=-1, keepdims=True), 0.0)
+    return margins
 
 
-def expected_feasibility(mean: Tensor, sd: Tensor, band_sd: float = 2.0) -> Tensor:
+def expected_feasibility(mean: Array, sd: Array, band_sd: float = 2.0) -> Array:
     """Expected depth inside a band of `band_sd` SDs around the level, of a Gaussian margin."""
-    z = mean / sd.clamp_min(1e-12)
+    z = mean / np.maximum(sd, 1e-12)
     low, high = -band_sd - z, band_sd - z
-    below, at, above = (torch.special.ndtr(x) for x in (low, -z, high))
+    below, at, above = (scipy.special.ndtr(x) for x in (low, -z, high))
     inside = band_sd * (above - below)
     # By parts: the expected distance from the level, where the margin is inside the band.
     distance = z * (below + above - 2.0 * at) + 2.0 * _density(z) - _density(low) - _density(high)
-    feasibility: Tensor = sd * (inside - distance)
+    feasibility: Array = sd * (inside - distance)
     return feasibility
 
 
-def _density(z: Tensor) -> Tensor:
+def _density(z: Array) -> Array:
     """Of a standard Gaussian."""
-    return _INV_SQRT_2PI * torch.exp(-0.5 * z.square())
+    density: Array = _INV_SQRT_2PI * np.exp(-0.5 * np.square(z))
+    return density
 
 
 @dataclass(frozen=True)
@@ -54,10 +59,11 @@ class Straddle(Checked):
     width_sd: Positive = 1.96
     needs: ClassVar[tuple[type, ...]] = (SamplesProfiles,)
 
-    def __call__(self, posterior: SamplesProfiles, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: SamplesProfiles, isi_ms: Array) -> Array:
         """The reach of the margin's credible interval across zero [mV], shape (b, t)."""
         margins = _margins_mv(posterior, isi_ms)
-        return self.width_sd * margins.std(dim=1, correction=0) - margins.mean(dim=1).abs()
+        reach: Array = self.width_sd * margins.std(axis=1) - np.abs(margins.mean(axis=1))
+        return reach
 
 
 @dataclass(frozen=True)
@@ -71,15 +77,15 @@ class IntegratedFeasibility(Checked):
     band_sd: Positive = 2.0
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesProfiles)
 
-    def __call__(self, posterior: ForeseesProfiles, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: ForeseesProfiles, isi_ms: Array) -> Array:
         """By how much the next MEP is expected to reduce the summed expected feasibility [mV], shape (b, t)."""
         margins = _margins_mv(posterior, isi_ms)
-        mean, sd = margins.mean(dim=1), margins.std(dim=1, correction=0)
-        now = expected_feasibility(mean, sd, self.band_sd).sum(-1, keepdim=True)
-        centre = margins.mean(dim=1, keepdim=True)
+        centre = margins.mean(axis=1, keepdims=True)
+        now = expected_feasibility(centre[:, 0], margins.std(axis=1), self.band_sd).sum(-1, keepdims=True)
         offset = margins - centre
-        ahead = lookahead(posterior.outcome_mass(isi_ms), torch.cat((offset, offset.square()), dim=-1))
-        first, second = ahead.mean.chunk(2, dim=-1)
-        left_sd = (second - first.square()).clamp_min(0.0).sqrt()
-        later = expected_feasibility(centre.unsqueeze(1) + first, left_sd, self.band_sd).sum(-1)
-        return now - (ahead.probability * later).sum(-1)
+        ahead = lookahead(posterior.outcome_mass(isi_ms), np.concatenate((offset, np.square(offset)), axis=-1))
+        first, second = np.split(ahead.mean, 2, axis=-1)
+        left_sd = np.sqrt(np.maximum(second - np.square(first), 0.0))
+        later = expected_feasibility(centre[:, None] + first, left_sd, self.band_sd).sum(-1)
+        gain: Array = now - (ahead.probability * later).sum(-1)
+        return gain

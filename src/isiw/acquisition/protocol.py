@@ -9,7 +9,6 @@ import numpy as np
 
 from isiw.design import DesignSpace
 from isiw.errors import StrategyError
-from isiw.lazy import torch
 from isiw.models.protocol import (
     Conditions,
     Posterior,
@@ -17,8 +16,8 @@ from isiw.models.protocol import (
     ProposesIsi,
     SamplesProfiles,
     SamplesWindows,
-    Tensor,
 )
+from isiw.types import Array, IntArray
 
 
 class ForeseesProfiles(PredictsOutcomes, SamplesProfiles, Protocol):
@@ -37,7 +36,7 @@ class AcquisitionFunction(Protocol):
     def needs(self) -> tuple[type, ...]:
         """The capability protocols that a posterior must have."""
 
-    def __call__(self, posterior: Any, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: Any, isi_ms: Array) -> Array:
         """Score the candidate ISIs for each person.
 
         Args:
@@ -77,24 +76,29 @@ def require_acquisition(given: object) -> None:
         )
 
 
-def require_scores(acquisition: AcquisitionFunction, scores: object, candidates: int, people: int = 1) -> Tensor:
+def require_scores(acquisition: AcquisitionFunction, scores: object, candidates: int, people: int = 1) -> Array:
     """The scores of an acquisition function, which has one for each ISI, for all people alike or for each of them."""
     what = f"{type(acquisition).__name__} must score each ISI"
     shape = f"shape ({candidates},) or ({people}, {candidates})"
-    if not isinstance(scores, torch.Tensor):
-        got, remedy = type(scores).__name__, "Return torch.as_tensor(scores)."
-        raise StrategyError(what, got=got, expected=f"a torch tensor of {shape}", remedy=remedy)
-    if tuple(scores.shape) not in {(candidates,), (1, candidates), (people, candidates)}:
-        raise StrategyError(what, got=tuple(scores.shape), expected=f"scores of {shape}")
-    return scores
+    try:
+        given = np.asarray(scores)
+    except (RuntimeError, TypeError, ValueError) as error:  # ragged lists; tensors with gradients, or on a GPU
+        remedy = "Return a NumPy array; of a torch tensor, scores.detach().cpu().numpy()."
+        raise StrategyError(what, got=f"{type(scores).__name__}: {error}", expected=shape, remedy=remedy) from error
+    if given.dtype.kind not in "biuf":
+        remedy = "Return a NumPy array of numbers."
+        raise StrategyError(what, got=type(scores).__name__, expected=f"numbers of {shape}", remedy=remedy)
+    if given.shape not in {(candidates,), (1, candidates), (people, candidates)}:
+        raise StrategyError(what, got=given.shape, expected=f"scores of {shape}")
+    return given if given.dtype.kind == "f" else given.astype(float)
 
 
-def best_candidate(scores: Tensor, first: int = 0) -> Tensor:
+def best_candidate(scores: Array, first: int = 0) -> IntArray:
     """Index of the best candidate for each person, shape (b,); a score that is not finite loses."""
-    given = scores.detach().cpu().numpy()
-    ranked = np.where(np.isfinite(given), given, -np.inf)
+    ranked = np.where(np.isfinite(scores), scores, -np.inf)
     from_first = np.concatenate((ranked[..., first:], ranked[..., :first]), axis=-1)
-    return torch.from_numpy((from_first.argmax(-1) + first) % given.shape[-1])
+    best: IntArray = (from_first.argmax(-1) + first) % scores.shape[-1]
+    return best
 
 
 def own_plan(posterior: Posterior, acquisition: AcquisitionFunction) -> list[float]:
@@ -136,5 +140,7 @@ def _as_expected(posterior: Posterior, isi_ms: float) -> Posterior:
             got=f"a posterior without {', '.join(missing)}",
             remedy="Ask for one ISI at a time, or choose another model.",
         )
-    isi = torch.tensor([isi_ms], dtype=torch.float32)
-    return posterior.condition(isi, posterior.profiles_mv(isi).median(dim=1).values.squeeze(-1))
+    isi = np.array([isi_ms], dtype=np.float32)
+    profiles_mv = posterior.profiles_mv(isi)[..., 0]
+    middle = (profiles_mv.shape[1] - 1) // 2
+    return posterior.condition(isi, np.partition(profiles_mv, middle, axis=1)[:, middle])

@@ -5,37 +5,40 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
+import numpy as np
+
 from isiw.acquisition.protocol import ForeseesWindows
 from isiw.checks import Checked, Count
-from isiw.lazy import torch
-from isiw.models.protocol import PredictsOutcomes, SamplesWindows, Tensor
+from isiw.models.protocol import PredictsOutcomes, SamplesWindows
+from isiw.types import Array
 
 
 class Lookahead(NamedTuple):
     """Expectations after the next MEP."""
 
-    probability: Tensor  # of each value of the next MEP, (b, t, y)
-    mean: Tensor  # of each quantity given that value, (b, t, y, g)
+    probability: Array  # of each value of the next MEP, (b, t, y)
+    mean: Array  # of each quantity given that value, (b, t, y, g)
 
 
-def lookahead(mass: Tensor, values: Tensor, weights: Tensor | None = None) -> Lookahead:
+def lookahead(mass: Array, values: Array, weights: Array | None = None) -> Lookahead:
     """Expectations of some quantities after each value of the next MEP."""
     people, samples, candidates, outcomes = mass.shape
-    share = 1.0 / samples if weights is None else weights.unsqueeze(1)
-    joint = mass.flatten(2).transpose(1, 2) * share
-    probability = joint.sum(-1, keepdim=True).clamp_min(1e-12)
+    share = 1.0 / samples if weights is None else weights[:, None]
+    joint = mass.reshape(people, samples, -1).swapaxes(1, 2) * share
+    probability = np.maximum(joint.sum(-1, keepdims=True), 1e-12)
     mean = (joint @ values) / probability
     return Lookahead(
-        probability.view(people, candidates, outcomes), mean.view(people, candidates, outcomes, values.shape[-1])
+        probability.reshape(people, candidates, outcomes), mean.reshape(people, candidates, outcomes, values.shape[-1])
     )
 
 
-def expected_variance_reduction(mass: Tensor, values: Tensor, weights: Tensor | None = None) -> Tensor:
+def expected_variance_reduction(mass: Array, values: Array, weights: Array | None = None) -> Array:
     """Expected reduction of summed variances by the next MEP: by the law of total variance that of means after it."""
-    mean = values.mean(dim=1, keepdim=True) if weights is None else weights.unsqueeze(1) @ values
+    mean = values.mean(axis=1, keepdims=True) if weights is None else weights[:, None] @ values
     # Centred, so that a small reduction is not the difference of two large numbers.
     ahead = lookahead(mass, values - mean, weights)
-    return (ahead.probability * ahead.mean.square().sum(-1)).sum(-1)
+    reduction: Array = (ahead.probability * np.square(ahead.mean).sum(-1)).sum(-1)
+    return reduction
 
 
 @dataclass(frozen=True)
@@ -58,29 +61,29 @@ class TwoStep(Checked):
     stride: Count = 3
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesWindows)
 
-    def __call__(self, posterior: ForeseesWindows, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: ForeseesWindows, isi_ms: Array) -> Array:
         """Expected reduction of the summed variance of membership, shape (b, t); by one trial off the shortlist."""
         mass, masks = posterior.outcome_mass(isi_ms), posterior.window_masks(isi_ms)
         gain = expected_variance_reduction(mass, masks)
-        second, total = mass[:, :, :: self.stride], gain.clone()
-        for candidate in gain.topk(min(self.shortlist, gain.shape[-1]), dim=-1).indices.unbind(-1):
-            index = candidate[:, None, None, None].expand(-1, mass.shape[1], 1, mass.shape[-1])
-            by_group = _grouped(mass.gather(2, index).squeeze(2), self.groups)
-            behind = torch.stack([_best_gain(second, masks, weights) for weights in by_group.unbind(-1)], dim=-1)
-            column = candidate.unsqueeze(-1)
-            total.scatter_add_(1, column, (by_group.mean(dim=1) * behind).sum(-1, keepdim=True))
+        second, total, people = mass[:, :, :: self.stride], gain.copy(), np.arange(len(gain))
+        for candidate in np.argsort(-gain, axis=-1, kind="stable")[:, : self.shortlist].T:
+            by_group = _grouped(mass[people, :, candidate], self.groups)
+            behind = [_best_gain(second, masks, by_group[..., group]) for group in range(self.groups)]
+            total[people, candidate] += (by_group.mean(axis=1) * np.stack(behind, axis=-1)).sum(-1)
         return total
 
 
-def _grouped(mass: Tensor, groups: int) -> Tensor:
+def _grouped(mass: Array, groups: int) -> Array:
     """Probability of each group of outcomes given each sample, from that of each outcome (b, s, y), shape (b, s, g)."""
-    predicted = mass.mean(dim=1)
+    predicted = mass.mean(axis=1)
     middle = predicted.cumsum(-1) - 0.5 * predicted
-    group = (middle * groups).long().clamp(0, groups - 1)
-    return mass @ torch.nn.functional.one_hot(group, groups).to(mass.dtype)
+    group = (middle * groups).astype(int).clip(0, groups - 1)
+    by_group: Array = mass @ np.eye(groups, dtype=mass.dtype)[group]
+    return by_group
 
 
-def _best_gain(mass: Tensor, masks: Tensor, weights: Tensor) -> Tensor:
+def _best_gain(mass: Array, masks: Array, weights: Array) -> Array:
     """The largest gain of any candidate among samples of given weights (b, s), shape (b,)."""
-    share = weights / weights.sum(dim=1, keepdim=True).clamp_min(1e-12)
-    return expected_variance_reduction(mass, masks, share).amax(-1)
+    share = weights / np.maximum(weights.sum(axis=1, keepdims=True), 1e-12)
+    gain: Array = expected_variance_reduction(mass, masks, share).max(-1)
+    return gain

@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from isiw.acquisition.protocol import ForeseesProfiles, ForeseesWindows
 from isiw.acquisition.twostep import expected_variance_reduction
-from isiw.lazy import torch
-from isiw.models.protocol import PredictsOutcomes, SamplesProfiles, SamplesWindows, Tensor
+from isiw.models.protocol import PredictsOutcomes, SamplesProfiles, SamplesWindows
+from isiw.types import Array
 
 
 @dataclass(frozen=True)
@@ -17,9 +19,10 @@ class ProfileVariance:
 
     needs: ClassVar[tuple[type, ...]] = (SamplesProfiles,)
 
-    def __call__(self, posterior: SamplesProfiles, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: SamplesProfiles, isi_ms: Array) -> Array:
         """The variance at each ISI [mV²], shape (b, t)."""
-        return posterior.profiles_mv(isi_ms).var(dim=1, correction=0)
+        variance: Array = posterior.profiles_mv(isi_ms).var(axis=1)
+        return variance
 
 
 @dataclass(frozen=True)
@@ -31,7 +34,7 @@ class IntegratedVariance:
 
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesProfiles)
 
-    def __call__(self, posterior: ForeseesProfiles, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: ForeseesProfiles, isi_ms: Array) -> Array:
         """Expected reduction of the profile's variance, summed over the candidates [mV²], shape (b, t)."""
         return expected_variance_reduction(posterior.outcome_mass(isi_ms), posterior.profiles_mv(isi_ms))
 
@@ -46,14 +49,14 @@ class EdgeVariance:
 
     needs: ClassVar[tuple[type, ...]] = (PredictsOutcomes, SamplesWindows)
 
-    def __call__(self, posterior: ForeseesWindows, isi_ms: Tensor) -> Tensor:
+    def __call__(self, posterior: ForeseesWindows, isi_ms: Array) -> Array:
         """Score the candidate ISIs, shape (b, t)."""
         masks = posterior.window_masks(isi_ms)
-        edges = torch.stack((masks.argmax(-1), masks.shape[-1] - 1 - masks.flip(-1).argmax(-1)), dim=-1).to(masks.dtype)
-        found = masks.any(-1)
+        ends = masks.argmax(-1), masks.shape[-1] - 1 - masks[..., ::-1].argmax(-1)
+        edges, found = np.stack(ends, axis=-1).astype(masks.dtype), masks.max(-1, keepdims=True) > 0
         # Samples without a window have no edges, and are left out.
-        count = found.sum(-1).clamp_min(1)[:, None, None]
-        mean = torch.where(found.unsqueeze(-1), edges, 0.0).sum(dim=1, keepdim=True) / count
-        centred = torch.where(found.unsqueeze(-1), edges - mean, 0.0)
-        mass = posterior.outcome_mass(isi_ms) * found[..., None, None]
+        count = np.maximum(found.sum(axis=1, keepdims=True, dtype=masks.dtype), 1)
+        mean = np.where(found, edges, 0.0).sum(axis=1, keepdims=True) / count
+        centred = np.where(found, edges - mean, 0.0)
+        mass = posterior.outcome_mass(isi_ms) * found[..., None]
         return expected_variance_reduction(mass, centred)

@@ -19,10 +19,9 @@ from isiw.design import DesignSpace
 from isiw.dissertation.nonlinear import NonlinearRegression
 from isiw.dissertation.regression import FittedCurve, curve_masks
 from isiw.estimate import WindowEstimate
-from isiw.lazy import torch
-from isiw.models.protocol import Observation, Tensor
+from isiw.models.protocol import Observation
 from isiw.models.shared.history import AmplitudeHistory, FloorTreatment, OfAmplitudes
-from isiw.types import BoolArray, FloatArray, IntArray
+from isiw.types import BoolArray, FloatArray, IntArray, Singles
 from isiw.window import Window
 
 WindowKind = Literal["expectation", "fit", "particles"]
@@ -168,11 +167,11 @@ class BootstrapPosterior(OfAmplitudes):
             return None
         return "No MEP of the last generation was above the floor: all of its particles were given the same weight."
 
-    def proposed_isis_ms(self) -> Tensor:
+    def proposed_isis_ms(self) -> Singles:
         """The particles that are not measured yet; see `ProposesIsi`."""
         left = self.model.particles - int(self.count.max())
         plan_ms = np.take_along_axis(self.plan_ms, self.count[:, None] + np.arange(left), axis=-1)
-        return torch.as_tensor(plan_ms, dtype=torch.float32)
+        return plan_ms.astype(np.float32)
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person: none before the first generation is complete."""

@@ -14,10 +14,9 @@ from isiw.design import DesignSpace
 from isiw.dissertation.regression import curve_masks
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
-from isiw.lazy import torch
-from isiw.models.protocol import Observation, Tensor
+from isiw.models.protocol import Observation
 from isiw.models.shared.history import AmplitudeHistory, FloorTreatment, OfAmplitudes, PersonTrials
-from isiw.types import FloatArray
+from isiw.types import FloatArray, Singles
 from isiw.window import EDGE_LEVEL, Window
 
 SweepRule = Literal["baseline", "share"]
@@ -76,11 +75,12 @@ class SweepPosterior(OfAmplitudes):
     def _stops_ms(self) -> FloatArray:
         return self.space.stops_ms(self.model.step_ms)
 
-    def proposed_isis_ms(self) -> Tensor:
+    def proposed_isis_ms(self) -> Singles:
         """One sweep, from where it has come to; see `ProposesIsi`."""
         sweep = self._stops_ms.repeat(self.model.trials_per_isi)
         done = (~np.isnan(self.told.isi_ms)).sum(axis=-1, keepdims=True)
-        return torch.as_tensor(sweep[(done + np.arange(len(sweep))) % len(sweep)], dtype=torch.float32)
+        plan_ms: Singles = sweep[(done + np.arange(len(sweep))) % len(sweep)].astype(np.float32)
+        return plan_ms
 
     def _means(self, trials: PersonTrials) -> tuple[FloatArray, FloatArray, FloatArray]:
         """ISIs swept so far, ascending, with mean MEP and standard error, (t,); a trial belongs to the nearest stop."""

@@ -17,10 +17,10 @@ from threadpoolctl import ThreadpoolController
 from isiw.checks import Checked, Count, NonNegative, Number, Positive, number, whole
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
-from isiw.lazy import scipy, sklearn, torch
-from isiw.models.protocol import Observation, Tensor
+from isiw.lazy import scipy, sklearn
+from isiw.models.protocol import Observation
 from isiw.models.shared.history import AmplitudeHistory, FloorTreatment, OfAmplitudes
-from isiw.types import BoolArray, FloatArray
+from isiw.types import Array, BoolArray, FloatArray, IntArray, Singles
 from isiw.window import EDGE_LEVEL, Window, least_excess_mv
 
 Segments = Literal["peak", "all"]
@@ -130,47 +130,47 @@ class RegressionPosterior(OfAmplitudes):
         return " ".join(dict.fromkeys(curve.trouble for curve in self.curves if curve.trouble)) or None
 
     @cached_property
-    def _samples_mv(self) -> Tensor:
+    def _samples_mv(self) -> Singles:
         """Sampled curves above the floor, shape (b, s, t)."""
-        return torch.as_tensor(np.stack([curve.samples_mv for curve in self.curves]), dtype=torch.float32)
+        return np.stack([curve.samples_mv for curve in self.curves], dtype=np.float32, casting="same_kind")
 
     @cached_property
-    def _masks(self) -> Tensor:
+    def _masks(self) -> Singles:
         """Their windows as 0 or 1, shape (b, s, t)."""
         pairs = zip(self.curves, self.floors_mv, strict=True)
         masks = [curve_masks(curve.samples_mv, floor_mv, self.model.segments) for curve, floor_mv in pairs]
-        return torch.as_tensor(np.stack(masks), dtype=torch.float32)
+        return np.stack(masks).astype(np.float32)
 
-    def _nearest(self, isi_ms: Tensor) -> Tensor:
+    def _nearest(self, isi_ms: Array) -> IntArray:
         """Indices of the nearest grid points, shape (t,)."""
-        grid_ms = torch.as_tensor(self.space.grid_ms.copy(), dtype=isi_ms.dtype)
-        return (isi_ms.unsqueeze(-1) - grid_ms).abs().argmin(-1)
+        nearest: IntArray = np.abs(isi_ms[:, None] - self.space.grid_ms.astype(isi_ms.dtype)).argmin(-1)
+        return nearest
 
-    def window_masks(self, isi_ms: Tensor) -> Tensor:
+    def window_masks(self, isi_ms: Array) -> Singles:
         """Sampled windows; see `SamplesWindows`."""
         return self._masks[..., self._nearest(isi_ms)]
 
-    def profiles_mv(self, isi_ms: Tensor) -> Tensor:
+    def profiles_mv(self, isi_ms: Array) -> Singles:
         """Sampled profiles; see `SamplesProfiles`."""
-        return self._samples_mv[..., self._nearest(isi_ms)] + self.baselines_mv().unsqueeze(-1)
+        return self._samples_mv[..., self._nearest(isi_ms)] + self.baselines_mv()[..., None]
 
-    def baselines_mv(self) -> Tensor:
+    def baselines_mv(self) -> Singles:
         """The floor, which a fit does not sample; see `SamplesProfiles`."""
-        floors = torch.as_tensor(self.floors_mv, dtype=torch.float32)
-        return floors.unsqueeze(-1).expand(self._samples_mv.shape[:2])
+        return np.broadcast_to(self.floors_mv.astype(np.float32)[:, None], self._samples_mv.shape[:2])
 
-    def outcome_mass(self, isi_ms: Tensor) -> Tensor:
+    def outcome_mass(self, isi_ms: Array) -> Singles:
         """Gaussian predictions about each sampled curve; see `PredictsOutcomes`."""
         expected = self._samples_mv[..., self._nearest(isi_ms), None]
-        noise = torch.tensor([curve.noise_sd_mv for curve in self.curves], dtype=torch.float32)[:, None, None, None]
-        low, high = expected.amin((1, 2, 3), keepdim=True), expected.amax((1, 2, 3), keepdim=True)
-        share = torch.linspace(0.0, 1.0, OUTCOMES, dtype=torch.float32)
+        noise = np.array([curve.noise_sd_mv for curve in self.curves], dtype=np.float32)[:, None, None, None]
+        low, high = expected.min((1, 2, 3), keepdims=True), expected.max((1, 2, 3), keepdims=True)
+        share = np.linspace(0.0, 1.0, OUTCOMES, dtype=np.float32)
         values = (low - 3.0 * noise) + share * (high - low + 6.0 * noise)
         # Noise finer than the grid of values would fall between two of them.
-        spread = noise.maximum(values.diff(dim=-1)[..., :1]).clamp_min(1e-9)
-        return torch.softmax(-0.5 * ((values - expected) / spread).square(), dim=-1)
+        spread = np.maximum(np.maximum(noise, np.diff(values, axis=-1)[..., :1]), 1e-9)
+        mass: Singles = scipy.special.softmax(-0.5 * np.square((values - expected) / spread), axis=-1)
+        return mass
 
-    def condition(self, isi_ms: Tensor, mep_mv: Tensor) -> RegressionPosterior:
+    def condition(self, isi_ms: Array, mep_mv: Array) -> RegressionPosterior:
         """The fit with an imagined trial as well; see `Conditions`."""
         return self.model.update(self, Observation.of(isi_ms, mep_mv))
 

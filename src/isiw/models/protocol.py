@@ -15,16 +15,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
+import numpy as np
+
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
-from isiw.lazy import torch
-from isiw.types import ArrayLike, FloatArray
+from isiw.types import Array, ArrayLike, FloatArray, Singles
 from isiw.window import Window
 
-Tensor: TypeAlias = "torch.Tensor"
-
-Values: TypeAlias = "Tensor | Sequence[float | None] | Sequence[bool | None]"
-"""One value a person, as a tensor or plain; None is not known."""
+Values: TypeAlias = Array | Sequence[float | None] | Sequence[bool | None]
+"""One value a person, as an array or plain; None is not known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,12 +42,12 @@ class Observation:
             trials of nearly the same ISI share [natural log], shape (b, 3); None for none.
     """
 
-    isi_ms: Tensor
-    mep_mv: Tensor
-    isi_sd_ms: Tensor
-    response: Tensor
-    mep_high_mv: Tensor | None = None
-    known_mv: Tensor | None = None
+    isi_ms: Singles
+    mep_mv: Singles
+    isi_sd_ms: Singles
+    response: Singles
+    mep_high_mv: Singles | None = None
+    known_mv: Singles | None = None
 
     @classmethod
     def of(
@@ -72,24 +71,22 @@ class Observation:
                 trials of nearly the same ISI share, one a person.
         """
         isi, mep = _column(isi_ms), _column(mep_mv)
-        seen = torch.full_like(mep, torch.nan) if response is None else _column(response)
-        sds = torch.zeros_like(isi) if isi_sd_ms is None else _column(isi_sd_ms)
+        seen = np.full_like(mep, np.nan) if response is None else _column(response)
+        sds = np.zeros_like(isi) if isi_sd_ms is None else _column(isi_sd_ms)
         high = None if mep_high_mv is None else _column(mep_high_mv)
-        known = None if known_mv is None else torch.tensor(known_mv, dtype=torch.float32).reshape(-1, 3)
+        known = None if known_mv is None else np.array(known_mv, dtype=np.float32).reshape(-1, 3)
         return cls(isi, mep, sds, seen, high, known)
 
     @classmethod
     def side_by_side(cls, people: Sequence[Observation]) -> Observation:
         """One trial of each of some people, of whom the same is known."""
         columns = [[getattr(one, column.name) for one in people] for column in fields(cls)]
-        joined: list[Any] = [None if column[0] is None else torch.cat(column) for column in columns]
+        joined: list[Any] = [None if column[0] is None else np.concatenate(column) for column in columns]
         return cls(*joined)
 
 
-def _column(values: Values) -> Tensor:
-    if isinstance(values, torch.Tensor):
-        return values
-    return torch.tensor([math.nan if value is None else float(value) for value in values], dtype=torch.float32)
+def _column(values: Values) -> Singles:
+    return np.array([math.nan if value is None else float(value) for value in values], dtype=np.float32)
 
 
 @runtime_checkable
@@ -117,7 +114,7 @@ class CountsPairs(Protocol):
 class PredictsOutcomes(Protocol):
     """Capability: the predictive distribution of the next MEP, sample by sample."""
 
-    def outcome_mass(self, isi_ms: Tensor) -> Tensor:
+    def outcome_mass(self, isi_ms: Array) -> Array:
         """Probability of each value of the next MEP, on a grid of values that covers all of them.
 
         Args:
@@ -148,7 +145,7 @@ class PredictsMeps(Protocol):
 class SamplesWindows(Protocol):
     """Capability: windows sampled from the posterior."""
 
-    def window_masks(self, isi_ms: Tensor) -> Tensor:
+    def window_masks(self, isi_ms: Array) -> Array:
         """Which ISIs [ms] (shape (t,)) each sampled window holds, as 0 or 1, shape (b, s, t); all 0 means no window."""
 
 
@@ -156,7 +153,7 @@ class SamplesWindows(Protocol):
 class SamplesDepression(Protocol):
     """Capability: sampled segments in which the tap depresses the MEP, beside the windows in which it enhances it."""
 
-    def depressed_masks(self, isi_ms: Tensor) -> Tensor:
+    def depressed_masks(self, isi_ms: Array) -> Array:
         """Which ISIs [ms] (shape (t,)) each sample depresses, as 0 or 1, shape (b, s, t); all 0 means nowhere."""
 
 
@@ -164,10 +161,10 @@ class SamplesDepression(Protocol):
 class SamplesProfiles(Protocol):
     """Capability: profiles sampled from the posterior."""
 
-    def profiles_mv(self, isi_ms: Tensor) -> Tensor:
+    def profiles_mv(self, isi_ms: Array) -> Array:
         """Expected MEP [mV] at some ISIs [ms] (shape (t,)) under each sample, shape (b, s, t)."""
 
-    def baselines_mv(self) -> Tensor:
+    def baselines_mv(self) -> Array:
         """Expected MEP without a tap [mV] under each sample, shape (b, s)."""
 
 
@@ -175,7 +172,7 @@ class SamplesProfiles(Protocol):
 class Conditions(Protocol):
     """Capability: fantasies, for batches and look-ahead."""
 
-    def condition(self, isi_ms: Tensor, mep_mv: Tensor) -> Posterior:
+    def condition(self, isi_ms: Array, mep_mv: Array) -> Posterior:
         """The posterior after one more trial of each person at these ISIs [ms] with these MEPs [mV].
 
         It may be rougher than `ResponseModel.update`. Shapes (b,).
@@ -190,7 +187,7 @@ class Conditions(Protocol):
 class HasEvidence(Protocol):
     """Capability: how well the model as a whole predicted the trials."""
 
-    def log_evidence(self) -> Tensor:
+    def log_evidence(self) -> Array:
         """Log marginal likelihood of the trials so far [nat], shape (b,)."""
 
 
@@ -210,7 +207,7 @@ class HasBotorchModel(Protocol):
 class ProposesIsi(Protocol):
     """Capability: a method with a plan of its own."""
 
-    def proposed_isis_ms(self) -> Tensor:
+    def proposed_isis_ms(self) -> Array:
         """The ISIs [ms] that it wants for each person, in order, before it learns anything, shape (b, k)."""
 
 

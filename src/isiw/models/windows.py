@@ -11,22 +11,15 @@ import numpy as np
 
 from isiw.design import DesignSpace
 from isiw.estimate import BestISI, Enhancement, WindowEstimate
-from isiw.lazy import Later, torch
-from isiw.models.protocol import Tensor
-from isiw.types import FloatArray, IntArray
-from isiw.window import EDGE_LEVEL, MIN_EXCESS_MV, MIN_EXCESS_OF_BASELINE, Window
+from isiw.lazy import Later
+from isiw.types import Array, FloatArray, IntArray, Singles
+from isiw.window import Window, least_excess_mv
 
 PROFILE_POINTS = 101
 """ISIs at which the expected MEP and its band are reported, at least."""
 
 PROFILE_STEP_MS = 4.0
 """They are no further apart than this, if the space has ISIs between them: narrow peaks are 20 ms wide."""
-
-
-def least_excess_mv(peak_mv: Tensor, baseline_mv: Tensor) -> Tensor:
-    """The least-excess rule of `isiw.window.least_excess_mv`, for tensors."""
-    enough_mv = (MIN_EXCESS_OF_BASELINE * baseline_mv).clamp_min(MIN_EXCESS_MV)
-    return torch.where(peak_mv >= enough_mv, EDGE_LEVEL * peak_mv, torch.inf)
 
 
 EXCLUDED_AT = 0.9
@@ -44,11 +37,11 @@ class Runs:
     points: int  # how many ISIs
 
     @classmethod
-    def of_masks(cls, masks: Tensor) -> Runs:
+    def of_masks(cls, masks: Array) -> Runs:
         """The runs of windows given as 0 or 1, shape (s, t)."""
         samples, points = masks.shape
         inside = np.zeros((samples, points + 2), dtype=np.int8)
-        inside[:, 1:-1] = masks.cpu().numpy() > 0
+        inside[:, 1:-1] = masks > 0
         steps = np.diff(inside, axis=-1)
         (sample, first), behind = np.nonzero(steps > 0), np.nonzero(steps < 0)[1]
         return cls(sample, first, behind, samples, points)
@@ -125,34 +118,35 @@ def edge_samples(windows: Runs, space: DesignSpace) -> FloatArray:
 
 
 @cache
-def profile_grid(space: DesignSpace) -> Tensor:
-    """The ISIs at which profiles are reported [ms], shape (t,); one tensor for all callers, who leave it as it is."""
+def profile_grid(space: DesignSpace) -> Singles:
+    """The ISIs at which profiles are reported [ms], shape (t,); one array for all callers, who leave it as it is."""
     every = max(1, min(len(space.grid_ms) // PROFILE_POINTS, int(PROFILE_STEP_MS / space.step_ms)))
-    return torch.tensor(sorted({*space.grid_ms[::every], space.grid_ms[-1]}), dtype=torch.float32)
+    return np.array(sorted({*space.grid_ms[::every], space.grid_ms[-1]}), dtype=np.float32)
 
 
 @cache
-def grid_of(space: DesignSpace, device: torch.device) -> Tensor:
+def grid_of(space: DesignSpace) -> Singles:
     """The ISIs of the space's grid [ms], likewise."""
-    return torch.tensor(space.grid_ms, dtype=torch.float32, device=device)
+    return space.grid_ms.astype(np.float32)
 
 
 class SampledProfiles(NamedTuple):
     """Sampled profiles of one person."""
 
-    mep_mv: Tensor  # expected at the ISIs of `profile_grid`, (s, t)
-    baseline_mv: Tensor  # expected without a tap, (s,)
+    mep_mv: Array  # expected at the ISIs of `profile_grid`, (s, t)
+    baseline_mv: Array  # expected without a tap, (s,)
 
     @property
-    def excess_mv(self) -> Tensor:
+    def excess_mv(self) -> Array:
         """Largest enhancement at any ISI [mV], shape (s,)."""
-        return (self.mep_mv.amax(-1) - self.baseline_mv).clamp_min(0.0)
+        excess_mv: Array = np.maximum(self.mep_mv.max(-1) - self.baseline_mv, 0.0)
+        return excess_mv
 
 
 class SampledHypotheses(NamedTuple):
     """The hypotheses that sampled windows belong to: an index of the names for each sample, shape (s,)."""
 
-    kinds: Tensor
+    kinds: IntArray
     names: tuple[str, ...]
 
 
@@ -176,31 +170,31 @@ def sampled_estimate(
         window=reported,
         start_ms=start,
         end_ms=end,
-        grid_ms=profile_grid(space).double().numpy(),
+        grid_ms=profile_grid(space).astype(float),
         edge_samples_ms=edges,
         profile_quantiles_mv=Later(lambda: _band_mv(profiles())),
         split_probability=float((windows.sizes <= last - first).mean()) if len(edges) else None,
-        hypothesis_samples=None if hypotheses is None else hypotheses.kinds.cpu().numpy()[windows.found],
+        hypothesis_samples=None if hypotheses is None else hypotheses.kinds[windows.found],
         hypothesis_names=() if hypotheses is None else hypotheses.names,
         expected_f1=f1 * (1.0 - probability if reported is None else probability),
         best_isi=Later(lambda: _best_isi(profiles(), space)),
         largest_excluded=Later(
-            lambda: Enhancement(float(torch.quantile(profiles().excess_mv, EXCLUDED_AT)), shift_pct_rmt())
+            lambda: Enhancement(float(np.quantile(profiles().excess_mv, EXCLUDED_AT)), shift_pct_rmt())
         ),
     )
 
 
+_BAND: Final = (0.05, 0.5, 0.95)
+
+
 def _band_mv(profiles: SampledProfiles) -> FloatArray:
-    levels = torch.tensor([0.05, 0.5, 0.95], dtype=profiles.mep_mv.dtype, device=profiles.mep_mv.device)
-    band_mv: FloatArray = torch.quantile(profiles.mep_mv, levels, dim=0).double().cpu().numpy()
+    band_mv: FloatArray = np.quantile(profiles.mep_mv, _BAND, axis=0).astype(float)
     return band_mv
 
 
 def _best_isi(profiles: SampledProfiles, space: DesignSpace) -> BestISI | None:
-    enhanced = least_excess_mv(profiles.excess_mv, profiles.baseline_mv).isfinite()
-    if not bool(enhanced.any()):
+    enhanced = np.isfinite(least_excess_mv(profiles.excess_mv, profiles.baseline_mv))
+    if not enhanced.any():
         return None
-    isi_ms = profile_grid(space).to(enhanced.device)[profiles.mep_mv[enhanced].argmax(-1)]
-    levels = torch.tensor([0.05, 0.5, 0.95], dtype=isi_ms.dtype, device=isi_ms.device)
-    low, median, high = torch.quantile(isi_ms, levels).tolist()
+    low, median, high = np.quantile(profile_grid(space)[profiles.mep_mv[enhanced].argmax(-1)], _BAND).tolist()
     return BestISI(median, low, high)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import ctypes
 from functools import cached_property
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from isiw.native.library import call
-from isiw.types import IntArray, Singles
+from isiw.types import Array, BoolArray, FloatArray, IntArray, Singles
 
 FIELDS: Final = 27
 """Of a particle; their names and order are those of `isiw.models.particles.records`."""
@@ -32,39 +33,57 @@ LANES: Final = 16
 UNKNOWN: Final = np.float32(1e30)
 """In place of the log density of a block that was not worked out yet."""
 
-_f, _i, _b = np.dtype(np.float32), np.dtype(np.int64), np.dtype(np.bool_)
+_f, _d = np.dtype(np.float32), np.dtype(np.float64)
+_i, _u, _b = np.dtype(np.int64), np.dtype(np.uint64), np.dtype(np.bool_)
+
+Seeds: TypeAlias = NDArray[np.uint64]
+
+
+class Crowd(NamedTuple):
+    """Weighted particles of b people."""
+
+    values: Singles  # of latents, (b, p, d)
+    kinds: IntArray  # (b, p, k)
+    log_weights: FloatArray  # (b, p)
+    log_likelihood: Singles  # of the trials so far, (b, p)
+    densities: Singles  # log densities of blocks, as far as known, (b, p, blocks)
+
+    def copied(self) -> Crowd:
+        """The same, to be changed."""
+        log_weights, log_likelihood = self.log_weights.copy(), self.log_likelihood.copy()
+        return Crowd(self.values.copy(), self.kinds.copy(), log_weights, log_likelihood, self.densities.copy())
 
 
 class Tables(NamedTuple):
     """What the engine knows of a model's prior and of its moves."""
 
     at: IntArray  # of the latent of each of `MEANINGS`; d where the model has none, (m,)
-    spreads: Singles  # usual SD of each latent, (d,)
+    spreads: Array  # usual SD of each latent, (d,)
     first: IntArray  # latent of each block, (k,)
     size: IntArray  # how many latents it has, (k,)
     components: (
         IntArray  # of its mixture, (k,); 0 for a start, negative for start and width that may be those of a place
     )
-    log_shares: Singles  # of the components, less the logs of their SDs, (k, c)
-    below: Singles  # sums of the shares of earlier components, from the second on, (k, c)
-    means: Singles  # of the latents in each component, (d, c)
-    sds: Singles  # likewise, (d, c)
-    per_sds: Singles  # 1 / SD, as dividers are slow, (d, c)
-    start_ms: Singles  # knots of the density of a start, evenly spaced, (s,)
-    density: Singles  # at the knots, (s,)
-    quantiles: Singles  # probability of an earlier start, at the knots, (s,)
-    places: Singles  # log share less the logs of the SDs, mean and SD of the start, then of the log width, (l, 5)
-    place_below: Singles  # given a place, sums of the shares of earlier ones, (l,)
+    log_shares: Array  # of the components, less the logs of their SDs, (k, c)
+    below: Array  # sums of the shares of earlier components, from the second on, (k, c)
+    means: Array  # of the latents in each component, (d, c)
+    sds: Array  # likewise, (d, c)
+    per_sds: Array  # 1 / SD, as dividers are slow, (d, c)
+    start_ms: Array  # knots of the density of a start, evenly spaced, (s,)
+    density: Array  # at the knots, (s,)
+    quantiles: Array  # probability of an earlier start, at the knots, (s,)
+    places: Array  # log share less the logs of the SDs, mean and SD of the start, then of the log width, (l, 5)
+    place_below: Array  # given a place, sums of the shares of earlier ones, (l,)
     place_share: float  # probability of all places
     apart: bool  # enhancement and depression may not overlap
     state_of: IntArray  # weights of the kinds in the number of a particle's state, (kinds,)
-    shifted: Any  # which latents a difference moves, by state and part, (states, parts, d)
-    parts: Singles  # sums of the probabilities of earlier parts, (parts - 1,)
-    jumps: Singles  # likewise of earlier jumps, (jumps - 1,)
-    redrawn: Any  # which latents each jump draws again, (jumps, d)
-    renewed: Any  # which kinds each jump draws again, (jumps, kinds)
-    of_profile: Any  # the jump concerns nothing but a profile, which without facilitation means nothing, (jumps,)
-    kinds: Singles  # sums of the probabilities of earlier values of each kind, (kinds, v - 1)
+    shifted: BoolArray  # which latents a difference moves, by state and part, (states, parts, d)
+    parts: Array  # sums of the probabilities of earlier parts, (parts - 1,)
+    jumps: Array  # likewise of earlier jumps, (jumps - 1,)
+    redrawn: BoolArray  # which latents each jump draws again, (jumps, d)
+    renewed: BoolArray  # which kinds each jump draws again, (jumps, kinds)
+    of_profile: BoolArray  # the jump concerns nothing but a profile, which without facilitation means nothing, (jumps,)
+    kinds: Array  # sums of the probabilities of earlier values of each kind, (kinds, v - 1)
     changed: int  # block of the latent that says when something changes; that of its size is the next
 
 
@@ -95,7 +114,7 @@ class Law:
     def __init__(self, tables: Tables) -> None:
         blocks, (latents, width), knots = len(tables.first), tables.means.shape, tables.start_ms
         (states, parts, _), jumps, (_, values) = tables.shifted.shape, len(tables.jumps) + 1, tables.kinds.shape
-        shapes: dict[str, tuple[np.dtype[Any], tuple[int, ...]]] = {
+        shapes: dict[str, tuple[np.dtype[np.generic], tuple[int, ...]]] = {
             "at": (_i, (MEANINGS,)),
             "spreads": (_f, (latents,)),
             **dict.fromkeys(("first", "size", "components"), (_i, (blocks,))),
@@ -126,7 +145,11 @@ class Law:
             changed=tables.changed,
             **{name: _address(self._arrays[name], dtype, *shape) for name, (dtype, shape) in shapes.items()},
         )
-        self.latents, self.blocks, self._last = latents, blocks, np.minimum(_LAST_KINDS, [3, 4, 1, 1, values])
+        self.latents, self.blocks, self._last = (
+            latents,
+            blocks,
+            np.minimum(_LAST_KINDS, [3, 4, 1, 1, values]).astype(_u),
+        )
         self._require_indices(width, knots=len(knots), changed=tables.changed)
 
     def _require_indices(self, width: int, *, knots: int, changed: int) -> None:
@@ -153,21 +176,94 @@ class Law:
         call("meanings", self._at, people, particles, *arrays, trials, _address(found, _f, *found.shape))
         return found
 
-    def log_usual(self, values: Singles, kinds: IntArray, densities: Singles) -> Singles:
-        """Log prior density of what ISIs are chosen with another law of, but for a constant, (b, p)."""
-        people, particles = self._require_particles(values, kinds)
-        found = np.empty((people, particles), dtype=_f)
-        arrays = _address(values, _f, *values.shape), _address(kinds, _i, *kinds.shape)
-        known = _address(densities, _f, people, particles, self.blocks)
-        call("log_usual", self._at, people, particles, *arrays, known, _address(found, _f, people, particles))
+    def usual_weights(self, usual: Law, crowd: Crowd) -> FloatArray:
+        """Log weights of particles under another prior, which ISIs are chosen with, (b, p)."""
+        people, particles = self._require_crowd(crowd)
+        found = np.empty((people, particles), dtype=_d)
+        if usual.latents != self.latents:
+            raise ValueError("the other prior is of other latents")
+        arrays = self._values(crowd.values, crowd.kinds)
+        known = _address(crowd.densities, _f, people, particles, self.blocks)
+        weights = _address(crowd.log_weights, _d, people, particles), _address(found, _d, people, particles)
+        call("usual_weights", self._at, usual._at, people, particles, *arrays, known, *weights)
         return found
+
+    def learn(self, columns: Singles, min_ess: float, sweeps: tuple[int, int], dice: Seeds, crowd: Crowd) -> FloatArray:
+        """Let particles learn the last of the trials, in place; what was found on the way, (b, 6).
+
+        Args:
+            columns: the trials, (b, n, columns).
+            min_ess: they are resampled where their effective sample size, as a share, is below it.
+            sweeps: how often they move where they were kept, and where they were resampled.
+            dice: seeds, which move on, (b,).
+            crowd: the particles, which change.
+
+        Returns:
+            Log likelihood of the trial, effective sample size before resampling as a share, shifts, those that were
+            accepted, jumps, and those that were accepted, (b, 6).
+        """
+        people, particles = self._require_crowd(crowd)
+        trials, found = columns.shape[1], np.empty((people, 6), dtype=_d)
+        if particles < 2 or not trials:
+            raise ValueError("particles move by differences of others, and learn from a trial")
+        call(
+            "learn",
+            self._at,
+            people,
+            particles,
+            trials,
+            _address(columns, _f, people, trials, COLUMNS),
+            min_ess,
+            *sweeps,
+            _address(dice, _u, people),
+            *self._values(crowd.values, crowd.kinds),
+            _address(crowd.log_weights, _d, people, particles),
+            _address(crowd.log_likelihood, _f, people, particles),
+            _address(crowd.densities, _f, people, particles, self.blocks),
+            _address(found, _d, people, 6),
+        )
+        return found
+
+    def represent(
+        self, values: Singles, kinds: IntArray, log_weights: FloatArray, size: int, trials: int
+    ) -> tuple[IntArray, Singles]:
+        """Equally weighted particles that stand for weighted ones: numbers (b, s), and fields after so many trials."""
+        people, particles = self._require_particles(values, kinds)
+        picks, fields = np.empty((people, size), dtype=_i), np.empty((people, size, FIELDS), dtype=_f)
+        weights = _address(log_weights, _d, people, particles)
+        arrays = weights, _address(picks, _i, people, size), _address(fields, _f, *fields.shape)
+        call("represent", self._at, people, particles, size, trials, *self._values(values, kinds), *arrays)
+        return picks, fields
+
+    def _values(self, values: Singles, kinds: IntArray) -> tuple[int, int]:
+        return _address(values, _f, *values.shape), _address(kinds, _i, *kinds.shape)
+
+    def _require_crowd(self, crowd: Crowd) -> tuple[int, int]:
+        return self._require_particles(crowd.values, crowd.kinds)
+
+    def nothing_known(self, people: int, particles: int) -> Singles:
+        """Log densities of blocks of which none was worked out yet, (b, p, blocks)."""
+        return np.full((people, particles, self.blocks), UNKNOWN)
+
+    def draws(self, particles: int, seeds: Seeds) -> tuple[Singles, IntArray]:
+        """So many particles of the prior of each person: latents (b, p, d), and kinds (b, p, k).
+
+        Args:
+            particles: how many a person.
+            seeds: of each person, (b,) whole numbers of 64 bits without a sign.
+        """
+        people = len(seeds)
+        values = np.empty((people, particles, self.latents), dtype=_f)
+        kinds = np.empty((people, particles, KINDS), dtype=_i)
+        arrays = _address(values, _f, *values.shape), _address(kinds, _i, *kinds.shape)
+        call("draws", self._at, people, particles, _address(seeds, _u, people), *arrays)
+        return values, kinds
 
     def sweeps(
         self,
         numbers: IntArray,
         columns: Singles,
-        steps: Singles,
-        dice: Any,
+        dice: Seeds,
         state: tuple[Singles, IntArray, Singles, Singles],
     ) -> Singles:
         """Move each person's particles so many times (b,), in place; the counts of their moves, (b, 4).
@@ -175,7 +271,6 @@ class Law:
         Args:
             numbers: how often each person's particles move, (b,).
             columns: the trials, (b, n, columns).
-            steps: of the mean log MEP at each trial, (b, n + 1).
             dice: seeds, which move on, (b,) whole numbers of 64 bits without a sign.
             state: latents, kinds, log likelihood and log densities of blocks of the particles, which change.
 
@@ -195,8 +290,7 @@ class Law:
             trials,
             _address(numbers, _i, people),
             _address(columns, _f, people, trials, COLUMNS),
-            _address(steps, _f, people, trials + 1),
-            _address(dice, np.dtype(np.uint64), people),
+            _address(dice, _u, people),
             _address(values, _f, *values.shape),
             _address(kinds, _i, *kinds.shape),
             _address(log_likelihood, _f, people, particles),
@@ -208,7 +302,7 @@ class Law:
     def _require_particles(self, values: Singles, kinds: IntArray) -> tuple[int, int]:
         people, particles, latents = values.shape
         within = latents == self.latents and kinds.shape == (people, particles, KINDS)
-        if not within or ((kinds < 0) | (kinds > self._last)).any():
+        if not within or (kinds.view(_u) > self._last).any():  # without a sign, what is below 0 is too large
             raise ValueError("these are no particles of this prior")
         return people, particles
 
@@ -222,19 +316,15 @@ def log_likelihoods(fields: Singles, columns: Singles) -> Singles:
     return found
 
 
-def table_rows(fields: Singles, rows: int) -> Singles:
-    """Facilitations of the rows of tables: squares of equal steps, or equal steps from below 0, (b, s, l)."""
-    levels = np.empty((*fields.shape[:2], _rows(rows)), dtype=_f)
-    call("table_rows", _samples(fields), rows, _fields(fields), _address(levels, _f, *levels.shape))
-    return levels
+def evoked_means(fields: Singles, rows: int) -> tuple[Singles, Singles]:
+    """Facilitations of the rows of tables, and expected MEPs above the floor there, in floors, (b, s, l) each.
 
-
-def evoked_means(fields: Singles, levels: Singles) -> Singles:
-    """Expected MEP above the floor, in floors, at the facilitations (b, s, l), of the same shape."""
-    rows, means = levels.shape[2], np.empty(levels.shape, dtype=_f)
-    at = _address(levels, _f, *fields.shape[:2], rows)
-    call("evoked_means", _samples(fields), rows, _fields(fields), at, _address(means, _f, *means.shape))
-    return means
+    Rows are at squares of equal steps, or where there is a depression at equal steps from below 0.
+    """
+    levels, means = (np.empty((*fields.shape[:2], _rows(rows)), dtype=_f) for _ in range(2))
+    arrays = _address(levels, _f, *levels.shape), _address(means, _f, *means.shape)
+    call("evoked_means", _samples(fields), rows, _fields(fields), *arrays)
+    return levels, means
 
 
 def outcome_tables(fields: Singles, levels: Singles, order: int, log_mep: Singles, widths: Singles) -> Singles:
@@ -301,7 +391,7 @@ def edge_levels(fields: Singles, evoked: Singles, isi_ms: Singles, *, fine: bool
     return found
 
 
-def window_runs(fields: Singles, levels: Singles, isi_ms: Singles) -> Any:
+def window_runs(fields: Singles, levels: Singles, isi_ms: Singles) -> NDArray[np.int32]:
     """Which ISIs are in each particle's window, as two runs of indices (first, behind the last), (b, s, 4) int32."""
     runs = np.empty((*levels.shape, 4), dtype=np.int32)
     arrays = _address(levels, _f, *fields.shape[:2]), _address(isi_ms, _f, len(isi_ms))
@@ -361,7 +451,7 @@ def _rows(rows: int) -> int:
     return rows
 
 
-def _address(array: Any, dtype: np.dtype[Any], *shape: int) -> int:
+def _address(array: NDArray[np.generic], dtype: np.dtype[np.generic], *shape: int) -> int:
     """Where an array begins, if it is what the engine takes it for: C reads and writes all of the shape."""
     if array.dtype != dtype or array.shape != shape or not array.flags.c_contiguous:
         raise ValueError(f"the engine needs {dtype} {shape} side by side, not {array.dtype} {array.shape}")

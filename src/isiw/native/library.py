@@ -15,20 +15,27 @@ from isiw.native.stamp import require_built_of
 LEVELS: Final = ("x86-64-v4", "x86-64-v3", "x86-64-v2", "base")
 """What the library is compiled for, the fastest first: AVX-512, AVX2, SSE4.2, and processors that are no x86."""
 
-VERSION: Final = 4
+VERSION: Final = 5
 """Of the engine: it grows if the same draws come to other numbers."""
 
 _FILES: Final = {"Darwin": "_engine.dylib", "Windows": "_engine.dll"}
 _PATH: Final = Path(__file__).with_name(_FILES.get(platform.system(), "_engine.so.1"))
 _WANTED: Final = "ISIW_LEVEL"
 
-_KINDS: Final = {"n": ctypes.c_int64, "s": ctypes.c_int32, "a": ctypes.c_void_p}
+_KINDS: Final[dict[str, type[ctypes._SimpleCData[Any]]]] = {
+    "n": ctypes.c_int64,
+    "s": ctypes.c_int32,
+    "d": ctypes.c_double,
+    "a": ctypes.c_void_p,
+}
 _SIGNATURES: Final = {
     "likelihoods": "nnnaaa",
     "meanings": "annaana",
-    "log_usual": "annaaaa",
-    "sweeps": "annnaaaaaaaaa",
-    "table_rows": "nnaa",
+    "usual_weights": "aannaaaaa",
+    "learn": "annnadnnaaaaaaa",
+    "represent": "annnnaaaaa",
+    "draws": "annaaa",
+    "sweeps": "annnaaaaaaaa",
     "evoked_means": "nnaaa",
     "outcome_tables": "nnnnnaaaaa",
     "rows_between": "nnnnaaaa",
@@ -39,7 +46,7 @@ _SIGNATURES: Final = {
     "variance_reductions": "nnnnaaa",
     "elementary": "snaaa",
 }
-"""The functions in the order of `Engine` in engine.h, and what they take: numbers of 64 and 32 bits, and arrays."""
+"""The functions in the order of `Engine` in engine.h, and what they take: numbers, and arrays."""
 
 
 class _Functions(ctypes.Structure):

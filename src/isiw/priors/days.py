@@ -17,17 +17,17 @@ import numpy as np
 
 from isiw.checks import Checked, Positive, Share, mean_and_sd, share
 from isiw.errors import DamagedLogError, InvalidValueError, LogError
-from isiw.lazy import sklearn, torch
+from isiw.lazy import sklearn
 from isiw.log.reader import SessionRecord, require_records
 from isiw.models.particles import ParticleModel, ParticlePosterior
 from isiw.models.particles.latents import LATENTS, Latents, used_by
+from isiw.models.particles.mixture import log_sum
 from isiw.models.particles.places import MOST_APART_MS
 from isiw.models.particles.prior import Prior
-from isiw.models.protocol import Tensor
 from isiw.priors.population import Component, beside, columns, floor, gain, mixed, mixed_shares, muscle, place
 from isiw.strategy.outcomes import Outcomes
 from isiw.text.sanitize import command
-from isiw.types import FloatArray
+from isiw.types import FloatArray, IntArray
 from isiw.visit import MOST_APART_PCT_RMT
 
 TOLD_LOSSES: Final = 3
@@ -188,8 +188,9 @@ def moved(first: SessionRecord, second: SessionRecord, law: DayToDay | None = No
     before = _another_day(earlier, law or DayToDay())
     later = recalled(second, before)
     _require_window(second, later)
-    weights = (later.swarm.log_weights.exp() * later.swarm.latents.present)[0].double()
-    anywhere = later.model.prior.log_places(later.swarm.latents.values, later.space)[0].double().softmax(-1)[:, 0]
+    weights = (np.exp(later.swarm.log_weights) * later.swarm.latents.present)[0]
+    places = later.model.prior.log_places(later.swarm.latents.values, later.space)[0]
+    anywhere = np.exp(places[:, 0] - log_sum(places))
     return float((weights * anywhere).sum() / weights.sum())
 
 
@@ -226,7 +227,7 @@ def _require_days_of_one_person(records: Sequence[SessionRecord]) -> None:
 
 
 def _require_window(record: SessionRecord, posterior: ParticlePosterior) -> None:
-    probability = float((posterior.swarm.log_weights.exp() * posterior.swarm.latents.present).sum())
+    probability = float((np.exp(posterior.swarm.log_weights) * posterior.swarm.latents.present).sum())
     if probability < 0.5:
         raise InvalidValueError(
             "whether a window moved cannot be said of a session that probably has none",
@@ -238,8 +239,8 @@ def _require_window(record: SessionRecord, posterior: ParticlePosterior) -> None
 def _another_day(posterior: ParticlePosterior, law: DayToDay) -> Prior:
     """The prior of the next day, from a posterior."""
     usual = posterior.model.prior
-    latents = posterior.swarm.picked(posterior.model.particles)
-    p_window = float(latents.present.double().mean())
+    latents, _ = posterior.swarm.picked(posterior.law, posterior.model.particles)
+    p_window = float(latents.present.mean())
     shapes, kinds = usual.profile.shapes, usual.noise
     start, stimulus, reference = usual.profile.start, usual.profile.stimulus, posterior.space.reference
     own_place = partial(place, reference=reference, hit_delay_ms=start.hit_delay_ms, conditioning=stimulus)
@@ -259,9 +260,9 @@ def _another_day(posterior: ParticlePosterior, law: DayToDay) -> Prior:
     )
 
 
-def _shares(kinds: Tensor, of: int) -> list[float]:
+def _shares(kinds: IntArray, of: int) -> list[float]:
     """Shares of the kinds, counting one more particle that is of all kinds."""
-    counts = torch.bincount(kinds.flatten(), minlength=of).double() + 1.0 / of
+    counts = np.bincount(kinds.ravel(), minlength=of) + 1.0 / of
     shares: list[float] = (counts / counts.sum()).tolist()
     return shares
 
@@ -277,7 +278,7 @@ def _normals(latents: Latents, name: str, law: DayToDay) -> list[_Normal]:
     """Normal laws of some latents on the next day; none if hardly a particle uses them."""
     own = columns(name)
     used = used_by(latents.noise, latents.present)[0][:, own].all(-1)
-    values = latents.values[0][used][:, own].double().numpy()
+    values = latents.values[0][used][:, own].astype(float)
     if len(values) < LEAST_PARTICLES:
         return []
     centre, spread = values.mean(0), values.std(0) + 1e-6

@@ -15,7 +15,7 @@ import isiw
 from isiw.checks import MOST_OF_A_KIND, Checked, share, whole
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
 from isiw.errors import InvalidValueError, LogError
-from isiw.lazy import pd, torch
+from isiw.lazy import pd
 from isiw.log.reader import SessionRecord, read_session
 from isiw.models.particles.latents import LATENTS
 from isiw.models.particles.laws import Floor, Gain, Muscle, NoiseShares
@@ -34,6 +34,7 @@ from isiw.priors.population import (
     Law,
     Population,
     beside,
+    drawn_from,
     floor,
     gain,
     hyper_prior,
@@ -323,8 +324,7 @@ def _drawn(lab: LabPrior) -> list[dict[str, FloatArray]]:
     space = VALVE_SPACE if lab.place is None or lab.place.reference == "valve" else IMPACT_SPACE
     drawn, own = [], lab.joined()
     for prior in (Prior(ProfilePrior(conditioning=own.profile.conditioning)), own):
-        latents = prior.sample(1, DRAWN, torch.Generator().manual_seed(0), space)
-        columns = latents.values[0].double().numpy().T
+        columns = drawn_from(prior, space, DRAWN).T
         drawn.append(dict(zip(LATENTS, columns, strict=True)))
     return drawn
 

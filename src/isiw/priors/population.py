@@ -16,8 +16,8 @@ from typing import Final, NamedTuple, TypeAlias, TypeVar
 import numpy as np
 
 from isiw.design import DesignSpace
-from isiw.lazy import torch
 from isiw.models.particles import ParticlePosterior
+from isiw.models.particles.jumps import law_of
 from isiw.models.particles.latents import latents_of, used_by
 from isiw.models.particles.laws import Floor, Gain, Muscle, NoiseShares
 from isiw.models.particles.places import Place
@@ -35,8 +35,7 @@ _Shares = TypeVar("_Shares", ShapeShares, NoiseShares)
 
 def columns(name: str) -> list[int]:
     """The latents that one of `LATENT_BLOCKS` is about, as columns of a particle's values."""
-    mask = latents_of(*LATENT_BLOCKS[name], device=torch.device("cpu"))
-    return [int(column) for column in torch.nonzero(mask)[:, 0]]
+    return np.flatnonzero(latents_of(*LATENT_BLOCKS[name])).tolist()
 
 
 def place(
@@ -244,26 +243,33 @@ def people_of(posteriors: Sequence[ParticlePosterior]) -> People:
 
 def _person(posterior: ParticlePosterior) -> tuple[dict[str, LatentBlock], dict[str, IntArray]]:
     """The blocks of one person's particles by name, and the discrete latents."""
-    latents = posterior.swarm.picked(PARTICLES)
+    latents, _ = posterior.swarm.picked(posterior.law, PARTICLES)
     densities = posterior.model.prior.log_densities(latents.values, posterior.space)
-    values, used = latents.values[0].double().numpy(), used_by(latents.noise, latents.present)[0].numpy()
+    values, used = latents.values[0].astype(float), used_by(latents.noise, latents.present)[0]
     blocks = {
         name: LatentBlock(
             values[:, columns(name)],
-            densities["place" if name == "place" else LATENT_BLOCKS[name][0]][0].double().numpy(),
+            densities["place" if name == "place" else LATENT_BLOCKS[name][0]][0],
             np.all(used[:, columns(name)], axis=-1),
         )
         for name in LATENT_BLOCKS
     }
-    shape = torch.where(latents.present, latents.shape, -1)
-    kinds = {"window": latents.present.long(), "shape": shape, "noise": latents.noise}
-    return blocks, {name: kind[0].numpy() for name, kind in kinds.items()}
+    shape = np.where(latents.present, latents.shape, -1)
+    kinds = {"window": latents.present.astype(np.int64), "shape": shape, "noise": latents.noise}
+    return blocks, {name: kind[0] for name, kind in kinds.items()}
+
+
+def drawn_from(prior: Prior, space: DesignSpace, size: int) -> FloatArray:
+    """Latents of so many people in general, shape (size, d)."""
+    values, _ = law_of(prior, space).draws(size, np.zeros(1, dtype=np.uint64))
+    drawn: FloatArray = values[0].astype(float)
+    return drawn
 
 
 def hyper_prior(prior: Prior, space: DesignSpace) -> dict[str, HyperPrior]:
     """Of the variance between usual people, one part is between labs, and the other between the people of a lab."""
-    drawn = prior.sample(1, HYPER_DRAWS, torch.Generator().manual_seed(0), space).values[0].double().numpy()
-    sd = np.sqrt(WITHIN_A_LAB) * prior.spreads.double().numpy()
+    drawn = drawn_from(prior, space, HYPER_DRAWS)
+    sd = np.sqrt(WITHIN_A_LAB) * prior.spreads
     mean_sd = np.sqrt(np.maximum(drawn.var(0) - sd**2, sd**2))  # all else by which people in general differ
     return {
         name: HyperPrior(drawn[:, own].mean(0), mean_sd[own], sd[own])

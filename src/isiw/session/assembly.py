@@ -38,7 +38,7 @@ from isiw.trials import TrialTable
 from isiw.visit import Visit, VisitProtocol
 
 BELIEF_VERSION: Final = 6
-ENGINE_VERSION: Final = 2
+ENGINE_VERSION: Final = 3
 """Which belief a session learns by, and which engine computes it, for its header."""
 
 _PACKAGES = ("numpy", "torch", "botorch", "gpytorch")
@@ -59,7 +59,7 @@ class Earlier:
 
 
 def versions() -> dict[str, str]:
-    """The versions that what a strategy asks depends on, by package; a log that states no engine is torch's."""
+    """The versions that what a strategy asks depends on, by package."""
     installed = {package: _version(package) for package in _PACKAGES}
     return {"isiw": isiw.__version__, "python": platform.python_version(), **installed, "engine": engine_version()}
 

@@ -339,7 +339,7 @@ def estimate_record(
         more["chosen_by"] = choice.by
         if choice.scores is not None:
             more["scored_ms"] = tuple(candidate_isis(strategy.space).tolist())
-            more["scores"] = _rounded(choice.scores.detach().double().numpy())
+            more["scores"] = _rounded(choice.scores.astype(float))
     return record.model_copy(update=more)
 
 

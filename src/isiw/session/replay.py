@@ -24,7 +24,7 @@ from isiw.session.assembly import BELIEF_VERSION, ENGINE_VERSION, Earlier, versi
 from isiw.session.examination import learn, relearned
 from isiw.signals.limits import SignalLimits
 from isiw.signals.tap import TapResponses
-from isiw.strategy.catalogue import known_settings, remade_strategy, settings_for
+from isiw.strategy.catalogue import remade_strategy, settings_for
 from isiw.strategy.strategy import Strategy
 from isiw.text import plain
 from isiw.trials import Sweep, Trial, TrialTable
@@ -103,6 +103,10 @@ def _compared(record: SessionRecord) -> frozenset[int]:
     return frozenset(near_an_end) - {event.trial for event in record.events if event.kind == "fallback"}
 
 
+_GONE: Final = frozenset({"engine", "device"})
+"""Settings that said who computes, in torch or compiled: there is one engine now, which the log's versions state."""
+
+
 def strategy_of(header: Header) -> Strategy:
     """The strategy of a logged session, before its first trial; it warns of settings that are not known any more."""
     recipe = header.strategy
@@ -111,7 +115,7 @@ def strategy_of(header: Header) -> Strategy:
             "the session's strategy was built from a user's own objects, which no log can hold",
             remedy="Build the same strategy again and hand it over: isiw.resume(path, device, strategy).",
         )
-    settings = known_settings(recipe.name, {"engine": "torch"}) | recipe.settings  # the one there was before others
+    settings = {key: value for key, value in recipe.settings.items() if key not in _GONE}
     if header.schema_version < SCHEMA_VERSION:
         settings = _known_settings(recipe.model_copy(update={"settings": settings}))
     return knowing_earlier(remade_strategy(recipe.name, header.space, recipe.seed, **settings), header)

@@ -8,12 +8,14 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Literal, TypeAlias
 
+import numpy as np
+
 from isiw.acquisition.fixed import golden_index
 from isiw.acquisition.protocol import AcquisitionFunction, best_candidate, require_scores
 from isiw.design import DesignSpace
-from isiw.lazy import torch
-from isiw.models.protocol import Posterior, Tensor
+from isiw.models.protocol import Posterior
 from isiw.signals.limits import off_by
+from isiw.types import Array, Singles
 
 ASKED_AGAIN = 2
 """So often a lost trial is asked again at the same ISI; then another ISI stands in for it."""
@@ -21,7 +23,7 @@ ASKED_AGAIN = 2
 MAX_CANDIDATES = 101
 """At most so many ISIs are scored, so that the cost of an ask does not grow with the range."""
 
-Cost = Callable[[Tensor], Tensor]
+Cost = Callable[[Array], Array]
 """What each of some ISIs [ms] (shape (t,)) costs, in the unit of the scores, shape (t,)."""
 
 ChosenBy: TypeAlias = Literal["initial", "plan", "acquisition", "fallback", "again"]
@@ -36,16 +38,16 @@ class Choice:
     isi_ms: float
     fallback: str | None = None
     by: ChosenBy = field(default="acquisition", compare=False)
-    scores: Tensor | None = field(default=None, compare=False, repr=False)
+    scores: Array | None = field(default=None, compare=False, repr=False)
 
 
 @cache
-def candidate_isis(space: DesignSpace) -> Tensor:
-    """Evenly spaced ISIs to score [ms], both ends included, shape (t,); one tensor for all, who leave it as it is."""
+def candidate_isis(space: DesignSpace) -> Singles:
+    """Evenly spaced ISIs to score [ms], both ends included, shape (t,); one array for all, who leave it as it is."""
     grid = space.grid_ms
     stride = max(1, math.ceil((len(grid) - 1) / (MAX_CANDIDATES - 1)))
     picked = sorted({*range(0, len(grid), stride), len(grid) - 1})
-    return torch.as_tensor(grid[picked], dtype=torch.float32)
+    return grid[picked].astype(np.float32)
 
 
 def best_choices(
@@ -60,16 +62,15 @@ def best_choices(
     """The ISI of each person that the acquisition function scores best; an evenly spaced one if it scores none."""
     candidates = candidate_isis(space)
     given = require_scores(acquisition, acquisition(posterior, candidates), len(candidates), people)
-    scores = given.detach().cpu().expand(people, -1)
+    scores = np.broadcast_to(given, (people, len(candidates)))
     net = scores if cost is None else scores - cost(candidates)
     best = best_candidate(net, first=golden_index(told, len(candidates)))
     nothing = f"{type(acquisition).__name__} gives no ISI a finite score: an evenly spaced one instead."
-    chosen = zip(candidates[best].tolist(), net.gather(-1, best.unsqueeze(-1)).tolist(), net, strict=True)
     return tuple(
-        Choice(space.snap(isi_ms), scores=own)
-        if math.isfinite(highest)
-        else Choice(space.snap(isi_ms), nothing, by="fallback")
-        for isi_ms, (highest,), own in chosen
+        Choice(space.snap(float(candidates[index])), scores=own)
+        if math.isfinite(own[index])
+        else Choice(space.snap(float(candidates[index])), nothing, by="fallback")
+        for index, own in zip(best.tolist(), net, strict=True)
     )
 
 

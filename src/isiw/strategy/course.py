@@ -8,6 +8,8 @@ from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
+import numpy as np
+
 from isiw.acquisition.protocol import AcquisitionFunction, FollowsPlan, own_plan
 from isiw.checks import can
 from isiw.design import DesignSpace
@@ -98,7 +100,7 @@ class Course:
 
     def after(self, observation: Observation) -> Course:
         """The course after one more trial of each person; all of them pairs of stimuli, or all TMS alone."""
-        alone = bool(observation.isi_ms.isnan().all())
+        alone = bool(np.isnan(observation.isi_ms).all())
         return replace(
             self,
             posterior=self.method.model.update(self.posterior, observation),

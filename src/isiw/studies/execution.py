@@ -10,6 +10,7 @@ import asyncio
 import ctypes
 import os
 import signal
+import sys
 import threading
 import time
 import traceback
@@ -22,23 +23,37 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Any, Protocol, TypeVar
 
-from loky import ProcessPoolExecutor
+from loky import ProcessPoolExecutor, cpu_count
+from threadpoolctl import threadpool_limits
 
 from isiw.checks import Checked, Count
 from isiw.errors import StudyError
-from isiw.lazy import torch
 from isiw.text.named_code import library
+
+_THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS")
+"""Variables from which torch takes its number of threads as it is imported."""
 
 
 @contextmanager
-def one_torch_thread() -> Generator[None, None, None]:
-    """Have torch compute with one thread, without which the same session may come to other numbers, until the end."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
+def one_thread() -> Generator[None, None, None]:
+    """Have libraries compute with one thread, without which the same session may come to other numbers, until the end.
+
+    Most strategies do without torch: it is not imported for this, and starts with one thread if a strategy imports it.
+    """
+    torch = sys.modules.get("torch")
+    before = cpu_count() if torch is None else torch.get_num_threads()
+    kept = {name: os.environ.get(name) for name in _THREADS}
+    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    if torch is not None:
+        torch.set_num_threads(1)
     try:
-        yield
+        with threadpool_limits(1, user_api="blas"):
+            yield
     finally:
-        torch.set_num_threads(before)
+        for name, value in kept.items():
+            os.environ.pop(name) if value is None else os.environ.update({name: value})
+        if (torch := sys.modules.get("torch")) is not None:
+            torch.set_num_threads(before)
 
 
 # Parameters of mallopt(3), from malloc.h, and the value that both begin with.

@@ -23,7 +23,7 @@ from typing import Annotated, Any, Final, Literal, TypeAlias
 from isiw.checks import Checked, Positive, text, whole
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace, require_space
 from isiw.errors import ConfigError, InvalidValueError
-from isiw.lazy import pd, torch
+from isiw.lazy import pd
 from isiw.strategy.catalogue import settings_for
 from isiw.strategy.settings.common import settings_values
 from isiw.studies.players import OWN, OwnCode
@@ -115,18 +115,16 @@ class Unit:
         key: its name in the study; the same whenever and wherever it runs.
         sessions: one a person.
         engine: what runs them.
-        device: torch device of the batched engine.
     """
 
     key: str
     sessions: tuple[SimulatedSession, ...]
     engine: Engine = "single"
-    device: str = "cpu"
 
 
 def run_unit(unit: Unit) -> pd.DataFrame:
     """The rows of a unit, with the :doc:`columns </studies>` of a study, its key and one's own code's checksum too."""
-    rows = simulate_batch(unit.sessions, unit.device) if unit.engine == "batched" else simulate(*unit.sessions)
+    rows = simulate_batch(unit.sessions) if unit.engine == "batched" else simulate(*unit.sessions)
     own = unit.sessions[0].own
     return rows.assign(unit=unit.key, code="" if own is None else own.checksum)
 
@@ -148,7 +146,6 @@ class Study(Checked):
             after each trial), or `"ends"` the session.
         engine: `"single"`, one session at a time, or `"batched"`, people side by side.
         batch: how many people side by side.
-        device: torch device of the batched engine, for the models that have one.
         amplitude: factor on all amplitudes of the people.
         hit_delay: strategies that can use it get the hit delay as the rig states it (`"stated"`), or `"unstated"`.
         intensity: the same of the intensity, as the visit states it.
@@ -167,7 +164,6 @@ class Study(Checked):
     stopping: Stopping = "noted"
     engine: Engine = "single"
     batch: Annotated[int, partial(whole, least=1, most=_MOST_SESSIONS)] = 50
-    device: str = "cpu"
     amplitude: Positive = 1.0
     hit_delay: Stated = "unstated"
     intensity: Stated = "unstated"
@@ -182,7 +178,6 @@ class Study(Checked):
         if isinstance(self.space, str) and self.space in _SPACES:
             object.__setattr__(self, "space", _SPACES[self.space])
         require_space(self.space)
-        _require_torch_device(self.device)
         if list(self.marks) != sorted(set(self.marks)) or not 0 <= self.marks[0] <= self.marks[-1] <= self.trials:
             raise InvalidValueError("marks ascend from 0 to the number of trials", got=self.marks)
         require_cohorts(self.cohorts)
@@ -230,16 +225,7 @@ class Study(Checked):
 
     def _unit(self, sessions: tuple[SimulatedSession, ...]) -> Unit:
         first, last = sessions[0], f"-{sessions[-1].person:05d}" if self.engine == "batched" else ""
-        return Unit(f"{first.label}.{first.cohort}.{first.person:05d}{last}", sessions, self.engine, self.device)
-
-
-def _require_torch_device(device: str) -> None:
-    try:
-        torch.device(text("device", device))
-    except RuntimeError as error:
-        raise InvalidValueError(
-            "torch has no such device", got=device, expected="cpu, or cuda where there is"
-        ) from error
+        return Unit(f"{first.label}.{first.cohort}.{first.person:05d}{last}", sessions, self.engine)
 
 
 def load_study(path: str | Path) -> Study:

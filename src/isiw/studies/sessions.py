@@ -8,17 +8,19 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, is_dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, TypeAlias
 
-from isiw.acquisition.protocol import AcquisitionFunction
+import numpy as np
+
+from isiw.acquisition.protocol import AcquisitionFunction, require_scores
 from isiw.checks import Checked, Count, Natural, Positive, whole
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, StudyError
 from isiw.estimate import WindowEstimate
-from isiw.lazy import pd, torch
+from isiw.lazy import pd
 from isiw.metrics import covers, f1
-from isiw.models.protocol import Observation, Posterior, ReportsTrouble, Tensor
+from isiw.models.protocol import Observation, Posterior, ReportsTrouble
 from isiw.signals import wrong_isi
 from isiw.strategy.catalogue import known_settings, make_strategy
 from isiw.strategy.choice import Choice, instead_of_lost
@@ -26,10 +28,11 @@ from isiw.strategy.course import Course, Method
 from isiw.strategy.outcomes import Outcome, Outcomes
 from isiw.strategy.stopping import StopDecision, stimuli_left
 from isiw.strategy.strategy import Strategy
-from isiw.studies.execution import one_torch_thread
+from isiw.studies.execution import one_thread
 from isiw.studies.players import Alone, OwnCode, Player, Reported
 from isiw.subjects.cohorts import COHORTS, person_of
 from isiw.subjects.subject import Response, SimulatedSubject
+from isiw.types import Array
 from isiw.window import Window, bayes_factor
 
 TIMES = ("ask_ms", "tell_ms")
@@ -136,7 +139,7 @@ class SimulatedSession(Checked):
 
 def simulate(session: SimulatedSession) -> pd.DataFrame:
     """Run one session with its named strategy, to rows with the :doc:`columns </studies>` of a study."""
-    with one_torch_thread():
+    with one_thread():
         return play(session, session.player())
 
 
@@ -276,16 +279,16 @@ def _judged(estimate: Reported, truth: Window | None, space: DesignSpace) -> dic
     }
 
 
-def simulate_batch(sessions: Sequence[SimulatedSession], device: str = "cpu") -> pd.DataFrame:
-    """Run sessions side by side on a CPU or a GPU, by the rules of single ones; only the models' draws differ."""
-    with one_torch_thread():
-        return examine(sessions, _Batch(sessions, device))
+def simulate_batch(sessions: Sequence[SimulatedSession]) -> pd.DataFrame:
+    """Run sessions side by side, by the rules of single ones; only the models' draws differ."""
+    with one_thread():
+        return examine(sessions, _Batch(sessions))
 
 
 class _Batch:
     """A strategy with b people, as `Alone` is with one: without TMS alone and without deadlines."""
 
-    def __init__(self, sessions: Sequence[SimulatedSession], device: str) -> None:
+    def __init__(self, sessions: Sequence[SimulatedSession]) -> None:
         if len({(session.strategy, repr(session.settings)) for session in sessions}) > 1:
             raise StudyError(
                 "the people of a batch have strategies with different settings",
@@ -293,13 +296,10 @@ class _Batch:
             )
         players = [_strategy(session.player()) for session in sessions]
         first = players[0]
-        model: Any = first.model
-        if is_dataclass(first.model) and hasattr(first.model, "device"):
-            model = replace(first.model, device=device)
         self.players, acquisition = players, first.acquisition
         if any(player.acquisition != acquisition for player in players):
             acquisition = _EachTheirOwn([player.acquisition for player in players])
-        method = Method(first.space, model, acquisition, first.stopping, first.initial_ms, first.cost)
+        method = Method(first.space, first.model, acquisition, first.stopping, first.initial_ms, first.cost)
         self.stopping = first.stopping
         self.course = method.begin(first.seed, len(players))
         self.alone = dict[int, Course]()
@@ -375,6 +375,7 @@ class _EachTheirOwn:
     def needs(self) -> tuple[type, ...]:
         return self.functions[0].needs
 
-    def __call__(self, posterior: Posterior, isi_ms: Tensor) -> Tensor:
-        scores = (score(posterior, isi_ms).expand(len(self.functions), -1) for score in self.functions)
-        return torch.stack([of_all[person] for person, of_all in enumerate(scores)])
+    def __call__(self, posterior: Posterior, isi_ms: Array) -> Array:
+        people, isis = len(self.functions), len(isi_ms)
+        given = (require_scores(score, score(posterior, isi_ms), isis, people) for score in self.functions)
+        return np.stack([np.broadcast_to(scores, (people, isis))[person] for person, scores in enumerate(given)])

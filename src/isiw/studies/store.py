@@ -16,16 +16,17 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from functools import cache, cached_property
+from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
 import tomli_w
 
 import isiw
 from isiw.errors import StudyError, os_errors
 from isiw.files import TEMPORARY, opened, put
-from isiw.lazy import pa, parquet, pd, torch
+from isiw.lazy import pa, parquet, pd
 from isiw.log.durable import claim
 from isiw.studies.execution import Failure
 from isiw.studies.plan import Study, Unit, begun_study, study_values
@@ -150,7 +151,8 @@ def begin_store(study: Study, folder: str | Path) -> Store:
             remedy="Put that file back, or choose another folder.",
         )
     values = study_values(study)
-    versions = {module.__name__: str(module.__version__) for module in (isiw, np, torch, pd)}
+    versions = {"isiw": isiw.__version__}
+    versions |= {name: version(name) for name in ("numpy", "torch", "pandas") if find_spec(name)}
     versions |= {"python": platform.python_version(), "code": code_checksum()}
     text = tomli_w.dumps(values | {"checksum": _state(values), "versions": versions})
     with _disk_errors(store.folder):

@@ -12,7 +12,6 @@ from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError, StrategyError
 from isiw.estimate import WindowEstimate
-from isiw.lazy import torch
 from isiw.models.protocol import (
     Conditions,
     HasEvidence,
@@ -25,11 +24,11 @@ from isiw.models.protocol import (
     ResponseModel,
     SamplesProfiles,
     SamplesWindows,
-    Tensor,
 )
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.text.sanitize import shown
+from isiw.types import Singles
 
 Trials = tuple[tuple[float | None, float], ...]
 """ISIs [ms] (None is TMS alone) and MEPs [mV], in the order of telling."""
@@ -165,7 +164,7 @@ def _check_order(model: ResponseModel, space: DesignSpace, trials: Trials, toler
 
 
 def _check_capabilities(posterior: Posterior, space: DesignSpace, people: int, when: str) -> None:
-    isi_ms = torch.linspace(space.low_ms, space.high_ms, 7, dtype=torch.float32)
+    isi_ms = np.linspace(space.low_ms, space.high_ms, 7, dtype=np.float32)
     shapes = _sample_shapes(posterior, isi_ms, when)
     wrong = [shape for shape in shapes if shape[0] != people]
     require(not wrong, f"all samples are of {people} people {when}", str(wrong))
@@ -192,40 +191,47 @@ def _check_prediction(posterior: Any, person: int, when: str) -> None:
     require(nested, f"a band of prediction_mv holds those of smaller probability {when}")
 
 
-def _sample_shapes(posterior: Any, isi_ms: Tensor, when: str) -> list[tuple[int, ...]]:
+def _sample_shapes(posterior: Any, isi_ms: Singles, when: str) -> list[tuple[int, ...]]:
     """Shapes of whatever the posterior samples, after a look at the values."""
     shapes = []
     if isinstance(posterior, PredictsOutcomes):
-        mass = posterior.outcome_mass(isi_ms)
-        require(mass.dim() == 4, f"outcome_mass has the shape (b, s, t, y) {when}", str(tuple(mass.shape)))
-        proper = bool((mass >= 0).all()) and bool(((mass.sum(-1) - 1).abs() < 1e-3).all())
+        mass = _array("outcome_mass", posterior.outcome_mass(isi_ms), when)
+        require(mass.ndim == 4, f"outcome_mass has the shape (b, s, t, y) {when}", str(mass.shape))
+        proper = bool((mass >= 0).all()) and bool((np.abs(mass.sum(-1) - 1) < 1e-3).all())
         require(proper, f"outcome_mass is a probability of each value {when}")
-        shapes.append(tuple(mass.shape))
+        shapes.append(mass.shape)
     if isinstance(posterior, SamplesWindows):
-        masks = posterior.window_masks(isi_ms)
+        masks = _array("window_masks", posterior.window_masks(isi_ms), when)
         require(bool(((masks == 0) | (masks == 1)).all()), f"window_masks are 0 or 1 {when}")
-        shapes.append(tuple(masks.shape))
+        shapes.append(masks.shape)
     if isinstance(posterior, SamplesProfiles):
-        profiles, baselines = posterior.profiles_mv(isi_ms), posterior.baselines_mv()
-        require(bool(profiles.isfinite().all() and baselines.isfinite().all()), f"profiles are finite {when}")
-        shapes += [tuple(profiles.shape), tuple(baselines.shape)]
+        profiles = _array("profiles_mv", posterior.profiles_mv(isi_ms), when)
+        baselines = _array("baselines_mv", posterior.baselines_mv(), when)
+        finite = bool(np.isfinite(profiles).all() and np.isfinite(baselines).all())
+        require(finite, f"profiles are finite {when}")
+        shapes += [profiles.shape, baselines.shape]
     return shapes
+
+
+def _array(what: str, given: Any, when: str = "") -> Any:
+    require(isinstance(given, np.ndarray), f"{what} is a NumPy array {when}".rstrip(), type(given).__name__)
+    return given
 
 
 def _check_further(posterior: Posterior, people: int, when: str) -> None:
     trials = posterior.trials
     if isinstance(posterior, Conditions):
-        isi_ms, mep_mv = torch.tensor([[100.0] * people, [0.05] * people], dtype=torch.float32)
+        isi_ms, mep_mv = np.array([[100.0] * people, [0.05] * people], dtype=np.float32)
         imagined = posterior.condition(isi_ms, mep_mv)
         require(imagined.trials == trials + 1, f"condition adds one trial {when}")
     if isinstance(posterior, HasEvidence):
-        evidence = posterior.log_evidence()
-        fine = tuple(evidence.shape) == (people,) and bool(evidence.isfinite().all())
+        evidence = _array("log_evidence", posterior.log_evidence(), when)
+        fine = evidence.shape == (people,) and bool(np.isfinite(evidence).all())
         require(fine, f"log_evidence is finite and has the shape (b,) {when}", str(evidence))
     if isinstance(posterior, ProposesIsi):
-        plan = posterior.proposed_isis_ms()
-        fine = plan.dim() == 2 and plan.shape[0] == people and plan.shape[1] > 0 and bool(plan.isfinite().all())
-        require(fine, f"proposed_isis_ms has the shape (b, k) with k of at least 1 {when}", str(tuple(plan.shape)))
+        plan = _array("proposed_isis_ms", posterior.proposed_isis_ms(), when)
+        fine = plan.ndim == 2 and plan.shape[0] == people and plan.shape[1] > 0 and bool(np.isfinite(plan).all())
+        require(fine, f"proposed_isis_ms has the shape (b, k) with k of at least 1 {when}", str(plan.shape))
     if isinstance(posterior, ReportsTrouble):
         trouble = posterior.trouble
         require(trouble is None or trouble.endswith("."), f"trouble is stated in sentences {when}", repr(trouble))
@@ -334,10 +340,10 @@ def check_acquisition(acquisition: AcquisitionFunction, posterior: Posterior, sp
     require(not missing, "the posterior has what the acquisition function needs", f"not {', '.join(missing)}")
     before = posterior.estimate()
     for count in (1, 2, 23):
-        isi_ms = torch.linspace(space.low_ms, space.high_ms, count, dtype=torch.float32)
-        scores = acquisition(posterior, isi_ms)
-        shaped = scores.dim() == 2 and scores.shape[1] == count
-        require(shaped, "scores have the shape (b, t)", f"{tuple(scores.shape)} for {count} ISIs")
-        require(bool(scores.isfinite().all()), "scores are finite", str(scores.tolist()))
-        require(torch.equal(scores, acquisition(posterior, isi_ms)), "the same posterior gives the same scores")
+        isi_ms = np.linspace(space.low_ms, space.high_ms, count, dtype=np.float32)
+        scores = _array("scores", acquisition(posterior, isi_ms))
+        shaped = scores.ndim == 2 and scores.shape[1] == count
+        require(shaped, "scores have the shape (b, t)", f"{scores.shape} for {count} ISIs")
+        require(bool(np.isfinite(scores).all()), "scores are finite", str(scores.tolist()))
+        require(np.array_equal(scores, acquisition(posterior, isi_ms)), "the same posterior gives the same scores")
     require(same_estimates(posterior.estimate(), before), "scoring leaves the posterior as it was")

@@ -10,22 +10,16 @@ import torch
 from isiw.design import VALVE_SPACE
 from isiw.models.parametric.law import Likelihood, Unknowns, WindowPrior, levels, log_likelihood
 from isiw.models.parametric.sampling import WindowProgram
-from isiw.models.shared.history import History
+from isiw.models.parametric.tables import Trials
 from known import known
 
 LIKELIHOODS: tuple[Likelihood, ...] = ("gamma", "log-normal", "input-noise")
 
-TRIALS = History(
-    *(
-        torch.tensor([column], dtype=torch.double)
-        for column in (
-            [250.0, 300.0, math.nan, 210.0, 260.0, 240.0],
-            [0.0, 0.0, 0.0, 4.0, 0.0, 0.0],
-            [math.log(0.08), math.log(0.02), math.log(0.01), math.log(0.03), -math.inf, math.log(0.02)],
-            [math.log(0.08), math.log(0.02), math.log(0.01), math.log(0.03), math.log(0.005), math.inf],
-            [0.0, 1.0, 2.0, 3.0, 4.0, 5.0],
-        )
-    )
+MEPS_MV = [(0.08, 0.08), (0.02, 0.02), (0.01, 0.01), (0.03, 0.03), (0.0, 0.005), (0.02, math.inf)]
+TRIALS = Trials(
+    torch.tensor([250.0, 300.0, math.nan, 210.0, 260.0, 240.0], dtype=torch.double),
+    torch.tensor([0.0, 0.0, 0.0, 4.0, 0.0, 0.0], dtype=torch.double),
+    torch.tensor(MEPS_MV, dtype=torch.double).log(),
 )
 """Amplitudes, TMS alone, an uncertain ISI, an amplitude below the detection limit, and a response that was seen."""
 
@@ -54,11 +48,11 @@ def test_an_uncertain_isi_is_integrated_out() -> None:
     # By brute force on 400 quantiles; three nodes are exact up to the fifth power of the SD.
     model = program("log-normal")
     some = latents(model, 300)
-    trial = History(*(column[:, 3:4] for column in TRIALS.columns))
+    trial = Trials(*(column[3:4] for column in TRIALS))
     got = model.log_likelihood(some, trial)
     shifts_ms = 4.0 * torch.special.ndtri((torch.arange(400, dtype=torch.double) + 0.5) / 400)
     unknowns = model.unknowns(some)
-    ends = torch.stack((trial.log_mep[0], trial.log_mep_high[0]), dim=-1).expand(400, -1)
+    ends = trial.log_mep.expand(400, -1)
     by_isi = log_likelihood(unknowns, levels(unknowns, 210.0 + shifts_ms), ends, "log-normal")
     expected = torch.logsumexp(by_isi, dim=-1) - math.log(400)
     assert (got - expected).abs().median() < 0.01
@@ -67,7 +61,7 @@ def test_an_uncertain_isi_is_integrated_out() -> None:
 
 def test_without_a_window_the_isi_does_not_matter() -> None:
     model = replace(program("gamma"), present=False)
-    elsewhere = History(TRIALS.isi_ms + 100.0, *TRIALS.columns[1:])
+    elsewhere = TRIALS._replace(isi_ms=TRIALS.isi_ms + 100.0)
     some = latents(model)
     here, there = (model.log_density(some, trials) for trials in (TRIALS, elsewhere))
     assert torch.equal(here, there)
@@ -77,7 +71,8 @@ def test_the_program_draws_meps_of_its_own_where_those_told_are_set_aside() -> N
     pyro.set_rng_seed(1)
     model = program("log-normal")
     latent = torch.zeros(model.latents, dtype=torch.double)
-    trials = History(*(torch.full((1, 4000), value, dtype=torch.double) for value in (250.0, 0.0, 0.0, 0.0, 0.0)))
+    nothing = torch.zeros(4000, dtype=torch.double)
+    trials = Trials(nothing + 250.0, nothing, torch.stack((nothing, nothing), dim=-1))
     conditioned = pyro.poutine.condition(pyro.poutine.uncondition(model), data={"latents": latent})
     trace = pyro.poutine.trace(conditioned).get_trace(trials)
     drawn = known(trace.nodes["log_mep"]["value"])

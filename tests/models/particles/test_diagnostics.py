@@ -6,25 +6,19 @@ import math
 
 import numpy as np
 import pytest
-import torch
 
 import isiw
-from isiw.models.particles.swarm import Health, distinct_share, ess_share, trouble_of
+from isiw.models.particles.swarm import Health, distinct_share, trouble_of
 from isiw.subjects.cohorts import cohort
 
 
 def trouble(*, ess: float = 0.5, shifts: float = 0.3, distinct: float = 0.9) -> str | None:
-    *health, shares = (torch.tensor([0.5, value]) for value in (ess, shifts, 0.2, distinct))
+    *health, shares = (np.array([0.5, value]) for value in (ess, shifts, 0.2, distinct))
     return trouble_of(Health(*health), shares)
 
 
-def test_the_effective_sample_size_counts_equal_weights() -> None:
-    log_weights = torch.tensor([[0.5, 0.5, 0.0, 0.0], [0.25, 0.25, 0.25, 0.25]]).log()
-    torch.testing.assert_close(ess_share(log_weights), torch.tensor([0.5, 1.0]))
-
-
 def test_copies_of_a_particle_count_once() -> None:
-    torch.testing.assert_close(distinct_share(torch.tensor([[-1.0, -2.0, -1.0, -1.0]])), torch.tensor([0.5]))
+    assert distinct_share(np.array([[-1.0, -2.0, -1.0, -1.0]], dtype=np.float32)).tolist() == [0.5]
 
 
 def test_sound_particles_are_no_trouble() -> None:

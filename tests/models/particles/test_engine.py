@@ -1,190 +1,112 @@
+"""What the engine computes of particles holds whatever the law is; its law is compared in tests/native."""
+
+from __future__ import annotations
+
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import replace
-from functools import partial
-from operator import itemgetter
-from typing import Any, get_args
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
-import torch
+import scipy.special
 
-from isiw.design import VALVE_SPACE, DesignSpace
+from isiw.design import VALVE_SPACE
 from isiw.models.particles import ParticleModel
-from isiw.models.particles.changes import Change
-from isiw.models.particles.engine import Compiled, EngineName, TorchEngine, engine_for, log_likelihood_of
-from isiw.models.particles.jumps import WindowTarget
 from isiw.models.particles.latents import Latents
-from isiw.models.particles.likelihood import total_log_likelihood
-from isiw.models.particles.moves import steps_of
-from isiw.models.particles.noise import NoiseKind, Response
-from isiw.models.particles.places import Place
-from isiw.models.particles.predictions import PersonSample
-from isiw.models.particles.prior import Depression, Person, Prior
-from isiw.models.particles.profile import ProfilePrior
-from isiw.models.particles.records import columns_of, people_of
-from isiw.models.particles.shapes import Shape
-from isiw.models.particles.supra.jumps import SupraTarget
-from isiw.models.particles.supra.predictions import SupraSample
-from isiw.models.particles.supra.prior import SupraPrior
-from isiw.models.protocol import Observation
-from isiw.models.shared.history import Circumstances, History
-from isiw.models.shared.scales import Scale
-from isiw.native.engine import UNKNOWN, elementary
-
-PLACES = ProfilePrior(
-    places=(Place(0.5, Scale(230.0, 12.0), Scale(80.0, 0.3)), Place(0.2, Scale(90.0, 9.0), Scale(60.0, 0.2)))
+from isiw.models.particles.noise import NoiseKind
+from isiw.models.particles.records import (
+    BOOST,
+    DRIFT,
+    FLOOR_SD,
+    LOG_FLOOR,
+    LOG_RATIO,
+    OUTPUT_SD,
+    PRESENT,
+    REST,
+    SLOPE,
+    SPREAD,
+    STARTLED,
 )
-TARGETS: dict[str, Any] = {
-    "default": WindowTarget(Prior(), VALVE_SPACE),
-    "places": WindowTarget(Prior(PLACES), VALVE_SPACE),
-    "supra": SupraTarget(SupraPrior(), DesignSpace(0, 200, reference="impact")),
-}
+from isiw.models.protocol import Observation
+from isiw.models.shared.history import Circumstances, History, neutral
+from isiw.models.shared.tables import systematic
+from isiw.native.engine import UNKNOWN, Crowd, elementary, log_likelihoods
+from isiw.types import FloatArray, Singles
+from native import reference
+from native.drawn import CASES, Case, columns, history, seeds, trials
+
+KINDS = {kind.name: kind for kind in NoiseKind}
 
 
-def generator(seed: int) -> torch.Generator:
-    return torch.Generator().manual_seed(seed)
+def crowd_of(case: Case, latents: Latents) -> Crowd:
+    """Particles of equal weights that have learnt nothing, as a crowd of their own."""
+    people, particles = latents.kinds.shape[:2]
+    nothing = np.zeros((people, particles), dtype=np.float32)
+    equal = np.full((people, particles), -math.log(particles))
+    return Crowd(latents.values.copy(), latents.kinds.copy(), equal, nothing, case.law.nothing_known(people, particles))
 
 
-def history(person: Person, trials: int, draws: torch.Generator, *, isi_sd_ms: float = 0.0) -> History:
-    """Random ISIs, TMS alone among them, and MEPs from the floor to 100 floors; some censored on a side or both."""
-    people = len(person.present)
-    isi_ms = 500.0 * torch.rand((people, trials), generator=draws)
-    isi_ms[torch.rand(isi_ms.shape, generator=draws) < 0.1] = torch.nan
-    low = -4.5 + torch.randn((people, trials), generator=draws).abs() * 1.5
-    high = low.clone()
-    sort = torch.rand(low.shape, generator=draws)
-    high[sort < 0.3] = low[sort < 0.3] + 0.5
-    low[sort < 0.2] = -torch.inf
-    high[(sort > 0.2) & (sort < 0.25)] = torch.inf
-    order = torch.arange(float(trials)).expand(people, -1)
-    return History(isi_ms, torch.full_like(isi_ms, isi_sd_ms), low, high, order)
-
-
-def in_double(person: Person) -> Person:
-    def double(fields: Any) -> list[torch.Tensor]:
-        return [field.double() if field.is_floating_point() else field for field in fields]
-
-    low = person.depression
-    depression = None if low is None else Depression(Shape(*double(low.shape)), low.depth.double(), low.present)
-    change = None if person.change is None else Change(*double(person.change))
-    return Person(Shape(*double(person.shape)), Response(*double(person.response)), person.present, depression, change)
-
-
-def furthest(target: Any, people: int, particles: int, seed: int, isi_sd_ms: float) -> float:
-    """By how much the log likelihoods of both engines differ, at most, torch computing in double precision."""
-    draws = generator(seed)
-    latents = target.prior.sample(people, particles, draws, target.space)
-    person = target.person(latents)
-    told = history(person, int(torch.randint(1, 60, (1,), generator=draws)), draws, isi_sd_ms=isi_sd_ms)
-    got = engine_for("compiled", target).log_likelihood(latents, told)
-    expected = total_log_likelihood(in_double(person), told.to("cpu", torch.double))
-    return float((got - expected).abs().max())
-
-
-@pytest.mark.parametrize("isi_sd_ms", [0.0, 4.0])
-@pytest.mark.parametrize("name", TARGETS)
-def test_the_likelihood_of_any_history_is_that_of_torch(name: str, isi_sd_ms: float) -> None:
-    assert max(furthest(TARGETS[name], 4, 50, seed, isi_sd_ms) for seed in range(3)) < 1e-3
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", TARGETS)
-def test_the_likelihood_of_ten_thousand_histories_is_that_of_torch(name: str) -> None:
-    assert max(furthest(TARGETS[name], 100, 10, seed, 4.0 * (seed % 2)) for seed in range(10)) < 1e-3
+def moved(case: Case, latents: Latents, told: History, numbers: Sequence[int], seed: int) -> tuple[Latents, Any, Any]:
+    """Particles after so many sweeps each, their log likelihoods, and the counts of their moves."""
+    people, particles = latents.kinds.shape[:2]
+    values, kinds = latents.values.copy(), latents.kinds.copy()
+    log_likelihood = log_likelihoods(case.fields(latents), told.columns)
+    state = values, kinds, log_likelihood, case.law.nothing_known(people, particles)
+    counts = case.law.sweeps(np.array(numbers), told.columns, seeds(seed, people), state)
+    return Latents(values, kinds), log_likelihood, counts
 
 
 def test_no_trials_say_nothing() -> None:
-    target = TARGETS["default"]
-    latents = Prior().sample(2, 20, generator(1), VALVE_SPACE)
-    none = History.empty(2, torch.device("cpu"))
-    for engine in (engine_for("compiled", target), TorchEngine(target)):
-        assert not engine.log_likelihood(latents, none).any()
+    case = CASES["default"]
+    assert not log_likelihoods(case.fields(case.drawn(20, 1, people=2)), History.empty(2).columns).any()
 
 
 def test_long_histories_are_summed_piece_by_piece() -> None:
-    draws = generator(1)
-    person = Prior().person(Prior().sample(1, 20, draws, VALVE_SPACE))
-    told = history(person, 400, draws)
-    got = log_likelihood_of(people_of(person), told).numpy()
-    expected = total_log_likelihood(in_double(person), told.to("cpu", torch.double))
-    np.testing.assert_allclose(got, expected.numpy(), rtol=1e-5)
+    case, told = CASES["default"], trials(400, np.random.default_rng(1))
+    drawn = case.of_all_kinds(4, 1)
+    got = log_likelihoods(case.fields(drawn), columns(told))[0]
+    expected = [reference.log_likelihood(one, told) for one in case.particles(drawn)]
+    np.testing.assert_allclose(got, expected, rtol=1e-5)
 
 
-@pytest.mark.parametrize("name", TARGETS)
-def test_moves_of_both_engines_are_accepted_as_often_and_lead_to_the_same_posterior(name: str) -> None:
-    # Twelve trials, 4,000 particles of the prior weighted by nothing, 30 sweeps: means of what both engines come to
-    # differ by less than five standard errors of 200 independent particles.
-    target, found = TARGETS[name], {}
-    for engine in (engine_for("compiled", target), TorchEngine(target)):
-        latents = target.prior.sample(1, 4000, generator(3), target.space)
-        isi_ms = torch.linspace(20.0, 180.0, 12).unsqueeze(0)
-        log_mep = torch.where((isi_ms > 60.0) & (isi_ms < 120.0), math.log(0.2), math.log(0.02))
-        order = torch.arange(12.0).unsqueeze(0)
-        told = History(isi_ms, torch.zeros_like(isi_ms), log_mep, log_mep, order)
-        start = engine.log_likelihood(latents, told)
-        found[type(engine)] = engine.sweeps(torch.tensor([30]), latents, start, told, generator(4))
-    ours, theirs = found[Compiled], found[TorchEngine]
-    assert ours.shifts.item() == pytest.approx(theirs.shifts.item(), abs=0.03)
-    assert ours.jumps.item() == pytest.approx(theirs.jumps.item(), abs=0.03)
-    spread = theirs.latents.values.std(1)
-    apart = (ours.latents.values.mean(1) - theirs.latents.values.mean(1)).abs() / spread
-    assert apart.max() < 5.0 / math.sqrt(200)
-    assert ours.log_likelihood.mean().item() == pytest.approx(theirs.log_likelihood.mean().item(), abs=0.5)
+def few_trials() -> History:
+    """Four trials with a window of about 60 to 120 ms."""
+    made = neutral(4)
+    made[:, 0] = 20.0, 80.0, 110.0, 160.0
+    made[:, 2] = made[:, 3] = np.log([0.02, 0.1, 0.05, 0.02])
+    return History(made[np.newaxis])
 
 
-@pytest.mark.parametrize("name", get_args(EngineName))
-def test_each_person_moves_as_often_as_they_need(name: EngineName) -> None:
-    target = TARGETS["default"]
-    latents = target.prior.sample(3, 100, generator(3), target.space)
-    told = history(target.person(latents), 6, generator(4))
-    engine = engine_for(name, target)
-    start = engine.log_likelihood(latents, told)
-    moved = engine.sweeps(torch.tensor([3, 0, 1]), latents, start, told, generator(5))
-    changed = (moved.latents.values != latents.values).any(-1).double().mean(-1)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CASES)
+def test_moved_particles_have_the_posterior_that_weighted_particles_of_the_prior_have(name: str) -> None:
+    # 40 sweeps of 4,000 particles, against 400,000 that are weighted: means differ by less than five standard errors of
+    # 200 independent particles, and shares of the kinds by less than .05.
+    case, told = CASES[name], few_trials()
+    drawn = case.drawn(400_000, 3)
+    log_weights = log_likelihoods(case.fields(drawn), told.columns).astype(float)
+    weights = scipy.special.softmax(log_weights, axis=-1)[0]
+    assert 1.0 / np.square(weights).sum() > 1000
+    found, log_likelihood, counts = moved(case, case.drawn(4000, 4), told, [40], 5)
+    assert 0.05 < counts[0, 1] / counts[0, 0] < 1
+    assert 0.02 < counts[0, 3] / counts[0, 2] < 1
+    means = weights @ drawn.values[0]
+    spread = np.sqrt(weights @ np.square(drawn.values[0] - means))
+    assert (np.abs(found.values[0].mean(0) - means) / spread).max() < 5.0 / math.sqrt(200)
+    for ours, theirs in zip(found.kinds[0].T, drawn.kinds[0].T, strict=True):
+        shares = np.bincount(ours, minlength=5) / 4000
+        np.testing.assert_allclose(shares, np.bincount(theirs, weights, minlength=5), atol=0.05)
+    assert log_likelihood.mean() == pytest.approx(weights @ log_weights[0], abs=0.5)
+
+
+def test_each_person_moves_as_often_as_they_need() -> None:
+    case, told = CASES["default"], history(3, 6, 4)
+    latents = case.drawn(100, 3, people=3)
+    found, log_likelihood, _ = moved(case, latents, told, [3, 0, 1], 5)
+    changed = (found.values != latents.values).any(-1).mean(-1)
     assert changed[0] > changed[2] > changed[1] == 0.0
-    torch.testing.assert_close(moved.log_likelihood, engine.log_likelihood(moved.latents, told), atol=1e-3, rtol=1e-4)
-
-
-@pytest.mark.parametrize("space", [VALVE_SPACE, DesignSpace(0, 300, 5, reference="valve")], ids=["fine", "coarse"])
-def test_a_sample_predicts_what_it_predicts_in_torch(space: DesignSpace) -> None:
-    target = WindowTarget(Prior(), space)
-    latents = target.prior.sample(2, 300, generator(6), space)
-    meant = engine_for("compiled", target).meaning(latents, 1), target.person(latents).after(1)
-    ours, theirs = (PersonSample(particles, space, 1) for particles in meant)
-    grid_ms, few_ms = torch.tensor(space.grid_ms, dtype=torch.float32), torch.tensor([0.0, 180.0, 233.0, 260.0, 300.0])
-    torch.testing.assert_close(ours.window_masks(grid_ms), theirs.window_masks(grid_ms))
-    torch.testing.assert_close(ours.outcome_mass(few_ms), theirs.outcome_mass(few_ms), atol=2e-5, rtol=0.0)
-    torch.testing.assert_close(ours.expected_mep_mv(few_ms), theirs.expected_mep_mv(few_ms), atol=1e-6, rtol=1e-4)
-    torch.testing.assert_close(ours.baselines_mv(), theirs.baselines_mv(), atol=1e-6, rtol=1e-4)
-    runs = [sample.runs(grid_ms, 1) for sample in (ours, theirs)]
-    np.testing.assert_array_equal(runs[0].membership, runs[1].membership)
-    np.testing.assert_array_equal(runs[0].hulls, runs[1].hulls)
-
-
-def test_a_sample_with_a_depression_predicts_what_it_predicts_in_torch() -> None:
-    target = TARGETS["supra"]
-    latents = SupraPrior().sample(1, 300, generator(6), target.space)
-    meant = engine_for("compiled", target).meaning(latents, 3), target.person(latents)
-    ours, theirs = (SupraSample(particles, target.space, 3) for particles in meant)
-    isi_ms = torch.arange(0.0, 201.0, 4.0)
-    torch.testing.assert_close(ours.outcome_mass(isi_ms), theirs.outcome_mass(isi_ms), atol=0.02, rtol=0.0)
-    torch.testing.assert_close(ours.expected_mep_mv(isi_ms), theirs.expected_mep_mv(isi_ms), atol=1e-4, rtol=0.02)
-    for masks in ("window_masks", "depressed_masks"):  # tables of other rows put a few edges one ISI further
-        apart = (getattr(ours, masks)(isi_ms) != getattr(theirs, masks)(isi_ms)).float().mean()
-        assert apart < 0.002, masks
-
-
-@pytest.mark.parametrize("profile", [ProfilePrior(), PLACES])
-def test_both_engines_hold_the_usual_for_as_probable_where_isis_are_chosen(profile: ProfilePrior) -> None:
-    model = ParticleModel(Prior(profile))
-    latents = model.prior.sample(1, 500, generator(8), VALVE_SPACE)
-    targets = [WindowTarget(prior, VALVE_SPACE) for prior in (model.prior_where_asking, model.prior)]
-    ours, theirs = (
-        one(targets[0]).log_usual(latents) - one(targets[1]).log_usual(latents)
-        for one in (partial(engine_for, "compiled"), TorchEngine)
-    )
-    torch.testing.assert_close(ours, theirs, atol=1e-3, rtol=1e-3)
+    expected = log_likelihoods(case.fields(found), told.columns)
+    np.testing.assert_allclose(log_likelihood, expected, atol=1e-3, rtol=1e-4)
 
 
 def test_densities_of_blocks_kept_from_trial_to_trial_are_those_of_the_particles() -> None:
@@ -193,124 +115,126 @@ def test_densities_of_blocks_kept_from_trial_to_trial_are_those_of_the_particles
         mep_mv = 0.2 if isi_ms > 200.0 else 0.012
         posterior = posterior.model.update(posterior, Observation.of([isi_ms, 230.0], [mep_mv, 0.015]))
         posterior = posterior.noting_change() if trial == 3 else posterior
-        latents, engine = posterior.swarm.latents, posterior.engine
-        if latents.log_blocks is not None:
-            kept += 1
-            assert torch.equal(engine.log_usual(latents), engine.log_usual(Latents(latents.values, latents.kinds)))
-            assert (latents.log_blocks < UNKNOWN).any()
+        crowd, law = posterior.swarm.crowd, posterior.law
+        forgotten = crowd._replace(densities=law.nothing_known(*crowd.log_weights.shape))
+        with_them, without = (law.usual_weights(posterior.usual, each) for each in (crowd, forgotten))
+        np.testing.assert_array_equal(with_them, without)
+        kept += bool((crowd.densities < UNKNOWN).any())
     assert kept == 5
 
 
 def test_people_of_a_batch_have_the_likelihood_that_each_has_alone() -> None:
-    draws, target = generator(5), TARGETS["default"]
-    latents = Prior().sample(3, 40, draws, VALVE_SPACE)
-    told = history(target.person(latents), 30, draws)
-    engine = engine_for("compiled", target)
-    together = engine.log_likelihood(latents, told)
+    case, told = CASES["default"], history(3, 30, 5)
+    fields = case.fields(case.drawn(40, 5, people=3))
+    together = log_likelihoods(fields, told.columns)
     for person in range(3):
         one = slice(person, person + 1)
-        alone = History(*(column[one] for column in told.columns))
-        part = latents.each(itemgetter(one))
-        assert torch.equal(engine.log_likelihood(part, alone), together[one])
+        np.testing.assert_array_equal(log_likelihoods(fields[one], told.columns[one]), together[one])
 
 
-def test_both_engines_of_one_seed_come_to_the_same_belief_in_different_ways() -> None:
-    trials = [(100.0, 0.01), (230.0, 0.2), (260.0, 0.25), (400.0, 0.012), (330.0, 0.01), (210.0, 0.15)]
-    posteriors = []
-    for engine in get_args(EngineName):
-        model = ParticleModel(engine=engine)
-        posterior = model.begin(VALVE_SPACE, 1)
-        for isi_ms, mep_mv in trials:
-            posterior = model.update(posterior, Observation.of([isi_ms], [mep_mv]))
-        posteriors.append(posterior)
-    ours, theirs = posteriors
-    assert ours.log_evidence() != theirs.log_evidence()
-    assert ours.estimate().probability == pytest.approx(theirs.estimate().probability, abs=0.05)
+@pytest.mark.parametrize("known_log_sd", [0.0, 0.6])
+def test_a_trial_weighs_particles_by_its_likelihood(known_log_sd: float) -> None:
+    case, told = CASES["default"], history(2, 3, 6, known_mv=0.02, known_log_sd=known_log_sd)
+    latents, none = case.drawn(500, 6, people=2), np.zeros(2, dtype=np.uint64)
+    crowd, evidence = crowd_of(case, latents), np.zeros(2)
+    for trials_so_far in (1, 2, 3):
+        found = case.law.learn(told.columns[:, :trials_so_far].copy(), 0.0, (0, 0), none, crowd)
+        evidence += found[:, 0]
+    expected = log_likelihoods(case.fields(latents), told.columns).astype(float)
+    weights = scipy.special.log_softmax(expected, axis=-1)
+    np.testing.assert_array_equal(crowd.values, latents.values)
+    np.testing.assert_allclose(crowd.log_weights, weights, atol=1e-3)
+    np.testing.assert_allclose(evidence, scipy.special.logsumexp(expected, axis=-1) - math.log(500), atol=1e-3)
+    np.testing.assert_allclose(found[:, 1], 1.0 / np.exp(2 * weights).sum(-1) / 500, rtol=1e-3)
 
 
-# What else bears on a trial: neutral in every history today, and for each field something that it must equal.
+def test_only_those_whose_particles_have_worn_out_are_resampled() -> None:
+    case, latents = CASES["default"], CASES["default"].drawn(500, 7, people=2)
+    crowd, made = crowd_of(case, latents), np.stack([neutral(1)] * 2)
+    made[:, 0, 0], made[:, 0, 2:4] = 230.0, [[math.log(3.0)] * 2, [-math.inf, math.inf]]
+    ess = case.law.learn(made, 0.5, (0, 0), seeds(7, 2), crowd)[:, 1]
+    assert ess[0] < 0.5 < ess[1]
+    assert (crowd.values[0] != latents.values[0]).any()
+    np.testing.assert_array_equal(crowd.values[1], latents.values[1])
+    whose = (crowd.values[0, :, np.newaxis] == latents.values[0]).all(-1)
+    assert whose.any(-1).all()  # each is one of those there were
+    log_likelihood = log_likelihoods(case.fields(Latents(crowd.values, crowd.kinds)), made)
+    np.testing.assert_allclose(crowd.log_likelihood, log_likelihood, atol=1e-4)
+    np.testing.assert_allclose(np.exp(crowd.log_weights).sum(-1), 1.0)
 
-KINDS = {kind.name: kind for kind in NoiseKind}
+
+def test_weighted_particles_are_represented_by_evenly_spaced_picks() -> None:
+    case, rng = CASES["default"], np.random.default_rng(8)
+    latents, log_weights = case.drawn(300, 8, people=2), 3.0 * rng.standard_normal((2, 300))
+    picks, fields = case.law.represent(*latents, log_weights, 70, 9)
+    np.testing.assert_array_equal(picks, systematic(log_weights, 70))
+    meant = case.fields(latents, 9)
+    np.testing.assert_array_equal(fields, np.take_along_axis(meant, picks[..., np.newaxis], axis=1))
 
 
-def of_kind(kind: NoiseKind) -> tuple[Person, History]:
-    draws = generator(7)
-    latents = Prior().sample(2, 60, draws, VALVE_SPACE)
-    latents = latents.with_kind("noise", torch.full_like(latents.noise, kind))
-    person = Prior().person(latents)
-    return person, history(person, 20, draws)
+# What else bears on a trial: neutral in every history, and for each field something that it must equal.
+
+
+def of_kind(kind: NoiseKind) -> tuple[Singles, History]:
+    """Particles with a kind of noise and no change, and trials of theirs."""
+    case = CASES["default"]
+    latents = case.drawn(60, 7, people=2).with_kind("change", np.zeros((2, 60), dtype=np.int64))
+    return case.fields(latents.with_kind("noise", np.full((2, 60), kind))), history(2, 20, 7)
 
 
 def with_circumstances(told: History, **fields: float) -> History:
-    around = told.isi_ms.new_tensor(Circumstances(**fields)).expand(*told.isi_ms.shape, -1)
-    return replace(told, circumstances=around)
+    around = told.columns.copy()
+    around[..., 5:] = Circumstances(**fields)
+    return History(around)
 
 
-def log_likelihood(person: Person, told: History) -> Any:
-    return log_likelihood_of(people_of(person), told).numpy()
+def likelihood(fields: Singles, told: History) -> Singles:
+    return log_likelihoods(fields, told.columns)
 
 
-def response_with(person: Person, **changes: Callable[[Response], torch.Tensor]) -> Person:
-    changed = {name: change(person.response) for name, change in changes.items()}
-    return person._replace(response=person.response._replace(**changed))
-
-
-@pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
-def test_neutral_circumstances_change_nothing(kind: NoiseKind) -> None:
-    person, told = of_kind(kind)
-    np.testing.assert_array_equal(log_likelihood(person, with_circumstances(told)), log_likelihood(person, told))
+def with_field(fields: Singles, field: int, values: Any) -> Singles:
+    changed = fields.copy()
+    changed[..., field] = values
+    return changed
 
 
 @pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
 def test_an_offset_is_a_larger_response(kind: NoiseKind) -> None:
-    person, told = of_kind(kind)
-    larger = response_with(person, log_ratio=lambda r: r.log_ratio + 0.4)
-    got = log_likelihood(person, with_circumstances(told, log_offset=0.4))
-    np.testing.assert_allclose(got, log_likelihood(larger, told), atol=1e-3)
+    fields, told = of_kind(kind)
+    larger = with_field(fields, LOG_RATIO, fields[..., LOG_RATIO] + 0.4)
+    got = likelihood(fields, with_circumstances(told, log_offset=0.4))
+    np.testing.assert_allclose(got, likelihood(larger, told), atol=1e-3)
 
 
 @pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
 def test_a_stronger_pulse_moves_up_a_recruitment_curve_and_is_nothing_to_others(kind: NoiseKind) -> None:
-    person, told = of_kind(kind)
-    moved = response_with(person, rest=lambda r: r.rest + 5.0 * r.slope)
-    got = log_likelihood(person, with_circumstances(told, shift_pct_rmt=5.0))
-    np.testing.assert_allclose(got, log_likelihood(moved, told), atol=1e-3)
+    fields, told = of_kind(kind)
+    higher = with_field(fields, REST, fields[..., REST] + 5.0 * fields[..., SLOPE])
+    got = likelihood(fields, with_circumstances(told, shift_pct_rmt=5.0))
+    np.testing.assert_allclose(got, likelihood(higher, told), atol=1e-3)
+    assert (got != likelihood(fields, told)).any() == (kind in {NoiseKind.RECRUITMENT, NoiseKind.RECTIFIED})
 
 
 @pytest.mark.parametrize("kind", [NoiseKind.RECRUITMENT, NoiseKind.RECTIFIED])
 def test_half_an_enhancement_is_half_a_boost(kind: NoiseKind) -> None:
-    person, told = of_kind(kind)
-    weaker = response_with(person, boost=lambda r: 0.5 * r.boost)
-    got = log_likelihood(person, with_circumstances(told, enhancement=0.5))
-    np.testing.assert_allclose(got, log_likelihood(weaker, told), atol=1e-3)
-
-
-@pytest.mark.parametrize("known_log_sd", [0.0, 0.8])
-@pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
-def test_both_engines_know_the_same_circumstances(kind: NoiseKind, known_log_sd: float) -> None:
-    person, told = of_kind(kind)
-    draws = generator(11)
-    spread = torch.randn((*told.isi_ms.shape, 5), generator=draws)
-    log_sd = known_log_sd * torch.rand(spread[..., 0].shape, generator=draws)
-    known_mv = torch.stack((0.05 * spread[..., 0].abs(), 0.01 * spread[..., 1].abs(), log_sd), dim=-1)
-    around = torch.cat((known_mv, spread[..., 2:3], 5.0 * spread[..., 3:4], torch.rand(spread[..., :1].shape)), dim=-1)
-    told = replace(told, circumstances=around)
-    expected = total_log_likelihood(in_double(person), told.to("cpu", torch.double))
-    np.testing.assert_allclose(log_likelihood(person, told), expected, atol=1e-3)
+    fields, told = of_kind(kind)
+    weaker = with_field(fields, BOOST, 0.5 * fields[..., BOOST])
+    got = likelihood(fields, with_circumstances(told, enhancement=0.5))
+    np.testing.assert_allclose(got, likelihood(weaker, told), atol=1e-3)
 
 
 def test_a_mistaken_known_part_is_paid_for_once_and_not_in_each_trial() -> None:
     # MEPs of TMS alone that are exp(2) times the known part, at one ISI or at ISIs far from each other.
-    person, _ = of_kind(NoiseKind.MISSING)
-    nobody = person._replace(present=torch.zeros_like(person.present))
+    nobody = with_field(of_kind(NoiseKind.MISSING)[0], PRESENT, 0.0)
 
     def lost(isi_ms: Sequence[float]) -> tuple[float, float]:
-        column = torch.tensor([isi_ms] * len(person.present))
-        log_mep, order = torch.full_like(column, math.log(0.25)), torch.arange(len(isi_ms)).expand_as(column).float()
-        told = History(column, torch.zeros_like(column), log_mep, log_mep, order)
+        made = np.stack([neutral(len(isi_ms))] * 2)
+        made[..., 0], made[..., 2:4] = isi_ms, math.log(0.25)
         right, wrong, open_to = (
             np.median(
-                log_likelihood(nobody, with_circumstances(told, known_mv=mv, known_sd_mv=0.2 * mv, known_log_sd=sd))
+                likelihood(
+                    nobody, with_circumstances(History(made), known_mv=mv, known_sd_mv=0.2 * mv, known_log_sd=sd)
+                )
             )
             for mv, sd in ((0.25, 0.0), (0.25 * math.exp(-2.0), 0.0), (0.25 * math.exp(-2.0), 1.0))
         )
@@ -324,37 +248,28 @@ def test_a_mistaken_known_part_is_paid_for_once_and_not_in_each_trial() -> None:
 
 
 def test_a_conditioning_stimulus_without_any_enhancement_is_tms_alone() -> None:
-    person, told = of_kind(NoiseKind.MISSING)
-    alone = replace(told, isi_ms=torch.full_like(told.isi_ms, torch.nan))
-    got = log_likelihood(person, with_circumstances(told, enhancement=0.0))
-    np.testing.assert_array_equal(got, log_likelihood(person, alone))
+    fields, told = of_kind(NoiseKind.MISSING)
+    alone = History(with_field(told.columns, 0, np.nan))
+    got = likelihood(fields, with_circumstances(told, enhancement=0.0))
+    np.testing.assert_array_equal(got, likelihood(fields, alone))
 
 
 @pytest.mark.parametrize("sd_mv", [0.0, 0.02])
 def test_a_known_part_is_added_to_floor_and_response(sd_mv: float) -> None:
     # One particle of a recruitment curve, by its distribution function over 200,000 simulated trials.
-    rng = np.random.default_rng(3)
-    person, _ = of_kind(NoiseKind.RECRUITMENT)
-    shape, response = (Shape(*(f[:1, :1] for f in person.shape)), Response(*(f[:1, :1] for f in person.response)))
-    person = Person(shape, response, torch.ones(1, 1, dtype=torch.bool))
-    fields = {"log_floor": math.log(0.01), "floor_log_sd": 0.2, "log_ratio": math.log(16.0), "spread": 1.0}
-    fields |= {"output_log_sd": 0.3, "rest": -1.0, "boost": 0.0, "drift": 0.0, "startup": 0.0}
-    person = response_with(person, **{k: lambda r, v=v: torch.full_like(r.rest, v) for k, v in fields.items()})
+    rng, fields = np.random.default_rng(3), of_kind(NoiseKind.RECRUITMENT)[0][:1, :1].copy()
+    set_to = {LOG_FLOOR: math.log(0.01), FLOOR_SD: 0.2, LOG_RATIO: math.log(16.0), SPREAD: 1.0, OUTPUT_SD: 0.3}
+    for field, value in (set_to | {REST: -1.0, BOOST: 0.0, DRIFT: 0.0, STARTLED: 0.0, PRESENT: 1.0}).items():
+        fields[..., field] = value
     z = rng.standard_normal((4, 200_000))
     evoked_mv = 0.16 / (1.0 + np.exp(1.0 - z[0])) * np.exp(0.3 * z[1])
-    mep_mv = 0.01 * np.exp(0.2 * z[2]) + evoked_mv + 0.08 + sd_mv * z[3]
+    mep_mv: FloatArray = 0.01 * np.exp(0.2 * z[2]) + evoked_mv + 0.08 + sd_mv * z[3]
     for end_mv in (0.1, 0.13, 0.16, 0.2):
-        end = torch.full((1, 1), math.log(end_mv))
-        told = History(
-            torch.full((1, 1), torch.nan),
-            torch.zeros(1, 1),
-            torch.full((1, 1), -torch.inf),
-            end,
-            torch.full((1, 1), 9.0),
-        )
-        got = np.exp(log_likelihood(person, with_circumstances(told, known_mv=0.08, known_sd_mv=sd_mv)))
+        made = neutral(10)[np.newaxis, 9:].copy()
+        made[..., 0], made[..., 2], made[..., 3] = np.nan, -np.inf, math.log(end_mv)
+        told = with_circumstances(History(made), known_mv=0.08, known_sd_mv=sd_mv)
         # Three of a hundred trials are outliers to the model; the rest is its log-normal sum.
-        assert got.item() == pytest.approx((mep_mv < end_mv).mean(), abs=0.06)
+        assert np.exp(likelihood(fields, told)).item() == pytest.approx((mep_mv < end_mv).mean(), abs=0.06)
 
 
 def test_the_elementary_functions_are_those_of_numpy() -> None:
@@ -367,20 +282,18 @@ def test_the_elementary_functions_are_those_of_numpy() -> None:
     np.testing.assert_allclose(elementary("per_root", positive), positive.astype(float) ** -0.5, rtol=4e-7)
 
 
-@pytest.mark.parametrize("name", TARGETS)
+@pytest.mark.parametrize("name", CASES)
 def test_sweeps_one_by_one_lead_where_sweeps_at_once_do(name: str) -> None:
     # Within a call log densities of blocks are kept from sweep to sweep; each call works them out again.
-    target, found = TARGETS[name], list[tuple[Any, ...]]()
-    latents = target.prior.sample(1, 300, generator(3), target.space)
-    told = history(target.person(latents), 8, generator(4))
-    engine = Compiled(target)
-    start, law = engine.log_likelihood(latents, told).numpy(), engine.law
+    case, told, found = CASES[name], history(1, 8, 4), list[tuple[Any, ...]]()
+    latents = case.drawn(300, 3)
+    start = log_likelihoods(case.fields(latents), told.columns)
     for number, calls in ((6, 1), (1, 6)):
-        values, kinds = latents.values.numpy().copy(), latents.kinds.numpy().copy()
-        log_likelihood, dice, counts = start.copy(), np.full(1, 7, dtype=np.uint64), np.zeros((1, 4), dtype=np.float32)
+        values, kinds, log_likelihood = latents.values.copy(), latents.kinds.copy(), start.copy()
+        dice, counts = np.full(1, 7, dtype=np.uint64), np.zeros((1, 4), dtype=np.float32)
         for _ in range(calls):
-            state = values, kinds, log_likelihood, np.full((1, 300, law.blocks), UNKNOWN)
-            counts += law.sweeps(np.array([number]), columns_of(told), steps_of(told), dice, state)
+            state = values, kinds, log_likelihood, case.law.nothing_known(1, 300)
+            counts += case.law.sweeps(np.array([number]), told.columns, dice, state)
         found.append((values, kinds, log_likelihood, counts))
     for together, one_by_one in zip(*found, strict=True):
         np.testing.assert_array_equal(together, one_by_one)

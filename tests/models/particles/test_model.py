@@ -1,26 +1,25 @@
 import math
 from dataclasses import astuple, replace
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 import pytest
-import torch
+from scipy.special import log_softmax, logsumexp
+from scipy.stats import norm
 
 from isiw.acquisition.information import MutualInformation
 from isiw.design import VALVE_SPACE
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
 from isiw.metrics import covers
-from isiw.models.particles.engine import EngineName, engine_for
-from isiw.models.particles.jumps import WindowTarget
 from isiw.models.particles.latents import LATENTS
 from isiw.models.particles.laws import FOREARM, NoiseShares
-from isiw.models.particles.likelihood import levels, total_log_likelihood
 from isiw.models.particles.model import ParticleModel, ParticlePosterior
-from isiw.models.particles.noise import NoiseKind, draw_log_mep, log_gain, log_likelihood
-from isiw.models.particles.predictions import PersonSample
-from isiw.models.particles.prior import Person, Prior
+from isiw.models.particles.noise import NoiseKind
+from isiw.models.particles.predictions import PersonSample, drawn_mep_mv
+from isiw.models.particles.prior import Prior
 from isiw.models.particles.profile import ProfilePrior
+from isiw.models.particles.records import LOG_FLOOR
 from isiw.models.particles.swarm import Moving
 from isiw.models.protocol import (
     Observation,
@@ -30,20 +29,24 @@ from isiw.models.protocol import (
     SamplesWindows,
     SimulatesPeople,
 )
-from isiw.models.shared.history import History
+from isiw.models.shared.history import History, neutral
 from isiw.models.shared.tables import systematic
+from isiw.models.windows import grid_of
+from isiw.native.engine import log_likelihoods
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.subject import SimulatedSubject
+from isiw.types import FloatArray
 from isiw.window import Window
 from known import known
+from native.drawn import Case, seeds
 
-GRID = torch.arange(0.0, 501.0, 5.0)
+GRID = np.arange(0.0, 501.0, 5.0)
 
 
 def observation(isi_ms: list[float], mep_mv: list[float], response: list[float] | None = None) -> Observation:
     unknown = [math.nan] * len(isi_ms)
     columns = (isi_ms, mep_mv, [0.0] * len(isi_ms), response or unknown)
-    return Observation(*(torch.tensor(column) for column in columns))
+    return Observation(*(np.array(column, dtype=np.float32) for column in columns))
 
 
 def after(model: ParticleModel, trials: list[tuple[float, float]], seed: int = 1) -> ParticlePosterior:
@@ -51,16 +54,6 @@ def after(model: ParticleModel, trials: list[tuple[float, float]], seed: int = 1
     for isi_ms, mep_mv in trials:
         posterior = model.update(posterior, observation([isi_ms], [mep_mv]))
     return posterior
-
-
-def sampled_meps_mv(person: Person, isi_ms: float, generator: torch.Generator) -> list[float]:
-    """One MEP of each person, by inversion of its distribution function on a fine grid."""
-    ends = torch.linspace(math.log(1e-4), math.log(20.0), 1500)
-    level = levels(person, torch.tensor([[isi_ms]])).expand(-1, -1, len(ends))
-    high = ends.expand(len(level), 1, -1)
-    below = log_likelihood(person.response, level, torch.full_like(high, -torch.inf), high).exp()
-    picks = torch.searchsorted(below[:, 0].contiguous(), torch.rand((len(level), 1), generator=generator))
-    return ends[picks.clamp_max(len(ends) - 1)].exp()[:, 0].tolist()
 
 
 def spread_ms(estimate: WindowEstimate) -> np.ndarray:
@@ -90,10 +83,10 @@ def test_model_and_posterior_keep_their_protocols() -> None:
 def test_an_update_changes_no_earlier_posterior() -> None:
     model = ParticleModel(particles=200)
     before = model.begin(VALVE_SPACE, 3)
-    latents = before.swarm.latents.values.clone()
+    latents = before.swarm.latents.values.copy()
     model.update(before, observation([250.0], [0.08]))
     assert before.trials == 0
-    assert torch.equal(before.swarm.latents.values, latents)
+    np.testing.assert_array_equal(before.swarm.latents.values, latents)
 
 
 def test_the_same_seed_and_trials_give_the_same_posterior() -> None:
@@ -111,30 +104,28 @@ def test_people_in_one_batch_do_not_see_each_other() -> None:
         isi_ms = 20.0 + 10.0 * trial
         calm = model.update(calm, observation([isi_ms, isi_ms], [mep_mv, 0.010]))
         wild = model.update(wild, observation([isi_ms, 280.0], [mep_mv, 0.3 * (trial + 1)]))
-        assert torch.equal(calm.swarm.latents.values[0], wild.swarm.latents.values[0])
-        assert torch.equal(calm.swarm.log_weights[0], wild.swarm.log_weights[0])
-    assert not torch.equal(calm.swarm.latents.values[1], wild.swarm.latents.values[1])
+        np.testing.assert_array_equal(calm.swarm.latents.values[0], wild.swarm.latents.values[0])
+        np.testing.assert_array_equal(calm.swarm.log_weights[0], wild.swarm.log_weights[0])
+    assert (calm.swarm.latents.values[1] != wild.swarm.latents.values[1]).any()
     assert calm.estimate(0).probability == wild.estimate(0).probability
 
 
 def test_an_uncertain_isi_is_integrated_out() -> None:
     # The likelihood must be the average over the ISIs that may have come about, here by brute force on 400 quantiles.
-    generator = torch.Generator().manual_seed(4)
-    prior = Prior(ProfilePrior(p_window=1.0))
-    person = prior.person(prior.sample(1, 4000, generator, VALVE_SPACE))
-    isi_ms, isi_sd_ms, mep_mv = 230.0, 3.0, 0.05
+    case = Case(Prior(ProfilePrior(p_window=1.0)), VALVE_SPACE)
+    fields, isi_ms, isi_sd_ms = case.fields(case.drawn(4000, 4)), 230.0, 3.0
 
-    def trial(isi: torch.Tensor, sd: float) -> History:
-        log_mep = torch.full_like(isi, math.log(mep_mv))
-        return History(isi, torch.full_like(isi, sd), log_mep, log_mep, torch.zeros_like(isi))
+    def of_trial(isi: float, sd: float) -> FloatArray:
+        made = neutral(1)[np.newaxis]
+        made[..., :4] = isi, sd, math.log(0.05), math.log(0.05)
+        return log_likelihoods(fields, made).astype(float)
 
-    got = total_log_likelihood(person, trial(torch.tensor([[isi_ms]]), isi_sd_ms))
-    quantiles = torch.special.ndtri((torch.arange(400) + 0.5) / 400)
-    by_isi = [total_log_likelihood(person, trial(torch.tensor([[isi_ms + isi_sd_ms * q]]), 0.0)) for q in quantiles]
-    expected = torch.logsumexp(torch.stack(by_isi), dim=0) - math.log(400)
+    got = of_trial(isi_ms, isi_sd_ms)
+    quantiles = norm.ppf((np.arange(400) + 0.5) / 400)
+    expected = logsumexp([of_trial(isi_ms + isi_sd_ms * q, 0.0) for q in quantiles], axis=0) - math.log(400)
     # Three nodes are exact up to the fifth power of the SD; only the steepest flanks differ.
-    assert (got - expected).abs().median() < 0.005
-    assert (got - expected).abs().quantile(0.99) < 0.1
+    assert np.median(np.abs(got - expected)) < 0.005
+    assert np.quantile(np.abs(got - expected), 0.99) < 0.1
 
 
 def test_an_estimate_knows_the_noise_that_its_samples_suppose() -> None:
@@ -145,10 +136,10 @@ def test_an_estimate_knows_the_noise_that_its_samples_suppose() -> None:
     posterior = ParticleModel(prior).begin(VALVE_SPACE, 3)
     recruits = posterior.swarm.latents.noise == NoiseKind.RECRUITMENT
     width = LATENTS.index("log_width_ms")
-    posterior.swarm.latents.values[..., width] = torch.where(recruits, math.log(250.0), math.log(35.0))
-    weights = torch.linspace(-3.0, 3.0, recruits.shape[-1]).unsqueeze(0)  # every pick is another particle than its own
-    swarm = replace(posterior.swarm, log_weights=torch.log_softmax(weights, -1))
-    estimate = replace(posterior, swarm=swarm).estimate()
+    posterior.swarm.latents.values[..., width] = np.where(recruits, math.log(250.0), math.log(35.0))
+    weights = np.linspace(-3.0, 3.0, recruits.shape[-1])[np.newaxis]  # every pick is another particle than its own
+    crowd = posterior.swarm.crowd._replace(log_weights=log_softmax(weights, axis=-1))
+    estimate = replace(posterior, swarm=replace(posterior.swarm, crowd=crowd)).estimate()
     edges_ms = known(estimate.edge_samples_ms)
     kinds = np.array(estimate.hypothesis_names)[known(estimate.hypothesis_samples)]
     assert set(kinds) == {"constant-CV noise", "recruitment curve, forearm"}
@@ -160,29 +151,26 @@ def test_an_estimate_knows_the_noise_that_its_samples_suppose() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("engine", get_args(EngineName))
-def test_moves_that_learn_nothing_leave_the_prior_as_it_is(engine: EngineName) -> None:
+def test_moves_that_learn_nothing_leave_the_prior_as_it_is() -> None:
     # 8,000 particles, 20 sweeps. Quantiles stay within 0.03, 3 standard errors of a share among 2,500 independent
     # particles, and kinds within 0.025 of their probabilities.
     prior = Prior()
-    generator = torch.Generator().manual_seed(2)
-    reference = prior.sample(1, 100_000, generator, VALVE_SPACE).values[0]
-    latents = prior.sample(1, 8000, generator, VALVE_SPACE)
-    trials = torch.zeros((1, 3))
-    nothing = History(trials, trials, trials - torch.inf, trials + torch.inf, torch.arange(3.0).unsqueeze(0))
-    moves = engine_for(engine, WindowTarget(prior, VALVE_SPACE))
-    moved = moves.sweeps(torch.tensor([20]), latents, torch.zeros(1, 8000), nothing, generator)
-    latents = moved.latents
-    assert 0.05 < moved.shifts.item() < 1
-    assert moved.jumps.item() > 0.8
+    case = Case(prior, VALVE_SPACE)
+    reference, latents = case.drawn(100_000, 1).values[0], case.drawn(8000, 2)
+    nothing = neutral(3)[np.newaxis]
+    nothing[..., 2], nothing[..., 3] = -np.inf, np.inf
+    state = *latents, np.zeros((1, 8000), dtype=np.float32), case.law.nothing_known(1, 8000)
+    counts = case.law.sweeps(np.array([20]), nothing, seeds(2), state)
+    assert 0.05 < counts[0, 1] / counts[0, 0] < 1
+    assert counts[0, 3] / counts[0, 2] > 0.8
     for quantile in (0.1, 0.5, 0.9):
-        below = (latents.values[0] < torch.quantile(reference, quantile, dim=0)).float().mean(0)
-        assert (below - quantile).abs().max() < 0.03
-    assert abs(latents.present.float().mean().item() - prior.profile.p_window) < 0.025
-    kinds_of = {latents.shape: astuple(prior.profile.shapes), latents.noise: astuple(prior.noise)}
-    for kinds, probabilities in (kinds_of | {latents.change: prior.changes.shares}).items():
-        shares = torch.bincount(kinds[0], minlength=len(probabilities)) / 8000
-        assert (shares - torch.tensor(probabilities)).abs().max() < 0.025
+        below = (latents.values[0] < np.quantile(reference, quantile, axis=0)).mean(0)
+        assert np.abs(below - quantile).max() < 0.03
+    assert abs(latents.present.mean() - prior.profile.p_window) < 0.025
+    kinds_of = [(latents.shape, astuple(prior.profile.shapes)), (latents.noise, astuple(prior.noise))]
+    for kinds, probabilities in (*kinds_of, (latents.change, prior.changes.shares)):
+        shares = np.bincount(kinds[0], minlength=len(probabilities)) / 8000
+        assert np.abs(shares - probabilities).max() < 0.025
 
 
 @pytest.mark.slow
@@ -190,7 +178,7 @@ def test_moved_particles_agree_with_plain_importance_sampling() -> None:
     # The reference weights 100,000 particles of the prior by the likelihood of all trials at once.
     trials = evenly(cohort("gaussian", 3, 0)[2], 6)[:4]
     reference = after(ParticleModel(particles=100_000, moves=Moving(sweeps=0, min_ess=0.0)), trials)
-    ess = torch.exp(-torch.logsumexp(2 * reference.swarm.log_weights, -1)).item()
+    ess = 1.0 / np.exp(2 * reference.swarm.log_weights).sum()
     assert ess > 500
     expected = reference.estimate()
     got = [after(ParticleModel(particles=1000), trials, seed).estimate() for seed in range(4)]
@@ -256,19 +244,19 @@ def test_data_that_break_things_give_finite_beliefs(trials: list[tuple[float, fl
     posterior = after(ParticleModel(particles=300), trials)
     estimate = posterior.estimate()
     assert 0 <= known(estimate.probability) <= 1
-    assert torch.isfinite(posterior.swarm.log_likelihood).all()
+    assert np.isfinite(posterior.swarm.crowd.log_likelihood).all()
     mass = posterior.outcome_mass(GRID)
-    assert torch.isfinite(mass).all()
-    torch.testing.assert_close(mass.sum(-1), torch.ones_like(mass[..., 0]))
+    assert np.isfinite(mass).all()
+    np.testing.assert_allclose(mass.sum(-1), 1.0, rtol=1e-5)
 
 
 def test_tms_alone_teaches_the_baseline_and_nothing_about_the_window() -> None:
     model = ParticleModel()
     posterior = model.begin(VALVE_SPACE, 1)
-    before = posterior.sample.person.response.log_floor.std().item()
+    before = posterior.sample.fields[..., LOG_FLOOR].std()
     for mep_mv in (0.009, 0.011, 0.010, 0.008):
         posterior = model.update(posterior, observation([math.nan], [mep_mv]))
-    assert posterior.sample.person.response.log_floor.std().item() < before / 3
+    assert posterior.sample.fields[..., LOG_FLOOR].std() < before / 3
     assert abs(known(posterior.estimate().probability) - Prior().profile.p_window) < 0.08
 
 
@@ -286,23 +274,25 @@ def test_responses_seen_or_not_are_learnt_from() -> None:
 
 def test_resampling_leaves_particles_to_a_rare_hypothesis_and_its_probability_as_it_is() -> None:
     model = ParticleModel(particles=4000, moves=Moving(sweeps=0, min_ess=1.0))
-    swarm = model.begin(VALVE_SPACE, 1).swarm
-    changed = swarm.latents.change > 0
-    swarm = replace(swarm, log_weights=torch.log_softmax(torch.where(changed, -9.0, 0.0), dim=-1))
-    probability = (swarm.log_weights.exp() * changed).sum().item()
+    posterior = model.begin(VALVE_SPACE, 1)
+    changed = posterior.swarm.latents.change > 0
+    log_weights = log_softmax(np.where(changed, -9.0, 0.0), axis=-1)
+    probability = np.exp(log_weights)[changed].sum()
     assert probability < 1e-4
-    engine = engine_for("torch", WindowTarget(model.prior, VALVE_SPACE))
-    moved = swarm.moved(engine, model.moves, torch.Generator().manual_seed(1))
+    swarm = replace(posterior.swarm, crowd=posterior.swarm.crowd._replace(log_weights=log_weights))
+    nothing = neutral(1)[np.newaxis]
+    nothing[..., 2], nothing[..., 3] = -np.inf, np.inf
+    moved = swarm.after(History(nothing), posterior.law, model.moves, 1)
     changed = moved.latents.change > 0
-    assert changed.double().mean() > 0.1  # eight hypotheses, each with three in a hundred before the shares sum to one
-    assert (moved.log_weights.exp() * changed).sum().item() == pytest.approx(probability, rel=0.1)
-    assert moved.latents.present.double().mean() == pytest.approx(model.prior.profile.p_window, abs=0.1)
+    assert changed.mean() > 0.1  # eight hypotheses, each with three in a hundred before the shares sum to one
+    assert np.exp(moved.log_weights)[changed].sum() == pytest.approx(probability, rel=0.1)
+    assert moved.latents.present.mean() == pytest.approx(model.prior.profile.p_window, abs=0.1)
 
 
 def test_systematic_picks_are_as_frequent_as_their_weights() -> None:
-    weights = torch.tensor([[0.1, 0.6, 0.3]])
-    picks = systematic(weights.log(), 1000)
-    torch.testing.assert_close(torch.bincount(picks[0]) / 1000, weights[0], rtol=0, atol=1e-3)
+    weights = np.array([[0.1, 0.6, 0.3]])
+    picks = systematic(np.log(weights), 1000)
+    np.testing.assert_allclose(np.bincount(picks[0]) / 1000, weights[0], atol=1.1e-3)
 
 
 @pytest.mark.parametrize(
@@ -333,17 +323,16 @@ def test_people_of_its_own_have_windows_as_often_as_believed_and_meps_of_their_o
 def test_intervals_hold_what_they_promise_on_the_models_own_people() -> None:
     # People drawn from the prior, whose MEPs are drawn from their own predictive distribution; 200 people, 20 trials at
     # even ISIs. The 90 % intervals of 200 honest posteriors cover 0.83 to 0.96 (99.8 %).
-    generator = torch.Generator().manual_seed(11)
-    beliefs = Prior(ProfilePrior(p_window=1.0))
-    hidden = beliefs.person(beliefs.sample(200, 1, generator, VALVE_SPACE))
-    model = ParticleModel(prior=beliefs)
+    rng, beliefs = np.random.default_rng(11), Prior(ProfilePrior(p_window=1.0))
+    case, model = Case(beliefs, VALVE_SPACE), ParticleModel(prior=beliefs)
+    hidden = case.drawn(1, 11, people=200)
     posterior = model.begin(VALVE_SPACE, 12, people=200)
-    isis_ms = torch.linspace(170, 440, 20)[torch.randperm(20, generator=generator)]
-    for isi_ms in isis_ms.tolist():
-        meps_mv = sampled_meps_mv(hidden, isi_ms, generator)
-        posterior = model.update(posterior, observation([isi_ms] * 200, meps_mv))
-    sample = PersonSample(hidden, VALVE_SPACE)
-    masks = sample.window_masks(torch.tensor(VALVE_SPACE.grid_ms, dtype=torch.float32))[:, 0].numpy()
+    isis_ms = rng.permutation(np.linspace(170, 440, 20)).astype(np.float32)
+    fields = case.fields(hidden)
+    meps_mv = np.stack([drawn_mep_mv(fields[i : i + 1], isis_ms, rng) for i in range(200)])
+    for isi_ms, each_mv in zip(isis_ms.tolist(), meps_mv.T, strict=True):
+        posterior = model.update(posterior, observation([isi_ms] * 200, each_mv.tolist()))
+    masks = PersonSample(case.fields(hidden, 20), VALVE_SPACE).window_masks(grid_of(VALVE_SPACE))[:, 0]
     windows = [Window.from_mask(VALVE_SPACE.grid_ms, mask) for mask in masks]
     pairs = [(posterior.estimate(i), window) for i, window in enumerate(windows) if window is not None]
     covered = np.array([covers(estimate, window, VALVE_SPACE) for estimate, window in pairs])
@@ -359,8 +348,6 @@ def test_intervals_hold_what_they_promise_on_the_models_own_people() -> None:
         {"particles": 10**9},
         {"thinned": 0},
         {"detection_limit_mv": 0.0},
-        {"device": "tpu"},
-        {"device": "meta"},
     ],
 )
 def test_an_invalid_model_is_refused(wrong: dict[str, Any]) -> None:
@@ -375,21 +362,16 @@ def test_invalid_moves_are_refused(wrong: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("isi_ms", [180.0, 260.0, 330.0, 450.0])
-def test_mutual_information_agrees_with_brute_force_within_its_error(isi_ms: float) -> None:
-    # 25600 MEPs drawn from the law itself, each weighed under its own sample and under all 128; three standard errors.
+def test_mutual_information_agrees_with_that_of_the_law_on_a_fine_grid(isi_ms: float) -> None:
     posterior = after(ParticleModel(thinned=128), [(100.0, 0.01), (250.0, 0.09), (280.0, 0.12), (400.0, 0.012)])
-    person = posterior.sample.person
-    draws, samples = 200, person.present.shape[1]
-    level = levels(person, torch.tensor([[isi_ms]]))
-    gain = log_gain(person.response, torch.tensor([float(posterior.trials)]))
-    log_mep = draw_log_mep(person.response, level.expand(-1, -1, draws), torch.Generator().manual_seed(3), gain)
-    everyone = log_mep.reshape(1, 1, -1)
-    each = log_likelihood(person.response, level.expand(-1, -1, everyone.shape[-1]), everyone, everyone, gain)[0]
-    own = each.gather(0, torch.arange(samples).repeat_interleave(draws)[None]).squeeze(0)
-    information = own - torch.logsumexp(each, dim=0) + math.log(samples)
-    error = information.std().item() / math.sqrt(len(information))
-    score = MutualInformation()(posterior, torch.tensor([isi_ms])).item()
-    assert score == pytest.approx(information.mean().item(), abs=3 * error)
+    log_mep = np.linspace(math.log(1e-4), math.log(50.0), 2001)
+    made = np.tile(neutral(posterior.trials + 1)[-1], (2001, 1, 1))
+    made[..., 0], made[..., 2], made[..., 3] = isi_ms, log_mep[:, np.newaxis], log_mep[:, np.newaxis]
+    each = np.exp(log_likelihoods(np.tile(posterior.sample.fields, (2001, 1, 1)), made), dtype=float)
+    each /= each.sum(0)
+    mean = each.mean(-1, keepdims=True)
+    expected = (each * np.log(each / mean)).sum(0).mean()
+    assert MutualInformation()(posterior, np.array([isi_ms])).item() == pytest.approx(expected, abs=0.02)
 
 
 def test_isis_are_chosen_with_the_usual_more_probable_and_the_rest_is_believed_as_ever() -> None:
@@ -403,8 +385,9 @@ def test_isis_are_chosen_with_the_usual_more_probable_and_the_rest_is_believed_a
     )
     assert expected < 0.6 * believed
     assert reached == pytest.approx(expected, rel=0.1)
-    assert (asking.trials, asking.swarm.latents) == (posterior.trials, posterior.swarm.latents)
-    torch.testing.assert_close(asking.swarm.log_weights.exp().sum(), torch.tensor(1.0))
+    assert asking.trials == posterior.trials
+    assert asking.swarm.crowd.values is posterior.swarm.crowd.values
+    assert np.exp(asking.swarm.log_weights).sum() == pytest.approx(1.0)
 
 
 def test_a_window_that_trials_show_to_be_late_is_asked_about_all_the_same() -> None:
@@ -412,14 +395,13 @@ def test_a_window_that_trials_show_to_be_late_is_asked_about_all_the_same() -> N
     away_ms = []
     for seed in range(6):
         posterior = after(ParticleModel(), [(float(isi_ms), mep_mv) for isi_ms, mep_mv in trials], seed)
-        weights = posterior.as_usual.swarm.log_weights.exp()
-        start_ms = posterior.swarm.latents.values[..., LATENTS.index("start_ms")]
-        away_ms.append((weights * (start_ms - 300.0).abs()).sum().item())
+        weights, start_ms = np.exp(posterior.as_usual.swarm.log_weights), posterior.swarm.latents.of("start_ms")
+        away_ms.append((weights * np.abs(start_ms - 300.0)).sum())
     assert np.mean(away_ms) < 40.0
 
 
 def test_where_everything_is_kept_isis_are_chosen_with_what_is_believed() -> None:
     posterior = after(ParticleModel(unusual_kept=1.0), [(250.0, 0.1), (100.0, 0.01)])
-    torch.testing.assert_close(posterior.as_usual.swarm.log_weights, posterior.swarm.log_weights)
+    np.testing.assert_allclose(posterior.as_usual.swarm.log_weights, posterior.swarm.log_weights)
     with pytest.raises(InvalidValueError, match="unusual_kept"):
         ParticleModel(unusual_kept=1.5)

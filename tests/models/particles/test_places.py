@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
-import torch
+from scipy.special import softmax
+from scipy.stats import norm
 
-from isiw.design import IMPACT_SPACE, VALVE_SPACE
+from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.models.particles import ParticleModel
 from isiw.models.particles.places import Place
@@ -17,6 +19,8 @@ from isiw.models.particles.profile import ProfilePrior
 from isiw.models.shared.scales import Scale
 from isiw.models.shared.start import StartPrior
 from isiw.priors.population import beside
+from isiw.types import Singles
+from native.drawn import Case
 
 MANY = 20_000
 HERE = Place(0.5, Scale(150.0, 5.0), Scale(60.0, 0.1))
@@ -28,17 +32,16 @@ def prior_with(*places: Place) -> Prior:
     return replace(usual, profile=replace(usual.profile, places=places))
 
 
-def drawn(prior: Prior) -> torch.Tensor:
-    return prior.sample(1, MANY, torch.Generator().manual_seed(1), VALVE_SPACE).values
+def drawn(prior: Prior, space: DesignSpace = VALVE_SPACE) -> Singles:
+    return Case(prior, space).drawn(MANY, 1).values
 
 
 def test_windows_are_in_their_places_as_often_as_stated_and_have_the_width_of_the_place() -> None:
     values = drawn(prior_with(HERE, THERE))[0]
     for place in (HERE, THERE):
-        inside = ((values[:, 0] - place.start_ms.median).abs() < 20) & (
-            (values[:, 1].exp() / place.width_ms.median).log().abs() < 0.4
-        )
-        assert place.share < inside.float().mean() < place.share + 0.04
+        inside = np.abs(values[:, 0] - place.start_ms.median) < 20
+        inside &= np.abs(values[:, 1] - np.log(place.width_ms.median)) < 0.4
+        assert place.share < inside.mean() < place.share + 0.04
 
 
 def test_start_and_width_have_a_density_that_is_the_law_of_the_draws() -> None:
@@ -46,16 +49,14 @@ def test_start_and_width_have_a_density_that_is_the_law_of_the_draws() -> None:
     prior = prior_with(HERE, THERE)
     values = drawn(prior)
     start, width = values[..., 0], values[..., 1]
-    other = torch.distributions.Normal(150.0, 4.0).log_prob(start) + torch.distributions.Normal(4.1, 0.08).log_prob(
-        width
-    )
-    ratio = (other - prior.log_densities(values, VALVE_SPACE)["place"]).exp()
+    other = norm.logpdf(start, 150.0, 4.0) + norm.logpdf(width, 4.1, 0.08)
+    ratio = np.exp(other - prior.log_densities(values, VALVE_SPACE)["place"])
     assert ratio.mean().item() == pytest.approx(1.0, abs=0.03)
 
 
 def test_each_place_has_its_part_of_the_density() -> None:
     prior = prior_with(HERE, THERE)
-    parts = prior.log_places(drawn(prior), VALVE_SPACE).softmax(-1)[0]
+    parts = softmax(prior.log_places(drawn(prior), VALVE_SPACE), axis=-1)[0]
     assert parts.mean(0).tolist() == pytest.approx([0.3, 0.5, 0.2], abs=0.02)
 
 
@@ -64,14 +65,14 @@ def test_without_places_and_early_windows_start_and_width_do_not_depend_on_each_
     values = drawn(prior)
     start = prior.profile.start.log_density(values[..., 0], VALVE_SPACE)
     width = prior.mixtures["width"].log_density(values[..., 1:2])
-    torch.testing.assert_close(prior.log_densities(values, VALVE_SPACE)["place"], start + width)
+    np.testing.assert_allclose(prior.log_densities(values, VALVE_SPACE)["place"], start + width, rtol=1e-6)
 
 
 def test_windows_that_start_before_the_hit_are_wide_and_others_start_when_they_like() -> None:
     prior = Prior(ProfilePrior(start=StartPrior(p_anywhere=0.0)))
-    start, width = prior.sample(1, MANY, torch.Generator().manual_seed(1), IMPACT_SPACE).values[0, :, :2].T
-    early, wide = (start > -40) & (start < 0), width.exp() > 160
-    assert (early & wide).float().mean() > 0.08
+    start, width = drawn(prior, IMPACT_SPACE)[0, :, :2].T
+    early, wide = (start > -40) & (start < 0), np.exp(width) > 160
+    assert (early & wide).mean() > 0.08
     assert (wide & early).sum() / wide.sum() > 0.25
     assert (~wide & early).sum() / (~wide).sum() < 0.1
 
@@ -82,9 +83,8 @@ def test_early_windows_have_a_density_that_is_the_law_of_the_draws(hit_delay_ms:
     prior = Prior(ProfilePrior(start=StartPrior(hit_delay_ms=hit_delay_ms)))
     values = drawn(prior)
     for start_ms, log_width in ((165.0, 5.3), (230.0, 4.7)):
-        other = torch.distributions.Normal(start_ms, 10.0).log_prob(values[..., 0])
-        other = other + torch.distributions.Normal(log_width, 0.3).log_prob(values[..., 1])
-        ratio = (other - prior.log_densities(values, VALVE_SPACE)["place"]).exp()
+        other = norm.logpdf(values[..., 0], start_ms, 10.0) + norm.logpdf(values[..., 1], log_width, 0.3)
+        ratio = np.exp(other - prior.log_densities(values, VALVE_SPACE)["place"])
         assert ratio.mean().item() == pytest.approx(1.0, abs=0.06)
 
 
@@ -125,5 +125,5 @@ def test_a_known_muscle_keeps_what_was_learnt_of_it() -> None:
         "as in the lab",
     ]
     assert len(set(prior.hypotheses)) == len(prior.hypotheses) == 7
-    latents = prior.sample(1, 500, torch.Generator().manual_seed(1), VALVE_SPACE)
+    latents = Case(prior, VALVE_SPACE).drawn(500, 1)
     assert int(prior.hypothesis(latents).max()) < 7

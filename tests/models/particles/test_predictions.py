@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import torch
 
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.metrics import f1
@@ -12,8 +11,9 @@ from isiw.models.particles.prior import Prior
 from isiw.models.particles.profile import ProfilePrior
 from isiw.models.protocol import Observation
 from isiw.models.shared.start import StartPrior
-from isiw.models.windows import profile_grid
+from isiw.models.windows import grid_of, profile_grid
 from isiw.window import Window, window_from_excess
+from native.drawn import Case
 
 
 @pytest.mark.parametrize(
@@ -28,12 +28,10 @@ from isiw.window import Window, window_from_excess
 )
 def test_windows_are_those_of_the_rule_also_where_a_peak_lies_beyond_the_range(space: DesignSpace) -> None:
     # Tables of facilitations are interpolated in windows and in MEPs; they differ where an edge or a peak lies between.
-    beliefs = Prior(ProfilePrior(p_window=0.9, start=StartPrior(p_anywhere=0.3)))
-    person = beliefs.person(beliefs.sample(1, 1000, torch.Generator().manual_seed(3), space))
-    sample = PersonSample(person, space)
-    grid_ms = torch.tensor(space.grid_ms, dtype=torch.float32)
-    masks = sample.window_masks(grid_ms)[0].numpy()
-    meps_mv, baselines_mv = (x[0].double().numpy() for x in (sample.expected_mep_mv(grid_ms), sample.baselines_mv()))
+    case = Case(Prior(ProfilePrior(p_window=0.9, start=StartPrior(p_anywhere=0.3))), space)
+    sample, grid_ms = PersonSample(case.fields(case.drawn(1000, 3)), space), grid_of(space)
+    masks = sample.window_masks(grid_ms)[0]
+    meps_mv, baselines_mv = (x[0].astype(float) for x in (sample.expected_mep_mv(grid_ms), sample.baselines_mv()))
     told = [Window.from_mask(space.grid_ms, mask) for mask in masks]
     ruled = [
         window_from_excess(space.grid_ms, mep_mv - baseline_mv, baseline_mv)
@@ -44,9 +42,10 @@ def test_windows_are_those_of_the_rule_also_where_a_peak_lies_beyond_the_range(s
     assert np.quantile(scores[scores > 0], 0.01) > 0.98
 
 
+@pytest.mark.slow
 def test_nine_of_ten_meps_of_people_in_general_lie_in_the_predicted_band() -> None:
     model = ParticleModel(particles=2000, thinned=1000)
-    isis_ms = profile_grid(VALVE_SPACE).double().numpy()
+    isis_ms = profile_grid(VALVE_SPACE).astype(float)
     low_mv, high_mv = model.begin(VALVE_SPACE, seed=5).prediction_mv(0.9)
     assert low_mv.shape == high_mv.shape == isis_ms.shape
     meps_mv = np.stack([model.simulate(VALVE_SPACE, seed, [isis_ms[50]]).mep_mv for seed in range(600)])[:, 0]

@@ -6,14 +6,14 @@ import math
 from dataclasses import dataclass
 from typing import Any, cast
 
+import numpy as np
 import pytest
-import torch
 
 from isiw.checks import Checked
 from isiw.errors import InvalidValueError
 from isiw.models.shared.scales import AnyScale, PositiveScale, Scale
 
-Z = torch.linspace(-3, 3, 61)
+Z = np.linspace(-3, 3, 61)
 
 
 @dataclass(frozen=True)
@@ -24,17 +24,16 @@ class Believed(Checked):
 
 def test_the_median_is_that_of_the_quantity_and_the_sd_that_of_its_logarithm() -> None:
     scale = Scale(100.0, 0.4)
-    assert scale.log_normal(torch.tensor([0.0])).item() == pytest.approx(100.0)
-    assert scale.log_normal(torch.tensor([1.0])).item() == pytest.approx(100.0 * math.exp(0.4))
-    assert scale.normal(torch.tensor([-1.0])).item() == pytest.approx(99.6)
-    assert Scale(0.0, 1.0).probability(torch.tensor([0.0])).item() == 0.5
+    assert math.exp(scale.log.normal(0.0)) == pytest.approx(100.0)
+    assert math.exp(scale.log.normal(1.0)) == pytest.approx(100.0 * math.exp(0.4))
+    assert scale.normal(-1.0) == pytest.approx(99.6)
 
 
 def test_a_tail_reaches_further_and_leaves_the_middle_where_it_is() -> None:
     plain, tailed = (Scale(0.0, 1.0, tail).normal(Z) for tail in (0.0, 0.1))
-    assert (tailed.diff() > 0).all()
+    assert (np.diff(tailed) > 0).all()
     assert tailed[-1] - plain[-1] == pytest.approx(2.7)
-    assert (tailed - plain).abs()[Z.abs() < 0.5].max() < 0.02
+    assert np.abs(tailed - plain)[np.abs(Z) < 0.5].max() < 0.02
 
 
 def test_pairs_and_lists_are_scales() -> None:

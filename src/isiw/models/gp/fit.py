@@ -23,10 +23,10 @@ from isiw.models.gp.prior import (
     Hyperparameters,
     ProcessSettings,
     Standardisation,
+    Tensor,
     correlations,
     regression,
 )
-from isiw.models.protocol import Tensor
 from isiw.models.shared.history import PersonTrials
 from isiw.types import FloatArray
 

@@ -17,11 +17,13 @@ from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
 from isiw.lazy import botorch, torch
 from isiw.models.gp.fit import Fit, fit
-from isiw.models.gp.prior import ProcessSettings, Standardisation, Transform, expected_mep_mv, scale_of
-from isiw.models.protocol import Observation, Tensor
+from isiw.models.gp.prior import ProcessSettings, Standardisation, Tensor, Transform, expected_mep_mv, scale_of
+from isiw.models.protocol import Observation
 from isiw.models.shared.history import AmplitudeHistory, FloorKind, FloorTreatment, OfAmplitudes, PersonTrials
 from isiw.models.shared.tables import systematic
-from isiw.models.windows import Runs, SampledProfiles, grid_of, least_excess_mv, profile_grid, sampled_estimate
+from isiw.models.windows import Runs, SampledProfiles, grid_of, profile_grid, sampled_estimate
+from isiw.types import Array, Singles
+from isiw.window import least_excess_mv
 
 PATH_STEP_MS = 4.0
 """Paths are drawn at ISIs this far apart at most, and are straight in between; length scales are 10 ms and more."""
@@ -61,7 +63,7 @@ class Paths(NamedTuple):
 
 def draw_paths(found: Fit, isi_ms: Tensor, size: int, rng: np.random.Generator) -> Paths:
     """Draw sample paths, from each process as many as it is believable."""
-    picks = systematic(torch.log_softmax(found.log_joint, 0).unsqueeze(0), size)[0]
+    picks = torch.as_tensor(systematic(found.log_joint.numpy()[None], size)[0])
     chosen = found.processes.picked(picks)
     present = chosen.amplitude > 0
     # The first of a path's numbers is its constant's, which is drawn last.
@@ -140,7 +142,7 @@ class ProfileSample:
         """Expected MEP at the window's edge [mV], shape (b, s, 1); infinite if there is no window."""
         floor_mv = self.floor_mv
         peak_mv = self._expected_mv.amax(-1) - floor_mv
-        level_mv = floor_mv + least_excess_mv(peak_mv, floor_mv)
+        level_mv = floor_mv + torch.as_tensor(least_excess_mv(peak_mv, floor_mv)).to(floor_mv)
         return torch.where(self.paths.present, level_mv, torch.inf).unsqueeze(-1)
 
     @cached_property
@@ -267,32 +269,32 @@ class GaussianProcessPosterior(OfAmplitudes):
         paths = Paths(*(x if x.dtype == torch.bool else x.float() for x in stacked))
         return ProfileSample(isi_ms.float(), paths, self.model.transform, self.model.floor.floor)
 
-    def outcome_mass(self, isi_ms: Tensor) -> Tensor:
+    def outcome_mass(self, isi_ms: Array) -> Singles:
         """Predictive distribution of the next MEP; see `PredictsOutcomes`."""
-        return self._sample.outcome_mass(isi_ms)
+        return self._sample.outcome_mass(torch.tensor(isi_ms)).numpy()
 
-    def window_masks(self, isi_ms: Tensor) -> Tensor:
+    def window_masks(self, isi_ms: Array) -> Singles:
         """Sampled windows; see `SamplesWindows`."""
-        return self._sample.window_masks(isi_ms)
+        return self._sample.window_masks(torch.tensor(isi_ms)).numpy()
 
-    def profiles_mv(self, isi_ms: Tensor) -> Tensor:
+    def profiles_mv(self, isi_ms: Array) -> Singles:
         """Sampled profiles; see `SamplesProfiles`."""
-        return self._sample.expected_mep_mv(isi_ms)
+        return self._sample.expected_mep_mv(torch.tensor(isi_ms)).numpy()
 
-    def baselines_mv(self) -> Tensor:
+    def baselines_mv(self) -> Singles:
         """Sampled floors; see `SamplesProfiles`. They are 0 unless the floor is `"subtracted"`."""
-        return self._sample.floor_mv
+        return self._sample.floor_mv.numpy()
 
-    def condition(self, isi_ms: Tensor, mep_mv: Tensor) -> GaussianProcessPosterior:
+    def condition(self, isi_ms: Array, mep_mv: Array) -> GaussianProcessPosterior:
         """The posterior after one more trial, with the same hyperparameters; see `Conditions`."""
         return replace(self, told=self.told.appended(Observation.of(isi_ms, mep_mv)), held=self.fits)
 
-    def log_evidence(self) -> Tensor:
+    def log_evidence(self) -> Singles:
         """Log marginal likelihood of the trials, as a density of log amplitudes [nat]; see `HasEvidence`.
 
         It compares these processes, under equal noise and empirical Bayes, with each other only, not with other models.
         """
-        return torch.tensor([f.log_evidence for f in self.fits], dtype=torch.float32)
+        return np.array([f.log_evidence for f in self.fits], dtype=np.float32)
 
     @property
     def trouble(self) -> str | None:
@@ -310,7 +312,7 @@ class GaussianProcessPosterior(OfAmplitudes):
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person."""
-        grid = grid_of(self.space, torch.device("cpu"))
+        grid = grid_of(self.space)
 
         def profiles() -> SampledProfiles:
             mep_mv = self.profiles_mv(profile_grid(self.space))

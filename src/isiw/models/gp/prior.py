@@ -12,9 +12,10 @@ import numpy as np
 from isiw.checks import Checked, Count, Number, Positive, number
 from isiw.errors import InvalidValueError
 from isiw.lazy import botorch, gpytorch, torch
-from isiw.models.protocol import Tensor
 from isiw.models.shared.scales import PositiveScale, Scale
 from isiw.types import FloatArray
+
+Tensor: TypeAlias = "torch.Tensor"
 
 GRID_SD = 2.25
 GRID_POINTS = (7, 5, 7)

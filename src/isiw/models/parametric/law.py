@@ -17,10 +17,10 @@ from typing import Annotated, Final, Literal, NamedTuple
 from isiw.checks import Checked, number
 from isiw.design import DesignSpace
 from isiw.lazy import torch
-from isiw.models.protocol import Tensor
-from isiw.models.shared.normal import log_between
+from isiw.models.parametric.normal import log_between
+from isiw.models.parametric.tables import Tensor
 from isiw.models.shared.scales import AnyScale, PositiveScale, Scale
-from isiw.models.shared.start import Span, StartPrior
+from isiw.models.shared.start import Knots, Span, StartPrior
 
 Likelihood = Literal["gamma", "log-normal", "input-noise"]
 """Families of the MEP around its expectation."""
@@ -53,6 +53,20 @@ class Unknowns(NamedTuple):
 
 
 _Evoked = tuple[Tensor, Tensor, Tensor, Tensor, Tensor]
+
+
+def _positive(scale: Scale, z: Tensor) -> Tensor:
+    """The positive quantity at some latents, same shape."""
+    return torch.exp(scale.log.normal(z))
+
+
+def start_at(quantile: Tensor, knots: Knots) -> Tensor:
+    """Starts [ms] at some quantiles of their law, straight between its knots, same shape."""
+    below, start_ms = (torch.from_numpy(column).to(quantile) for column in (knots.below, knots.start_ms))
+    right = torch.searchsorted(below, quantile.detach().contiguous()).clamp(1, len(below) - 1)
+    left = right - 1
+    share = (quantile - below[left]) / (below[right] - below[left]).clamp_min(1e-12)
+    return start_ms[left] + share.clamp(0.0, 1.0) * (start_ms[right] - start_ms[left])
 
 
 @dataclass(frozen=True)
@@ -112,20 +126,21 @@ class WindowPrior(Checked):
     def unknowns(self, latents: Tensor, likelihood: Likelihood, space: DesignSpace) -> Unknowns:
         """The unknowns that standard normal latents stand for."""
         z = dict(zip(latent_names(likelihood), latents.unbind(-1), strict=True))
-        floor_mv = self.floor.mean_mv.log_normal(z["floor"])
+        floor_mv = _positive(self.floor.mean_mv, z["floor"])
         evoked = self._saturating(z, floor_mv) if likelihood == "input-noise" else self._proportional(z, floor_mv)
-        start_ms = self.start.start_ms(torch.special.ndtr(z["start"]), space)
-        width_ms = self.width_ms.log_normal(z["width"])
-        floor_cv, p_outlier = self.floor.cv.log_normal(z["floor_cv"]), self.outliers.probability(z["outliers"])
+        start_ms = start_at(torch.special.ndtr(z["start"]), self.start.knots(space))
+        width_ms = _positive(self.width_ms, z["width"])
+        floor_cv = _positive(self.floor.cv, z["floor_cv"])
+        p_outlier = torch.sigmoid(self.outliers.normal(z["outliers"]))
         return Unknowns(start_ms, width_ms, floor_mv, floor_cv, *evoked, p_outlier)
 
     def _saturating(self, z: Mapping[str, Tensor], floor_mv: Tensor) -> _Evoked:
         """Baseline, amplitude, CV, saturation and input SD of a saturating curve."""
         curve = self.input_noise
-        saturation_mv = floor_mv * curve.saturation.log_normal(z["amplitude"])
-        input_sd, rest = curve.input_sd.log_normal(z["noise"]), curve.rest.normal(z["rest"])
+        saturation_mv = floor_mv * _positive(curve.saturation, z["amplitude"])
+        input_sd, rest = _positive(curve.input_sd, z["noise"]), curve.rest.normal(z["rest"])
         # Averaged over its noise, a probit of the input is a probit again, only flatter.
-        blur, boosted = torch.sqrt(1.0 + input_sd.square()), rest + curve.boost.log_normal(z["boost"])
+        blur, boosted = torch.sqrt(1.0 + input_sd.square()), rest + _positive(curve.boost, z["boost"])
         at_rest, at_centre = (torch.special.ndtr(x / blur) for x in (rest, boosted))
         baseline_mv = floor_mv + saturation_mv * at_rest
         output_cv = torch.full_like(floor_mv, OUTPUT_CV)
@@ -133,9 +148,9 @@ class WindowPrior(Checked):
 
     def _proportional(self, z: Mapping[str, Tensor], floor_mv: Tensor) -> _Evoked:
         """Baseline, amplitude, CV, saturation and input SD if the MEP is in proportion to its level."""
-        amplitude_mv = floor_mv * self.amplitude.log_normal(z["amplitude"])
+        amplitude_mv = floor_mv * _positive(self.amplitude, z["amplitude"])
         ones = torch.ones_like(floor_mv)
-        return floor_mv, amplitude_mv, self.cv.log_normal(z["noise"]), ones, 0.0 * ones
+        return floor_mv, amplitude_mv, _positive(self.cv, z["noise"]), ones, 0.0 * ones
 
 
 NODES: Final = 12

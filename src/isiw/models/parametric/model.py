@@ -20,12 +20,13 @@ from isiw.lazy import torch
 from isiw.models.parametric.importance import Effort
 from isiw.models.parametric.law import Likelihood, Unknowns, WindowPrior, draw_log_mep, levels, log_likelihood
 from isiw.models.parametric.sampling import Chains, WindowProgram, sample_person
-from isiw.models.protocol import Observation, PriorPerson, Tensor
+from isiw.models.parametric.tables import Tensor, Trials, interpolated, step_generator, table_levels
+from isiw.models.protocol import Observation, PriorPerson
 from isiw.models.shared.history import History, observed, without_known
-from isiw.models.shared.tables import OUTCOMES, SIMULATED, interpolated, step_generator, systematic, table_levels
-from isiw.models.windows import Runs, SampledProfiles, least_excess_mv, profile_grid, sampled_estimate
-from isiw.types import ArrayLike
-from isiw.window import Window
+from isiw.models.shared.tables import OUTCOMES, SIMULATED, systematic
+from isiw.models.windows import Runs, SampledProfiles, profile_grid, sampled_estimate
+from isiw.types import Array, ArrayLike, FloatArray, Singles
+from isiw.window import Window, least_excess_mv
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ class ParametricModel(Checked):
 
     def begin(self, space: DesignSpace, seed: int, people: int = 1) -> ParametricPosterior:
         """The posterior before the first trial."""
-        return self._after(space, seed, History.empty(people, torch.device("cpu")).to("cpu", torch.double))
+        return self._after(space, seed, History.empty(people))
 
     def update(self, posterior: ParametricPosterior, observation: Observation) -> ParametricPosterior:
         """The posterior after one more trial."""
@@ -73,7 +74,7 @@ class ParametricModel(Checked):
         """
         history = posterior.history
         for observation in observations:
-            history = history.appended(self.observed(observation, history.isi_ms.shape[-1]))
+            history = history.appended(self.observed(observation, history.trials))
         return self._after(posterior.space, posterior.seed, history)
 
     def observed(self, observation: Observation, order: int) -> History:
@@ -84,30 +85,29 @@ class ParametricModel(Checked):
             order: its place among the trials, from 0.
         """
         known = self.detection_limit_mv, self.response_threshold_mv
-        return observed(without_known(observation), *known, order=order).to("cpu", torch.double)
+        return observed(without_known(observation), *known, order=order)
 
     def simulate(self, space: DesignSpace, seed: int, isi_ms: ArrayLike) -> PriorPerson:
         """Draw one person from the prior, and an MEP at each ISI; see `SimulatesPeople`."""
-        generator = step_generator("cpu", seed, SIMULATED)
+        generator = step_generator(seed, SIMULATED)
         program = self.program(space)
         latents = torch.randn((1, 1, program.latents), generator=generator, dtype=torch.double)
         present = torch.rand((1, 1), generator=generator, dtype=torch.float32) < self.prior.p_window
         person = WindowSample(program.unknowns(latents), present, self.likelihood, space)
-        log_mep = draw_log_mep(
-            person.unknowns, person.levels(torch.as_tensor(isi_ms, dtype=torch.double)), self.likelihood, generator
-        )
+        level = person.levels(torch.tensor(np.asarray(isi_ms, dtype=float)))
+        log_mep = draw_log_mep(person.unknowns, level, self.likelihood, generator)
         mask = person.window_masks(torch.tensor(space.grid_ms))[0, 0]
         return PriorPerson(Window.from_mask(space.grid_ms, mask.numpy()), log_mep.exp()[0, 0].numpy())
 
     def _after(self, space: DesignSpace, seed: int, history: History) -> ParametricPosterior:
-        people, trials = history.isi_ms.shape
+        people, trials = len(history.columns), history.trials
         fits = [
             sample_person(
                 self.program(space),
-                _sorted(history, person),
+                Trials.of(history, person),
                 self.samples,
                 self.effort,
-                step_generator("cpu", seed, trials),
+                step_generator(seed, trials),
                 self.chains if self.method == "nuts" else None,
             )
             for person in range(people)
@@ -119,16 +119,9 @@ class ParametricModel(Checked):
             history=history,
             latents=torch.stack([fit.latents for fit in fits]),
             present=torch.stack([fit.present for fit in fits]),
-            evidence=torch.tensor([fit.log_evidence for fit in fits], dtype=torch.float32),
+            evidence=np.array([fit.log_evidence for fit in fits]),
             trouble=" ".join(fit.trouble for fit in fits if fit.trouble) or None,
         )
-
-
-def _sorted(history: History, person: int) -> History:
-    """The trials of one person in a fixed order, so that the posterior does not depend on the order of telling."""
-    columns = [column[person] for column in history.columns]
-    order = torch.from_numpy(np.lexsort([column.numpy() for column in columns[:-1]]))  # whenever they came
-    return History(*(column[order].unsqueeze(0) for column in columns))
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +146,8 @@ class WindowSample:
         """Excess at the window's edge [mV]; infinite if there is no window, shape (b, s)."""
         middle_ms = self.unknowns.start_ms + 0.5 * self.unknowns.width_ms
         reached_ms = middle_ms.clamp(self.space.low_ms, self.space.high_ms)
-        return least_excess_mv(self._excess_mv(reached_ms.unsqueeze(-1)).squeeze(-1), self.unknowns.baseline_mv)
+        peak_mv = self._excess_mv(reached_ms.unsqueeze(-1)).squeeze(-1)
+        return torch.from_numpy(least_excess_mv(peak_mv, self.unknowns.baseline_mv))
 
     def window_masks(self, isi_ms: Tensor) -> Tensor:
         """Sampled windows as 0 or 1, shape (b, s, t)."""
@@ -178,7 +172,7 @@ class WindowSample:
             -1, -1, -1, -1, 2
         )
         each = Unknowns(*(field.unsqueeze(-1) for field in u))
-        level = table_levels(share.device).view(-1, 1)
+        level = table_levels().view(-1, 1)
         return torch.softmax(log_likelihood(each, level, log_mep, self.likelihood), dim=-1)
 
 
@@ -192,18 +186,18 @@ class ParametricPosterior:
     history: History  # the trials so far, in order
     latents: Tensor  # equally weighted samples, (b, s, d)
     present: Tensor  # there is any excess, (b, s)
-    evidence: Tensor  # log marginal likelihood of the trials [nat], (b,)
+    evidence: FloatArray  # log marginal likelihood of the trials [nat], (b,)
     trouble: str | None  # with the last fit, and what stands in for it
 
     @property
     def trials(self) -> int:
         """Number of trials of each person that it has learnt."""
-        return self.history.isi_ms.shape[-1]
+        return self.history.trials
 
     @property
     def pairs(self) -> int:
         """Number of them that were pairs of stimuli; see `CountsPairs`."""
-        return int((~self.history.isi_ms[0].isnan()).sum())
+        return int((~np.isnan(self.history.isi_ms[0])).sum())
 
     @cached_property
     def sample(self) -> WindowSample:
@@ -211,45 +205,45 @@ class ParametricPosterior:
         unknowns = self.model.program(self.space).unknowns(self.latents)
         return WindowSample(unknowns, self.present, self.model.likelihood, self.space)
 
-    def outcome_mass(self, isi_ms: Tensor) -> Tensor:
+    def outcome_mass(self, isi_ms: Array) -> Singles:
         """Predictive distribution of the next MEP; see `PredictsOutcomes`."""
-        return self.sample.outcome_mass(isi_ms)
+        return self.sample.outcome_mass(torch.tensor(isi_ms)).numpy()
 
-    def window_masks(self, isi_ms: Tensor) -> Tensor:
+    def window_masks(self, isi_ms: Array) -> Singles:
         """Sampled windows; see `SamplesWindows`."""
-        return self.sample.window_masks(isi_ms)
+        return self.sample.window_masks(torch.tensor(isi_ms)).numpy()
 
-    def profiles_mv(self, isi_ms: Tensor) -> Tensor:
+    def profiles_mv(self, isi_ms: Array) -> Singles:
         """Sampled profiles; see `SamplesProfiles`."""
-        return self.sample.profiles_mv(isi_ms)
+        return self.sample.profiles_mv(torch.tensor(isi_ms)).numpy()
 
-    def baselines_mv(self) -> Tensor:
+    def baselines_mv(self) -> Singles:
         """Sampled baselines; see `SamplesProfiles`."""
-        return self.sample.unknowns.baseline_mv.float()
+        return self.sample.unknowns.baseline_mv.float().numpy()
 
-    def condition(self, isi_ms: Tensor, mep_mv: Tensor) -> ParametricPosterior:
+    def condition(self, isi_ms: Array, mep_mv: Array) -> ParametricPosterior:
         """The same samples, some more often and some no more, by an imagined trial; see `Conditions`."""
         trial = self.model.observed(Observation.of(isi_ms, mep_mv), self.trials)
-        ends = torch.stack((trial.log_mep, trial.log_mep_high), dim=-1).unsqueeze(1)
-        level = self.sample.levels(trial.isi_ms.unsqueeze(1))
+        isi, ends = (torch.tensor(column[:, None], dtype=torch.double) for column in (trial.isi_ms, trial.log_mep))
+        level = self.sample.levels(isi)
         gain = log_likelihood(self.sample.unknowns, level, ends, self.model.likelihood).squeeze(-1)
         log_mean = torch.logsumexp(gain, dim=-1, keepdim=True)
-        picks = systematic(gain - log_mean, gain.shape[-1])
+        picks = torch.from_numpy(systematic(gain.numpy(), gain.shape[-1]))
         return replace(
             self,
             history=self.history.appended(trial),
             latents=self.latents.gather(1, picks.unsqueeze(-1).expand_as(self.latents)),
             present=self.present.gather(1, picks),
-            evidence=self.evidence + log_mean.squeeze(-1) - np.log(gain.shape[-1]),
+            evidence=self.evidence + log_mean.squeeze(-1).numpy() - np.log(gain.shape[-1]),
         )
 
-    def log_evidence(self) -> Tensor:
+    def log_evidence(self) -> FloatArray:
         """Log marginal likelihood of the trials [nat]; see `HasEvidence`."""
         return self.evidence
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person."""
-        masks = self.window_masks(torch.tensor(self.space.grid_ms))[person]
+        masks = self.window_masks(self.space.grid_ms)[person]
 
         def profiles() -> SampledProfiles:
             mep_mv = self.profiles_mv(profile_grid(self.space))

@@ -13,8 +13,7 @@ from isiw.lazy import pyro, torch
 from isiw.models import parametric
 from isiw.models.parametric.importance import Effort, Modes, Proposal, WeightedDraws, importance_sample, worth
 from isiw.models.parametric.law import Likelihood, Unknowns, WindowPrior, latent_names
-from isiw.models.protocol import Tensor
-from isiw.models.shared.history import History
+from isiw.models.parametric.tables import Tensor, Trials
 from isiw.models.shared.tables import systematic
 
 TREE_DEPTH: Final = 6
@@ -35,24 +34,24 @@ class WindowProgram:
         """Number of latents."""
         return len(latent_names(self.likelihood))
 
-    def __call__(self, trials: History) -> Unknowns:
+    def __call__(self, trials: Trials) -> Unknowns:
         """Run the program."""
         latents = pyro.sample("latents", self._latents())
         unknowns = self.unknowns(latents)
         for name in ("start_ms", "width_ms", "baseline_mv", "amplitude_mv"):
             pyro.deterministic(name, getattr(unknowns, name))
-        with pyro.plate("trials", trials.isi_ms.shape[-1]):
-            pyro.sample("log_mep", self._meps(unknowns, trials), obs=_ends(trials))
+        with pyro.plate("trials", len(trials.isi_ms)):
+            pyro.sample("log_mep", self._meps(unknowns, trials), obs=trials.log_mep)
         return unknowns
 
-    def log_density(self, latents: Tensor, trials: History) -> Tensor:
+    def log_density(self, latents: Tensor, trials: Trials) -> Tensor:
         """Log density of the program's trace for each of many latents (m, d), shape (m,)."""
         prior: Tensor = self._latents().log_prob(latents)
         return prior + self.log_likelihood(latents, trials)
 
-    def log_likelihood(self, latents: Tensor, trials: History) -> Tensor:
+    def log_likelihood(self, latents: Tensor, trials: Trials) -> Tensor:
         """Log likelihood of the trials under each of many latents (m, d), shape (m,)."""
-        return self._meps(self.unknowns(latents), trials).log_prob(_ends(trials)).sum(-1)
+        return self._meps(self.unknowns(latents), trials).log_prob(trials.log_mep).sum(-1)
 
     def unknowns(self, latents: Tensor) -> Unknowns:
         """The unknowns that latents (..., d) stand for."""
@@ -63,16 +62,12 @@ class WindowProgram:
             pyro.distributions.Normal(torch.zeros(self.latents, dtype=torch.double), 1.0), 1
         )
 
-    def _meps(self, unknowns: Unknowns, trials: History) -> parametric.MepLaw:
-        return parametric.MepLaw(unknowns, trials.isi_ms[0], trials.isi_sd_ms[0], self.likelihood, present=self.present)
-
-
-def _ends(trials: History) -> Tensor:
-    return torch.stack((trials.log_mep[0], trials.log_mep_high[0]), dim=-1)
+    def _meps(self, unknowns: Unknowns, trials: Trials) -> parametric.MepLaw:
+        return parametric.MepLaw(unknowns, trials.isi_ms, trials.isi_sd_ms, self.likelihood, present=self.present)
 
 
 def nuts_sample(
-    program: WindowProgram, trials: History, starts: Tensor, draws: int, warmup: int, generator: torch.Generator
+    program: WindowProgram, trials: Trials, starts: Tensor, draws: int, warmup: int, generator: torch.Generator
 ) -> Tensor:
     """Draw from the posterior of a program by the no-U-turn sampler: slow, for reference."""
     chains = []
@@ -125,7 +120,7 @@ class PersonDraws:
 
 def sample_person(
     program: WindowProgram,
-    trials: History,
+    trials: Trials,
     samples: int,
     effort: Effort,
     generator: torch.Generator,
@@ -148,7 +143,7 @@ def sample_person(
     ]
     kept, troubles = zip(*flattened, strict=True)
     log_weights = torch.cat([model.log_weights + share for model, share in zip(kept, log_shares, strict=True)])
-    picks = systematic(log_weights.unsqueeze(0), samples)[0]
+    picks = torch.from_numpy(systematic(log_weights.numpy()[None], samples)[0])
     latents, present = torch.cat([model.points for model in kept])[picks], picks < len(kept[0].points)
     # Without trials there is nothing to climb, and Pyro knows no empty plate.
     if chains is not None and bool(present.any()) and trials.isi_ms.numel():
@@ -175,7 +170,7 @@ def _flattened(drawn: WeightedDraws, log_share: float, which: str) -> tuple[Weig
 
 
 def _by_nuts(
-    program: WindowProgram, trials: History, modes: Modes, size: int, chains: Chains, generator: torch.Generator
+    program: WindowProgram, trials: Trials, modes: Modes, size: int, chains: Chains, generator: torch.Generator
 ) -> tuple[Tensor, str | None]:
     """Draws by NUTS from each mode, by its evidence, as chains may not mix, and a sentence if they disagree."""
     shares = torch.softmax(modes.log_evidence, dim=0)
@@ -183,7 +178,7 @@ def _by_nuts(
     length = max(chains.least, size // len(shares))
     drawn = nuts_sample(program, trials, modes.points[: len(shares)], length, chains.warmup, generator)
     log_weights = (shares / shares.sum() / length).log().repeat_interleave(length)
-    picks = systematic(log_weights.unsqueeze(0), size)[0]
+    picks = torch.from_numpy(systematic(log_weights.numpy()[None], size)[0])
     r_hat = _r_hat(drawn[..., :2])
     disagree = None
     if r_hat > chains.max_r_hat:

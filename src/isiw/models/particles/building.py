@@ -9,12 +9,14 @@ from typing import Any, Final
 import numpy as np
 
 from isiw.design import DesignSpace
-from isiw.lazy import torch
 from isiw.models.particles.mixture import Mixture
-from isiw.models.particles.moves import PART_PROBABILITY
-from isiw.models.protocol import Tensor
 from isiw.models.shared.start import StartPrior
 from isiw.native.engine import LANES, MEANINGS, Tables
+from isiw.types import FloatArray, Singles
+
+PART_PROBABILITY: Final = (0.25, 0.30, 0.25, 0.20)
+"""How often a difference moves all latents, those of the profile alone, those of the response alone, and place, floor
+and size alone: particles whose floor is far off have another window and gain as well, and leave that with all three."""
 
 _NOT_REACHED: Final = 2.0
 """No uniform draw is above it."""
@@ -31,7 +33,7 @@ def prior_tables(
     starts: int,
     places: tuple[float, Mixture] | None,
     at: Sequence[int],
-    spreads: Tensor,
+    spreads: FloatArray,
     moves: dict[str, Any],
 ) -> Tables:
     """The tables of a prior."""
@@ -44,26 +46,22 @@ def prior_tables(
     means, sds = np.zeros((latents, width), dtype=np.float32), np.ones((latents, width), dtype=np.float32)
     for block, mixture in enumerate(mixtures, start=starts):
         count, span = components[block], slice(first[block], first[block] + size[block])
-        log_shares[block, :count] = (mixture.shares.log() - mixture.sds.log().sum(-1)).numpy()
-        below[block, : count - 1] = mixture.shares.cumsum(-1).numpy()[:-1]
-        means[span, :count], sds[span, :count] = mixture.means.numpy().T, mixture.sds.numpy().T
+        log_shares[block, :count] = _log(mixture.shares) - np.log(mixture.sds).sum(-1)
+        below[block, : count - 1] = mixture.shares.cumsum()[:-1]
+        means[span, :count], sds[span, :count] = mixture.means.T, mixture.sds.T
     if places is not None:
         # Start and width are one block: anywhere, or in one of the places; only here do the constants matter.
         log_shares[1] += math.log1p(-places[0]) - 0.5 * math.log(2.0 * math.pi)
         first, size, components = [0, *first[2:]], [2, *size[2:]], [-components[1], *components[2:]]
         log_shares, below = log_shares[1:], below[1:]
-    knots = [values.numpy() for values in start.knots(space)]
     where = np.full(MEANINGS, latents)
     where[: len(at)] = [latents if index < 0 else index for index in at]
     most_kinds = max(map(len, moves["kinds"]))
-    law: dict[str, Any] = {"at": where, "spreads": spreads.numpy().copy(), "log_shares": log_shares, "below": below}
+    law: dict[str, Any] = {"at": where, "spreads": spreads, "log_shares": log_shares, "below": below}
     law |= {"means": means, "sds": sds, "per_sds": 1.0 / sds}
     law |= {"first": np.array(first), "size": np.array(size), "components": np.array(components)}
-    law |= dict(zip(("start_ms", "density", "quantiles"), knots, strict=True)) | _of_places(places)
-    made: dict[str, Any] = {
-        name: value.numpy() if isinstance(value, torch.Tensor) else value for name, value in moves.items()
-    }
-    made |= {"changed": int(np.searchsorted(law["first"], where[27]))}
+    law |= dict(zip(("start_ms", "density", "quantiles"), start.knots(space), strict=True)) | _of_places(places)
+    made = moves | {"changed": int(np.searchsorted(law["first"], where[27]))}
     made |= {"parts": _edges(PART_PROBABILITY, len(PART_PROBABILITY))}
     made |= {"jumps": _edges(moves["jumps"], len(moves["jumps"]))}
     made |= {"kinds": np.stack([_edges(shares, most_kinds) for shares in moves["kinds"]])}
@@ -75,13 +73,17 @@ def _of_places(places: tuple[float, Mixture] | None) -> dict[str, Any]:
         nothing = np.zeros((0, 5), dtype=np.float32)
         return {"places": nothing, "place_share": 0.0, "place_below": np.zeros(0, dtype=np.float32)}
     share, law = places
-    scale = math.log(share) + law.shares.log() - law.sds.log().sum(-1) - math.log(2.0 * math.pi)
-    columns = [scale, law.means[:, 0], law.sds[:, 0], law.means[:, 1], law.sds[:, 1]]
-    table = torch.stack(columns, dim=-1).contiguous().numpy()
-    return {"places": table, "place_share": share, "place_below": law.shares.cumsum(-1).numpy()}
+    scale = math.log(share) + _log(law.shares) - np.log(law.sds).sum(-1) - math.log(2.0 * math.pi)
+    table = np.stack([scale, law.means[:, 0], law.sds[:, 0], law.means[:, 1], law.sds[:, 1]], axis=-1)
+    return {"places": table, "place_share": share, "place_below": law.shares.cumsum()}
 
 
-def _edges(shares: Sequence[float], values: int) -> Any:
+def _log(shares: FloatArray) -> FloatArray:
+    """Logs of shares; of none `_NO_SHARE`."""
+    return np.where(shares > 0, np.log(np.maximum(shares, 1e-300)), _NO_SHARE)
+
+
+def _edges(shares: Sequence[float], values: int) -> Singles:
     """Sums of the probabilities of earlier alternatives, from the second on, for so many of them."""
     edges = np.full(values - 1, _NOT_REACHED, dtype=np.float32)
     edges[: len(shares) - 1] = np.cumsum(shares)[:-1]

@@ -13,14 +13,16 @@ from enum import IntEnum
 from functools import cached_property
 from typing import Final, NamedTuple
 
+import numpy as np
+
 from isiw.change import LIKELY_CHANGE
 from isiw.change import Change as EstimatedChange
 from isiw.checks import Checked, Positive, Share
 from isiw.errors import InvalidValueError
-from isiw.lazy import torch
 from isiw.models.particles.mixture import Mixture
-from isiw.models.protocol import Tensor
 from isiw.models.shared.scales import PositiveLaw, Scale
+from isiw.models.shared.tables import normal_below
+from isiw.types import Array, BoolArray, FloatArray, IntArray
 
 INTENSITY_PCT: Final = 9.0
 """By how much the intensity changes, where it does, at a size of 1 [% RMT]."""
@@ -132,56 +134,44 @@ class ChangePrior(Checked):
     def untouched(self, trials: int) -> float:
         """Probability that nothing has changed any of so many trials."""
         law, shares = self.mixtures["changed"], self.shares
-        later = torch.special.ndtr((law.means - math.log(max(trials - 1, 0.5))) / law.sds)[:, 0]
+        later = normal_below((law.means - math.log(max(trials - 1, 0.5))) / law.sds)[:, 0]
         steps = 1.0 - shares[ChangeKind.NONE] - shares[ChangeKind.ENHANCEMENT]
         return shares[ChangeKind.NONE] + steps * float((law.shares * later).sum())
 
-    def where_noted(self, size: tuple[int, int], generator: torch.Generator) -> tuple[Tensor, Tensor]:
+    def where_noted(self, size: tuple[int, int], rng: np.random.Generator) -> tuple[IntArray, FloatArray]:
         """Changes at the last note: their kinds (b, p), and log trial and size (b, p, 2)."""
-        uniform = torch.rand((2, *size), generator=generator, dtype=torch.float32, device=generator.device)
-        normal = torch.randn(size, generator=generator, dtype=torch.float32, device=generator.device)
-        place = uniform[0] * self._steps
-        kind = torch.where(place < self.level + self.intensity, ChangeKind.INTENSITY, ChangeKind.SCALE)
-        kind = torch.where(place < self.level, ChangeKind.LEVEL, kind)
-        after = self.noted[-1] - 0.01 - 0.98 * uniform[1]
-        return kind, torch.stack((after.log(), self.size_sd * normal), dim=-1)
-
-
-class Changed(NamedTuple):
-    """What has changed after some trials, fields (b, p, n); logarithms are natural."""
-
-    log_gain: Tensor  # of everything evoked
-    shift_pct_rmt: Tensor  # by how much the pulse is stronger
-    enhancement: Tensor  # the share of the enhancement that there is
-    log_scale: Tensor  # of all amplitudes
+        place = rng.random(size) * self._steps
+        kind = np.where(place < self.level + self.intensity, ChangeKind.INTENSITY, ChangeKind.SCALE)
+        kind = np.where(place < self.level, ChangeKind.LEVEL, kind)
+        after = self.noted[-1] - 0.01 - 0.98 * rng.random(size)
+        return kind, np.stack((np.log(after), self.size_sd * rng.standard_normal(size)), axis=-1)
 
 
 class Change(NamedTuple):
     """What changes in a session, fields (b, p); logarithms are natural."""
 
-    after: Tensor  # how many trials come before it
-    log_gain: Tensor  # of everything evoked from then on
-    shift_pct_rmt: Tensor  # by how much the pulse is stronger from then on
-    fading: Tensor  # by how many halves the enhancement fades from trial to trial; negative where it grows
-    log_scale: Tensor  # of all amplitudes from then on, the EMG floor's among them
+    after: Array  # how many trials come before it
+    log_gain: Array  # of everything evoked from then on
+    shift_pct_rmt: Array  # by how much the pulse is stronger from then on
+    fading: Array  # by how many halves the enhancement fades from trial to trial; negative where it grows
+    log_scale: Array  # of all amplitudes from then on, the EMG floor's among them
 
     @classmethod
-    def of(cls, kind: Tensor, log_after: Tensor, size: Tensor, curved: Tensor) -> Change:
+    def of(cls, kind: IntArray, log_after: Array, size: Array, curved: BoolArray) -> Change:
         """What latents mean; without a recruitment curve an intensity is a level."""
         shifted = (kind == ChangeKind.INTENSITY) & curved
         levelled = (kind == ChangeKind.LEVEL) | ((kind == ChangeKind.INTENSITY) & ~curved)
-        fading = torch.where(kind == ChangeKind.ENHANCEMENT, FADING * size, 0.0)
-        gain, shift = torch.where(levelled, size, 0.0), torch.where(shifted, INTENSITY_PCT * size, 0.0)
-        return cls(log_after.exp(), gain, shift, fading, torch.where(kind == ChangeKind.SCALE, size, 0.0))
+        fading = np.where(kind == ChangeKind.ENHANCEMENT, FADING * size, 0.0)
+        gain, shift = np.where(levelled, size, 0.0), np.where(shifted, INTENSITY_PCT * size, 0.0)
+        return cls(np.exp(log_after), gain, shift, fading, np.where(kind == ChangeKind.SCALE, size, 0.0))
 
-    def at(self, order: Tensor) -> Changed:
-        """What has changed after so many trials (b, 1, n), fields (b, p, n)."""
-        after, gain, shift, fading, scale = (field.unsqueeze(-1) for field in self)
-        there = order >= after
-        age = torch.where(fading > 0, order, (GROWN_AFTER - order).clamp_min(0.0))
-        return Changed(gain * there, shift * there, torch.exp2(-fading.abs() * age), scale * there)
+    def enhancement(self, trials: int) -> Array:
+        """The share of the enhancement that there is after so many trials, (b, p)."""
+        age = np.where(self.fading > 0, trials, max(GROWN_AFTER - trials, 0.0))
+        share: Array = np.exp2(-np.abs(self.fading) * age)
+        return share
 
-    def steps(self, trials: int) -> tuple[Tensor, Tensor]:
+    def steps(self, trials: int) -> tuple[Array, Array]:
         """Log of what amplitudes are multiplied by, and the shift [% RMT], at the last of so many trials, (b, p)."""
         there = self.after <= trials - 1
         return (self.log_gain + self.log_scale) * there, self.shift_pct_rmt * there
@@ -189,22 +179,21 @@ class Change(NamedTuple):
     def named(self, trials: int) -> EstimatedChange | None:
         """What changed by the last of so many trials of equally weighted particles (1, p), as far as it matters."""
         gain, shift_pct = (step[0] for step in self.steps(trials))
-        before, now = self.at(torch.tensor([0.0, trials], device=self.after.device)).enhancement[0].unbind(-1)
-        enhancement = now / before
-        levelled, shifted = gain.abs() > MATTERS, shift_pct.abs() > MATTERS * INTENSITY_PCT
-        stepped, faded = levelled | shifted, enhancement.log().abs() > MATTERS
-        share = stepped.double().mean().item(), faded.double().mean().item()
+        enhancement = (self.enhancement(trials) / self.enhancement(0))[0]
+        levelled, shifted = np.abs(gain) > MATTERS, np.abs(shift_pct) > MATTERS * INTENSITY_PCT
+        stepped, faded = levelled | shifted, np.abs(np.log(enhancement)) > MATTERS
+        share = float(stepped.mean()), float(faded.mean())
         if max(share) < LIKELY_CHANGE:
             return None
         if share[1] > share[0]:
             return EstimatedChange("enhancement", share[1], *_interval(enhancement[faded]))
-        trial = int(self.after[0, stepped].ceil().median())
+        trial = int(np.quantile(np.ceil(self.after[0, stepped]), 0.5, method="lower"))
         if shifted.sum() > levelled.sum():
             return EstimatedChange("intensity", share[0], *_interval(shift_pct[shifted]), trial)
-        return EstimatedChange("amplitudes", share[0], *_interval(gain[levelled].exp()), trial)
+        return EstimatedChange("amplitudes", share[0], *_interval(np.exp(gain[levelled])), trial)
 
 
-def _interval(sizes: Tensor) -> tuple[float, float, float]:
+def _interval(sizes: Array) -> tuple[float, float, float]:
     """Median, and the ends of the 90 % interval."""
-    low, median, high = torch.quantile(sizes, torch.tensor([0.05, 0.5, 0.95], dtype=sizes.dtype)).tolist()
+    low, median, high = np.quantile(sizes, (0.05, 0.5, 0.95)).tolist()
     return median, low, high

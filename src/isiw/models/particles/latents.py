@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache
 from typing import Final, NamedTuple
 
-from isiw.lazy import torch
+import numpy as np
+
 from isiw.models.particles.changes import ChangeKind
 from isiw.models.particles.noise import NoiseKind
-from isiw.models.protocol import Tensor
+from isiw.types import BoolArray, IntArray, Singles
 
 _CURVE: Final = ("log_ceiling", "log_slope", "log_input_sd", "log_sigma_y", "log_boost", "rest")
 
@@ -51,90 +50,70 @@ _USED: Final = {
 }
 
 
-@cache
-def latents_of(*blocks: str, device: torch.device) -> Tensor:
-    """Which latents belong to some of `BLOCKS`, shape (d,); one tensor for all callers, who leave it as it is."""
+def latents_of(*blocks: str) -> BoolArray:
+    """Which latents belong to some of `BLOCKS`, shape (d,)."""
     chosen = {latent for block in blocks for latent in BLOCKS[block]}
-    return torch.tensor([latent in chosen for latent in LATENTS], device=device)
+    return np.array([latent in chosen for latent in LATENTS])
 
 
-def used_by(noise: Tensor, present: Tensor, change: Tensor | None = None) -> Tensor:
-    """Which latents mean anything to particles of some kinds; all others are as the prior draws them."""
-    of_profile = latents_of(*PROFILE_BLOCKS, device=noise.device)
-    used = _used_by_kind(noise.device)[noise] | (present.unsqueeze(-1) & of_profile)
-    return used if change is None else used | _used_by_change(noise.device)[change]
+def used_by(noise: IntArray, present: BoolArray, change: IntArray | None = None) -> BoolArray:
+    """Which latents mean anything to particles of some kinds (...); all others are drawn from the prior, (..., d)."""
+    used: BoolArray = _USED_BY_KIND[noise] | (present[..., np.newaxis] & _OF_PROFILE)
+    return used if change is None else used | _USED_BY_CHANGE[change]
 
 
-@cache
-def _used_by_kind(device: torch.device) -> Tensor:
-    return torch.stack([latents_of(*_COMMON, *_USED[kind], device=device) for kind in NoiseKind])
-
-
-@cache
-def _used_by_change(device: torch.device) -> Tensor:
-    used = {ChangeKind.NONE: (), ChangeKind.ENHANCEMENT: ("change",)}
-    return torch.stack([latents_of(*used.get(kind, ("changed", "change")), device=device) for kind in ChangeKind])
+_OF_PROFILE: Final = latents_of(*PROFILE_BLOCKS)
+_USED_BY_KIND: Final = np.stack([latents_of(*_COMMON, *_USED[kind]) for kind in NoiseKind])
+_BY_CHANGE: Final = {ChangeKind.NONE: (), ChangeKind.ENHANCEMENT: ("change",)}
+_USED_BY_CHANGE: Final = np.stack([latents_of(*_BY_CHANGE.get(kind, ("changed", "change"))) for kind in ChangeKind])
 
 
 KINDS: Final = ("shape", "noise", "present", "depressed", "change")
 """What a particle is of: `ShapeKind`, `NoiseKind`, whether there is an enhancement, a depression, and `ChangeKind`."""
 
 
-HYPOTHESES: Final = 4 * len(ChangeKind)
-"""How many there are: a window or none, a depression or none, and what changes."""
-
-
 class Latents(NamedTuple):
     """Particles of b people, of any model."""
 
-    values: Tensor  # of the model's latents, in their order, (b, p, d)
-    kinds: Tensor  # whole numbers in the order of `KINDS`, (b, p, k)
-    log_blocks: Tensor | None = None  # known log densities of blocks, under the prior they moved under, (b, p, n)
+    values: Singles  # of the model's latents, in their order, (b, p, d)
+    kinds: IntArray  # whole numbers in the order of `KINDS`, (b, p, k)
 
-    @classmethod
-    def of(cls, values: Tensor, **kinds: Tensor | int) -> Latents:
-        """Particles from some of their kinds by name, each (b, p) or the same for all; the others are 0."""
-        like = values[..., 0].long()
-        columns = [torch.as_tensor(kinds.get(name, 0)).to(like).expand_as(like) for name in KINDS]
-        return cls(values, torch.stack(columns, dim=-1))
+    def of(self, name: str) -> Singles:
+        """The values of one of `LATENTS`, (b, p)."""
+        return self.values[..., LATENTS.index(name)]
 
-    def each(self, made: Callable[..., Tensor], *others: Latents) -> Latents:
-        """Values and kinds made in one way of those of these particles, and of others; without densities of blocks."""
-        particles = self, *others
-        return Latents(made(*(p.values for p in particles)), made(*(p.kinds for p in particles)))
-
-    def with_kind(self, name: str, kind: Tensor) -> Latents:
+    def with_kind(self, name: str, kind: IntArray) -> Latents:
         """The same with one of `KINDS` changed, shape (b, p)."""
-        kinds = self.kinds.clone()
+        kinds = self.kinds.copy()
         kinds[..., KINDS.index(name)] = kind
-        return Latents(self.values, kinds)
+        return self._replace(kinds=kinds)
 
     @property
-    def shape(self) -> Tensor:
+    def shape(self) -> IntArray:
         """Kinds of the profiles, (b, p)."""
         return self.kinds[..., 0]
 
     @property
-    def noise(self) -> Tensor:
+    def noise(self) -> IntArray:
         """Kinds of the noise, (b, p)."""
         return self.kinds[..., 1]
 
     @property
-    def present(self) -> Tensor:
+    def present(self) -> BoolArray:
         """Which particles have any facilitation, (b, p)."""
         return self.kinds[..., 2] > 0
 
     @property
-    def depressed(self) -> Tensor:
+    def depressed(self) -> BoolArray:
         """Which particles have a depression, (b, p)."""
         return self.kinds[..., 3] > 0
 
     @property
-    def change(self) -> Tensor:
+    def change(self) -> IntArray:
         """What changes in the session, (b, p)."""
         return self.kinds[..., 4]
 
-    @property
-    def hypothesis(self) -> Tensor:
-        """Which of `HYPOTHESES` each particle is of, (b, p)."""
-        return len(ChangeKind) * (2 * self.kinds[..., 2] + self.kinds[..., 3]) + self.change
+    def taken(self, picks: IntArray) -> Latents:
+        """Some of the particles of each person, by their numbers (b, s), fields of shape (b, s, ...)."""
+        who = np.arange(len(picks))[:, np.newaxis]
+        return Latents(self.values[who, picks], self.kinds[who, picks])

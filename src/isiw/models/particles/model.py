@@ -7,30 +7,24 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Annotated
 
-from isiw.checks import (
-    MOST_OF_A_KIND,
-    Checked,
-    NonNegative,
-    Positive,
-    Share,
-    whole,
-)
+import numpy as np
+
+from isiw.checks import MOST_OF_A_KIND, Checked, NonNegative, Positive, Share, whole
 from isiw.design import DesignSpace
-from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
-from isiw.lazy import Later, torch
-from isiw.models.particles.engine import Engine, EngineName, engine_for
-from isiw.models.particles.jumps import WindowTarget
+from isiw.lazy import Later
+from isiw.models.particles.jumps import law_of
 from isiw.models.particles.latents import Latents, latents_of
-from isiw.models.particles.likelihood import levels
-from isiw.models.particles.noise import draw_log_mep, log_gain, recruits
+from isiw.models.particles.mixture import log_sum
+from isiw.models.particles.noise import recruits
 from isiw.models.particles.posterior import SwarmPosterior
-from isiw.models.particles.predictions import PersonSample
+from isiw.models.particles.predictions import PersonSample, drawn_mep_mv
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.swarm import Moving, Swarm
 from isiw.models.protocol import Observation, PriorPerson
-from isiw.models.shared.tables import NOTED, SIMULATED, step_generator
+from isiw.models.shared.tables import NOTED, SIMULATED, seeds, stream
 from isiw.models.windows import EXCLUDED_AT, SampledHypotheses, SampledProfiles, grid_of, profile_grid, sampled_estimate
+from isiw.native.engine import Crowd, Law
 from isiw.types import ArrayLike, FloatArray
 from isiw.window import Window
 
@@ -53,8 +47,6 @@ class ParticleModel(Checked):
         response_threshold_mv: a response that was seen lies above this [mV].
         unusual_kept: the part of their probability that unusual starts and widths of the window, intensities, drifts
             and changes keep where the next ISI is chosen; the reported estimate keeps all of it.
-        device: torch device.
-        engine: `"compiled"` on the CPU, or `"torch"`; the same seed asks other ISIs with each.
 
     Raises:
         InvalidValueError: fewer than two particles or more than a memory holds, or an invalid number.
@@ -68,12 +60,6 @@ class ParticleModel(Checked):
     amplitude_step_mv: NonNegative | None = None
     response_threshold_mv: Positive = 0.02
     unusual_kept: Share = 0.2
-    device: str = "cpu"
-    engine: EngineName = "compiled"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _require_device(self.device)
 
     @cached_property
     def prior_where_asking(self) -> Prior:
@@ -83,42 +69,33 @@ class ParticleModel(Checked):
     def begin(self, space: DesignSpace, seed: int, people: int = 1) -> ParticlePosterior:
         """The posterior before the first trial."""
         self.prior.profile.require_space(space)
-        latents = self.prior.sample(people, self.particles, step_generator(self.device, seed, 0), space)
-        return ParticlePosterior(self, space, seed, Swarm.of(latents), *_engines(self, space))
+        law = law_of(self.prior, space)
+        swarm = Swarm.of(law, people, self.particles, seed)
+        return ParticlePosterior(self, space, seed, swarm, law, law_of(self.prior_where_asking, space))
 
     def update(self, posterior: ParticlePosterior, observation: Observation) -> ParticlePosterior:
         """The posterior after one more trial."""
-        after = posterior.told(observation)
-        generator = step_generator(self.device, posterior.seed, after.trials)
-        return replace(after, swarm=after.swarm.moved(posterior.engine, self.moves, generator))
+        return posterior.after(observation)
 
     def simulate(self, space: DesignSpace, seed: int, isi_ms: ArrayLike) -> PriorPerson:
         """Draw one person from the prior, and an MEP at each ISI; see `SimulatesPeople`."""
-        generator = step_generator(self.device, seed, SIMULATED)
-        latents = self.prior.sample(1, 1, generator, space)
-        person = self.prior.person(latents)
-        isis_ms = torch.as_tensor(isi_ms, dtype=torch.float32, device=self.device).unsqueeze(0)
-        order = torch.arange(isis_ms.shape[-1], dtype=torch.float32, device=self.device)
-        changed = self.prior.change(latents).at(order)
-        gain, level = log_gain(person.response, order) + changed.log_gain, levels(person, isis_ms) * changed.enhancement
-        log_mep = draw_log_mep(person.response, level, generator, gain, changed.shift_pct_rmt) + changed.log_scale
-        mask = PersonSample(person.after(len(order)), space).window_masks(grid_of(space, order.device))[0, 0]
-        window = Window.from_mask(space.grid_ms, mask.cpu().numpy())
-        return PriorPerson(window, log_mep[0, 0].double().exp().cpu().numpy())
+        law, isis_ms = law_of(self.prior, space), np.asarray(isi_ms, dtype=np.float32)
+        latents = law.draws(1, seeds(seed, SIMULATED, 1))
+        mep_mv = drawn_mep_mv(law.meanings(*latents, -1), isis_ms, stream(seed, SIMULATED + 1))
+        sample = PersonSample(law.meanings(*latents, len(mep_mv)), space)
+        return PriorPerson(Window.from_mask(space.grid_ms, sample.window_masks(grid_of(space))[0, 0]), mep_mv)
 
 
 @dataclass(frozen=True, eq=False)
 class ParticlePosterior(SwarmPosterior[ParticleModel]):
     """The posterior of b people."""
 
-    usual: Engine  # under the prior that ISIs are chosen with
+    usual: Law  # the prior that ISIs are chosen with
 
     @cached_property
     def as_usual(self) -> ParticlePosterior:
         """The same with the prior that ISIs are chosen with; see `ExpectsTheUsual`."""
-        latents = self.swarm.latents
-        log_usual = self.usual.log_usual(latents._replace(log_blocks=None))  # the kept ones are of the other prior
-        return replace(self, swarm=self.swarm.times(log_usual - self.engine.log_usual(latents)))
+        return replace(self, swarm=self.swarm.as_usual(self.law, self.usual))
 
     def noting_change(self) -> ParticlePosterior:
         """The posterior if somebody has seen that something changes now; see `NotesChanges`."""
@@ -127,51 +104,46 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
             return self
         changes = before.noting(trials)
         model = replace(self.model, prior=replace(self.model.prior, changes=changes))
-        generator = step_generator(self.model.device, self.seed, NOTED + len(changes.noted))
-        kind, noted = changes.where_noted((len(latents.change), self.model.particles), generator)
+        rng = stream(self.seed, NOTED + len(changes.noted))
+        kind, noted = changes.where_noted((len(latents.change), self.model.particles), rng)
         # Particles that nothing has touched so far stand for those, too, in which something changes now.
         untouched = self.model.prior.untouched(latents, trials)
         share, left = changes.noted_share / before.untouched(trials), 1.0 - changes.noted_share
-        chance = torch.rand(kind.shape, generator=generator, dtype=torch.float32, device=generator.device)
-        chosen = untouched & (chance < share / (share + left))
-        values = latents.values.clone()
-        own = latents_of("changed", "change", device=values.device)
-        values[..., own] = torch.where(chosen.unsqueeze(-1), noted, values[..., own])
-        latents = Latents(values, latents.kinds).with_kind("change", torch.where(chosen, kind, latents.change))
-        swarm = replace(self.swarm, latents=latents).times(
-            torch.where(untouched, math.log(share + left), math.log(left))
-        )
-        engine, usual = _engines(model, self.space)
-        return replace(self, model=model, swarm=swarm, engine=engine, usual=usual)
+        chosen = untouched & (rng.random(kind.shape) < share / (share + left))
+        values, own = latents.values.copy(), latents_of("changed", "change")
+        values[..., own] = np.where(chosen[..., np.newaxis], noted, values[..., own])
+        kinds = latents.with_kind("change", np.where(chosen, kind, latents.change)).kinds
+        law, usual = law_of(model.prior, self.space), law_of(model.prior_where_asking, self.space)
+        log_weights = self.swarm.log_weights + np.where(untouched, math.log(share + left), math.log(left))
+        log_weights -= log_sum(log_weights)[:, np.newaxis]
+        nothing, log_likelihood = law.nothing_known(*kind.shape), self.swarm.crowd.log_likelihood
+        swarm = replace(self.swarm, crowd=Crowd(values, kinds, log_weights, log_likelihood, nothing))
+        return replace(self, model=model, swarm=swarm, law=law, usual=usual)
 
     @cached_property
     def sample(self) -> PersonSample:
         """The particles that represent all of them where every candidate ISI is scored."""
-        return self._sample(self.swarm.picked(self.model.thinned))
-
-    def _sample(self, latents: Latents) -> PersonSample:
-        return PersonSample(self.engine.meaning(latents, self.trials), self.space, self.trials)
+        _, fields = self.swarm.picked(self.law, self.model.thinned)
+        return PersonSample(fields, self.space, self.trials)
 
     def prediction_mv(self, level: float, person: int = 0) -> tuple[FloatArray, FloatArray]:
         """Between which amplitudes the next MEP lies; see `PredictsMeps`."""
-        isi_ms = profile_grid(self.space).to(self.device)
-        shares = 0.5 + 0.5 * torch.tensor([-level, level], dtype=torch.float32, device=isi_ms.device)
-        low_mv, high_mv = self.sample.mep_quantiles_mv(isi_ms, shares)[person].T.double().cpu().numpy()
+        shares = 0.5 + 0.5 * np.array([-level, level])
+        low_mv, high_mv = self.sample.mep_quantiles_mv(profile_grid(self.space), shares)[person].T
         return low_mv, high_mv
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person."""
-        one, prior = self.swarm.of_person(person), self.model.prior
-        latents = one.picked(self.model.particles)
+        prior = self.model.prior
+        latents, fields = self.swarm.picked(self.law, self.model.particles, person)
 
         def profiles() -> SampledProfiles:
-            sample = self._sample(one.picked(self.model.thinned))
-            return SampledProfiles(
-                sample.expected_mep_mv(profile_grid(self.space).to(self.device))[0], sample.baselines_mv()[0]
-            )
+            few = self.swarm.picked(self.law, self.model.thinned, person)[1]
+            sample = PersonSample(few, self.space, self.trials)
+            return SampledProfiles(sample.expected_mep_mv(profile_grid(self.space))[0], sample.baselines_mv()[0])
 
         estimate = sampled_estimate(
-            self._sample(latents).runs(grid_of(self.space, self.device)),
+            PersonSample(fields, self.space, self.trials).runs(grid_of(self.space)),
             profiles,
             self.space,
             SampledHypotheses(prior.hypothesis(latents)[0], prior.hypotheses),
@@ -180,32 +152,11 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
         return estimate.noting(
             unusual=Later(lambda: prior.unusual(latents, self.space)),
             change=Later(lambda: prior.change(latents).named(self.trials)),
-            time_alone=Later(lambda: float((prior.of_time(latents, self.trials) & ~latents.present).double().mean())),
+            time_alone=Later(lambda: float((prior.of_time(latents, self.trials) & ~latents.present).mean())),
         )
-
-
-def _engines(model: ParticleModel, space: DesignSpace) -> tuple[Engine, Engine]:
-    """What computes with a model's prior, and with that which ISIs are chosen with."""
-    priors = model.prior, model.prior_where_asking
-    engine, usual = (engine_for(model.engine, WindowTarget(prior, space), model.device) for prior in priors)
-    return engine, usual
 
 
 def _excluded_shift_pct_rmt(prior: Prior, latents: Latents) -> float | None:
     """The shift of the input that recruitment curves exclude [% RMT]; None where few particles have one."""
     shift_pct_rmt = prior.shift_pct_rmt(latents)[recruits(latents.noise)]
-    return float(torch.quantile(shift_pct_rmt, EXCLUDED_AT)) if len(shift_pct_rmt) >= LEAST_SAMPLES else None
-
-
-def _require_device(name: str) -> None:
-    if name == "cpu":  # is always there; settings are read where torch is not needed, too
-        return
-    try:
-        torch.Generator(device=name)
-    except (RuntimeError, TypeError) as error:
-        raise InvalidValueError(
-            "there is no such torch device here",
-            got=name,
-            expected="such as cpu, cuda or mps",
-            remedy="Leave the device out to use the cpu.",
-        ) from error
+    return float(np.quantile(shift_pct_rmt, EXCLUDED_AT)) if len(shift_pct_rmt) >= LEAST_SAMPLES else None

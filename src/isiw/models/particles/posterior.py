@@ -7,12 +7,14 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Generic, Protocol, Self, TypeVar
 
+import numpy as np
+
 from isiw.design import DesignSpace
-from isiw.lazy import torch
-from isiw.models.particles.engine import Engine
-from isiw.models.particles.swarm import Swarm
-from isiw.models.protocol import Observation, Tensor
-from isiw.models.shared.history import observed
+from isiw.models.particles.swarm import Moving, Swarm
+from isiw.models.protocol import Observation
+from isiw.models.shared.history import History, observed
+from isiw.native.engine import Law
+from isiw.types import Array, FloatArray, Singles
 
 
 class _Model(Protocol):
@@ -22,15 +24,17 @@ class _Model(Protocol):
     def detection_limit_mv(self) -> float: ...
     @property
     def response_threshold_mv(self) -> float: ...
+    @property
+    def moves(self) -> Moving: ...
 
 
 class _Sample(Protocol):
     """What equally weighted particles say about the next MEP and about the window."""
 
-    def outcome_mass(self, isi_ms: Tensor) -> Tensor: ...
-    def window_masks(self, isi_ms: Tensor) -> Tensor: ...
-    def expected_mep_mv(self, isi_ms: Tensor) -> Tensor: ...
-    def baselines_mv(self) -> Tensor: ...
+    def outcome_mass(self, isi_ms: Singles) -> Singles: ...
+    def window_masks(self, isi_ms: Singles) -> Singles: ...
+    def expected_mep_mv(self, isi_ms: Singles) -> Singles: ...
+    def baselines_mv(self) -> Singles: ...
 
 
 M = TypeVar("M", bound=_Model)
@@ -44,17 +48,12 @@ class SwarmPosterior(ABC, Generic[M]):
     space: DesignSpace
     seed: int
     swarm: Swarm
-    engine: Engine
+    law: Law
 
     @cached_property
     @abstractmethod
     def sample(self) -> _Sample:
         """The particles that represent all of them where every candidate ISI is scored."""
-
-    @property
-    def device(self) -> torch.device:
-        """Where the particles are."""
-        return self.swarm.log_weights.device
 
     @property
     def trials(self) -> int:
@@ -64,39 +63,47 @@ class SwarmPosterior(ABC, Generic[M]):
     @cached_property
     def pairs(self) -> int:
         """Number of them that were pairs of stimuli; see `CountsPairs`."""
-        return self.trials - int(self.swarm.history.isi_ms[0].isnan().sum())
+        return self.trials - int(np.isnan(self.swarm.history.isi_ms[0]).sum())
 
     @property
     def trouble(self) -> str | None:
         """What is wrong with the particles; see `ReportsTrouble`."""
         return self.swarm.trouble
 
-    def told(self, observation: Observation) -> Self:
-        """The same particles, weighted by one more trial as well."""
+    def after(self, observation: Observation) -> Self:
+        """The posterior after one more trial."""
+        swarm = self.swarm.after(self._trial(observation), self.law, self.model.moves, self.seed)
+        return replace(self, swarm=swarm)
+
+    def condition(self, isi_ms: Array, mep_mv: Array) -> Self:
+        """The same particles, weighed by an imagined trial; see `Conditions`."""
+        return replace(self, swarm=self.swarm.weighed(self._trial(Observation.of(isi_ms, mep_mv)), self.law))
+
+    def _trial(self, observation: Observation) -> History:
         known = self.model.detection_limit_mv, self.model.response_threshold_mv
-        trial = observed(observation, *known, order=self.trials).to(self.device, torch.float32)
-        return replace(self, swarm=self.swarm.told(trial, self.engine))
+        return observed(observation, *known, order=self.trials)
 
-    def condition(self, isi_ms: Tensor, mep_mv: Tensor) -> Self:
-        """The same particles, weighted by an imagined trial; see `Conditions`."""
-        return self.told(Observation.of(isi_ms, mep_mv))
-
-    def outcome_mass(self, isi_ms: Tensor) -> Tensor:
+    def outcome_mass(self, isi_ms: Array) -> Singles:
         """Predictive distribution of the next MEP; see `PredictsOutcomes`."""
-        return self.sample.outcome_mass(isi_ms.to(self.device, torch.float32))
+        return self.sample.outcome_mass(singles(isi_ms))
 
-    def window_masks(self, isi_ms: Tensor) -> Tensor:
+    def window_masks(self, isi_ms: Array) -> Singles:
         """Sampled windows; see `SamplesWindows`."""
-        return self.sample.window_masks(isi_ms.to(self.device, torch.float32))
+        return self.sample.window_masks(singles(isi_ms))
 
-    def profiles_mv(self, isi_ms: Tensor) -> Tensor:
+    def profiles_mv(self, isi_ms: Array) -> Singles:
         """Sampled profiles; see `SamplesProfiles`."""
-        return self.sample.expected_mep_mv(isi_ms.to(self.device, torch.float32))
+        return self.sample.expected_mep_mv(singles(isi_ms))
 
-    def baselines_mv(self) -> Tensor:
+    def baselines_mv(self) -> Singles:
         """Sampled baselines; see `SamplesProfiles`."""
         return self.sample.baselines_mv()
 
-    def log_evidence(self) -> Tensor:
+    def log_evidence(self) -> FloatArray:
         """Log marginal likelihood of the trials [nat]; see `HasEvidence`."""
         return self.swarm.evidence
+
+
+def singles(values: Array) -> Singles:
+    """As the engine takes numbers: in single precision, side by side."""
+    return np.ascontiguousarray(values, dtype=np.float32)

@@ -1,89 +1,151 @@
-"""A sample of the posterior: predictive distributions, windows and profiles of equally weighted particles."""
+"""A sample of the posterior: predictive distributions, windows and profiles of equally weighted particles.
+
+Responses are worked out in tables by facilitation, between whose rows predictions are interpolated.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 
-from isiw.lazy import torch
-from isiw.models.particles.shapes import facilitation, highest_facilitation, reaches
-from isiw.models.particles.tables import TabledSample, cell_ends, log_ends
-from isiw.models.protocol import Tensor
-from isiw.models.shared.tables import LEVELS, OUTCOMES, interpolated
-from isiw.models.windows import Runs, grid_of, least_excess_mv
+from isiw.design import DesignSpace
+from isiw.models.particles.records import FLOOR_SD, LOG_FLOOR
+from isiw.models.shared import history
+from isiw.models.shared.tables import LEVELS, OUTCOMES
+from isiw.models.windows import Runs, grid_of
 from isiw.native import engine
-from isiw.types import IntArray, Singles
+from isiw.types import Array, FloatArray, IntArray, Singles
 
-FINE_MS = 1.0
+FINE_MS: Final = 1.0
 """Between the points of such a grid facilitation hardly changes."""
+
+_ENDS: Final = np.linspace(0.0, 1.0, OUTCOMES + 1, dtype=np.float32) ** np.float32(1.5)
+"""Ends of the cells of the log MEP, from 0 to 1, (y + 1,); narrow where MEPs are as small as the floor."""
+
+_MIDDLES, _WIDTHS = 0.5 * (_ENDS[1:] + _ENDS[:-1]), np.diff(_ENDS)
+
+
+@dataclass(frozen=True, eq=False)
+class TabledSample:
+    """What equally weighted particles say about the next MEP."""
+
+    fields: Singles  # what they mean, as the engine has it, (b, s, fields)
+    space: DesignSpace  # in whose range windows are looked for
+    order: int = 0  # how many trials came before the next one
+
+    def expected_mep_mv(self, isi_ms: Singles) -> Singles:
+        """Expected MEP [mV], shape (b, s, t)."""
+        return self._mean_mv(engine.facilitations(self.fields, isi_ms))
+
+    def outcome_mass(self, isi_ms: Singles) -> Singles:
+        """Predictive distribution of the next MEP under each particle, shape (b, s, t, y)."""
+        return engine.rows_between(self.fields, self._outcome_table, engine.facilitations(self.fields, isi_ms))
+
+    def mep_quantiles_mv(self, isi_ms: Singles, shares: FloatArray) -> FloatArray:
+        """Quantiles of the next MEP [mV], shape (b, t, q)."""
+        below = self.outcome_mass(isi_ms).mean(1, dtype=float).cumsum(-1)
+        ends = np.array([[np.interp(shares, np.append(0.0, own), _ENDS) for own in of_isis] for of_isis in below])
+        low, high = (end[:, np.newaxis, np.newaxis] for end in self._log_ends)
+        quantiles_mv: FloatArray = np.exp(low + ends * (high - low))
+        return quantiles_mv
+
+    def _mean_mv(self, level: Singles) -> Singles:
+        """Expected MEP [mV] by facilitation (b, s, t), of the same shape."""
+        between = engine.rows_between(self.fields, self._evoked[..., np.newaxis], level)
+        return self._with_floor_mv(between[..., 0])
+
+    def _with_floor_mv(self, evoked: Singles) -> Singles:
+        """From an expected MEP above the floor, in floors, to mV, shape (b, s, ...)."""
+        floor_mv, rest = (each[..., np.newaxis] for each in (np.exp(self._log_floor), self._rest))
+        found: Singles = floor_mv * (evoked + rest)
+        return found
+
+    @property
+    def _log_floor(self) -> Singles:
+        """Log of the EMG floor [mV], shape (b, s)."""
+        return self.fields[..., LOG_FLOOR]
+
+    @property
+    def _rest(self) -> Singles:
+        """Mean of the floor, in medians, shape (b, s)."""
+        mean: Singles = np.exp(0.5 * np.square(self.fields[..., FLOOR_SD]))
+        return mean
+
+    @cached_property
+    def _rows(self) -> tuple[Singles, Singles]:
+        """Facilitations of the rows, and expected MEPs above the floor there, in floors, shape (b, s, l) each."""
+        return engine.evoked_means(self.fields, LEVELS)
+
+    @property
+    def _evoked(self) -> Singles:
+        return self._rows[1]
+
+    @cached_property
+    def _log_ends(self) -> tuple[Singles, Singles]:
+        """Between which log MEPs outcomes lie, each of shape (b,)."""
+        top = self._log_floor + np.log1p(self._evoked.max(-1))
+        return _quantile(self._log_floor, 0.05) - 1.0, _quantile(top, 0.95) + 1.5
+
+    @cached_property
+    def _outcome_table(self) -> Singles:
+        """Probability of each outcome of the next trial in each row, shape (b, s, l, y)."""
+        low, high = (end[:, np.newaxis] for end in self._log_ends)
+        return engine.outcome_tables(self.fields, self._rows[0], self.order, low + _MIDDLES * (high - low), _WIDTHS)
 
 
 @dataclass(frozen=True, eq=False)
 class PersonSample(TabledSample):
     """What equally weighted particles say about the next MEP and about the window."""
 
-    @property
-    def _grid_ms(self) -> Tensor:
-        return grid_of(self.space, self._evoked.device)
-
     @cached_property
-    def _highest(self) -> Tensor:
-        """Largest facilitation on the space's grid, shape (b, s); on a fine one that of its whole range."""
-        if self.space.step_ms <= FINE_MS:
-            return highest_facilitation(self.person.shape, self.space.low_ms, self.space.high_ms)
-        return facilitation(self.person.shape, self._grid_ms).amax(-1)
-
-    @cached_property
-    def edge_level(self) -> Tensor:
+    def edge_level(self) -> Singles:
         """Facilitation at a window's edge by the least-excess rule; above 1 where there is no window, shape (b, s)."""
-        if self.records is not None:
-            fine = self.space.step_ms <= FINE_MS
-            found = engine.edge_levels(self.records, self._evoked.numpy(), self._grid_ms.numpy(), fine=fine)
-            return torch.from_numpy(found)
-        excess_mv = self.person.response.log_floor.exp().unsqueeze(-1) * (self._evoked - self._evoked[..., :1])
-        peak_mv = interpolated(excess_mv.unsqueeze(-1), self._highest.unsqueeze(-1))[..., 0, 0]
-        least_mv = least_excess_mv(peak_mv, self.baselines_mv()).unsqueeze(-1)
-        right = torch.searchsorted(excess_mv.contiguous(), least_mv.contiguous()).clamp(1, LEVELS - 1)
-        low_mv, high_mv = excess_mv.gather(-1, right - 1), excess_mv.gather(-1, right)
-        position = (right - 1 + (least_mv - low_mv) / (high_mv - low_mv).clamp_min(1e-12)).squeeze(-1) / (LEVELS - 1)
-        enhanced = least_mv.squeeze(-1).isfinite() & self.person.present
-        return torch.where(enhanced, position.square(), 2.0)
+        fine = self.space.step_ms <= FINE_MS
+        return engine.edge_levels(self.fields, self._evoked, grid_of(self.space), fine=fine)
 
-    def window_masks(self, isi_ms: Tensor) -> Tensor:
+    def window_masks(self, isi_ms: Singles) -> Singles:
         """Sampled windows as 0 or 1, shape (b, s, t)."""
-        if self.records is None:
-            return reaches(self.person.shape, self.edge_level, isi_ms).to(torch.float32)
-        return torch.from_numpy(_masks_of(self._pairs(self.records, isi_ms), len(isi_ms)))
+        runs, at = self._pairs(isi_ms), np.arange(len(isi_ms))
+        firsts, behinds = runs[..., ::2, np.newaxis], runs[..., 1::2, np.newaxis]
+        return np.asarray(((firsts <= at) & (at < behinds)).any(-2), dtype=np.float32)
 
-    def runs(self, isi_ms: Tensor, person: int = 0) -> Runs:
+    def runs(self, isi_ms: Singles, person: int = 0) -> Runs:
         """Sampled windows of one person, as runs of some ascending ISIs [ms] (t,)."""
-        if self.records is None:
-            return Runs.of_masks(self.window_masks(isi_ms)[person])
-        return Runs.of_pairs(self._pairs(self.records, isi_ms)[person], len(isi_ms))
+        return Runs.of_pairs(self._pairs(isi_ms)[person], len(isi_ms))
 
-    def _pairs(self, records: Singles, isi_ms: Tensor) -> IntArray:
-        edges: IntArray = engine.window_runs(records, self.edge_level.numpy(), isi_ms.contiguous().numpy())
-        return edges
+    def _pairs(self, isi_ms: Singles) -> IntArray:
+        return engine.window_runs(self.fields, self.edge_level, isi_ms).astype(np.int64)
 
-    def baselines_mv(self) -> Tensor:
+    def baselines_mv(self) -> Singles:
         """Expected MEP without a tap [mV], shape (b, s)."""
-        return self._with_floor_mv(self._evoked[..., :1]).squeeze(-1)
-
-    def mep_quantiles_mv(self, isi_ms: Tensor, shares: Tensor) -> Tensor:
-        """Quantiles of the next MEP [mV], shape (b, t, q)."""
-        below = torch.nn.functional.pad(self.outcome_mass(isi_ms).mean(1).cumsum(-1), (1, 0))
-        wanted = shares.expand(*below.shape[:-1], -1).contiguous()
-        right = torch.searchsorted(below, wanted).clamp(1, OUTCOMES)
-        less, more = below.gather(-1, right - 1), below.gather(-1, right)
-        ends = cell_ends(below.device)
-        place = torch.lerp(ends[right - 1], ends[right], (wanted - less) / (more - less).clamp_min(1e-12))
-        low, high = (end[:, None, None] for end in log_ends(self._log_floor, self._evoked))
-        return torch.exp(low + place * (high - low))
+        return self._with_floor_mv(self._evoked[..., :1])[..., 0]
 
 
-def _masks_of(runs: IntArray, points: int) -> Singles:
-    """Windows as 0 or 1 (b, s, t) from their runs (b, s, 4) on so many ISIs."""
-    at, firsts, behinds = np.arange(points), runs[..., ::2, np.newaxis], runs[..., 1::2, np.newaxis]
-    return np.asarray(((firsts <= at) & (at < behinds)).any(-2), dtype=np.float32)
+def _quantile(values: Array, share: float) -> Singles:
+    """A quantile of values (b, s), shape (b,); `np.quantile` takes ten times as long for so few."""
+    place = share * (values.shape[-1] - 1)
+    picks = [int(place), min(int(place) + 1, values.shape[-1] - 1)]
+    low, high = np.partition(values, picks)[:, picks].T
+    found: Singles = (low + np.float32(place - picks[0]) * (high - low)).astype(np.float32)
+    return found
+
+
+_FLOORS: Final = np.linspace(-10.0, 16.0, 4097)
+"""Log MEPs over the floor between which amplitudes are drawn; beyond them is none."""
+
+
+def drawn_mep_mv(fields: Singles, isi_ms: Singles, rng: np.random.Generator) -> FloatArray:
+    """One MEP of one particle (1, 1, fields) at each ISI in turn [mV], exactly as the likelihood says, shape (n,)."""
+    # An MEP by how far it is above the floor: lanes are particles, so that each point is one, of a floor of its own.
+    points, columns = np.tile(fields, (1, len(_FLOORS), 1)), history.neutral(len(isi_ms))
+    points[..., LOG_FLOOR], log_mep = -_FLOORS, fields[0, 0, LOG_FLOOR] + _FLOORS
+    columns[:, 0], columns[:, 2:4] = isi_ms, 0.0
+    log_density = np.concatenate([engine.log_likelihoods(points, one[np.newaxis, np.newaxis]) for one in columns])
+    density = np.exp(log_density - log_density.max(-1, keepdims=True), dtype=float)
+    below = np.concatenate((np.zeros((len(isi_ms), 1)), (density[:, 1:] + density[:, :-1]).cumsum(-1)), axis=-1)
+    wanted = rng.random(len(isi_ms)) * below[:, -1]
+    mep_mv: FloatArray = np.exp([np.interp(*one, log_mep) for one in zip(wanted, below, strict=True)])
+    return mep_mv

@@ -8,15 +8,16 @@ on, and moves need no Jacobians.
 from __future__ import annotations
 
 import math
-from dataclasses import astuple, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Final, NamedTuple
+from typing import Final
+
+import numpy as np
 
 from isiw.checks import Checked, Positive, choice
 from isiw.design import DesignSpace
-from isiw.lazy import torch
-from isiw.models.particles.changes import INTENSITY_PCT, MATTERS, Change, Changed, ChangeKind, ChangePrior
-from isiw.models.particles.latents import BLOCKS, LATENTS, RECTIFIED, Latents, latents_of
+from isiw.models.particles.changes import INTENSITY_PCT, MATTERS, Change, ChangeKind, ChangePrior
+from isiw.models.particles.latents import BLOCKS, RECTIFIED, Latents, latents_of
 from isiw.models.particles.laws import (
     FOREARM,
     HAND,
@@ -32,18 +33,14 @@ from isiw.models.particles.laws import (
     check_laws,
     with_less_of_others,
 )
-from isiw.models.particles.mixture import JointMixture, Mixture, drawn
-from isiw.models.particles.noise import PERSISTENCE, NoiseKind, Response, recruits
+from isiw.models.particles.mixture import Mixture, log_sum
+from isiw.models.particles.noise import PERSISTENCE, NoiseKind, recruits
 from isiw.models.particles.profile import ProfilePrior
-from isiw.models.particles.shapes import Shape
-from isiw.models.protocol import Tensor
 from isiw.models.shared.scales import Scale
+from isiw.types import BoolArray, FloatArray, IntArray, Singles
 
 STATED_SD_PCT_RMT: Final = 0.5
 """How far an intensity that is stated may be off [% RMT]; how far people's curves are is in their laws."""
-
-MOST_ONSET: Final = 0.9
-"""A threshold further up a recruitment curve would leave nothing of it."""
 
 _WITHOUT_MUSCLE: Final = {
     NoiseKind.CONSTANT_CV: "constant-CV noise",
@@ -51,32 +48,6 @@ _WITHOUT_MUSCLE: Final = {
     NoiseKind.ALL_OR_NONE: "all-or-none responses",
     NoiseKind.RECTIFIED: "recruitment curve with a threshold",
 }
-
-
-class Depression(NamedTuple):
-    """Where the tap depresses the MEP, how deeply in units of the largest facilitation, and whether it does; (b, p)."""
-
-    shape: Shape
-    depth: Tensor
-    present: Tensor
-
-
-class Person(NamedTuple):
-    """What the latents mean: a profile, a response, and whether there is any facilitation; fields (b, p)."""
-
-    shape: Shape
-    response: Response
-    present: Tensor
-    depression: Depression | None = None  # there only where it is looked for
-    change: Change | None = None  # there where particles are not as of one trial
-
-    def after(self, trials: int) -> Person:
-        """The person as they are after so many trials, without any further change."""
-        if self.change is None:
-            return self
-        order = torch.tensor([float(trials)], device=self.present.device)
-        changed = Changed(*(field.squeeze(-1) for field in self.change.at(order)))
-        return self._replace(response=self.response.changed(changed), change=None)
 
 
 @dataclass(frozen=True)
@@ -155,66 +126,35 @@ class Prior(Checked):
         }
 
     @cached_property
-    def _joint(self) -> JointMixture:
-        return JointMixture(list(self.mixtures.values()))
-
-    @cached_property
-    def spreads(self) -> Tensor:
+    def spreads(self) -> FloatArray:
         """Usual SD of each latent, shape (d,)."""
         first = self.profile.start.spans[0]
-        parts = [torch.tensor([first.high_ms - first.low_ms], dtype=torch.float32) / math.sqrt(12.0)]
-        return torch.cat(parts + [self.mixtures[name].sds[0] for name in BLOCKS if name != "start"])
+        start = [(first.high_ms - first.low_ms) / math.sqrt(12.0)]
+        return np.concatenate([start] + [self.mixtures[name].sds[0] for name in BLOCKS if name != "start"])
 
-    def sample(self, people: int, particles: int, generator: torch.Generator, space: DesignSpace) -> Latents:
-        """Particles of the prior."""
-        size = (people, particles)
-        uniform = torch.rand((5, *size), generator=generator, dtype=torch.float32, device=generator.device)
-        start_ms = self.profile.start.start_ms(uniform[3], space).unsqueeze(-1)
-        values = torch.cat([start_ms, self._joint.sample(size, generator)], dim=-1)
-        joint = self.profile.joint(space)
-        if joint is not None:
-            chance = torch.rand((*size, 1), generator=generator, dtype=torch.float32, device=generator.device)
-            known, place = chance < joint.share, joint.drawn.sample(size, generator)
-            values = torch.cat([torch.where(known, place, values[..., :2]), values[..., 2:]], dim=-1)
-        shape, noise = drawn(astuple(self.profile.shapes), uniform[0]), drawn(astuple(self.noise), uniform[1])
-        change = drawn(self.changes.shares, uniform[4])
-        present = uniform[2] < self.profile.p_window
-        return Latents.of(values, shape=shape, noise=noise, present=present, change=change)
-
-    def log_density(self, values: Tensor, space: DesignSpace) -> Tensor:
-        """Log density of latents but for a constant, shape (b, p)."""
-        if self.profile.joint(space) is None:
-            return self.profile.start.log_density(values[..., 0], space) + self._joint.log_density(values[..., 1:])
-        return self.log_place(values, space) + self._beside_place.log_density(values[..., 2:])
-
-    def log_densities(self, values: Tensor, space: DesignSpace) -> dict[str, Tensor]:
+    def log_densities(self, values: Singles, space: DesignSpace) -> dict[str, FloatArray]:
         """Log density of the latents of each block, shape (b, p); start and width are one: `"place"`."""
-        sizes = [len(names) for names in BLOCKS.values()]
-        parts = dict(zip(BLOCKS, torch.split(values, sizes, dim=-1), strict=True))
+        behind = np.cumsum([len(names) for names in BLOCKS.values()])[:-1]
+        parts = dict(zip(BLOCKS, np.split(values, behind, axis=-1), strict=True))
         others = {name: mixture for name, mixture in self.mixtures.items() if name != "width"}
         place = {"place": self.log_place(values, space)}
         return place | {name: mixture.log_density(parts[name]) for name, mixture in others.items()}
 
-    def log_places(self, values: Tensor, space: DesignSpace) -> Tensor:
+    def log_places(self, values: Singles, space: DesignSpace) -> FloatArray:
         """Log density of start and width, times its probability: anywhere, and in each place, shape (b, p, 1 + k)."""
         start, width = self.profile.start.log_density(values[..., 0], space), self.mixtures["width"]
-        anywhere = (start + width.log_density(values[..., 1:2])).unsqueeze(-1)
+        anywhere = (start + width.log_density(values[..., 1:2]))[..., np.newaxis]
         joint = self.profile.joint(space)
         if joint is None:
             return anywhere
         parts = math.log(joint.share) + joint.mixture.log_parts(values[..., :2])
         early = parts.shape[-1] - len(self.profile.places)
-        anywhere = torch.cat([math.log1p(-joint.share) + anywhere, parts[..., :early]], dim=-1)
-        return torch.cat([torch.logsumexp(anywhere, dim=-1, keepdim=True), parts[..., early:]], dim=-1)
+        anywhere = np.concatenate([math.log1p(-joint.share) + anywhere, parts[..., :early]], axis=-1)
+        return np.concatenate([log_sum(anywhere)[..., np.newaxis], parts[..., early:]], axis=-1)
 
-    def log_place(self, values: Tensor, space: DesignSpace) -> Tensor:
+    def log_place(self, values: Singles, space: DesignSpace) -> FloatArray:
         """Log density of start and width, shape (b, p)."""
-        density: Tensor = torch.logsumexp(self.log_places(values, space), dim=-1)
-        return density
-
-    @cached_property
-    def _beside_place(self) -> JointMixture:
-        return JointMixture([mixture for name, mixture in self.mixtures.items() if name != "width"])
+        return log_sum(self.log_places(values, space))
 
     def as_usual(self, kept: float) -> Prior:
         """The same with a part of the probability of unusual starts, widths and intensities, far drifts and changes."""
@@ -226,19 +166,6 @@ class Prior(Checked):
             session=replace(self.session, far_drift_share=far),
             changes=self.changes.as_usual(kept),
         )
-
-    def log_beside(self, latents: Latents) -> Tensor:
-        """Log density of a particle's recruitment curve, drift and change but for a constant, shape (b, p)."""
-        device = latents.values.device
-        blocks = "recruitment", "rectified", "session", "changed"
-        own, rectified, session, changed = (
-            self.mixtures[name].log_density(latents.values[..., latents_of(name, device=device)]) for name in blocks
-        )
-        curve = torch.where(latents.noise == NoiseKind.RECTIFIED, rectified, 0.0)
-        curve = torch.where(latents.noise == NoiseKind.RECRUITMENT, own, curve)
-        stepped = (latents.change != ChangeKind.NONE) & (latents.change != ChangeKind.ENHANCEMENT)
-        share = torch.tensor(self.changes.shares, device=device).log()[latents.change]
-        return curve + session + share + torch.where(stepped, changed, 0.0)
 
     @property
     def possible_muscles(self) -> tuple[Muscle, ...]:
@@ -270,83 +197,54 @@ class Prior(Checked):
         return (*_WITHOUT_MUSCLE.values(), *names)
 
     @cached_property
-    def _hypothesis_numbers(self) -> Tensor:
+    def _hypothesis_numbers(self) -> IntArray:
         """Which of `hypotheses` a particle is of by its kind of noise and its possible curve, shape (kinds, k)."""
         names = [muscle.name for muscle, *_ in self._possible_curves]
         curves = [len(_WITHOUT_MUSCLE) + list(dict.fromkeys(names)).index(name) for name in names]
         others = {noise: [number] * len(curves) for number, noise in enumerate(_WITHOUT_MUSCLE)}
-        return torch.tensor([others.get(noise, curves) for noise in NoiseKind])
+        return np.array([others.get(noise, curves) for noise in NoiseKind])
 
-    def hypothesis(self, latents: Latents) -> Tensor:
+    def hypothesis(self, latents: Latents) -> IntArray:
         """Which of `hypotheses` each particle belongs to, shape (b, p)."""
-        first = LATENTS.index(BLOCKS["recruitment"][0])
-        recruitment = latents.values[..., first : first + len(BLOCKS["recruitment"])]
-        curve = self.mixtures["recruitment"].component(recruitment)
-        return self._hypothesis_numbers.to(curve.device)[latents.noise, curve]
+        curve = self.mixtures["recruitment"].component(latents.values[..., latents_of("recruitment")])
+        return self._hypothesis_numbers[latents.noise, curve]
 
     def unusual(self, latents: Latents, space: DesignSpace) -> dict[str, float]:
         """How probable it is that parts of a person are of another law than the usual one, by what they are called."""
         values = latents.values
-        start, width = values[..., 0], values[..., latents_of("width", device=values.device)]
-        anywhere = torch.softmax(self.log_places(values, space), dim=-1)[..., 0]
+        places, width = self.log_places(values, space), values[..., latents_of("width")]
+        anywhere = np.exp(places[..., 0] - log_sum(places))
         unusual = {
-            "the start of the window": anywhere * (1.0 - self.profile.start.usual(start, space)),
+            "the start of the window": anywhere * (1.0 - self.profile.start.usual(values[..., 0], space)),
             "the width of the window": anywhere * (1.0 - self.mixtures["width"].usual(width)),
         }
-        floor = values[..., latents_of("floor", device=values.device)]
         given = {name: share[latents.present] for name, share in unusual.items()}
-        given["the EMG floor"] = 1.0 - self.mixtures["floor"].usual(floor)
-        return {name: float(share.mean()) for name, share in given.items() if share.numel()}
+        given["the EMG floor"] = 1.0 - self.mixtures["floor"].usual(values[..., latents_of("floor")])
+        return {name: float(share.mean()) for name, share in given.items() if share.size}
 
-    def of_time(self, latents: Latents, trials: int) -> Tensor:
+    def of_time(self, latents: Latents, trials: int) -> BoolArray:
         """In which particles amplitudes change within so many trials at any ISI, as far as it matters, shape (b, p)."""
         gain, shift_pct = self.change(latents).steps(trials)
-        drifted = latents.values[..., LATENTS.index("drift")] * (1.0 - PERSISTENCE ** max(0, trials - 1))
-        return (gain.abs() > MATTERS) | (shift_pct.abs() > MATTERS * INTENSITY_PCT) | (drifted.abs() > MATTERS)
+        drifted = latents.of("drift") * (1.0 - PERSISTENCE ** max(0, trials - 1))
+        matters: BoolArray = np.maximum(np.abs(gain), np.abs(drifted)) > MATTERS
+        return matters | (np.abs(shift_pct) > MATTERS * INTENSITY_PCT)
 
-    def untouched(self, latents: Latents, trials: int) -> Tensor:
+    def untouched(self, latents: Latents, trials: int) -> BoolArray:
         """In which particles nothing has changed any of so many trials, shape (b, p)."""
         change = self.change(latents)
-        return (latents.change == ChangeKind.NONE) | ((change.fading == 0) & (change.after > trials - 1))
+        untouched: BoolArray = (change.fading == 0) & (change.after > trials - 1) | (latents.change == ChangeKind.NONE)
+        return untouched
 
     def change(self, latents: Latents) -> Change:
         """What changes in a session of each particle, fields (b, p)."""
-        log_after, size = (latents.values[..., LATENTS.index(name)] for name in ("log_changed_after", "change_size"))
-        return Change.of(latents.change, log_after, size, recruits(latents.noise))
+        when, size = latents.of("log_changed_after"), latents.of("change_size")
+        return Change.of(latents.change, when, size, recruits(latents.noise))
 
-    def shift_pct_rmt(self, latents: Latents) -> Tensor:
+    def shift_pct_rmt(self, latents: Latents) -> Singles:
         """Shift of the recruitment curve's input at the best ISI [% RMT], 0 without facilitation, shape (b, p)."""
-        own, rectified = (latents.values[..., LATENTS.index(name)] for name in ("log_boost", RECTIFIED["log_boost"]))
-        boost = torch.where(latents.noise == NoiseKind.RECTIFIED, rectified, own)
-        return torch.where(latents.present, boost.exp(), 0.0)
-
-    def person(self, latents: Latents) -> Person:
-        """What particles mean."""
-        z = dict(zip(LATENTS, latents.values.unbind(-1), strict=True))
-        shape = Shape(latents.shape, z["start_ms"], z["log_width_ms"].exp(), 2.0 * torch.special.ndtr(z["form"]) - 1.0)
-        return Person(shape, self._response(z, latents.noise), latents.present, change=self.change(latents))
-
-    def _response(self, z: dict[str, Tensor], noise: Tensor) -> Response:
-        curved, switches, rectified = recruits(noise), noise == NoiseKind.ALL_OR_NONE, noise == NoiseKind.RECTIFIED
-        z |= {name: torch.where(rectified, z[own], z[name]) for name, own in RECTIFIED.items()}
-        onset = torch.where(rectified, z["log_onset"].exp().clamp_max(MOST_ONSET), 0.0)
-        slope, cv = z["log_slope"].exp(), torch.where(switches, z["log_size_cv"], z["log_cv"])
-        return Response(
-            kind=noise,
-            log_floor=z["log_floor_mv"],
-            floor_log_sd=z["log_floor_sd"].exp(),
-            log_ratio=torch.where(curved, z["log_ceiling"], torch.where(switches, z["log_size"], z["log_gain"])),
-            spread=torch.where(curved, z["log_input_sd"], cv).exp(),
-            output_log_sd=z["log_sigma_y"].exp(),
-            boost=slope * z["log_boost"].exp(),
-            rest=slope * z["rest"] + torch.where(rectified, torch.logit(onset), 0.0),
-            onset=onset,
-            max_probability=torch.sigmoid(torch.where(switches, z["switched_on"], z["reliability"])),
-            rest_probability=torch.sigmoid(z["switched_off"]),
-            drift=z["drift"],
-            startup=z["startup"],
-            slope=slope,
-        )
+        own, rectified = latents.of("log_boost"), latents.of(RECTIFIED["log_boost"])
+        boost = np.exp(np.where(latents.noise == NoiseKind.RECTIFIED, rectified, own))
+        return np.where(latents.present, boost, np.float32(0.0))
 
 
 def _of_gain(law: Gain) -> list[tuple[float, float]]:

@@ -16,7 +16,7 @@ from isiw.checks import Checked, Share
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.models.particles.laws import Shares, check_laws, with_less_of_others
-from isiw.models.particles.mixture import JointMixture, Mixture
+from isiw.models.particles.mixture import Mixture
 from isiw.models.particles.places import Place
 from isiw.models.shared.scales import AnyLaw, PositiveLaw, Scale
 from isiw.models.shared.start import TAP_SPANS, Span, StartPrior
@@ -26,7 +26,7 @@ from isiw.types import Conditioning
 
 @dataclass(frozen=True)
 class ShapeShares(Shares):
-    """Probabilities of the families of profiles, in the order of `ShapeKind`.
+    """Probabilities of the families of profiles, in the order of their kinds in the engine.
 
     Most profiles pass a normality test (dissertation, 4.2: 8 of 11), the others are described in its outlook (8.1).
 
@@ -113,7 +113,6 @@ class JointPlaces(NamedTuple):
 
     share: float  # their probability
     mixture: Mixture  # of start and log width
-    drawn: JointMixture  # the same, to draw from
 
 
 @dataclass(frozen=True)
@@ -243,5 +242,4 @@ def _joint(profile: ProfilePrior, space: DesignSpace) -> JointPlaces | None:
     laws += [(place.share, [place.start_ms.law, place.width_ms.log_law]) for place in profile.places]
     if not laws:
         return None
-    mixture = Mixture.of(laws)
-    return JointPlaces(math.fsum(share for share, _ in laws), mixture, JointMixture([mixture]))
+    return JointPlaces(math.fsum(share for share, _ in laws), Mixture.of(laws))

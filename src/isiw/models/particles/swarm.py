@@ -8,24 +8,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cache, cached_property, partial
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from isiw.checks import Checked, Natural, Share
-from isiw.lazy import torch
-from isiw.models.particles.engine import Engine
-from isiw.models.particles.latents import HYPOTHESES, Latents
-from isiw.models.protocol import Tensor
+from isiw.models.particles.latents import Latents
 from isiw.models.shared.history import History
-from isiw.models.shared.tables import systematic
-
-LEAST_SHARE = 0.03
-"""Share of the particles that resampling leaves to a hypothesis, however improbable it has become: it can come back."""
-
-LEAST_PROBABILITY = 1e-9
-"""Less probable hypotheses are left fewer particles."""
+from isiw.models.shared.tables import seeds
+from isiw.native.engine import Crowd, Law
+from isiw.types import FloatArray, Singles
 
 LEAST_ESS = 0.01
 """Effective sample size before resampling, as a share of the particles: below it a trial contradicted the belief."""
@@ -40,27 +33,22 @@ LEAST_DISTINCT = 0.4
 class Health(NamedTuple):
     """How b people's particles took a trial; fields of shape (b,)."""
 
-    ess: Tensor  # effective sample size before resampling, as a share of the particles
-    shifts: Tensor  # share of the shifts that were accepted; NaN where there were none
-    jumps: Tensor  # likewise of the jumps to other kinds
+    ess: FloatArray  # effective sample size before resampling, as a share of the particles
+    shifts: FloatArray  # share of the shifts that were accepted; NaN where there were none
+    jumps: FloatArray  # likewise of the jumps to other kinds
 
 
-def ess_share(log_weights: Tensor) -> Tensor:
-    """Effective sample size as a share of the particles, shape (b,)."""
-    share: Tensor = torch.exp(-torch.logsumexp(2.0 * log_weights, dim=-1)) / log_weights.shape[-1]
-    return share
-
-
-def distinct_share(log_likelihood: Tensor) -> Tensor:
+def distinct_share(log_likelihood: Singles) -> FloatArray:
     """Share of the particles that differ, shape (b,); equal ones have the same likelihood of the history."""
-    ordered = np.sort(log_likelihood.cpu().numpy(), axis=-1)
-    distinct = 1 + np.count_nonzero(ordered[:, 1:] != ordered[:, :-1], axis=-1)
-    return torch.as_tensor(distinct / ordered.shape[-1], dtype=torch.float32)
+    ordered = np.sort(log_likelihood, axis=-1)
+    distinct: FloatArray = (1 + np.count_nonzero(ordered[:, 1:] != ordered[:, :-1], axis=-1)) / ordered.shape[-1]
+    return distinct
 
 
-def trouble_of(health: Health, distinct_share: Tensor) -> str | None:
+def trouble_of(health: Health, distinct_share: FloatArray) -> str | None:
     """What is wrong with the particles of any of the people, in sentences; None where nothing is."""
-    ess, shifts, distinct = (float(x.nan_to_num(1.0).min()) for x in (health.ess, health.shifts, distinct_share))
+    worst = (np.nan_to_num(share, nan=1.0).min() for share in (health.ess, health.shifts, distinct_share))
+    ess, shifts, distinct = map(float, worst)
     said = []
     if ess < LEAST_ESS:
         said.append(f"The trial contradicts the estimate before it: {ess:.1%} of the particles carry the posterior.")
@@ -98,109 +86,69 @@ class Moving(Checked):
 class Swarm:
     """Weighted particles of b people."""
 
-    latents: Latents  # fields of shape (b, p)
-    log_weights: Tensor  # normalised, (b, p)
-    log_likelihood: Tensor  # of the history under each of them, (b, p)
-    evidence: Tensor  # log marginal likelihood of the history [nat], (b,)
+    crowd: Crowd  # which nobody changes
+    evidence: FloatArray  # log marginal likelihood of the history [nat], (b,)
     history: History
     health: Health | None = None  # after the last trial; None before the first
 
     @classmethod
-    def of(cls, latents: Latents) -> Swarm:
+    def of(cls, law: Law, people: int, particles: int, seed: int) -> Swarm:
         """Particles of the prior, before the first trial."""
-        people, particles = latents.values.shape[:-1]
-        nothing = latents.values.new_zeros((people, particles))
-        history = History.empty(people, nothing.device)
-        return cls(latents, nothing - math.log(particles), nothing, nothing[:, 0], history)
+        values, kinds = law.draws(particles, seeds(seed, 0, people))
+        equal = np.full((people, particles), -math.log(particles))
+        nothing = np.zeros((people, particles), dtype=np.float32)
+        crowd = Crowd(values, kinds, equal, nothing, law.nothing_known(people, particles))
+        return cls(crowd, np.zeros(people), History.empty(people))
+
+    @property
+    def latents(self) -> Latents:
+        """The particles, fields of shape (b, p)."""
+        return Latents(self.crowd.values, self.crowd.kinds)
+
+    @property
+    def log_weights(self) -> FloatArray:
+        """Their normalised log weights, (b, p)."""
+        return self.crowd.log_weights
 
     @property
     def trials(self) -> int:
         """Number of trials of each person that it has learnt."""
-        return self.history.isi_ms.shape[-1]
+        return self.history.trials
 
     @cached_property
     def trouble(self) -> str | None:
         """What is wrong with the particles; see `isiw.models.protocol.ReportsTrouble`."""
-        return None if self.health is None else trouble_of(self.health, distinct_share(self.log_likelihood))
+        return None if self.health is None else trouble_of(self.health, distinct_share(self.crowd.log_likelihood))
 
-    def times(self, log_ratio: Tensor) -> Swarm:
-        """The same particles under another prior."""
-        return replace(self, log_weights=torch.log_softmax(self.log_weights + log_ratio, dim=-1))
-
-    def told(self, trial: History, engine: Engine) -> Swarm:
-        """The same particles, weighted by one more trial as well."""
+    def after(self, trial: History, law: Law, moves: Moving, seed: int) -> Swarm:
+        """The particles after one more trial: weighed, resampled where too few carry the posterior, and moved."""
         history = self.history.appended(trial)
-        if history.shares_factor:
-            gain = engine.log_likelihood(self.latents, history) - self.log_likelihood
-        else:
-            gain = engine.log_likelihood(self.latents, trial)
-        log_weights = self.log_weights + gain
-        return replace(
-            self,
-            log_weights=torch.log_softmax(log_weights, dim=-1),
-            log_likelihood=self.log_likelihood + gain,
-            evidence=self.evidence + torch.logsumexp(log_weights, dim=-1),
-            history=history,
-        )
+        kept, resampled = (moves.sweeps_after(history.trials, resampled=worn) for worn in (False, True))
+        crowd, dice = self.crowd.copied(), seeds(seed, history.trials, len(self.evidence))
+        found = law.learn(history.columns, moves.min_ess, (kept, resampled), dice, crowd)
+        with np.errstate(invalid="ignore"):  # where there were no moves, no share of them was accepted
+            health = Health(found[:, 1], found[:, 3] / found[:, 2], found[:, 5] / found[:, 4])
+        return Swarm(crowd, self.evidence + found[:, 0], history, health)
 
-    def moved(self, engine: Engine, moves: Moving, generator: torch.Generator) -> Swarm:
-        """The particles after the moves that follow a trial, resampled where too few carried the posterior."""
-        ess = ess_share(self.log_weights)
-        worn = ess < moves.min_ess
-        # Systematic picks are ordered; shuffled, both halves of the particles represent the posterior.
-        shuffled = torch.randperm(self.log_weights.shape[-1], generator=generator, device=generator.device)
-        fresh = self._resampled(worn, shuffled) if bool(worn.any()) else self
-        least, most = (moves.sweeps_after(self.trials, resampled=resampled) for resampled in (False, True))
-        sweeps = torch.where(worn, most, least)
-        moved = engine.sweeps(sweeps, fresh.latents, fresh.log_likelihood, self.history, generator)
-        health = Health(ess, moved.shifts, moved.jumps)
-        return replace(fresh, latents=moved.latents, log_likelihood=moved.log_likelihood, health=health)
+    def weighed(self, trial: History, law: Law) -> Swarm:
+        """The same particles, weighed by one more trial as well."""
+        history, crowd = self.history.appended(trial), self.crowd.copied()
+        found = law.learn(history.columns, 0.0, (0, 0), np.zeros(len(self.evidence), dtype=np.uint64), crowd)
+        return Swarm(crowd, self.evidence + found[:, 0], history)
 
-    def of_person(self, person: int) -> Swarm:
-        """The particles of one person."""
-        one = slice(person, person + 1)
-        return replace(self, latents=self.latents.each(lambda field: field[one]), log_weights=self.log_weights[one])
+    def as_usual(self, law: Law, usual: Law) -> Swarm:
+        """The same particles under the prior that ISIs are chosen with."""
+        return replace(self, crowd=self.crowd._replace(log_weights=law.usual_weights(usual, self.crowd)))
 
-    def picked(self, size: int) -> Latents:
-        """Equally weighted particles that represent the same posterior, fields of shape (b, s)."""
-        return self.latents.each(partial(taken, rows=self._rows(systematic(self.log_weights, size))))
+    def picked(self, law: Law, size: int, person: int | None = None) -> tuple[Latents, Singles]:
+        """Equally weighted particles that represent the same posterior, and what they mean now, fields of (b, s).
 
-    def _rows(self, picks: Tensor) -> Tensor:
-        """Picks of each person's particles if those of all people follow each other, shape (b, s)."""
-        people, particles = self.log_weights.shape
-        return picks + _first_rows(people, particles, picks.device)
-
-    def _resampled(self, worn: Tensor, shuffled: Tensor) -> Swarm:
-        """Resample, in this order, those people whose effective sample size has fallen (b,); nobody else notices."""
-        size, worn = len(shuffled), worn.unsqueeze(-1)
-        kept, log_favour = torch.arange(size, device=shuffled.device), self._log_favour()
-        picks = systematic(self.log_weights + log_favour, size)[:, shuffled]
-        rows = self._rows(torch.where(worn, picks, kept))
-        fresh = torch.log_softmax(-taken(log_favour, rows), dim=-1)
-        log_blocks = self.latents.log_blocks
-        known = None if log_blocks is None else taken(log_blocks, rows)
-        return replace(
-            self,
-            latents=self.latents.each(partial(taken, rows=rows))._replace(log_blocks=known),
-            log_weights=torch.where(worn, fresh, self.log_weights),
-            log_likelihood=taken(self.log_likelihood, rows),
-        )
-
-    def _log_favour(self) -> Tensor:
-        """Log of how much more often particles are picked than their weights say, (b, p); 0 if none is too rare."""
-        hypotheses, weights = self.latents.hypothesis, self.log_weights.exp()
-        probability = weights.new_zeros((len(weights), HYPOTHESES)).scatter_add_(-1, hypotheses, weights)
-        favour = (LEAST_SHARE / probability.clamp_min(LEAST_PROBABILITY)).clamp_min(1.0)
-        return favour.log().gather(-1, hypotheses)
-
-
-@cache
-def _first_rows(people: int, particles: int, device: torch.device) -> Tensor:
-    """Each person's first particle, shape (b, 1)."""
-    return particles * torch.arange(people, device=device).unsqueeze(-1)
-
-
-def taken(values: Tensor, rows: Tensor) -> Tensor:
-    """Some of the particles (b, p, ...), those of all people following each other, shape (b, s, ...)."""
-    picked = values.flatten(0, 1).index_select(0, rows.flatten())
-    return picked.view(*rows.shape, *values.shape[2:])
+        Args:
+            law: what they mean.
+            size: how many.
+            person: of one person alone.
+        """
+        some = slice(None) if person is None else slice(person, person + 1)
+        latents = Latents(self.crowd.values[some], self.crowd.kinds[some])
+        picks, fields = law.represent(*latents, self.log_weights[some], size, self.trials)
+        return latents.taken(picks), fields

@@ -10,9 +10,8 @@ import numpy as np
 
 from isiw.checks import Checked, Positive
 from isiw.errors import StrategyError
-from isiw.lazy import torch
-from isiw.models.protocol import Observation, Tensor
-from isiw.types import FloatArray
+from isiw.models.protocol import Observation
+from isiw.types import FloatArray, Singles
 
 _LEAST_MV: Final = 1e-3
 """What is left at least of an amplitude without its known part [mV]."""
@@ -31,83 +30,93 @@ class Circumstances(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """The trials so far; amplitudes are intervals of log mV, which are points if the amplitude is known."""
+    """The trials so far; amplitudes are intervals of log mV, which are points if the amplitude is known.
 
-    isi_ms: Tensor  # realised; NaN is TMS alone, (b, n)
-    isi_sd_ms: Tensor  # (b, n)
-    log_mep: Tensor  # lower end, (b, n)
-    log_mep_high: Tensor  # upper end, (b, n)
-    order: Tensor  # how many trials came before each, (b, n)
-    circumstances: Tensor | None = None  # the fields of `Circumstances`, (b, n, 6); None if all are neutral
+    The columns are those of a trial in the compiled engine: realised ISI (NaN is TMS alone) and its SD [ms], lower and
+    upper end of the log MEP, how many trials came before, and the fields of `Circumstances`, shape (b, n, 11).
+    """
+
+    columns: Singles
 
     @classmethod
-    def empty(cls, people: int, device: torch.device) -> History:
+    def empty(cls, people: int) -> History:
         """No trials."""
-        return cls(*(torch.empty((people, 0), dtype=torch.float32, device=device) for _ in range(5)))
+        return cls(np.empty((people, 0, _OF_A_TRIAL + len(Circumstances._fields)), dtype=np.float32))
 
     @property
-    def columns(self) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor]:
-        """Everything but the circumstances, in order."""
-        return self.isi_ms, self.isi_sd_ms, self.log_mep, self.log_mep_high, self.order
-
-    def to(self, device: torch.device | str, dtype: torch.dtype) -> History:
-        """The same on another device, or in another precision."""
-        circumstances = None if self.circumstances is None else self.circumstances.to(device, dtype)
-        columns = History(*(column.to(device, dtype) for column in self.columns))
-        return replace(columns, circumstances=circumstances)
-
-    def appended(self, trial: History) -> History:
-        """This history and one more trial."""
-        both = History(*(torch.cat(pair, dim=-1) for pair in zip(self.columns, trial.columns, strict=True)))
-        if self.circumstances is None and trial.circumstances is None:
-            return both
-        return replace(both, circumstances=torch.cat((self.around, trial.around), dim=1))
-
-    def of_people(self, who: Tensor) -> History:
-        """The trials of some of the people, as a mask (b,) says."""
-        circumstances = None if self.circumstances is None else self.circumstances[who]
-        return replace(History(*(column[who] for column in self.columns)), circumstances=circumstances)
+    def trials(self) -> int:
+        """Number of trials of each person."""
+        return int(self.columns.shape[1])
 
     @property
-    def around(self) -> Tensor:
-        """The circumstances of all trials, shape (b, n, 6)."""
-        if self.circumstances is not None:
-            return self.circumstances
-        return self.isi_ms.new_tensor(Circumstances()).expand(*self.isi_ms.shape, -1)
+    def isi_ms(self) -> Singles:
+        """Realised ISIs [ms], NaN for TMS alone, shape (b, n)."""
+        return self.columns[..., 0]
+
+    @property
+    def isi_sd_ms(self) -> Singles:
+        """Their SDs [ms], shape (b, n)."""
+        return self.columns[..., 1]
+
+    @property
+    def log_mep(self) -> Singles:
+        """Lower and upper ends of the log MEPs [log mV], shape (b, n, 2)."""
+        return self.columns[..., 2:4]
 
     @property
     def shares_factor(self) -> bool:
         """True if an unknown factor of known parts makes the trials depend on each other, given a person."""
-        return self.circumstances is not None and bool(self.circumstances[..., 2].any())
+        return bool(self.columns[..., _OF_A_TRIAL + Circumstances._fields.index("known_log_sd")].any())
+
+    def appended(self, trial: History) -> History:
+        """This history and one more trial."""
+        return History(np.concatenate((self.columns, trial.columns), axis=1))
+
+
+_OF_A_TRIAL: Final = 5
+"""Columns before the circumstances."""
 
 
 def observed(observation: Observation, detection_limit_mv: float, response_threshold_mv: float, order: int) -> History:
     """One trial of each person as a history."""
-    seen, unseen = observation.response == 1, observation.response == 0
-    log_mep = torch.log(observation.mep_mv)
-    limit, threshold = math.log(detection_limit_mv), math.log(response_threshold_mv)
-    low = torch.where(seen, threshold, torch.where(unseen, -torch.inf, log_mep))
-    high = torch.where(seen, torch.inf, torch.where(unseen, threshold, log_mep))
-    high = torch.where(observation.mep_mv == 0, limit, high)
-    if observation.mep_high_mv is not None:
-        told = torch.log(observation.mep_high_mv)
-        high = torch.where(told.isnan(), high, torch.where(observation.mep_mv == 0, told.clamp_min(limit), told))
-    columns = (observation.isi_ms, observation.isi_sd_ms, low, high, torch.full_like(log_mep, order))
-    trial = History(*(x.unsqueeze(-1) for x in columns))
-    if observation.known_mv is None:
-        return trial
-    around = trial.around.clone()
-    around[:, 0, :3] = observation.known_mv.to(around)
-    return replace(trial, circumstances=around)
+    limits = math.log(detection_limit_mv), math.log(response_threshold_mv)
+    columns = np.empty((len(observation.isi_ms), 1, _OF_A_TRIAL + len(Circumstances._fields)), dtype=np.float32)
+    columns[:, 0, _OF_A_TRIAL - 1], columns[:, 0, _OF_A_TRIAL:] = order, Circumstances()
+    columns[:, 0, 0], columns[:, 0, 1] = observation.isi_ms, observation.isi_sd_ms
+    high_mv = [math.nan] * len(columns) if observation.mep_high_mv is None else observation.mep_high_mv.tolist()
+    people = zip(observation.mep_mv.tolist(), high_mv, observation.response.tolist(), strict=True)
+    columns[:, 0, 2:4] = [_ends(*one, *limits) for one in people]
+    if observation.known_mv is not None:
+        columns[:, 0, _OF_A_TRIAL : _OF_A_TRIAL + 3] = observation.known_mv
+    return History(columns)
+
+
+def _ends(mep_mv: float, high_mv: float, response: float, limit: float, threshold: float) -> tuple[float, float]:
+    """Between which log MEPs [log mV] an amplitude lies, or a response that was seen (1) or not (0)."""
+    if response == 1:
+        return threshold, math.inf
+    if response == 0:
+        return -math.inf, threshold
+    if mep_mv == 0:
+        return -math.inf, limit if math.isnan(high_mv) else max(math.log(high_mv), limit)
+    low = math.log(mep_mv)
+    return low, low if math.isnan(high_mv) else math.log(high_mv)
+
+
+def neutral(trials: int) -> Singles:
+    """Columns of so many trials that nothing but their order is known of, shape (n, 11)."""
+    columns = np.zeros((trials, _OF_A_TRIAL + len(Circumstances._fields)), dtype=np.float32)
+    columns[:, _OF_A_TRIAL - 1], columns[:, _OF_A_TRIAL:] = np.arange(trials), Circumstances()
+    return columns
 
 
 def without_known(observation: Observation) -> Observation:
     """The same without the mean of the known parts, for models that know no such part."""
     if observation.known_mv is None:
         return observation
-    known = observation.known_mv[:, 0].to(observation.mep_mv)
-    left = torch.where(known > 0, (observation.mep_mv - known).clamp_min(_LEAST_MV), observation.mep_mv)
-    return replace(observation, mep_mv=left, known_mv=None)
+    known_mv, mep_mv = observation.known_mv[:, 0], observation.mep_mv
+    left_mv = np.where(known_mv > 0, np.maximum(mep_mv - known_mv, np.float32(_LEAST_MV)), mep_mv)
+    return replace(observation, mep_mv=left_mv, known_mv=None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,9 +154,9 @@ class AmplitudeHistory:
         """These and one more trial; of an interval its middle."""
         amplitude = without_known(observation).mep_mv
         if observation.mep_high_mv is not None:
-            high = observation.mep_high_mv.nan_to_num(0.0, posinf=0.0)
-            amplitude = torch.where(high > amplitude, (amplitude + high) / 2, amplitude)
-        isi_ms, mep_mv = (x.detach().cpu().double().numpy()[:, None] for x in (observation.isi_ms, amplitude))
+            high = np.nan_to_num(observation.mep_high_mv, nan=0.0, posinf=0.0)
+            amplitude = np.where(high > amplitude, (amplitude + high) / 2, amplitude)
+        isi_ms, mep_mv = (x.astype(float)[:, None] for x in (observation.isi_ms, amplitude))
         if np.isnan(mep_mv).any():
             raise StrategyError(
                 "the model learns from amplitudes only",

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import Annotated, Final, NamedTuple, TypeAlias
+from typing import Annotated, Any, Final, NamedTuple, TypeAlias, TypeVar
 
 from isiw.errors import InvalidValueError
-from isiw.lazy import torch
-from isiw.models.protocol import Tensor
+
+Number = TypeVar("Number", bound=Any)
+"""A number, or an array or a tensor of numbers."""
 
 _MOST_MEDIAN: Final = 1e5
 """In any unit that is used [ms, mV, % RMT, ratios]; no quantity of a person is as large."""
@@ -34,17 +35,15 @@ class Scale(NamedTuple):
         """Mean and SD of the natural logarithm of the positive quantity, tail aside."""
         return math.log(self.median), self.sd
 
-    def normal(self, z: Tensor) -> Tensor:
+    @property
+    def log(self) -> Scale:
+        """The scale of the natural logarithm of the positive quantity."""
+        return Scale(math.log(self.median), self.sd, self.tail)
+
+    def normal(self, z: Number) -> Number:
         """The quantity at some latents, same shape."""
-        return self.median + self.sd * z + self.tail * z**3
-
-    def log_normal(self, z: Tensor) -> Tensor:
-        """The positive quantity at some latents, same shape."""
-        return torch.exp(Scale(math.log(self.median), self.sd, self.tail).normal(z))
-
-    def probability(self, z: Tensor) -> Tensor:
-        """The probability, whose logit the scale is of, at some latents, same shape."""
-        return torch.sigmoid(self.normal(z))
+        found: Number = self.median + self.sd * z + self.tail * z**3
+        return found
 
 
 def scale(what: str, given: object, *, positive: bool = True, tailed: bool = True) -> Scale:

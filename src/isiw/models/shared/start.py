@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final, NamedTuple
 
+import numpy as np
+
 from isiw.checks import (
     Checked,
     MeanAndSd,
@@ -17,8 +19,8 @@ from isiw.checks import (
     require_sum_of_one,
 )
 from isiw.design import DesignSpace
-from isiw.lazy import torch
-from isiw.models.protocol import Tensor
+from isiw.models.shared.tables import normal_below
+from isiw.types import Array, FloatArray
 
 BEFORE_MS: Final = 100.0
 """How far before the range a window may start."""
@@ -56,10 +58,10 @@ class Span(Checked):
         super().__post_init__()
         ascending("Span.low_ms and Span.high_ms", (self.low_ms, self.high_ms))
 
-    def density(self, start_ms: Tensor) -> Tensor:
+    def density(self, start_ms: Array) -> FloatArray:
         """Density at some starts [1/ms], same shape."""
-        low, high = (torch.special.ndtr((start_ms - edge) / self.sd_ms) for edge in (self.low_ms, self.high_ms))
-        density: Tensor = (low - high) / (self.high_ms - self.low_ms)
+        low, high = (normal_below((start_ms - edge) / self.sd_ms) for edge in (self.low_ms, self.high_ms))
+        density: FloatArray = (low - high) / (self.high_ms - self.low_ms)
         return density
 
     def later(self, mean_ms: float, sd_ms: float, share: float = 1.0) -> Span:
@@ -70,6 +72,14 @@ class Span(Checked):
 
 TAP_SPANS: Final = (Span(0.635, 0.0, 115.0), Span(0.365, -30.0, 260.0, 20.0))
 """Where windows start after a tap; some wide ones start before it (`isiw.models.particles.profile`)."""
+
+
+class Knots(NamedTuple):
+    """A law of starts that is straight between some of them, each of shape (k,)."""
+
+    start_ms: FloatArray  # evenly spaced
+    density: FloatArray  # [1/ms]
+    below: FloatArray  # probability of an earlier start
 
 
 @dataclass(frozen=True)
@@ -95,31 +105,24 @@ class StartPrior(Checked):
         super().__post_init__()
         require_sum_of_one("the shares of StartPrior.spans", (span.share for span in self.spans))
 
-    def start_ms(self, quantile: Tensor, space: DesignSpace) -> Tensor:
-        """Starts in a space [ms] at some quantiles of the prior, same shape."""
-        _, starts_ms = _law(space, self, quantile.dtype, quantile.device)
-        return starts_ms.at(quantile)
+    def knots(self, space: DesignSpace) -> Knots:
+        """Evenly spaced starts in a space, with their density and the probability of earlier ones."""
+        return _knots(space, self)
 
-    def knots(self, space: DesignSpace) -> tuple[Tensor, Tensor, Tensor]:
-        """Evenly spaced starts in a space [ms], the density there, and the probability of earlier ones, (k,) each."""
-        density, starts_ms = _law(space, self, torch.float32, torch.device("cpu"))
-        return density.x, density.y, starts_ms.x
-
-    def log_density(self, start_ms: Tensor, space: DesignSpace) -> Tensor:
+    def log_density(self, start_ms: Array, space: DesignSpace) -> FloatArray:
         """Log density at some starts, same shape; -inf where no start can be."""
-        density, _ = _law(space, self, start_ms.dtype, start_ms.device)
-        inside = (start_ms >= density.x[0]) & (start_ms <= density.x[-1])
-        return torch.where(inside, density.at(start_ms).clamp_min(LEAST_DENSITY).log(), -torch.inf)
+        knots_ms, density, _ = self.knots(space)
+        at = np.log(np.maximum(np.interp(start_ms, knots_ms, density), LEAST_DENSITY))
+        return np.where((start_ms >= knots_ms[0]) & (start_ms <= knots_ms[-1]), at, -np.inf)
 
-    def usual(self, start_ms: Tensor, space: DesignSpace) -> Tensor:
+    def usual(self, start_ms: Array, space: DesignSpace) -> FloatArray:
         """Probability that some starts are of the usual span, whatever the rig, same shape."""
-        spans = torch.stack([span.share * span.density(start_ms) for span in self.in_space(space)])
+        spans = np.stack([span.share * span.density(start_ms) for span in self.in_space(space)])
         usual = spans[:: len(self.spans)].sum(0)  # the first of all spans is there once for each kind of rig
         even = self.p_anywhere / (space.high_ms - space.low_ms + BEFORE_MS)
-        among = ((1.0 - self.p_anywhere) * spans.sum(0) + even).clamp_min(
-            LEAST_DENSITY
-        )  # where no start is, there is 0
-        return (1.0 - self.p_anywhere) * usual / among
+        among = np.maximum((1.0 - self.p_anywhere) * spans.sum(0) + even, LEAST_DENSITY)  # 0 where no start can be
+        share: FloatArray = (1.0 - self.p_anywhere) * usual / among
+        return share
 
     def as_usual(self, kept: float) -> StartPrior:
         """The same with less probability of all but the usual span."""
@@ -155,38 +158,22 @@ def _with_any_hit_delay(span: Span, share: float) -> Span:
     return Span(share * span.share, low_ms + middle_ms, high_ms + middle_ms, math.hypot(span.sd_ms, sd_ms))
 
 
-class _Line(NamedTuple):
-    """A function that is straight between some knots, and level beyond them."""
-
-    x: Tensor  # of the knots, ascending, (k,)
-    y: Tensor  # at the knots, (k,)
-    run: Tensor  # to the next knot, (k - 1,)
-    rise: Tensor  # likewise
-
-    @classmethod
-    def through(cls, x: Tensor, y: Tensor) -> _Line:
-        return cls(x, y, x.diff().clamp_min(1e-12), y.diff())
-
-    def at(self, x: Tensor) -> Tensor:
-        left = torch.searchsorted(self.x, x.contiguous()).sub_(1).clamp_(0, len(self.run) - 1)
-        share = (x - self.x[left]).div_(self.run[left]).clamp_(0.0, 1.0)
-        return self.y[left] + share.mul_(self.rise[left])
-
-
 @lru_cache(maxsize=64)
-def _law(space: DesignSpace, prior: StartPrior, dtype: torch.dtype, device: torch.device) -> tuple[_Line, _Line]:
-    """The density of window starts by the start [ms], and the start by its quantile."""
+def _knots(space: DesignSpace, prior: StartPrior) -> Knots:
     low_ms, high_ms = space.low_ms - BEFORE_MS, space.high_ms
-    knots = min(MAX_KNOTS, math.ceil((high_ms - low_ms) / KNOT_MS) + 1)
-    knots_ms = torch.linspace(low_ms, high_ms, knots, dtype=torch.float32).double()
-    expected = torch.stack([span.share * span.density(knots_ms) for span in prior.in_space(space)]).sum(0)
-    even = torch.full_like(knots_ms, 1.0 / (high_ms - low_ms))
+    knots_ms = np.linspace(low_ms, high_ms, min(MAX_KNOTS, math.ceil((high_ms - low_ms) / KNOT_MS) + 1))
+    expected = np.sum([span.share * span.density(knots_ms) for span in prior.in_space(space)], axis=0)
+    even = np.full_like(knots_ms, 1.0 / (high_ms - low_ms))
     mixed = (1.0 - prior.p_anywhere) * expected + prior.p_anywhere * even
-    below = torch.cumulative_trapezoid(mixed, knots_ms)
-    if float(below[-1]) < LEAST_MASS:
-        mixed, below = even, torch.cumulative_trapezoid(even, knots_ms)
+    below = _integral(knots_ms, mixed)
+    if below[-1] < LEAST_MASS:
+        mixed, below = even, _integral(knots_ms, even)
     # Given that it lies in the range: the further that is from where starts usually are, the more "anywhere" counts.
-    total = below[-1]
-    exact = knots_ms, mixed / total, torch.nn.functional.pad(below / total, (1, 0))
-    knots_ms, density, below = (values.to(device, dtype) for values in exact)
-    return (_Line.through(knots_ms, density), _Line.through(below, knots_ms))
+    return Knots(knots_ms, mixed / below[-1], below / below[-1])
+
+
+def _integral(x: FloatArray, y: FloatArray) -> FloatArray:
+    """Of what is straight between its knots, from the first to each, (k,)."""
+    below = np.zeros_like(x)
+    np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(x), out=below[1:])
+    return below

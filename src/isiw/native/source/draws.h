@@ -50,7 +50,7 @@ INLINE int64_t one_of(uint64_t *dice, int64_t count) {
 /* Which of some alternatives a draw is of, by the sums of the probabilities of earlier ones. */
 INLINE int64_t which(float quantile, const float *edges, int64_t count) {
     int64_t drawn = 0;
-    for (int64_t i = 0; i < count; i++) drawn += quantile > edges[i];
+    for (int64_t i = 0; i < count; i++) drawn += quantile >= edges[i];
     return drawn;
 }
 

@@ -8,7 +8,7 @@ in between. Single precision; indices are 64 bits. Arrays lie in C order: (b, p,
 
 #include <stdint.h>
 
-/* What is known of a model's prior and of its moves; see `isiw.models.particles.target.Tables`. */
+/* What is known of a model's prior and of its moves; see `isiw.native.engine.Tables`. */
 typedef struct {
     int64_t latents, blocks, width, knots, place_count, states, part_count, jump_count, kind_values;
     const int64_t *at;         /* of the latent of each meaning; `latents` where the model has none, (MEANINGS,) */
@@ -46,17 +46,30 @@ typedef struct {
     /* What particles mean after so many trials, or with their changes if it is negative, (b, p, FIELDS). */
     int (*meanings)(const Tables *tables, int64_t people, int64_t particles, const float *values, const int64_t *kinds,
                     int64_t trials, float *fields);
-    /* The log prior density of what ISIs are chosen with another law of, but for a constant, (b, p). */
-    int (*log_usual)(const Tables *tables, int64_t people, int64_t particles, const float *values, const int64_t *kinds,
-                     const float *densities, float *found);
+    /* Log weights (b, p) under another prior, which ISIs are chosen with, by those under the particles' own. */
+    int (*usual_weights)(const Tables *tables, const Tables *usual, int64_t people, int64_t particles,
+                         const float *values, const int64_t *kinds, const float *densities, const double *log_weights,
+                         double *found);
+    /* Particles after one more trial, the last of the columns (b, n, COLUMNS), in place: weighed, resampled where fewer
+    carry the posterior than a share, and moved so often where they were kept and where they were resampled. Found are
+    the log likelihood of the trial, the effective sample size as a share, and counts of moves, (b, 6). */
+    int (*learn)(const Tables *tables, int64_t people, int64_t particles, int64_t trials, const float *columns,
+                 double min_ess, int64_t kept, int64_t resampled, uint64_t *dice, float *values, int64_t *kinds,
+                 double *log_weights, float *log_likelihood, float *densities, double *found);
+    /* Particles of equal weight that stand for weighted ones, as they are after so many trials: their numbers (b, s)
+    and fields (b, s, FIELDS). */
+    int (*represent)(const Tables *tables, int64_t people, int64_t particles, int64_t size, int64_t trials,
+                     const float *values, const int64_t *kinds, const double *log_weights, int64_t *picks,
+                     float *fields);
+    /* Particles of the prior, by the seed of each person, (b, p, latents) and (b, p, KINDS). */
+    int (*draws)(const Tables *tables, int64_t people, int64_t particles, const uint64_t *seeds, float *values,
+                 int64_t *kinds);
     /* Each person's particles moved so many times, in place; counts are shifts, accepted ones, jumps, accepted ones. */
     int (*sweeps)(const Tables *tables, int64_t people, int64_t particles, int64_t trials, const int64_t *numbers,
-                  const float *columns, const float *steps, uint64_t *dice, float *values, int64_t *kinds,
-                  float *log_likelihood, float *densities, float *counts);
-    /* Facilitations of the rows of tables, (b, s, rows). */
-    int (*table_rows)(int64_t samples, int64_t rows, const float *fields, float *levels);
-    /* Expected MEPs above the floor, in floors, at the facilitations (b, s, rows). */
-    int (*evoked_means)(int64_t samples, int64_t rows, const float *fields, const float *levels, float *means);
+                  const float *columns, uint64_t *dice, float *values, int64_t *kinds, float *log_likelihood,
+                  float *densities, float *counts);
+    /* Facilitations of the rows of tables, and expected MEPs above the floor there, in floors, (b, s, rows) each. */
+    int (*evoked_means)(int64_t samples, int64_t rows, const float *fields, float *levels, float *means);
     /* The probability of each outcome of the next trial, after so many, at the facilitations, (b, s, rows, y). */
     int (*outcome_tables)(int64_t people, int64_t samples, int64_t rows, int64_t outcomes, int64_t order,
                           const float *fields, const float *levels, const float *log_mep, const float *widths,

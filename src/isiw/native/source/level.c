@@ -2,6 +2,7 @@
 
 #include "engine.h"
 #include "information.h"
+#include "learning.h"
 #include "likelihood.h"
 #include "moves.h"
 #include "predictions.h"
@@ -31,8 +32,22 @@ const Engine *NAMED(ISIW_LEVEL)(void);
 
 const Engine *NAMED(ISIW_LEVEL)(void) {
     static const Engine engine = {
-        likelihoods,  meanings,      log_usual,   sweeps,      table_rows,         evoked_means,        outcome_tables,
-        rows_between, facilitations, edge_levels, window_runs, entropy_reductions, variance_reductions, elementary,
+        .likelihoods = likelihoods,
+        .meanings = meanings,
+        .usual_weights = usual_weights,
+        .learn = learn,
+        .represent = represent,
+        .draws = draws,
+        .sweeps = sweeps,
+        .evoked_means = evoked_means,
+        .outcome_tables = outcome_tables,
+        .rows_between = rows_between,
+        .facilitations = facilitations,
+        .edge_levels = edge_levels,
+        .window_runs = window_runs,
+        .entropy_reductions = entropy_reductions,
+        .variance_reductions = variance_reductions,
+        .elementary = elementary,
     };
     fill_nodes();
     return &engine;

@@ -23,10 +23,26 @@ and latents again. A move is accepted with probability min(1, exp(likelihood rat
 /* What the moves of a person have in common. */
 typedef struct {
     const Tables *tables;
-    const float *steps; /* of the mean log MEP at each trial, see `steps_of`, (count + 1,) */
+    const float *steps; /* of the mean log MEP at each trial, see steps_of, (count + 1,) */
     int64_t count;      /* of trials */
     float *redrawn;     /* room for latents that are drawn again, (latents,) */
 } Chain;
+
+/* By how much the mean log MEP is larger from each trial on than before it; 0 for all and none, (count + 1,). */
+static void steps_of(const float *columns, int64_t count, float *steps) {
+    double all_of = 0.0, before = 0.0;
+    for (int64_t n = 0; n <= count; n++) {
+        steps[n] = (float)all_of;
+        if (n == count) break;
+        float low = columns[n * COLUMNS + LOW], high = columns[n * COLUMNS + HIGH];
+        all_of += isfinite(low) ? low : isfinite(high) ? high : 0.0f;
+    }
+    for (int64_t n = 1; n < count; n++) {
+        before = steps[n];
+        steps[n] = (float)((all_of - before) / (double)(count - n) - before / (double)n);
+    }
+    steps[count] = 0.0f;
+}
 
 /* The step of the amplitudes at the trial before which a change comes. */
 static double step_at(const Chain *chain, double after) {
@@ -243,11 +259,12 @@ static void move_half(const Chain *chain, const Proposals *to, const Trial *tria
 }
 
 static int sweeps(const Tables *tables, int64_t people, int64_t particles, int64_t count, const int64_t *numbers,
-                  const float *columns, const float *steps, uint64_t *dice, float *values, int64_t *kinds,
-                  float *log_likelihood, float *densities, float *counts) {
+                  const float *columns, uint64_t *dice, float *values, int64_t *kinds, float *log_likelihood,
+                  float *densities, float *counts) {
     int64_t half = particles / 2, most = particles - half, latents = tables->latents, blocks = tables->blocks;
     size_t each = (size_t)most;
     Trial *trials = malloc((size_t)(count + 1) * sizeof *trials);
+    float *steps = malloc((size_t)(count + 1) * sizeof *steps);
     Proposals to = {.z = malloc(each * (size_t)(latents + 1) * sizeof(float)),
                     .found = malloc(each * (size_t)blocks * sizeof(float)),
                     .fields = malloc(each * FIELDS * sizeof(float)),
@@ -258,11 +275,12 @@ static int sweeps(const Tables *tables, int64_t people, int64_t particles, int64
                     .jumped = malloc(each),
                     .wanted = malloc(each)};
     float *redrawn = malloc((size_t)latents * sizeof *redrawn);
-    int there = trials && to.z && to.found && to.fields && to.after && to.ratio && to.kinds && to.dice && to.jumped &&
-                to.wanted && redrawn;
+    int there = trials && steps && to.z && to.found && to.fields && to.after && to.ratio && to.kinds && to.dice &&
+                to.jumped && to.wanted && redrawn;
     for (int64_t person = 0; there && person < people; person++) {
         int shares = trials_of(columns + person * count * COLUMNS, count, trials);
-        Chain chain = {tables, steps + person * (count + 1), count, redrawn};
+        Chain chain = {tables, steps, count, redrawn};
+        steps_of(columns + person * count * COLUMNS, count, steps);
         int64_t at = person * particles;
         State state = {values + at * latents, log_likelihood + at, densities + at * blocks, counts + 4 * person,
                        kinds + at * KINDS};
@@ -272,9 +290,29 @@ static int sweeps(const Tables *tables, int64_t people, int64_t particles, int64
             move_half(&chain, &to, trials, shares, &state, stream, half, particles, 0, half);
         }
     }
-    free(trials), free(to.z), free(to.found), free(to.fields), free(to.after), free(to.ratio), free(to.kinds);
+    free(trials), free(steps), free(to.z), free(to.found), free(to.fields), free(to.after), free(to.ratio),
+        free(to.kinds);
     free(to.dice), free(to.jumped), free(to.wanted), free(redrawn);
     return there ? 0 : -1;
+}
+
+#define REDRAWS 20 /* how often segments that overlap are drawn again; next to none do then */
+
+/* Particles of the prior, each from a stream of its own. */
+static int draws(const Tables *tables, int64_t people, int64_t particles, const uint64_t *seeds, float *values,
+                 int64_t *kinds) {
+    for (int64_t i = 0; i < people * particles; i++) {
+        uint64_t dice = stream_of(seeds[i / particles], i % particles);
+        float *z = values + i * tables->latents;
+        for (int kind = 0; kind < KINDS; kind++)
+            kinds[i * KINDS + kind] =
+                which(uniform(&dice), tables->kinds + kind * tables->kind_values, tables->kind_values);
+        int time = 0;
+        do {
+            for (int64_t block = 0; block < tables->blocks; block++) draw_block(tables, block, &dice, z);
+        } while (tables->apart && overlap(tables, z) && time++ < REDRAWS);
+    }
+    return 0;
 }
 
 #endif

@@ -8,7 +8,7 @@ Here the lanes are the rows of a table, or the outcomes. */
 #include "likelihood.h"
 
 /* Facilitations of the rows: squares of equal steps, or equal steps from the deepest depression. */
-static int table_rows(int64_t samples, int64_t rows, const float *fields, float *levels) {
+static void table_rows(int64_t samples, int64_t rows, const float *fields, float *levels) {
     for (int64_t i = 0; i < samples; i++) {
         float depth = fields[i * FIELDS + DEPTH];
         for (int64_t row = 0; row < rows; row++) {
@@ -16,7 +16,6 @@ static int table_rows(int64_t samples, int64_t rows, const float *fields, float 
             levels[i * rows + row] = depth > 0.0f ? share * (1.0f + depth) - depth : share * share;
         }
     }
-    return 0;
 }
 
 /* Where a facilitation lies among the rows of a table. */
@@ -40,7 +39,8 @@ INLINE Reals responses(const float *fields, Reals level) {
 }
 
 /* Expected MEPs above the floor: nodes that have all of the variance of the noise are enough for an expectation. */
-static int evoked_means(int64_t samples, int64_t rows, const float *fields, const float *levels, float *means) {
+static int evoked_means(int64_t samples, int64_t rows, const float *fields, float *levels, float *means) {
+    table_rows(samples, rows, fields, levels);
     for (int64_t i = 0; i < samples; i++) {
         const float *one = fields + i * FIELDS;
         int curved = is_curved(one), whole = one[NOISE] == ALL_OR_NONE;

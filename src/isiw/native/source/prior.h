@@ -208,22 +208,20 @@ static int is_weighed(const Tables *tables, int64_t block, const int64_t *kinds)
            (stepped && block == tables->changed);
 }
 
-static int log_usual(const Tables *tables, int64_t people, int64_t particles, const float *values, const int64_t *kinds,
-                     const float *densities, float *found) {
+/* The log prior density of what ISIs are chosen with another law of, but for a constant; densities of blocks may be
+known. */
+static float log_usual(const Tables *tables, const float *z, const int64_t *kinds, const float *densities) {
     const float *edges = tables->kinds + OF_CHANGE * tables->kind_values;
-    for (int64_t i = 0; i < people * particles; i++) {
-        int64_t change = kinds[i * KINDS + OF_CHANGE];
-        float share =
-            (change < tables->kind_values ? least_1(edges[change], 1.0f) : 1.0f) - (change ? edges[change - 1] : 0.0f);
-        float sum = log_1(most_1(share, 1e-30f));
-        for (int64_t block = 0; block < tables->blocks; block++) {
-            if (!is_weighed(tables, block, kinds + i * KINDS)) continue;
-            float known = densities[i * tables->blocks + block];
-            sum += known == UNKNOWN ? log_block(tables, block, values + i * tables->latents) : known;
-        }
-        found[i] = sum;
+    int64_t change = kinds[OF_CHANGE];
+    float share =
+        (change < tables->kind_values ? least_1(edges[change], 1.0f) : 1.0f) - (change ? edges[change - 1] : 0.0f);
+    float sum = log_1(most_1(share, 1e-30f));
+    for (int64_t block = 0; block < tables->blocks; block++) {
+        if (!is_weighed(tables, block, kinds)) continue;
+        float known = densities ? densities[block] : UNKNOWN;
+        sum += known == UNKNOWN ? log_block(tables, block, z) : known;
     }
-    return 0;
+    return sum;
 }
 
 #endif

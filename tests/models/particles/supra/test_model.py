@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from typing import get_args
 
 import numpy as np
 import pytest
-import torch
 
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.metrics import f1
-from isiw.models.particles.engine import EngineName, engine_for
+from isiw.models.particles.latents import Latents
 from isiw.models.particles.supra import SupraModel
-from isiw.models.particles.supra.jumps import SupraTarget
 from isiw.models.particles.supra.model import SupraPosterior
 from isiw.models.particles.supra.prior import LATENTS, Segment, SupraPrior
 from isiw.models.protocol import SamplesDepression
@@ -26,6 +23,7 @@ from isiw.testing import check_model
 from isiw.window import Window
 from known import known
 from models.told_trials import Trial, told
+from native.drawn import Case, seeds
 
 SPACE = DesignSpace(0, 120, reference="impact")
 MODEL = SupraModel(particles=300, thinned=96)
@@ -85,7 +83,7 @@ def test_meps_near_the_floor_are_not_called_depressed() -> None:
 def test_what_is_sampled_has_both_kinds_of_segment() -> None:
     posterior = posterior_after(0.1)
     assert isinstance(posterior, SamplesDepression)
-    isi_ms = torch.tensor([30.0, 75.0, 110.0])
+    isi_ms = np.array([30.0, 75.0, 110.0])
     enhanced, depressed = posterior.window_masks(isi_ms), posterior.depressed_masks(isi_ms)
     assert enhanced.shape == depressed.shape == (1, MODEL.thinned, 3)
     posteriors = [posterior_after(0.1, seed) for seed in SEEDS]
@@ -96,32 +94,30 @@ def test_what_is_sampled_has_both_kinds_of_segment() -> None:
     assert mean_mv[0] < posterior.baselines_mv().mean() < mean_mv[1]
 
 
-@pytest.mark.parametrize("engine", get_args(EngineName))
-def test_moves_leave_the_prior_as_it_is(engine: EngineName) -> None:
-    prior, generator = SupraPrior(), torch.Generator().manual_seed(2)
-    drawn = prior.sample(1, 4000, generator, SPACE)
-    moves = engine_for(engine, SupraTarget(prior, SPACE))
-    moved = moves.sweeps(
-        torch.tensor([8]), drawn, torch.zeros(1, 4000), History.empty(1, torch.device("cpu")), generator
-    )
-    assert (moved.latents.values != drawn.values).any(-1).double().mean() > 0.9
-    assert moved.shifts.item() > 0.1
-    fresh = prior.sample(1, 4000, generator, SPACE)
-    for name, ours, theirs in zip(LATENTS, moved.latents.values[0].T, fresh.values[0].T, strict=True):
+def test_moves_leave_the_prior_as_it_is() -> None:
+    prior, case = SupraPrior(), Case(SupraPrior(), SPACE)
+    drawn, fresh = case.drawn(4000, 2), case.drawn(4000, 3)
+    moved = Latents(drawn.values.copy(), drawn.kinds.copy())
+    state = *moved, np.zeros((1, 4000), dtype=np.float32), case.law.nothing_known(1, 4000)
+    counts = case.law.sweeps(np.array([8]), History.empty(1).columns, seeds(4), state)
+    assert (moved.values != drawn.values).any(-1).mean() > 0.9
+    assert counts[0, 1] / counts[0, 0] > 0.1
+    for name, ours, theirs in zip(LATENTS, moved.values[0].T, fresh.values[0].T, strict=True):
         apart = abs(ours.mean() - theirs.mean()) / (theirs.std() * math.sqrt(2 / 4000))
         assert apart < 6, name  # particles that move together are fewer than they look
-    for ours, segment in ((moved.latents.present, prior.enhanced), (moved.latents.depressed, prior.depressed)):
-        assert ours.double().mean().item() == pytest.approx(segment.probability, abs=0.03)
+    for ours, segment in ((moved.present, prior.enhanced), (moved.depressed, prior.depressed)):
+        assert ours.mean() == pytest.approx(segment.probability, abs=0.03)
 
 
 def test_segments_lie_apart_before_the_first_trial_and_after_the_last() -> None:
-    fresh = SupraPrior().sample(1, 1000, torch.Generator().manual_seed(3), SPACE)
+    fresh = Case(SupraPrior(), SPACE).drawn(1000, 3)
     for latents in (fresh, posterior_after(0.1).swarm.latents):
-        z = dict(zip(LATENTS, latents.values.unbind(-1), strict=True))
+        z = dict(zip(LATENTS, np.moveaxis(latents.values, -1, 0), strict=True))
         first, second = (
-            (z[f"{kind}start_ms"], z[f"{kind}start_ms"] + z[f"{kind}log_width_ms"].exp()) for kind in ("", "depressed_")
+            (z[f"{kind}start_ms"], z[f"{kind}start_ms"] + np.exp(z[f"{kind}log_width_ms"]))
+            for kind in ("", "depressed_")
         )
-        assert bool(((first[1] <= second[0]) | (second[1] <= first[0])).all())
+        assert ((first[1] <= second[0]) | (second[1] <= first[0])).all()
 
 
 def test_a_segment_needs_a_probability_and_a_positive_shift() -> None:

@@ -6,22 +6,21 @@ Each particle has a segment in which the tap enhances the MEP, one in which it d
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Annotated
 
 from isiw.checks import MOST_OF_A_KIND, Checked, Positive, whole
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
-from isiw.models.particles.engine import EngineName, engine_for
-from isiw.models.particles.posterior import SwarmPosterior
-from isiw.models.particles.supra.jumps import SupraTarget
+from isiw.models.particles.posterior import SwarmPosterior, singles
+from isiw.models.particles.supra.jumps import law_of
 from isiw.models.particles.supra.predictions import SupraSample
 from isiw.models.particles.supra.prior import SupraPrior
 from isiw.models.particles.swarm import Moving, Swarm
-from isiw.models.protocol import Observation, Tensor
-from isiw.models.shared.tables import step_generator
+from isiw.models.protocol import Observation
 from isiw.models.windows import Runs, SampledProfiles, best_window, grid_of, profile_grid, sampled_estimate
+from isiw.types import Array, Singles
 
 
 @dataclass(frozen=True)
@@ -35,7 +34,6 @@ class SupraModel(Checked):
         moves: how often particles move, and when they are resampled.
         detection_limit_mv: an amplitude of 0 lies below this [mV].
         response_threshold_mv: a response that was seen lies above this [mV].
-        engine: `"compiled"`, or `"torch"`.
     """
 
     prior: SupraPrior = field(default_factory=SupraPrior)
@@ -44,19 +42,15 @@ class SupraModel(Checked):
     moves: Moving = field(default_factory=Moving)
     detection_limit_mv: Positive = 0.005
     response_threshold_mv: Positive = 0.02
-    engine: EngineName = "compiled"
 
     def begin(self, space: DesignSpace, seed: int, people: int = 1) -> SupraPosterior:
         """The posterior before the first trial."""
-        latents = self.prior.sample(people, self.particles, step_generator("cpu", seed, 0), space)
-        engine = engine_for(self.engine, SupraTarget(self.prior, space))
-        return SupraPosterior(self, space, seed, Swarm.of(latents), engine)
+        law = law_of(self.prior, space)
+        return SupraPosterior(self, space, seed, Swarm.of(law, people, self.particles, seed), law)
 
     def update(self, posterior: SupraPosterior, observation: Observation) -> SupraPosterior:
         """The posterior after one more trial."""
-        after = posterior.told(observation)
-        generator = step_generator("cpu", posterior.seed, after.trials)
-        return replace(after, swarm=after.swarm.moved(posterior.engine, self.moves, generator))
+        return posterior.after(observation)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,15 +67,15 @@ class SupraPosterior(SwarmPosterior[SupraModel]):
         return self._sample(self.model.particles, 0)
 
     def _sample(self, size: int, order: int) -> SupraSample:
-        return SupraSample(self.engine.meaning(self.swarm.picked(size), self.trials), self.space, order)
+        return SupraSample(self.swarm.picked(self.law, size)[1], self.space, order)
 
-    def depressed_masks(self, isi_ms: Tensor) -> Tensor:
+    def depressed_masks(self, isi_ms: Array) -> Singles:
         """Sampled depressed segments; see `SamplesDepression`."""
-        return self.sample.depressed_masks(isi_ms)
+        return self.sample.depressed_masks(singles(isi_ms))
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The window of one person, and the segment in which the tap depresses the MEP."""
-        grid = grid_of(self.space, self.device)
+        grid = grid_of(self.space)
 
         def profiles() -> SampledProfiles:
             mep_mv = self.sample.expected_mep_mv(profile_grid(self.space))

@@ -12,19 +12,15 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final
 
+import numpy as np
+
 from isiw.checks import Checked, Share
-from isiw.design import DesignSpace
-from isiw.lazy import torch
-from isiw.models.particles.latents import Latents
 from isiw.models.particles.laws import Floor, SessionPrior, check_laws
-from isiw.models.particles.mixture import JointMixture, Mixture
-from isiw.models.particles.noise import NoiseKind, Response
-from isiw.models.particles.prior import Depression, Person
+from isiw.models.particles.mixture import Mixture
 from isiw.models.particles.profile import Width
-from isiw.models.particles.shapes import Shape, ShapeKind
-from isiw.models.protocol import Tensor
 from isiw.models.shared.scales import AnyLaw, PositiveLaw, Scale
 from isiw.models.shared.start import Span, StartPrior
+from isiw.types import FloatArray
 
 LATENTS: Final = (
     "start_ms",
@@ -52,10 +48,6 @@ BLOCKS: Final = {
     "curve": ("log_ceiling", "log_slope", "log_input_sd", "log_sigma_y", "rest"),
 }
 """The latents by what they are about."""
-
-
-REDRAWS: Final = 20
-"""How often segments that overlap are drawn again; next to none do then."""
 
 
 @dataclass(frozen=True)
@@ -144,54 +136,11 @@ class SupraPrior:
         )
 
     @cached_property
-    def _joint(self) -> JointMixture:
-        return JointMixture(list(self.mixtures))
-
-    @cached_property
-    def spreads(self) -> Tensor:
+    def spreads(self) -> FloatArray:
         """Usual SD of each latent, shape (d,)."""
         first = self.start.spans[0]
-        starts = torch.full((2,), (first.high_ms - first.low_ms) / math.sqrt(12.0), dtype=torch.float32)
-        return torch.cat([starts, *(mixture.sds[0] for mixture in self.mixtures)])
-
-    def sample(self, people: int, particles: int, generator: torch.Generator, space: DesignSpace) -> Latents:
-        """Particles of the prior."""
-        latents = self.draw(people, particles, generator, space)
-        for _ in range(REDRAWS):
-            again = self.draw(people, particles, generator, space).values
-            latents = latents._replace(values=torch.where(_apart(latents.values).unsqueeze(-1), latents.values, again))
-        return latents
-
-    def draw(self, people: int, particles: int, generator: torch.Generator, space: DesignSpace) -> Latents:
-        """Particles of the prior, but for segments that overlap."""
-        size = (people, particles)
-        uniform = torch.rand((4, *size), generator=generator, dtype=torch.float32, device=generator.device)
-        starts_ms = self.start.start_ms(uniform[:2], space).movedim(0, -1)
-        values = torch.cat([starts_ms, self._joint.sample(size, generator)], dim=-1)
-        there = uniform[2] < self.enhanced.probability, uniform[3] < self.depressed.probability
-        return Latents.of(values, noise=NoiseKind.RECRUITMENT, present=there[0], depressed=there[1])
-
-    def log_density(self, values: Tensor, space: DesignSpace) -> Tensor:
-        """Log density of latents but for a constant, -inf where the segments overlap, shape (b, p)."""
-        starts = self.start.log_density(values[..., :2], space).sum(-1)
-        density = starts + self._joint.log_density(values[..., 2:])
-        return torch.where(_apart(values), density, -torch.inf)
-
-    def person(self, latents: Latents) -> Person:
-        """What particles mean."""
-        z = dict(zip(LATENTS, latents.values.unbind(-1), strict=True))
-        enhanced = _bell(z["start_ms"], z["log_width_ms"])
-        depressed = _bell(z["depressed_start_ms"], z["depressed_log_width_ms"])
-        depth = (z["depressed_log_shift"] - z["log_shift"]).exp()
-        return Person(enhanced, _response(z), latents.present, Depression(depressed, depth, latents.depressed))
-
-
-def _apart(values: Tensor) -> Tensor:
-    """Whether one segment ends before the other starts, of latents (b, p, d), shape (b, p)."""
-    z = dict(zip(LATENTS, values.unbind(-1), strict=True))
-    enhanced_ms, depressed_ms = z["start_ms"], z["depressed_start_ms"]
-    before: Tensor = enhanced_ms + z["log_width_ms"].exp() <= depressed_ms
-    return before | (depressed_ms + z["depressed_log_width_ms"].exp() <= enhanced_ms)
+        starts = np.full(2, (first.high_ms - first.low_ms) / math.sqrt(12.0))
+        return np.concatenate([starts, *(mixture.sds[0] for mixture in self.mixtures)])
 
 
 def _of_segment(segment: Segment) -> tuple[Mixture, Mixture]:
@@ -202,28 +151,3 @@ def _of_segment(segment: Segment) -> tuple[Mixture, Mixture]:
 def _of_curve(curve: Curve) -> list[tuple[float, float]]:
     scales = (curve.ratio, curve.slope_per_pct, curve.input_sd, curve.sigma_y)
     return [*(scale.log_law for scale in scales), curve.rest_pct.law]
-
-
-def _bell(start_ms: Tensor, log_width_ms: Tensor) -> Shape:
-    kind = torch.full_like(start_ms, ShapeKind.GAUSSIAN, dtype=torch.long)
-    return Shape(kind, start_ms, log_width_ms.exp(), torch.zeros_like(start_ms))
-
-
-def _response(z: dict[str, Tensor]) -> Response:
-    slope, nothing = z["log_slope"].exp(), torch.zeros_like(z["rest"])
-    return Response(
-        kind=torch.full_like(nothing, NoiseKind.RECRUITMENT, dtype=torch.long),
-        log_floor=z["log_floor_mv"],
-        floor_log_sd=z["log_floor_sd"].exp(),
-        log_ratio=z["log_ceiling"],
-        spread=z["log_input_sd"].exp(),
-        output_log_sd=z["log_sigma_y"].exp(),
-        boost=slope * z["log_shift"].exp(),
-        rest=slope * z["rest"],
-        onset=nothing,
-        max_probability=nothing + 1.0,
-        rest_probability=nothing,
-        drift=z["drift"],
-        startup=z["startup"],
-        slope=slope,
-    )

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from isiw.lazy import torch
-from isiw.models.protocol import Tensor
+from isiw.models.parametric.tables import Tensor
 
 
 def log_between(low: Tensor, high: Tensor) -> Tensor:

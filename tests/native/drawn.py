@@ -1,0 +1,127 @@
+"""Particles of priors and random trials, for the engine and for the reference."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from isiw.design import VALVE_SPACE, DesignSpace
+from isiw.models.particles import jumps, latents
+from isiw.models.particles.changes import ChangeKind
+from isiw.models.particles.latents import Latents
+from isiw.models.particles.noise import NoiseKind
+from isiw.models.particles.places import Place
+from isiw.models.particles.prior import Prior
+from isiw.models.particles.profile import ProfilePrior
+from isiw.models.particles.supra import jumps as supra_jumps
+from isiw.models.particles.supra import prior as supra_prior
+from isiw.models.shared.history import Circumstances, History
+from isiw.models.shared.scales import Scale
+from isiw.native.engine import COLUMNS, Law
+from isiw.types import Singles
+from native import reference
+
+PLACES: Final = ProfilePrior(
+    places=(Place(0.5, Scale(230.0, 12.0), Scale(80.0, 0.3)), Place(0.2, Scale(90.0, 9.0), Scale(60.0, 0.2)))
+)
+
+
+class Case(NamedTuple):
+    """A prior in a space."""
+
+    prior: Any
+    space: DesignSpace
+
+    @property
+    def supra(self) -> bool:
+        """Whether it is that of TMS above the motor threshold."""
+        return isinstance(self.prior, supra_prior.SupraPrior)
+
+    @property
+    def law(self) -> Law:
+        """The prior as the engine has it."""
+        law: Law = (supra_jumps if self.supra else jumps).law_of(self.prior, self.space)
+        return law
+
+    def drawn(self, particles: int, seed: int, people: int = 1) -> Latents:
+        """Particles of the prior."""
+        return Latents(*self.law.draws(particles, seeds(seed, people)))
+
+    def of_all_kinds(self, particles: int, seed: int) -> Latents:
+        """Particles of one person, all kinds of them as often."""
+        rng, made = np.random.default_rng(seed), self.drawn(particles, seed)
+        kinds = {"shape": 4, "noise": len(NoiseKind), "present": 2, "change": len(ChangeKind)}
+        for name, number in ({"present": 2, "depressed": 2} if self.supra else kinds).items():
+            made = made.with_kind(name, rng.integers(number, size=(1, particles)))
+        return made
+
+    def particles(self, made: Latents, person: int = 0) -> list[reference.Particle]:
+        """One person's particles as the reference has them."""
+        names = supra_prior.LATENTS if self.supra else latents.LATENTS
+        each = zip(made.values[person].tolist(), made.kinds[person].tolist(), strict=True)
+        return [reference.Particle.of(names, values, kinds) for values, kinds in each]
+
+    def fields(self, made: Latents, trials: int = -1) -> Singles:
+        """The particles as the engine has them after so many trials, or with their changes, (b, p, fields)."""
+        return self.law.meanings(*made, trials)
+
+
+CASES: Final = {
+    "default": Case(Prior(), VALVE_SPACE),
+    "places": Case(Prior(PLACES), VALVE_SPACE),
+    "supra": Case(supra_prior.SupraPrior(), DesignSpace(0, 200, reference="impact")),
+}
+
+
+def seeds(seed: int, people: int = 1) -> Any:
+    """Of the engine's draws for each person, (b,)."""
+    return np.random.default_rng(seed).integers(2**64, size=people, dtype=np.uint64)
+
+
+def trials(number: int, rng: np.random.Generator, *, known_log_sd: float = 0.0) -> list[reference.Trial]:
+    """Trials with points and intervals, TMS alone, uncertain ISIs, known parts and other pulses."""
+    found = []
+    for order in range(number):
+        low = rng.normal(-3.0, 1.2)
+        high = low + rng.choice([0.0, 0.0, 0.3, math.inf])
+        if rng.random() < 0.1:
+            low, high = -math.inf, low
+        known_mv = rng.choice([0.0, 0.0, 0.03])
+        found.append(
+            reference.Trial(
+                order=order,
+                isi_ms=math.nan if rng.random() < 0.15 else rng.uniform(0.0, 500.0),
+                low=low,
+                high=high,
+                isi_sd_ms=rng.choice([0.0, 3.0]),
+                known_mv=known_mv,
+                known_sd_mv=0.5 * known_mv,
+                known_log_sd=known_log_sd * rng.random(),
+                log_offset=rng.choice([0.0, 0.2]),
+                shift_pct_rmt=rng.choice([0.0, -5.0]),
+                enhancement=rng.choice([1.0, 0.6]),
+            )
+        )
+    return found
+
+
+def columns(told: list[reference.Trial]) -> Singles:
+    """The trials as the engine has them, (1, n, columns)."""
+    made = [
+        [
+            *(trial.isi_ms, trial.isi_sd_ms, trial.low, trial.high, trial.order, trial.known_mv, trial.known_sd_mv),
+            *(trial.known_log_sd, trial.log_offset, trial.shift_pct_rmt, trial.enhancement),
+        ]
+        for trial in told
+    ]
+    return np.array(made, dtype=np.float32).reshape(1, -1, COLUMNS)
+
+
+def history(people: int, number: int, seed: int, **around: float) -> History:
+    """Random trials of each person that nothing else bears on, unless some of `Circumstances` are given."""
+    rng = np.random.default_rng(seed)
+    made = np.concatenate([columns(trials(number, rng)) for _ in range(people)])
+    made[..., COLUMNS - len(Circumstances._fields) :] = Circumstances(**around)
+    return History(made)
