@@ -47,6 +47,7 @@ class Trial:
     log_offset: float = 0.0
     shift_pct_rmt: float = 0.0
     enhancement: float = 1.0
+    log_by_curves: float = math.nan  # what it is to kinds of noise without a curve; NaN for their own law
 
 
 @dataclass(frozen=True)
@@ -190,6 +191,9 @@ def log_likelihood(particle: Particle, trials: Sequence[Trial]) -> float:
     """Log likelihood of trials; an ISI that is known with an SD only is integrated out."""
     total = 0.0
     for trial in trials:
+        if not (particle.curved or math.isnan(trial.log_by_curves)):
+            total += trial.log_by_curves
+            continue
         nodes = ISI_NODES if trial.isi_sd_ms > 0 else ((0.0, 1.0),)
         total += math.log(sum(w * likelihood(particle, trial, trial.isi_ms + at * trial.isi_sd_ms) for at, w in nodes))
     return total

@@ -98,10 +98,11 @@ class Course:
 
     def after(self, observation: Observation) -> Course:
         """The course after one more trial of each person; all of them pairs of stimuli, or all TMS alone."""
-        alone = bool(observation.isi_ms.isnan().all())
+        alone, shift = bool(observation.isi_ms.isnan().all()), observation.shift_pct_rmt
+        learnt = shift is None or not bool(shift.isnan().any())  # else the model has no law of this intensity
         return replace(
             self,
-            posterior=self.method.model.update(self.posterior, observation),
+            posterior=self.method.model.update(self.posterior, observation) if learnt else self.posterior,
             told=self.told + 1,
             alone=self.alone + alone,
             earlier=tuple(e.without_posterior() if len(e.made) == self.people else e for e in self.past),

@@ -277,6 +277,15 @@ def test_a_stronger_pulse_moves_up_a_recruitment_curve_and_is_nothing_to_others(
     np.testing.assert_allclose(got, log_likelihood(moved, told), atol=1e-3)
 
 
+@pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
+def test_what_curves_alone_have_a_law_of_is_to_other_kinds_as_curves_predict_it(kind: NoiseKind) -> None:
+    person, told = of_kind(kind)
+    got = log_likelihood(person, with_circumstances(told, shift_pct_rmt=5.0, log_by_curves=-1.5))
+    curved = kind in {NoiseKind.RECRUITMENT, NoiseKind.RECTIFIED}
+    expected = log_likelihood(person, with_circumstances(told, shift_pct_rmt=5.0)) if curved else -1.5 * 20
+    np.testing.assert_allclose(got, expected, rtol=1e-5)
+
+
 @pytest.mark.parametrize("kind", [NoiseKind.RECRUITMENT, NoiseKind.RECTIFIED])
 def test_half_an_enhancement_is_half_a_boost(kind: NoiseKind) -> None:
     person, told = of_kind(kind)
@@ -294,6 +303,8 @@ def test_both_engines_know_the_same_circumstances(kind: NoiseKind, known_log_sd:
     log_sd = known_log_sd * torch.rand(spread[..., 0].shape, generator=draws)
     known_mv = torch.stack((0.05 * spread[..., 0].abs(), 0.01 * spread[..., 1].abs(), log_sd), dim=-1)
     around = torch.cat((known_mv, spread[..., 2:3], 5.0 * spread[..., 3:4], torch.rand(spread[..., :1].shape)), dim=-1)
+    by_curves = torch.where(spread[..., 4:] > 0.0, -spread[..., 4:], torch.nan)
+    around = torch.cat((around, by_curves), dim=-1)
     told = replace(told, circumstances=around)
     expected = total_log_likelihood(in_double(person), told.to("cpu", torch.double))
     np.testing.assert_allclose(log_likelihood(person, told), expected, atol=1e-3)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import partial
 
 from isiw.lazy import torch
-from isiw.models.particles.noise import NODES, Response, log_gain, log_likelihood
+from isiw.models.particles.noise import NODES, Response, log_gain, log_likelihood, recruits
 from isiw.models.particles.prior import Person
 from isiw.models.particles.shapes import facilitation
 from isiw.models.protocol import Tensor
@@ -46,7 +46,7 @@ def _by_trial(person: Person, history: History, factor_at: float, isi_ms: Tensor
     """Log likelihood of each trial at some ISIs, shape (b, p, n)."""
     ends = (history.log_mep.unsqueeze(-2), history.log_mep_high.unsqueeze(-2))
     level, gain = levels(person, isi_ms), log_gain(person.response, history.order.unsqueeze(-2))
-    known_mv, sd_mv, log_sd, offset, shift_pct_rmt, enhancement = history.around.unsqueeze(-3).unbind(-1)
+    known_mv, sd_mv, log_sd, offset, shift_pct_rmt, enhancement, by_curves = history.around.unsqueeze(-3).unbind(-1)
     if factor_at:
         factor = torch.exp(factor_at * log_sd)
         known_mv, sd_mv = known_mv * factor, sd_mv * factor
@@ -57,7 +57,9 @@ def _by_trial(person: Person, history: History, factor_at: float, isi_ms: Tensor
         ends = (ends[0] - changed.log_scale, ends[1] - changed.log_scale)
         known_mv, sd_mv = known_mv * per_scale, sd_mv * per_scale
     others = (level * enhancement, *ends, gain + offset, shift_pct_rmt, known_mv, sd_mv)
-    return in_pieces(log_likelihood, person.response, others, NODES * isi_ms.shape[-1])
+    found = in_pieces(log_likelihood, person.response, others, NODES * isi_ms.shape[-1])
+    unknown = ~by_curves.isnan() & ~recruits(person.response.kind).unsqueeze(-1)
+    return torch.where(unknown, by_curves, found)
 
 
 def in_pieces(function: Callable[..., Tensor], response: Response, others: tuple[Tensor, ...], elements: int) -> Tensor:

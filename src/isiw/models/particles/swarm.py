@@ -17,8 +17,9 @@ from isiw.checks import Checked, Natural, Share
 from isiw.lazy import torch
 from isiw.models.particles.engine import Engine
 from isiw.models.particles.latents import HYPOTHESES, Latents
+from isiw.models.particles.noise import recruits
 from isiw.models.protocol import Tensor
-from isiw.models.shared.history import History
+from isiw.models.shared.history import BY_CURVES, SHIFT, History
 from isiw.models.shared.tables import systematic
 
 LEAST_SHARE = 0.03
@@ -129,6 +130,7 @@ class Swarm:
 
     def told(self, trial: History, engine: Engine) -> Swarm:
         """The same particles, weighted by one more trial as well."""
+        trial = self._as_curves_have_it(trial, engine)
         history = self.history.appended(trial)
         if history.shares_factor:
             gain = engine.log_likelihood(self.latents, history) - self.log_likelihood
@@ -142,6 +144,18 @@ class Swarm:
             evidence=self.evidence + torch.logsumexp(log_weights, dim=-1),
             history=history,
         )
+
+    def _as_curves_have_it(self, trial: History, engine: Engine) -> History:
+        """A trial of TMS alone at another intensity, with the density that recruitment curves predict (decision 45)."""
+        elsewhere = trial.isi_ms.isnan() & (trial.around[..., SHIFT] != 0)
+        if not bool(elsewhere.any()):
+            return trial
+        log_weights = self.log_weights.masked_fill(~recruits(self.latents.noise), -torch.inf)
+        joint = torch.logsumexp(log_weights + engine.log_likelihood(self.latents, trial), dim=-1, keepdim=True)
+        predicted = (joint - torch.logsumexp(log_weights, dim=-1, keepdim=True)).nan_to_num(0.0)
+        around = trial.around.clone()
+        around[..., BY_CURVES] = torch.where(elsewhere, predicted, torch.nan)
+        return replace(trial, circumstances=around)
 
     def moved(self, engine: Engine, moves: Moving, generator: torch.Generator) -> Swarm:
         """The particles after the moves that follow a trial, resampled where too few carried the posterior."""

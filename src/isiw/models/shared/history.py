@@ -27,6 +27,10 @@ class Circumstances(NamedTuple):
     log_offset: float = 0.0  # by how much evoked MEPs are larger than usual, natural log
     shift_pct_rmt: float = 0.0  # by how much the pulse is stronger than usual
     enhancement: float = 1.0  # the share of its usual enhancement that the conditioning stimulus has
+    log_by_curves: float = math.nan  # log density for kinds of noise without a law of other intensities
+
+
+SHIFT, BY_CURVES = (Circumstances._fields.index(name) for name in ("shift_pct_rmt", "log_by_curves"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +42,7 @@ class History:
     log_mep: Tensor  # lower end, (b, n)
     log_mep_high: Tensor  # upper end, (b, n)
     order: Tensor  # how many trials came before each, (b, n)
-    circumstances: Tensor | None = None  # the fields of `Circumstances`, (b, n, 6); None if all are neutral
+    circumstances: Tensor | None = None  # the fields of `Circumstances`, (b, n, 7); None if all are neutral
 
     @classmethod
     def empty(cls, people: int, device: torch.device) -> History:
@@ -70,7 +74,7 @@ class History:
 
     @property
     def around(self) -> Tensor:
-        """The circumstances of all trials, shape (b, n, 6)."""
+        """The circumstances of all trials, shape (b, n, 7)."""
         if self.circumstances is not None:
             return self.circumstances
         return self.isi_ms.new_tensor(Circumstances()).expand(*self.isi_ms.shape, -1)
@@ -94,10 +98,13 @@ def observed(observation: Observation, detection_limit_mv: float, response_thres
         high = torch.where(told.isnan(), high, torch.where(observation.mep_mv == 0, told.clamp_min(limit), told))
     columns = (observation.isi_ms, observation.isi_sd_ms, low, high, torch.full_like(log_mep, order))
     trial = History(*(x.unsqueeze(-1) for x in columns))
-    if observation.known_mv is None:
+    if observation.known_mv is None and observation.shift_pct_rmt is None:
         return trial
     around = trial.around.clone()
-    around[:, 0, :3] = observation.known_mv.to(around)
+    if observation.known_mv is not None:
+        around[:, 0, :3] = observation.known_mv.to(around)
+    if observation.shift_pct_rmt is not None:
+        around[:, 0, SHIFT] = observation.shift_pct_rmt.to(around)
     return replace(trial, circumstances=around)
 
 
