@@ -93,8 +93,8 @@ class Outcomes:
 
     Of taps alone that were measured at no ISI the amplitude is the largest at any time; they only say whether a window
     may be the tap's own response.
-    Pulses whose ISI is `doubted`, by their numbers, are no observations. `pairs_pct_rmt` is None for a model that has no
-    law of TMS alone at another intensity than the pairs'.
+    Pulses whose ISI is `doubted`, by their numbers, are no observations. `pairs_pct_rmt` is None for a model that
+    has no law of TMS alone at another intensity than the pairs'.
     """
 
     reference: Reference
