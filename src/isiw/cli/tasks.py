@@ -128,6 +128,7 @@ def threshold(  # noqa: PLR0913, PLR0917 - an option each
     max_pulses: Annotated[int, typer.Option(help="Largest number of pulses, including lost ones.")] = 100,
     min_iti_s: Annotated[float, typer.Option(help="Shortest time between two pulses, in seconds.")] = 5.0,
     subject: Annotated[str, typer.Option(help="The person's code, for the log.", **NO_DEFAULT)] = "",
+    muscle: Annotated[str, typer.Option(help="Whose MEPs they are, as [visit] of a session says.", **NO_DEFAULT)] = "",
     cohort: Annotated[str, typer.Option(help="The cohort that a simulated person comes from.")] = "recruitment",
     seed: Annotated[int, typer.Option(help="Seed of the simulated person.")] = 0,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the log, as it was begun.")] = False,  # noqa: FBT002 - a flag
@@ -142,7 +143,8 @@ def threshold(  # noqa: PLR0913, PLR0917 - an option each
             space = isiw.strategy.threshold.IntensityRange(low, high, step)
             own = {} if enough is None else {"enough": enough}
             search = isiw.strategy.threshold.make_threshold_search(method, space, **own)
-            options: dict[str, Any] = {"subject": subject, "min_iti_s": min_iti_s, "max_pulses": max_pulses}
+            options: dict[str, Any] = {"subject": subject, "muscle": muscle, "min_iti_s": min_iti_s}
+            options |= {"max_pulses": max_pulses}
             if by_hand:
                 recorder = isiw.session.open_threshold(search, log, **options)
             else:

@@ -33,7 +33,7 @@ UNKNOWN = "outcome unknown"
 BY_HAND = DeviceInfo("a stimulator that is set by hand", "impact")
 
 
-def open_threshold(
+def open_threshold(  # noqa: PLR0913 - what a search may state
     search: ThresholdSearch,
     log: str | Path,
     *,
@@ -42,6 +42,7 @@ def open_threshold(
     max_pulses: int = 100,
     clock: Clock | None = None,
     subject: str = "",
+    muscle: str = "",
     config: Mapping[str, Any] | None = None,
 ) -> ThresholdRecorder:
     """Open a search for the motor threshold: ask it for intensities, and tell it what came of them.
@@ -54,6 +55,7 @@ def open_threshold(
         max_pulses: most pulses, lost ones included.
         clock: tells the time, and waits; a virtual one for a simulated device only, where it is the default.
         subject: the person's code, for the log.
+        muscle: whose MEPs they are, for the log and for a session that knows the pulses.
         config: anything that should be kept in the log, as TOML values.
 
     Raises:
@@ -68,6 +70,7 @@ def open_threshold(
     header = ThresholdHeader(
         **begun(seed=0),
         subject=text("subject", subject),
+        muscle=text("muscle", muscle),
         search=StrategyRecipe(name=search.name, seed=0, settings=search.settings),
         intensities=search.space,
         min_iti_s=interval_s("min_iti_s", min_iti_s),

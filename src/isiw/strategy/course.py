@@ -12,6 +12,7 @@ from isiw.acquisition.protocol import AcquisitionFunction, FollowsPlan, own_plan
 from isiw.checks import can
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
+from isiw.lazy import Later
 from isiw.models.protocol import (
     ExpectsTheUsual,
     NotesChanges,
@@ -201,7 +202,10 @@ class Course:
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The estimate of the window of one person."""
-        return self.estimates.estimate(person)
+        estimate = self.estimates.estimate(person)
+        if not self.known_told:
+            return estimate
+        return estimate.noting(change=Later(lambda: estimate.change and estimate.change.counted_from(self.known_told)))
 
     def decision(self, person: int = 0, mistrials: int = 0, *, silent: bool = False) -> StopDecision:
         """The decision to stop with one person or not, with its reason."""
