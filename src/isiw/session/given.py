@@ -11,6 +11,7 @@ from isiw.findings import Kind
 from isiw.log.reader import ThresholdRecord
 from isiw.log.schema import PulseOutcome
 from isiw.session.threshold import search_of
+from isiw.strategy.threshold.curve import CurvePulses
 from isiw.trials import RESPONSE_MV, Status, Trial
 
 _DIGITS: Final = 2
@@ -24,7 +25,8 @@ def given_pulses(records: Sequence[ThresholdRecord]) -> tuple[Trial, ...]:
     are mistrials, so that limits count them.
 
     Args:
-        records: the searches, earliest first; one without a threshold of its own takes that of the one before.
+        records: the searches, earliest first; pulses over a curve, and a search that found no threshold, take
+            that of the one before.
 
     Raises:
         InvalidValueError: a search for the hot spot, or one without a threshold.
@@ -38,8 +40,10 @@ def given_pulses(records: Sequence[ThresholdRecord]) -> tuple[Trial, ...]:
                 got=str(record.path),
                 remedy="Leave this log out, and give that of the search for the threshold at the hot spot.",
             )
-        own_pct_mso = search_of(record).estimate().threshold_pct_mso
-        threshold_pct_mso = threshold_pct_mso if own_pct_mso is None else own_pct_mso
+        search = search_of(record)
+        own_pct_mso = search.estimate().threshold_pct_mso
+        if threshold_pct_mso is None or not (own_pct_mso is None or isinstance(search.method, CurvePulses)):
+            threshold_pct_mso = own_pct_mso
         if threshold_pct_mso is None:
             raise InvalidValueError(
                 "the intensities of this search are shares of no known threshold",

@@ -10,7 +10,7 @@ import pytest
 from isiw.errors import ConfigError, InvalidValueError, LimitExceededError
 from isiw.session import open_threshold, resume_threshold
 from isiw.session.given import given_pulses
-from isiw.session.threshold import read_threshold
+from isiw.session.threshold import read_threshold, search_of
 from isiw.strategy.threshold import IntensityRange, ThresholdSearch, make_threshold_search
 
 SPACE = IntensityRange(20, 80)
@@ -89,3 +89,16 @@ def test_a_lost_pulse_is_asked_again_and_a_curve_goes_on_where_its_log_ends(tmp_
     assert asked == [*uninterrupted[:3], *uninterrupted[2:]]
     trials = given_pulses([read_threshold(log)])
     assert Counter(trial.counts for trial in trials) == {True: 12, False: 1}
+
+
+def test_pulses_over_a_curve_are_shares_of_the_threshold_that_was_sought_before(tmp_path: Path) -> None:
+    for name, search in (("t", make_threshold_search("bayes", SPACE)), ("c", curve())):
+        with open_threshold(search, tmp_path / f"{name}.mcap", min_iti_s=0) as session:
+            while not session.decision().stop:
+                session.tell(mep_mv(session.ask()))
+    sought, over = (read_threshold(tmp_path / f"{name}.mcap") for name in "tc")
+    threshold = search_of(sought).estimate().threshold_pct_mso
+    assert threshold is not None
+    trials = given_pulses([sought, over])[sought.given :]
+    assert {trial.intensity_pct_rmt for trial in trials} == {round(100 * at / threshold, 2) for at in AT}
+    assert {trial.intensity_pct_rmt for trial in given_pulses([over])} != {trial.intensity_pct_rmt for trial in trials}

@@ -76,9 +76,7 @@ class CurvePulses(Checked):
         """
         left = self.left(pulses)
         if not left:
-            raise LimitExceededError(
-                "all pulses that were named have been given", got=len(pulses), expected=self.budget
-            )
+            raise LimitExceededError("all pulses that were named have been given", got=f"{len(pulses)} pulses")
         return left[0]
 
     def estimate(self, pulses: Sequence[Pulse], space: IntensityRange) -> ThresholdEstimate:
