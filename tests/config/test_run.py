@@ -386,8 +386,14 @@ def test_a_session_after_a_search_for_the_threshold_knows_its_pulses_and_counts_
 ) -> None:
     threshold_log(tmp_path)
     (tmp_path / "curve.csv").write_text("intensity_pct_rmt,mep_mv\n110,0.4\n130,1.1\n")
-    settings = "[strategy.settings]\nparticles = 20\n[limits]\nmax_pulses = 9\n"
-    config = load_config(config_file(f'after = ["FCR-P07.mcap"]\nearlier = ["curve.csv"]\n{VISIT}{settings}'))
+
+    def read(most_trials: int) -> RunConfig:
+        settings = f"[strategy.settings]\nparticles = 20\nmax_trials = {most_trials}\n[limits]\nmax_pulses = 9\n"
+        return load_config(config_file(f'after = ["FCR-P07.mcap"]\nearlier = ["curve.csv"]\n{VISIT}{settings}'))
+
+    with pytest.raises(InvalidValueError, match=r"max_pulses = 9, 8 of them given before.*at least 10"):
+        session_for(read(2).with_overrides(log=tmp_path / "b.mcap")).require_effect()
+    config = read(1)
     session = session_for(config.with_overrides(log=tmp_path / "a.mcap"))
     header = session.header
     assert (len(header.earlier), header.given_before, header.limits.max_pulses) == (8, 8, 9)
