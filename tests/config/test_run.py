@@ -15,7 +15,7 @@ from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import ConfigError, DeviceError, InvalidValueError, StrategyError
 from isiw.log.reader import read_session
 from isiw.session.loop import Session
-from isiw.session.threshold import open_threshold
+from isiw.session.threshold import open_threshold, resume_threshold
 from isiw.strategy.threshold import IntensityRange, make_threshold_search
 from isiw.subjects.cohorts import person_of
 from scripted import ScriptedDevice, scripted_strategy
@@ -432,3 +432,26 @@ def test_a_table_that_holds_no_pulses_is_refused_by_its_row(
     config = load_config(config_file(f'earlier = ["curve.csv"]\n{VISIT}'))
     with pytest.raises(ConfigError, match=says):
         session_for(config.with_overrides(log=tmp_path / "a.mcap"))
+
+
+def test_a_visit_with_pulses_over_the_curve_needs_the_log_of_all_of_them(
+    tmp_path: Path, config_file: WriteFile
+) -> None:
+    space, log = IntensityRange(20, 80), tmp_path / "c.mcap"
+    plan = f"{VISIT}curve = {{ at_pct_mso = [45, 55.0], each = 2 }}\n[strategy.settings]\nparticles = 20\n"
+    config = load_config(config_file(f"seed = 7\n{plan}")).with_overrides(log=tmp_path / "a.mcap")
+    asks = r"4 pulses at 45, 55 % MSO.*--method curve --at 45 --at 55 --each 2 --seed 7"
+    with pytest.raises(ConfigError, match=asks):
+        session_for(config)
+    search = make_threshold_search("curve", space, at_pct_mso=(45.0, 55.0), each=2, seed=7)
+    after = config.with_overrides(after=[log])
+    with open_threshold(search, log, min_iti_s=0, subject="P07", muscle="FCR") as session:
+        for _ in range(3):
+            session.tell(0.01 if session.ask() < 50 else 0.4)
+    with pytest.raises(ConfigError, match="no log of all of them"):
+        session_for(after)
+    with resume_threshold(log) as session:
+        session.tell(0.01 if session.ask() < 50 else 0.4)
+    assert session_for(after).header.given_before == 4
+    with pytest.raises(ConfigError, match="at_pct_mso"):
+        load_config(config_file(f"{VISIT}curve = {{ each = 2 }}"))

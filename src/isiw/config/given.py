@@ -11,7 +11,9 @@ from isiw.config.run import RunConfig
 from isiw.errors import ConfigError
 from isiw.log.reader import SessionRecord, ThresholdRecord, read_any
 from isiw.log.salvage import salvage
-from isiw.text.sanitize import counted
+from isiw.session.threshold import search_of
+from isiw.strategy.threshold.curve import CurvePulses
+from isiw.text.sanitize import command, counted
 from isiw.trials import Status, Trial
 from isiw.visit import different_muscles, require_percent
 
@@ -27,8 +29,8 @@ def searches_after(config: RunConfig) -> list[ThresholdRecord]:
     """The searches for the motor threshold, whose pulses are earlier trials.
 
     Raises:
-        ConfigError: one of another muscle than the visit's.
-        DamagedLogError: one of which nobody knows how many pulses it had.
+        ConfigError: one of another muscle than the visit's, one that is damaged, or none of the visit's pulses over the
+            curve.
     """
     searches = [record for record in _read(config) if isinstance(record, ThresholdRecord)]
     for record in searches:
@@ -45,7 +47,27 @@ def searches_after(config: RunConfig) -> list[ThresholdRecord]:
                 expected=muscles[0],
                 remedy="Leave this file out, or correct visit.muscle.",
             )
+    _require_curve(config, searches)
     return searches
+
+
+def _require_curve(config: RunConfig, searches: Sequence[ThresholdRecord]) -> None:
+    """Raise if the visit's pulses over the curve were not all given."""
+    if config.visit.curve is None:
+        return
+    plan = config.visit.curve.pulses(config.seed)
+    for search in map(search_of, searches):
+        if isinstance(search.method, CurvePulses) and not plan.left(search.pulses):
+            return
+    at = [word for intensity in plan.at_pct_mso for word in ("--at", f"{intensity:g}")]
+    options = ["--method", "curve", *at, "--each", plan.each, "--seed", plan.seed]
+    by_hand = ["--by-hand", "--high", f"{max(plan.at_pct_mso):g}"] if config.own_rig else []
+    raise ConfigError(
+        "the visit has pulses over the recruitment curve before the pairs, and no log of all of them is given",
+        got=", ".join(str(record.path) for record in searches) or "no log of a search",
+        expected=f"{plan.budget} pulses at {', '.join(f'{at:g}' for at in plan.at_pct_mso)} % MSO",
+        remedy=f"Give them first, and name their log with --after: {command('threshold', 'LOG', *by_hand, *options)}",
+    )
 
 
 def is_table(path: Path) -> bool:

@@ -23,12 +23,12 @@ from isiw.config.sections import (
     TIMEOUT_S,
     DeviceConfig,
     LimitsConfig,
+    PlannedVisit,
     RobotConfig,
     Section,
     SpaceConfig,
     StrategyConfig,
     SubjectConfig,
-    VisitConfig,
     require_together,
     require_units,
     robot_for,
@@ -69,7 +69,7 @@ class RunConfig(Section):
     after: tuple[Path, ...] = ()
     earlier: tuple[Path, ...] = ()
     device: DeviceConfig | None = None
-    visit: VisitConfig = VisitConfig()
+    visit: PlannedVisit = PlannedVisit()
     subject: SubjectConfig = SubjectConfig()
     space: SpaceConfig = SpaceConfig(reference="valve")
     strategy: StrategyConfig = StrategyConfig()
