@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import Any
 
 import pytest
 
@@ -20,11 +22,12 @@ CURVE = [(pct_rmt, 0.01 + 2.0 / (1.0 + math.exp(-(pct_rmt - 112.0) / 4.0))) for 
 """Intensities [% RMT], and MEPs [mV] of a saturating curve."""
 
 
-def small(name: str = "default", **settings: object) -> Strategy:
-    return make_strategy(name, seed=3, **({"particles": 200} if name == "default" else {}), **settings)
+def small(name: str = "default", **settings: Any) -> Strategy:
+    few: dict[str, Any] = {"particles": 200} if name == "default" else {}
+    return make_strategy(name, seed=3, **few, **settings)
 
 
-def given(strategy: Strategy, curve: list[tuple[float, float]] = CURVE) -> Strategy:
+def given(strategy: Strategy, curve: Sequence[tuple[float, float]] = CURVE) -> Strategy:
     for pct_rmt, mep_mv in curve:
         strategy.tell(None, mep_mv, intensity_pct_rmt=pct_rmt)
     return strategy
@@ -91,8 +94,10 @@ def test_earlier_pulses_teach_what_pulses_of_the_session_do_and_starting_again_k
     assert other_level.estimate().hypotheses != told.estimate().hypotheses
     for strategy in (earlier, other_level):
         again = strategy.restarted()
-        asks = [[one.ask() for _ in range(3) if one.tell(one.ask(), 0.05) is None] for one in (strategy, again)]
-        assert asks[0] == asks[1]
+        for _ in range(3):
+            assert strategy.ask() == again.ask()
+            strategy.tell(strategy.ask(), 0.05)
+            again.tell(again.ask(), 0.05)
         assert strategy.spent == 3
 
 

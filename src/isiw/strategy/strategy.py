@@ -252,8 +252,8 @@ class Strategy:
             return
         asked_ms = None if plain_ms is None else self._asked.meant_ms(plain_ms, plain_mv, self.space)
         require_plausible(plain_ms, plain_mv, asked_ms, self.space, isi_sd_ms)
-        of_amplitude = {"mep_sd_mv": mep_sd_mv, "mep_interval_mv": mep_interval_mv}
-        more = Details(response=response, isi_sd_ms=isi_sd_ms, intensity_pct_rmt=intensity_pct_rmt, **of_amplitude)
+        more = Details(response=response, isi_sd_ms=isi_sd_ms, mep_sd_mv=mep_sd_mv, mep_interval_mv=mep_interval_mv)
+        more["intensity_pct_rmt"] = intensity_pct_rmt
         outcome = Outcome(isi_ms, mep_mv, **more)
         require_plausible_range(outcome.mep_sd_mv, outcome.mep_interval_mv)
         reported = self._reported if plain_ms is None else self._reported.confirmed_by(confirm=flag("confirm", confirm))
