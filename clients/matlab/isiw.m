@@ -43,6 +43,7 @@ classdef isiw < handle
 
     function create(this, id, plan)
       % Begin a session. PLAN may have the fields seed, visit, space, strategy, limits and protocol, as a configuration.
+      % Its field earlier has TMS alone that was given before: struct('mep_mv', [..], 'intensity_pct_rmt', [..]).
       if nargin < 3
         plan = struct();
       end
@@ -90,6 +91,13 @@ classdef isiw < handle
       end
       pairs = {'trial', number(trial), 'isi_ms', number(isi_ms), 'mep_mv', number(mep_mv), ...
                'client', this.key, 'confirm', truth(confirm)};
+      this.conclude(this.post(this.path('tell'), pairs));
+    end
+
+    function alone(this, mep_mv, intensity_pct_rmt)
+      % TMS alone, as the trial lab.trials: the MEP [mV] of a pulse at an intensity [% RMT].
+      pairs = {'trial', number(this.trials), 'isi_ms', '', 'mep_mv', number(mep_mv), ...
+               'intensity_pct_rmt', number(intensity_pct_rmt), 'client', this.key};
       this.conclude(this.post(this.path('tell'), pairs));
     end
 

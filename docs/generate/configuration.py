@@ -11,10 +11,10 @@ from pydantic import TypeAdapter
 
 import isiw
 from isiw.config.run import RunConfig
-from isiw.config.sections import LimitsConfig, SpaceConfig, VisitConfig
+from isiw.config.sections import LimitsConfig, PlannedVisit, SpaceConfig
 from isiw.studies import Study, StudyStrategy
 
-_EXPLAINED: dict[Any, Any] = {LimitsConfig: isiw.Limits, SpaceConfig: isiw.DesignSpace, VisitConfig: isiw.Visit}
+_EXPLAINED: dict[Any, Any] = {LimitsConfig: isiw.Limits, SpaceConfig: isiw.DesignSpace, PlannedVisit: isiw.Visit}
 """Sections that are explained where the value that they make is."""
 
 _SUBJECT = "the person's code, never a name."

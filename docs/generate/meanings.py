@@ -137,6 +137,7 @@ MEANINGS: Final[Mapping[str, Mapping[str, str]]] = {
     | {
         "kind": '"threshold".',
         "search": "name, seed and settings of the search.",
+        "muscle": "whose MEPs they are; empty if it was not stated.",
         "intensities": "the intensities that may be given.",
         "min_iti_s": "shortest time between two pulses [s].",
         "max_pulses": "largest number of pulses.",

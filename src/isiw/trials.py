@@ -172,6 +172,16 @@ class Measurement(Checked):
     t_tms_ms: Number | None = None
 
 
+def require_alone(intensity_pct_rmt: float | None, isi_ms: float | None, *, tap_alone: bool = False) -> None:
+    """Raise if an intensity is stated of anything but TMS alone."""
+    if intensity_pct_rmt is not None and (isi_ms is not None or tap_alone):
+        raise InvalidValueError(
+            "an intensity of its own belongs to TMS alone",
+            got=f"{intensity_pct_rmt:g} % RMT, " + ("a tap alone" if tap_alone else f"a pair at {isi_ms:g} ms"),
+            remedy="Leave it out: all pairs of a session have one intensity, intensity_pct_rmt of the visit.",
+        )
+
+
 @dataclass(frozen=True)
 class Trial(Checked):
     """One delivered pair of stimuli and its outcome, as logged.
@@ -196,10 +206,12 @@ class Trial(Checked):
         mep_sd_mv: SD of the amplitude [mV]: of the mean of several, or from what is left of the tap's own response.
         mep_interval_mv: the interval that the amplitude lies in, if no more is known [mV]; its end may be infinite.
         tap_mv: what is left of the tap's own response in the amplitude, in the mean [mV]; None if it is unknown.
+        intensity_pct_rmt: intensity of TMS alone [% RMT]; None for that of the pairs.
 
     Raises:
         InvalidValueError: a mistrial without a reason, an accepted trial with one or without an amplitude, a tap alone
-            with an ISI, or a value that is not finite or that no amplifier gives.
+            with an ISI, an intensity of anything but TMS alone, or a value that is not finite or that no amplifier
+            gives.
     """
 
     index: Natural
@@ -219,6 +231,7 @@ class Trial(Checked):
     mep_sd_mv: NonNegative = 0.0
     mep_interval_mv: AmplitudeInterval | None = None
     tap_mv: NonNegative | None = None
+    intensity_pct_rmt: Positive | None = None
     __pydantic_config__: ClassVar = {"ser_json_inf_nan": "strings"}  # as JSON knows no infinity
 
     def __post_init__(self) -> None:
@@ -231,6 +244,7 @@ class Trial(Checked):
             raise InvalidValueError("a mistrial needs a reason and an accepted trial has none", got=self.reason)
         if self.tap_alone and self.commanded_isi_ms is not None:
             raise InvalidValueError("a tap alone has no ISI", got=self.commanded_isi_ms, expected="None")
+        require_alone(self.intensity_pct_rmt, self.wanted_isi_ms, tap_alone=self.tap_alone)
         measured = self.mep_mv is not None or self.mep_interval_mv is not None
         if self.status is Status.ACCEPTED and not measured and not self.tap_alone:
             raise InvalidValueError("an accepted trial needs its MEP", got=self.index)

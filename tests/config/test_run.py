@@ -9,12 +9,14 @@ import tomli_w
 
 from isiw.config import RunConfig, device_for, load_config, session_for
 from isiw.config.resume import Truth, run_of_log, truth_of
-from isiw.config.session import assumed_space, fresh_log_path
+from isiw.config.session import assumed_space, fresh_log_path, told_imported
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import ConfigError, DeviceError, InvalidValueError, StrategyError
 from isiw.log.reader import read_session
 from isiw.session.loop import Session
+from isiw.session.threshold import open_threshold, resume_threshold
+from isiw.strategy.threshold import IntensityRange, make_threshold_search
 from isiw.subjects.cohorts import person_of
 from scripted import ScriptedDevice, scripted_strategy
 
@@ -363,3 +365,93 @@ def test_an_intensity_of_the_visit_that_the_settings_contradict_begins_nothing(
     with pytest.raises(InvalidValueError, match="the visit and the strategy state different intensities"):
         session_for(load_config(config_file(text))).run()
     assert not list(tmp_path.glob("s.mcap*"))
+
+
+def threshold_log(tmp_path: Path, muscle: str = "FCR", subject: str = "P07") -> Path:
+    """A short search for the threshold of a real person; MEPs begin at 50 % MSO."""
+    log = tmp_path / f"{muscle}-{subject}.mcap"
+    search = make_threshold_search("bayes", IntensityRange(20, 80))
+    with open_threshold(search, log, min_iti_s=0, subject=subject, muscle=muscle) as session:
+        for _ in range(6):
+            asked = session.ask()
+            session.tell(0.01 if asked < 50 else 0.05 * (asked - 48))
+    return log
+
+
+VISIT = '[visit]\nsubject = "P07"\nmuscle = "FCR"\n'
+
+
+def test_a_session_after_a_search_for_the_threshold_knows_its_pulses_and_counts_them(
+    tmp_path: Path, config_file: WriteFile
+) -> None:
+    threshold_log(tmp_path)
+    (tmp_path / "curve.csv").write_text("intensity_pct_rmt,mep_mv\n110,0.4\n130,1.1\n")
+
+    def read(most_trials: int) -> RunConfig:
+        settings = f"[strategy.settings]\nparticles = 20\nmax_trials = {most_trials}\n[limits]\nmax_pulses = 9\n"
+        return load_config(config_file(f'after = ["FCR-P07.mcap"]\nearlier = ["curve.csv"]\n{VISIT}{settings}'))
+
+    with pytest.raises(InvalidValueError, match=r"max_pulses = 9, 8 of them given before.*at least 10"):
+        session_for(read(2).with_overrides(log=tmp_path / "b.mcap")).require_effect()
+    config = read(1)
+    session = session_for(config.with_overrides(log=tmp_path / "a.mcap"))
+    header = session.header
+    assert (len(header.earlier), header.given_before, header.limits.max_pulses) == (8, 8, 9)
+    assert [trial.intensity_pct_rmt for trial in header.earlier[-2:]] == [110.0, 130.0]
+    assert not header.earlier_same_level
+    said = told_imported(config)
+    assert "6 pulses of the search for the threshold came before" in said
+    assert "of FCR, at the same hot spot" in said
+
+
+def test_a_search_of_another_muscle_or_person_is_refused_and_one_without_a_muscle_is_named(
+    tmp_path: Path, config_file: WriteFile
+) -> None:
+    for muscle, subject, says in (("FDI", "P07", "of another muscle"), ("FCR", "P08", "another person's")):
+        log = threshold_log(tmp_path, muscle, subject)
+        config = load_config(config_file(f'after = ["{log.name}"]\n{VISIT}'))
+        with pytest.raises(ConfigError, match=says):
+            session_for(config.with_overrides(log=tmp_path / "a.mcap"))
+    log = threshold_log(tmp_path, "")
+    assert f"not stated in {log.name}" in told_imported(load_config(config_file(f'after = ["{log.name}"]\n{VISIT}')))
+
+
+@pytest.mark.parametrize(
+    ("table", "says"),
+    [
+        ("intensity,mep\n110,0.4\n", "the columns intensity, mep"),
+        ("intensity_pct_rmt,mep_mv\n110,much\n", "row 1 of .* is no pulse"),
+        ("intensity_pct_rmt,mep_mv\n1.1,0.4\n", "row 1 of .* is no pulse"),
+        ("intensity_pct_rmt,mep_mv\n", "no table of pulses"),
+    ],
+)
+def test_a_table_that_holds_no_pulses_is_refused_by_its_row(
+    tmp_path: Path, config_file: WriteFile, table: str, says: str
+) -> None:
+    (tmp_path / "curve.csv").write_text(table)
+    config = load_config(config_file(f'earlier = ["curve.csv"]\n{VISIT}'))
+    with pytest.raises(ConfigError, match=says):
+        session_for(config.with_overrides(log=tmp_path / "a.mcap"))
+
+
+def test_a_visit_with_pulses_over_the_curve_needs_the_log_of_all_of_them(
+    tmp_path: Path, config_file: WriteFile
+) -> None:
+    space, log = IntensityRange(20, 80), tmp_path / "c.mcap"
+    plan = f"{VISIT}curve = {{ at_pct_mso = [45, 55.0], each = 2 }}\n[strategy.settings]\nparticles = 20\n"
+    config = load_config(config_file(f"seed = 7\n{plan}")).with_overrides(log=tmp_path / "a.mcap")
+    asks = r"4 pulses at 45, 55 % MSO.*--method curve --at 45 --at 55 --each 2 --seed 7"
+    with pytest.raises(ConfigError, match=asks):
+        session_for(config)
+    search = make_threshold_search("curve", space, at_pct_mso=(45.0, 55.0), each=2, seed=7)
+    after = config.with_overrides(after=[log])
+    with open_threshold(search, log, min_iti_s=0, subject="P07", muscle="FCR") as session:
+        for _ in range(3):
+            session.tell(0.01 if session.ask() < 50 else 0.4)
+    with pytest.raises(ConfigError, match="no log of all of them"):
+        session_for(after)
+    with resume_threshold(log) as session:
+        session.tell(0.01 if session.ask() < 50 else 0.4)
+    assert session_for(after).header.given_before == 4
+    with pytest.raises(ConfigError, match="at_pct_mso"):
+        load_config(config_file(f"{VISIT}curve = {{ each = 2 }}"))

@@ -358,3 +358,20 @@ def test_isis_that_are_all_the_same_make_no_space() -> None:
     (person,) = read_people(pd.DataFrame({"isi_ms": [30.0] * 4, "mep_mv": [0.1, 0.2, 0.3, 0.4]}), IMPACT)
     with pytest.raises(IsiwError, match="all the same"):
         person.space()
+
+
+def test_tms_alone_has_its_intensity_where_it_is_not_that_of_all_pairs(tmp_path: Path) -> None:
+    table = pd.DataFrame(
+        {
+            "isi_ms": ["10", "TMS alone", "20", "TMS alone", "30"],
+            "mep_mv": [0.1, 0.2, 0.3, 0.9, 0.2],
+            "intensity_pct_rmt": [95, 95, 95, 120, 95],
+        }
+    )
+    table.to_csv(tmp_path / "a.csv", index=False)
+    (person,) = read_people(tmp_path / "a.csv", IMPACT)
+    assert [trial.intensity_pct_rmt for trial in person.trials] == [None, None, None, 120.0, None]
+    assert person.visit.intensity_pct_rmt == 95.0
+    wrong = table.assign(intensity_pct_rmt=table["intensity_pct_rmt"] / 100)
+    with pytest.raises(IsiwError, match=r"row 1 .*% of the resting motor threshold"):
+        read_people(wrong, IMPACT)

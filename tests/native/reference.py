@@ -57,6 +57,7 @@ class Trial:
     log_offset: float = 0.0
     shift_pct_rmt: float = 0.0
     enhancement: float = 1.0
+    log_by_curves: float = math.nan  # log likelihood under kinds of noise that know no other intensity
 
 
 @dataclass(frozen=True)
@@ -256,6 +257,8 @@ def between_ends(mean: Values | float, sd: Values | float, low: float, high: flo
 
 def likelihood(particle: Particle, trial: Trial, factor: float = 1.0) -> float:
     """Density of a log MEP, or the probability of an interval; an ISI that is known with an SD is integrated out."""
+    if not (particle.curved or math.isnan(trial.log_by_curves)):
+        return math.exp(trial.log_by_curves)
     floor, found = log_floor_of(particle, trial.order), 0.0
     for at, weight in ISI_NODES if trial.isi_sd_ms > 0 else ((0.0, 1.0),):
         level = trial.enhancement * particle.facilitation(trial.isi_ms + at * trial.isi_sd_ms)
@@ -317,7 +320,8 @@ def outcome_masses(particle: Particle, order: int, level: float, log_mep: Values
     """Probability of each outcome of the next trial, by their middles [log mV] and widths, (y,)."""
     law, over = outcome_of(particle, Trial(order, math.nan, 0.0, 0.0), level), log_mep - log_floor_of(particle, order)
     mass = widths * np.array([law.density(at) for at in over])
-    return mass / mass.sum()
+    share: Values = mass / mass.sum()
+    return share
 
 
 def edge_level(particle: Particle, order: int, evoked: Values, isi_ms: Values, *, fine: bool) -> float:

@@ -64,6 +64,25 @@ lab.resume('P07');
 disp(lab.trials);
 """
 
+GIVEN = """
+lab = isiw(getenv('ISIW_URL'), getenv('ISIW_TOKEN'));
+given = struct('mep_mv', [0.02 0.9 1.4], 'intensity_pct_rmt', [95 115 130]);
+lab.create('P07', struct('limits', struct('min_iti_s', 0), 'strategy', struct('name', 'nr'), 'earlier', given));
+lab.alone(1.1, 120);
+lab.close();
+"""
+
+
+def test_pulses_over_the_curve_are_given_before_and_within_a_session(tmp_path: Path) -> None:
+    (tmp_path / "given.m").write_text(GIVEN)
+    with client_of(tmp_path / "sessions") as client:
+        ran = octave(client, str(tmp_path / "given.m"))
+    assert ran.returncode == 0, ran.stderr
+    record = read_session(tmp_path / "sessions" / "P07.mcap")
+    known = [(trial.mep_mv, trial.intensity_pct_rmt) for trial in (*record.header.earlier, *record.table)]
+    assert known == [(0.02, 95.0), (0.9, 115.0), (1.4, 130.0), (1.1, 120.0)]
+
+
 DOUBTED = """
 warning('off', 'isiw:Doubt');
 lab = isiw(getenv('ISIW_URL'), getenv('ISIW_TOKEN'));

@@ -132,6 +132,38 @@ def test_tms_alone_is_told_without_being_asked(client: httpx.Client, session: st
     assert read_session(tmp_path / "P07.mcap").table[0].commanded_isi_ms is None
 
 
+def test_tms_alone_at_an_intensity_is_told_logged_and_one_when_told_again(
+    client: httpx.Client, session: str, tmp_path: Path
+) -> None:
+    outcome = {"trial": 0, "isi_ms": None, "mep_mv": 0.9, "intensity_pct_rmt": 120}
+    assert done(client.post(f"{session}/tell", json=outcome)) == done(client.post(f"{session}/tell", json=outcome))
+    refused(client.post(f"{session}/tell", json=outcome | {"intensity_pct_rmt": 110}), 409, "OtherOutcome")
+    assert done(client.get(f"{session}/trials"))["trials"][0]["intensity_pct_rmt"] == 120.0
+    assert [trial.intensity_pct_rmt for trial in read_session(tmp_path / "P07.mcap").table] == [120.0]
+
+
+def test_pulses_that_were_given_before_are_known_before_the_first_ask_and_after_resuming(
+    client: httpx.Client, tmp_path: Path
+) -> None:
+    earlier = {"mep_mv": [0.02, 0.9, 1.4], "intensity_pct_rmt": [95, 115, 130]}
+    plan = {"earlier": earlier, "limits": {"min_iti_s": 0.0, "max_pulses": 4}}
+    said = refused(client.post("/sessions", json={**PLAN, "id": "P08", **plan}), 422, "InvalidValueError")
+    assert "at least 9" in said["expected"]
+    session = created(client, "P08", strategy={"name": "even", "settings": {**SETTINGS, "max_trials": 1}}, **plan)
+    done(client.post(f"{session}/close"))
+    done(client.post(f"{session}/resume", json={}))
+    assert [trial.intensity_pct_rmt for trial in read_session(tmp_path / "P08.mcap").header.earlier] == [95, 115, 130]
+    assert len(told(client, session, 1)) == 1
+    refused(client.post(f"{session}/ask"), 409, "LimitExceededError")
+    uneven = {"mep_mv": [0.02], "intensity_pct_rmt": [95, 115]}
+    assert (
+        "1 and 2"
+        in refused(client.post("/sessions", json={**PLAN, "id": "P09", "earlier": uneven}), 422, "InvalidValueError")[
+            "message"
+        ]
+    )
+
+
 def test_tms_alone_that_was_refused_stays_open_until_it_is_told_rightly(client: httpx.Client, session: str) -> None:
     alone = {"trial": 0, "isi_ms": None, "mep_mv": 60.0}
     refused(client.post(f"{session}/tell", json=alone), 422, "InvalidValueError")

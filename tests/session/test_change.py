@@ -28,6 +28,20 @@ def test_a_change_is_found_with_its_trial_in_the_log_and_its_size(change: Change
     assert said in found.text
 
 
+def test_a_change_before_the_first_trial_is_between_what_was_given_before_and_the_session() -> None:
+    change = Change("amplitudes", 0.97, 2.9, 2.0, 4.1, 31)
+    assert change.counted_from(0) == change
+    assert change.counted_from(20) == Change("amplitudes", 0.97, 2.9, 2.0, 4.1, 11)
+    assert change.counted_from(40) is None
+    found = change_found(change.counted_from(32), TOLD)
+    assert found is not None
+    assert "do not fit each other: amplitudes are ×2.9 now (90 % interval ×2 to ×4.1)" in found.text
+    assert "muscle, coil, gain" in (found.remedy or "")
+    shifted = change_found(Change("intensity", 0.97, -9.0, -14.0, -5.0, 0), TOLD)
+    assert shifted is not None
+    assert "do not fit each other: MEPs are as if the intensity were 9 % RMT lower" in shifted.text
+
+
 def test_a_change_that_is_not_sure_is_not_said() -> None:
     assert change_found(Change("amplitudes", 0.85, 4.6, 3.1, 6.7, 2), TOLD) is None
     assert change_found(None, TOLD) is None

@@ -6,6 +6,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import hypothesis
+import hypothesis.strategies as st
 import numpy as np
 import pytest
 
@@ -67,15 +69,76 @@ def test_a_session_that_goes_on_knows_them_still(tmp_path: Path) -> None:
     assert asked[0] == asked[1]
 
 
+def over_the_curve(number: int, seed: int) -> list[tuple[float, float]]:
+    """Intensities [% RMT] and MEPs [mV] of pulses over a saturating curve."""
+    rng = np.random.default_rng(seed)
+    pct_rmt = rng.uniform(90.0, 140.0, number)
+    meps_mv = 0.01 + 1.5 / (1.0 + np.exp(-(pct_rmt - 112.0 + rng.normal(0.0, 6.0, number)) / 4.0))
+    return list(zip(pct_rmt.tolist(), meps_mv.tolist(), strict=True))
+
+
+def given(number: int, seed: int) -> tuple[Trial, ...]:
+    pulses = enumerate(over_the_curve(number, seed))
+    return tuple(Trial(n, "accepted", None, mep_mv=mep_mv, intensity_pct_rmt=pct) for n, (pct, mep_mv) in pulses)  # type: ignore[arg-type]
+
+
+@pytest.mark.slow
+@hypothesis.settings(max_examples=8, deadline=None, derandomize=True)
+@hypothesis.given(
+    before=st.integers(0, 4), within=st.lists(st.integers(0, 3), min_size=1, max_size=4), seed=st.integers(0, 99)
+)
+def test_a_session_with_pulses_over_the_curve_resumes_with_the_same_asks(
+    tmp_path_factory: pytest.TempPathFactory, before: int, within: list[int], seed: int
+) -> None:
+    """`within` are numbers of pulses of TMS alone before each pair, the session is resumed before the last one."""
+    asked: list[list[float]] = []
+    for resumed in (False, True):
+        log = tmp_path_factory.mktemp("log") / "a.mcap"
+        strategy = isiw.make_strategy(space=SPACE, seed=seed, particles=40)
+        session = isiw.open_session(strategy, log, earlier=given(before, seed), limits=isiw.Limits.of_space(SPACE))
+        asks: list[float] = []
+        for place, pulses in enumerate(within):
+            for pct_rmt, mep_mv in over_the_curve(pulses, seed + 100 * place):
+                session.tell(None, mep_mv, intensity_pct_rmt=pct_rmt)
+            if resumed and place == len(within) - 1:
+                session.close()
+                session = isiw.resume(log)  # type: ignore[assignment]
+            asks.append(session.ask())
+            session.tell(asks[-1], 0.03 * (1 + place))
+        asked.append([*asks, session.ask()])
+        session.close()
+        record = isiw.read_session(log)
+        told = [trial.intensity_pct_rmt for trial in record.table.told if trial.isi_ms is None]
+        assert told == [pct for n, k in enumerate(within) for pct, _ in over_the_curve(k, seed + 100 * n)]
+        assert [trial.intensity_pct_rmt for trial in record.header.earlier] == [
+            pct for pct, _ in over_the_curve(before, seed)
+        ]
+        assert record.trials["intensity_pct_rmt"].notna().sum() == len(told)
+    assert asked[0] == asked[1]
+
+
+def test_an_intensity_of_a_pair_is_refused_before_anything_is_logged(tmp_path: Path) -> None:
+    session = isiw.open_session(isiw.make_strategy("nr", space=SPACE), tmp_path / "a.mcap")
+    isi_ms = session.ask()
+    with pytest.raises(isiw.errors.InvalidValueError, match="belongs to TMS alone"):
+        session.tell(isi_ms, 0.1, intensity_pct_rmt=110.0)
+    session.tell(isi_ms, 0.1)
+    session.tell(None, 0.1, intensity_pct_rmt=110.0)
+    session.close()
+    assert [trial.intensity_pct_rmt for trial in isiw.read_session(tmp_path / "a.mcap").table] == [None, 110.0]
+
+
 @pytest.mark.parametrize("factor", [1.0, 5.0])
 def test_the_window_is_taken_over_whatever_the_level_was(factor: float) -> None:
-    strategy = isiw.make_strategy(space=SPACE, seed=2, particles=500)
-    strategy.learn_all(earlier(factor=factor))
-    responder = isiw.subjects.cohort("recruitment", 1, 3)[0].begin(4)
-    for isi_ms in (130.0, 20.0, 120.0, 180.0, 140.0, 60.0):
-        strategy.learn(isi_ms, responder.respond(isi_ms, "impact").mep_mv)
-    truth = isiw.subjects.cohort("recruitment", 1, 3)[0].window(SPACE)
-    assert isiw.metrics.f1(strategy.estimate().window, truth, SPACE) > 0.8
+    subject, found = isiw.subjects.cohort("recruitment", 1, 3)[0], []
+    for seed in range(3):
+        strategy = isiw.make_strategy(space=SPACE, seed=seed, particles=500)
+        strategy.learn_all(earlier(factor=factor))
+        responder = subject.begin(4)
+        for isi_ms in (130.0, 20.0, 120.0, 180.0, 140.0, 60.0):
+            strategy.learn(isi_ms, responder.respond(isi_ms, "impact").mep_mv)
+        found.append(isiw.metrics.f1(strategy.estimate().window, subject.window(SPACE), SPACE))
+    assert sum(found) / len(found) > 0.8
 
 
 def test_at_the_same_level_they_are_learnt_as_if_they_were_the_sessions_own() -> None:

@@ -29,7 +29,8 @@ class HeldUp:
         del posterior
         self.asked.append(len(isi_ms))
         assert self.go.wait(30)
-        return -np.abs(isi_ms - 40.0)[None]
+        scores: Array = -np.abs(isi_ms - 40.0)[None]
+        return scores
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,10 @@ Data = Annotated[Path | None, typer.Option(help="The folder with the recorded EM
 Day = Annotated[int | None, typer.Option(help="The number of the person's visit, for the log.", **NO_DEFAULT)]
 Earlier = Annotated[
     list[Path] | None,
-    typer.Option(help="The log of an earlier session of the same person; repeat it for several, earliest first."),
+    typer.Option(
+        help="The log of an earlier session of the same person, or of the search for the threshold just before, whose "
+        "pulses teach the recruitment curve; repeat it for several, earliest first."
+    ),
 ]
 Live = Annotated[
     bool, typer.Option("--live", help="Show the session in the browser while it runs, and operate it there.")
@@ -67,7 +70,10 @@ def run(  # noqa: PLR0913, PLR0917 - an option each
     after: Earlier = None,
     earlier: Annotated[
         list[Path] | None,
-        typer.Option(help="A log of earlier trials of this visit, such as isiw analyse writes; repeat it for several."),
+        typer.Option(
+            help="A log of earlier trials of this visit, such as isiw analyse writes, or a table (.csv) of pulses of "
+            "TMS alone, with the columns intensity_pct_rmt and mep_mv; repeat it for several."
+        ),
     ] = None,
     day: Day = None,
     operator: Annotated[str | None, typer.Option(help="Who runs the session, for the log.", **NO_DEFAULT)] = None,

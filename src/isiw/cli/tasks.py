@@ -119,17 +119,25 @@ def threshold(  # noqa: PLR0913, PLR0917 - an option each
     step: Annotated[float, typer.Option(help="The step between intensities [% MSO].")] = 1.0,
     method: Annotated[
         str,
-        typer.Option(help="bayes, maximum-likelihood, five-of-ten; or hot-spot, which says where to hold the coil."),
+        typer.Option(
+            help="bayes, maximum-likelihood, five-of-ten; hot-spot, which says where to hold the coil; or curve, which "
+            "asks for the intensities --at in an order by the seed."
+        ),
     ] = "bayes",
     enough: Annotated[
         int | None,
         typer.Option(help="five-of-ten: how many of ten suffice; default 5, and 6 for more than five.", **NO_DEFAULT),
     ] = None,
+    at: Annotated[
+        list[float] | None, typer.Option(help="curve: an intensity [% MSO]; repeat it for several.", **NO_DEFAULT)
+    ] = None,
+    each: Annotated[int | None, typer.Option(help="curve: pulses at each; default 5.", **NO_DEFAULT)] = None,
     max_pulses: Annotated[int, typer.Option(help="Largest number of pulses, including lost ones.")] = 100,
     min_iti_s: Annotated[float, typer.Option(help="Shortest time between two pulses, in seconds.")] = 5.0,
     subject: Annotated[str, typer.Option(help="The person's code, for the log.", **NO_DEFAULT)] = "",
+    muscle: Annotated[str, typer.Option(help="Whose MEPs they are, as [visit] of a session says.", **NO_DEFAULT)] = "",
     cohort: Annotated[str, typer.Option(help="The cohort that a simulated person comes from.")] = "recruitment",
-    seed: Annotated[int, typer.Option(help="Seed of the simulated person.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the simulated person, and of the order of a curve.")] = 0,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the log, as it was begun.")] = False,  # noqa: FBT002 - a flag
     show_only: Annotated[bool, typer.Option("--show", help="Only say what the log holds.")] = False,  # noqa: FBT002 - a flag
 ) -> None:
@@ -140,9 +148,12 @@ def threshold(  # noqa: PLR0913, PLR0917 - an option each
             _run(isiw.session.resume_threshold(log), log)
         elif not show_only:
             space = isiw.strategy.threshold.IntensityRange(low, high, step)
-            own = {} if enough is None else {"enough": enough}
+            stated = {"enough": enough, "at_pct_mso": tuple(at or ()) or None, "each": each}
+            own: dict[str, Any] = {name: value for name, value in stated.items() if value is not None}
+            own |= {"seed": seed} if method == "curve" else {}
             search = isiw.strategy.threshold.make_threshold_search(method, space, **own)
-            options: dict[str, Any] = {"subject": subject, "min_iti_s": min_iti_s, "max_pulses": max_pulses}
+            options: dict[str, Any] = {"subject": subject, "muscle": muscle, "min_iti_s": min_iti_s}
+            options |= {"max_pulses": max_pulses}
             if by_hand:
                 recorder = isiw.session.open_threshold(search, log, **options)
             else:
@@ -157,7 +168,8 @@ def _require_used(context: typer.Context, *, kept: bool, by_hand: bool) -> None:
         named = [name for name in context.params if name not in {"log", "by_hand", "resume", "show_only"}]
         refuse_ignored("a search keeps what its log says", context, *named)
     if by_hand:
-        refuse_ignored("nobody is simulated if a stimulator is set by hand", context, "cohort", "seed")
+        of_people = ("cohort",) if context.params["method"] == "curve" else ("cohort", "seed")
+        refuse_ignored("nobody is simulated if a stimulator is set by hand", context, *of_people)
     if by_hand and not kept and not is_given(context, "high"):
         raise isiw.errors.ConfigError(
             "the highest intensity is missing", remedy="Say with --high how far you may go with this person."

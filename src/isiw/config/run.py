@@ -23,12 +23,12 @@ from isiw.config.sections import (
     TIMEOUT_S,
     DeviceConfig,
     LimitsConfig,
+    PlannedVisit,
     RobotConfig,
     Section,
     SpaceConfig,
     StrategyConfig,
     SubjectConfig,
-    VisitConfig,
     require_together,
     require_units,
     robot_for,
@@ -57,8 +57,10 @@ class RunConfig(Section):
         seed: of the simulated person, the trials and the strategy.
         log: the file of the log; by default a new one in `isiw-sessions`.
         prior: a lab's prior, as `isiw prior learn` writes it.
-        after: logs of earlier sessions of the same person, earliest first.
-        earlier: logs of earlier trials of this visit, which are learnt before the first ISI.
+        after: logs of earlier sessions of the same person, earliest first, and of searches for the threshold just
+            before, whose pulses teach the recruitment curve.
+        earlier: logs of earlier trials of this visit, or tables (.csv) of pulses of TMS alone with the columns
+            `intensity_pct_rmt` and `mep_mv`, which are learnt before the first ISI.
     """
 
     seed: int = Field(default=0, ge=0)
@@ -67,7 +69,7 @@ class RunConfig(Section):
     after: tuple[Path, ...] = ()
     earlier: tuple[Path, ...] = ()
     device: DeviceConfig | None = None
-    visit: VisitConfig = VisitConfig()
+    visit: PlannedVisit = PlannedVisit()
     subject: SubjectConfig = SubjectConfig()
     space: SpaceConfig = SpaceConfig(reference="valve")
     strategy: StrategyConfig = StrategyConfig()

@@ -30,6 +30,7 @@ from isiw.devices.robot.vane.tapper import WAIT_MS, RotatingTapper
 from isiw.errors import ConfigError
 from isiw.findings import STOP_WIDTH_MS
 from isiw.strategy.catalogue import list_strategies, settings_for
+from isiw.strategy.threshold.curve import CurvePulses
 from isiw.subjects.cohorts import COHORTS, person_of
 from isiw.subjects.subject import SimulatedSubject
 from isiw.text.toml_files import checked
@@ -244,7 +245,29 @@ class VisitConfig(Section):
 
     def noted(self) -> Visit:
         """The notes about the visit."""
-        return Visit(**self.model_dump(exclude={"subject"}))
+        return Visit(**self.model_dump(exclude={"subject", "curve"}))
+
+
+class CurveConfig(Section):
+    """Pulses of TMS alone over the recruitment curve: the intensities, and how many at each."""
+
+    at_pct_mso: list[float] = Field(min_length=1)
+    each: int = Field(default=5, ge=1)
+
+    def pulses(self, seed: int) -> CurvePulses:
+        """The pulses, in an order of the seed."""
+        return CurvePulses(tuple(map(float, self.at_pct_mso)), self.each, seed)
+
+
+class PlannedVisit(VisitConfig):
+    """Who is examined, what is noted about it, and what comes before the pairs.
+
+    Args:
+        curve: pulses over the recruitment curve, which `isiw threshold` gives before the session: `at_pct_mso`, the
+            intensities, and `each`, how many at each of them. A session without their log in `after` is refused.
+    """
+
+    curve: CurveConfig | None = None
 
 
 def require_together(values: Mapping[str, Any]) -> None:

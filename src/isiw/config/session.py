@@ -10,6 +10,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, Final
 
+from isiw.config.given import is_table, pulses_of_table, searches_after, searches_sentence, sessions_after
 from isiw.config.run import RunConfig, limits_for
 from isiw.config.sections import RobotConfig, SimulatedConfig, SubjectConfig, robot_for
 from isiw.design import DesignSpace
@@ -20,11 +21,12 @@ from isiw.files import write_output
 from isiw.log.durable import log_exists
 from isiw.log.headers import RUN_KEY
 from isiw.log.kinds import imported_sentence
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.reader import SessionRecord, ThresholdRecord, read_session
 from isiw.log.schema import now
 from isiw.models.particles.prior import Prior
 from isiw.priors import after, read_lab_prior
 from isiw.priors.days import require_each_once, require_whole
+from isiw.session.given import given_pulses
 from isiw.session.loop import Session
 from isiw.strategy.catalogue import known_settings, make_strategy, settings_for
 from isiw.subjects.cohorts import person_of
@@ -67,7 +69,8 @@ def write_rig_template(folder: str | Path) -> tuple[Path, ...]:
 def settings_with_prior(config: RunConfig, device: DeviceInfo) -> dict[str, Any]:
     """The strategy's settings, with what earlier sessions taught as its prior."""
     settings = dict(config.strategy.settings)
-    if config.prior is None and not config.after:
+    earlier = sessions_after(config)
+    if config.prior is None and not earlier:
         return settings
     if "prior" in settings:
         raise ConfigError(
@@ -80,7 +83,6 @@ def settings_with_prior(config: RunConfig, device: DeviceInfo) -> dict[str, Any]
             remedy="Leave out the prior and the earlier sessions, or choose another strategy, such as default.",
         )
     lab = None if config.prior is None else read_lab_prior(config.prior)
-    earlier = [read_session(path) for path in config.after]
     _require_people(config, earlier, device, [str(config.prior)] if lab is not None and lab.simulated else [])
     if lab is not None:
         _require_like(config, Visit(muscle=lab.noted_muscle), config.prior)
@@ -97,7 +99,10 @@ def learns_from_earlier(name: str) -> bool:
 
 
 def _require_people(
-    config: RunConfig, records: Sequence[SessionRecord], device: DeviceInfo, simulated: Sequence[str] = ()
+    config: RunConfig,
+    records: Sequence[SessionRecord | ThresholdRecord],
+    device: DeviceInfo,
+    simulated: Sequence[str] = (),
 ) -> None:
     """Raise if sessions, or what else was simulated, cannot teach anything of the person who will be examined."""
     nobodys = [*simulated, *(str(record.path) for record in records if record.header.device.simulated)]
@@ -109,14 +114,15 @@ def _require_people(
         )
     require_same_person(config, records)
     for record in records:
-        _require_like(config, record.header.visit, record.path)
+        if isinstance(record, SessionRecord):
+            _require_like(config, record.header.visit, record.path)
 
 
 def earlier_trials(config: RunConfig, device: DeviceInfo) -> tuple[Trial, ...]:
     """The earlier trials of the visit, which count for the limits, and which a strategy learns before its first ask."""
-    records = [read_session(path) for path in config.earlier]
-    _require_people(config, records, device)
-    require_each_once([*records, *(read_session(path) for path in config.after)])
+    records, searches = [read_session(path) for path in _logs(config)], searches_after(config)
+    _require_people(config, [*records, *searches], device)
+    require_each_once([*records, *sessions_after(config)])
     for record in records:
         require_whole(record, "as a table: isiw export, then isiw analyse")
         header = record.header
@@ -127,16 +133,24 @@ def earlier_trials(config: RunConfig, device: DeviceInfo) -> tuple[Trial, ...]:
                 expected=f"{device.conditioning} and {device.reference}",
                 remedy="Leave this file out.",
             )
-    return tuple(trial for record in records for trial in (*record.table, *record.unknown_trials))
+    learnt = [trial for record in records for trial in (*record.table, *record.unknown_trials)]
+    tables = [pulse for path in config.earlier if is_table(path) for pulse in pulses_of_table(path)]
+    return (*given_pulses(searches), *tables, *learnt)
+
+
+def _logs(config: RunConfig) -> list[Path]:
+    """The logs of earlier trials."""
+    return [path for path in config.earlier if not is_table(path)]
 
 
 def told_imported(config: RunConfig) -> str:
     """That some of the earlier sessions were none, in words; empty if all were."""
-    logs = (*config.after, *config.earlier)
-    return imported_sentence([path.name for path in logs if read_session(path).header.imported])
+    records = [*sessions_after(config), *(read_session(path) for path in _logs(config))]
+    imported = imported_sentence([record.path.name for record in records if record.header.imported])
+    return " ".join(filter(None, (imported, searches_sentence(config))))
 
 
-def require_same_person(config: RunConfig, records: Sequence[SessionRecord]) -> None:
+def require_same_person(config: RunConfig, records: Sequence[SessionRecord | ThresholdRecord]) -> None:
     """Raise if a session is of another person than the configuration names, if both name somebody."""
     subject = config.visit.subject
     others = [record for record in records if record.header.subject not in {"", subject}]
@@ -246,8 +260,8 @@ def session_for(config: RunConfig) -> Session:
     }
     settings = known_settings(config.strategy.name, known) | settings_with_prior(config, info)
     strategy = make_strategy(config.strategy.name, space=space, seed=config.seed, **settings)
-    if config.earlier:
-        strategy.learn_all(earlier_trials(config, info))
+    if earlier := earlier_trials(config, info):
+        strategy.learn_all(earlier)
     code = "" if config.own_rig else f"{config.subject.cohort}-{config.seed}-{config.subject.number}"
     return Session(
         device,

@@ -58,8 +58,8 @@ class TrialsByIsi(NamedTuple):
 
 
 def by_isi(trials: Iterable[Trial]) -> TrialsByIsi:
-    """The trials that count, with ISIs that hardly repeat put into steps."""
-    measured = [trial for trial in trials if trial.told and trial.mep_mv is not None]
+    """The trials that count, at the intensity of the pairs, with ISIs that hardly repeat put into steps."""
+    measured = [t for t in trials if t.told and t.mep_mv is not None and t.intensity_pct_rmt is None]
     pairs = [trial for trial in measured if trial.isi_ms is not None]
     commanded_ms = np.array([trial.commanded_isi_ms for trial in pairs], dtype=np.float64)
     if len(np.unique(commanded_ms)) > len(commanded_ms) / 2:

@@ -116,7 +116,9 @@ def _read(source: Path, way: Way) -> Iterator[Person]:
             remedy="ISIs of one cannot be compared with those of the other: correct one of them.",
         )
     for delivered in read_people(source, layout, subject=way.subject, limits=way.limits, also=way.also):
-        visit = replace(way.visit, day=delivered.visit.day or way.visit.day)
+        own = delivered.visit
+        pct_rmt = way.visit.intensity_pct_rmt or own.intensity_pct_rmt
+        visit = replace(way.visit, day=own.day or way.visit.day, intensity_pct_rmt=pct_rmt)
         simulated = way.simulated or delivered.simulated
         made_of = {
             **_identity(source, delivered.files),
@@ -188,7 +190,10 @@ def analyse_person(person: Person, way: Way) -> Analysis:
     if person.refused is not None:
         raise person.refused
     delivered = person.delivered
-    strategy = isiw.strategy.make_strategy(way.strategy, way.space or delivered.space(), way.seed, **way.settings)
+    over_the_curve = any(trial.intensity_pct_rmt is not None for trial in delivered.trials)
+    stated = {"intensity_pct_rmt": delivered.visit.intensity_pct_rmt if over_the_curve else None}
+    settings = isiw.strategy.catalogue.known_settings(way.strategy, stated) | dict(way.settings)
+    strategy = isiw.strategy.make_strategy(way.strategy, way.space or delivered.space(), way.seed, **settings)
     analysis = isiw.existing.analysed(delivered, strategy, {ANALYSED_KEY: dict(person.made_of)})
     if person.log is not None:
         analysis.to_log(person.log)

@@ -46,6 +46,7 @@ COLUMNS: Final[Mapping[str, tuple[str, ...]]] = {
                 "ausschluss", "ausgeschlossen", "verworfen", "artefakt"),
     "reason": ("reason", "grund"),
     "tap_alone": ("tapalone",),
+    "intensity": ("intensitypctrmt", "pctrmt", "intensityrmt", "percentrmt", "intensitypercentrmt"),
     "subject": ("subject", "subjectid", "participant", "participantid", "subj", "person", "patient", "sub", "proband",
                 "probandin", "versuchsperson", "vp", "teilnehmer", "teilnehmerin", "id"),
     "day": ("day", "visit", "session", "sessionid", "ses", "sitzung", "termin", "messtag"),

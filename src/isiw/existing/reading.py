@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from isiw.checks import MOST_MEP_MV
 from isiw.design import DesignSpace
@@ -24,7 +24,7 @@ from isiw.existing.formats.contents import Contents
 from isiw.existing.layout import Layout
 from isiw.existing.limits import ReadingLimits, require_file, require_table, require_visits
 from isiw.files import is_mcap
-from isiw.findings import Kind
+from isiw.findings import INTENSITY_PCT, Kind
 from isiw.lazy import pd
 from isiw.log.durable import log_exists
 from isiw.signals.judgement import judge_measurement
@@ -32,6 +32,9 @@ from isiw.signals.limits import SignalLimits
 from isiw.trials import Measurement, Status, Stimulus, Trial
 from isiw.types import Reference
 from isiw.visit import Visit
+
+_STRONGEST_PCT_RMT: Final = 300.0
+"""No stimulator reaches more in a person whose threshold can be found [% RMT]."""
 
 
 def read_people(
@@ -157,7 +160,7 @@ def people_of(
         begun = dates[own[0]].isoformat(timespec="microseconds") if own[0] in dates else ""
         person = _person(columns, own, layout, reference, subject or name)
         given_by = latest_of([columns["date"].text(row) for row in own], [dates.get(row) for row in own])
-        found.append(replace(person, visit=Visit(day=day), created=begun, given_by=given_by))
+        found.append(replace(person, visit=replace(person.visit, day=day), created=begun, given_by=given_by))
     return found
 
 
@@ -196,6 +199,7 @@ def _person(
     require_isis(columns, rows, layout)
     space, signals = anywhere(reference), SignalLimits()
     trials = [_trial(columns, row, number, layout, space, signals) for number, row in enumerate(rows)]
+    trials, paired_pct_rmt = _with_intensities(trials, columns, rows)
     blocks = [columns["block"].text(row) for row in rows]
     begun = [n for n, block in enumerate(blocks) if not n or block != blocks[n - 1]]
     if (name := columns["block"].name) not in layout.where:
@@ -214,6 +218,7 @@ def _person(
         units=columns.units,
         unused=columns.unused,
         blocks={n: blocks[n] for n in begun if n},
+        visit=Visit(intensity_pct_rmt=paired_pct_rmt),
     )
     require_short([trial.isi_ms for trial in trials if trial.isi_ms is not None], layout, columns["isi"].of)
     return found
@@ -248,6 +253,26 @@ def _trial(
         judged = judge_measurement(measured, Stimulus(number, meant_ms), space, signals)
         lost = judged.reason
     return Trial(number, Status.ACCEPTED if lost is None else Status.MISTRIAL, reason=lost, **facts)
+
+
+def _with_intensities(
+    trials: Sequence[Trial], columns: tables.Columns, rows: Sequence[int]
+) -> tuple[list[Trial], float | None]:
+    """Trials of TMS alone with their intensities [% RMT], and that of all pairs; None where none is stated."""
+    stated = [columns["intensity"].number(row) for row in rows]
+    for row, pct_rmt in zip(rows, stated, strict=True):
+        if pct_rmt is not None and not INTENSITY_PCT.least <= pct_rmt <= _STRONGEST_PCT_RMT:
+            remedy = "It must be in % of the resting motor threshold."
+            raise columns.of["intensity"].refused(row, "is no intensity in % RMT", remedy)
+    paired = {pct_rmt for trial, pct_rmt in zip(trials, stated, strict=True) if trial.wanted_isi_ms is not None}
+    usual = paired.pop() if len(paired) == 1 else None
+    own = [
+        replace(trial, intensity_pct_rmt=pct_rmt)
+        if trial.wanted_isi_ms is None and not trial.tap_alone and pct_rmt != usual
+        else trial
+        for trial, pct_rmt in zip(trials, stated, strict=True)
+    ]
+    return own, usual
 
 
 def _require_ascending(columns: tables.Columns, rows: Sequence[int]) -> None:

@@ -151,7 +151,7 @@ class Columns:
 def _scaled(columns: Mapping[str, Column], layout: Layout) -> tuple[dict[str, Column], tuple[str, str]]:
     """Columns whose numbers are in ms, mV or µV by the units that are stated; those of ISIs and amplitudes besides."""
     columns = dict(columns)
-    numeric = ("isi", "mep", "asked", "isi_sd", "background")
+    numeric = ("isi", "mep", "asked", "isi_sd", "background", "intensity")
     columns |= with_decimals({key: columns[key] for key in numeric if key in columns}, layout.decimal)
     isi_unit = required_unit("ISIs", columns["isi"], layout, ISI_UNITS_MS)
     factors, mep_unit = {"isi": ISI_UNITS_MS[isi_unit]}, "mV"

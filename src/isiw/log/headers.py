@@ -229,6 +229,7 @@ class ThresholdHeader(_Header):
 
     kind: Literal["threshold"] = "threshold"
     search: StrategyRecipe
+    muscle: str = ""
     intensities: IntensityRange
     min_iti_s: float
     max_pulses: int

@@ -40,6 +40,7 @@ class Observation:
             if all amplitudes are points.
         known_mv: mean and SD of a part of the amplitude that is not the pulse's [mV], and the SD of a factor that
             trials of nearly the same ISI share [natural log], shape (b, 3); None for none.
+        shift_pct_rmt: by how much the pulse is stronger than the pairs' [% RMT], shape (b,); None for not at all.
     """
 
     isi_ms: Singles
@@ -48,6 +49,7 @@ class Observation:
     response: Singles
     mep_high_mv: Singles | None = None
     known_mv: Singles | None = None
+    shift_pct_rmt: Singles | None = None
 
     @classmethod
     def of(
@@ -58,6 +60,7 @@ class Observation:
         response: Sequence[bool | None] | None = None,
         mep_high_mv: Values | None = None,
         known_mv: Sequence[tuple[float, float, float]] | None = None,
+        shift_pct_rmt: Values | None = None,
     ) -> Observation:
         """One trial of each person.
 
@@ -69,13 +72,14 @@ class Observation:
             mep_high_mv: if amplitudes are intervals, their upper ends [mV], one a person.
             known_mv: mean and SD of a part of the amplitude that is not the pulse's [mV], and the SD of the factor that
                 trials of nearly the same ISI share, one a person.
+            shift_pct_rmt: by how much the pulse is stronger than the pairs' [% RMT], one a person.
         """
         isi, mep = _column(isi_ms), _column(mep_mv)
         seen = np.full_like(mep, np.nan) if response is None else _column(response)
         sds = np.zeros_like(isi) if isi_sd_ms is None else _column(isi_sd_ms)
         high = None if mep_high_mv is None else _column(mep_high_mv)
         known = None if known_mv is None else np.array(known_mv, dtype=np.float32).reshape(-1, 3)
-        return cls(isi, mep, sds, seen, high, known)
+        return cls(isi, mep, sds, seen, high, known, None if shift_pct_rmt is None else _column(shift_pct_rmt))
 
     @classmethod
     def side_by_side(cls, people: Sequence[Observation]) -> Observation:
@@ -229,6 +233,15 @@ class NotesChanges(Protocol):
 
 
 @runtime_checkable
+class LearnsCurves(Protocol):
+    """Capability of a model: TMS alone at other intensities than the pairs' teaches it; to others it means nothing."""
+
+    @property
+    def pairs_pct_rmt(self) -> float:
+        """The intensity of the pairs' pulse [% RMT], as it is stated, or else as it usually is."""
+
+
+@runtime_checkable
 class ReportsTrouble(Protocol):
     """Capability: a fit that can fail, and says so."""
 
@@ -260,6 +273,11 @@ class ResponseModel(Protocol):
         Raises:
             StrategyError: an observation of a kind that the model cannot learn from.
         """
+
+
+def pairs_pct_rmt_of(model: object) -> float | None:
+    """The intensity of the pairs' pulse that a model reckons with [% RMT]; None if it has no law of other ones."""
+    return model.pairs_pct_rmt if isinstance(model, LearnsCurves) else None
 
 
 def profile_of(model: object) -> Any:

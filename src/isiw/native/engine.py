@@ -15,7 +15,7 @@ from isiw.types import Array, BoolArray, FloatArray, IntArray, Singles
 FIELDS: Final = 27
 """Of a particle; their names and order are those of `isiw.models.particles.records`."""
 
-COLUMNS: Final = 11
+COLUMNS: Final = 12
 """Of a trial, likewise."""
 
 KINDS: Final = 5

@@ -170,7 +170,8 @@ def _finish_isis(axes: Axes, record: SessionRecord) -> None:
     space = record.header.space
     low_ms, high_ms = _ends_ms(record)
     room_ms = _EDGE * (space.high_ms - space.low_ms)
-    meps_mv = [trial.mep_mv for trial in record.table.told if trial.isi_ms is None and trial.mep_mv is not None]
+    alone = [t for t in record.table.told if t.isi_ms is None and t.intensity_pct_rmt is None]
+    meps_mv = [trial.mep_mv for trial in alone if trial.mep_mv is not None]
     if not any(trial.is_control and not trial.tap_alone for trial in record.table):
         axes.set_xlim(low_ms - room_ms, high_ms + room_ms)
         return

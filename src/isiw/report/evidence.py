@@ -142,7 +142,8 @@ def nothing_stood_out(trials: Sequence[Trial], window_ms: tuple[float, float] | 
     A muscle that the pulse alone does not reach looks like this, and so do a stimulator that does not fire and an MEP
     outside the window that it is sought in.
     """
-    known = [trial for trial in trials if trial.mep_mv is not None and trial.background_rms_uv]
+    of_pairs = [trial for trial in trials if trial.intensity_pct_rmt is None]
+    known = [trial for trial in of_pairs if trial.mep_mv is not None and trial.background_rms_uv]
     stood_out = [one.stands_out for one in told_of(known)]
     if len(known) >= ENOUGH_TO_STAND_OUT and not any(stood_out):
         return sentences.at_rest(window_ms, None)

@@ -188,11 +188,12 @@ class TrialRow(BaseModel):
     isi_ms: float | None
     mep_mv: float | None
     excluded: bool
+    intensity_pct_rmt: float | None
 
     @classmethod
     def of(cls, trial: Trial) -> Self:
         """The row of a trial."""
-        names = ("status", "reason", "commanded_isi_ms", "isi_ms", "mep_mv", "excluded")
+        names = ("status", "reason", "commanded_isi_ms", "isi_ms", "mep_mv", "excluded", "intensity_pct_rmt")
         return cls(trial=trial.index, **{name: getattr(trial, name) for name in names})
 
 

@@ -173,6 +173,7 @@ class DrivenSession:
                 background_rms_uv=request.background_rms_uv,
                 pulse=request.pulse,
                 confirm=request.confirm,
+                intensity_pct_rmt=request.intensity_pct_rmt,
             )
         return self._concluded()
 
@@ -304,13 +305,13 @@ def _recorded(trial: Trial) -> str:
     """What was told about a trial, in words."""
     if trial.status is Status.MISTRIAL:
         return f"mistrial, {trial.reason}"
-    names = ("isi_ms", "mep_mv", "isi_sd_ms", "background_rms_uv")
+    names = ("isi_ms", "mep_mv", "isi_sd_ms", "background_rms_uv", "intensity_pct_rmt")
     told = {name: getattr(trial, name) for name in names}
     return _in_words(TellRequest.model_construct(trial=trial.index, **told, pulse=not trial.tap_alone))
 
 
 def _in_words(told: TellRequest) -> str:
     """What is told about a trial, in words that differ where its values do."""
-    usual = {"isi_sd_ms": 0.0, "background_rms_uv": None, "pulse": True}
+    usual = {"isi_sd_ms": 0.0, "background_rms_uv": None, "pulse": True, "intensity_pct_rmt": None}
     values = told.model_dump(exclude={"trial", "client", "confirm"})
     return " ".join(f"{name}={value}" for name, value in values.items() if name not in usual or value != usual[name])

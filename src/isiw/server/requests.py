@@ -12,7 +12,7 @@ from pydantic_core import ErrorDetails
 
 from isiw.checks import MOST_TRIALS
 from isiw.config.sections import LimitsConfig, SpaceConfig, StrategyConfig, VisitConfig, require_together, require_units
-from isiw.errors import IsiwError
+from isiw.errors import InvalidValueError, IsiwError
 from isiw.log.schema import TrialNumber
 from isiw.server.answers import Refusal
 from isiw.server.clients import KEY
@@ -26,6 +26,7 @@ from isiw.text.toml_files import (
     once_each,
     read_json,
 )
+from isiw.trials import Status, Trial
 from isiw.visit import VisitProtocol
 
 FORM: Final = "application/x-www-form-urlencoded"
@@ -36,6 +37,7 @@ NAME: Final = r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$"
 
 MOST_FIELDS: Final = 50
 MOST_WAIT_S: Final = 30.0
+MOST_GIVEN: Final = 1000
 
 Text = Annotated[str, Field(max_length=10_000)]
 
@@ -44,6 +46,31 @@ _Kind = TypeVar("_Kind", bound=BaseModel)
 
 class _Request(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class GivenPulses(_Request):
+    """Pulses of TMS alone that were given before, such as those over the recruitment curve, in their order."""
+
+    mep_mv: tuple[float, ...] = Field(max_length=MOST_GIVEN, description="Their amplitudes [mV].")
+    intensity_pct_rmt: tuple[float, ...] = Field(max_length=MOST_GIVEN, description="Their intensities [% RMT].")
+
+    @property
+    def trials(self) -> tuple[Trial, ...]:
+        """The pulses as trials.
+
+        Raises:
+            InvalidValueError: not as many amplitudes as intensities, or values that cannot be.
+        """
+        if len(self.mep_mv) != len(self.intensity_pct_rmt):
+            raise InvalidValueError(
+                "the pulses that were given before have an amplitude and an intensity each",
+                got=f"{len(self.mep_mv)} and {len(self.intensity_pct_rmt)}",
+            )
+        pulses = enumerate(zip(self.mep_mv, self.intensity_pct_rmt, strict=True))
+        return tuple(
+            Trial(number, Status.ACCEPTED, None, mep_mv=mep_mv, intensity_pct_rmt=pct)
+            for number, (mep_mv, pct) in pulses
+        )
 
 
 class CreateRequest(_Request):
@@ -59,6 +86,9 @@ class CreateRequest(_Request):
     strategy: StrategyConfig = StrategyConfig()
     limits: LimitsConfig = LimitsConfig()
     protocol: VisitProtocol = VisitProtocol()
+    earlier: GivenPulses | None = Field(
+        default=None, description="TMS alone that was given before; limits.max_pulses counts it."
+    )
     client: str | None = Field(
         default=None,
         pattern=KEY,
@@ -123,6 +153,9 @@ class TellRequest(_Request):
     )
     confirm: bool = Field(
         default=False, description="True confirms realised ISIs that are far from those asked; otherwise InDoubt."
+    )
+    intensity_pct_rmt: float | None = Field(
+        default=None, description="Intensity of TMS alone [% RMT]; null for that of the pairs."
     )
     client: str | None = _TOLD_BY
 

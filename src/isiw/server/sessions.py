@@ -180,6 +180,7 @@ class Sessions:
         recorder = open_session(
             make_strategy(request.strategy.name, space=space, seed=request.seed, **settings),
             self._path(request.id),
+            earlier=request.earlier.trials if request.earlier else (),
             limits=dataclasses.replace(Limits.of_space(space), **request.limits.model_dump()),
             subject=request.visit.subject,
             visit=request.visit.noted(),

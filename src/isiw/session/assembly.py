@@ -33,6 +33,7 @@ from isiw.session.steps import Steps
 from isiw.signals.limits import SignalLimits
 from isiw.signals.tap import TapResponses
 from isiw.signals.watch import Watch
+from isiw.strategy.stopping import stimuli_left
 from isiw.strategy.strategy import Strategy
 from isiw.trials import TrialTable
 from isiw.visit import Visit, VisitProtocol
@@ -106,6 +107,8 @@ def require_fitting(strategy: Strategy, header: Header) -> None:
             got=f"max_pulses = {most}, {before} stimuli given before",
             remedy="Write a larger max_pulses under [limits] if your ethics approval allows it.",
         )
+    if planned is None and any(trial.intensity_pct_rmt is not None for trial in strategy.earlier):
+        planned = stimuli_left(strategy.stopping, 0)  # who plans pulses over the curve plans the pairs after them
     if planned is None or (needed := header.protocol.stimuli_for(planned) + before) <= most:
         return
     name, planned = strategy.recipe.name or type(strategy.acquisition).__name__, planned + before

@@ -300,6 +300,8 @@ def change_found(change: Change | None, told: Sequence[Trial]) -> Finding | None
         return None
     at = None if change.trial is None else told[min(change.trial, len(told) - 1)].index
     remedy = "" if at is None else "Did the coil or an electrode move, or was a gain or the intensity changed?"
+    if change.trial == 0:
+        remedy = "Are muscle, coil, gain and the scale of intensities the same? The window allows for the change."
     return Finding(Kind.CHANGED, Severity.DOUBT, sentences.at_a_trial(change, at), remedy)
 
 

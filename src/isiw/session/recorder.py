@@ -29,7 +29,7 @@ from isiw.signals.watch import Doubts, findings
 from isiw.strategy.outcomes import Outcome
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
-from isiw.trials import Status, Stimulus, Trial, TrialTable
+from isiw.trials import Status, Stimulus, Trial, TrialTable, require_alone
 
 RecordedT = TypeVar("RecordedT")
 
@@ -175,7 +175,7 @@ class Recorder(Recording[Trial], Judging):
         self._sink.log.require_in_place()
         self._asked = stimulus
 
-    def tell(
+    def tell(  # noqa: PLR0913 - what may be known of an outcome
         self,
         isi_ms: float | None,
         mep_mv: float | None = None,
@@ -186,6 +186,7 @@ class Recorder(Recording[Trial], Judging):
         mep_interval_mv: tuple[float, float] | None = None,
         pulse: bool = True,
         confirm: bool = False,
+        intensity_pct_rmt: float | None = None,
     ) -> None:
         """Report the outcome of the ISI that was asked; it is on disk before the strategy learns it.
 
@@ -202,11 +203,13 @@ class Recorder(Recording[Trial], Judging):
             mep_interval_mv: as for `Strategy.tell` [mV].
             pulse: False is a tap alone, as for `Strategy.tell`, which was given without a request.
             confirm: whether all realised ISIs are right, however far from those asked; it is logged.
+            intensity_pct_rmt: as for `Strategy.tell` [% RMT].
 
         Raises:
             InvalidValueError: nothing was asked, a value that cannot be, a slip of unit or order, a pulse before the
-                impact, an ISI that is too uncertain, or earlier ISIs that are to be confirmed; the outcome is not
-                logged, and the right value can be given. TMS alone counts as given from the first try on.
+                impact, an ISI that is too uncertain, an intensity of anything but TMS alone, or earlier ISIs that are
+                to be confirmed; the outcome is not logged, and the right value can be given. TMS alone counts as given
+                from the first try on.
             OutOfSpaceError: an ISI beyond the space and its tolerance.
             LogError: the log cannot be written, or is no longer at its path; closing saves the outcome with the rest.
             StrategyError: as for `ask`; the outcome is logged.
@@ -221,7 +224,8 @@ class Recorder(Recording[Trial], Judging):
                 self._begin(None, tap_alone=not pulse)
                 if self._given_before + len(self.trials) >= self._limits.max_pulses:
                     self._examination.event("limit", f"TMS alone was given beyond {self._limits.max_pulses} pulses.")
-            outcome = Outcome(isi_ms, mep_mv, None, isi_sd_ms, mep_sd_mv, mep_interval_mv)
+            require_alone(intensity_pct_rmt, isi_ms, tap_alone=not pulse)
+            outcome = Outcome(isi_ms, mep_mv, None, isi_sd_ms, mep_sd_mv, mep_interval_mv, None, intensity_pct_rmt)
             self._tell(outcome, background_rms_uv, pulse=pulse, confirm=flag("confirm", confirm))
 
     def _tell(self, outcome: Outcome, background_rms_uv: float | None, *, pulse: bool, confirm: bool) -> None:
@@ -240,7 +244,8 @@ class Recorder(Recording[Trial], Judging):
             )
         trial = Trial(asked.trial, Status.ACCEPTED, asked.isi_ms, isi_ms=isi_ms, mep_mv=mep_mv,
                       isi_sd_ms=outcome.isi_sd_ms, background_rms_uv=background_rms_uv, tap_alone=not pulse,
-                      mep_sd_mv=outcome.mep_sd_mv, mep_interval_mv=outcome.mep_interval_mv)  # fmt: skip
+                      mep_sd_mv=outcome.mep_sd_mv, mep_interval_mv=outcome.mep_interval_mv,
+                      intensity_pct_rmt=outcome.intensity_pct_rmt)  # fmt: skip
         if self.in_doubt and asked.isi_ms is not None:
             self._confirm(confirm=confirm)
         self._conclude(trial)

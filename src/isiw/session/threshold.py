@@ -24,6 +24,7 @@ from isiw.session.assembly import begun, require_parts
 from isiw.session.examination import Examination
 from isiw.session.recorder import Recording
 from isiw.strategy.stopping import StopDecision
+from isiw.strategy.threshold.curve import CurvePulses
 from isiw.strategy.threshold.pulses import Pulse, ThresholdEstimate
 from isiw.strategy.threshold.search import ThresholdSearch, make_threshold_search
 from isiw.trials import Stimulus
@@ -33,7 +34,7 @@ UNKNOWN = "outcome unknown"
 BY_HAND = DeviceInfo("a stimulator that is set by hand", "impact")
 
 
-def open_threshold(
+def open_threshold(  # noqa: PLR0913 - what a search may state
     search: ThresholdSearch,
     log: str | Path,
     *,
@@ -42,6 +43,7 @@ def open_threshold(
     max_pulses: int = 100,
     clock: Clock | None = None,
     subject: str = "",
+    muscle: str = "",
     config: Mapping[str, Any] | None = None,
 ) -> ThresholdRecorder:
     """Open a search for the motor threshold: ask it for intensities, and tell it what came of them.
@@ -54,20 +56,29 @@ def open_threshold(
         max_pulses: most pulses, lost ones included.
         clock: tells the time, and waits; a virtual one for a simulated device only, where it is the default.
         subject: the person's code, for the log.
+        muscle: whose MEPs they are, for the log and for a session that knows the pulses.
         config: anything that should be kept in the log, as TOML values.
 
     Raises:
         DeviceError: a virtual clock for a device that is not simulated.
-        InvalidValueError: no search, one that knows of pulses already, limits that limit nothing, or an interval in ms.
+        InvalidValueError: no search, one that knows of pulses already, limits that limit nothing or do
+            not hold the pulses over a curve, or an interval in ms.
         LogError: there is a log already, or it cannot be written.
     """
     path = require_parts(log, search=(search, ThresholdSearch), device=(device, DeviceInfo))
     clock = _clock_for(device, clock)
     if search.pulses:
         raise InvalidValueError("the search knows of pulses that are not this log's", got=len(search.pulses))
+    if isinstance(search.method, CurvePulses) and search.method.budget > max_pulses:
+        raise InvalidValueError(
+            "the pulses over the curve do not fit into the limit",
+            got=f"{search.method.budget} pulses, max_pulses = {max_pulses}",
+            remedy=f"Say --max-pulses {search.method.budget} if your ethics approval allows it, or name fewer.",
+        )
     header = ThresholdHeader(
         **begun(seed=0),
         subject=text("subject", subject),
+        muscle=text("muscle", muscle),
         search=StrategyRecipe(name=search.name, seed=0, settings=search.settings),
         intensities=search.space,
         min_iti_s=interval_s("min_iti_s", min_iti_s),

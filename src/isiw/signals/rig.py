@@ -55,8 +55,9 @@ class Told:
 
 
 def told_of(trials: Iterable[Trial]) -> tuple[Told, ...]:
-    """Those of some trials that count and have an amplitude."""
-    return tuple(Told(t.mep_mv, t.isi_ms, t.background_rms_uv) for t in trials if t.told and t.mep_mv is not None)
+    """Those of some trials that count and have an amplitude, at the intensity of the pairs."""
+    comparable = (t for t in trials if t.told and t.intensity_pct_rmt is None)
+    return tuple(Told(t.mep_mv, t.isi_ms, t.background_rms_uv) for t in comparable if t.mep_mv is not None)
 
 
 _USUAL_LIMITS: Final = SignalLimits()

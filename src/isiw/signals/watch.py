@@ -248,7 +248,7 @@ class Watch:
 
 def _after_told(watch: Watch, trial: Trial, answer: Sweep | Measurement) -> Watch:
     """After a trial that may count: what is odd about it and those before."""
-    if trial.mep_mv is None or not trial.told:
+    if trial.mep_mv is None or not trial.told or trial.intensity_pct_rmt is not None:
         return watch
     if isinstance(answer, Sweep):
         told = told_by(answer, trial, watch.signals, watch.emg)

@@ -14,6 +14,7 @@ from isiw.acquisition.protocol import AcquisitionFunction, FollowsPlan, own_plan
 from isiw.checks import can
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
+from isiw.lazy import Later
 from isiw.models.protocol import (
     ExpectsTheUsual,
     NotesChanges,
@@ -100,10 +101,11 @@ class Course:
 
     def after(self, observation: Observation) -> Course:
         """The course after one more trial of each person; all of them pairs of stimuli, or all TMS alone."""
-        alone = bool(np.isnan(observation.isi_ms).all())
+        alone, shift = bool(np.isnan(observation.isi_ms).all()), observation.shift_pct_rmt
+        learnt = shift is None or not np.isnan(shift).any()  # else the model has no law of this intensity
         return replace(
             self,
-            posterior=self.method.model.update(self.posterior, observation),
+            posterior=self.method.model.update(self.posterior, observation) if learnt else self.posterior,
             told=self.told + 1,
             alone=self.alone + alone,
             earlier=tuple(e.without_posterior() if len(e.made) == self.people else e for e in self.past),
@@ -202,7 +204,10 @@ class Course:
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The estimate of the window of one person."""
-        return self.estimates.estimate(person)
+        estimate = self.estimates.estimate(person)
+        if not self.known_told:
+            return estimate
+        return estimate.noting(change=Later(lambda: estimate.change and estimate.change.counted_from(self.known_told)))
 
     def decision(self, person: int = 0, mistrials: int = 0, *, silent: bool = False) -> StopDecision:
         """The decision to stop with one person or not, with its reason."""

@@ -12,13 +12,13 @@ from typing import Final, TypedDict
 import numpy as np
 
 from isiw.change import MOST_NOTED
-from isiw.checks import Amplitude, AmplitudeInterval, Checked, Flag, NonNegative
+from isiw.checks import Amplitude, AmplitudeInterval, Checked, Flag, NonNegative, Positive
 from isiw.errors import InvalidValueError
 from isiw.models.protocol import (
     Observation,
 )
 from isiw.signals.tap import TapsAlone, is_inside, meets_response, taps_anywhere, taps_near
-from isiw.trials import Trial
+from isiw.trials import Trial, require_alone
 from isiw.types import Reference
 from isiw.window import Window
 
@@ -43,6 +43,7 @@ class Details(TypedDict, total=False):
     mep_sd_mv: float
     mep_interval_mv: tuple[float, float] | None
     tap_mv: float | None
+    intensity_pct_rmt: float | None
 
 
 def details_of(trial: Trial) -> Details:
@@ -52,6 +53,7 @@ def details_of(trial: Trial) -> Details:
         "mep_sd_mv": trial.mep_sd_mv,
         "mep_interval_mv": trial.mep_interval_mv,
         "tap_mv": trial.tap_mv,
+        "intensity_pct_rmt": trial.intensity_pct_rmt,
     }
 
 
@@ -70,12 +72,14 @@ class Outcome(Checked):
     mep_sd_mv: NonNegative = 0.0
     mep_interval_mv: AmplitudeInterval | None = None
     tap_mv: NonNegative | None = None
+    intensity_pct_rmt: Positive | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
         told = self.mep_mv, self.mep_interval_mv, self.response
         if sum(value is not None for value in told) != 1:
             raise InvalidValueError("tell needs one of mep_mv, mep_interval_mv and response", got=told)
+        require_alone(self.intensity_pct_rmt, self.isi_ms)
 
     @classmethod
     def of(cls, trial: Trial) -> Outcome:
@@ -89,7 +93,8 @@ class Outcomes:
 
     Of taps alone that were measured at no ISI the amplitude is the largest at any time; they only say whether a window
     may be the tap's own response.
-    Pulses whose ISI is `doubted`, by their numbers, are no observations.
+    Pulses whose ISI is `doubted`, by their numbers, are no observations. `pairs_pct_rmt` is None for a model that
+    has no law of TMS alone at another intensity than the pairs'.
     """
 
     reference: Reference
@@ -99,6 +104,7 @@ class Outcomes:
     taps_anywhere_mv: tuple[float, ...] = ()
     changes: tuple[int, ...] = ()
     doubted: frozenset[int] = frozenset()
+    pairs_pct_rmt: float | None = None
 
     def of(self, trials: Iterable[Trial]) -> Outcomes:
         """The same after some trials of a session."""
@@ -157,7 +163,15 @@ class Outcomes:
             [outcome.response],
             None if math.isnan(high_mv) else [high_mv],
             [(mean_mv, sd_mv, log_sd)] if mean_mv or sd_mv else None,
+            self._shift_pct_rmt(outcome),
         )
+
+    def _shift_pct_rmt(self, outcome: Outcome) -> list[float] | None:
+        """By how much a pulse is stronger than the pairs' [% RMT]: NaN if the model has no law of that; None for 0."""
+        stated = outcome.intensity_pct_rmt
+        if stated is None or stated == self.pairs_pct_rmt:
+            return None
+        return [math.nan if self.pairs_pct_rmt is None else stated - self.pairs_pct_rmt]
 
     def _tap_mv(self, outcome: Outcome) -> tuple[float, float, float] | None:
         """Mean and SD of the tap's own part of an amplitude [mV], and the SD of its log mean; None if it is unknown."""

@@ -50,7 +50,8 @@ class Reported:
         if isi_ms is not None and asked_ms is not None:
             far = is_far(isi_ms - asked_ms, self.space, isi_sd_ms)
             reported = replace(self, asked=(*self.asked, (len(pulses) - 1, far)))
-        told = [Told(one.mep_mv, one.isi_ms) for one in pulses if one.mep_mv is not None]
+        of_pairs = [one for one in pulses if one.intensity_pct_rmt is None]
+        told = [Told(one.mep_mv, one.isi_ms) for one in of_pairs if one.mep_mv is not None]
         evidence = Evidence(told=told, detection_limit_mv=detection_limit_mv)
         odd = (IN_DOUBT if reported.doubted else found, *findings(evidence))
         return replace(reported, doubts=self.doubts.after(odd))

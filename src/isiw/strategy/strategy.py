@@ -12,7 +12,7 @@ from isiw.design import DesignSpace, require_space
 from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError, warn
 from isiw.estimate import WindowEstimate
 from isiw.findings import lacking
-from isiw.models.protocol import Posterior, PredictsMeps, ReportsTrouble, ResponseModel
+from isiw.models.protocol import Posterior, PredictsMeps, ReportsTrouble, ResponseModel, pairs_pct_rmt_of
 from isiw.signals.limits import require_plausible, require_plausible_range
 from isiw.signals.watch import is_silent
 from isiw.strategy.choice import Asked, Choice, Cost, instead_of_lost
@@ -21,7 +21,7 @@ from isiw.strategy.outcomes import Details, Outcome, Outcomes
 from isiw.strategy.reported import Reported
 from isiw.strategy.settings.common import Recipe
 from isiw.strategy.stopping import StopDecision, StoppingRule, for_lack, stimuli_left
-from isiw.trials import Trial
+from isiw.trials import Trial, require_alone
 from isiw.types import FloatArray
 
 MOST_OF_A_BATCH = 1000
@@ -72,7 +72,7 @@ class Strategy:
                 remedy="Choose another acquisition function, or a model whose posterior has the capability.",
             )
         self._mistrials = self._controls = self._lost = 0
-        self._outcomes = Outcomes(space.reference, self.amplitude_step_mv)
+        self._outcomes = Outcomes(space.reference, self.amplitude_step_mv, pairs_pct_rmt=pairs_pct_rmt_of(model))
         self.earlier: tuple[Trial, ...] = ()  # learnt before the first ask
         self.same_level, self.earlier_given = True, 0  # stimuli, also of trials from which nothing was learnt
         self.in_doubt, self._asked, self._reported = False, Asked(), Reported(space)
@@ -200,7 +200,7 @@ class Strategy:
         """The fault of the last fit and what replaces it; None if there was none."""
         return self.posterior.trouble if isinstance(self.posterior, ReportsTrouble) else None
 
-    def tell(
+    def tell(  # noqa: PLR0913 - what may be known of an outcome
         self,
         isi_ms: float | None,
         mep_mv: float | None = None,
@@ -211,6 +211,7 @@ class Strategy:
         mep_interval_mv: tuple[float, float] | None = None,
         pulse: bool = True,
         confirm: bool = False,
+        intensity_pct_rmt: float | None = None,
     ) -> None:
         """Learn from one accepted trial.
 
@@ -228,12 +229,14 @@ class Strategy:
                 `mep_mv` is the amplitude of what the MEP window would hold at `isi_ms`, and what the tap itself adds to
                 amplitudes near this ISI is learnt.
             confirm: whether all realised ISIs are right, however far from those asked.
+            intensity_pct_rmt: intensity of TMS alone [% RMT]; None for that of the pairs. At another one it teaches the
+                default the person's recruitment curve, and other models nothing.
 
         Raises:
-            InvalidValueError: NaN, infinite or negative values, a response that is neither True nor False, not exactly
-                one of `mep_mv`, `mep_interval_mv` and `response`, an amplitude that no muscle gives, swapped arguments,
-                seconds, a pulse before the impact, an ISI that is too uncertain, a tap alone without ISI or amplitude,
-                or earlier ISIs that are to be confirmed.
+            InvalidValueError: a value that cannot be, not exactly one of `mep_mv`, `mep_interval_mv` and `response`, an
+                amplitude that no muscle gives, swapped arguments, seconds, a pulse before the impact, an ISI that is
+                too uncertain, a tap alone without ISI or amplitude, an intensity of anything but TMS alone, or
+                earlier ISIs that are to be confirmed.
             OutOfSpaceError: an ISI beyond the space and its tolerance.
             StrategyError: a kind of outcome that the model cannot learn from.
 
@@ -244,11 +247,13 @@ class Strategy:
         plain_ms = None if isi_ms is None else number("a realised ISI [ms]", isi_ms)
         plain_mv = None if mep_mv is None else number("mep_mv", mep_mv, least=0)
         if not flag("pulse", pulse):
+            require_alone(intensity_pct_rmt, plain_ms, tap_alone=True)
             self.learn_tap(plain_ms, plain_mv)
             return
         asked_ms = None if plain_ms is None else self._asked.meant_ms(plain_ms, plain_mv, self.space)
         require_plausible(plain_ms, plain_mv, asked_ms, self.space, isi_sd_ms)
         more = Details(response=response, isi_sd_ms=isi_sd_ms, mep_sd_mv=mep_sd_mv, mep_interval_mv=mep_interval_mv)
+        more["intensity_pct_rmt"] = intensity_pct_rmt
         outcome = Outcome(isi_ms, mep_mv, **more)
         require_plausible_range(outcome.mep_sd_mv, outcome.mep_interval_mv)
         reported = self._reported if plain_ms is None else self._reported.confirmed_by(confirm=flag("confirm", confirm))
@@ -317,9 +322,8 @@ class Strategy:
             if outcomes.step_mv == self._outcomes.step_mv
             else self._course.again(self.seed, outcomes.observations)
         )
-        self._outcomes, isi_ms = outcomes, outcome.isi_ms
-        self._asked = self._asked.after(isi_ms)
-        self._lost = 0 if isi_ms is not None else self._lost
+        self._outcomes, self._asked = outcomes, self._asked.after(outcome.isi_ms)
+        self._lost = 0 if outcome.isi_ms is not None else self._lost
 
     def learn_tap(self, isi_ms: float | None, mep_mv: float | None) -> None:
         """Learn from a tap alone, whatever was learnt before it.
@@ -375,17 +379,12 @@ class Strategy:
     def estimate(self) -> WindowEstimate:
         """The present estimate of the window."""
         estimate = self._course.estimate()
-        tap = self._outcomes.about_the_tap(estimate.window)
-        estimate = estimate.noting(**tap) if any(tap.values()) else estimate
-        estimate = estimate.noting(silent=True) if self._is_silent else estimate
+        noted = self._outcomes.about_the_tap(estimate.window) | {"silent": self._is_silent}
+        estimate = estimate.noting(**noted) if any(noted.values()) else estimate
         return estimate.doubted() if self.in_doubt else estimate
 
     def prediction_mv(self) -> tuple[FloatArray, FloatArray] | None:
-        """The band in which nine of ten next MEPs lie, at each ISI of `estimate().grid_ms`.
-
-        Returns:
-            Its lower and its upper limit [mV], (low, high), each of shape (t,); None if the model predicts no MEPs.
-        """
+        """The ends [mV] between which nine of ten MEPs lie at `estimate().grid_ms`, (t,) each; None if unknown."""
         return self.posterior.prediction_mv(0.9) if isinstance(self.posterior, PredictsMeps) else None
 
     def decision(self) -> StopDecision:

@@ -215,6 +215,15 @@ def test_a_stronger_pulse_moves_up_a_recruitment_curve_and_is_nothing_to_others(
     assert (got != likelihood(fields, told)).any() == (kind in {NoiseKind.RECRUITMENT, NoiseKind.RECTIFIED})
 
 
+@pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
+def test_what_curves_alone_have_a_law_of_is_to_other_kinds_as_curves_predict_it(kind: NoiseKind) -> None:
+    fields, told = of_kind(kind)
+    got = likelihood(fields, with_circumstances(told, shift_pct_rmt=5.0, log_by_curves=-1.5))
+    curved = kind in {NoiseKind.RECRUITMENT, NoiseKind.RECTIFIED}
+    expected = likelihood(fields, with_circumstances(told, shift_pct_rmt=5.0)) if curved else -1.5 * told.trials
+    np.testing.assert_allclose(got, expected, rtol=1e-5)
+
+
 @pytest.mark.parametrize("kind", [NoiseKind.RECRUITMENT, NoiseKind.RECTIFIED])
 def test_half_an_enhancement_is_half_a_boost(kind: NoiseKind) -> None:
     fields, told = of_kind(kind)

@@ -69,7 +69,7 @@ _USED_BY_CHANGE: Final = np.stack([latents_of(*_BY_CHANGE.get(kind, ("changed", 
 
 
 KINDS: Final = ("shape", "noise", "present", "depressed", "change")
-"""What a particle is of: `ShapeKind`, `NoiseKind`, whether there is an enhancement, a depression, and `ChangeKind`."""
+"""Of a particle: family of its profile, `NoiseKind`, whether it has an enhancement, and a depression, `ChangeKind`."""
 
 
 class Latents(NamedTuple):

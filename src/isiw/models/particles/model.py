@@ -66,6 +66,12 @@ class ParticleModel(Checked):
         """The prior that ISIs are chosen with."""
         return self.prior.as_usual(self.unusual_kept)
 
+    @property
+    def pairs_pct_rmt(self) -> float:
+        """The intensity of the pairs' pulse [% RMT]; see `LearnsCurves`."""
+        usual = max(self.prior.intensities, key=lambda law: law.share)
+        return self.prior.intensity_pct_rmt or usual.pct_rmt.median
+
     def begin(self, space: DesignSpace, seed: int, people: int = 1) -> ParticlePosterior:
         """The posterior before the first trial."""
         self.prior.profile.require_space(space)

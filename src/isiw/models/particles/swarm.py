@@ -15,9 +15,11 @@ import numpy as np
 
 from isiw.checks import Checked, Natural, Share
 from isiw.models.particles.latents import Latents
-from isiw.models.shared.history import History
+from isiw.models.particles.mixture import log_sum
+from isiw.models.particles.noise import recruits
+from isiw.models.shared.history import BY_CURVES, SHIFT, History
 from isiw.models.shared.tables import seeds
-from isiw.native.engine import Crowd, Law
+from isiw.native.engine import Crowd, Law, log_likelihoods
 from isiw.types import FloatArray, Singles
 
 LEAST_ESS = 0.01
@@ -122,7 +124,7 @@ class Swarm:
 
     def after(self, trial: History, law: Law, moves: Moving, seed: int) -> Swarm:
         """The particles after one more trial: weighed, resampled where too few carry the posterior, and moved."""
-        history = self.history.appended(trial)
+        history = self.history.appended(self._as_curves_have_it(trial, law))
         kept, resampled = (moves.sweeps_after(history.trials, resampled=worn) for worn in (False, True))
         crowd, dice = self.crowd.copied(), seeds(seed, history.trials, len(self.evidence))
         found = law.learn(history.columns, moves.min_ess, (kept, resampled), dice, crowd)
@@ -132,9 +134,24 @@ class Swarm:
 
     def weighed(self, trial: History, law: Law) -> Swarm:
         """The same particles, weighed by one more trial as well."""
-        history, crowd = self.history.appended(trial), self.crowd.copied()
+        history, crowd = self.history.appended(self._as_curves_have_it(trial, law)), self.crowd.copied()
         found = law.learn(history.columns, 0.0, (0, 0), np.zeros(len(self.evidence), dtype=np.uint64), crowd)
         return Swarm(crowd, self.evidence + found[:, 0], history)
+
+    def _as_curves_have_it(self, trial: History, law: Law) -> History:
+        """A trial of TMS alone at another intensity, with the density that recruitment curves predict (decision 45)."""
+        elsewhere = np.isnan(trial.isi_ms) & (trial.columns[..., SHIFT] != 0)
+        if not elsewhere.any():
+            return trial
+        curved = recruits(self.latents.noise)
+        likely = log_likelihoods(law.meanings(*self.latents, -1), trial.columns)
+        joint, among = (
+            log_sum(np.where(curved, each, -np.inf)) for each in (self.log_weights + likely, self.log_weights)
+        )
+        columns = trial.columns.copy()
+        predicted = np.where(np.isfinite(among), joint - among, 0.0)
+        columns[..., BY_CURVES] = np.where(elsewhere, predicted[:, np.newaxis], np.nan)
+        return History(columns)
 
     def as_usual(self, law: Law, usual: Law) -> Swarm:
         """The same particles under the prior that ISIs are chosen with."""

@@ -26,6 +26,13 @@ class Circumstances(NamedTuple):
     log_offset: float = 0.0  # by how much evoked MEPs are larger than usual, natural log
     shift_pct_rmt: float = 0.0  # by how much the pulse is stronger than usual
     enhancement: float = 1.0  # the share of its usual enhancement that the conditioning stimulus has
+    log_by_curves: float = math.nan  # log density for kinds of noise without a law of other intensities
+
+
+_OF_A_TRIAL: Final = 5
+"""Columns of a trial before its circumstances."""
+
+SHIFT, BY_CURVES = (_OF_A_TRIAL + Circumstances._fields.index(name) for name in ("shift_pct_rmt", "log_by_curves"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +40,7 @@ class History:
     """The trials so far; amplitudes are intervals of log mV, which are points if the amplitude is known.
 
     The columns are those of a trial in the compiled engine: realised ISI (NaN is TMS alone) and its SD [ms], lower and
-    upper end of the log MEP, how many trials came before, and the fields of `Circumstances`, shape (b, n, 11).
+    upper end of the log MEP, how many trials came before, and the fields of `Circumstances`, shape (b, n, 12).
     """
 
     columns: Singles
@@ -73,10 +80,6 @@ class History:
         return History(np.concatenate((self.columns, trial.columns), axis=1))
 
 
-_OF_A_TRIAL: Final = 5
-"""Columns before the circumstances."""
-
-
 def observed(observation: Observation, detection_limit_mv: float, response_threshold_mv: float, order: int) -> History:
     """One trial of each person as a history."""
     limits = math.log(detection_limit_mv), math.log(response_threshold_mv)
@@ -88,6 +91,8 @@ def observed(observation: Observation, detection_limit_mv: float, response_thres
     columns[:, 0, 2:4] = [_ends(*one, *limits) for one in people]
     if observation.known_mv is not None:
         columns[:, 0, _OF_A_TRIAL : _OF_A_TRIAL + 3] = observation.known_mv
+    if observation.shift_pct_rmt is not None:
+        columns[:, 0, SHIFT] = observation.shift_pct_rmt
     return History(columns)
 
 
@@ -104,7 +109,7 @@ def _ends(mep_mv: float, high_mv: float, response: float, limit: float, threshol
 
 
 def neutral(trials: int) -> Singles:
-    """Columns of so many trials that nothing but their order is known of, shape (n, 11)."""
+    """Columns of so many trials that nothing but their order is known of, shape (n, 12)."""
     columns = np.zeros((trials, _OF_A_TRIAL + len(Circumstances._fields)), dtype=np.float32)
     columns[:, _OF_A_TRIAL - 1], columns[:, _OF_A_TRIAL:] = np.arange(trials), Circumstances()
     return columns

@@ -231,6 +231,7 @@ INLINE void drive_at(const Group *group, const Trial *trial, float isi_ms, Whole
 /* Log likelihood of one trial under each particle. The ISI, where it is known with an SD only, is integrated out
 (Gauss and Hermite, three nodes). */
 INLINE Reals of_trial(const Group *group, const Trial *trial, float factor_at, int rectified) {
+    if (trial->of_curves && !group->curved) return all(trial->of[BY_CURVES]);
     static const float shift[3] = {0.0f, -1.7320508f, 1.7320508f}, share[3] = {2.0f / 3.0f, 1.0f / 6.0f, 1.0f / 6.0f};
     const Reals *of = group->particles->of;
     Wholes changed = trial->of[ORDER] >= of[CHANGED];
@@ -321,6 +322,7 @@ static int trials_of(const float *columns, int64_t count, Trial *trials) {
         if (isnan(trial->of[ISI])) trial->of[ISI] = trial->of[FACTOR] = 0.0f;
         gain_of(trial->of[ORDER], &trial->startle, &trial->relaxed);
         shares |= trial->of[KNOWN_LOG_SD] > 0.0f;
+        trial->of_curves = !isnan(trial->of[BY_CURVES]);
     }
     return shares;
 }

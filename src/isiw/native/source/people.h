@@ -51,6 +51,7 @@ enum {
     OFFSET,       /* by how much evoked MEPs are larger */
     SHIFT,        /* by how much the pulse is stronger [% RMT] */
     FACTOR,       /* the share of its usual enhancement that the conditioning stimulus has */
+    BY_CURVES,    /* log density for kinds of noise that know no other intensity; not a number where they know it */
     COLUMNS
 };
 
@@ -68,6 +69,7 @@ typedef struct {
 typedef struct {
     float of[COLUMNS];
     float startle, relaxed; /* the two parts of its gain, see gain_of */
+    int of_curves;          /* whether recruitment curves alone have a law of it */
 } Trial;
 
 /* How a trial after so many others startles, and how far amplitudes have wandered by then. */

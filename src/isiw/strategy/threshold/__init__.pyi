@@ -3,6 +3,7 @@ from .bayes import BayesThreshold as BayesThreshold
 from .bayes import FiveOfTen as FiveOfTen
 from .bayes import MaximumLikelihood as MaximumLikelihood
 from .bayes import RecruitmentBelief as RecruitmentBelief
+from .curve import CurvePulses as CurvePulses
 from .pulses import IntensityRange as IntensityRange
 from .pulses import Pulse as Pulse
 from .pulses import ThresholdEstimate as ThresholdEstimate

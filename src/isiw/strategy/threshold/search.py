@@ -11,6 +11,7 @@ from isiw.errors import InvalidValueError
 from isiw.signals.limits import implausible_scale, require_amplitude
 from isiw.strategy.stopping import StopDecision, StopKind
 from isiw.strategy.threshold.bayes import BayesThreshold, FiveOfTen, MaximumLikelihood
+from isiw.strategy.threshold.curve import CurvePulses
 from isiw.strategy.threshold.hotspot import BayesHotSpot
 from isiw.strategy.threshold.pulses import (
     IntensityRange,
@@ -23,10 +24,11 @@ from isiw.strategy.threshold.pulses import (
 )
 from isiw.text.toml_files import checked
 
-METHODS: Final[Mapping[str, type[BayesThreshold | MaximumLikelihood | FiveOfTen]]] = {
+METHODS: Final[Mapping[str, type[BayesThreshold | MaximumLikelihood | FiveOfTen | CurvePulses]]] = {
     "bayes": BayesThreshold,
     "maximum-likelihood": MaximumLikelihood,
     "five-of-ten": FiveOfTen,
+    "curve": CurvePulses,
 }
 
 _LOOK: Final = "Do the amplitudes grow with the intensity? If they do not, look for hum or an artefact in the EMG."
@@ -52,10 +54,14 @@ def make_threshold_search(name: str, space: IntensityRange, **settings: Any) -> 
     Raises:
         ConfigError: a setting that the method does not have, or an invalid one.
         InvalidValueError: an unknown name.
+        LimitExceededError: an intensity of the curve beyond the range, or off its grid.
     """
     methods: Mapping[str, type[Any]] = {**METHODS, HOT_SPOT: BayesHotSpot}
     choice("the method", name, methods)
-    return ThresholdSearch(name, checked(methods[name], settings, f"the settings of {name}"), space)
+    method = checked(methods[name], settings, f"the settings of {name}")
+    if isinstance(method, CurvePulses):
+        method.require_within(space)
+    return ThresholdSearch(name, method, space)
 
 
 class ThresholdSearch:
@@ -138,7 +144,8 @@ class ThresholdSearch:
 
     def decision(self) -> StopDecision:
         """The decision to stop or not, with its reason; no number if the range is wrong or the budget used up."""
-        return self._refused() or self.method.decision(self.pulses, self.space)
+        refused = None if isinstance(self.method, CurvePulses) else self._refused()
+        return refused or self.method.decision(self.pulses, self.space)
 
     def _refused(self) -> StopDecision | None:
         """Why the pulses give no number, whatever the method says; None if they may."""

@@ -1,0 +1,132 @@
+"""What `after` of a configuration names: sessions, and searches for the threshold whose pulses teach the curve."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+from isiw.config.run import RunConfig
+from isiw.errors import ConfigError
+from isiw.log.reader import SessionRecord, ThresholdRecord, read_any
+from isiw.log.salvage import salvage
+from isiw.session.threshold import search_of
+from isiw.strategy.threshold.curve import CurvePulses
+from isiw.text.sanitize import command, counted
+from isiw.trials import Status, Trial
+from isiw.visit import different_muscles, require_percent
+
+_COLUMNS: Final = ("intensity_pct_rmt", "mep_mv")
+
+
+def sessions_after(config: RunConfig) -> list[SessionRecord]:
+    """The earlier sessions, whose windows teach a prior."""
+    return [record for record in _read(config) if isinstance(record, SessionRecord)]
+
+
+def searches_after(config: RunConfig) -> list[ThresholdRecord]:
+    """The searches for the motor threshold, whose pulses are earlier trials.
+
+    Raises:
+        ConfigError: one of another muscle than the visit's, one that is damaged, or none of the visit's pulses over the
+            curve.
+    """
+    searches = [record for record in _read(config) if isinstance(record, ThresholdRecord)]
+    for record in searches:
+        if record.end_lost or record.losses:
+            raise ConfigError(
+                "the log of the search for the threshold is damaged, so that pulses may be missing",
+                got=str(record.path),
+                remedy="Leave it out, and take the pulses that the stimulator has counted off limits.max_pulses.",
+            )
+        if muscles := different_muscles((config.visit.muscle, record.header.muscle)):
+            raise ConfigError(
+                "the search for the threshold is of another muscle than the visit",
+                got=f"{muscles[1]} in {record.path}",
+                expected=muscles[0],
+                remedy="Leave this file out, or correct visit.muscle.",
+            )
+    _require_curve(config, searches)
+    return searches
+
+
+def _require_curve(config: RunConfig, searches: Sequence[ThresholdRecord]) -> None:
+    """Raise if the visit's pulses over the curve were not all given."""
+    if config.visit.curve is None:
+        return
+    plan = config.visit.curve.pulses(config.seed)
+    for search in map(search_of, searches):
+        if isinstance(search.method, CurvePulses) and not plan.left(search.pulses):
+            return
+    at = [word for intensity in plan.at_pct_mso for word in ("--at", f"{intensity:g}")]
+    options = ["--method", "curve", *at, "--each", plan.each, "--seed", plan.seed]
+    by_hand = ["--by-hand", "--high", f"{max(plan.at_pct_mso):g}"] if config.own_rig else []
+    raise ConfigError(
+        "the visit has pulses over the recruitment curve before the pairs, and no log of all of them is given",
+        got=", ".join(str(record.path) for record in searches) or "no log of a search",
+        expected=f"{plan.budget} pulses at {', '.join(f'{at:g}' for at in plan.at_pct_mso)} % MSO",
+        remedy=f"Give them first, and name their log with --after: {command('threshold', 'LOG', *by_hand, *options)}",
+    )
+
+
+def is_table(path: Path) -> bool:
+    """True if a file is a table of pulses, and no log."""
+    return path.suffix.lower() == ".csv"
+
+
+def pulses_of_table(path: Path) -> tuple[Trial, ...]:
+    """The pulses of TMS alone in a table of intensities and amplitudes, in the order of its rows.
+
+    Raises:
+        ConfigError: no such file, no table of these two columns, or a cell that is no number.
+    """
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            table = csv.DictReader(file)
+            rows, names = list(table), table.fieldnames or []
+    except (OSError, ValueError, csv.Error) as error:
+        raise ConfigError("the table of pulses cannot be read", got=f"{path}: {error}") from error
+    if not {*_COLUMNS} <= {*names} or not rows:
+        raise ConfigError(
+            "this is no table of pulses that were given before",
+            got=f"the columns {', '.join(names) or 'none'} in {path}",
+            expected=f"the columns {' and '.join(_COLUMNS)}, and a row for each pulse",
+            remedy="Trials with ISIs become a log first: isiw analyse.",
+        )
+    return tuple(_pulse(path, number, row) for number, row in enumerate(rows))
+
+
+def _pulse(path: Path, number: int, row: Mapping[str, str | None]) -> Trial:
+    try:
+        pct_rmt, mep_mv = (float(row[name] or "") for name in _COLUMNS)
+        require_percent("the intensity", pct_rmt)
+        return Trial(number, Status.ACCEPTED, None, mep_mv=mep_mv, intensity_pct_rmt=pct_rmt)
+    except ValueError as error:
+        raise ConfigError(
+            f"row {number + 1} of {path} is no pulse",
+            got=", ".join(f"{name} = {row[name]}" for name in _COLUMNS),
+            expected="an intensity in % RMT and an amplitude in mV",
+            remedy=f"Correct the row: {error}",
+        ) from error
+
+
+def searches_sentence(config: RunConfig) -> str:
+    """That pulses of searches are learnt, and what nobody has stated of them; empty if there are none."""
+    searches = searches_after(config)
+    if not searches:
+        return ""
+    said = f"{counted(sum(record.given for record in searches), 'pulse')} of the search for the threshold came before: "
+    unstated = _without_muscle(config, searches)
+    whose = f"of {config.visit.muscle}" if not unstated else "of the same muscle, which is not stated in " + unstated
+    return f"{said}they are learnt as TMS alone, {whose}, at the same hot spot. Their level may be another one."
+
+
+def _without_muscle(config: RunConfig, searches: Sequence[ThresholdRecord]) -> str:
+    """Where no muscle is stated, in words; empty if it is everywhere."""
+    names = [record.path.name for record in searches if not record.header.muscle.strip()]
+    return ", ".join([*([] if config.visit.muscle.strip() else ["[visit]"]), *names])
+
+
+def _read(config: RunConfig) -> list[SessionRecord | ThresholdRecord]:
+    return [read_any(salvage(path)) for path in config.after]

@@ -1,0 +1,121 @@
+"""TMS alone at intensities of its own: what it teaches, and what it leaves as it is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from isiw.design import VALVE_SPACE
+from isiw.errors import InvalidValueError
+from isiw.models.particles.model import ParticleModel
+from isiw.models.particles.noise import NoiseKind
+from isiw.models.particles.records import LOG_FLOOR, LOG_RATIO
+from isiw.models.protocol import Observation
+from isiw.strategy.catalogue import make_strategy
+from isiw.strategy.strategy import Strategy
+from isiw.trials import Status, Trial
+
+WITHOUT_CURVE = "constant-CV noise", "missing responses", "all-or-none responses"
+
+CURVE = [(pct_rmt, 0.01 + 2.0 / (1.0 + math.exp(-(pct_rmt - 112.0) / 4.0))) for pct_rmt in (140, 100, 120, 130, 110)]
+"""Intensities [% RMT], and MEPs [mV] of a saturating curve."""
+
+
+def small(name: str = "default", **settings: Any) -> Strategy:
+    few: dict[str, Any] = {"particles": 200} if name == "default" else {}
+    return make_strategy(name, seed=3, **few, **settings)
+
+
+def given(strategy: Strategy, curve: Sequence[tuple[float, float]] = CURVE) -> Strategy:
+    for pct_rmt, mep_mv in curve:
+        strategy.tell(None, mep_mv, intensity_pct_rmt=pct_rmt)
+    return strategy
+
+
+def without_curve(strategy: Strategy) -> float:
+    hypotheses = strategy.estimate().hypotheses
+    assert hypotheses is not None
+    return sum(hypotheses[name] for name in WITHOUT_CURVE)
+
+
+def test_pulses_over_the_curve_teach_the_largest_mep_of_those_who_have_one() -> None:
+    model = ParticleModel(particles=600)
+    posterior = model.begin(VALVE_SPACE, 5)
+    for _ in range(2):
+        for pct_rmt, mep_mv in CURVE:
+            observation = Observation.of([None], [mep_mv], shift_pct_rmt=[pct_rmt - model.pairs_pct_rmt])
+            posterior = model.update(posterior, observation)
+    latents, fields = posterior.swarm.picked(posterior.law, 600)
+    log_largest = (fields[..., LOG_RATIO] + fields[..., LOG_FLOOR])[latents.noise == NoiseKind.RECRUITMENT]
+    assert 1.2 < np.exp(np.median(log_largest)) < 3.2
+    assert log_largest.std() < 0.5  # of the prior it is more than 1
+
+
+def test_kinds_of_noise_that_know_no_other_intensity_are_neither_favoured_nor_excluded() -> None:
+    assert without_curve(given(small())) == pytest.approx(without_curve(small()), abs=0.25)
+
+
+def test_the_intensity_of_the_pairs_is_tms_alone_as_ever() -> None:
+    plain, stated = small(), small()
+    for _, mep_mv in CURVE:
+        plain.tell(None, mep_mv)
+        stated.tell(None, mep_mv, intensity_pct_rmt=90.0)
+    assert plain.ask() == stated.ask()
+    assert plain.estimate().hypotheses == stated.estimate().hypotheses
+    at_100 = small(intensity_pct_rmt=100.0)
+    for _, mep_mv in CURVE:
+        at_100.tell(None, mep_mv, intensity_pct_rmt=100.0)
+    assert at_100.estimate().hypotheses != plain.estimate().hypotheses
+
+
+@pytest.mark.parametrize("name", ["nr", "supra-threshold"])
+def test_a_method_without_a_law_of_other_intensities_is_not_misled_by_them(name: str) -> None:
+    plain, taught = small(name), given(small(name))
+    assert taught.ask() == plain.ask()
+    for strategy in (plain, taught):
+        strategy.tell(strategy.ask(), 0.05)
+    assert taught.estimate().window == plain.estimate().window
+    assert taught.spent == plain.spent == 1
+    assert taught.delivered == 1 + len(CURVE)
+
+
+def test_earlier_pulses_teach_what_pulses_of_the_session_do_and_starting_again_knows_them() -> None:
+    trials = [
+        Trial(number, Status.ACCEPTED, None, mep_mv=mep_mv, intensity_pct_rmt=pct_rmt)
+        for number, (pct_rmt, mep_mv) in enumerate(CURVE)
+    ]
+    told, earlier, other_level = given(small()), small(), small()
+    earlier.learn_all(trials, same_level=True)
+    other_level.learn_all(trials)
+    assert earlier.estimate().hypotheses == told.estimate().hypotheses
+    assert other_level.estimate().hypotheses != told.estimate().hypotheses
+    for strategy in (earlier, other_level):
+        again = strategy.restarted()
+        for _ in range(3):
+            assert strategy.ask() == again.ask()
+            strategy.tell(strategy.ask(), 0.05)
+            again.tell(again.ask(), 0.05)
+        assert strategy.spent == 3
+
+
+def test_an_intensity_of_a_pair_or_of_a_tap_alone_is_refused_with_the_way_out() -> None:
+    strategy = small()
+    with pytest.raises(InvalidValueError, match=r"belongs to TMS alone.*a pair at 50 ms.*Leave it out"):
+        strategy.tell(50.0, 0.1, intensity_pct_rmt=110.0)
+    with pytest.raises(InvalidValueError, match="a tap alone"):
+        strategy.tell(50.0, 0.1, pulse=False, intensity_pct_rmt=110.0)
+    with pytest.raises(InvalidValueError, match="intensity_pct_rmt"):
+        strategy.tell(None, 0.1, intensity_pct_rmt=-1.0)
+    assert strategy.delivered == 0
+
+
+def test_amplitudes_over_the_curve_do_not_look_like_a_slip_of_unit() -> None:
+    strategy = small()
+    for number in range(6):
+        strategy.tell(None, 0.011 + 0.001 * number)
+    given(strategy, [(140.0, 3.0 + 0.4 * number) for number in range(6)])  # warnings are errors
+    assert strategy.delivered == 12
