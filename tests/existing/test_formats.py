@@ -145,14 +145,11 @@ def test_a_table_of_matlab_73_is_read_and_its_sweeps_too(tmp_path: Path) -> None
 
 @pytest.mark.parametrize("suffix", [".sav", ".zsav", ".dta"])
 def test_a_table_of_spss_or_stata_has_the_units_and_words_of_its_labels(suffix: str, tmp_path: Path) -> None:
-    if suffix == ".zsav":
-        as_statistics(tmp_path / "P01.sav").rename(tmp_path / "P01.zsav")
-        require_as_written(read(tmp_path / "P01.zsav"))
-    else:
-        require_as_written(read(as_statistics(tmp_path / f"P01{suffix}")))
-    as_statistics(tmp_path / f"P02{suffix.replace('z', '')}", "Peak to peak (% of control)")
+    layout, written = Layout(reference="impact"), suffix.replace("z", "")
+    require_as_written(read(as_statistics(tmp_path / f"P01{written}").rename(tmp_path / f"P01{suffix}"), layout))
+    as_statistics(tmp_path / f"P02{written}", "Peak to peak (% of control)")
     with pytest.raises(IsiwError, match="relative to others"):
-        read(tmp_path / f"P02{suffix.replace('z', '')}", NAMED.saying(units=("uV",)))
+        read(tmp_path / f"P02{written}", layout.saying(units=("uV",)))
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Final
@@ -25,6 +27,13 @@ from isiw.trials import Channel, Status, Stimulus, Sweep, Trial
 _BEFORE_MS: Final = 150.0
 _AFTER_MS: Final = 100.0
 """What is cut out of a continuous recording: from so long before the longest ISI to so long after the pulse."""
+
+OF_SWEEPS: Final[Mapping[str, AbstractSet[str]]] = {
+    "columns": {"isi", "status", "exclude", "reason", "tap_alone", "subject", "day", "condition"},
+    "channels": {"emg", "tap", "valve"},
+    "markers": {"pulse", "tap", "valve"},
+}
+"""What columns, channels and markers can hold that is used of sweeps whose ISIs are stated."""
 
 Found = tuple[Stimulus, Sweep, Mapping[str, Any]]
 """What was given, what was recorded of it, and what the file says of it."""
@@ -122,6 +131,10 @@ def _of_rows(contents: Contents, recording: Recording, layout: Layout, subject: 
             f"{recording.source} does not say the ISI of each sweep",
             got=f"{columns.rows} rows and {len(emg.stretches)} sweeps",
         )
+    known, names = {*layout.markers.values()}, dict.fromkeys(map(str, recording.events["name"]))
+    if known and names.keys().isdisjoint(known | {re.sub(r"\D", "", one) for one in known}):  # MNE may keep the number
+        got, expected = ", ".join(sorted(known)), f"one of {', '.join(names)}"
+        raise InvalidValueError(f"no sweep of {recording.source} is marked so", got=got, expected=expected)
     about_tap = {round(at, 6) for at in marked(recording.events, origin_key(layout), layout)}
     rows = columns.chosen(told)
     columns.require_said(rows, told.alone)
@@ -138,7 +151,8 @@ def _of_rows(contents: Contents, recording: Recording, layout: Layout, subject: 
         begins: dict[str, Any] = {begin: None if isi_ms is None else -isi_ms}
         meant = Stimulus(number, None if isi_ms is None else max(isi_ms, 0.0))
         sweep = Sweep({"emg": Channel(values, emg.rate_hz, "mV", -pulse_ms)}, t_tms_ms=0.0, **begins)
-        sweeps.append((meant, sweep, {"excluded": columns.lost(row) is not None}))
+        lost = layout.unmarked == "lost" and not columns["isi"].text(row)
+        sweeps.append((meant, sweep, {"excluded": columns.lost(row) is not None, "lost": lost}))
     require_short([one[0].isi_ms for one in sweeps if one[0].isi_ms is not None], layout, recording.source)
     found = delivered_of(recording, sweeps, layout, _only_one(columns, rows, recording.source) or subject)
     return replace(found, unused=columns.unused)

@@ -12,6 +12,7 @@ from isiw.errors import InvalidValueError
 from isiw.existing.formats.beside import bids_events
 from isiw.existing.formats.contents import APART_S, Contents, Stretch, Track, events_of, with_codes
 from isiw.existing.layout import Layout
+from isiw.files import opened
 from isiw.lazy import pd
 from isiw.text.named_code import library
 from isiw.types import FloatArray
@@ -19,13 +20,37 @@ from isiw.types import FloatArray
 _SCALES_V: Final = {"V": 1.0, "mV": 1e-3, "µV": 1e-6, "uV": 1e-6, "nV": 1e-9}
 """The units that MNE knows, in V; numbers in others it leaves as they are."""
 
+_ODD_MARKER: Final = re.compile(r"\s*Mk\d+=[^,]*,(?!([^,]*,){3}[^,]*(,\s*\d{14,}\s*)?$)(.*,){4}")
+"""A marker of BrainVision with more than its text, place, size, channel, and a date."""
+
 
 def read(path: Path, _layout: Layout) -> Contents:
     """The contents of a file that MNE reads."""
     mne = library("mne", "import")
     if re.search(r"\.fif(\.gz)?$", path.name) and re.search(r"epo(chs)?\b", path.name):
         return of_epochs(mne.read_epochs(path, verbose="ERROR"), path.name)
+    if path.suffix.casefold() == ".vhdr":
+        _require_whole_markers(path)
     return of_raw(mne.io.read_raw(path, verbose="ERROR"), path.name, bids_events(path))
+
+
+def _require_whole_markers(path: Path) -> None:
+    """Raise if a comma in the text of a marker is not coded, which MNE takes for the end of the text."""
+    said = re.search(r"^\s*MarkerFile\s*=\s*(.*?)\s*$", _text(path), re.MULTILINE)
+    markers = path.with_name(said[1].replace("$b", path.stem)) if said else path
+    for line in _text(markers).splitlines() if markers.is_file() else ():
+        if _ODD_MARKER.match(line):
+            raise InvalidValueError(
+                f"a comma stands in the text of a marker in {markers.name}, where it must be coded",
+                got=line.strip(),
+                expected=r"\1 in its place, as BrainVision has it",
+                remedy="Write that into the .vmrk with an editor; what wrote the file left it out.",
+            )
+
+
+def _text(path: Path) -> str:
+    with opened(path) as file:
+        return file.read().decode("utf-8", errors="replace")
 
 
 def of_raw(raw: Any, source: str = "the recording", events: pd.DataFrame | None = None) -> Contents:
