@@ -39,7 +39,7 @@ Rows = Sequence[Sequence[Any]]
 def read_frame(path: Path, layout: Layout) -> pd.DataFrame:
     """The table in a file, its cells as they are."""
     readers: Mapping[str, Callable[[bytes, Layout], pd.DataFrame]] = {
-        ".mat": lambda content, layout: _of_vectors(_arrays(content, path), layout),
+        ".mat": lambda content, layout: of_vectors(_arrays(content, path), layout),
         ".parquet": lambda content, _: named(pd.read_parquet(io.BytesIO(content))),
         **dict.fromkeys(WORKBOOKS, _workbook),
     }
@@ -266,7 +266,7 @@ def _flat(values: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], Any]]:
             yield (name,), np.asarray(value)
 
 
-def _of_vectors(arrays: Mapping[str, Any], layout: Layout) -> pd.DataFrame:
+def of_vectors(arrays: Mapping[str, Any], layout: Layout) -> pd.DataFrame:
     """The vectors in a file of MATLAB that are as long as that of the ISIs, or the longest, as columns of a table."""
     squeezed = {name: array.squeeze() if array.size > 1 else array for name, array in arrays.items()}
     vectors = {name: array for name, array in squeezed.items() if array.ndim == 1}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Final
 
 from isiw.errors import InvalidValueError, did_you_mean
 from isiw.existing.cells import ALONE, TAP_ALONE, Column, plain, says_alone, with_decimals, without_unit_in_cells
@@ -207,14 +207,6 @@ def _missing(key: str, names: list[str], source: str) -> InvalidValueError:
         got=", ".join(name for name in names if name.strip()) or "no names",
         remedy=f'Say --column "{key}=NAME"; if the names are not in the first line, describe the file: --layout FILE.',
     )
-
-
-def as_long_as_isis(vectors: Mapping[str, Sequence[Any]], layout: Layout, source: str) -> dict[str, Sequence[Any]]:
-    """The vectors that come with sweeps: those that are as long as that of the ISIs."""
-    name = _named("isi", list(vectors), layout, source)
-    if name is None:
-        raise _missing("isi", list(vectors), source)
-    return {other: cells for other, cells in vectors.items() if len(cells) == len(vectors[name])}
 
 
 def _numbers_rows(column: Column | None) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.existing import frames
 from isiw.existing.cells import Column, is_missing, with_decimals
-from isiw.existing.formats.contents import APART_S, Contents, Stretch, Track, events_of
+from isiw.existing.formats.contents import Contents, Track, events_of, parted, time_of
 from isiw.existing.layout import EMG_UNITS, ISI_UNITS_MS, MARKERS, Layout
 from isiw.existing.tables import require_one, unit_said
 from isiw.lazy import pd
@@ -34,11 +34,7 @@ def read(path: Path, layout: Layout) -> Contents:
     frame, block = frame[~breaks], np.cumsum(breaks)[~breaks]
     pauses_s = _pauses_s(frame[block == block[:1]], layout, rate_hz, source)
     blocks = np.flatnonzero(np.diff(block, prepend=-1)).tolist()
-    starts_s = {at: n * APART_S for n, at in enumerate(blocks)}
-    if len(blocks) == 1:
-        starts_s |= {at: at / rate_hz + sum(pauses_s[one] for one in pauses_s if one <= at) for at in pauses_s}
-    ends = [*list(starts_s)[1:], len(block)]
-    stretches = tuple(Stretch(at, end - at, own_s) for (at, own_s), end in zip(starts_s.items(), ends, strict=True))
+    stretches = parted(blocks if len(blocks) > 1 else pauses_s, len(block), rate_hz, pauses_s)
     tracks = list[Track]()
     for key, name in layout.channels.items():
         if key != "events" and name not in {track.name for track in tracks}:
@@ -48,8 +44,7 @@ def read(path: Path, layout: Layout) -> Contents:
     rows = []
     for at, text in enumerate(frame[layout.channels["events"]].tolist() if "events" in layout.channels else ()):
         if not is_missing(text):
-            stretch = next(one for one in reversed(stretches) if one.first <= at)
-            rows.append((str(text).lstrip("#* "), stretch.start_s + (at - stretch.first) / rate_hz, 0.0))
+            rows.append((str(text).lstrip("#* "), time_of(at, stretches, rate_hz), 0.0))
     if len(blocks) > 1:
         rows += [("sweep", one.start_s, one.samples / rate_hz) for one in stretches]
     return Contents(source, tuple(tracks), events_of(rows))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from operator import itemgetter
+from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -28,6 +30,24 @@ class Stretch(NamedTuple):
     first: int
     samples: int
     start_s: float
+
+
+def parted(
+    cuts: Iterable[int], samples: int, rate_hz: float, missing_s: Mapping[int, float] = MappingProxyType({})
+) -> tuple[Stretch, ...]:
+    """Samples as stretches: before those at cuts something is missing, for `APART_S` if it is not known how long."""
+    found, first, start_s = list[Stretch](), 0, 0.0
+    for at in sorted({*cuts, samples}):
+        if first < at <= samples:
+            found.append(Stretch(first, at - first, start_s))
+            first, start_s = at, start_s + (at - first) / rate_hz + (missing_s.get(at) or APART_S)
+    return tuple(found)
+
+
+def time_of(sample: float, stretches: Sequence[Stretch], rate_hz: float) -> float:
+    """When a sample was taken, which may be between two of them [s]."""
+    stretch = next((one for one in reversed(stretches) if one.first <= sample + 0.5), Stretch(0, 0, 0.0))
+    return stretch.start_s + (sample - stretch.first) / rate_hz
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,13 +80,6 @@ class Track:
             return np.asarray(values[first:last], dtype=np.float64)
 
         return cls(name, rate_hz, tuple(stretches), part, unit, kind)
-
-    @classmethod
-    def of_sweeps(cls, name: str, rate_hz: float, sweeps: FloatArray, unit: str, kind: str = "") -> Track:
-        """A channel of sweeps of one length, shape (n, w)."""
-        length = sweeps.shape[1]
-        stretches = [Stretch(n * length, length, n * APART_S) for n in range(len(sweeps))]
-        return cls.of_values(name, rate_hz, stretches, np.ascontiguousarray(sweeps).ravel(), unit, kind)
 
     def at(self, time_s: float) -> Stretch | None:
         """The stretch that a time is in; None in a gap."""
@@ -144,8 +157,8 @@ class Track:
 
 
 def events_of(rows: Iterable[Sequence[Any]]) -> pd.DataFrame:
-    """Events as a table: what each is called, when it was [s], and how long it lasted [s]."""
-    return pd.DataFrame([tuple(row) for row in rows], columns=["name", "onset", "duration"])
+    """Events as a table, by their times: what each is called, when it was [s], and how long it lasted [s]."""
+    return pd.DataFrame(sorted(map(tuple, rows), key=itemgetter(1)), columns=["name", "onset", "duration"])
 
 
 def with_codes(rows: Sequence[tuple[str, float, float]], tracks: Iterable[Track]) -> pd.DataFrame:
@@ -159,7 +172,7 @@ def with_codes(rows: Sequence[tuple[str, float, float]], tracks: Iterable[Track]
             if not any(abs(at - other) * track.rate_hz <= _SAME for other in known):
                 known.append(at)
                 found.append((str(code), at, 0.0))
-    return events_of(sorted(found, key=lambda row: row[1]))
+    return events_of(found)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from isiw.errors import InvalidValueError
 from isiw.existing.formats.beside import bids_events
-from isiw.existing.formats.contents import APART_S, Contents, Stretch, Track, events_of, with_codes
+from isiw.existing.formats.contents import Contents, Stretch, Track, events_of, parted, time_of, with_codes
 from isiw.existing.layout import Layout
 from isiw.files import opened
 from isiw.lazy import pd
@@ -19,6 +19,9 @@ from isiw.types import FloatArray
 
 _SCALES_V: Final = {"V": 1.0, "mV": 1e-3, "µV": 1e-6, "uV": 1e-6, "nV": 1e-9}
 """The units that MNE knows, in V; numbers in others it leaves as they are."""
+
+_PAUSE: Final = re.compile(r"new segment|\bboundary\b", re.IGNORECASE)
+"""What annotations say of a pause of unknown length."""
 
 _ODD_MARKER: Final = re.compile(r"\s*Mk\d+=[^,]*,(?!([^,]*,){3}[^,]*(,\s*\d{14,}\s*)?$)(.*,){4}")
 """A marker of BrainVision with more than its text, place, size, channel, and a date."""
@@ -55,7 +58,9 @@ def _text(path: Path) -> str:
 
 def of_raw(raw: Any, source: str = "the recording", events: pd.DataFrame | None = None) -> Contents:
     """The channels of an `mne.io.Raw`, and its annotations, or a table of events."""
-    stretches = tuple(_between(raw))
+    rate_hz = float(raw.info["sfreq"])
+    cuts = (round(at * rate_hz) for at, one in _annotations(raw) if _PAUSE.search(one))
+    stretches = parted(cuts, raw.n_times, rate_hz)
     tracks = tuple(_tracks(raw, stretches, lambda index: partial(_values, raw, index)))
     return Contents(source, tracks, _events(raw, tracks) if events is None else events)
 
@@ -63,15 +68,19 @@ def of_raw(raw: Any, source: str = "the recording", events: pd.DataFrame | None 
 def of_epochs(epochs: Any, source: str = "the epochs") -> Contents:
     """The sweeps of `mne.Epochs`: their metadata say the ISIs, or their annotations the stimuli."""
     data = {index: epochs.get_data(picks=[index], verbose="ERROR")[:, 0] for index in range(len(epochs.ch_names))}
-    length, count = len(epochs.times), len(epochs)
-    stretches = tuple(Stretch(n * length, length, n * APART_S) for n in range(count))
+    length, rate_hz = len(epochs.times), float(epochs.info["sfreq"])
+    stretches = parted(range(0, length * len(epochs), length), length * len(epochs), rate_hz)
     flat = {index: values.ravel() for index, values in data.items()}
     tracks = tuple(_tracks(epochs, stretches, lambda index: lambda first, last: flat[index][first:last]))
     if epochs.metadata is not None:
-        return Contents(source, tracks, _zeros(epochs), epochs.metadata, -float(epochs.tmin), empty_is_alone=True)
+        names, zero_s = {code: name for name, code in epochs.event_id.items()}, -float(epochs.tmin)
+        zeros = (
+            (names[code], one.start_s + zero_s, 0.0) for code, one in zip(epochs.events[:, 2], stretches, strict=True)
+        )
+        return Contents(source, tracks, events_of(zeros), epochs.metadata, zero_s, empty_is_alone=True)
     noted = [
-        (str(one[2]), n * APART_S + float(one[0]) - float(epochs.tmin), float(one[1]))
-        for n, each in enumerate(epochs.get_annotations_per_epoch())
+        (str(one[2]), stretch.start_s + float(one[0]) - float(epochs.tmin), float(one[1]))
+        for stretch, each in zip(stretches, epochs.get_annotations_per_epoch(), strict=True)
         for one in each
     ]
     if not noted:
@@ -80,12 +89,6 @@ def of_epochs(epochs: Any, source: str = "the epochs") -> Contents:
             expected="a column isi_ms in their metadata, or annotations of the stimuli",
         )
     return Contents(source, tracks, events_of(noted))
-
-
-def _zeros(epochs: Any) -> pd.DataFrame:
-    """What each epoch is about, at its time 0."""
-    names = {code: name for name, code in epochs.event_id.items()}
-    return events_of((names[code], n * APART_S - float(epochs.tmin), 0.0) for n, code in enumerate(epochs.events[:, 2]))
 
 
 def _tracks(held: Any, stretches: tuple[Stretch, ...], reader: Any) -> Iterator[Track]:
@@ -108,17 +111,6 @@ def _divided(read: Any, scale: float, first: int, last: int) -> FloatArray:
     return values / scale
 
 
-def _between(raw: Any) -> Iterator[Stretch]:
-    """What lies between pauses of unknown length, of which annotations tell."""
-    rate_hz, count, first = float(raw.info["sfreq"]), raw.n_times, 0
-    cuts = sorted({at for at, one in _annotations(raw) if re.search(r"new segment|\bboundary\b", one, re.IGNORECASE)})
-    for number, at_s in enumerate([*cuts, count / rate_hz]):
-        at = min(round(at_s * rate_hz), count)
-        if at > first:
-            yield Stretch(first, at - first, first / rate_hz + APART_S * (number if first else 0))
-            first = at
-
-
 def _annotations(raw: Any) -> list[tuple[float, str]]:
     return [(float(one["onset"]) - raw.first_time, str(one["description"])) for one in raw.annotations]
 
@@ -127,11 +119,9 @@ def _events(raw: Any, tracks: tuple[Track, ...]) -> pd.DataFrame:
     """The annotations, and what stim channels have besides."""
     rate_hz = float(raw.info["sfreq"])
     lasts = [float(one["duration"]) for one in raw.annotations]
-    starts = [(stretch.first / rate_hz, stretch.start_s) for stretch in (tracks[0].stretches if tracks else ())]
-
-    def moved(at_s: float) -> float:
-        begins, own = max((pair for pair in starts if pair[0] <= at_s + 0.5 / rate_hz), default=(0.0, 0.0))
-        return at_s - begins + own
-
-    rows = [(name, moved(at), long) for (at, name), long in zip(_annotations(raw), lasts, strict=True)]
+    stretches = tracks[0].stretches if tracks else ()
+    rows = [
+        (name, time_of(at * rate_hz, stretches, rate_hz), long)
+        for (at, name), long in zip(_annotations(raw), lasts, strict=True)
+    ]
     return with_codes(rows, tracks)

@@ -35,7 +35,7 @@ def read(path: Path, _layout: Layout) -> Contents:
             Track(str(channel["name"]), float(channel["sampling_rate"]), stretches, scaled, str(channel["units"]))
         )
     rows = [row for index in range(len(raw.header["event_channels"])) for row in _events(raw, index)]
-    return Contents(path.name, tuple(tracks), events_of(sorted(rows, key=lambda row: row[1])))
+    return Contents(path.name, tuple(tracks), events_of(rows))
 
 
 def _part(raw: Any, index: int, firsts: list[int], gain: float, offset: float, first: int, last: int) -> FloatArray:

@@ -48,7 +48,7 @@ def read(path: Path, _layout: Layout) -> Contents:
     twice = {track.name for track in tracks if [one.name for one in tracks].count(track.name) > 1}
     if twice:
         notes.append(f"Several channels are called {', '.join(sorted(twice))}.")
-    return Contents(path.name, tuple(tracks), events_of(sorted(rows, key=lambda row: row[1])), notes=tuple(notes))
+    return Contents(path.name, tuple(tracks), events_of(rows), notes=tuple(notes))
 
 
 def _is_of_markers(stream: Mapping[str, Any]) -> bool:
