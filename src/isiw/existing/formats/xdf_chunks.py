@@ -9,7 +9,7 @@ from __future__ import annotations
 import gzip
 import io
 import re
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import lru_cache
@@ -19,7 +19,7 @@ from typing import Any, Final
 import numpy as np
 
 from isiw.files import opened
-from isiw.types import FloatArray
+from isiw.types import FloatArray, IntArray
 
 BOUNDARY: Final = bytes.fromhex("43a546dccbf5410fb30ed5467383cbe4")
 _TYPES: Final = {"float32": "<f4", "double64": "<f8", "int8": "<i1", "int16": "<i2", "int32": "<i4", "int64": "<i8"}
@@ -36,52 +36,40 @@ class Numbers:
         self.path, self.type = path, np.dtype(_TYPES[_of(said, "channel_format")])
         self.width = int(_of(said, "channel_count")) * self.type.itemsize
         self.period_s = 1.0 / float(_of(said, "nominal_srate"))
-        self.firsts, self.places = [0], list[tuple[int, int, int]]()
+        self.firsts, self.places = [0], list[tuple[int, int]]()  # of each chunk
         self.index, self.times_s, self.last_s = list[int](), list[float](), 0.0
 
     def add(self, at: int, count: int, raw: bytes) -> None:
         """A chunk whose samples begin at a byte of the file."""
-        _, stamps = self._placed(raw, count)
-        known_s = np.array([self.last_s, *stamps])
-        since = np.maximum.accumulate(np.where(np.isnan(known_s), 0, np.arange(count + 1)))
-        times_s = (known_s[since] + self.period_s * (np.arange(count + 1) - since))[1:]
+        begins, number = self._begins(raw, count), np.arange(count)
+        stamped = np.flatnonzero(np.diff(begins, prepend=-self.width) > 1 + self.width)
+        known, known_s = np.append(-1, stamped), np.append(self.last_s, _picked(raw, begins[stamped] - 8, "<f8"))
+        since = np.searchsorted(stamped, number, side="right")
+        times_s = known_s[since] + self.period_s * (number - known[since])
         late = np.flatnonzero(np.abs(np.diff(times_s) - self.period_s) > _LATE_S) + 1
         chosen = np.unique([0, *late, count - 1])
         self.last_s = float(times_s[-1])
         self.index += (self.firsts[-1] + chosen).tolist()
         self.times_s += times_s[chosen].tolist()
-        self.places.append((at, len(raw), count))
+        self.places.append((at, len(raw)))
         self.firsts.append(self.firsts[-1] + count)
 
-    def _placed(self, raw: bytes, count: int) -> tuple[Any, FloatArray]:
-        """Where the numbers of each sample are in a chunk [bytes], and the times of those that have one [s]."""
-        bare, number = 1 + self.width, np.arange(count)
-        if len(raw) == count * bare + 8 and raw[0]:  # the first has a time, and the others follow
-            begins, stamped = 9 + bare * number, number[:1]
-        elif len(raw) == count * (bare + 8):
-            begins, stamped = 9 + (bare + 8) * number, number
-        else:
-            found, at = list[int](), 0
-            for _ in range(count):
-                found.append(at + 1 + 8 * bool(raw[at]))
-                at = found[-1] + self.width
-            begins = np.array(found)
-            stamped = np.flatnonzero(np.diff(begins, prepend=-self.width) > bare)
-        stamps = np.full(count, np.nan)
-        stamps[stamped] = _picked(raw, begins[stamped] - 8, "<f8")
-        return begins, stamps
+    def _begins(self, raw: bytes, count: int) -> IntArray:
+        """Where the numbers of each sample begin in a chunk [bytes]: behind its time, if it has one."""
+        found, at = list[int](), 0
+        for _ in range(count):
+            found.append(at + 9 if raw[at] else at + 1)
+            at = found[-1] + self.width
+        return np.array(found, dtype=np.int64)
 
     def read(self, channel: int, first: int, last: int) -> FloatArray:
         """The numbers of a channel from one sample to before another."""
         found = [np.empty(0)]
         with _opened(self.path) as file:
-            for n in range(bisect_right(self.firsts, first) - 1, len(self.places)):
-                if self.firsts[n] >= last:
-                    break
-                at, length, count = self.places[n]
-                file.seek(at)
-                raw = file.read(length)
-                begins = self._placed(raw, count)[0][max(0, first - self.firsts[n]) : last - self.firsts[n]]
+            for n in range(bisect_right(self.firsts, first) - 1, bisect_left(self.firsts, last)):
+                file.seek(self.places[n][0])
+                raw, begin = file.read(self.places[n][1]), self.firsts[n]
+                begins = self._begins(raw, self.firsts[n + 1] - begin)[max(0, first - begin) : last - begin]
                 found.append(_picked(raw, begins + channel * self.type.itemsize, self.type))
         return np.concatenate(found)
 
