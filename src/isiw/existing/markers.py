@@ -52,19 +52,24 @@ class Pulse:
     said: Mapping[str, Any] = field(default_factory=dict)
 
 
+def times_of(events: pd.DataFrame, *names: str | None) -> FloatArray:
+    """When the events of some names came, ascending [s]."""
+    return np.sort(events.loc[events["name"].astype(str).isin(names), "onset"].to_numpy(dtype=np.float64))
+
+
 def marked(events: pd.DataFrame, key: str, layout: Layout) -> list[float]:
     """When the events of a key came, if there are any [s]."""
-    names = _fitting(events, key, layout)
-    return [] if not names else events.loc[events["name"].astype(str).isin(names), "onset"].tolist()
+    return times_of(events, *_fitting(events, key, layout)).tolist()
 
 
-def _names(events: pd.DataFrame) -> list[str]:
-    return [str(name) for name in dict.fromkeys(events["name"])]
+def names_of(events: pd.DataFrame) -> list[str]:
+    """What events are called, each name once."""
+    return list(dict.fromkeys(map(str, events["name"])))
 
 
 def _fitting(events: pd.DataFrame, key: str, layout: Layout) -> list[str]:
     """The names of the events that mark something."""
-    names = _names(events)
+    names = names_of(events)
     if key in layout.channels:
         return [key]
     if (stated := layout.markers.get(key)) is None:
@@ -77,7 +82,7 @@ def _marker(events: pd.DataFrame, key: str, layout: Layout, source: str) -> str 
     fitting = _fitting(events, key, layout)
     if key in layout.markers and len(fitting) != 1:
         what = "several events" if fitting else "no event"
-        expected = f"one of {', '.join(map(repr, _names(events)))}"
+        expected = f"one of {', '.join(map(repr, names_of(events)))}"
         raise InvalidValueError(f"{source} has {what} of this name", got=layout.markers[key], expected=expected)
     if len(fitting) > 1:
         raise InvalidValueError(
@@ -98,7 +103,7 @@ def _required_markers(events: pd.DataFrame, keys: Iterable[str], layout: Layout,
     found = {key: _marker(events, key, layout, source) for key in keys}
     missing = [key for key, name in found.items() if name is None]
     if missing:
-        names = ", ".join(map(repr, _names(events)))
+        names = ", ".join(map(repr, names_of(events)))
         said = " ".join(f"--marker {key}=NAME" for key in missing)
         triggers = " ".join(f"--channel {key}=NAME" for key in missing)
         raise InvalidValueError(
@@ -118,12 +123,12 @@ def pulses_of(events: pd.DataFrame, key: str, layout: Layout, source: str) -> li
         raise InvalidValueError(
             f"one event of {source} cannot mark both stimuli", got=pulse_name, remedy=f"Say --marker {key}=NAME."
         )
-    names = events["name"].astype(str)
-    at_s, origins_s = _sorted(events, names == pulse_name), _once(_sorted(events, names == origin_name))
+    at_s, origins_s = times_of(events, pulse_name), times_of(events, origin_name)
+    origins_s = origins_s[np.diff(origins_s, prepend=-np.inf) > _TWICE_S]
     alone_name = _marker(events, "alone", layout, source)
-    alone_s = _sorted(events, names == alone_name) if alone_name not in {None, pulse_name, origin_name} else at_s[:0]
+    alone_s = at_s[:0] if alone_name in {pulse_name, origin_name} else times_of(events, alone_name)
     more_s = [at for at in alone_s.tolist() if not np.any(np.abs(at_s - at) <= _SAME_PULSE_S)]
-    epochs = events[names == "sweep"]
+    epochs = events[events["name"].astype(str) == "sweep"]
     found = [
         _placed(at, origins_s, epochs, alone=bool(np.any(np.abs(alone_s - at) <= _SAME_PULSE_S)), layout=layout)
         for at in sorted([*at_s.tolist(), *more_s])
@@ -148,15 +153,6 @@ def _require_one_each(pulses: list[Pulse], origins_s: FloatArray, layout: Layout
                 remedy="Leave out the events that mark no stimulus, such as a second edge, or give them another name.",
             )
         last_s = pulse.at_s + _EARLY_S
-
-
-def _sorted(events: pd.DataFrame, chosen: Any) -> FloatArray:
-    return np.sort(events.loc[chosen, "onset"].to_numpy(dtype=np.float64))
-
-
-def _once(at_s: FloatArray) -> FloatArray:
-    """The first of edges that come so soon after each other that they are of one trigger."""
-    return at_s[np.diff(at_s, prepend=-np.inf) > _TWICE_S]
 
 
 def _placed(at_s: float, origins_s: FloatArray, epochs: pd.DataFrame, *, alone: bool, layout: Layout) -> Pulse:

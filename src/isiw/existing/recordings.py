@@ -10,13 +10,14 @@ from itertools import pairwise
 from typing import Any, Final
 
 from isiw.errors import InvalidValueError
+from isiw.existing.cells import is_missing
 from isiw.existing.delivered import Delivered, anywhere, renumbered
 from isiw.existing.doubts import is_rectified, require_short
 from isiw.existing.formats.columns import require_rate
 from isiw.existing.formats.contents import Contents, Track
 from isiw.existing.frames import named
 from isiw.existing.layout import EMG_UNITS, MARKERS, UNIT_WORDS, Layout
-from isiw.existing.markers import Pulse, marked, pulses_of
+from isiw.existing.markers import marked, names_of, pulses_of
 from isiw.existing.tables import Columns, require_one
 from isiw.findings import Kind
 from isiw.lazy import pd
@@ -131,8 +132,8 @@ def _of_rows(contents: Contents, recording: Recording, layout: Layout, subject: 
             f"{recording.source} does not say the ISI of each sweep",
             got=f"{columns.rows} rows and {len(emg.stretches)} sweeps",
         )
-    known, names = {*layout.markers.values()}, dict.fromkeys(map(str, recording.events["name"]))
-    if known and names.keys().isdisjoint(known | {re.sub(r"\D", "", one) for one in known}):  # MNE may keep the number
+    known, names = {*layout.markers.values()}, names_of(recording.events)
+    if known and {*names}.isdisjoint(known | {re.sub(r"\D", "", one) for one in known}):  # MNE may keep the number
         got, expected = ", ".join(sorted(known)), f"one of {', '.join(names)}"
         raise InvalidValueError(f"no sweep of {recording.source} is marked so", got=got, expected=expected)
     about_tap = {round(at, 6) for at in marked(recording.events, origin_key(layout), layout)}
@@ -223,32 +224,22 @@ def sweeps_of(recording: Recording, layout: Layout) -> list[Found]:
             remedy="Is the marker of the pulse the right one? Say --marker pulse=NAME.",
         )
     longest_s = max((pulse.isi_s or 0.0 for pulse in pulses), default=0.0)
-    found = []
+    events, found = recording.events, []
+    bad = events[events["name"].astype(str).str.lower().str.startswith("bad")]  # as MNE takes them
     for number, pulse in enumerate(pulses):
         begin_s = pulse.at_s - _BEFORE_MS / 1e3 - longest_s
         span_s = pulse.sweep_s or (begin_s, pulse.at_s + _AFTER_MS / 1e3)
         origin_s = None if pulse.isi_s is None else pulse.at_s - pulse.isi_s
         sweep = _cut(recording, span_s, pulse.at_s, origin_s, origin_key(layout))
-        said: Mapping[str, Any] = {**pulse.said, "lost": pulse.lost}
-        if _is_bad(recording.events, min(pulse.at_s - _BEFORE_MS / 1e3, origin_s or pulse.at_s), pulse.at_s):
-            said = {**said, "excluded": True}
-        found.append((Stimulus(number, _commanded_ms(pulse)), sweep, said))
+        said: dict[str, Any] = {**pulse.said, "lost": pulse.lost}
+        judged_s = min(pulse.at_s - _BEFORE_MS / 1e3, origin_s or pulse.at_s), pulse.at_s + _AFTER_MS / 1e3
+        if ((bad["onset"] <= judged_s[1]) & (bad["onset"] + bad["duration"] >= judged_s[0])).any():
+            said["excluded"] = True
+        asked_ms = said.get("commanded_isi_ms")  # what the file says, or else what the events do
+        if pulse.isi_s is not None and is_missing(asked_ms):
+            asked_ms = max(1e3 * pulse.isi_s, 0.0)
+        found.append((Stimulus(number, None if pulse.isi_s is None else float(asked_ms)), sweep, said))
     return found
-
-
-def _commanded_ms(pulse: Pulse) -> float | None:
-    """The ISI that was meant: what the file says, or that of the events, at least 0."""
-    asked = pulse.said.get("commanded_isi_ms")
-    if pulse.isi_s is None:
-        return None
-    return max(1e3 * pulse.isi_s, 0.0) if asked is None or asked != asked else float(asked)  # noqa: PLR0124 - NaN
-
-
-def _is_bad(events: pd.DataFrame, begin_s: float, pulse_s: float) -> bool:
-    """True if an annotation that MNE takes for one of bad data overlaps what is judged of a sweep."""
-    bad = events[events["name"].astype(str).str.lower().str.startswith("bad")]
-    last_s = pulse_s + _AFTER_MS / 1e3
-    return bool(((bad["onset"] <= last_s) & (bad["onset"] + bad["duration"] >= begin_s)).any())
 
 
 def _cut(recording: Recording, span_s: tuple[float, float], pulse_s: float, origin_s: float | None, key: str) -> Sweep:

@@ -109,7 +109,13 @@ class Columns:
         held = {key: _named(key, names, layout, source) for key in wanted}
         for key in needed:
             if held[key] is None:
-                raise _missing(key, names, source)
+                what = {"isi": "ISIs", "mep": "amplitudes of the MEPs"}[key]
+                raise InvalidValueError(
+                    f"no column of {source} is known to hold the {what}",
+                    got=", ".join(name for name in names if name.strip()) or "no names",
+                    remedy=f'Say --column "{key}=NAME"; if the names are not in the first line, describe the file: '
+                    "--layout FILE.",
+                )
         columns = {}
         for key, name in held.items():
             if name is not None:
@@ -128,24 +134,12 @@ class Columns:
             for place, name in enumerate(names)
             if name not in held.values() and name.strip()
         }
-        found = cls(columns, len(frame), units, beside, Column("", [None] * len(frame), of=source))
-        return (
-            replace(found, beside={**beside, columns["condition"].name: found._pairs()})
-            if found._has_conditions()
-            else found
-        )
-
-    def _pairs(self) -> Column:
-        """The condition of what is no stimulus alone."""
-        alone = ALONE | TAP_ALONE
-        return replace(
-            self["condition"], cells=["" if plain(str(cell)) in alone else cell for cell in self["condition"].cells]
-        )
-
-    def _has_conditions(self) -> bool:
-        """True if the condition also tells pairs from each other, of which nothing is read."""
-        words = {plain(self["condition"].text(row)) for row in range(self.rows)}
-        return len(words - ALONE - TAP_ALONE - {""}) > 1
+        if (condition := columns.get("condition")) is not None:  # which may tell pairs from each other, too
+            alone = ALONE | TAP_ALONE
+            of_pairs = replace(condition, cells=["" if plain(str(cell)) in alone else cell for cell in condition.cells])
+            if len({plain(of_pairs.text(row)) for row in range(len(frame))} - {""}) > 1:
+                beside[condition.name] = of_pairs
+        return cls(columns, len(frame), units, beside, Column("", [None] * len(frame), of=source))
 
 
 def _scaled(columns: Mapping[str, Column], layout: Layout) -> tuple[dict[str, Column], tuple[str, str]]:
@@ -198,15 +192,6 @@ def _named(key: str, names: list[str], layout: Layout, source: str) -> str | Non
             remedy=f'Say --column "{key}={several[0]}".' if len(set(several)) > 1 else "Rename one of them.",
         )
     return several[0] if several else None
-
-
-def _missing(key: str, names: list[str], source: str) -> InvalidValueError:
-    what = {"isi": "ISIs", "mep": "amplitudes of the MEPs"}[key]
-    return InvalidValueError(
-        f"no column of {source} is known to hold the {what}",
-        got=", ".join(name for name in names if name.strip()) or "no names",
-        remedy=f'Say --column "{key}=NAME"; if the names are not in the first line, describe the file: --layout FILE.',
-    )
 
 
 def _numbers_rows(column: Column | None) -> bool:

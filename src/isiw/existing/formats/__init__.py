@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from isiw.errors import InvalidValueError
-from isiw.existing import frames
+from isiw.errors import ConfigError, InvalidValueError
 from isiw.existing.formats import acq, cfs, columns, edf, eeglab, matlab, mne_files, nwb, smr, statistics, windows, xdf
 from isiw.existing.formats.contents import Contents
 from isiw.existing.layout import Layout
@@ -78,5 +78,13 @@ def read(path: Path, layout: Layout) -> Contents:
         ConfigError: a library is not installed.
     """
     found = format_of(path)
-    with frames.reading(path, f"the file cannot be read as {found.name}", found.way_in):
-        return found.read(path, layout)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of styles, names and dates; what is read is checked
+            return found.read(path, layout)
+    except (ConfigError, InvalidValueError, MemoryError):
+        raise
+    except Exception as error:  # each library has errors of its own
+        why, *_ = str(error).splitlines() or [type(error).__name__]
+        what = f"the file cannot be read as {found.name}: {why}"
+        raise InvalidValueError(what, got=str(path), remedy=found.way_in) from error

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
+
+import numpy as np
 
 from isiw.errors import InvalidValueError
 from isiw.existing.formats.beside import bids_events
@@ -61,7 +63,11 @@ def of_raw(raw: Any, source: str = "the recording", events: pd.DataFrame | None 
     rate_hz = float(raw.info["sfreq"])
     cuts = (round(at * rate_hz) for at, one in _annotations(raw) if _PAUSE.search(one))
     stretches = parted(cuts, raw.n_times, rate_hz)
-    tracks = tuple(_tracks(raw, stretches, lambda index: partial(_values, raw, index)))
+
+    def values(index: int, first: int, last: int) -> Any:
+        return raw.get_data(picks=[index], start=first, stop=last, verbose="ERROR")[0]
+
+    tracks = tuple(_tracks(raw, stretches, values))
     return Contents(source, tracks, _events(raw, tracks) if events is None else events)
 
 
@@ -71,7 +77,7 @@ def of_epochs(epochs: Any, source: str = "the epochs") -> Contents:
     length, rate_hz = len(epochs.times), float(epochs.info["sfreq"])
     stretches = parted(range(0, length * len(epochs), length), length * len(epochs), rate_hz)
     flat = {index: values.ravel() for index, values in data.items()}
-    tracks = tuple(_tracks(epochs, stretches, lambda index: lambda first, last: flat[index][first:last]))
+    tracks = tuple(_tracks(epochs, stretches, lambda index, first, last: flat[index][first:last]))
     if epochs.metadata is not None:
         names, zero_s = {code: name for name, code in epochs.event_id.items()}, -float(epochs.tmin)
         zeros = (
@@ -91,24 +97,17 @@ def of_epochs(epochs: Any, source: str = "the epochs") -> Contents:
     return Contents(source, tracks, events_of(noted))
 
 
-def _tracks(held: Any, stretches: tuple[Stretch, ...], reader: Any) -> Iterator[Track]:
+def _tracks(held: Any, stretches: tuple[Stretch, ...], values: Callable[[int, int, int], Any]) -> Iterator[Track]:
     units = getattr(held, "_orig_units", None) or {}
     for index, (name, kind) in enumerate(zip(held.ch_names, held.get_channel_types(), strict=True)):
         said = units.get(name, "V")
-        known_v = _SCALES_V.get(said)
-        read = reader(index) if known_v is None else partial(_divided, reader(index), known_v)
+        read = partial(_in_unit, values, _SCALES_V.get(said, 1.0), index)
         usual = "" if kind == "misc" and said not in {"V", "n/a", ""} else kind
         yield Track(str(name), float(held.info["sfreq"]), stretches, read, "" if said == "n/a" else said, usual)
 
 
-def _values(raw: Any, index: int, first: int, last: int) -> FloatArray:
-    values: FloatArray = raw.get_data(picks=[index], start=first, stop=last, verbose="ERROR")[0]
-    return values
-
-
-def _divided(read: Any, scale: float, first: int, last: int) -> FloatArray:
-    values: FloatArray = read(first, last)
-    return values / scale
+def _in_unit(values: Callable[[int, int, int], Any], unit_v: float, index: int, first: int, last: int) -> FloatArray:
+    return np.asarray(values(index, first, last), dtype=np.float64) / unit_v
 
 
 def _annotations(raw: Any) -> list[tuple[float, str]]:
