@@ -14,7 +14,7 @@ from isiw.existing.cells import is_missing
 from isiw.existing.delivered import Delivered, anywhere, renumbered
 from isiw.existing.doubts import is_rectified, require_short
 from isiw.existing.formats.columns import require_rate
-from isiw.existing.formats.contents import Contents, Track
+from isiw.existing.formats.contents import Contents, Track, events_of
 from isiw.existing.frames import named
 from isiw.existing.layout import EMG_UNITS, MARKERS, UNIT_WORDS, Layout
 from isiw.existing.markers import marked, names_of, pulses_of
@@ -61,27 +61,18 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
 
 def recording_of(contents: Contents, layout: Layout) -> Recording:
     """The channels that are needed of a file, and its events with those of the triggers that the layout names."""
-    tracks = {"emg": track_of(contents, "emg", layout)}
-    if "acceleration" in layout.channels:
-        tracks["acceleration"] = track_of(contents, "acceleration", layout)
-    for key, name in layout.channels.items():
-        if key != "events":
-            require_one("channel", contents.source, name, [track.name for track in contents.tracks])
+    held = {"emg": None, **dict.fromkeys(key for key in layout.channels if key != "events")}
+    tracks = {key: track_of(contents, key, layout) for key in held}
     if layout.rate_hz is not None:
         require_rate(layout.rate_hz, tracks["emg"].rate_hz, contents.source)
-    rows = []
-    for key in MARKERS:
-        if key in layout.channels:
-            rows += [(key, at_s, 0.0) for at_s in track_of(contents, key, layout).onsets_s()]
-    events = contents.events
-    if rows:
-        triggers = pd.DataFrame(rows, columns=["name", "onset", "duration"])
-        events = pd.concat([events, triggers], ignore_index=True) if len(events) else triggers
+    triggers = events_of((key, at_s, 0.0) for key in MARKERS if key in tracks for at_s in tracks[key].onsets_s())
+    events = pd.concat([each for each in (contents.events, triggers) if len(each)] or [triggers], ignore_index=True)
     unit, said = unit_of(tracks["emg"], layout, contents.source), tracks["emg"].unit
     other = (
         [f"{contents.source} says {said}, and {unit} is used, as stated."] if _known(said) not in {None, unit} else []
     )
-    return Recording(tracks, unit, events, contents.source, (*contents.notes, *other))
+    signals = {key: track for key, track in tracks.items() if key not in MARKERS}
+    return Recording(signals, unit, events, contents.source, (*contents.notes, *other))
 
 
 def track_of(contents: Contents, key: str, layout: Layout) -> Track:

@@ -225,18 +225,9 @@ def required_unit(what: str, column: Column, layout: Layout, known: Mapping[str,
     unit = layout.unit_of(known) or unit_said(column.name, known)
     if unit is None:
         units = "ms or s" if "ms" in known else "mV, uV or V"
-        numbers = [value for row in range(len(column.cells)) if isinstance(value := _tried(column, row), float)]
-        span = f"{min(numbers):g} to {max(numbers):g}" if numbers else None
         raise InvalidValueError(
             f"the unit of the {what} of {column.of} is not stated, in the column {column.name!r}",
-            got=span,
+            got=", ".join(filter(None, map(column.text, range(min(5, len(column.cells)))))) or None,
             remedy=f"Say --unit with {units}.",
         )
     return unit
-
-
-def _tried(column: Column, row: int) -> float | None:
-    try:
-        return column.number(row)
-    except InvalidValueError:
-        return None

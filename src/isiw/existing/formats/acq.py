@@ -28,7 +28,8 @@ def read(path: Path, _layout: Layout) -> Contents:
     with opened(path) as file:
         found = reader.read_headers(file)
     held, base_hz = found.datafile, float(found.samples_per_second)
-    marks = [(_signed(one), one) for one in found.event_markers or () if one.sample_index is not None]
+    marked = [(int(one.sample_index), one) for one in found.event_markers or () if one.sample_index is not None]
+    marks = [(at - _TURNS if at >= _TURNS // 2 else at, one) for at, one in marked]
     begun = min((at for at, one in marks if _SEGMENT.fullmatch(one.text.strip())), default=0)
     placed = [(at - min(begun, 0), one) for at, one in marks]
     cuts = [at for at, one in placed if _SEGMENT.fullmatch(one.text.strip())]
@@ -50,11 +51,6 @@ def read(path: Path, _layout: Layout) -> Contents:
         if not _SEGMENT.fullmatch(one.text.strip())
     ]
     return Contents(path.name, tuple(tracks), events_of(rows))
-
-
-def _signed(marker: Any) -> int:
-    at = int(marker.sample_index)
-    return at - _TURNS if at >= _TURNS // 2 else at
 
 
 def _part(numbers: Any, index: int, first: int, last: int) -> FloatArray:

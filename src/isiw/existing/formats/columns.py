@@ -32,7 +32,11 @@ def read(path: Path, layout: Layout) -> Contents:
         require_one("column", source, name, frame, remedy)
     breaks = frame.iloc[:, 0].astype(str).str.endswith("=").to_numpy()
     frame, block = frame[~breaks], np.cumsum(breaks)[~breaks]
-    pauses_s = _pauses_s(frame[block == block[:1]], layout, rate_hz, source)
+    pauses_s, first_block = dict[int, float](), frame[block == block[:1]]
+    for place, name in enumerate(frame.columns):
+        if name not in layout.channels.values() and (clock := clock_of(first_block.iloc[:, place], name, rate_hz)):
+            require_rate(rate_hz, clock[0], f"the column {name!r} of {source}")
+            pauses_s = pauses_s or clock[1]
     blocks = np.flatnonzero(np.diff(block, prepend=-1)).tolist()
     stretches = parted(blocks if len(blocks) > 1 else pauses_s, len(block), rate_hz, pauses_s)
     tracks = list[Track]()
@@ -67,16 +71,6 @@ def require_rate(stated_hz: float, found_hz: float, where: str) -> None:
             expected=f"{found_hz:g} Hz",
             remedy="Correct rate_hz in the layout.",
         )
-
-
-def _pauses_s(frame: pd.DataFrame, layout: Layout, rate_hz: float, source: str) -> dict[int, float]:
-    """How long recording paused before some samples, by a column of times; raise if it says another sampling rate."""
-    found = dict[int, float]()
-    for name in sorted({*frame.columns} - {*layout.channels.values()}):
-        if (clock := clock_of(frame.iloc[:, list(frame.columns).index(name)], name, rate_hz)) is not None:
-            require_rate(rate_hz, clock[0], f"the column {name!r} of {source}")
-            found = found or clock[1]
-    return found
 
 
 def clock_of(cells: pd.Series, name: str, rate_hz: float) -> tuple[float, dict[int, float]] | None:

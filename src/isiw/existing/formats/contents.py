@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from operator import itemgetter
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
@@ -52,23 +53,14 @@ def time_of(sample: float, stretches: Sequence[Stretch], rate_hz: float) -> floa
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """A channel of a file, whose samples are read when they are needed.
-
-    Args:
-        name: what it is called.
-        rate_hz: its sampling rate.
-        stretches: where it was recorded, ascending.
-        read: its numbers from one sample to before another, scaled as the file says.
-        unit: the unit of these numbers, as the file writes it; empty if it says none.
-        kind: its type, such as `emg` or `stim`, where the file says so.
-    """
+    """A channel of a file, whose samples are read when they are needed."""
 
     name: str
     rate_hz: float
-    stretches: tuple[Stretch, ...]
-    read: Callable[[int, int], FloatArray]
-    unit: str = ""
-    kind: str = ""
+    stretches: tuple[Stretch, ...]  # where it was recorded, ascending
+    read: Callable[[int, int], FloatArray]  # its numbers from one sample to before another, scaled as the file says
+    unit: str = ""  # of these numbers, as the file writes it; empty if it says none
+    kind: str = ""  # such as emg or stim, where the file says so
 
     @classmethod
     def of_values(
@@ -177,22 +169,20 @@ def with_codes(rows: Sequence[tuple[str, float, float]], tracks: Iterable[Track]
 
 @dataclass(frozen=True, eq=False)
 class Contents:
-    """What a file holds.
+    """What a file holds."""
 
-    Args:
-        source: the file in words, for messages.
-        tracks: its channels; none of a table.
-        events: what happened when, with the columns `name`, `onset` and `duration` [s], and what is said of each.
-        trials: a row for each trial, or for each sweep; None if it says nothing of them.
-        pulse_at_s: of sweeps that `trials` says the ISIs of, when the pulse came after the first sample.
-        empty_is_alone: whether a sweep without an ISI is TMS alone.
-        notes: what the operator should know of how it was read.
-    """
+    source: str  # in words, for messages
+    tracks: tuple[Track, ...] = ()  # none of a table
+    events: pd.DataFrame = field(default_factory=lambda: events_of(()))  # of each its name, onset and duration [s]
+    trials: pd.DataFrame | None = None  # a row for each trial, or for each sweep
+    pulse_at_s: float | None = None  # of sweeps whose ISIs are in trials, after the first sample
+    empty_is_alone: bool = False  # whether a sweep without an ISI is TMS alone
+    notes: tuple[str, ...] = ()  # what the operator should know of how it was read
 
-    source: str
-    tracks: tuple[Track, ...] = ()
-    events: pd.DataFrame = field(default_factory=lambda: events_of(()))
-    trials: pd.DataFrame | None = None
-    pulse_at_s: float | None = None
-    empty_is_alone: bool = False
-    notes: tuple[str, ...] = ()
+    def with_bids(self, path: Path) -> Contents:
+        """The same with the events that BIDS has in a file beside a recording, if there is one."""
+        beside = path.with_name(f"{path.stem.rpartition('_')[0]}_events.tsv")
+        if not beside.is_file() or beside.name == "_events.tsv":
+            return self
+        frame = pd.read_csv(beside, sep="\t", na_values=["n/a"])
+        return replace(self, events=frame.rename(columns={"trial_type" if "trial_type" in frame else "value": "name"}))

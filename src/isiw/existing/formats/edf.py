@@ -12,7 +12,6 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.existing.formats.beside import bids_events
 from isiw.existing.formats.contents import Contents, Stretch, Track, with_codes
 from isiw.existing.layout import Layout
 from isiw.files import opened
@@ -88,8 +87,7 @@ def read(path: Path, _layout: Layout) -> Contents:
             stretches = tuple(_stretches(starts, header, header.counts[signal]))
             unit = header.fields["unit"][signal]
             tracks.append(Track(label, rate_hz, stretches, partial(header.samples, signal), unit, kind))
-    beside = bids_events(path)
-    return Contents(path.name, tuple(tracks), with_codes(events, tracks) if beside is None else beside)
+    return Contents(path.name, tuple(tracks), with_codes(events, tracks)).with_bids(path)
 
 
 def _annotations(header: _Header, signal: int) -> Iterator[list[tuple[float, float, str]]]:

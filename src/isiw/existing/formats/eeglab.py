@@ -11,7 +11,6 @@ from typing import Any, Final
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.existing.formats.beside import bids_events
 from isiw.existing.formats.contents import Contents, Track, events_of, parted, time_of
 from isiw.existing.layout import EMG_UNITS, Layout
 from isiw.files import opened
@@ -52,9 +51,8 @@ def read(path: Path, layout: Layout) -> Contents:
         for one in events
         if _name(one.get("type")) != "boundary"
     ]
-    beside = bids_events(path)
     notes = () if layout.unit_of(EMG_UNITS) else (_ASSUMED,)
-    return Contents(path.name, tuple(tracks), events_of(rows) if beside is None else beside, notes=notes)
+    return Contents(path.name, tuple(tracks), events_of(rows), notes=notes).with_bids(path)
 
 
 def _values(eeg: Mapping[str, Any], path: Path, channel: int, first: int, last: int) -> FloatArray:

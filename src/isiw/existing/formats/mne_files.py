@@ -11,11 +11,9 @@ from typing import Any, Final
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.existing.formats.beside import bids_events
 from isiw.existing.formats.contents import Contents, Stretch, Track, events_of, parted, time_of, with_codes
 from isiw.existing.layout import Layout
 from isiw.files import opened
-from isiw.lazy import pd
 from isiw.text.named_code import library
 from isiw.types import FloatArray
 
@@ -36,7 +34,7 @@ def read(path: Path, _layout: Layout) -> Contents:
         return of_epochs(mne.read_epochs(path, verbose="ERROR"), path.name)
     if path.suffix.casefold() == ".vhdr":
         _require_whole_markers(path)
-    return of_raw(mne.io.read_raw(path, verbose="ERROR"), path.name, bids_events(path))
+    return of_raw(mne.io.read_raw(path, verbose="ERROR"), path.name).with_bids(path)
 
 
 def _require_whole_markers(path: Path) -> None:
@@ -58,17 +56,19 @@ def _text(path: Path) -> str:
         return file.read().decode("utf-8", errors="replace")
 
 
-def of_raw(raw: Any, source: str = "the recording", events: pd.DataFrame | None = None) -> Contents:
-    """The channels of an `mne.io.Raw`, and its annotations, or a table of events."""
+def of_raw(raw: Any, source: str = "the recording") -> Contents:
+    """The channels of an `mne.io.Raw`, its annotations, and what stim channels have besides."""
     rate_hz = float(raw.info["sfreq"])
-    cuts = (round(at * rate_hz) for at, one in _annotations(raw) if _PAUSE.search(one))
-    stretches = parted(cuts, raw.n_times, rate_hz)
+    noted = [(str(one["description"]), (float(one["onset"]) - raw.first_time) * rate_hz, float(one["duration"]))
+             for one in raw.annotations]  # fmt: skip
+    stretches = parted((round(at) for name, at, _ in noted if _PAUSE.search(name)), raw.n_times, rate_hz)
 
     def values(index: int, first: int, last: int) -> Any:
         return raw.get_data(picks=[index], start=first, stop=last, verbose="ERROR")[0]
 
     tracks = tuple(_tracks(raw, stretches, values))
-    return Contents(source, tracks, _events(raw, tracks) if events is None else events)
+    events = [(name, time_of(at, stretches, rate_hz), lasts) for name, at, lasts in noted]
+    return Contents(source, tracks, with_codes(events, tracks))
 
 
 def of_epochs(epochs: Any, source: str = "the epochs") -> Contents:
@@ -108,19 +108,3 @@ def _tracks(held: Any, stretches: tuple[Stretch, ...], values: Callable[[int, in
 
 def _in_unit(values: Callable[[int, int, int], Any], unit_v: float, index: int, first: int, last: int) -> FloatArray:
     return np.asarray(values(index, first, last), dtype=np.float64) / unit_v
-
-
-def _annotations(raw: Any) -> list[tuple[float, str]]:
-    return [(float(one["onset"]) - raw.first_time, str(one["description"])) for one in raw.annotations]
-
-
-def _events(raw: Any, tracks: tuple[Track, ...]) -> pd.DataFrame:
-    """The annotations, and what stim channels have besides."""
-    rate_hz = float(raw.info["sfreq"])
-    lasts = [float(one["duration"]) for one in raw.annotations]
-    stretches = tracks[0].stretches if tracks else ()
-    rows = [
-        (name, time_of(at * rate_hz, stretches, rate_hz), long)
-        for (at, name), long in zip(_annotations(raw), lasts, strict=True)
-    ]
-    return with_codes(rows, tracks)

@@ -68,10 +68,8 @@ def _codes(series: Any) -> list[tuple[str, float, float]] | None:
         return None
     times_s = np.asarray(series.timestamps[:], dtype=np.float64)
     steps_s = np.diff(times_s)
-    if (
-        len(steps_s) > 1 and np.quantile(np.abs(steps_s / np.median(steps_s) - 1), 0.9) < 0.1
-    ):  # samples, that come evenly
-        return None
+    if len(steps_s) > 1 and np.quantile(np.abs(steps_s / np.median(steps_s) - 1), 0.9) < 0.1:
+        return None  # samples, that come evenly
     return [(f"{code}", at, 0.0) for code, at in zip(series.data[:].tolist(), times_s.tolist(), strict=True)]
 
 

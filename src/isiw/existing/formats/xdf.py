@@ -53,13 +53,9 @@ def read(path: Path, _layout: Layout) -> Contents:
 
 def _is_of_markers(stream: Mapping[str, Any]) -> bool:
     """True for texts, and for numbers that come at no rate: whole ones, or of a type that says so."""
-    form = _said(stream["info"], "channel_format")
-    coded = form.startswith("int") or any(word in _kind(stream) for word in ("marker", "trig", "ttl", "stim", "event"))
+    form, kind = (_said(stream["info"], key).casefold() for key in ("channel_format", "type"))
+    coded = form.startswith("int") or any(word in kind for word in ("marker", "trig", "ttl", "stim", "event"))
     return form == "string" or (float(_said(stream["info"], "nominal_srate") or 0.0) == 0.0 and coded)
-
-
-def _kind(stream: Mapping[str, Any]) -> str:
-    return _said(stream["info"], "type").casefold()
 
 
 def _said(info: Mapping[str, Any] | None, key: str) -> str:
@@ -84,5 +80,5 @@ def _channels(stream: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     for channel in range(count):
         said = each[channel] if channel < len(each) else None
         label = _said(said, "label") or (name if count == 1 else f"{name} {channel + 1}")
-        found.append((label, _said(said, "unit"), (_said(said, "type") or _kind(stream)).casefold()))
+        found.append((label, _said(said, "unit"), (_said(said, "type") or _said(info, "type")).casefold()))
     return found
