@@ -53,14 +53,6 @@ class Recording:
 
 def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
     """The trials of what a file holds, whose sweeps are cut already or are yet to be cut out."""
-    recording = recording_of(contents, layout)
-    if contents.trials is not None and contents.pulse_at_s is not None:
-        return _of_rows(contents, recording, layout, subject)
-    return delivered_of(recording, sweeps_of(recording, layout), layout, subject)
-
-
-def recording_of(contents: Contents, layout: Layout) -> Recording:
-    """The channels that are needed of a file, and its events with those of the triggers that the layout names."""
     held = {"emg": None, **dict.fromkeys(key for key in layout.channels if key != "events")}
     tracks = {key: track_of(contents, key, layout) for key in held}
     if layout.rate_hz is not None:
@@ -72,7 +64,10 @@ def recording_of(contents: Contents, layout: Layout) -> Recording:
         [f"{contents.source} says {said}, and {unit} is used, as stated."] if _known(said) not in {None, unit} else []
     )
     signals = {key: track for key, track in tracks.items() if key not in MARKERS}
-    return Recording(signals, unit, events, contents.source, (*contents.notes, *other))
+    recording = Recording(signals, unit, events, contents.source, (*contents.notes, *other))
+    if contents.trials is not None and contents.pulse_at_s is not None:
+        return _of_rows(contents, recording, layout, subject)
+    return delivered_of(recording, sweeps_of(recording, layout), layout, subject)
 
 
 def track_of(contents: Contents, key: str, layout: Layout) -> Track:

@@ -122,11 +122,12 @@ class Columns:
                 said, cells = without_unit_in_cells(name, frame.iloc[:, names.index(name)].tolist())
                 columns[key] = Column(said, cells, of=source)
         columns, units = _scaled(columns, layout)
-        if "subject" not in layout.columns and _numbers_rows(columns.get("subject")):
-            held["subject"] = None
-            del columns["subject"]
-        if "subject" in columns:
-            columns["subject"] = replace(columns["subject"], of_codes=True)
+        if (subject := columns.pop("subject", None)) is not None:
+            is_id = "subject" not in layout.columns and letters(subject.name) == "id"
+            if is_id and 1 < len(frame) == len({*map(subject.text, range(len(frame)))}):
+                held["subject"] = None  # each row has one of its own, so that it is of trials and not of people
+            else:
+                columns["subject"] = replace(subject, of_codes=True)
         if "mep" in columns:
             require_single_trials(columns["mep"], columns["isi"], frame, source)
         beside = {
@@ -192,14 +193,6 @@ def _named(key: str, names: list[str], layout: Layout, source: str) -> str | Non
             remedy=f'Say --column "{key}={several[0]}".' if len(set(several)) > 1 else "Rename one of them.",
         )
     return several[0] if several else None
-
-
-def _numbers_rows(column: Column | None) -> bool:
-    """True if a column called id has another value in each row, so that it is of trials and not of people."""
-    if column is None or letters(column.name) != "id":
-        return False
-    values = [column.text(row) for row in range(len(column.cells))]
-    return len(values) > 1 and len({*values}) == len(values)
 
 
 def unit_said(name: str, known: Mapping[str, float]) -> str | None:
