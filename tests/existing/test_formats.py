@@ -33,7 +33,6 @@ from isiw.errors import IsiwError
 from isiw.existing.delivered import Delivered
 from isiw.existing.formats import xdf
 from isiw.existing.formats.stamps import clocked
-from isiw.existing.formats.xdf_chunks import BOUNDARY
 from isiw.existing.layout import Layout
 from isiw.existing.reading import read_people
 
@@ -94,7 +93,7 @@ def test_samples_of_xdf_are_those_of_pyxdf_whichever_of_them_have_a_time(suffix:
         parts.append(chunk(3, struct.pack("<IBB", 1, 1, 20) + samples))
         parts.append(chunk(3, struct.pack("<IBB", 1, 1, 0)))
         number += 20
-    whole = b"".join([*parts[:-4], b"\x05" * 9, chunk(5, BOUNDARY), *parts[-4:]])  # damaged in between
+    whole = b"".join([*parts[:-4], b"\x05" * 9, chunk(5, xdf.BOUNDARY), *parts[-4:]])  # damaged in between
     path = tmp_path / f"P01{suffix}"
     path.write_bytes(gzip.compress(whole[:-30]) if suffix == ".xdfz" else whole[:-30])  # and cut off
     (stream,), _ = pyxdf.load_xdf(path, dejitter_timestamps=False)

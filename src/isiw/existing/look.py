@@ -179,7 +179,9 @@ def _with_markers(contents: Contents, triggers: Mapping[str, FloatArray], layout
     if pair is None or follows[pair] < 0.5:
         return layout
     said = dict(zip((key, "pulse"), pair, strict=True))
-    return layout.saying(channels=said) if triggers else layout.saying(markers=said)
+    if triggers:  # and no events that a marker could be of
+        return replace(layout, markers={}).saying(channels=said)
+    return layout.saying(markers=said)
 
 
 def _share(taps_s: FloatArray, pulses_s: FloatArray, longest_s: float) -> float:
