@@ -59,12 +59,13 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
         require_rate(layout.rate_hz, tracks["emg"].rate_hz, contents.source)
     triggers = events_of((key, at_s, 0.0) for key in MARKERS if key in tracks for at_s in tracks[key].onsets_s())
     events = pd.concat([each for each in (contents.events, triggers) if len(each)] or [triggers], ignore_index=True)
-    unit, said = unit_of(tracks["emg"], layout, contents.source), tracks["emg"].unit
-    other = (
-        [f"{contents.source} says {said}, and {unit} is used, as stated."] if _known(said) not in {None, unit} else []
-    )
+    said, what = tracks["emg"].unit, f"the channel {tracks['emg'].name!r} of {contents.source}"
+    known, notes = UNIT_WORDS.get(said.strip().casefold()), contents.notes
+    unit = layout.required_unit(EMG_UNITS, known, what, said or None)
+    if known not in {None, unit}:
+        notes = (*notes, f"{contents.source} says {said}, and {unit} is used, as stated.")
     signals = {key: track for key, track in tracks.items() if key not in MARKERS}
-    recording = Recording(signals, unit, events, contents.source, (*contents.notes, *other))
+    recording = Recording(signals, unit, events, contents.source, notes)
     if contents.trials is not None and contents.pulse_at_s is not None:
         return _of_rows(contents, recording, layout, subject)
     return delivered_of(recording, sweeps_of(recording, layout), layout, subject)
@@ -89,22 +90,6 @@ def track_of(contents: Contents, key: str, layout: Layout) -> Track:
             remedy=f'Say --channel "{key}={(fitting or tracks)[0].name}".' if tracks else "Is it the right file?",
         )
     return fitting[0]
-
-
-def unit_of(track: Track, layout: Layout, source: str) -> str:
-    """The unit of a channel's numbers: the one that is stated, or else the one that the file says."""
-    unit = layout.unit_of(EMG_UNITS) or _known(track.unit)
-    if unit is None or unit not in EMG_UNITS:
-        raise InvalidValueError(
-            f"the unit of the channel {track.name!r} of {source} is not stated, or unknown",
-            got=track.unit or None,
-            remedy="Say --unit with mV, uV, nV or V.",
-        )
-    return unit
-
-
-def _known(unit: str) -> str | None:
-    return UNIT_WORDS.get(unit.strip().casefold())
 
 
 def _of_rows(contents: Contents, recording: Recording, layout: Layout, subject: str) -> Delivered:

@@ -148,10 +148,11 @@ def _scaled(columns: Mapping[str, Column], layout: Layout) -> tuple[dict[str, Co
     columns = dict(columns)
     numeric = ("isi", "mep", "asked", "isi_sd", "background")
     columns |= with_decimals({key: columns[key] for key in numeric if key in columns}, layout.decimal)
-    isi_unit = required_unit("ISIs", columns["isi"], layout, ISI_UNITS_MS)
+    isi_unit = _required_unit("ISIs", columns["isi"], layout, ISI_UNITS_MS)
     factors, mep_unit = {"isi": ISI_UNITS_MS[isi_unit]}, "mV"
     if "mep" in columns:
-        mep_unit = required_unit("amplitudes", columns["mep"], layout, EMG_UNITS)
+        require_absolute(columns["mep"].name, columns["mep"].of)
+        mep_unit = _required_unit("amplitudes", columns["mep"], layout, EMG_UNITS)
         factors["mep"] = EMG_UNITS[mep_unit]
     for key in ("asked", "isi_sd"):
         if key in columns:
@@ -211,16 +212,8 @@ def unit_said(name: str, known: Mapping[str, float]) -> str | None:
     return next(reversed(found or usual), None)
 
 
-def required_unit(what: str, column: Column, layout: Layout, known: Mapping[str, float]) -> str:
+def _required_unit(what: str, column: Column, layout: Layout, known: Mapping[str, float]) -> str:
     """The column's unit, as it is stated or as its name says."""
-    if known is EMG_UNITS:
-        require_absolute(column.name, column.of)
-    unit = layout.unit_of(known) or unit_said(column.name, known)
-    if unit is None:
-        units = "ms or s" if "ms" in known else "mV, uV or V"
-        raise InvalidValueError(
-            f"the unit of the {what} of {column.of} is not stated, in the column {column.name!r}",
-            got=", ".join(filter(None, map(column.text, range(min(5, len(column.cells)))))) or None,
-            remedy=f"Say --unit with {units}.",
-        )
-    return unit
+    some = ", ".join(filter(None, map(column.text, range(min(5, len(column.cells)))))) or None
+    what = f"the {what} of {column.of} in the column {column.name!r}"
+    return layout.required_unit(known, unit_said(column.name, known), what, some)
