@@ -16,7 +16,7 @@ from isiw.existing.doubts import is_rectified, require_short
 from isiw.existing.formats.columns import require_rate
 from isiw.existing.formats.contents import Contents, Track, events_of
 from isiw.existing.frames import named
-from isiw.existing.layout import EMG_UNITS, MARKERS, UNIT_WORDS, Layout
+from isiw.existing.layout import EMG_UNITS, MARKERS, UNIT_WORDS, Layout, required_unit
 from isiw.existing.markers import marked, names_of, pulses_of
 from isiw.existing.tables import Columns, require_one
 from isiw.findings import Kind
@@ -61,7 +61,7 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
     events = pd.concat([each for each in (contents.events, triggers) if len(each)] or [triggers], ignore_index=True)
     said, what = tracks["emg"].unit, f"the channel {tracks['emg'].name!r} of {contents.source}"
     known, notes = UNIT_WORDS.get(said.strip().casefold()), contents.notes
-    unit = layout.required_unit(EMG_UNITS, known, what, said or None)
+    unit = required_unit(layout, EMG_UNITS, known, what, said or None)
     if known not in {None, unit}:
         notes = (*notes, f"{contents.source} says {said}, and {unit} is used, as stated.")
     signals = {key: track for key, track in tracks.items() if key not in MARKERS}

@@ -10,7 +10,7 @@ from typing import Final
 from isiw.errors import InvalidValueError, did_you_mean
 from isiw.existing.cells import ALONE, TAP_ALONE, Column, plain, says_alone, with_decimals, without_unit_in_cells
 from isiw.existing.doubts import ALL, require_absolute, require_single_trials
-from isiw.existing.layout import COLUMNS, EMG_UNITS, ISI_UNITS_MS, UNIT_WORDS, Layout, letters
+from isiw.existing.layout import COLUMNS, EMG_UNITS, ISI_UNITS_MS, UNIT_WORDS, Layout, letters, required_unit
 from isiw.findings import Kind
 from isiw.lazy import pd
 from isiw.text.sanitize import counted
@@ -216,4 +216,4 @@ def _required_unit(what: str, column: Column, layout: Layout, known: Mapping[str
     """The column's unit, as it is stated or as its name says."""
     some = ", ".join(filter(None, map(column.text, range(min(5, len(column.cells)))))) or None
     what = f"the {what} of {column.of} in the column {column.name!r}"
-    return layout.required_unit(known, unit_said(column.name, known), what, some)
+    return required_unit(layout, known, unit_said(column.name, known), what, some)
