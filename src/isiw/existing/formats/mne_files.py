@@ -23,8 +23,8 @@ _SCALES_V: Final = {"V": 1.0, "mV": 1e-3, "µV": 1e-6, "uV": 1e-6, "nV": 1e-9}
 _PAUSE: Final = re.compile(r"new segment|\bboundary\b", re.IGNORECASE)
 """What annotations say of a pause of unknown length."""
 
-_ODD_MARKER: Final = re.compile(r"\s*Mk\d+=[^,]*,(?!([^,]*,){3}[^,]*(,\s*\d{14,}\s*)?$)(.*,){4}")
-"""A marker of BrainVision with more than its text, place, size, channel, and a date."""
+_DATE: Final = 14
+"""The date of a marker of BrainVision has at least so many digits."""
 
 
 def read(path: Path, _layout: Layout) -> Contents:
@@ -39,10 +39,13 @@ def read(path: Path, _layout: Layout) -> Contents:
 
 def _require_whole_markers(path: Path) -> None:
     """Raise if a comma in the text of a marker is not coded, which MNE takes for the end of the text."""
-    said = re.search(r"^\s*MarkerFile\s*=\s*(.*?)\s*$", _text(path), re.MULTILINE)
-    markers = path.with_name(said[1].replace("$b", path.stem)) if said else path
+    said = re.search(r"^MarkerFile=(.*)$", _text(path), re.MULTILINE)
+    markers = path.parent / (said[1].strip().replace("$b", path.stem) if said else path.name)
     for line in _text(markers).splitlines() if markers.is_file() else ():
-        if _ODD_MARKER.match(line):
+        kind, *fields = line.partition("=")[2].split(",")  # of these: text, place, size, channel, and perhaps a date
+        is_date = kind != "Comment" or len(fields[-1].strip()) >= _DATE
+        dated = len(fields) == 5 and fields[1].strip().isdigit() and is_date
+        if re.match(r"Mk\d+=", line) and len(fields) > 4 and not dated:
             raise InvalidValueError(
                 f"a comma stands in the text of a marker in {markers.name}, where it must be coded",
                 got=line.strip(),
