@@ -86,5 +86,5 @@ def read(path: Path, layout: Layout) -> Contents:
         raise
     except Exception as error:  # each library has errors of its own
         why, *_ = str(error).splitlines() or [type(error).__name__]
-        what = f"the file cannot be read as {found.name}: {why}"
+        what = f"the file {'is no table, and ' if found.is_table else ''}cannot be read as {found.name}: {why}"
         raise InvalidValueError(what, got=str(path), remedy=found.way_in) from error
