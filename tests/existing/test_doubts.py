@@ -93,7 +93,6 @@ ASKED: dict[str, tuple[pd.DataFrame, dict[str, Any], str]] = {
     "muscles below each other": (pd.concat([table().assign(isi_ms=ISIS + np.linspace(0, 1, 36))] * 2), {}, "2 times"),
     "a few rows of another coil": (table(coil=of(["sham", *["real"] * 7])), {}, "'coil'"),
     "a few rows a person": (table(code=of([f"VP{n}" for n in range(9)])), {}, "'code'.*and 6 others"),
-    "what recordings have": (table(), {"markers": {"pulse": "TMS"}}, "is a table, and has no use for markers"),
     "a value that is not there": (long("muscle", ["FCR", "FDI"]), {"where": {"muscle": "APB"}}, "one of FCR, FDI"),
 }  # fmt: skip
 

@@ -33,7 +33,6 @@ from isiw.errors import IsiwError
 from isiw.existing.delivered import Delivered
 from isiw.existing.formats import xdf
 from isiw.existing.formats.stamps import clocked
-from isiw.existing.formats.xdf_chunks import BOUNDARY
 from isiw.existing.layout import Layout
 from isiw.existing.reading import read_people
 
@@ -94,7 +93,7 @@ def test_samples_of_xdf_are_those_of_pyxdf_whichever_of_them_have_a_time(suffix:
         parts.append(chunk(3, struct.pack("<IBB", 1, 1, 20) + samples))
         parts.append(chunk(3, struct.pack("<IBB", 1, 1, 0)))
         number += 20
-    whole = b"".join([*parts[:-4], b"\x05" * 9, chunk(5, BOUNDARY), *parts[-4:]])  # damaged in between
+    whole = b"".join([*parts[:-4], b"\x05" * 9, chunk(5, xdf.BOUNDARY), *parts[-4:]])  # damaged in between
     path = tmp_path / f"P01{suffix}"
     path.write_bytes(gzip.compress(whole[:-30]) if suffix == ".xdfz" else whole[:-30])  # and cut off
     (stream,), _ = pyxdf.load_xdf(path, dejitter_timestamps=False)
@@ -145,14 +144,11 @@ def test_a_table_of_matlab_73_is_read_and_its_sweeps_too(tmp_path: Path) -> None
 
 @pytest.mark.parametrize("suffix", [".sav", ".zsav", ".dta"])
 def test_a_table_of_spss_or_stata_has_the_units_and_words_of_its_labels(suffix: str, tmp_path: Path) -> None:
-    if suffix == ".zsav":
-        as_statistics(tmp_path / "P01.sav").rename(tmp_path / "P01.zsav")
-        require_as_written(read(tmp_path / "P01.zsav"))
-    else:
-        require_as_written(read(as_statistics(tmp_path / f"P01{suffix}")))
-    as_statistics(tmp_path / f"P02{suffix.replace('z', '')}", "Peak to peak (% of control)")
+    layout, written = Layout(reference="impact"), suffix.replace("z", "")
+    require_as_written(read(as_statistics(tmp_path / f"P01{written}").rename(tmp_path / f"P01{suffix}"), layout))
+    as_statistics(tmp_path / f"P02{written}", "Peak to peak (% of control)")
     with pytest.raises(IsiwError, match="relative to others"):
-        read(tmp_path / f"P02{suffix.replace('z', '')}", NAMED.saying(units=("uV",)))
+        read(tmp_path / f"P02{written}", layout.saying(units=("uV",)))
 
 
 @pytest.mark.parametrize(

@@ -58,6 +58,7 @@ def test_triggers_are_found_in_channels_if_there_are_no_events(tmp_path: Path) -
     assert "channel 'in 3': mV, 4000 Hz, 14.0 s; a trigger? 6 times" in str(found)
     assert "--channel 'tap=in 2' --channel 'pulse=in 3'" in found.command
     assert found.missing == ""
+    assert look(tmp_path / "P01.edf", Layout("impact", unmarked="alone", markers={"tap": "x"})).command == found.command
 
 
 def test_the_columns_of_a_table_are_listed_with_what_they_are_taken_for(tmp_path: Path) -> None:

@@ -135,6 +135,21 @@ def test_a_recording_is_read_back_to_the_numbers_that_were_written(kind: str, tm
     require_as_written(person)
 
 
+def test_a_comma_that_is_not_coded_in_a_comment_of_brainvision_is_said_with_its_line(tmp_path: Path) -> None:
+    path = as_brainvision(tmp_path)
+    markers = path.with_suffix(".vmrk")
+    whole = markers.read_text()
+    for text in ("coil moved, pair repeated", "again, 5", "one, two, three"):
+        markers.write_text(f"{whole}Mk99=Comment,{text},500,1,0\n")
+        with pytest.raises(IsiwError, match=rf"comma .* of a marker in P01\.vmrk.*Mk99=Comment,{text}.*\\1"):
+            read_people(path, KNOWN)
+    markers.write_text(
+        f"{whole}Mk99=Comment,coil moved\\1 again,500,1,0\nMk100=New Segment,,1,1,0,20131113161403794232\n"
+    )
+    (person,) = read_people(path, KNOWN)
+    require_as_written(person)
+
+
 def test_recordings_in_memory_are_read_too() -> None:
     for made in (raw(), epochs()):
         (person,) = read_people(made, KNOWN, subject="P01")

@@ -55,7 +55,8 @@ def lines(*columns: Any, first: int = 0, last: int | None = None) -> str:
 
 def read(path: Path, content: str, layout: str) -> Delivered:
     (path / "P01.txt").write_text(content)
-    (path / "layout.toml").write_text(f'reference = "impact"\nunmarked = "alone"\n{layout}')
+    unmarked = 'unmarked = "alone"\n' if "[channels]" in layout else ""
+    (path / "layout.toml").write_text(f'reference = "impact"\n{unmarked}{layout}')
     (person,) = read_people(path / "P01.txt", read_layout(path / "layout.toml"))
     return person
 

@@ -116,12 +116,14 @@ def _read(source: Path, way: Way) -> Iterator[Person]:
             remedy="ISIs of one cannot be compared with those of the other: correct one of them.",
         )
     for delivered in read_people(source, layout, subject=way.subject, limits=way.limits, also=way.also):
+        beside = {name: sha256 for name, sha256 in delivered.files.items() if name != source.name}
+        digest = delivered.files.get(source.name) or (hash_of(source) if source.is_file() else "")
         own = delivered.visit
         pct_rmt = way.visit.intensity_pct_rmt or own.intensity_pct_rmt
         visit = replace(way.visit, day=own.day or way.visit.day, intensity_pct_rmt=pct_rmt)
         simulated = way.simulated or delivered.simulated
         made_of = {
-            **_identity(source, delivered.files),
+            **({"file": source.name, "sha256": digest} | ({"beside": beside} if beside else {})),
             "layout": {key: value for key, value in asdict(layout).items() if value not in (None, {}, ())},
             "strategy": {"name": way.strategy, "seed": way.seed, "settings": dict(way.settings)},
             "space": "as delivered" if way.space is None else f"{way.space}",
@@ -129,13 +131,6 @@ def _read(source: Path, way: Way) -> Iterator[Person]:
         }
         as_logged = json.loads(json.dumps(made_of))  # a log knows no tuples
         yield Person(replace(delivered, visit=visit, simulated=simulated), None, as_logged)
-
-
-def _identity(source: Path, files: Mapping[str, str]) -> dict[str, Any]:
-    """What tells the content of a file from another, with those that it refers to."""
-    beside = {name: sha256 for name, sha256 in files.items() if name != source.name}
-    own = files.get(source.name) or (hash_of(source) if source.is_file() else "")
-    return {"file": source.name, "sha256": own} | ({"beside": beside} if beside else {})
 
 
 def _placed(people: Sequence[Person], output: str | Path | None) -> list[Person]:

@@ -70,8 +70,13 @@ def _float(cell: object) -> float:
 
 def says_alone(cell: Any, mark: str | None) -> bool:
     """True if a cell of ISIs stands for TMS alone; an empty one does only if that is the mark."""
-    if mark is not None and (is_missing(cell) if not mark.strip() else _same(cell, mark)):
+    if mark is not None and not mark.strip() and is_missing(cell):
         return True
+    if mark is not None and mark.strip():
+        words = [str(one).strip().casefold() for one in (cell, mark)]
+        numbers = [{_value(word, sign) for sign in ".,"} - {math.nan} for word in words]
+        if words[0] == words[1] or any(map(math.isfinite, numbers[0] & numbers[1])):
+            return True
     return isinstance(cell, str) and plain(cell) in ALONE
 
 
@@ -79,14 +84,6 @@ def says_alone(cell: Any, mark: str | None) -> bool:
 def plain(text: str) -> str:
     """A text in lower case, with blanks for hyphens and underscores."""
     return " ".join(re.split(r"[\s_-]+", text.strip().casefold()))
-
-
-def _same(cell: Any, mark: str) -> bool:
-    """True if a cell is the mark, as a text or as a number."""
-    if str(cell).strip().casefold() == mark.strip().casefold():
-        return True
-    numbers = [{_value(str(one), sign) for sign in ".,"} for one in (cell, mark)]
-    return any(number in numbers[1] for number in numbers[0] if math.isfinite(number))
 
 
 @dataclass(frozen=True)
@@ -145,6 +142,13 @@ def with_decimals(columns: Mapping[str, Column], stated: str | None) -> dict[str
     usual = stated or (all_signs.pop() if len(all_signs) == 1 else None)
     found = {}
     for key, column in columns.items():
+        if stated is not None and signs[key] and stated not in signs[key]:
+            raise InvalidValueError(
+                f"the column {column.name!r} of {column.of} has another decimal sign than the one that is stated",
+                got=stated,
+                expected=f"{''.join(signs[key])!r}, as its numbers have",
+                remedy="Leave --decimal out, or correct it.",
+            )
         if usual is None and not signs[key] and (doubtful := _doubtful(column)):
             raise InvalidValueError(
                 f"the {'comma' if ',' in doubtful else 'point'} in the column {column.name!r} of {column.of} may be a "

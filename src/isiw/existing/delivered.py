@@ -8,7 +8,7 @@ import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import isiw
 from isiw.checks import MOST_TRIALS
@@ -21,9 +21,6 @@ from isiw.text.sanitize import counted
 from isiw.trials import Channel, Trial, TrialTable
 from isiw.types import Conditioning, Reference
 from isiw.visit import Visit
-
-if TYPE_CHECKING:  # what reads logs takes long to load
-    from isiw.log.reader import SessionRecord
 
 LONGEST_ISI_MS: Final = 5000.0
 """Longer than any interval after which a tap is studied; a larger number is in another unit."""
@@ -168,6 +165,10 @@ def read_log(path: str | Path) -> Delivered:
     sweeps: dict[int, dict[str, Channel]] = {}
     for (number, name), channel in record.waveforms.items():
         sweeps.setdefault(number, {})[name] = channel
+    given_by, at_ns = header.given_by, [onset.at_ns for onset in record.onsets.values()]
+    if not header.imported:  # its last stimulus was about to be delivered then, if that is known of all
+        last = dt.datetime.fromtimestamp(max(at_ns, default=0) / 1e9 + 1, dt.UTC)
+        given_by = last.isoformat(timespec="seconds") if 0 < len(at_ns) >= len(record.table) else ""
     return Delivered(
         record.table,
         header.space.reference,
@@ -175,20 +176,12 @@ def read_log(path: str | Path) -> Delivered:
         visit=header.visit,
         source=header.source or record.path.name,
         created=header.created,
-        given_by=header.given_by if header.imported else _last_given(record),
+        given_by=given_by,
         signals=header.signals,
         sweeps=sweeps,
         conditioning=header.conditioning,
         simulated=header.device.simulated,
     )
-
-
-def _last_given(record: SessionRecord) -> str:
-    """When a session's last stimulus was about to be delivered, by its log; empty if that is not known of all."""
-    at_ns = [onset.at_ns for onset in record.onsets.values()]
-    if len(at_ns) < len(record.table) or not at_ns:
-        return ""
-    return dt.datetime.fromtimestamp(max(at_ns) / 1e9 + 1, dt.UTC).isoformat(timespec="seconds")
 
 
 def renumbered(trials: Sequence[Trial]) -> TrialTable:

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import csv
 import io
-import warnings
 from collections import Counter
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from itertools import islice, zip_longest
 from pathlib import Path
 from typing import Any, Final, cast
 
 import numpy as np
 
-from isiw.errors import ConfigError, InvalidValueError
+from isiw.errors import InvalidValueError
 from isiw.existing.cells import is_missing
 from isiw.existing.layout import COLUMNS, UNIT_WORDS, Layout, letters
 from isiw.existing.tables import require_one
@@ -38,44 +37,22 @@ Rows = Sequence[Sequence[Any]]
 
 def read_frame(path: Path, layout: Layout) -> pd.DataFrame:
     """The table in a file, its cells as they are."""
-    readers: Mapping[str, Callable[[bytes, Layout], pd.DataFrame]] = {
-        ".mat": lambda content, layout: _of_vectors(_arrays(content, path), layout),
-        ".parquet": lambda content, _: named(pd.read_parquet(io.BytesIO(content))),
-        **dict.fromkeys(WORKBOOKS, _workbook),
-    }
-    read = readers.get(path.suffix.lower(), _texts)
-    frame: pd.DataFrame = _read(path, lambda content: read(content, layout))
+    suffix = path.suffix.lower()
+    if suffix == ".mat":
+        frame = of_vectors(read_arrays(path), layout)
+    elif suffix == ".parquet":
+        frame = named(pd.read_parquet(io.BytesIO(_content(path))))
+    else:
+        frame = (_workbook if suffix in WORKBOOKS else _texts)(_content(path), layout)
     if not len(frame):
         raise InvalidValueError("the table has no rows", got=str(path), remedy="Are the lines before it skipped?")
     return frame
 
 
-def read_arrays(path: Path) -> dict[str, Any]:
-    """The arrays in a file of MATLAB by name, those in structures among them."""
-    arrays: dict[str, Any] = _read(path, lambda content: _arrays(content, path))
-    return arrays
-
-
-def _read(path: Path, read: Callable[[bytes], Any]) -> Any:
+def _content(path: Path) -> bytes:
     with opened(path) as file:
-        content = file.read()
-    remedy = "Save it as CSV, with the columns' names in the first line."
-    with reading(path, "the file is no table that can be read", remedy):
-        return read(content)
-
-
-@contextmanager
-def reading(path: Path, what: str, remedy: str) -> Generator[None, None, None]:
-    """Within, whatever a reader of another library fails with is an `InvalidValueError`; its warnings are not shown."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of styles, names and dates; what is read is checked
-            yield
-    except (ConfigError, InvalidValueError, MemoryError):
-        raise
-    except Exception as error:  # each reader has errors of its own
-        why, *_ = str(error).splitlines() or [type(error).__name__]
-        raise InvalidValueError(f"{what}: {why}", got=str(path), remedy=remedy) from error
+        content: bytes = file.read()
+    return content
 
 
 def named(frame: pd.DataFrame | None) -> pd.DataFrame:
@@ -202,12 +179,12 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
     book = pd.ExcelFile(io.BytesIO(content), engine="openpyxl")
     if layout.sheet is not None:
         require_one("sheet", "the workbook", layout.sheet, book.sheet_names)
-    sheets = {
-        str(name): _from_names(
-            book.parse(name, header=None, dtype=object, keep_default_na=False).to_numpy().tolist(), layout
-        )
-        for name in ([layout.sheet] if layout.sheet is not None else book.sheet_names)
-    }
+    sheets = dict[str, list[list[Any]]]()
+    for name in [layout.sheet] if layout.sheet is not None else book.sheet_names:
+        cells = book.parse(name, header=None, dtype=object, keep_default_na=False).to_numpy().tolist()
+        rows = cells[layout.skip_lines :]
+        first = next((n for n, row in enumerate(rows[:_LINES]) if _is_header(row, layout)), 0)
+        sheets[str(name)] = rows if layout.names else rows[first:]
     with_trials = [name for name, rows in sheets.items() if rows and _is_header(rows[0], layout)]
     if len(with_trials) > 1:
         raise InvalidValueError(
@@ -234,15 +211,9 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
     return _table(rows, layout)
 
 
-def _from_names(rows: list[list[Any]], layout: Layout) -> list[list[Any]]:
-    """The rows of a sheet from the columns' names on."""
-    rows = rows[layout.skip_lines :]
-    if layout.names:
-        return rows
-    return rows[next((n for n, row in enumerate(rows[:_LINES]) if _is_header(row, layout)), 0) :]
-
-
-def _arrays(content: bytes, path: Path) -> dict[str, Any]:
+def read_arrays(path: Path) -> dict[str, Any]:
+    """The arrays in a file of MATLAB by name, those in structures among them."""
+    content = _content(path)
     if content.startswith(b"MATLAB 7.3"):
         values = library("pymatreader", "import").read_mat(str(path))
     else:
@@ -266,7 +237,7 @@ def _flat(values: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], Any]]:
             yield (name,), np.asarray(value)
 
 
-def _of_vectors(arrays: Mapping[str, Any], layout: Layout) -> pd.DataFrame:
+def of_vectors(arrays: Mapping[str, Any], layout: Layout) -> pd.DataFrame:
     """The vectors in a file of MATLAB that are as long as that of the ISIs, or the longest, as columns of a table."""
     squeezed = {name: array.squeeze() if array.size > 1 else array for name, array in arrays.items()}
     vectors = {name: array for name, array in squeezed.items() if array.ndim == 1}

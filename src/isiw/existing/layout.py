@@ -124,6 +124,11 @@ class Layout(Checked):
                 choice(f"what a {what} holds", key, sorted(known))
         for unit in self.units:
             choice("a unit", unit, [*ISI_UNITS_MS, *EMG_UNITS])
+        for known in (ISI_UNITS_MS, EMG_UNITS):
+            if len(several := {*self.units} & known.keys()) > 1:
+                raise InvalidValueError("two units of one quantity are stated", got=sorted(several), expected="one")
+        if both := sorted(self.markers.keys() & self.channels.keys()):
+            raise InvalidValueError(f"both a marker and a channel are stated for {both[0]}", remedy="Leave one out.")
 
     def required_reference(self, source: str) -> Reference:
         """The event that the ISIs of a file count from, which nobody but the lab knows."""
@@ -146,8 +151,21 @@ class Layout(Checked):
             if name in given:
                 given[name] = {**getattr(self, name), **given[name]}
         if "units" in given:
-            given["units"] = (*given["units"], *self.units)
+            said = [ISI_UNITS_MS if unit in ISI_UNITS_MS else EMG_UNITS for unit in given["units"]]
+            kept = (unit for unit in self.units if not any(unit in known for known in said))
+            given["units"] = (*given["units"], *kept)
         return replace(self, **given)
+
+
+def required_unit(layout: Layout, known: Mapping[str, float], said: str | None, what: str, got: str | None) -> str:
+    """The unit of something: the one that is stated, or else the one that the file says."""
+    unit = layout.unit_of(known) or said
+    if unit is None or unit not in known:
+        units = "ms or s" if known is ISI_UNITS_MS else "mV, uV or V"
+        raise InvalidValueError(
+            f"the unit of {what} is not stated, or unknown", got=got, remedy=f"Say --unit with {units}."
+        )
+    return unit
 
 
 def read_layout(path: str | Path) -> Layout:

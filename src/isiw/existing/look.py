@@ -22,7 +22,7 @@ from isiw.existing.formats.contents import Contents, Track
 from isiw.existing.frames import named
 from isiw.existing.layout import Layout
 from isiw.existing.limits import ReadingLimits
-from isiw.existing.markers import marked
+from isiw.existing.markers import marked, names_of, times_of
 from isiw.existing.reading import contents_in, people_of_contents
 from isiw.existing.tables import Columns
 from isiw.text.sanitize import command, counted
@@ -124,9 +124,9 @@ def _of_recording(contents: Contents, triggers: Mapping[str, FloatArray]) -> Ite
         yield f"  channel {track.name!r}: {said}{trigger}"
     if len(contents.tracks) > _MOST:
         yield f"  and {counted(len(contents.tracks) - _MOST, 'other channel')}"
-    names = dict.fromkeys(map(str, contents.events["name"]))
-    for name in [*names][:_MOST]:
-        yield f"  event {name!r}: {_times(_at(contents, name))}"
+    names = names_of(contents.events)
+    for name in names[:_MOST]:
+        yield f"  event {name!r}: {_times(times_of(contents.events, name))}"
     if len(names) > _MOST:
         yield f"  and {counted(len(names) - _MOST, 'other name', 'other names')} of events"
     if not names and not triggers:
@@ -148,11 +148,6 @@ def _times(at_s: FloatArray) -> str:
     return f"{len(at_s)} times, {np.median(apart_s):.3g} s apart ({apart_s.min():.3g} to {apart_s.max():.3g})"
 
 
-def _at(contents: Contents, name: str) -> FloatArray:
-    events = contents.events
-    return np.sort(events.loc[events["name"].astype(str) == name, "onset"].to_numpy(dtype=np.float64))
-
-
 def _triggers(contents: Contents) -> Iterator[tuple[str, FloatArray]]:
     """Channels of two levels, by when they leave the one at which they mostly are [s]."""
     for track in contents.tracks:
@@ -172,7 +167,7 @@ def _with_markers(contents: Contents, triggers: Mapping[str, FloatArray], layout
     key = "valve" if (layout.reference or _reference(contents)) == "valve" else "tap"
     if all(marked(contents.events, one, layout) or one in layout.channels for one in (key, "pulse")):
         return layout
-    times = triggers or {name: _at(contents, name) for name in dict.fromkeys(map(str, contents.events["name"]))}
+    times = triggers or {name: times_of(contents.events, name) for name in names_of(contents.events)}
     few = {
         name: at_s for name, at_s in times.items() if len(at_s) > 1 and not re.match("bad|sweep", name, re.IGNORECASE)
     }
@@ -184,7 +179,9 @@ def _with_markers(contents: Contents, triggers: Mapping[str, FloatArray], layout
     if pair is None or follows[pair] < 0.5:
         return layout
     said = dict(zip((key, "pulse"), pair, strict=True))
-    return layout.saying(channels=said) if triggers else layout.saying(markers=said)
+    if triggers:  # and no events that a marker could be of
+        return replace(layout, markers={}).saying(channels=said)
+    return layout.saying(markers=said)
 
 
 def _share(taps_s: FloatArray, pulses_s: FloatArray, longest_s: float) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
@@ -52,19 +52,24 @@ class Pulse:
     said: Mapping[str, Any] = field(default_factory=dict)
 
 
+def times_of(events: pd.DataFrame, *names: str | None) -> FloatArray:
+    """When the events of some names came, ascending [s]."""
+    return np.sort(events.loc[events["name"].astype(str).isin(names), "onset"].to_numpy(dtype=np.float64))
+
+
 def marked(events: pd.DataFrame, key: str, layout: Layout) -> list[float]:
     """When the events of a key came, if there are any [s]."""
-    names = _fitting(events, key, layout)
-    return [] if not names else events.loc[events["name"].astype(str).isin(names), "onset"].tolist()
+    return times_of(events, *_fitting(events, key, layout)).tolist()
 
 
-def _names(events: pd.DataFrame) -> list[str]:
-    return [str(name) for name in dict.fromkeys(events["name"])]
+def names_of(events: pd.DataFrame) -> list[str]:
+    """What events are called, each name once."""
+    return list(dict.fromkeys(map(str, events["name"])))
 
 
 def _fitting(events: pd.DataFrame, key: str, layout: Layout) -> list[str]:
     """The names of the events that mark something."""
-    names = _names(events)
+    names = names_of(events)
     if key in layout.channels:
         return [key]
     if (stated := layout.markers.get(key)) is None:
@@ -77,7 +82,7 @@ def _marker(events: pd.DataFrame, key: str, layout: Layout, source: str) -> str 
     fitting = _fitting(events, key, layout)
     if key in layout.markers and len(fitting) != 1:
         what = "several events" if fitting else "no event"
-        expected = f"one of {', '.join(map(repr, _names(events)))}"
+        expected = f"one of {', '.join(map(repr, names_of(events)))}"
         raise InvalidValueError(f"{source} has {what} of this name", got=layout.markers[key], expected=expected)
     if len(fitting) > 1:
         raise InvalidValueError(
@@ -93,43 +98,34 @@ def _plain(name: str) -> str:
     return "".join(name.rpartition("/")[2].casefold().split())
 
 
-def _required_markers(events: pd.DataFrame, keys: Iterable[str], layout: Layout, source: str) -> list[str]:
-    """The names of the events that mark several things."""
-    found = {key: _marker(events, key, layout, source) for key in keys}
-    missing = [key for key, name in found.items() if name is None]
-    if missing:
-        names = ", ".join(map(repr, _names(events)))
-        said = " ".join(f"--marker {key}=NAME" for key in missing)
-        triggers = " ".join(f"--channel {key}=NAME" for key in missing)
-        raise InvalidValueError(
-            f"no event of {source} is known to mark {', nor '.join(_WHAT[key] for key in missing)}",
-            got=names or "no events, so that no event was found",
-            remedy=f"Say {said if names else triggers}. isiw analyse FILE --look says what is in the file.",
-        )
-    return [name for name in found.values() if name is not None]
-
-
 def pulses_of(events: pd.DataFrame, key: str, layout: Layout, source: str) -> list[Pulse]:
     """All pulses, each with the tap, or the valve command, that it belongs to."""
-    for stated in layout.markers:
-        _marker(events, stated, layout, source)
-    pulse_name, origin_name = _required_markers(events, ("pulse", key), layout, source)
+    found = {one: _marker(events, one, layout, source) for one in ("pulse", key, "alone", *layout.markers)}
+    pulse_name, origin_name, alone_name = (found[one] for one in ("pulse", key, "alone"))
+    missing = [one for one in ("pulse", key) if found[one] is None]
+    if missing:
+        names = ", ".join(map(repr, names_of(events)))
+        said = " ".join(f"--{'marker' if names else 'channel'} {one}=NAME" for one in missing)
+        raise InvalidValueError(
+            f"no event of {source} is known to mark {', nor '.join(_WHAT[one] for one in missing)}",
+            got=names or "no events, so that no event was found",
+            remedy=f"Say {said}. isiw analyse FILE --look says what is in the file.",
+        )
     if origin_name == pulse_name:
         raise InvalidValueError(
             f"one event of {source} cannot mark both stimuli", got=pulse_name, remedy=f"Say --marker {key}=NAME."
         )
-    names = events["name"].astype(str)
-    at_s, origins_s = _sorted(events, names == pulse_name), _once(_sorted(events, names == origin_name))
-    alone_name = _marker(events, "alone", layout, source)
-    alone_s = _sorted(events, names == alone_name) if alone_name not in {None, pulse_name, origin_name} else at_s[:0]
+    at_s, origins_s = times_of(events, pulse_name), times_of(events, origin_name)
+    origins_s = origins_s[np.diff(origins_s, prepend=-np.inf) > _TWICE_S]
+    alone_s = at_s[:0] if alone_name in {pulse_name, origin_name} else times_of(events, alone_name)
     more_s = [at for at in alone_s.tolist() if not np.any(np.abs(at_s - at) <= _SAME_PULSE_S)]
-    epochs = events[names == "sweep"]
-    found = [
+    epochs = events[events["name"].astype(str) == "sweep"]
+    pulses = [
         _placed(at, origins_s, epochs, alone=bool(np.any(np.abs(alone_s - at) <= _SAME_PULSE_S)), layout=layout)
         for at in sorted([*at_s.tolist(), *more_s])
     ]
-    _require_one_each(found, origins_s, layout, source)
-    return _with_the_unmarked(found, layout, source)
+    _require_one_each(pulses, origins_s, layout, source)
+    return _with_the_unmarked(pulses, layout, source)
 
 
 def _require_one_each(pulses: list[Pulse], origins_s: FloatArray, layout: Layout, source: str) -> None:
@@ -150,15 +146,6 @@ def _require_one_each(pulses: list[Pulse], origins_s: FloatArray, layout: Layout
         last_s = pulse.at_s + _EARLY_S
 
 
-def _sorted(events: pd.DataFrame, chosen: Any) -> FloatArray:
-    return np.sort(events.loc[chosen, "onset"].to_numpy(dtype=np.float64))
-
-
-def _once(at_s: FloatArray) -> FloatArray:
-    """The first of edges that come so soon after each other that they are of one trigger."""
-    return at_s[np.diff(at_s, prepend=-np.inf) > _TWICE_S]
-
-
 def _placed(at_s: float, origins_s: FloatArray, epochs: pd.DataFrame, *, alone: bool, layout: Layout) -> Pulse:
     """A pulse with the tap before it, or one shortly after it."""
     epoch = epochs[(epochs["onset"] <= at_s) & (at_s < epochs["onset"] + epochs["duration"])]
@@ -168,17 +155,12 @@ def _placed(at_s: float, origins_s: FloatArray, epochs: pd.DataFrame, *, alone: 
         origins_s = origins_s[(origins_s >= sweep_s[0] - 1e-9) & (origins_s < sweep_s[1])]
     condition = said.get("condition")
     alone = alone or says_alone(condition, None)
-    isi_s = _isi_s(at_s, origins_s, layout.longest_isi_ms / 1e3)
+    before = origins_s[(origins_s <= at_s) & (origins_s >= at_s - layout.longest_isi_ms / 1e3)]
+    after = origins_s[(origins_s > at_s) & (origins_s <= at_s + _EARLY_S)]
+    nearest = [*before[-1:], *after[:1]]
+    isi_s = float(at_s - nearest[0]) if nearest else None  # below 0 if the tap came shortly after
     lost = isi_s is None and isinstance(condition, str) and plain(condition) in {"paired", "unknown"}
     return Pulse(at_s, isi_s, alone, lost, sweep_s, said)
-
-
-def _isi_s(at_s: float, origins_s: FloatArray, longest_s: float) -> float | None:
-    """The time from the last tap to a pulse [s], below 0 if the tap came shortly after it; None if there is none."""
-    before = origins_s[(origins_s <= at_s) & (origins_s >= at_s - longest_s)]
-    after = origins_s[(origins_s > at_s) & (origins_s <= at_s + _EARLY_S)]
-    nearest = before[-1] if len(before) else after[0] if len(after) else None
-    return None if nearest is None else float(at_s - nearest)
 
 
 def _with_the_unmarked(pulses: list[Pulse], layout: Layout, source: str) -> list[Pulse]:

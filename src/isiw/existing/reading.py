@@ -6,7 +6,8 @@ import datetime as dt
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Set as AbstractSet
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,7 +22,7 @@ from isiw.existing.delivered import Delivered, anywhere, read_log, renumbered
 from isiw.existing.doubts import ALL, require_codes, require_isis, require_one_kind, require_one_row_each, require_short
 from isiw.existing.formats import mne_files
 from isiw.existing.formats.contents import Contents
-from isiw.existing.layout import Layout
+from isiw.existing.layout import CHANNELS, EMG_UNITS, Layout
 from isiw.existing.limits import ReadingLimits, require_file, require_table, require_visits
 from isiw.files import is_mcap
 from isiw.findings import INTENSITY_PCT, Kind
@@ -35,6 +36,12 @@ from isiw.visit import Visit
 
 _STRONGEST_PCT_RMT: Final = 300.0
 """No stimulator reaches more in a person whose threshold can be found [% RMT]."""
+
+_OF_FILES: Final[Mapping[str, Mapping[str, None]]] = {
+    **dict.fromkeys(frames.TEXTS, dict.fromkeys(("skip_lines", "names", "separator"))),
+    **dict.fromkeys(frames.WORKBOOKS, dict.fromkeys(("skip_lines", "names", "sheet"))),
+}
+"""What of a layout is of files with a suffix alone."""
 
 
 def read_people(
@@ -65,7 +72,10 @@ def read_people(
         return _in_memory(source, layout, subject)
     path = Path(source)
     if log_exists(path) and is_mcap(path):
-        return [read_log(path)]
+        found = read_log(path)
+        other = None if layout.reference == found.reference else layout.reference
+        _require_use(replace(layout, reference=other), {}, path.name, "a log")
+        return [found]
     if not path.exists():
         raise InvalidValueError("there is no such file", got=str(path), remedy="Check the path.")
     return read_apart(path, layout, subject, limits or ReadingLimits(), also).people
@@ -93,39 +103,64 @@ def contents_in(path: Path, layout: Layout, limits: ReadingLimits, on_rows: Call
 
 
 def people_of_contents(
-    contents: Contents, path: Path, layout: Layout, subject: str, limits: ReadingLimits
+    contents: Contents, path: Path | None, layout: Layout, subject: str, limits: ReadingLimits | None = None
 ) -> list[Delivered]:
     """The people whose trials are in what a file holds; who has no code is called as the file is."""
     _require_used(contents, path, layout)
+    name = subject or ("" if path is None else path.stem)
     if contents.tracks:
-        return [recordings.of_contents(contents, layout, subject or path.stem)]
-    return people_of(frames.named(contents.trials), layout, path.name, subject or path.stem, limits)
+        return [recordings.of_contents(contents, layout, name)]
+    return people_of(frames.named(contents.trials), layout, contents.source, name, limits)
 
 
-def _require_used(contents: Contents, path: Path, layout: Layout) -> None:
-    """Raise if something is stated that a file of this kind has no use for."""
-    unused = ["markers", "rate_hz", "pulse_at_ms", "mep_window_ms"]
+def _require_used(contents: Contents, path: Path | None, layout: Layout) -> None:
+    """Raise if something is stated that contents of this kind have no use for."""
+    in_columns = path is not None and formats.format_of(path).is_table
+    used: dict[str, AbstractSet[str] | None] = dict.fromkeys(("reference", "units", "longest_isi_ms"))
+    used |= _OF_FILES.get("" if path is None else path.suffix.lower(), {})
+    if contents.trials is not None:
+        used |= dict.fromkeys(("columns", "where", "alone", "decimal"))
     if contents.tracks:
-        unused = [] if contents.trials is not None else ["where", "alone", "pulse_at_ms"]
-        unused += [] if contents.trials is not None or formats.format_of(path).is_table else ["columns"]
-    for name in unused if path.suffix.lower() in frames.WORKBOOKS else [*unused, "sheet"]:
-        if getattr(layout, name) not in (None, {}):
+        used |= dict.fromkeys(("channels", "markers", "rate_hz", "mep_window_ms"))
+    kind = "a recording" if contents.tracks else "a table"
+    if contents.tracks and contents.trials is not None:
+        kind = "of sweeps whose ISIs are stated"
+        used |= recordings.OF_SWEEPS
+        used |= {"pulse_at_ms": None, "channels": {"emg"}, "markers": set()} if in_columns else {"unmarked": None}
+    elif contents.tracks:
+        channels = {*CHANNELS} if in_columns else {*CHANNELS} - {"events"}
+        used |= {"unmarked": None, "units": {*EMG_UNITS}, "channels": channels}
+        used |= {"decimal": None} if in_columns else {}
+    _require_use(layout, used, "the data" if path is None else path.name, kind)
+
+
+def _require_use(layout: Layout, used: Mapping[str, AbstractSet[str] | None], source: str, kind: str) -> None:
+    """Raise if a layout states something else than what is used, of tables and lists also by their keys."""
+    for name in (one.name for one in fields(Layout)):
+        value = getattr(layout, name)
+        if name not in used and value == getattr(Layout(), name):
+            continue
+        known = used.get(name, set())
+        if known is not None and (odd := value if name not in used else sorted({*value} - known)):
             raise InvalidValueError(
-                f"{path.name} is {'a recording' if contents.tracks else 'a table'}, and has no use for {name}",
-                got=getattr(layout, name),
-                remedy="Leave it out, or choose the file that it belongs to.",
+                f"{source} is {kind}, and has no use for {name}",
+                got=odd,
+                remedy="Leave it out, or choose its file. If these are samples in columns, say --channel emg=NAME.",
             )
 
 
 def _in_memory(source: Any, layout: Layout, subject: str) -> list[Delivered]:
     """The people of a table, or of a recording that MNE has read."""
     if isinstance(source, pd.DataFrame):
-        return people_of(frames.named(source), layout, "the table", subject)
-    if hasattr(source, "metadata") and hasattr(source, "get_data"):
-        return [recordings.of_contents(mne_files.of_epochs(source), layout, subject)]
-    if hasattr(source, "annotations"):
-        return [recordings.of_contents(mne_files.of_raw(source), layout, subject)]
-    raise InvalidValueError("this holds no trials", got=source, expected="a path, a DataFrame, or mne.Epochs or Raw")
+        contents = Contents("the table", trials=source)
+    elif hasattr(source, "metadata") and hasattr(source, "get_data"):
+        contents = mne_files.of_epochs(source)
+    elif hasattr(source, "annotations"):
+        contents = mne_files.of_raw(source)
+    else:
+        expected = "a path, a DataFrame, or mne.Epochs or Raw"
+        raise InvalidValueError("this holds no trials", got=source, expected=expected)
+    return people_of_contents(contents, None, layout, subject)
 
 
 def people_of(

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Final
 
 from isiw.errors import InvalidValueError
+from isiw.existing.cells import is_missing
 from isiw.existing.delivered import Delivered, anywhere, renumbered
 from isiw.existing.doubts import is_rectified, require_short
 from isiw.existing.formats.columns import require_rate
-from isiw.existing.formats.contents import Contents, Track
+from isiw.existing.formats.contents import Contents, Track, events_of
 from isiw.existing.frames import named
-from isiw.existing.layout import EMG_UNITS, MARKERS, UNIT_WORDS, Layout
-from isiw.existing.markers import Pulse, marked, pulses_of
+from isiw.existing.layout import EMG_UNITS, MARKERS, UNIT_WORDS, Layout, required_unit
+from isiw.existing.markers import marked, names_of, pulses_of
 from isiw.existing.tables import Columns, require_one
 from isiw.findings import Kind
 from isiw.lazy import pd
@@ -25,6 +28,13 @@ from isiw.trials import Channel, Status, Stimulus, Sweep, Trial
 _BEFORE_MS: Final = 150.0
 _AFTER_MS: Final = 100.0
 """What is cut out of a continuous recording: from so long before the longest ISI to so long after the pulse."""
+
+OF_SWEEPS: Final[Mapping[str, AbstractSet[str]]] = {
+    "columns": {"isi", "status", "exclude", "reason", "tap_alone", "subject", "day", "condition"},
+    "channels": {"emg", "tap", "valve"},
+    "markers": {"pulse", "tap", "valve"},
+}
+"""What columns, channels and markers can hold that is used of sweeps whose ISIs are stated."""
 
 Found = tuple[Stimulus, Sweep, Mapping[str, Any]]
 """What was given, what was recorded of it, and what the file says of it."""
@@ -43,35 +53,22 @@ class Recording:
 
 def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
     """The trials of what a file holds, whose sweeps are cut already or are yet to be cut out."""
-    recording = recording_of(contents, layout)
+    held = {"emg": None, **dict.fromkeys(key for key in layout.channels if key != "events")}
+    tracks = {key: track_of(contents, key, layout) for key in held}
+    if layout.rate_hz is not None:
+        require_rate(layout.rate_hz, tracks["emg"].rate_hz, contents.source)
+    triggers = events_of((key, at_s, 0.0) for key in MARKERS if key in tracks for at_s in tracks[key].onsets_s())
+    events = pd.concat([each for each in (contents.events, triggers) if len(each)] or [triggers], ignore_index=True)
+    said, what = tracks["emg"].unit, f"the channel {tracks['emg'].name!r} of {contents.source}"
+    known, notes = UNIT_WORDS.get(said.strip().casefold()), contents.notes
+    unit = required_unit(layout, EMG_UNITS, known, what, said or None)
+    if known not in {None, unit}:
+        notes = (*notes, f"{contents.source} says {said}, and {unit} is used, as stated.")
+    signals = {key: track for key, track in tracks.items() if key not in MARKERS}
+    recording = Recording(signals, unit, events, contents.source, notes)
     if contents.trials is not None and contents.pulse_at_s is not None:
         return _of_rows(contents, recording, layout, subject)
     return delivered_of(recording, sweeps_of(recording, layout), layout, subject)
-
-
-def recording_of(contents: Contents, layout: Layout) -> Recording:
-    """The channels that are needed of a file, and its events with those of the triggers that the layout names."""
-    tracks = {"emg": track_of(contents, "emg", layout)}
-    if "acceleration" in layout.channels:
-        tracks["acceleration"] = track_of(contents, "acceleration", layout)
-    for key, name in layout.channels.items():
-        if key != "events":
-            require_one("channel", contents.source, name, [track.name for track in contents.tracks])
-    if layout.rate_hz is not None:
-        require_rate(layout.rate_hz, tracks["emg"].rate_hz, contents.source)
-    rows = []
-    for key in MARKERS:
-        if key in layout.channels:
-            rows += [(key, at_s, 0.0) for at_s in track_of(contents, key, layout).onsets_s()]
-    events = contents.events
-    if rows:
-        triggers = pd.DataFrame(rows, columns=["name", "onset", "duration"])
-        events = pd.concat([events, triggers], ignore_index=True) if len(events) else triggers
-    unit, said = unit_of(tracks["emg"], layout, contents.source), tracks["emg"].unit
-    other = (
-        [f"{contents.source} says {said}, and {unit} is used, as stated."] if _known(said) not in {None, unit} else []
-    )
-    return Recording(tracks, unit, events, contents.source, (*contents.notes, *other))
 
 
 def track_of(contents: Contents, key: str, layout: Layout) -> Track:
@@ -95,22 +92,6 @@ def track_of(contents: Contents, key: str, layout: Layout) -> Track:
     return fitting[0]
 
 
-def unit_of(track: Track, layout: Layout, source: str) -> str:
-    """The unit of a channel's numbers: the one that is stated, or else the one that the file says."""
-    unit = layout.unit_of(EMG_UNITS) or _known(track.unit)
-    if unit is None or unit not in EMG_UNITS:
-        raise InvalidValueError(
-            f"the unit of the channel {track.name!r} of {source} is not stated, or unknown",
-            got=track.unit or None,
-            remedy="Say --unit with mV, uV, nV or V.",
-        )
-    return unit
-
-
-def _known(unit: str) -> str | None:
-    return UNIT_WORDS.get(unit.strip().casefold())
-
-
 def _of_rows(contents: Contents, recording: Recording, layout: Layout, subject: str) -> Delivered:
     """The trials of sweeps that a row each says the ISI of."""
     layout.required_reference(recording.source)
@@ -122,6 +103,10 @@ def _of_rows(contents: Contents, recording: Recording, layout: Layout, subject: 
             f"{recording.source} does not say the ISI of each sweep",
             got=f"{columns.rows} rows and {len(emg.stretches)} sweeps",
         )
+    known, names = {*layout.markers.values()}, names_of(recording.events)
+    if known and {*names}.isdisjoint(known | {re.sub(r"\D", "", one) for one in known}):  # MNE may keep the number
+        got, expected = ", ".join(sorted(known)), f"one of {', '.join(names)}"
+        raise InvalidValueError(f"no sweep of {recording.source} is marked so", got=got, expected=expected)
     about_tap = {round(at, 6) for at in marked(recording.events, origin_key(layout), layout)}
     rows = columns.chosen(told)
     columns.require_said(rows, told.alone)
@@ -138,7 +123,8 @@ def _of_rows(contents: Contents, recording: Recording, layout: Layout, subject: 
         begins: dict[str, Any] = {begin: None if isi_ms is None else -isi_ms}
         meant = Stimulus(number, None if isi_ms is None else max(isi_ms, 0.0))
         sweep = Sweep({"emg": Channel(values, emg.rate_hz, "mV", -pulse_ms)}, t_tms_ms=0.0, **begins)
-        sweeps.append((meant, sweep, {"excluded": columns.lost(row) is not None}))
+        lost = layout.unmarked == "lost" and not columns["isi"].text(row)
+        sweeps.append((meant, sweep, {"excluded": columns.lost(row) is not None, "lost": lost}))
     require_short([one[0].isi_ms for one in sweeps if one[0].isi_ms is not None], layout, recording.source)
     found = delivered_of(recording, sweeps, layout, _only_one(columns, rows, recording.source) or subject)
     return replace(found, unused=columns.unused)
@@ -209,32 +195,22 @@ def sweeps_of(recording: Recording, layout: Layout) -> list[Found]:
             remedy="Is the marker of the pulse the right one? Say --marker pulse=NAME.",
         )
     longest_s = max((pulse.isi_s or 0.0 for pulse in pulses), default=0.0)
-    found = []
+    events, found = recording.events, []
+    bad = events[events["name"].astype(str).str.lower().str.startswith("bad")]  # as MNE takes them
     for number, pulse in enumerate(pulses):
         begin_s = pulse.at_s - _BEFORE_MS / 1e3 - longest_s
         span_s = pulse.sweep_s or (begin_s, pulse.at_s + _AFTER_MS / 1e3)
         origin_s = None if pulse.isi_s is None else pulse.at_s - pulse.isi_s
         sweep = _cut(recording, span_s, pulse.at_s, origin_s, origin_key(layout))
-        said: Mapping[str, Any] = {**pulse.said, "lost": pulse.lost}
-        if _is_bad(recording.events, min(pulse.at_s - _BEFORE_MS / 1e3, origin_s or pulse.at_s), pulse.at_s):
-            said = {**said, "excluded": True}
-        found.append((Stimulus(number, _commanded_ms(pulse)), sweep, said))
+        said: dict[str, Any] = {**pulse.said, "lost": pulse.lost}
+        judged_s = min(pulse.at_s - _BEFORE_MS / 1e3, origin_s or pulse.at_s), pulse.at_s + _AFTER_MS / 1e3
+        if ((bad["onset"] <= judged_s[1]) & (bad["onset"] + bad["duration"] >= judged_s[0])).any():
+            said["excluded"] = True
+        asked_ms = said.get("commanded_isi_ms")  # what the file says, or else what the events do
+        if pulse.isi_s is not None and is_missing(asked_ms):
+            asked_ms = max(1e3 * pulse.isi_s, 0.0)
+        found.append((Stimulus(number, None if pulse.isi_s is None else float(asked_ms)), sweep, said))
     return found
-
-
-def _commanded_ms(pulse: Pulse) -> float | None:
-    """The ISI that was meant: what the file says, or that of the events, at least 0."""
-    asked = pulse.said.get("commanded_isi_ms")
-    if pulse.isi_s is None:
-        return None
-    return max(1e3 * pulse.isi_s, 0.0) if asked is None or asked != asked else float(asked)  # noqa: PLR0124 - NaN
-
-
-def _is_bad(events: pd.DataFrame, begin_s: float, pulse_s: float) -> bool:
-    """True if an annotation that MNE takes for one of bad data overlaps what is judged of a sweep."""
-    bad = events[events["name"].astype(str).str.lower().str.startswith("bad")]
-    last_s = pulse_s + _AFTER_MS / 1e3
-    return bool(((bad["onset"] <= last_s) & (bad["onset"] + bad["duration"] >= begin_s)).any())
 
 
 def _cut(recording: Recording, span_s: tuple[float, float], pulse_s: float, origin_s: float | None, key: str) -> Sweep:

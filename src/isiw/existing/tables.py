@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Final
 
 from isiw.errors import InvalidValueError, did_you_mean
 from isiw.existing.cells import ALONE, TAP_ALONE, Column, plain, says_alone, with_decimals, without_unit_in_cells
 from isiw.existing.doubts import ALL, require_absolute, require_single_trials
-from isiw.existing.layout import COLUMNS, EMG_UNITS, ISI_UNITS_MS, UNIT_WORDS, Layout, letters
+from isiw.existing.layout import COLUMNS, EMG_UNITS, ISI_UNITS_MS, UNIT_WORDS, Layout, letters, required_unit
 from isiw.findings import Kind
 from isiw.lazy import pd
 from isiw.text.sanitize import counted
@@ -109,18 +109,25 @@ class Columns:
         held = {key: _named(key, names, layout, source) for key in wanted}
         for key in needed:
             if held[key] is None:
-                raise _missing(key, names, source)
+                what = {"isi": "ISIs", "mep": "amplitudes of the MEPs"}[key]
+                raise InvalidValueError(
+                    f"no column of {source} is known to hold the {what}",
+                    got=", ".join(name for name in names if name.strip()) or "no names",
+                    remedy=f'Say --column "{key}=NAME"; if the names are not in the first line, describe the file: '
+                    "--layout FILE.",
+                )
         columns = {}
         for key, name in held.items():
             if name is not None:
                 said, cells = without_unit_in_cells(name, frame.iloc[:, names.index(name)].tolist())
                 columns[key] = Column(said, cells, of=source)
         columns, units = _scaled(columns, layout)
-        if "subject" not in layout.columns and _numbers_rows(columns.get("subject")):
-            held["subject"] = None
-            del columns["subject"]
-        if "subject" in columns:
-            columns["subject"] = replace(columns["subject"], of_codes=True)
+        if (subject := columns.pop("subject", None)) is not None:
+            is_id = "subject" not in layout.columns and letters(subject.name) == "id"
+            if is_id and 1 < len(frame) == len({*map(subject.text, range(len(frame)))}):
+                held["subject"] = None  # each row has one of its own, so that it is of trials and not of people
+            else:
+                columns["subject"] = replace(subject, of_codes=True)
         if "mep" in columns:
             require_single_trials(columns["mep"], columns["isi"], frame, source)
         beside = {
@@ -128,24 +135,12 @@ class Columns:
             for place, name in enumerate(names)
             if name not in held.values() and name.strip()
         }
-        found = cls(columns, len(frame), units, beside, Column("", [None] * len(frame), of=source))
-        return (
-            replace(found, beside={**beside, columns["condition"].name: found._pairs()})
-            if found._has_conditions()
-            else found
-        )
-
-    def _pairs(self) -> Column:
-        """The condition of what is no stimulus alone."""
-        alone = ALONE | TAP_ALONE
-        return replace(
-            self["condition"], cells=["" if plain(str(cell)) in alone else cell for cell in self["condition"].cells]
-        )
-
-    def _has_conditions(self) -> bool:
-        """True if the condition also tells pairs from each other, of which nothing is read."""
-        words = {plain(self["condition"].text(row)) for row in range(self.rows)}
-        return len(words - ALONE - TAP_ALONE - {""}) > 1
+        if (condition := columns.get("condition")) is not None:  # which may tell pairs from each other, too
+            alone = ALONE | TAP_ALONE
+            of_pairs = replace(condition, cells=["" if plain(str(cell)) in alone else cell for cell in condition.cells])
+            if len({plain(of_pairs.text(row)) for row in range(len(frame))} - {""}) > 1:
+                beside[condition.name] = of_pairs
+        return cls(columns, len(frame), units, beside, Column("", [None] * len(frame), of=source))
 
 
 def _scaled(columns: Mapping[str, Column], layout: Layout) -> tuple[dict[str, Column], tuple[str, str]]:
@@ -153,10 +148,11 @@ def _scaled(columns: Mapping[str, Column], layout: Layout) -> tuple[dict[str, Co
     columns = dict(columns)
     numeric = ("isi", "mep", "asked", "isi_sd", "background", "intensity")
     columns |= with_decimals({key: columns[key] for key in numeric if key in columns}, layout.decimal)
-    isi_unit = required_unit("ISIs", columns["isi"], layout, ISI_UNITS_MS)
+    isi_unit = _required_unit("ISIs", columns["isi"], layout, ISI_UNITS_MS)
     factors, mep_unit = {"isi": ISI_UNITS_MS[isi_unit]}, "mV"
     if "mep" in columns:
-        mep_unit = required_unit("amplitudes", columns["mep"], layout, EMG_UNITS)
+        require_absolute(columns["mep"].name, columns["mep"].of)
+        mep_unit = _required_unit("amplitudes", columns["mep"], layout, EMG_UNITS)
         factors["mep"] = EMG_UNITS[mep_unit]
     for key in ("asked", "isi_sd"):
         if key in columns:
@@ -200,31 +196,6 @@ def _named(key: str, names: list[str], layout: Layout, source: str) -> str | Non
     return several[0] if several else None
 
 
-def _missing(key: str, names: list[str], source: str) -> InvalidValueError:
-    what = {"isi": "ISIs", "mep": "amplitudes of the MEPs"}[key]
-    return InvalidValueError(
-        f"no column of {source} is known to hold the {what}",
-        got=", ".join(name for name in names if name.strip()) or "no names",
-        remedy=f'Say --column "{key}=NAME"; if the names are not in the first line, describe the file: --layout FILE.',
-    )
-
-
-def as_long_as_isis(vectors: Mapping[str, Sequence[Any]], layout: Layout, source: str) -> dict[str, Sequence[Any]]:
-    """The vectors that come with sweeps: those that are as long as that of the ISIs."""
-    name = _named("isi", list(vectors), layout, source)
-    if name is None:
-        raise _missing("isi", list(vectors), source)
-    return {other: cells for other, cells in vectors.items() if len(cells) == len(vectors[name])}
-
-
-def _numbers_rows(column: Column | None) -> bool:
-    """True if a column called id has another value in each row, so that it is of trials and not of people."""
-    if column is None or letters(column.name) != "id":
-        return False
-    values = [column.text(row) for row in range(len(column.cells))]
-    return len(values) > 1 and len({*values}) == len(values)
-
-
 def unit_said(name: str, known: Mapping[str, float]) -> str | None:
     """The unit that a column's name says, of those of one quantity.
 
@@ -241,25 +212,8 @@ def unit_said(name: str, known: Mapping[str, float]) -> str | None:
     return next(reversed(found or usual), None)
 
 
-def required_unit(what: str, column: Column, layout: Layout, known: Mapping[str, float]) -> str:
+def _required_unit(what: str, column: Column, layout: Layout, known: Mapping[str, float]) -> str:
     """The column's unit, as it is stated or as its name says."""
-    if known is EMG_UNITS:
-        require_absolute(column.name, column.of)
-    unit = layout.unit_of(known) or unit_said(column.name, known)
-    if unit is None:
-        units = "ms or s" if "ms" in known else "mV, uV or V"
-        numbers = [value for row in range(len(column.cells)) if isinstance(value := _tried(column, row), float)]
-        span = f"{min(numbers):g} to {max(numbers):g}" if numbers else None
-        raise InvalidValueError(
-            f"the unit of the {what} of {column.of} is not stated, in the column {column.name!r}",
-            got=span,
-            remedy=f"Say --unit with {units}.",
-        )
-    return unit
-
-
-def _tried(column: Column, row: int) -> float | None:
-    try:
-        return column.number(row)
-    except InvalidValueError:
-        return None
+    some = ", ".join(filter(None, map(column.text, range(min(5, len(column.cells)))))) or None
+    what = f"the {what} of {column.of} in the column {column.name!r}"
+    return required_unit(layout, known, unit_said(column.name, known), what, some)

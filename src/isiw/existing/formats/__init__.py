@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from isiw.errors import InvalidValueError
-from isiw.existing import frames
+from isiw.errors import ConfigError, InvalidValueError
 from isiw.existing.formats import acq, cfs, columns, edf, eeglab, matlab, mne_files, nwb, smr, statistics, windows, xdf
 from isiw.existing.formats.contents import Contents
 from isiw.existing.layout import Layout
@@ -25,57 +25,30 @@ class Format(NamedTuple):
 
 
 _TABLE: Final = "Save it as CSV, with the columns' names in the first line."
+_EEGLAB: Final = "In EEGLAB: File, Save current dataset as; its .fdt stays beside it."
+_BRAINVISION: Final = "Are the .eeg and .vmrk beside it, under the names that it says?"
 _MNE: Final = "Are all of its files in one folder? Otherwise export it as EDF+ or BrainVision."
+_XDF: Final = "Record again with LabRecorder, or save the streams as EDF+."
+_ACQ: Final = "In AcqKnowledge: File, Save As, text (.txt) or MATLAB (.mat), and a layout."
 
 FORMATS: Final = (
     Format("text", (".csv", ".tsv", ".txt", ".dat", ".tab"), columns.read, _TABLE, is_table=True),
-    Format("Excel", (".xlsx", ".xlsm"), columns.read, _TABLE, library="openpyxl", is_table=True),
-    Format("Parquet", (".parquet",), columns.read, _TABLE, library="pyarrow", is_table=True),
+    Format("Excel", (".xlsx", ".xlsm"), columns.read, _TABLE, "openpyxl", is_table=True),
+    Format("Parquet", (".parquet",), columns.read, _TABLE, "pyarrow", is_table=True),
     Format("MATLAB", (".mat",), matlab.read, "In MATLAB: save('P01.mat', 'isi_ms', 'mep_mv', '-v7').", is_table=True),
-    Format("EDF and BDF", (".edf", ".bdf"), edf.read, "Export it again, as EDF+.", library="mne"),
-    Format(
-        "EEGLAB",
-        (".set",),
-        eeglab.read,
-        "In EEGLAB: File, Save current dataset as; its .fdt stays beside it.",
-        library="mne",
-    ),
-    Format(
-        "BrainVision",
-        (".vhdr",),
-        mne_files.read,
-        "Are the .eeg and .vmrk beside it, under the names that it says?",
-        library="mne",
-    ),
-    Format("FIF", (".fif", ".fif.gz"), mne_files.read, _MNE, library="mne"),
-    Format(
-        "XDF",
-        (".xdf", ".xdfz"),
-        xdf.read,
-        "Record again with LabRecorder, or save the streams as EDF+.",
-        library="pyxdf",
-    ),
-    Format(
-        "AcqKnowledge",
-        (".acq",),
-        acq.read,
-        "In AcqKnowledge: File, Save As, text (.txt) or MATLAB (.mat), and a layout.",
-        library="bioread",
-    ),
-    Format("Spike2", (".smr",), smr.read, windows.SMRX, library="neo"),
-    Format("NWB", (".nwb",), nwb.read, "Is it a file of NWB 2, and complete?", library="pynwb"),
-    Format(
-        "SPSS and Stata",
-        (".sav", ".zsav", ".por", ".dta"),
-        statistics.read,
-        _TABLE,
-        library="pyreadstat",
-        is_table=True,
-    ),
+    Format("EDF and BDF", (".edf", ".bdf"), edf.read, "Export it again, as EDF+."),
+    Format("EEGLAB", (".set",), eeglab.read, _EEGLAB, "pymatreader"),
+    Format("BrainVision", (".vhdr",), mne_files.read, _BRAINVISION, "mne"),
+    Format("FIF", (".fif", ".fif.gz"), mne_files.read, _MNE, "mne"),
+    Format("XDF", (".xdf", ".xdfz"), xdf.read, _XDF, "pyxdf"),
+    Format("AcqKnowledge", (".acq",), acq.read, _ACQ, "bioread"),
+    Format("Spike2", (".smr",), smr.read, windows.SMRX, "neo"),
+    Format("NWB", (".nwb",), nwb.read, "Is it a file of NWB 2, and complete?", "pynwb"),
+    Format("SPSS and Stata", (".sav", ".zsav", ".por", ".dta"), statistics.read, _TABLE, "pyreadstat", is_table=True),
     Format("Signal", (".cfs",), cfs.read, cfs.WAY_IN),
     Format("Spike2 from version 8 on", (".smrx",), windows.smrx, windows.SMRX),
     Format("LabChart", (".adicht",), windows.adicht, windows.ADICHT),
-    Format("CNT, GDF and MFF", (".cnt", ".gdf", ".mff"), mne_files.read, _MNE, library="mne"),
+    Format("CNT, GDF and MFF", (".cnt", ".gdf", ".mff"), mne_files.read, _MNE, "mne"),
 )
 
 
@@ -105,5 +78,13 @@ def read(path: Path, layout: Layout) -> Contents:
         ConfigError: a library is not installed.
     """
     found = format_of(path)
-    with frames.reading(path, f"the file cannot be read as {found.name}", found.way_in):
-        return found.read(path, layout)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of styles, names and dates; what is read is checked
+            return found.read(path, layout)
+    except (ConfigError, InvalidValueError, MemoryError):
+        raise
+    except Exception as error:  # each library has errors of its own
+        why, *_ = str(error).splitlines() or [type(error).__name__]
+        what = f"the file {'is no table, and ' if found.is_table else ''}cannot be read as {found.name}: {why}"
+        raise InvalidValueError(what, got=str(path), remedy=found.way_in) from error

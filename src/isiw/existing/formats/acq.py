@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from isiw.existing.formats.contents import APART_S, Contents, Stretch, Track, events_of
+from isiw.existing.formats.contents import Contents, Track, events_of, parted, time_of
 from isiw.existing.layout import Layout
 from isiw.files import opened
 from isiw.text.named_code import library
@@ -28,10 +28,11 @@ def read(path: Path, _layout: Layout) -> Contents:
     with opened(path) as file:
         found = reader.read_headers(file)
     held, base_hz = found.datafile, float(found.samples_per_second)
-    marks = [(_signed(one), one) for one in found.event_markers or () if one.sample_index is not None]
+    marked = [(int(one.sample_index), one) for one in found.event_markers or () if one.sample_index is not None]
+    marks = [(at - _TURNS if at >= _TURNS // 2 else at, one) for at, one in marked]
     begun = min((at for at, one in marks if _SEGMENT.fullmatch(one.text.strip())), default=0)
-    placed_s = [((at - min(begun, 0)) / base_hz, one) for at, one in marks]
-    cuts_s = sorted(at for at, one in placed_s if _SEGMENT.fullmatch(one.text.strip()) and at > 0)
+    placed = [(at - min(begun, 0), one) for at, one in marks]
+    cuts = [at for at, one in placed if _SEGMENT.fullmatch(one.text.strip())]
 
     @cache
     def numbers(channel: int) -> Any:
@@ -41,38 +42,18 @@ def read(path: Path, _layout: Layout) -> Contents:
     tracks = []
     for index, channel in enumerate(held.channels):
         rate_hz = float(channel.samples_per_second)
-        stretches = tuple(_between(cuts_s, rate_hz, int(channel.point_count)))
+        stretches = parted((round(at / base_hz * rate_hz) for at in cuts), int(channel.point_count), rate_hz)
         tracks.append(Track(channel.name.strip(), rate_hz, stretches, partial(_part, numbers, index), channel.units))
+    whole = parted(cuts, max((at for at, _ in placed), default=0) + 1, base_hz)
     rows = [
-        (one.text.strip() or str(one.type).replace("None", "marker"), _moved(at, cuts_s), 0.0)
-        for at, one in placed_s
+        (one.text.strip() or str(one.type).replace("None", "marker"), time_of(at, whole, base_hz), 0.0)
+        for at, one in placed
         if not _SEGMENT.fullmatch(one.text.strip())
     ]
     return Contents(path.name, tuple(tracks), events_of(rows))
-
-
-def _signed(marker: Any) -> int:
-    at = int(marker.sample_index)
-    return at - _TURNS if at >= _TURNS // 2 else at
 
 
 def _part(numbers: Any, index: int, first: int, last: int) -> FloatArray:
     channel = numbers(index)
     values: FloatArray = np.asarray(channel.raw_data[first:last], dtype=np.float64)
     return values * float(channel.raw_scale_factor) + float(channel.raw_offset)
-
-
-def _moved(at_s: float, cuts_s: list[float]) -> float:
-    """A time, after each pause moved by as much as it is taken for."""
-    return at_s + APART_S * sum(cut_s <= at_s for cut_s in cuts_s)
-
-
-def _between(cuts_s: list[float], rate_hz: float, count: int) -> list[Stretch]:
-    """What was recorded without a pause."""
-    begins = [0, *(min(round(cut_s * rate_hz), count) for cut_s in cuts_s)]
-    ends = [*begins[1:], count]
-    return [
-        Stretch(begin, end - begin, begin / rate_hz + APART_S * number)
-        for number, (begin, end) in enumerate(zip(begins, ends, strict=True))
-        if end > begin
-    ]

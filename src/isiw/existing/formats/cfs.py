@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from isiw.errors import ConfigError
-from isiw.existing.formats.contents import APART_S, Contents, Stretch, Track, events_of
+from isiw.existing.formats.contents import Contents, Track, events_of, parted, time_of
 from isiw.existing.layout import Layout
 
 _FRAME: Final = 0x7FFE
@@ -31,18 +31,16 @@ def read(path: Path, _layout: Layout) -> Contents:
     said, values = json.loads(biosig.header(str(path.resolve()))), np.asarray(biosig.data(str(path.resolve())))
     rate_hz, count = float(said["Samplingrate"]), len(values)
     events = [(int(one["TYP"], 16), float(one["POS"]), one) for one in said.get("EVENT", ())]
-    firsts = sorted({0, *(round(at * rate_hz) for kind, at, _ in events if kind == _FRAME)} - {count})
-    frames = [
-        Stretch(first, end - first, n * APART_S)
-        for n, (first, end) in enumerate(zip(firsts, [*firsts[1:], count], strict=True))
-    ]
+    firsts = [round(at * rate_hz) for kind, at, _ in events if kind == _FRAME]
+    frames = parted(firsts, count, rate_hz)
     tracks = [
         Track.of_values(one["Label"], rate_hz, frames, values[:, index], one.get("PhysicalUnit", ""))
         for index, one in enumerate(said["CHANNEL"][: values.shape[1]])
     ]
     rows = [("sweep", frame.start_s, frame.samples / rate_hz) for frame in frames if len(frames) > 1]
-    for kind, at, one in events:
-        if kind != _FRAME:
-            frame = next(frame for frame in reversed(frames) if frame.first <= at * rate_hz + 0.5)
-            rows.append((str(one.get("Description") or kind), frame.start_s + at - frame.first / rate_hz, 0.0))
+    rows += [
+        (str(one.get("Description") or kind), time_of(at * rate_hz, frames, rate_hz), 0.0)
+        for kind, at, one in events
+        if kind != _FRAME
+    ]
     return Contents(path.name, tuple(tracks), events_of(rows))

@@ -11,7 +11,7 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.existing import frames
 from isiw.existing.cells import Column, is_missing, with_decimals
-from isiw.existing.formats.contents import APART_S, Contents, Stretch, Track, events_of
+from isiw.existing.formats.contents import Contents, Track, events_of, parted, time_of
 from isiw.existing.layout import EMG_UNITS, ISI_UNITS_MS, MARKERS, Layout
 from isiw.existing.tables import require_one, unit_said
 from isiw.lazy import pd
@@ -32,13 +32,13 @@ def read(path: Path, layout: Layout) -> Contents:
         require_one("column", source, name, frame, remedy)
     breaks = frame.iloc[:, 0].astype(str).str.endswith("=").to_numpy()
     frame, block = frame[~breaks], np.cumsum(breaks)[~breaks]
-    pauses_s = _pauses_s(frame[block == block[:1]], layout, rate_hz, source)
+    pauses_s, first_block = dict[int, float](), frame[block == block[:1]]
+    for place, name in enumerate(frame.columns):
+        if name not in layout.channels.values() and (clock := clock_of(first_block.iloc[:, place], name, rate_hz)):
+            require_rate(rate_hz, clock[0], f"the column {name!r} of {source}")
+            pauses_s = pauses_s or clock[1]
     blocks = np.flatnonzero(np.diff(block, prepend=-1)).tolist()
-    starts_s = {at: n * APART_S for n, at in enumerate(blocks)}
-    if len(blocks) == 1:
-        starts_s |= {at: at / rate_hz + sum(pauses_s[one] for one in pauses_s if one <= at) for at in pauses_s}
-    ends = [*list(starts_s)[1:], len(block)]
-    stretches = tuple(Stretch(at, end - at, own_s) for (at, own_s), end in zip(starts_s.items(), ends, strict=True))
+    stretches = parted(blocks if len(blocks) > 1 else pauses_s, len(block), rate_hz, pauses_s)
     tracks = list[Track]()
     for key, name in layout.channels.items():
         if key != "events" and name not in {track.name for track in tracks}:
@@ -48,8 +48,7 @@ def read(path: Path, layout: Layout) -> Contents:
     rows = []
     for at, text in enumerate(frame[layout.channels["events"]].tolist() if "events" in layout.channels else ()):
         if not is_missing(text):
-            stretch = next(one for one in reversed(stretches) if one.first <= at)
-            rows.append((str(text).lstrip("#* "), stretch.start_s + (at - stretch.first) / rate_hz, 0.0))
+            rows.append((str(text).lstrip("#* "), time_of(at, stretches, rate_hz), 0.0))
     if len(blocks) > 1:
         rows += [("sweep", one.start_s, one.samples / rate_hz) for one in stretches]
     return Contents(source, tuple(tracks), events_of(rows))
@@ -72,16 +71,6 @@ def require_rate(stated_hz: float, found_hz: float, where: str) -> None:
             expected=f"{found_hz:g} Hz",
             remedy="Correct rate_hz in the layout.",
         )
-
-
-def _pauses_s(frame: pd.DataFrame, layout: Layout, rate_hz: float, source: str) -> dict[int, float]:
-    """How long recording paused before some samples, by a column of times; raise if it says another sampling rate."""
-    found = dict[int, float]()
-    for name in sorted({*frame.columns} - {*layout.channels.values()}):
-        if (clock := clock_of(frame.iloc[:, list(frame.columns).index(name)], name, rate_hz)) is not None:
-            require_rate(rate_hz, clock[0], f"the column {name!r} of {source}")
-            found = found or clock[1]
-    return found
 
 
 def clock_of(cells: pd.Series, name: str, rate_hz: float) -> tuple[float, dict[int, float]] | None:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from operator import itemgetter
+from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -30,25 +33,34 @@ class Stretch(NamedTuple):
     start_s: float
 
 
+def parted(
+    cuts: Iterable[int], samples: int, rate_hz: float, missing_s: Mapping[int, float] = MappingProxyType({})
+) -> tuple[Stretch, ...]:
+    """Samples as stretches: before those at cuts something is missing, for `APART_S` if it is not known how long."""
+    found, first, start_s = list[Stretch](), 0, 0.0
+    for at in sorted({*cuts, samples}):
+        if first < at <= samples:
+            found.append(Stretch(first, at - first, start_s))
+            first, start_s = at, start_s + (at - first) / rate_hz + (missing_s.get(at) or APART_S)
+    return tuple(found)
+
+
+def time_of(sample: float, stretches: Sequence[Stretch], rate_hz: float) -> float:
+    """When a sample was taken, which may be between two of them [s]."""
+    stretch = next((one for one in reversed(stretches) if one.first <= sample + 0.5), Stretch(0, 0, 0.0))
+    return stretch.start_s + (sample - stretch.first) / rate_hz
+
+
 @dataclass(frozen=True, eq=False)
 class Track:
-    """A channel of a file, whose samples are read when they are needed.
-
-    Args:
-        name: what it is called.
-        rate_hz: its sampling rate.
-        stretches: where it was recorded, ascending.
-        read: its numbers from one sample to before another, scaled as the file says.
-        unit: the unit of these numbers, as the file writes it; empty if it says none.
-        kind: its type, such as `emg` or `stim`, where the file says so.
-    """
+    """A channel of a file, whose samples are read when they are needed."""
 
     name: str
     rate_hz: float
-    stretches: tuple[Stretch, ...]
-    read: Callable[[int, int], FloatArray]
-    unit: str = ""
-    kind: str = ""
+    stretches: tuple[Stretch, ...]  # where it was recorded, ascending
+    read: Callable[[int, int], FloatArray]  # its numbers from one sample to before another, scaled as the file says
+    unit: str = ""  # of these numbers, as the file writes it; empty if it says none
+    kind: str = ""  # such as emg or stim, where the file says so
 
     @classmethod
     def of_values(
@@ -60,13 +72,6 @@ class Track:
             return np.asarray(values[first:last], dtype=np.float64)
 
         return cls(name, rate_hz, tuple(stretches), part, unit, kind)
-
-    @classmethod
-    def of_sweeps(cls, name: str, rate_hz: float, sweeps: FloatArray, unit: str, kind: str = "") -> Track:
-        """A channel of sweeps of one length, shape (n, w)."""
-        length = sweeps.shape[1]
-        stretches = [Stretch(n * length, length, n * APART_S) for n in range(len(sweeps))]
-        return cls.of_values(name, rate_hz, stretches, np.ascontiguousarray(sweeps).ravel(), unit, kind)
 
     def at(self, time_s: float) -> Stretch | None:
         """The stretch that a time is in; None in a gap."""
@@ -144,8 +149,8 @@ class Track:
 
 
 def events_of(rows: Iterable[Sequence[Any]]) -> pd.DataFrame:
-    """Events as a table: what each is called, when it was [s], and how long it lasted [s]."""
-    return pd.DataFrame([tuple(row) for row in rows], columns=["name", "onset", "duration"])
+    """Events as a table, by their times: what each is called, when it was [s], and how long it lasted [s]."""
+    return pd.DataFrame(sorted(map(tuple, rows), key=itemgetter(1)), columns=["name", "onset", "duration"])
 
 
 def with_codes(rows: Sequence[tuple[str, float, float]], tracks: Iterable[Track]) -> pd.DataFrame:
@@ -159,27 +164,25 @@ def with_codes(rows: Sequence[tuple[str, float, float]], tracks: Iterable[Track]
             if not any(abs(at - other) * track.rate_hz <= _SAME for other in known):
                 known.append(at)
                 found.append((str(code), at, 0.0))
-    return events_of(sorted(found, key=lambda row: row[1]))
+    return events_of(found)
 
 
 @dataclass(frozen=True, eq=False)
 class Contents:
-    """What a file holds.
+    """What a file holds."""
 
-    Args:
-        source: the file in words, for messages.
-        tracks: its channels; none of a table.
-        events: what happened when, with the columns `name`, `onset` and `duration` [s], and what is said of each.
-        trials: a row for each trial, or for each sweep; None if it says nothing of them.
-        pulse_at_s: of sweeps that `trials` says the ISIs of, when the pulse came after the first sample.
-        empty_is_alone: whether a sweep without an ISI is TMS alone.
-        notes: what the operator should know of how it was read.
-    """
+    source: str  # in words, for messages
+    tracks: tuple[Track, ...] = ()  # none of a table
+    events: pd.DataFrame = field(default_factory=lambda: events_of(()))  # of each its name, onset and duration [s]
+    trials: pd.DataFrame | None = None  # a row for each trial, or for each sweep
+    pulse_at_s: float | None = None  # of sweeps whose ISIs are in trials, after the first sample
+    empty_is_alone: bool = False  # whether a sweep without an ISI is TMS alone
+    notes: tuple[str, ...] = ()  # what the operator should know of how it was read
 
-    source: str
-    tracks: tuple[Track, ...] = ()
-    events: pd.DataFrame = field(default_factory=lambda: events_of(()))
-    trials: pd.DataFrame | None = None
-    pulse_at_s: float | None = None
-    empty_is_alone: bool = False
-    notes: tuple[str, ...] = ()
+    def with_bids(self, path: Path) -> Contents:
+        """The same with the events that BIDS has in a file beside a recording, if there is one."""
+        beside = path.with_name(f"{path.stem.rpartition('_')[0]}_events.tsv")
+        if not beside.is_file() or beside.name == "_events.tsv":
+            return self
+        frame = pd.read_csv(beside, sep="\t", na_values=["n/a"])
+        return replace(self, events=frame.rename(columns={"trial_type" if "trial_type" in frame else "value": "name"}))

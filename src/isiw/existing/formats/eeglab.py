@@ -11,8 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.existing.formats.beside import bids_events
-from isiw.existing.formats.contents import APART_S, Contents, Stretch, Track, events_of
+from isiw.existing.formats.contents import Contents, Track, events_of, parted, time_of
 from isiw.existing.layout import EMG_UNITS, Layout
 from isiw.files import opened
 from isiw.text.named_code import library
@@ -32,10 +31,10 @@ def read(path: Path, layout: Layout) -> Contents:
     rate_hz, samples, trials = float(eeg["srate"]), int(eeg["pnts"]), int(eeg.get("trials") or 1)
     places = _listed(eeg.get("chanlocs"))
     events = [one for one in _listed(eeg.get("event")) if not _empty(one.get("latency"))]
-    if trials > 1:
-        stretches = tuple(Stretch(n * samples, samples, n * APART_S) for n in range(trials))
-    else:
-        stretches = _between(events, samples, rate_hz)
+    pauses = {math.ceil(float(one["latency"]) - 1.0): _number(one.get("duration")) / rate_hz
+              for one in events if _name(one.get("type")) == "boundary"}  # fmt: skip
+    cuts = range(samples, trials * samples, samples) if trials > 1 else pauses
+    stretches = parted(cuts, trials * samples, rate_hz, {} if trials > 1 else pauses)
     tracks = []
     for n in range(int(eeg["nbchan"])):
         place = places[n] if n < len(places) else {}
@@ -46,15 +45,14 @@ def read(path: Path, layout: Layout) -> Contents:
     rows = [
         (
             _name(one["type"]),
-            _at_s(float(one["latency"]) - 1.0, stretches, rate_hz),
+            time_of(float(one["latency"]) - 1.0, stretches, rate_hz),
             _number(one.get("duration")) / rate_hz,
         )
         for one in events
         if _name(one.get("type")) != "boundary"
     ]
-    beside = bids_events(path)
     notes = () if layout.unit_of(EMG_UNITS) else (_ASSUMED,)
-    return Contents(path.name, tuple(tracks), events_of(rows) if beside is None else beside, notes=notes)
+    return Contents(path.name, tuple(tracks), events_of(rows), notes=notes).with_bids(path)
 
 
 def _values(eeg: Mapping[str, Any], path: Path, channel: int, first: int, last: int) -> FloatArray:
@@ -74,26 +72,6 @@ def _values(eeg: Mapping[str, Any], path: Path, channel: int, first: int, last: 
         values = values[None]
     flat = values[channel] if values.ndim < 3 else values[channel].T.ravel()
     return np.asarray(flat[first:last], dtype=np.float64)
-
-
-def _between(events: list[Mapping[str, Any]], samples: int, rate_hz: float) -> tuple[Stretch, ...]:
-    """What lies between boundaries, where data were cut out or recording paused, for as long as the file says."""
-    found, first, start_s = [], 0, 0.0
-    cuts = sorted(
-        (math.ceil(float(one["latency"]) - 1.0), one) for one in events if _name(one.get("type")) == "boundary"
-    )
-    for at, one in cuts:
-        if 0 < at < samples and at > first:
-            found.append(Stretch(first, at - first, start_s))
-            missing_s = _number(one.get("duration")) / rate_hz
-            first, start_s = at, start_s + (at - first) / rate_hz + (missing_s or APART_S)
-    return (*found, Stretch(first, samples - first, start_s))
-
-
-def _at_s(sample: float, stretches: tuple[Stretch, ...], rate_hz: float) -> float:
-    """When a sample was taken, which may be between two of them [s]."""
-    stretch = [one for one in stretches if one.first <= sample + 0.5][-1]
-    return stretch.start_s + (sample - stretch.first) / rate_hz
 
 
 def _listed(value: Any) -> list[Mapping[str, Any]]:

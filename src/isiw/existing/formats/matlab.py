@@ -11,7 +11,7 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.existing import frames, tables
 from isiw.existing.formats import columns
-from isiw.existing.formats.contents import Contents, Track
+from isiw.existing.formats.contents import Contents, Track, parted
 from isiw.existing.layout import EMG_UNITS, Layout, letters
 from isiw.lazy import pd
 
@@ -32,11 +32,8 @@ def read(path: Path, layout: Layout) -> Contents:
 def _sweeps(arrays: Mapping[str, Any], layout: Layout, source: str) -> Contents:
     rate_hz = columns.required(layout, "rate_hz", f"the sampling rate of {source}")
     pulse_at_ms = columns.required(layout, "pulse_at_ms", f"the time of the pulse in a sweep of {source}")
-    vectors = {
-        name: array.ravel().tolist() for name, array in arrays.items() if max(array.shape, default=0) == array.size
-    }
-    beside = tables.as_long_as_isis(vectors, layout, source)
-    name, count = layout.channels["emg"], len(next(iter(beside.values())))
+    beside, name = frames.of_vectors(arrays, layout), layout.channels["emg"]
+    count = len(beside)
     sweeps = np.asarray(arrays[name], dtype=np.float64)
     if sweeps.ndim != 2 or count not in sweeps.shape:
         raise InvalidValueError(
@@ -50,8 +47,10 @@ def _sweeps(arrays: Mapping[str, Any], layout: Layout, source: str) -> Contents:
         if array.size == sweeps.size // count != count:
             _require_zero(other, array.ravel(), rate_hz, pulse_at_ms, source)
     unit = tables.unit_said(name, EMG_UNITS) or ""
-    track = Track.of_sweeps(name, rate_hz, sweeps if sweeps.shape[0] == count else sweeps.T, unit)
-    return Contents(source, (track,), trials=pd.DataFrame(beside), pulse_at_s=pulse_at_ms / 1e3)
+    flat = (sweeps if sweeps.shape[0] == count else sweeps.T).ravel()
+    stretches = parted(range(0, flat.size, flat.size // count), flat.size, rate_hz)
+    track = Track.of_values(name, rate_hz, stretches, flat, unit)
+    return Contents(source, (track,), trials=beside, pulse_at_s=pulse_at_ms / 1e3)
 
 
 def _require_zero(name: str, times: Any, rate_hz: float, pulse_at_ms: float, source: str) -> None:

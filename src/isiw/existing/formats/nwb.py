@@ -22,23 +22,24 @@ def read(path: Path, _layout: Layout) -> Contents:
     pynwb = library("pynwb", "import-nwb")
     held = pynwb.NWBHDF5IO(str(path), "r", load_namespaces=True)
     objects = list(held.read().objects.values())
-    tracks, rows, tables = list[Track](), list[tuple[str, float, float]](), list[pd.DataFrame]()
+    tracks, tables, events = list[Track](), list[pd.DataFrame](), list[pd.DataFrame]()
     for one in objects:
         if isinstance(one, pynwb.misc.AnnotationSeries):
             texts, times_s = one.data[:], one.timestamps[:]
-            rows += [(_text(text), float(at), 0.0) for text, at in zip(texts, times_s, strict=True)]
+            events.append(events_of((_text(text), float(at), 0.0) for text, at in zip(texts, times_s, strict=True)))
         elif isinstance(one, pynwb.epoch.TimeIntervals):
             tables.append(one.to_dataframe())
+            events.append(_events(tables[-1], "start_time", "sweep"))
         elif isinstance(one, pynwb.core.DynamicTable) and "timestamp" in one.colnames:
-            rows += _stamped(one)
+            events.append(_events(one.to_dataframe(), "timestamp", str(one.name)))
         elif isinstance(one, pynwb.TimeSeries) and getattr(one.data, "ndim", np.ndim(one.data)) in {1, 2}:
             if (codes := _codes(one)) is None:
                 tracks += _channels(one, held)
             else:
-                rows += codes
-    events = pd.concat([events_of(rows), *(_intervals(table) for table in tables)], ignore_index=True)
+                events.append(events_of(codes))
+    found = pd.concat([events_of(()), *events], ignore_index=True).sort_values("onset", ignore_index=True)
     trials = next((table for table in tables if not tracks and len(table)), None)
-    return Contents(path.name, tuple(tracks), events.sort_values("onset", ignore_index=True), trials)
+    return Contents(path.name, tuple(tracks), found, trials)
 
 
 def _channels(series: Any, held: Any) -> Iterator[Track]:
@@ -67,10 +68,8 @@ def _codes(series: Any) -> list[tuple[str, float, float]] | None:
         return None
     times_s = np.asarray(series.timestamps[:], dtype=np.float64)
     steps_s = np.diff(times_s)
-    if (
-        len(steps_s) > 1 and np.quantile(np.abs(steps_s / np.median(steps_s) - 1), 0.9) < 0.1
-    ):  # samples, that come evenly
-        return None
+    if len(steps_s) > 1 and np.quantile(np.abs(steps_s / np.median(steps_s) - 1), 0.9) < 0.1:
+        return None  # samples, that come evenly
     return [(f"{code}", at, 0.0) for code, at in zip(series.data[:].tolist(), times_s.tolist(), strict=True)]
 
 
@@ -81,28 +80,18 @@ def _part(
     return np.asarray(values, dtype=np.float64) * factor + offset
 
 
-def _stamped(table: Any) -> Iterator[tuple[str, float, float]]:
-    """The rows of a table of events, by their texts, or by the table's name."""
-    frame = table.to_dataframe()
-    label = next((name for name in ("annotation", "label", "event_type") if name in frame), None)
-    for place, at in enumerate(frame["timestamp"].to_numpy(dtype=np.float64).tolist()):
-        text = "" if label is None else _text(frame[label].iloc[place])
-        yield text or str(table.name), at, 0.0
-
-
 def _text(value: Any) -> str:
     return value.decode("utf-8") if isinstance(value, bytes) else str(value)
 
 
-def _intervals(table: pd.DataFrame) -> pd.DataFrame:
-    """The rows of a table of intervals as sweeps, or by their labels, and each column of times as events."""
-    others = table.drop(columns=["start_time", "stop_time"])
-    label = next((name for name in ("label", "event", "event_type", "name") if name in others), None)
-    lasts = (table["stop_time"] - table["start_time"]).to_numpy(dtype=np.float64)
-    names = ["sweep"] * len(table) if label is None else list(map(_text, others[label]))
-    found = [others.assign(name=names, onset=table["start_time"].to_numpy(dtype=np.float64), duration=lasts)]
-    for column in others:
-        if str(column).endswith("_time"):
-            times_s = others[column].dropna().to_numpy(dtype=np.float64)
-            found.append(events_of((str(column).removesuffix("_time"), at, 0.0) for at in times_s.tolist()))
+def _events(table: pd.DataFrame, begin: str, usual: str) -> pd.DataFrame:
+    """The rows of a table of times by their labels, and each further column of times as events."""
+    label = next((name for name in ("label", "annotation", "event", "event_type", "name") if name in table), None)
+    names = [usual] * len(table) if label is None else [_text(text) or usual for text in table[label]]
+    lasts = (table["stop_time"] - table["start_time"]).to_numpy(dtype=np.float64) if "stop_time" in table else 0.0
+    others = table.drop(columns=[begin, "stop_time"], errors="ignore")
+    found = [others.assign(name=names, onset=table[begin].to_numpy(dtype=np.float64), duration=lasts)]
+    for column in (str(name) for name in others if str(name).endswith("_time")):
+        times_s = others[column].dropna().to_numpy(dtype=np.float64).tolist()
+        found.append(events_of((column.removesuffix("_time"), at, 0.0) for at in times_s))
     return pd.concat(found, ignore_index=True)

@@ -35,7 +35,7 @@ def read(path: Path, _layout: Layout) -> Contents:
             Track(str(channel["name"]), float(channel["sampling_rate"]), stretches, scaled, str(channel["units"]))
         )
     rows = [row for index in range(len(raw.header["event_channels"])) for row in _events(raw, index)]
-    return Contents(path.name, tuple(tracks), events_of(sorted(rows, key=lambda row: row[1])))
+    return Contents(path.name, tuple(tracks), events_of(rows))
 
 
 def _part(raw: Any, index: int, firsts: list[int], gain: float, offset: float, first: int, last: int) -> FloatArray:
@@ -52,8 +52,9 @@ def _events(raw: Any, index: int) -> list[tuple[str, float, float]]:
     ticks, _, labels = raw.get_event_timestamps(0, 0, index, t_start=0.0, t_stop=_EVER_S)
     times_s = raw.rescale_event_timestamp(ticks, "float64", index)
     kind = raw._channel_infos[int(channel["id"])]["kind"]  # noqa: SLF001 - neo does not say it elsewhere
-    if kind == _LEVEL:
-        first = _first_onset(times_s)
+    if kind == _LEVEL:  # which begins with the first edge that leaves the level at which it mostly is
+        spans_s = np.diff(times_s)
+        first = int(len(spans_s) > 1 and np.median(spans_s[0::2]) > np.median(spans_s[1::2]))
         times_s, labels = times_s[first::2], labels[first::2]
     title = str(channel["name"])
     return [
@@ -61,14 +62,6 @@ def _events(raw: Any, index: int) -> list[tuple[str, float, float]]:
         for at_s, label in zip(times_s.tolist(), labels.tolist(), strict=True)
         if math.isfinite(at_s)
     ]
-
-
-def _first_onset(edges_s: FloatArray) -> int:
-    """Which edge of a level is the first that leaves the level at which it mostly is."""
-    spans_s = np.diff(edges_s)
-    if len(spans_s) < 2:
-        return 0
-    return int(np.median(spans_s[0::2]) > np.median(spans_s[1::2]))
 
 
 def _name(title: str, kind: int, label: str) -> str:

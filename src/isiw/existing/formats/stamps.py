@@ -28,16 +28,9 @@ class Clocked(NamedTuple):
 def clocked(
     times_s: FloatArray, nominal_hz: float | None, what: str, index: IntArray | None = None, samples: int = 0
 ) -> Clocked:
-    """Times of samples as stretches without a gap; what is left out is jitter.
+    """Times of samples [s], shape (n,), as stretches without a gap, whatever its length; what is left out is jitter.
 
-    A gap is found whatever its length, and no stretch is stretched over it.
-
-    Args:
-        times_s: when each sample was taken [s], shape (n,), or each of those that are known.
-        nominal_hz: the rate that is stated; None for that of the times.
-        what: whose samples these are, for messages.
-        index: which samples these are, if they are not all, ascending, shape (n,).
-        samples: how many there are in all, if these are not all.
+    If not all times are known, `index` says of which samples they are, ascending, and `samples` how many there are.
     """
     index = np.arange(len(times_s)) if index is None else index
     ahead = np.diff(index)
@@ -47,7 +40,9 @@ def clocked(
     nominal_s = 1.0 / nominal_hz if nominal_hz else float(np.median(steps_s))
     late_s = times_s - index * nominal_s
     around = max(3, round(_AROUND_S / (nominal_s * float(ahead.mean()))))
-    least_s = max(_GAP_S, 1.5 * nominal_s, 2.0 * _jitter_s(late_s, around))
+    near_s = late_s[: len(late_s) // around * around].reshape(-1, around)  # about which times scatter, whatever gaps
+    jitter_s = 1.48 * np.median(np.abs(near_s - np.median(near_s, axis=1, keepdims=True))) if len(near_s) else 0.0
+    least_s = max(_GAP_S, 1.5 * nominal_s, 2.0 * float(jitter_s))
     late = (np.flatnonzero(np.diff(late_s) > 0.8 * least_s) + 1).tolist()
     begins = [0, *_gaps(late_s, late, (0, len(times_s)), around, least_s)]
     ends = [*begins[1:], len(times_s)]
@@ -66,30 +61,16 @@ def clocked(
 
 def _gaps(late_s: FloatArray, places: list[int], span: tuple[int, int], around: int, least_s: float) -> list[int]:
     """Where samples are later than those before, for good: the surest place, and those on both sides of it."""
-    sides = {
-        at: (late_s[max(span[0], at - around) : at], late_s[at : min(span[1], at + around)])
-        for at in places
-        if span[0] < at < span[1]
-    }
-    sure = {
-        at: float(after.mean() - before.mean())
-        for at, (before, after) in sides.items()
-        if np.median(after) - np.median(before) > least_s
-    }
+    sure = dict[int, float]()
+    for at in (place for place in places if span[0] < place < span[1]):
+        before, after = late_s[max(span[0], at - around) : at], late_s[at : min(span[1], at + around)]
+        if np.median(after) - np.median(before) > least_s:
+            sure[at] = float(after.mean() - before.mean())
     if not sure:
         return []
-    at = max(sure, key=lambda place: sure[place])
-    return [
-        *_gaps(late_s, places, (span[0], at), around, least_s),
-        at,
-        *_gaps(late_s, places, (at, span[1]), around, least_s),
-    ]
-
-
-def _jitter_s(late_s: FloatArray, around: int) -> float:
-    """The SD of times about those near them, whatever gaps there are [s]."""
-    whole = late_s[: len(late_s) // around * around].reshape(-1, around)
-    return 1.48 * float(np.median(np.abs(whole - np.median(whole, axis=1, keepdims=True)))) if len(whole) else 0.0
+    surest = max(sure, key=lambda place: sure[place])
+    sides = [_gaps(late_s, places, side, around, least_s) for side in ((span[0], surest), (surest, span[1]))]
+    return [*sides[0], surest, *sides[1]]
 
 
 def _period_s(times_s: FloatArray, index: IntArray, nominal_s: float) -> float:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from isiw.errors import ConfigError
-from isiw.existing.formats.contents import APART_S, Contents, Stretch, Track, events_of
+from isiw.existing.formats.contents import Contents, Stretch, Track, events_of, parted, time_of
 from isiw.existing.layout import Layout
 from isiw.text.named_code import library
 from isiw.types import FloatArray
@@ -60,7 +60,7 @@ def smrx(path: Path, _layout: Layout) -> Contents:
             rows += [(f"{title} {one.Code1}", one.Tick * tick_s, 0.0) for one in held.ReadMarkers(channel, 2**20, 0)]
         elif kind in _TEXTS:
             rows += [(one.Text, one.Tick * tick_s, 0.0) for one in held.ReadTextMarks(channel, 2**20, 0)]
-    return Contents(path.name, tuple(tracks), events_of(sorted(rows, key=lambda row: row[1])))
+    return Contents(path.name, tuple(tracks), events_of(rows))
 
 
 def adicht(path: Path, _layout: Layout) -> Contents:
@@ -70,10 +70,11 @@ def adicht(path: Path, _layout: Layout) -> Contents:
     for channel in held.channels:
         parts = [np.asarray(channel.get_data(n + 1), dtype=np.float64) for n in range(channel.n_records)]
         firsts = np.cumsum([0, *map(len, parts)]).tolist()
-        stretches = [Stretch(firsts[n], len(part), n * APART_S) for n, part in enumerate(parts) if len(part)]
-        units = {unit for unit in channel.units if unit}
-        unit = units.pop() if len(units) == 1 else ""
-        tracks.append(Track.of_values(channel.name, float(channel.fs[0]), stretches, np.concatenate(parts), unit))
-    for n, record in enumerate(held.records):
-        rows += [(one.text, n * APART_S + float(one.time), 0.0) for one in record.comments]
+        rate_hz, unit = float(channel.fs[0]), ", ".join(sorted({unit for unit in channel.units if unit}))
+        stretches = parted(firsts, firsts[-1], rate_hz)
+        tracks.append(Track.of_values(channel.name, rate_hz, stretches, np.concatenate(parts), unit))
+        if not rows:  # comments say how long after the beginning of their record they are
+            for first, record in zip(firsts, held.records, strict=False):
+                times = [(one.text, first + float(one.time) * rate_hz) for one in record.comments]
+                rows += [(text, time_of(at, stretches, rate_hz), 0.0) for text, at in times]
     return Contents(path.name, tuple(tracks), events_of(rows))
