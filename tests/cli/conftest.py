@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import io
 import shutil
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from functools import cache
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import IO, Any, TypeAlias
 
 import pytest
+from typer import testing
+from typer.main import get_command
 from typer.testing import CliRunner, Result
 
 from isiw.cli import app
@@ -19,6 +23,30 @@ COMMAND = [sys.executable, "-c", "from isiw.cli import app; app()"]
 """isiw as a process of its own."""
 
 SHORT = "[strategy.settings]\nmax_trials = 3\nparticles = 100\n"
+
+
+@pytest.fixture(scope="session", autouse=True)
+def described_once() -> Generator[None, None, None]:
+    """The command line is made of its functions once, as in a process, and not for each call."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(testing, "_get_command", cache(get_command))
+        yield
+
+
+def _framed(_: object, to: str | Path | IO[Any], **_options: object) -> None:
+    if isinstance(to, io.TextIOBase):
+        to.write("<svg></svg>")
+    elif isinstance(to, io.BytesIO):
+        to.write(b"a picture")
+    else:
+        Path(to).write_bytes(b"a picture")
+
+
+@pytest.fixture(autouse=True)
+def frames_alone(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures are put together, but drawn only for tests about them: that takes longer than a session."""
+    if request.node.get_closest_marker("needs_pictures") is None:
+        monkeypatch.setattr("matplotlib.figure.Figure.savefig", _framed)
 
 
 @pytest.fixture
@@ -40,7 +68,7 @@ def short(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The log of a short session."""
     folder = tmp_path_factory.mktemp("finished")

@@ -49,6 +49,7 @@ def test_each_person_of_a_file_gets_a_log_and_called_again_nothing_is_made_twice
 
 
 @pytest.mark.slow
+@pytest.mark.needs_pictures
 def test_what_reads_logs_reads_imported_ones_and_says_what_they_are(isiw: Command, people: Path) -> None:
     isiw("analyse", people, "--reference", "impact", "--config", "few.toml", "-o", "logs")
     logs = ("logs/A.mcap", "logs/B.mcap")
@@ -131,6 +132,7 @@ def test_a_session_is_run_with_earlier_trials(isiw: Command, people: Path) -> No
     assert "not those of the session" in refused.output
 
 
+@pytest.mark.needs_pictures
 def test_a_file_is_replayed_for_one_person(isiw: Command, people: Path) -> None:
     words = ("replay", people, "--reference", "impact", "--strategy", "random", "--seeds", "1", "--trials", "6")
     result = isiw(*words, "--only", "A", "-o", "a.png")
@@ -166,6 +168,7 @@ def test_a_replay_takes_every_option_that_a_file_may_need(isiw: Command, people:
     assert "No trial is TMS alone: no ISI is '-5', as --alone says." in other.output
 
 
+@pytest.mark.needs_pictures
 def test_a_look_into_a_file_writes_no_log(isiw: Command, tmp_path: Path) -> None:
     path = as_edf(tmp_path)
     done = isiw("analyse", path, "--look", "--unmarked", "alone", "--channel", "emg=FCR", "-o", "P01.mcap")
