@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import io
 import shutil
 import sys
 from collections.abc import Callable, Generator
 from functools import cache
 from pathlib import Path
-from typing import IO, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import pytest
 from typer import testing
@@ -33,20 +32,9 @@ def described_once() -> Generator[None, None, None]:
         yield
 
 
-def _framed(_: object, to: str | Path | IO[Any], **_options: object) -> None:
-    if isinstance(to, io.TextIOBase):
-        to.write("<svg></svg>")
-    elif isinstance(to, io.BytesIO):
-        to.write(b"a picture")
-    else:
-        Path(to).write_bytes(b"a picture")
-
-
 @pytest.fixture(autouse=True)
-def frames_alone(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pictures are put together, but drawn only for tests about them: that takes longer than a session."""
-    if request.node.get_closest_marker("needs_pictures") is None:
-        monkeypatch.setattr("matplotlib.figure.Figure.savefig", _framed)
+def _frames_alone(frames_alone: None) -> None:
+    """Most tests of commands are about something else than the picture that each of them makes."""
 
 
 @pytest.fixture
