@@ -7,6 +7,7 @@ import os
 import sys
 from collections import Counter
 from collections.abc import Generator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -20,11 +21,8 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
 
-COMPILES = "tests/strategy/test_catalogue.py"
-"""In a fresh clone, whoever begins with this file compiles the loops: half a minute."""
-
-COMPILED_LITTLE = tuple(f"tests/{room}/" for room in ("signals", "devices", "subjects"))
-"""Files that hardly call compiled loops: other workers begin with them, instead of waiting for the loops."""
+SLOW = 20
+"""As many usual tests take about as long as one that is marked slow."""
 
 
 @pytest.hookimpl(wrapper=True)
@@ -40,16 +38,13 @@ def pytest_collection() -> Generator[None, object, object]:
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Order of the files that workers take: see above, and files of many tests before those of few."""
+    """Workers take the files of most work first, so that none has one left when the others have done all theirs."""
     if not hasattr(config, "workerinput"):
         return
-    tests = Counter(item.path for item in items)
-
-    def turn(item: pytest.Item) -> tuple[int, int]:
-        first = 0 if item.nodeid.startswith(COMPILES) else 1 if item.nodeid.startswith(COMPILED_LITTLE) else 2
-        return first, -tests[item.path]
-
-    items.sort(key=turn)
+    work = Counter[Path]()
+    for item in items:
+        work[item.path] += SLOW if item.get_closest_marker("slow") else 1
+    items.sort(key=lambda item: -work[item.path])
 
 
 @pytest.hookimpl(optionalhook=True)

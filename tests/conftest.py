@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import os
 import signal
 from collections.abc import Generator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, Any
 
 import hypothesis
 import pytest
@@ -44,6 +45,22 @@ def one_thread() -> None:
     import torch  # noqa: PLC0415 - the process that starts the workers has no use for it, and they wait for that
 
     torch.set_num_threads(1)
+
+
+def _framed(_: object, to: str | Path | IO[Any], **_options: object) -> None:
+    if isinstance(to, io.TextIOBase):
+        to.write("<svg></svg>")
+    elif isinstance(to, io.BytesIO):
+        to.write(b"a picture")
+    else:
+        Path(to).write_bytes(b"a picture")
+
+
+@pytest.fixture
+def frames_alone(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures are put together, but drawn only for tests about them: that takes longer than a session."""
+    if request.node.get_closest_marker("needs_pictures") is None:
+        monkeypatch.setattr("matplotlib.figure.Figure.savefig", _framed)
 
 
 @pytest.fixture

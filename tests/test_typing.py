@@ -19,6 +19,7 @@ isiw.Windwo
 """
 
 
+@pytest.mark.slow
 def test_the_public_names_are_the_classes_and_functions_themselves(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import shutil
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import pytest
+from typer import testing
+from typer.main import get_command
 from typer.testing import CliRunner, Result
 
 from isiw.cli import app
@@ -19,6 +22,19 @@ COMMAND = [sys.executable, "-c", "from isiw.cli import app; app()"]
 """isiw as a process of its own."""
 
 SHORT = "[strategy.settings]\nmax_trials = 3\nparticles = 100\n"
+
+
+@pytest.fixture(scope="session", autouse=True)
+def described_once() -> Generator[None, None, None]:
+    """The command line is made of its functions once, as in a process, and not for each call."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(testing, "_get_command", cache(get_command))
+        yield
+
+
+@pytest.fixture(autouse=True)
+def _frames_alone(frames_alone: None) -> None:
+    """Most tests of commands are about something else than the picture that each of them makes."""
 
 
 @pytest.fixture
@@ -40,7 +56,7 @@ def short(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The log of a short session."""
     folder = tmp_path_factory.mktemp("finished")

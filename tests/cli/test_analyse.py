@@ -8,12 +8,19 @@ import pandas as pd
 import pytest
 
 import isiw as library
+from existing.conftest import reads_here
 from existing.test_recordings import as_edf
 
 if TYPE_CHECKING:
     from cli.conftest import Command
 
 CONFIG = "[strategy.settings]\nparticles = 100\n"
+
+
+@pytest.fixture
+def read_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For tests that are not about the process that reads a file, which takes a second to start."""
+    reads_here(monkeypatch)
 
 
 @pytest.fixture
@@ -49,6 +56,8 @@ def test_each_person_of_a_file_gets_a_log_and_called_again_nothing_is_made_twice
 
 
 @pytest.mark.slow
+@pytest.mark.needs_pictures
+@pytest.mark.usefixtures("read_here")
 def test_what_reads_logs_reads_imported_ones_and_says_what_they_are(isiw: Command, people: Path) -> None:
     isiw("analyse", people, "--reference", "impact", "--config", "few.toml", "-o", "logs")
     logs = ("logs/A.mcap", "logs/B.mcap")
@@ -71,6 +80,7 @@ def test_what_reads_logs_reads_imported_ones_and_says_what_they_are(isiw: Comman
         assert "delivered without isiw" in result.output
 
 
+@pytest.mark.usefixtures("read_here")
 def test_a_session_after_an_imported_log_knows_it_and_says_what_it_is(isiw: Command, people: Path) -> None:
     made = ("--reference", "impact", "--config", "few.toml", "--simulated", "--only", "A", "-o", "A.mcap")
     assert isiw("analyse", people, *made).exit_code == 0
@@ -91,6 +101,7 @@ def test_a_session_after_an_imported_log_knows_it_and_says_what_it_is(isiw: Comm
         (("--reference", "valve", "--config", "impact.toml"), "is not that of the design space"),
     ],
 )
+@pytest.mark.usefixtures("read_here")
 def test_what_is_missing_or_ambiguous_is_asked_for_and_nothing_is_written(
     words: tuple[str, ...], says: str, isiw: Command, people: Path
 ) -> None:
@@ -103,6 +114,7 @@ def test_what_is_missing_or_ambiguous_is_asked_for_and_nothing_is_written(
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("read_here")
 def test_earlier_trials_of_a_visit_count_for_its_limit_lost_ones_among_them(isiw: Command, people: Path) -> None:
     table = pd.read_csv(people)
     table.loc[[2, 3], "mep_mv"] = np.nan
@@ -116,6 +128,7 @@ def test_earlier_trials_of_a_visit_count_for_its_limit_lost_ones_among_them(isiw
     assert len(library.read_session("12.mcap").table) == 2
 
 
+@pytest.mark.usefixtures("read_here")
 def test_a_session_is_run_with_earlier_trials(isiw: Command, people: Path) -> None:
     made = ("--reference", "impact", "--config", "few.toml", "--simulated", "--only", "A", "-o", "A.mcap")
     assert isiw("analyse", people, *made).exit_code == 0
@@ -131,6 +144,7 @@ def test_a_session_is_run_with_earlier_trials(isiw: Command, people: Path) -> No
     assert "not those of the session" in refused.output
 
 
+@pytest.mark.needs_pictures
 def test_a_file_is_replayed_for_one_person(isiw: Command, people: Path) -> None:
     words = ("replay", people, "--reference", "impact", "--strategy", "random", "--seeds", "1", "--trials", "6")
     result = isiw(*words, "--only", "A", "-o", "a.png")
@@ -153,6 +167,7 @@ def test_who_cannot_be_analysed_keeps_nobody_else_from_it(isiw: Command, people:
     assert Path("logs/B.mcap").exists()
 
 
+@pytest.mark.usefixtures("read_here")
 def test_a_replay_takes_every_option_that_a_file_may_need(isiw: Command, people: Path) -> None:
     rows = pd.read_csv(people)
     rows = rows[rows["subject"] == "A"].drop(columns="subject")
@@ -166,6 +181,7 @@ def test_a_replay_takes_every_option_that_a_file_may_need(isiw: Command, people:
     assert "No trial is TMS alone: no ISI is '-5', as --alone says." in other.output
 
 
+@pytest.mark.needs_pictures
 def test_a_look_into_a_file_writes_no_log(isiw: Command, tmp_path: Path) -> None:
     path = as_edf(tmp_path)
     done = isiw("analyse", path, "--look", "--unmarked", "alone", "--channel", "emg=FCR", "-o", "P01.mcap")
@@ -174,6 +190,7 @@ def test_a_look_into_a_file_writes_no_log(isiw: Command, tmp_path: Path) -> None
     assert sorted(one.name for one in tmp_path.iterdir()) == ["P01.edf", "P01_look.png"]
 
 
+@pytest.mark.usefixtures("read_here")
 def test_rows_are_chosen_by_what_a_column_says(isiw: Command, people: Path) -> None:
     rows = pd.read_csv(people)
     pd.concat([rows.assign(muscle=name) for name in ("FCR", "FDI")]).to_csv("both.csv", index=False)

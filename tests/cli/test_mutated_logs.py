@@ -9,6 +9,8 @@ from benchmarks.log_mutations import faults, outcome_of, write_base
 
 from benchmarks import log_mutations
 
+pytestmark = pytest.mark.needs_pictures
+
 CHEAP = (
     ("export", "LOG", "OUT"),
     ("export", "LOG", "OUT", "--pseudonymise"),

@@ -45,6 +45,7 @@ def lab(isiw: Command, logs: Any, folder: Path) -> Any:
     return folder / "lab.toml"
 
 
+@pytest.mark.needs_pictures
 def test_a_lab_prior_is_shown_beside_the_built_in_one_and_drawn(isiw: Command, lab: Any, folder: Path) -> None:
     result = isiw("prior", "show", lab, "-o", "lab.png")
     assert result.exit_code == 0, result.output
@@ -65,6 +66,7 @@ def test_learning_replaces_no_log_and_asks_before_the_work_begins(isiw: Command,
 
 
 @pytest.mark.slow
+@pytest.mark.needs_pictures
 def test_a_prior_and_its_picture_are_replaced_only_where_that_is_asked_for(
     isiw: Command, lab: Any, folder: Path
 ) -> None:

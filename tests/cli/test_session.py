@@ -17,6 +17,7 @@ from known import known
 from scripted import ScriptedDevice, scripted_strategy
 
 
+@pytest.mark.needs_pictures
 def test_run_ends_with_a_statement_a_log_and_a_picture(isiw: Command, short: Path, tmp_path: Path) -> None:
     result = isiw("run", short, "--seed", 3)
     assert result.exit_code == 0, result.output
@@ -167,6 +168,7 @@ def test_a_picture_that_finds_no_room_takes_nothing_from_the_session(
     assert read_session("s.mcap").finished
 
 
+@pytest.mark.needs_pictures
 def test_the_picture_that_run_draws_takes_a_free_name(isiw: Any, short: Any, tmp_path: Path) -> None:
     (tmp_path / "new.png").write_bytes(b"precious")
     result = isiw("run", short, "--log", "new.mcap")

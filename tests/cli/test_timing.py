@@ -17,6 +17,7 @@ def run(*arguments: object) -> Result:
     return CliRunner().invoke(app, ["timing", *map(str, arguments)])
 
 
+@pytest.mark.needs_pictures
 def test_timing_of_a_preset_is_printed_and_drawn(tmp_path: Path) -> None:
     result = run("subject1", "--taps", 12, "--output", tmp_path / "timing.png")
     assert result.exit_code == 0
@@ -26,6 +27,7 @@ def test_timing_of_a_preset_is_printed_and_drawn(tmp_path: Path) -> None:
     assert (tmp_path / "timing.png").stat().st_size > 10_000
 
 
+@pytest.mark.needs_pictures
 def test_timing_of_the_vane_actuator_is_printed_and_drawn(tmp_path: Path) -> None:
     result = run("vane", "--taps", 12, "--output", tmp_path / "vane.png")
     assert result.exit_code == 0, result.output

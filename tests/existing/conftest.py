@@ -30,8 +30,13 @@ def _read_here(
     return Answer(reading.people_in(path, layout, subject, limits), {})
 
 
+def reads_here(patch: pytest.MonkeyPatch) -> None:
+    """Put the process of the tests in the place of `read_apart`."""
+    for module in (reading, looking):
+        patch.setattr(module, "read_apart", _read_here)
+
+
 @pytest.fixture(autouse=True)
 def read_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """In the place of `read_apart`; tests of that process have a fixture of this name that does nothing."""
-    for module in (reading, looking):
-        monkeypatch.setattr(module, "read_apart", _read_here)
+    """For all tests but those of that process, which have a fixture of this name that does nothing."""
+    reads_here(monkeypatch)

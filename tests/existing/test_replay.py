@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ SPACE = isiw.DesignSpace(0, 200, 5, reference="impact")
 FEW: dict[str, Any] = {"particles": 100}
 
 
+@cache  # trials never change
 def swept(trials: int = 4) -> Delivered:
     """Every ISI so many times, of a person whose MEPs tell much."""
     responder = isiw.subjects.cohort("gaussian", 1, 3)[0].begin(3)

@@ -14,11 +14,9 @@ from typing import Any
 import h5py
 import numpy as np
 import pandas as pd
-import pynwb
 import pyreadstat
 import scipy.io
 from bioread import headers as bh
-from neo.rawio import spike2rawio
 
 from existing.test_recordings import ISIS_MS, MEPS_MV, NAMES, RATE_HZ, as_edf, epochs, recording
 
@@ -110,6 +108,8 @@ def as_acq(path: Path, *, before: int = 0) -> Path:
 
 def as_smr(path: Path, *, paused: bool = False) -> Path:
     """A waveform in blocks of whole numbers, a level of the tap, and events of the pulse; ticks are 10 µs."""
+    from neo.rawio import spike2rawio  # noqa: PLC0415 - a second, for each worker that only collects
+
     digital = np.round(1e3 * recording()[0] / (1.25 / 6553.6 * 1e3) - 0.5).astype("<i2")
     ticks = {word: [round(1e5 * at_s) for at_s, name in named_events() if name == word] for word in WORDS.values()}
     wave = [(25 * first, digital[first : first + 8000]) for first in range(0, len(digital), 8000)]
@@ -147,6 +147,8 @@ def as_smr(path: Path, *, paused: bool = False) -> Path:
 
 def as_nwb(path: Path, *, stamped: bool = False, codes: bool = False) -> Path:
     """A series in µV that is stored in another scale, an annotation for each stimulus, and a series beside it."""
+    import pynwb  # noqa: PLC0415 - a second, for each worker that only collects
+
     file = pynwb.NWBFile(
         session_description="paired stimulation",
         identifier="P01",

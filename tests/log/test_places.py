@@ -184,12 +184,13 @@ def test_of_two_that_go_on_at_once_one_does_and_the_other_is_told_why(
     kind: Any, request: pytest.FixtureRequest
 ) -> None:
     log, start = request.getfixturevalue(kind), threading.Barrier(2)
+    header = read_session(log).header
     whole, finished = log.read_bytes(), log.parent / "s.mcap"
     won: list[str] = []
     told: list[str] = []
 
     def resume(name: str) -> None:
-        salvaged, header = salvage(log), read_session(log).header
+        salvaged = salvage(log)
         start.wait()
         try:
             with LogWriter.continuing(log, salvaged, header) as writer:

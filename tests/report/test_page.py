@@ -96,6 +96,7 @@ def test_the_numbers_that_are_drawn_are_those_of_the_log(page: Page, record: Ses
     assert shown["beliefs"][str(last.trial)]["profile"] == pytest.approx([1e3 * mv for mv in last.profile_mv], abs=0.01)
 
 
+@pytest.mark.needs_pictures
 def test_all_pictures_are_there_and_readable_without_javascript(page: Page, record: SessionRecord) -> None:
     whole = report_page(record)
     assert whole.count("<svg xmlns:xlink") == 4
@@ -105,6 +106,7 @@ def test_all_pictures_are_there_and_readable_without_javascript(page: Page, reco
     assert ("section", "hidden", "") in page.attributes
 
 
+@pytest.mark.needs_pictures
 def test_a_page_about_electrical_pulses_speaks_of_no_tap(page: Page, record: SessionRecord) -> None:
     of_a_tap = re.compile(r"\b(taps?|tapped|hammer|hit|impact|valve)\b")
     assert {"hammer", "valve", "impact"} <= set(of_a_tap.findall(page.words))
@@ -158,6 +160,7 @@ def test_a_verdict_after_the_last_estimate_is_said(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", OLD_LOGS)
+@pytest.mark.needs_pictures
 def test_logs_of_every_kind_have_a_page(name: str) -> None:
     record = read_session(LOGS / name)
     page = Page(report_page(record))
@@ -170,6 +173,7 @@ def test_a_session_without_a_trial_has_a_page(record: SessionRecord) -> None:
     assert "No trial has been completed." in Page(report_page(empty)).words
 
 
+@pytest.mark.needs_pictures
 def test_a_page_replaces_nothing_unasked(record: SessionRecord, tmp_path: Path) -> None:
     (tmp_path / "r.html").write_text("precious")
     with pytest.raises(InvalidValueError, match="not overwritten unasked"):
@@ -195,6 +199,7 @@ def test_without_its_libraries_the_extra_is_named(
 
 
 @pytest.mark.slow
+@pytest.mark.needs_pictures
 def test_three_hundred_trials_with_raw_sweeps_take_less_than_15_mb_and_10_s(record: SessionRecord) -> None:
     begin = time.process_time()
     page = report_page(many(record, 300))

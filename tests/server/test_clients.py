@@ -14,7 +14,7 @@ import pytest
 
 from isiw.findings import Kind
 from isiw.log.reader import read_session
-from server.serving import BEARER, PLAN, client_of, created, done, mep_mv, refused, server
+from server.serving import BEARER, NOBODY, PLAN, client_of, created, done, mep_mv, refused, server
 
 PAUSE_S = 0.3
 
@@ -47,7 +47,7 @@ def test_two_clients_that_name_the_same_trial_are_not_both_given_it(
     pulses: list[float] = []
 
     def loop(who: str | None) -> None:
-        with httpx.Client(base_url=client.base_url, headers=BEARER, timeout=120.0) as own:
+        with httpx.Client(base_url=client.base_url, headers=BEARER, verify=NOBODY, timeout=120.0) as own:
             for trial in range(3):
                 response = asked(own, session, trial, who)
                 if response.status_code == 200:
@@ -95,7 +95,7 @@ def test_who_states_no_key_is_given_an_isi_once(client: httpx.Client) -> None:
 def test_a_client_that_hangs_up_while_it_waits_begins_no_trial(client: httpx.Client, tmp_path: Path) -> None:
     session = created(client, limits={"min_iti_s": 0.6})
     with pytest.raises(httpx.ReadTimeout):
-        httpx.post(f"{client.base_url}{session}/ask", json={"trial": 0}, headers=BEARER, timeout=0.2)
+        httpx.post(f"{client.base_url}{session}/ask", json={"trial": 0}, headers=BEARER, verify=NOBODY, timeout=0.2)
     time.sleep(0.6)
     assert read_session(tmp_path / "P07.mcap").intents == ()
     assert done(asked(client, session, 0, None))["again"] is False
@@ -142,7 +142,10 @@ def test_a_session_that_was_closed_is_resumed_by_any_client(client: httpx.Client
 
 @pytest.mark.slow
 def test_the_key_outlives_a_server_that_is_killed(tmp_path: Path) -> None:
-    with server(tmp_path) as (_, url), httpx.Client(base_url=url, headers=BEARER, timeout=120.0) as client:
+    with (
+        server(tmp_path) as (_, url),
+        httpx.Client(base_url=url, headers=BEARER, verify=NOBODY, timeout=120.0) as client,
+    ):
         session = created(client, client="A")
         done(asked(client, session, 0, "A"))
     with client_of(tmp_path) as client:

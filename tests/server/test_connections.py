@@ -20,7 +20,7 @@ import pytest
 from isiw.server.guard import Connection
 from isiw.server.live.page import file_of
 from server.live.watched import Watched
-from server.serving import BEARER, client_of, done, refused, server
+from server.serving import BEARER, NOBODY, client_of, done, refused, server
 
 HALF = b"GET /sessions HTTP/1.1\r\nX: "
 OPENSSL = shutil.which("openssl") or ""
@@ -118,7 +118,9 @@ def test_a_body_that_is_not_wanted_does_not_hold_a_connection(tmp_path: Path) ->
 
 def test_too_many_connections_with_the_token_are_told_so_in_json(tmp_path: Path) -> None:
     with client_of(tmp_path, most_known=2) as client:
-        others = [httpx.Client(base_url=client.base_url, headers=BEARER, timeout=120.0) for _ in range(3)]
+        others = [
+            httpx.Client(base_url=client.base_url, headers=BEARER, verify=NOBODY, timeout=120.0) for _ in range(3)
+        ]
         with ExitStack() as stack:
             for other in others:
                 stack.enter_context(other)
@@ -174,7 +176,7 @@ def test_calls_that_wait_keep_neither_pause_nor_stop_waiting(tmp_path: Path, mon
         begun_s = time.monotonic()
         for button in ("pause", "stop"):
             token = {"Authorization": watched.client.headers["Authorization"]}
-            done(httpx.post(watched.client.base_url.join(f"/{button}"), headers=token))
+            done(httpx.post(watched.client.base_url.join(f"/{button}"), headers=token, verify=NOBODY))
         assert time.monotonic() - begun_s < IN_TIME_S
         written.set()
 

@@ -19,13 +19,13 @@ from isiw.cli import app
 from isiw.errors import ConfigError, InvalidValueError
 from isiw.log.reader import read_session
 from isiw.server import ServerSettings
-from server.serving import BEARER, client_of, created, done, refused, server, told
+from server.serving import BEARER, NOBODY, client_of, created, done, refused, server, told
 
 OPENSSL = shutil.which("openssl") or ""
 
 
 def client_at(url: str) -> httpx.Client:
-    return httpx.Client(base_url=url, headers=BEARER, timeout=120.0)
+    return httpx.Client(base_url=url, headers=BEARER, verify=NOBODY, timeout=120.0)
 
 
 @pytest.mark.slow

@@ -310,12 +310,12 @@ def test_two_peaks_have_one_of_height_1_and_a_lower_one_on_either_side() -> None
 def test_low_responders_have_a_response_probability_and_others_none() -> None:
     assert_uniform([gain_of(s).max_response_probability for s in people("low-response")], 0.4, 0.7)
     others = [name for name in GAIN if name != "low-response"]
-    assert {gain_of(s).max_response_probability for name in others for s in cohort(name, 20, 3)} == {None}
+    assert {gain_of(s).max_response_probability for name in others for s in people(name)[:20]} == {None}
 
 
 def test_only_the_cohorts_that_say_so_have_outliers_drift_or_jitter() -> None:
     for name in COHORTS:
-        for subject in cohort(name, 20, 3):
+        for subject in people(name)[:20]:
             assert subject.outlier_probability == (0.06 if name == "outliers" else 0.0)
             assert subject.drift == (Drift(0.97, 0.12, (0.29, 0.20)) if name == "drift" else None)
             assert (subject.isi_jitter_ms > 0) == name.startswith("jitter")
@@ -474,13 +474,13 @@ def test_a_nonresponder_has_no_window(space: DesignSpace) -> None:
 @pytest.mark.parametrize("space", SPACES, ids=["valve", "impact"])
 @pytest.mark.parametrize("name", COHORTS)
 def test_all_others_have_one_or_nearly_all(name: str, space: DesignSpace) -> None:
-    share = np.mean([s.window(space) is not None for s in cohort(name, 60, 3)])
+    share = np.mean([s.window(space) is not None for s in people(name)[:60]])
     assert share >= SOME_WITHOUT_A_WINDOW.get(name, 1.0)
 
 
 @pytest.mark.parametrize("name", ["gaussian", "skewed", "narrow", "wide", "outliers", "drift", "jitter"])
 def test_the_window_of_a_gain_is_the_span_of_its_profile(name: str) -> None:
-    for subject in cohort(name, 60, 3):
+    for subject in people(name)[:60]:
         window, profile = known(subject.window(IMPACT_SPACE)), profile_of(subject)
         span = (profile.start_ms, min(profile.start_ms + profile.width_ms, 320.0))
         # exp(-2) is 0.1353, a little above the rule's 0.135.
@@ -488,13 +488,13 @@ def test_the_window_of_a_gain_is_the_span_of_its_profile(name: str) -> None:
 
 
 def test_a_window_counts_from_the_valve_later_by_the_hit_delay() -> None:
-    for subject in cohort("gaussian", 60, 3):
+    for subject in people("gaussian")[:60]:
         by_valve, by_impact = known(subject.window(VALVE_SPACE)), known(subject.window(IMPACT_SPACE))
         assert by_valve.start_ms - by_impact.start_ms == pytest.approx(subject.hit_delay_ms, abs=1.0)
 
 
 def test_a_low_responder_has_a_narrower_window_than_the_profile_alone() -> None:
-    for subject in cohort("low-response", 60, 3):
+    for subject in people("low-response")[:60]:
         whole = replace(subject, response=replace(gain_of(subject), max_response_probability=None))
         assert known(subject.window(VALVE_SPACE)).width_ms < known(whole.window(VALVE_SPACE)).width_ms
 
@@ -527,7 +527,7 @@ def test_a_person_with_two_peaks_far_apart_has_a_window_of_two_segments() -> Non
 
 @pytest.mark.parametrize("name", ["gaussian", "recruitment", "nonresponder"])
 def test_the_window_does_not_depend_on_the_unit_above_the_least_excess(name: str) -> None:
-    for subject in cohort(name, 20, 3):
+    for subject in people(name)[:20]:
         assert replace(subject, scale=10.0).window(VALVE_SPACE) == subject.window(VALVE_SPACE)
 
 

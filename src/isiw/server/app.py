@@ -83,10 +83,15 @@ def make_app(folder: str | Path, rules: Rules) -> FastAPI:
         await run_in_threadpool(sessions.close_all)
 
     app = FastAPI(
-        title="isiw", version=isiw.__version__, lifespan=lifespan, docs_url=None, redoc_url=None, redirect_slashes=False
+        title="isiw",
+        version=isiw.__version__,
+        lifespan=lifespan,
+        docs_url=None,
+        redoc_url=None,
+        redirect_slashes=False,
+        routes=router.routes,  # as they are: FastAPI would make each of a router's routes again for its first request
     )
     app.state.sessions = sessions
-    app.include_router(router)
     guarded(app, rules)
     app.openapi = lambda: described(app)  # type: ignore[method-assign] # as FastAPI's documentation extends it
     return app

@@ -18,7 +18,7 @@ from isiw.server.live.page import FILES, file_of
 from isiw.server.live.view import Shown, View
 from isiw.text import plain
 from server.live.watched import HOSTILE, Watched
-from server.serving import done, refused
+from server.serving import NOBODY, done, refused
 
 
 @pytest.fixture
@@ -29,14 +29,14 @@ def watched(tmp_path: Path) -> Iterator[Watched]:
 
 def test_the_pages_files_need_no_token_as_they_say_nothing_of_the_session(watched: Watched) -> None:
     for path in FILES:
-        answer = httpx.get(watched.client.base_url.join(path))
+        answer = httpx.get(watched.client.base_url.join(path), verify=NOBODY)
         assert answer.status_code == 200
         assert "P07" not in answer.text
         assert "script-src 'self';" in answer.headers["Content-Security-Policy"]
 
 
 def test_who_shows_no_token_cannot_ask_without_a_pause(watched: Watched) -> None:
-    with httpx.Client(base_url=watched.client.base_url) as stranger:
+    with httpx.Client(base_url=watched.client.base_url, verify=NOBODY) as stranger:
         for path in ("updates", "live.css", "nothing"):
             begun_s = time.monotonic()
             for _ in range(3):
@@ -48,10 +48,10 @@ def test_who_shows_no_token_cannot_ask_without_a_pause(watched: Watched) -> None
 def test_a_browser_that_has_a_file_is_not_sent_it_again(watched: Watched) -> None:
     for path in FILES:
         url = watched.client.base_url.join(path)
-        tag = httpx.get(url).headers["ETag"]
-        again = httpx.get(url, headers={"If-None-Match": tag})
+        tag = httpx.get(url, verify=NOBODY).headers["ETag"]
+        again = httpx.get(url, headers={"If-None-Match": tag}, verify=NOBODY)
         assert (again.status_code, again.content) == (304, b"")
-        assert httpx.get(url, headers={"If-None-Match": '"another"'}).status_code == 200
+        assert httpx.get(url, headers={"If-None-Match": '"another"'}, verify=NOBODY).status_code == 200
 
 
 def test_a_file_is_made_once_however_often_it_is_asked_for(monkeypatch: pytest.MonkeyPatch, watched: Watched) -> None:
@@ -64,7 +64,7 @@ def test_a_file_is_made_once_however_often_it_is_asked_for(monkeypatch: pytest.M
     monkeypatch.setitem(FILES, "/live.css", ("text/css", text))
     file_of.cache_clear()
     for _ in range(3):
-        assert httpx.get(watched.client.base_url.join("/live.css")).text == "body {}"
+        assert httpx.get(watched.client.base_url.join("/live.css"), verify=NOBODY).text == "body {}"
     file_of.cache_clear()
     assert made == ["made"]
 
@@ -74,15 +74,19 @@ def test_what_is_of_the_session_needs_the_token_and_the_pages_own_origin(watched
     for path in ("updates", "pause", "stop", "exclude", "note", "resume", "include"):
         method = "GET" if path == "updates" else "POST"
         url = watched.client.base_url.join(path)
-        refused(httpx.request(method, url), 401, "Unauthorized")
-        refused(httpx.request(method, url, headers={"Authorization": "Bearer not-the-token"}), 401, "Unauthorized")
+        refused(httpx.request(method, url, verify=NOBODY), 401, "Unauthorized")
+        refused(
+            httpx.request(method, url, headers={"Authorization": "Bearer not-the-token"}, verify=NOBODY),
+            401,
+            "Unauthorized",
+        )
         refused(watched.client.request(method, path, headers={"Host": "evil.example"}), 403, "ForeignHost")
         refused(watched.client.request(method, path, headers={"Origin": "http://127.0.0.1:1"}), 403, "ForeignOrigin")
 
 
 def test_the_page_names_no_stimulus_before_the_session_says_which_it_gives(watched: Watched) -> None:
     for path in ("/", "/live.js", "/draw.js"):
-        assert "hammer" not in httpx.get(watched.client.base_url.join(path)).text
+        assert "hammer" not in httpx.get(watched.client.base_url.join(path), verify=NOBODY).text
     watched.start()
     with watched.viewer() as news:
         drawn = next(news)["drawn"]

@@ -197,9 +197,8 @@ class LivePage:
     def __init__(self, session: Session, port: int, config: Path | None = None) -> None:
         self._view, token = View(session, config), new_token()
         rules = Rules(token, open_paths=frozenset(FILES), urgent_paths=URGENT)
-        app = FastAPI(title="isiw", version=isiw.__version__, docs_url=None, redoc_url=None, openapi_url=None)
+        app = FastAPI(title="isiw", version=isiw.__version__, openapi_url=None, routes=router.routes)
         app.state.session, app.state.view = session, self._view
-        app.include_router(router)
         guarded(app, rules)
         settings = settings_of(app, rules, log_level="critical")  # the screen is the operator's
         self._listener = listening(_ADDRESS, port)
