@@ -17,7 +17,7 @@ from isiw.errors import InvalidValueError
 from isiw.models.protocol import (
     Observation,
 )
-from isiw.signals.tap import TapsAlone, is_inside, meets_response, taps_anywhere, taps_near
+from isiw.signals.taps_alone import TapsAlone, is_inside, meets_response, taps_anywhere, taps_near
 from isiw.trials import Trial
 from isiw.types import Reference
 from isiw.window import Window
