@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from functools import partial
+from functools import cached_property, partial
 from typing import Annotated, ClassVar, Final
 
 import numpy as np
@@ -352,7 +352,7 @@ class TrialTable:
         """A table of the same trials, each as the change makes it."""
         return TrialTable(tuple(change(trial) for trial in self.trials))
 
-    @property
+    @cached_property
     def told(self) -> tuple[Trial, ...]:
         """The trials that a strategy learns from."""
         return tuple(trial for trial in self.trials if trial.told)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from isiw.devices.robot.tapper import Tapper, TapperSettings, preset
-from isiw.signals import judge
+from isiw.signals import judge, tap
 from isiw.signals.tap import LONGER_MS, TapResponses
 from isiw.subjects.changes import TapResponse
 from isiw.trials import Channel, Stimulus, Sweep, Trial, TrialTable
-from isiw.types import BoolArray, FloatArray
+from isiw.types import FloatArray
 from isiw.window import Window
 from known import known
 from tapped import IMPACT, TapRig, reflex
@@ -152,19 +153,19 @@ def test_a_trial_of_a_long_session_is_corrected_without_a_look_at_all_courses_fo
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     rig, looked = TapRig(reflex(0.3)), 0
-    covering = TapResponses._covering  # noqa: SLF001 - its calls are counted
+    worked_out = tap._left_of  # noqa: SLF001 - its calls are counted
 
-    def counted(responses: TapResponses, since_hit_ms: FloatArray) -> tuple[BoolArray, FloatArray, BoolArray, float]:
+    def counted(*given: Any) -> tap.Left:
         nonlocal looked
         looked += 1
-        return covering(responses, since_hit_ms)
+        return worked_out(*given)
 
-    monkeypatch.setattr(TapResponses, "_covering", counted)
+    monkeypatch.setattr(tap, "_left_of", counted)
     trials: list[Trial] = []
-    for _ in range(60):
-        trials.append(rig.trial(100.0))
+    for number in range(60):
+        trials.append(rig.trial(20.0 if number % 2 else 300.0))
         rig.taps, _ = rig.taps.corrected(trials)
-    assert looked < 60 * 10
+    assert 30 < looked < 60 * 3
 
 
 def test_the_isis_that_would_show_what_is_not_known_within_a_window_are_longer_than_its_trials() -> None:

@@ -262,7 +262,7 @@ def _history(delivered: Delivered, strategy: Strategy, header: Header) -> Iterat
         watch = watch.after(trial, answer)
         if (doubt := watch.doubts.new) is not None and trial.told:
             yield Event(kind="doubt", finding=doubt.kind, trial=trial.index, text=f"{doubt}")
-        if strategy.trouble is not None and trial.told:
-            yield Event(kind="fit", trial=trial.index, text=strategy.trouble)
+        if trial.told and (trouble := strategy.trouble) is not None:
+            yield Event(kind="fit", trial=trial.index, text=trouble)
         if trial.index in logged or trial.index == trials[-1].index:
             yield estimate_record(strategy, trial.index, _END, None)

@@ -9,7 +9,9 @@ from __future__ import annotations
 import operator
 import threading
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar
+from typing import Any, Final, Generic, NamedTuple, Protocol, TypeAlias, TypeVar
+
+import numpy as np
 
 from isiw import checks, sentences
 from isiw.change import Change
@@ -29,6 +31,7 @@ TrialT = TypeVar("TrialT")
 TrialT_contra = TypeVar("TrialT_contra", contravariant=True)
 
 DIGITS = 4
+_EXACT: Final = 22  # of powers of ten up to here none is rounded itself
 """Significant digits of predicted amplitudes and scores, which are for pictures."""
 
 
@@ -346,4 +349,13 @@ def estimate_record(
 
 
 def _rounded(values: FloatArray) -> tuple[float, ...]:
-    return tuple(float(f"{value:.{DIGITS}g}") for value in values)
+    """Numbers to `DIGITS` digits, as texts have them."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        places = DIGITS - 1 - np.floor(np.log10(np.abs(values)))
+    fitting = np.isfinite(places) & (np.abs(places) <= _EXACT)
+    # Of powers of ten as small both are exact, and so is the number that is nearest to the decimal one.
+    up, down = (10.0 ** np.where(fitting, np.maximum(sign * places, 0.0), 0.0) for sign in (1, -1))
+    rounded = np.where(fitting, np.rint(values * up / down) * down / up, values)
+    for at in np.flatnonzero(~fitting & np.isfinite(values)):
+        rounded[at] = float(f"{values[at]:.{DIGITS}g}")
+    return tuple(rounded.tolist())

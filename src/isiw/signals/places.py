@@ -210,9 +210,15 @@ def _only_falls(sweep: Sweep, trial: Trial, window_ms: tuple[float, float], rest
 
 def _last_alike(told: Sequence[Told]) -> list[tuple[float | None, Response]]:
     """The last responses since an MEP in the window, and their ISIs, back to one at another time after the pulse."""
-    since = takewhile(lambda one: not (one.rest_uv and one.stands_out), reversed(told))
-    found = [(one.isi_ms, one.outside) for one in since if one.outside is not None]
-    return list(takewhile(lambda one: abs(one[1].at_ms - found[0][1].at_ms) <= ALIKE_MS, found))
+    found = list[tuple[float | None, Response]]()
+    for one in reversed(told):
+        if one.rest_uv and one.stands_out:
+            break
+        if one.outside is not None:
+            if found and abs(one.outside.at_ms - found[0][1].at_ms) > ALIKE_MS:
+                break
+            found.append((one.isi_ms, one.outside))
+    return found
 
 
 def _follow_the_pulse(isis_ms: Sequence[float | None]) -> bool:

@@ -9,6 +9,7 @@ import math
 import statistics
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import islice
 from typing import Final
 
 from isiw.design import DesignSpace
@@ -49,7 +50,7 @@ def _doubt(kind: Kind, text: str, remedy: str) -> Finding:
 
 def equal(evidence: Evidence) -> Finding | None:
     """Amplitudes that are one like the other."""
-    meps_mv = [one.mep_mv for one in evidence.told]
+    meps_mv = [one.mep_mv for one in evidence.told[-max(in_a_row for in_a_row, _ in ALIKE) :]]
     last = meps_mv[-EQUAL_IN_A_ROW:]
     if len(last) == EQUAL_IN_A_ROW and len(set(last)) == 1 and last[0] > 0:
         text = f"The last {EQUAL_IN_A_ROW} amplitudes are exactly equal ({last[0]:g} mV)"
@@ -65,10 +66,12 @@ def equal(evidence: Evidence) -> Finding | None:
 
 def silent(evidence: Evidence) -> Finding | None:
     """No MEP from the start on."""
-    meps_mv = [one.mep_mv for one in evidence.told]
-    if len(meps_mv) < SILENT_FROM_THE_START or not is_silent(meps_mv, evidence.detection_limit_mv):
+    told = evidence.told
+    if len(told) < SILENT_FROM_THE_START or any(one.mep_mv for one in told):
         return None
-    text = f"None of the first {len(meps_mv)} pulses evoked an MEP: every amplitude is 0"
+    if _zeros_are_usual(evidence.detection_limit_mv):
+        return None
+    text = f"None of the first {len(told)} pulses evoked an MEP: every amplitude is 0"
     ask = "Does the stimulator fire? Is the EMG recorded? Is the intensity high enough?"
     return _doubt(Kind.SILENT, text, ask)
 
@@ -76,8 +79,9 @@ def silent(evidence: Evidence) -> Finding | None:
 def stopped(evidence: Evidence) -> Finding | None:
     """No MEP any more, though there were some."""
     told = evidence.told
-    usual = _zeros_are_usual(evidence.detection_limit_mv)
-    first = None if usual else stopped_after([one.isi_ms for one in told], [one.stands_out for one in told])
+    if _zeros_are_usual(evidence.detection_limit_mv) or any(one.stands_out for one in told[-STOPPED_IN_A_ROW:]):
+        return None
+    first = stopped_after([one.isi_ms for one in told], [one.stands_out for one in told])
     if first is None:
         return None
     text = f"None of the last {len(told) - first} pulses evoked an MEP, though earlier ones did"
@@ -86,7 +90,7 @@ def stopped(evidence: Evidence) -> Finding | None:
 
 def small(evidence: Evidence) -> Finding | None:
     """Amplitudes below EMG at rest."""
-    last = _seen_mv(evidence.told)[-IN_A_ROW:]
+    last = _last_seen_mv(evidence.told)
     if len(last) < IN_A_ROW or max(last) >= SMALL_MV:
         return None
     text = f"The last {IN_A_ROW} amplitudes are below {1e3 * max(last):.2g} µV, less than EMG at rest has"
@@ -95,10 +99,10 @@ def small(evidence: Evidence) -> Finding | None:
 
 def large(evidence: Evidence) -> Finding | None:
     """Amplitudes that are large from the start, or larger by more than any muscle changes."""
-    seen = _seen_mv(evidence.told)
-    earlier, last = seen[:-IN_A_ROW], seen[-IN_A_ROW:]
+    last = _last_seen_mv(evidence.told)
     if len(last) < IN_A_ROW or (usual_mv := statistics.geometric_mean(last)) < LARGE_MV:
         return None
+    earlier = [one.mep_mv for one in evidence.told if one.mep_mv > 0][:-IN_A_ROW]
     if not earlier:
         text = f"The first {IN_A_ROW} amplitudes are {usual_mv:.2g} mV in the mean, more than most muscles give"
         return _doubt(Kind.LARGE, text, "Are they in µV? Divide by 1000.")
@@ -133,9 +137,10 @@ def stopped_after(isis_ms: Sequence[float | None], answered: Sequence[bool]) -> 
     return first if by_chance < STOPPED_BY_CHANCE else None
 
 
-def _seen_mv(told: Sequence[Told]) -> list[float]:
-    """The amplitudes above the detection limit."""
-    return [one.mep_mv for one in told if one.mep_mv > 0]
+def _last_seen_mv(told: Sequence[Told]) -> list[float]:
+    """The last amplitudes above the detection limit."""
+    seen = islice((one.mep_mv for one in reversed(told) if one.mep_mv > 0), IN_A_ROW)
+    return list(seen)[::-1]
 
 
 def _zeros_are_usual(detection_limit_mv: float | None) -> bool:

@@ -17,7 +17,7 @@ from isiw.errors import InvalidValueError
 from isiw.models.protocol import (
     Observation,
 )
-from isiw.signals.tap import TapsAlone, is_inside, meets_response, taps_anywhere, taps_near
+from isiw.signals.taps_alone import TapsAlone, is_inside, meets_response, taps_anywhere, taps_near
 from isiw.trials import Trial, require_alone
 from isiw.types import Reference
 from isiw.window import Window
@@ -136,6 +136,9 @@ class Outcomes:
         """The step that amplitudes are multiples of [mV]; 0 if there is none."""
         if self.stated_step_mv is not None:
             return self.stated_step_mv
+        newest = next((one.mep_mv for one in reversed(self.pulses) if one.mep_mv is not None), None)
+        if newest is None or not any(is_multiple(newest, step_mv) for step_mv in STEPS_MV):
+            return 0.0
         return found_step_mv([one.mep_mv for one in self.pulses if one.mep_mv is not None])
 
     @property
@@ -208,14 +211,19 @@ class Outcomes:
         return {"tap_may_explain": may_explain, "tap_is_likely": may_explain and counts[True] > counts[False]}
 
 
+def is_multiple(mep_mv: float, step_mv: float) -> bool:
+    """Whether an amplitude is a multiple of a step."""
+    steps = mep_mv / step_mv
+    return abs(steps - round(steps)) < NEAR_A_STEP
+
+
 def found_step_mv(amplitudes_mv: Sequence[float]) -> float:
     """The largest step that all of some amplitudes are multiples of, unless by chance [mV]; 0 if there is none."""
     sizes = np.asarray(amplitudes_mv)
     if len(set(amplitudes_mv)) < LEAST_DIFFERENT:
         return 0.0
     for step_mv in STEPS_MV:
-        newest = amplitudes_mv[-1] / step_mv
-        if abs(newest - round(newest)) >= NEAR_A_STEP:  # most often, so that no other has to be looked at
+        if not is_multiple(amplitudes_mv[-1], step_mv):  # most often, so that no other has to be looked at
             continue
         by_chance = np.count_nonzero(sizes) * math.log(FINEST_MV / step_mv)
         multiples = sizes / step_mv
