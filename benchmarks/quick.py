@@ -62,7 +62,7 @@ QUICK: Final[Mapping[str, str]] = {
     "raw_sweeps sizes": "",
     "read_files": "--minutes 1 --rows 2000",
     "readme_results": "--out OUT",
-    "recorded": "--strategies default,nr --people 1 --trials 8 --out OUT",
+    "recorded_cohort": "--people 10 --trials 10 --workers 1 --out OUT",
     "reduction.redraw": "--out OUT",
     "replayed": "--people 2 --sessions 1",
     "rules_as_printed": "--people 20 --out OUT",
