@@ -65,6 +65,7 @@ QUICK: Final[Mapping[str, str]] = {
     "recorded_cohort": "--people 10 --trials 10 --workers 1 --out OUT",
     "reduction.redraw": "--out OUT",
     "replayed": "--people 2 --sessions 1",
+    "response_prior": "--most 2 --bootstraps 2 --out OUT",
     "rules_as_printed": "--people 20 --out OUT",
     "said": "--share 0.01 --seed 1 --folder OUT",
     "same_asks": "--sessions 1 --stimuli 10 --strategies default nr",

@@ -3,14 +3,19 @@
     python -m benchmarks.recorded_cohort --people 400 --seed 10000 --given 0 --out benchmarks/results/recorded_cohort
 
 The recordings lie in no repository of ours: `--data`, or the variable ISIW_SHARED_DATA, names their folder. `--given
-0,10,30,60,600` gives the default so many single pulses of the other half first. Sessions are kept beside the result as
-they finish, and the same command continues where it was interrupted. Standard errors are by bootstrap over the ten
-persons, each with all coils. Seeds below 1,000 are for work.
+0,10,30,60,600` gives the default so many single pulses of the other half first; `--fitted` adds the default with the
+prior that `benchmarks.response_prior` fitted to all other persons. Sessions are kept beside the result as they finish,
+and the same command continues where it was interrupted. Standard errors are by bootstrap over the ten persons, each
+with all coils. Seeds below 1,000 are for work.
 """
 
 from __future__ import annotations
 
+import json
+import re
 import warnings
+import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -26,6 +31,7 @@ from benchmarks.quick import understood
 from benchmarks.recorded_law import KnowsTheLaw
 from benchmarks.recorded_people import RecordedPerson, recordings
 from benchmarks.recorded_tables import tables_of
+from benchmarks.response_prior import Fit, read_folds
 from benchmarks.tables import write_tables
 from isiw.errors import ImplausibleDataWarning
 from isiw.studies import Failure, Processes
@@ -34,6 +40,7 @@ SPACE: Final = isiw.VALVE_SPACE
 MARKS: Final = (0, 10, 15, 20, 30, 40)
 LAW: Final = "who knows the law"
 TOO_GOOD: Final = "law and draws from the same half (too good)"
+FITTED: Final = "default, prior fitted to the other persons"
 TOGETHER: Final = 5
 """Sessions that are kept in one file."""
 
@@ -44,15 +51,17 @@ class RecordedSession:
 
     Args:
         person: the person.
-        strategy: `default`, `LAW` or `TOO_GOOD`.
+        strategy: `default`, `FITTED`, `LAW` or `TOO_GOOD`.
         given: how many single pulses are given first.
         trials: how many pairs are delivered.
+        fit: numbers of the default's prior, of `FITTED` alone.
     """
 
     person: RecordedPerson
     strategy: str
     given: int
     trials: int
+    fit: Fit | None = None
 
     @property
     def label(self) -> str:
@@ -61,12 +70,13 @@ class RecordedSession:
 
     def player(self) -> Any:
         """What asks, learns and reports, before the first pair."""
-        if self.strategy != "default":
+        if self.strategy in {LAW, TOO_GOOD}:
             half = "other" if self.strategy == LAW else "drawn"
             return KnowsTheLaw(self.person.subject(half), SPACE)
         subject = self.person.subject()
         seed = self.person.seed + self.person.number
-        strategy = isiw.make_strategy("default", SPACE, seed, hit_delay_ms=subject.stated_hit_delay_ms)
+        prior = {} if self.fit is None else {"prior": self.fit.prior()}
+        strategy = isiw.make_strategy("default", SPACE, seed, hit_delay_ms=subject.stated_hit_delay_ms, **prior)
         for intensity_pct_rmt, mep_mv in self.person.single_pulses(self.given):
             strategy.tell(None, mep_mv, intensity_pct_rmt=intensity_pct_rmt)
         return strategy
@@ -122,21 +132,31 @@ class Chunk:
         return pd.read_parquet(self.file)
 
 
-def chunks(people: list[RecordedPerson], given: list[int], trials: int, folder: Path) -> list[Chunk]:
-    """All sessions: the default with so many pulses first, and who knows the law.
+def chunks(
+    people: list[RecordedPerson], given: list[int], trials: int, folder: Path, folds: Mapping[int, Fit] | None = None
+) -> list[Chunk]:
+    """All sessions: the default with so many pulses first, with fitted priors, and who knows the law.
 
     Args:
         people: the cohort.
         given: numbers of single pulses.
         trials: how many pairs are delivered.
         folder: where rows are kept.
+        folds: the fit without each person; None for no fitted priors.
     """
     plan = [("default", count) for count in given] + [(LAW, 0), (TOO_GOOD, 0)]
+    plan += [(FITTED, count) for count in given if folds]
+    fits = folds or {}
+    names = {strategy: re.sub("[^a-z]+", "_", strategy) for strategy, _ in plan}
+    names[FITTED] = f"fitted_{zlib.crc32(repr(fits).encode()):08x}"
     parts = [people[first : first + TOGETHER] for first in range(0, len(people), TOGETHER)]
     return [
         Chunk(
-            tuple(RecordedSession(person, strategy, count, trials) for person in part),
-            folder / f"{strategy.partition(' (')[0].replace(' ', '_')}-{count}-{part[0].number}-{len(part)}.parquet",
+            tuple(
+                RecordedSession(each, strategy, count, trials, fits[each.bank.person] if strategy == FITTED else None)
+                for each in part
+            ),
+            folder / f"{names[strategy]}-{count}-{part[0].number}-{len(part)}.parquet",
         )
         for part in parts
         for strategy, count in plan
@@ -150,6 +170,7 @@ def main(
     trials: Annotated[int, typer.Option(help="Pairs a session.")] = MARKS[-1],
     workers: Annotated[int, typer.Option(help="Processes.")] = 2,
     data: Annotated[Path | None, typer.Option(help="Folder of the recordings.")] = None,
+    fitted: Annotated[Path | None, typer.Option(help="JSON of benchmarks.response_prior, with its folds.")] = None,
     out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("recorded_cohort"),
 ) -> None:
     """Compare the default with who knows the law, on recorded people."""
@@ -160,7 +181,8 @@ def main(
     cohort = [RecordedPerson(number, seed, data) for number in range(people)]
     folder = out.with_suffix(f".{seed}-{trials}.sessions")
     folder.mkdir(parents=True, exist_ok=True)
-    units, found = chunks(cohort, [int(each) for each in given.split(",")], trials, folder), []
+    folds = None if fitted is None else read_folds(json.loads(fitted.read_text(encoding="utf-8")))
+    units, found = chunks(cohort, [int(each) for each in given.split(",")], trials, folder, folds), []
     with Progress() as progress:
         bar = progress.add_task("sessions", total=len(units))
         for _, result in Processes(workers).results(Chunk.run, units):

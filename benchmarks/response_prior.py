@@ -39,7 +39,7 @@ TODAY: Final = (HAND.rest_pct.median, HAND.rest_pct.sd)
 
 AS_ONE_PERSON: Final = 3.0
 """Today's shares count as so many banks, those of one person, so that kinds without support keep a small share."""
-ITERATIONS = 300
+ITERATIONS = 60
 
 
 @dataclass(frozen=True)
