@@ -24,7 +24,7 @@ from isiw.studies import SimulatedSession, play
 from isiw.subjects.measured import LABS, MEASURED_KIM, WIDTHS_KIM_MS, MeasuredPerson, lab
 from isiw.subjects.responses import GainResponse, PeakProfile, RecruitmentResponse, ResponseCurve
 from isiw.subjects.subject import OUTLIERS_MV, SimulatedSubject
-from isiw.types import BoolArray, FloatArray
+from isiw.types import BoolArray, FloatArray, IntArray
 from isiw.window import Window, least_excess_mv
 
 P_WINDOW: Final = 0.72
@@ -163,6 +163,54 @@ def outcome_table(
 
 
 @dataclass
+class Hypotheses:
+    """Windows that a person may have, and how probable each is: what an oracle asks, learns and reports.
+
+    Args:
+        space: the design space.
+        candidates_ms: the ISIs that may be asked, shape (c,).
+        mass: probability of each bin of the outcome by level of facilitation, shape (l, y).
+        level_at: the level of each hypothesis at each candidate, shape (h, c).
+        masks: its window on the space's grid, shape (h, t).
+        log_weights: logs of their probabilities, shape (h,).
+    """
+
+    space: DesignSpace
+    candidates_ms: FloatArray
+    mass: FloatArray
+    level_at: IntArray
+    masks: BoolArray
+    log_weights: FloatArray
+
+    def ask(self) -> float:
+        """The candidate ISI [ms] whose outcome says most about the window."""
+        weights = np.exp(self.log_weights)
+        entropy = -(self.mass * np.log(self.mass)).sum(1)
+        shares = np.stack([np.bincount(levels, weights, len(self.mass)) for levels in self.level_at.T])
+        mixture = shares @ self.mass
+        gain = -(mixture * np.log(mixture)).sum(1) - shares @ entropy
+        return float(self.candidates_ms[gain.argmax()])
+
+    def learn(self, levels: IntArray, outcome: int) -> None:
+        """Learn from one trial: the level of each hypothesis at its ISI, shape (h,), and the bin of its outcome."""
+        self.log_weights = self.log_weights + np.log(self.mass[levels, outcome])
+        self.log_weights -= np.logaddexp.reduce(self.log_weights)
+
+    def expectation(self) -> tuple[Window | None, float]:
+        """The answer of largest posterior expected F1, a level set of the membership or none; and that F1."""
+        weights = np.exp(self.log_weights)
+        membership = weights @ self.masks
+        cuts = np.linspace(0.1, 0.9, 17) * membership.max()
+        candidates = membership >= cuts[:, None]
+        overlap = candidates.astype(np.float32) @ self.masks.T.astype(np.float32)
+        sizes = candidates.sum(1)[:, None] + self.masks.sum(1)
+        expected = (2 * overlap / np.maximum(sizes, 1)) @ weights
+        if (none := weights[~self.masks.any(1)].sum()) >= expected.max():
+            return None, float(none)
+        return Window.from_mask(self.space.grid_ms, candidates[expected.argmax()]), float(expected.max())
+
+
+@dataclass
 class Oracle:
     """One session of the oracle with one person.
 
@@ -183,22 +231,16 @@ class Oracle:
             raise TypeError(self.subject.profile)
         starts, widths = self.spans.starts_ms, self.spans.widths_ms
         shift = self.subject.hit_delay_ms if self.space.reference == "valve" else 0.0
-        grid = self.space.grid_ms
-        middle, sd = starts + widths / 2 + shift, widths / 4
-        self.candidates_ms = grid[(grid - grid[0]) % 5.0 == 0]
-        self._edges_mv, self._mass = outcome_table(self.subject)
-        self._middle, self._sd = middle, sd
-        self._level_at = self._levels(self.candidates_ms)
-        self._masks = self._windows(self._facilitation(grid))
-        self._log_weights = np.log(self.spans.shares)
-        if self.p_window < 1.0:
-            self._doubt()
-
-    def _doubt(self) -> None:
-        """Add the hypothesis that there is no window: no ISI facilitates anything."""
-        self._level_at = np.vstack((self._level_at, np.zeros_like(self._level_at[:1])))
-        self._masks = np.vstack((self._masks, np.zeros_like(self._masks[:1])))
-        self._log_weights = np.append(self._log_weights + np.log(self.p_window), np.log1p(-self.p_window))
+        self._middle, self._sd = starts + widths / 2 + shift, widths / 4
+        candidates_ms = every_5_ms(self.space)
+        self._edges_mv, mass = outcome_table(self.subject)
+        masks, log_weights = self._windows(self._facilitation(self.space.grid_ms)), np.log(self.spans.shares)
+        level_at = self._levels(candidates_ms)
+        if self.p_window < 1.0:  # no ISI facilitates anything
+            level_at = np.vstack((level_at, np.zeros_like(level_at[:1])))
+            masks = np.vstack((masks, np.zeros_like(masks[:1])))
+            log_weights = np.append(log_weights + np.log(self.p_window), np.log1p(-self.p_window))
+        self._hypotheses = Hypotheses(self.space, candidates_ms, mass, level_at, masks, log_weights)
 
     def _windows(self, facilitation: FloatArray) -> BoolArray:
         """Windows by the 0.135 rule, empty where the range reaches too little, shape of `facilitation`."""
@@ -211,17 +253,12 @@ class Oracle:
     def _facilitation(self, isi_ms: FloatArray) -> FloatArray:
         return np.exp(-0.5 * ((isi_ms - self._middle[:, None]) / self._sd[:, None]) ** 2)
 
-    def _levels(self, isi_ms: FloatArray) -> FloatArray:
-        return np.rint(np.sqrt(self._facilitation(np.asarray(isi_ms))) * (len(LEVELS) - 1)).astype(int)
+    def _levels(self, isi_ms: FloatArray) -> IntArray:
+        return nearest_levels(self._facilitation(np.asarray(isi_ms)))
 
     def ask(self) -> float:
         """The candidate ISI [ms] whose outcome says most about start and width."""
-        weights = np.exp(self._log_weights)
-        entropy = -(self._mass * np.log(self._mass)).sum(1)
-        shares = np.stack([np.bincount(levels, weights, len(LEVELS)) for levels in self._level_at.T])
-        mixture = shares @ self._mass
-        gain = -(mixture * np.log(mixture)).sum(1) - shares @ entropy
-        return float(self.candidates_ms[gain.argmax()])
+        return self._hypotheses.ask()
 
     def tell(self, isi_ms: float | None, mep_mv: float | None = None, *, isi_sd_ms: float = 0.0) -> None:
         """Learn from one trial; the SD of the ISI is not used."""
@@ -232,21 +269,21 @@ class Oracle:
         levels = self._levels(np.array([isi_ms]))[:, 0]
         if self.p_window < 1.0:
             levels = np.append(levels, 0)
-        self._log_weights += np.log(self._mass[levels, outcome])
-        self._log_weights -= np.logaddexp.reduce(self._log_weights)
+        self._hypotheses.learn(levels, int(outcome))
 
     def estimate(self) -> Window | None:
         """The answer of largest posterior expected F1: a level set of the posterior's membership, or none."""
-        weights = np.exp(self._log_weights)
-        membership = weights @ self._masks
-        cuts = np.linspace(0.1, 0.9, 17) * membership.max()
-        candidates = membership >= cuts[:, None]
-        overlap = candidates.astype(np.float32) @ self._masks.T.astype(np.float32)
-        sizes = candidates.sum(1)[:, None] + self._masks.sum(1)
-        expected = (2 * overlap / np.maximum(sizes, 1)) @ weights
-        if weights[~self._masks.any(1)].sum() >= expected.max():
-            return None
-        return Window.from_mask(self.space.grid_ms, candidates[expected.argmax()])
+        return self._hypotheses.expectation()[0]
+
+
+def every_5_ms(space: DesignSpace) -> FloatArray:
+    """The ISIs that an oracle asks [ms]."""
+    return space.grid_ms[(space.grid_ms - space.low_ms) % 5.0 == 0]
+
+
+def nearest_levels(facilitation: FloatArray) -> IntArray:
+    """The nearest of `LEVELS`, by number; same shape."""
+    return np.rint(np.sqrt(facilitation) * (len(LEVELS) - 1)).astype(int)
 
 
 def simulate_oracle(session: SimulatedSession) -> pd.DataFrame:

@@ -1,171 +1,174 @@
-"""People whose MEPs were recorded: every trial's amplitude is that of a real sweep.
+"""People whose MEPs were recorded: a trial is one recorded amplitude at the intensity that facilitation makes of 90 %.
 
-Profiles and hit delays are those of the cohort `gaussian`; what facilitation does to the amplitude is put together from
-sweeps that were recorded at rest and after stronger pulses. The sweeps (University of Eastern Finland, BSD-3-Clause,
-repository NeuromodulationUEF/MEPFeatX) are those of the tests.
+The recordings, single pulses over recruitment curves of ten people under three coils each [OfirGeva], are in no
+repository of ours: a folder of them is handed over. Trials are drawn from every second pulse of a level, so that the
+other half can say what was known beforehand. A person is left out, and drawn for errors, with all three coils.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+import os
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
+from typing import Final, Literal, TypeAlias
 
 import numpy as np
 import pandas as pd
-from scipy.stats import norm
 
-from isiw.studies import SimulatedSession
-from isiw.subjects.cohorts import person_of
-from isiw.subjects.responses import EmgFloor, ResponseCurve, TrialNoise
-from isiw.subjects.subject import SimulatedSubject
+from isiw.subjects import EmgFloor, PeakProfile, SimulatedSubject, TrialNoise
 from isiw.types import ArrayLike, FloatArray
 
-FOLDER = Path(__file__).parents[1] / "tests" / "data" / "uef"
-AT_REST_MV = 0.013
-"""The forearm's recruitment curve has fourteen sweeps without an MEP, below this."""
-NO_FLOOR = EmgFloor(1e-6, 0.0)
+FOLDER: Final = "ISIW_SHARED_DATA"
+"""The environment variable that names the folder of the recordings, instead of that beside the repository."""
+
+PAIRS_PCT_RMT: Final = 90.0
+BOOSTS_PCT_RMT: Final = (10.0, 30.0)
+STARTS_MS: Final = (5.0, 90.0)
+WIDTHS_MS: Final = (100.0, 0.42, 40.0, 230.0)
+"""Median, log SD, and the ends to which widths are clipped."""
+HIT_DELAYS_MS: Final = (168.0, 192.0)
+STATED_HIT_DELAY_MS: Final = (180.0, 8.0)
+NO_FLOOR: Final = EmgFloor(1e-6, 0.0)
 """A recorded sweep has its floor already."""
+
+Half: TypeAlias = Literal["drawn", "other"]
+
+
+def recordings() -> Path:
+    """The folder of the recordings; it need not be there."""
+    beside = Path(__file__).parents[2] / "shared" / "data"
+    return Path(os.environ.get(FOLDER, beside))
+
+
+@dataclass(frozen=True, eq=False)
+class Bank:
+    """Recorded amplitudes of one person under one coil.
+
+    Args:
+        person: the person, from 1.
+        coil: the coil.
+        levels_pct_rmt: intensities that pulses were given at [% RMT], ascending, shape (k,).
+        amplitudes_mv: those of each level in the order of recording [mV], k arrays.
+    """
+
+    person: int
+    coil: str
+    levels_pct_rmt: FloatArray
+    amplitudes_mv: tuple[FloatArray, ...]
+
+    def half(self, which: Half) -> Bank:
+        """Every second pulse of each level: the first, third ... are those that trials are drawn from."""
+        first = ("drawn", "other").index(which)
+        return replace(self, amplitudes_mv=tuple(level[first::2] for level in self.amplitudes_mv))
+
+    @property
+    def means_mv(self) -> FloatArray:
+        """Mean amplitude of each level [mV], shape (k,)."""
+        return np.array([level.mean() for level in self.amplitudes_mv])
+
+    def places(self, intensity_pct_rmt: ArrayLike) -> FloatArray:
+        """Where intensities lie among the levels, 1.5 being halfway from the second to the third; same shape."""
+        numbers = np.arange(len(self.levels_pct_rmt))
+        return np.asarray(np.interp(intensity_pct_rmt, self.levels_pct_rmt, numbers))
+
+    def drawn_mv(self, place: float, rng: np.random.Generator) -> float:
+        """One amplitude of the level below or above a place [mV], the nearer the more probable."""
+        which, among = rng.random(2)
+        level = self.amplitudes_mv[int(place + which)]
+        return float(level[int(among * len(level))])
 
 
 @cache
-def sweeps_mv(dataset: str, folder: Path = FOLDER) -> FloatArray:
-    """Peak-to-peak amplitudes of the recorded sweeps of one muscle [mV], the smallest first."""
-    table = pd.read_csv(folder / "uef_trials.csv")
-    return np.sort(table.loc[table["dataset"] == dataset, "p2p_uV"].to_numpy() / 1000.0)
+def banks(folder: Path) -> tuple[Bank, ...]:
+    """The banks of all people, coil by coil, so that the first ten are of ten people.
 
-
-def hand_mv() -> FloatArray:
-    """152 hand sweeps (FDI) after pulses of one intensity [mV]."""
-    return sweeps_mv("ID01")
-
-
-def forearm_mv() -> FloatArray:
-    """70 forearm sweeps (ECR) over a whole recruitment curve [mV]."""
-    return sweeps_mv("ID10_1")
-
-
-def rest_mv() -> FloatArray:
-    """Forearm sweeps without an MEP [mV]."""
-    return forearm_mv()[forearm_mv() < AT_REST_MV]
+    Args:
+        folder: of the recordings.
+    """
+    table = pd.read_csv(folder / "shayofir" / "fdi_recruitment_trials.csv").query("use == 1")
+    found = []
+    for (coil, person), pulses in table.groupby(["coil", "person"]):
+        levels = {level: rows["mep_mv"].to_numpy() for level, rows in pulses.groupby("intensity_pct_rmt")}
+        found.append(Bank(int(person), str(coil), np.array(list(levels), dtype=float), tuple(levels.values())))
+    return tuple(found)
 
 
 @dataclass(frozen=True, eq=False)
-class Switched:
-    """A trial is one of some recorded sweeps, or one at rest; facilitation says how often.
+class RecordedResponse:
+    """The response of a person to the pulses of pairs, a recorded amplitude each; half of a bank.
 
     Args:
-        evoked_mv: the sweeps with an MEP [mV].
-        least: how often without facilitation.
-        most: how often at the best ISI.
+        bank: what is drawn from.
+        boost_pct_rmt: by how much facilitation shifts the intensity at the best ISI [% RMT].
     """
 
-    evoked_mv: FloatArray
-    least: float = 0.0
-    most: float = 1.0
-    floor: EmgFloor = NO_FLOOR
+    bank: Bank
+    boost_pct_rmt: float
+    floor: EmgFloor = field(default=NO_FLOOR)
 
-    def _share(self, facilitation: ArrayLike) -> FloatArray:
-        return self.least + (self.most - self.least) * np.asarray(facilitation, dtype=np.float64)
-
-    def expected_evoked_mv(self, facilitation: ArrayLike) -> FloatArray:
-        """Expected amplitude [mV]."""
-        share = self._share(facilitation)
-        return share * self.evoked_mv.mean() + (1.0 - share) * rest_mv().mean()
-
-    def sample_evoked_mv(self, facilitation: float, noise: TrialNoise, rng: np.random.Generator) -> float:
-        """The amplitude of a sweep [mV]."""
-        responds = rng.random() < self._share(facilitation)
-        return float(rng.choice(self.evoked_mv if responds else rest_mv()) * np.exp(noise.log_gain))
-
-
-@dataclass(frozen=True, eq=False)
-class Scaled:
-    """A trial is a recorded sweep times the facilitation, on an EMG floor.
-
-    Args:
-        evoked_mv: the sweeps [mV].
-        floor: the EMG floor.
-    """
-
-    evoked_mv: FloatArray
-    floor: EmgFloor
+    def places(self, facilitation: ArrayLike) -> FloatArray:
+        """Where trials lie among the bank's levels; same shape."""
+        return self.bank.places(PAIRS_PCT_RMT + self.boost_pct_rmt * np.asarray(facilitation, dtype=np.float64))
 
     def expected_evoked_mv(self, facilitation: ArrayLike) -> FloatArray:
-        """Expected amplitude above the floor [mV]."""
-        return np.asarray(facilitation, dtype=np.float64) * self.evoked_mv.mean()
+        """Mean amplitude, linear between the levels [mV]; same shape."""
+        numbers = np.arange(len(self.bank.levels_pct_rmt))
+        return np.asarray(np.interp(self.places(facilitation), numbers, self.bank.means_mv))
 
     def sample_evoked_mv(self, facilitation: float, noise: TrialNoise, rng: np.random.Generator) -> float:
-        """The amplitude above the floor [mV]."""
-        return float(facilitation * rng.choice(self.evoked_mv) * np.exp(noise.log_gain))
-
-
-@dataclass(frozen=True, eq=False)
-class Climbed:
-    """Facilitation, and noise, climb a recorded recruitment curve: the sweeps of one person in the order of their size.
-
-    Args:
-        low: where on the curve a trial without facilitation is, 0 being its smallest sweep and 1 its largest.
-        high: where one at the best ISI is.
-        noise_sd: SD of the place.
-    """
-
-    low: float
-    high: float
-    noise_sd: float
-    floor: EmgFloor = NO_FLOOR
-
-    def _sweep_mv(self, facilitation: ArrayLike, z: ArrayLike) -> FloatArray:
-        place = self.low + (self.high - self.low) * np.asarray(facilitation, dtype=np.float64)
-        curve = forearm_mv()
-        return np.interp(place + self.noise_sd * np.asarray(z), np.linspace(0.0, 1.0, len(curve)), curve)
-
-    def expected_evoked_mv(self, facilitation: ArrayLike) -> FloatArray:
-        """Expected amplitude [mV]."""
-        z = norm.ppf((np.arange(200) + 0.5) / 200)
-        return self._sweep_mv(np.asarray(facilitation, dtype=np.float64)[..., None], z).mean(-1)
-
-    def sample_evoked_mv(self, facilitation: float, noise: TrialNoise, rng: np.random.Generator) -> float:
-        """The amplitude of a sweep [mV]."""
-        del rng
-        return float(self._sweep_mv(facilitation, noise.input_z) * np.exp(noise.log_gain))
-
-
-def _occasional(rng: np.random.Generator) -> Switched:
-    return Switched(hand_mv(), float(rng.uniform(0, 0.1)), float(rng.uniform(0.5, 0.9)))
-
-
-def _scaled(rng: np.random.Generator) -> Scaled:
-    floor = EmgFloor(float(0.008 * np.exp(0.3 * rng.standard_normal())), 0.3)
-    return Scaled(float(rng.uniform(0.05, 1.0)) * hand_mv(), floor)
-
-
-def _climbed(rng: np.random.Generator) -> Climbed:
-    return Climbed(float(rng.uniform(0, 0.15)), float(rng.uniform(0.35, 0.8)), float(rng.uniform(0.08, 0.2)))
-
-
-def _nonresponder(rng: np.random.Generator) -> Switched:
-    share = float(rng.uniform(0, 0.2))
-    return Switched(float(rng.uniform(0.05, 1.0)) * hand_mv(), share, share)
-
-
-PEOPLE: dict[str, Callable[[np.random.Generator], ResponseCurve]] = {
-    "switched-hand": lambda _rng: Switched(hand_mv()),
-    "switched-forearm": lambda _rng: Switched(forearm_mv()[18:45]),
-    "occasional": _occasional,
-    "scaled": _scaled,
-    "climbed": _climbed,
-    "no-window": _nonresponder,
-}
+        """One recorded amplitude [mV]."""
+        del noise  # recorded amplitudes have theirs
+        return self.bank.drawn_mv(float(self.places(facilitation)), rng)
 
 
 @dataclass(frozen=True)
-class RecordedSession(SimulatedSession):
-    """A session with a person whose MEPs were recorded; `cohort` is one of `PEOPLE`."""
+class RecordedPerson:
+    """One of the cohort: a bank, and a window and a rig drawn for it.
 
-    def subject(self) -> SimulatedSubject:
-        """The person."""
-        usual = person_of("gaussian", self.person, self.seed)
-        rng = np.random.default_rng([list(PEOPLE).index(self.cohort), self.seed, self.person])
-        return replace(usual, response=PEOPLE[self.cohort](rng))
+    Args:
+        number: which one, from 0; the banks come in turn.
+        seed: of the cohort.
+        folder: of the recordings.
+    """
+
+    number: int
+    seed: int
+    folder: Path
+
+    @property
+    def bank(self) -> Bank:
+        """All that was recorded."""
+        all_banks = banks(self.folder)
+        return all_banks[self.number % len(all_banks)]
+
+    def subject(self, half: Half = "drawn") -> SimulatedSubject:
+        """The person whose responses are those of one half."""
+        rng = np.random.default_rng([self.seed, self.number])
+        median_ms, log_sd, *ends_ms = WIDTHS_MS
+        boost_pct_rmt, start_ms, hit_delay_ms, sd_ms = (
+            float(rng.uniform(*ends)) for ends in (BOOSTS_PCT_RMT, STARTS_MS, HIT_DELAYS_MS, (1.0, 4.0))
+        )
+        width_ms = float(np.clip(median_ms * np.exp(log_sd * rng.standard_normal()), *ends_ms))
+        return SimulatedSubject(
+            PeakProfile(start_ms, width_ms),
+            RecordedResponse(self.bank.half(half), boost_pct_rmt),
+            hit_delay_ms,
+            sd_ms,
+            stated_hit_delay_ms=STATED_HIT_DELAY_MS,
+        )
+
+    def single_pulses(self, count: int) -> list[tuple[float, float]]:
+        """Pulses alone given first: intensity [% RMT] and amplitude [mV] of each, from the other half.
+
+        All levels in turn, in an order drawn anew each time round; of more pulses the first ones are the same.
+
+        Args:
+            count: how many.
+        """
+        rng, half = np.random.default_rng([self.seed, self.number, 1]), self.bank.half("other")
+        pulses: list[tuple[float, float]] = []
+        while len(pulses) < count:
+            places = rng.permutation(len(half.levels_pct_rmt)).tolist()
+            pulses += [(float(half.levels_pct_rmt[place]), half.drawn_mv(place, rng)) for place in places]
+        return pulses[:count]

@@ -1,9 +1,10 @@
 """Analyse recorded EMG sweeps from beginning to end, and put what is said into docs/your-data.md.
 
-    python docs/analyse_recorded.py DIR
+    python docs/analyse_recorded.py RECORDINGS DIR
 
-makes `P01_raw.fif` in a new folder: recorded sweeps with the MEPs of a simulated person in them, one behind the other,
-with events. Then it analyses the file as `isiw analyse` does. Needs the extra import.
+makes `P01_raw.fif` in a new folder DIR: recorded sweeps of MEPFeatX, which lie in the folder RECORDINGS, with the MEPs
+of a simulated person in them, one behind the other, with events. Then it analyses the file as `isiw analyse` does.
+Needs the extra import.
 """
 
 from __future__ import annotations
@@ -24,10 +25,10 @@ SPACE = isiw.DesignSpace(0, 200, 5, reference="impact")
 MARKS = ("<!-- analysis: begin. Made by: python docs/analyse_recorded.py -->\n", "<!-- analysis: end -->")
 
 
-def written(folder: Path, trials: int = 60, seed: int = 2) -> Path:
+def written(recordings_folder: Path, folder: Path, trials: int = 60, seed: int = 2) -> Path:
     """A recording of sweeps, half a second apart."""
     responder = isiw.subjects.cohort("recruitment", 1, seed)[0].begin(seed)
-    recordings = load_recordings(ROOT / "tests" / "data" / "uef")
+    recordings = load_recordings(recordings_folder)
     device = isiw.RecordedPerson(lambda isi_ms: responder.respond(isi_ms, "impact"), "impact", recordings, seed)
     order = np.random.default_rng(seed).permutation(np.resize(SPACE.grid_ms, trials)).tolist()
     pieces, events, at_s = [], [], 0.0
@@ -48,9 +49,9 @@ def written(folder: Path, trials: int = 60, seed: int = 2) -> Path:
 
 def main() -> None:
     """Write the recording, log and page into the folder that is named, and what is said into the page of the docs."""
-    folder = Path(sys.argv[1])
+    recordings_folder, folder = map(Path, sys.argv[1:])
     folder.mkdir(parents=True)
-    (person,) = read_people(written(folder), Layout(reference="impact"), subject="P01")
+    (person,) = read_people(written(recordings_folder, folder), Layout(reference="impact"), subject="P01")
     analysis = isiw.existing.analysed(person, isiw.make_strategy(space=SPACE, seed=2))
     analysis.to_log(folder / "P01.mcap")
     analysis.plot(folder / "P01.png")

@@ -71,6 +71,15 @@ def space() -> DesignSpace:
 
 
 @pytest.fixture(scope="session")
-def recordings_folder() -> Path:
+def shared_data() -> Path:
+    """Recordings of others, which lie beside the repository; tests that need them are skipped where they do not."""
+    folder = Path(os.environ.get("ISIW_SHARED_DATA", Path(__file__).parents[2] / "shared" / "data"))
+    if not folder.is_dir():
+        pytest.skip(f"the recordings are not at hand: {folder} is no folder; ISIW_SHARED_DATA names another")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def recordings_folder(shared_data: Path) -> Path:
     """Recorded EMG sweeps."""
-    return Path(__file__).parent / "data" / "uef"
+    return shared_data / "uef"

@@ -13,7 +13,6 @@ ROOT = Path(__file__).parents[2]
 SCRIPTS = {
     "limits": "--cohorts late --people 2 --trials 5",
     "people": "--cohorts gaussian --people 2 --trials 5",
-    "recorded": "--strategies default --people 1 --trials 5",
 }
 
 

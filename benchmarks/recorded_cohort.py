@@ -1,0 +1,201 @@
+"""The default, and who knows the law, on people whose MEPs were recorded.
+
+    python -m benchmarks.recorded_cohort --people 400 --seed 10000 --given 0 --out benchmarks/results/recorded_cohort
+
+The recordings lie in no repository of ours: `--data`, or the variable ISIW_SHARED_DATA, names their folder. `--given
+0,10,30,60,600` gives the default so many single pulses of the other half first; `--fitted` adds the default with the
+prior that `benchmarks.response_prior` fitted to all other persons. Sessions are kept beside the result as they finish,
+and the same command continues where it was interrupted. Standard errors are by bootstrap over the ten persons, each
+with all coils. Seeds below 1,000 are for work.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import warnings
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import numpy as np
+import pandas as pd
+import typer
+from rich.progress import Progress
+
+import isiw
+from benchmarks.provenance import facts_of
+from benchmarks.quick import understood
+from benchmarks.recorded_law import KnowsTheLaw
+from benchmarks.recorded_people import RecordedPerson, recordings
+from benchmarks.recorded_tables import tables_of
+from benchmarks.response_prior import Fit, read_folds
+from benchmarks.tables import write_tables
+from isiw.errors import ImplausibleDataWarning
+from isiw.studies import Failure, Processes
+
+SPACE: Final = isiw.VALVE_SPACE
+MARKS: Final = (0, 10, 15, 20, 30, 40)
+LAW: Final = "who knows the law"
+TOO_GOOD: Final = "law and draws from the same half (too good)"
+FITTED: Final = "default, prior fitted to the other persons"
+TOGETHER: Final = 5
+"""Sessions that are kept in one file."""
+
+
+@dataclass(frozen=True)
+class RecordedSession:
+    """One session with one of the cohort.
+
+    Args:
+        person: the person.
+        strategy: `default`, `FITTED`, `LAW` or `TOO_GOOD`.
+        given: how many single pulses are given first.
+        trials: how many pairs are delivered.
+        fit: numbers of the default's prior, of `FITTED` alone.
+    """
+
+    person: RecordedPerson
+    strategy: str
+    given: int
+    trials: int
+    fit: Fit | None = None
+
+    @property
+    def label(self) -> str:
+        """What its rows are called."""
+        return f"{self.strategy}, {self.given} single pulses first" if self.given else self.strategy
+
+    def player(self) -> Any:
+        """What asks, learns and reports, before the first pair."""
+        if self.strategy in {LAW, TOO_GOOD}:
+            half = "other" if self.strategy == LAW else "drawn"
+            return KnowsTheLaw(self.person.subject(half), SPACE)
+        subject = self.person.subject()
+        seed = self.person.seed + self.person.number
+        prior = {} if self.fit is None else {"prior": self.fit.prior()}
+        strategy = isiw.make_strategy("default", SPACE, seed, hit_delay_ms=subject.stated_hit_delay_ms, **prior)
+        for intensity_pct_rmt, mep_mv in self.person.single_pulses(self.given):
+            strategy.tell(None, mep_mv, intensity_pct_rmt=intensity_pct_rmt)
+        return strategy
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row a mark."""
+        subject, player = self.person.subject(), self.player()
+        responder, truth = subject.begin(self.person.seed + self.person.number), subject.window(SPACE)
+        rows = []
+        for trial in range(self.trials + 1):
+            if trial in MARKS:
+                rows.append(self._row(trial, player.estimate(), truth))
+            if trial < self.trials:
+                response = responder.respond(player.ask(), SPACE.reference)
+                player.tell(response.isi_ms, response.mep_mv)
+        return rows
+
+    def _row(self, trial: int, estimate: isiw.WindowEstimate, truth: isiw.Window | None) -> dict[str, Any]:
+        bank, covered = self.person.bank, isiw.metrics.covers(estimate, truth, SPACE)
+        start, end = (np.nan, np.nan) if covered is None else map(float, covered)
+        return {
+            "strategy": self.label,
+            "number": self.person.number,
+            "person": bank.person,
+            "coil": bank.coil,
+            "pairs": trial,
+            "f1": isiw.metrics.f1(estimate, truth, SPACE),
+            "expected_f1": estimate.expected_f1,
+            "start_covered": start,
+            "end_covered": end,
+            "true_window": truth is not None,
+            "reported_window": estimate.window is not None,
+            **{f"believes {name}": share for name, share in (estimate.hypotheses or {}).items()},
+        }
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """Some sessions of one strategy, and the file that keeps them."""
+
+    sessions: tuple[RecordedSession, ...]
+    file: Path
+
+    def run(self) -> pd.DataFrame:
+        """Their rows, from the file if it is there."""
+        if not self.file.is_file():
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", ImplausibleDataWarning)
+                rows = pd.DataFrame([row for session in self.sessions for row in session.rows()])
+            unfinished = self.file.with_suffix(".unfinished")
+            rows.to_parquet(unfinished)
+            unfinished.replace(self.file)
+        return pd.read_parquet(self.file)
+
+
+def chunks(
+    people: list[RecordedPerson], given: list[int], trials: int, folder: Path, folds: Mapping[int, Fit] | None = None
+) -> list[Chunk]:
+    """All sessions: the default with so many pulses first, with fitted priors, and who knows the law.
+
+    Args:
+        people: the cohort.
+        given: numbers of single pulses.
+        trials: how many pairs are delivered.
+        folder: where rows are kept.
+        folds: the fit without each person; None for no fitted priors.
+    """
+    plan = [("default", count) for count in given] + [(LAW, 0), (TOO_GOOD, 0)]
+    plan += [(FITTED, count) for count in given if folds]
+    fits = folds or {}
+    names = {strategy: re.sub("[^a-z]+", "_", strategy) for strategy, _ in plan}
+    names[FITTED] = f"fitted_{zlib.crc32(repr(fits).encode()):08x}"
+    parts = [people[first : first + TOGETHER] for first in range(0, len(people), TOGETHER)]
+    return [
+        Chunk(
+            tuple(
+                RecordedSession(each, strategy, count, trials, fits[each.bank.person] if strategy == FITTED else None)
+                for each in part
+            ),
+            folder / f"{names[strategy]}-{count}-{part[0].number}-{len(part)}.parquet",
+        )
+        for part in parts
+        for strategy, count in plan
+    ]
+
+
+def main(
+    people: Annotated[int, typer.Option(help="Sessions of each strategy; the thirty banks come in turn.")] = 400,
+    seed: Annotated[int, typer.Option(help="Seed of windows, rigs and draws.")] = 10_000,
+    given: Annotated[str, typer.Option(help="Numbers of single pulses given first, comma-separated.")] = "0",
+    trials: Annotated[int, typer.Option(help="Pairs a session.")] = MARKS[-1],
+    workers: Annotated[int, typer.Option(help="Processes.")] = 2,
+    data: Annotated[Path | None, typer.Option(help="Folder of the recordings.")] = None,
+    fitted: Annotated[Path | None, typer.Option(help="JSON of benchmarks.response_prior, with its folds.")] = None,
+    out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("recorded_cohort"),
+) -> None:
+    """Compare the default with who knows the law, on recorded people."""
+    data = data or recordings()
+    if not data.is_dir():
+        print(f"Skipped: the recordings are not at hand, {data} is no folder. Name it with --data.")
+        return
+    cohort = [RecordedPerson(number, seed, data) for number in range(people)]
+    folder = out.with_suffix(f".{seed}-{trials}.sessions")
+    folder.mkdir(parents=True, exist_ok=True)
+    folds = None if fitted is None else read_folds(json.loads(fitted.read_text(encoding="utf-8")))
+    units, found = chunks(cohort, [int(each) for each in given.split(",")], trials, folder, folds), []
+    with Progress() as progress:
+        bar = progress.add_task("sessions", total=len(units))
+        for _, result in Processes(workers).results(Chunk.run, units):
+            if isinstance(result, Failure):
+                raise SystemExit(f"a session failed: {result.error}\n{result.details}")
+            found.append(result)
+            progress.advance(bar)
+    rows = pd.concat(found, ignore_index=True)
+    facts = facts_of("recorded_cohort", "numpy", seed=seed, sessions=people, space="valve, 0–500 ms")
+    write_tables(tables_of(rows, cohort, SPACE, LAW), facts, out)
+    print(out.with_suffix(".md").read_text())
+
+
+if __name__ == "__main__":
+    understood("recorded_cohort")
+    typer.run(main)
