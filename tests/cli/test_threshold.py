@@ -128,3 +128,17 @@ def test_the_hot_spot_of_a_simulated_person_is_found_and_shown(tmp_path: Path) -
     assert result.exit_code == 0, result.output
     assert "75 % MSO, coil " in result.output
     assert "true hot spot is " in run(tmp_path / "t.mcap", "--show").output
+
+
+def test_pulses_over_the_curve_are_those_that_were_named(tmp_path: Path) -> None:
+    words = (tmp_path / "c.mcap", "--method", "curve", "--at", 40, "--at", 60, "--each", 2, "--muscle", "FCR")
+    result = run(*words, "--by-hand", "--high", 60, "--min-iti-s", 0, "--seed", 3, typed="0.01\n0.4\n0.4\n0.01\n\n")
+    assert result.exit_code == 0, result.output
+    assert "All 4 pulses over the curve were given." in result.output
+    record = read_threshold(tmp_path / "c.mcap")
+    assert (record.header.muscle, record.header.search.settings["seed"]) == ("FCR", 3)
+    assert sorted(outcome.intensity_pct_mso or 0.0 for outcome in record.outcomes) == [40.0, 40.0, 60.0, 60.0]
+    beyond = run(tmp_path / "d.mcap", "--method", "curve", "--at", 70, "--by-hand", "--high", 60)
+    assert beyond.exit_code == 1
+    assert "beyond the limits" in beyond.output
+    assert not (tmp_path / "d.mcap").exists()
