@@ -74,7 +74,7 @@ ODD: dict[str, Any] = {
     "pulse_at_ms": 9.0, "longest_isi_ms": 9.0, "mep_window_ms": (60.0, 90.0),
 }  # fmt: skip
 VACUOUS = {("sweeps of MATLAB", "decimal"), ("epochs", "decimal")}  # which is of texts, and their numbers are none
-KEYS = {
+KEYS: dict[str, dict[str, Any]] = {
     "units of ISIs": {"units": ("s",)},
     "a column": {"columns": {"date": "elsewhere"}},
     "a channel of texts": {"channels": {"events": "elsewhere"}},
@@ -102,10 +102,10 @@ def test_no_option_leaves_what_is_read_as_it_would_be_without(kind: str, tmp_pat
     for stated in ({name: odd} for name, odd in ODD.items() if (kind, name) not in VACUOUS):
         assert outcome(source, layout, **stated) != before, stated
     if kind in {"text", "log"}:
-        for stated in ({"channels": {"tap": "muscle"}}, {"unmarked": "lost"}):
-            assert f"has no use for {next(iter(stated))}" in outcome(source, layout, **stated)
-    for what, stated in KEYS.items():
-        assert outcome(source, layout.saying(**stated)) != before, what
+        for name, odd in (("channels", {"tap": "muscle"}), ("unmarked", "lost")):
+            assert f"has no use for {name}" in outcome(source, layout, **{name: odd})
+    for what, said in KEYS.items():
+        assert outcome(source, layout.saying(**said)) != before, what
 
 
 def test_one_thing_is_stated_once() -> None:

@@ -124,8 +124,8 @@ class Layout(Checked):
                 choice(f"what a {what} holds", key, sorted(known))
         for unit in self.units:
             choice("a unit", unit, [*ISI_UNITS_MS, *EMG_UNITS])
-        for known in (ISI_UNITS_MS, EMG_UNITS):
-            if len(several := {*self.units} & known.keys()) > 1:
+        for quantity in (ISI_UNITS_MS, EMG_UNITS):
+            if len(several := {*self.units} & quantity.keys()) > 1:
                 raise InvalidValueError("two units of one quantity are stated", got=sorted(several), expected="one")
         if both := sorted(self.markers.keys() & self.channels.keys()):
             raise InvalidValueError(f"both a marker and a channel are stated for {both[0]}", remedy="Leave one out.")

@@ -59,7 +59,8 @@ def times_of(events: pd.DataFrame, *names: str | None) -> FloatArray:
 
 def marked(events: pd.DataFrame, key: str, layout: Layout) -> list[float]:
     """When the events of a key came, if there are any [s]."""
-    return times_of(events, *_fitting(events, key, layout)).tolist()
+    times_s: list[float] = times_of(events, *_fitting(events, key, layout)).tolist()
+    return times_s
 
 
 def names_of(events: pd.DataFrame) -> list[str]:

@@ -126,11 +126,15 @@ def _require_used(contents: Contents, path: Path | None, layout: Layout) -> None
     if contents.tracks and contents.trials is not None:
         kind = "of sweeps whose ISIs are stated"
         used |= recordings.OF_SWEEPS
-        used |= {"pulse_at_ms": None, "channels": {"emg"}, "markers": set()} if in_columns else {"unmarked": None}
+        if in_columns:
+            used |= {"pulse_at_ms": None, "channels": {"emg"}, "markers": set[str]()}
+        else:
+            used["unmarked"] = None
     elif contents.tracks:
         channels = {*CHANNELS} if in_columns else {*CHANNELS} - {"events"}
         used |= {"unmarked": None, "units": {*EMG_UNITS}, "channels": channels}
-        used |= {"decimal": None} if in_columns else {}
+        if in_columns:
+            used["decimal"] = None
     _require_use(layout, used, "the data" if path is None else path.name, kind)
 
 

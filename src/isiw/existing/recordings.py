@@ -195,7 +195,7 @@ def sweeps_of(recording: Recording, layout: Layout) -> list[Found]:
             remedy="Is the marker of the pulse the right one? Say --marker pulse=NAME.",
         )
     longest_s = max((pulse.isi_s or 0.0 for pulse in pulses), default=0.0)
-    events, found = recording.events, []
+    events, found = recording.events, list[Found]()
     bad = events[events["name"].astype(str).str.lower().str.startswith("bad")]  # as MNE takes them
     for number, pulse in enumerate(pulses):
         begin_s = pulse.at_s - _BEFORE_MS / 1e3 - longest_s
@@ -206,7 +206,7 @@ def sweeps_of(recording: Recording, layout: Layout) -> list[Found]:
         judged_s = min(pulse.at_s - _BEFORE_MS / 1e3, origin_s or pulse.at_s), pulse.at_s + _AFTER_MS / 1e3
         if ((bad["onset"] <= judged_s[1]) & (bad["onset"] + bad["duration"] >= judged_s[0])).any():
             said["excluded"] = True
-        asked_ms = said.get("commanded_isi_ms")  # what the file says, or else what the events do
+        asked_ms: Any = said.get("commanded_isi_ms")  # what the file says, or else what the events do
         if pulse.isi_s is not None and is_missing(asked_ms):
             asked_ms = max(1e3 * pulse.isi_s, 0.0)
         found.append((Stimulus(number, None if pulse.isi_s is None else float(asked_ms)), sweep, said))

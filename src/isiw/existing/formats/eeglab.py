@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -33,7 +33,7 @@ def read(path: Path, layout: Layout) -> Contents:
     events = [one for one in _listed(eeg.get("event")) if not _empty(one.get("latency"))]
     pauses = {math.ceil(float(one["latency"]) - 1.0): _number(one.get("duration")) / rate_hz
               for one in events if _name(one.get("type")) == "boundary"}  # fmt: skip
-    cuts = range(samples, trials * samples, samples) if trials > 1 else pauses
+    cuts: Iterable[int] = range(samples, trials * samples, samples) if trials > 1 else pauses
     stretches = parted(cuts, trials * samples, rate_hz, {} if trials > 1 else pauses)
     tracks = []
     for n in range(int(eeg["nbchan"])):

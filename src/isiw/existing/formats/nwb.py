@@ -88,7 +88,7 @@ def _events(table: pd.DataFrame, begin: str, usual: str) -> pd.DataFrame:
     """The rows of a table of times by their labels, and each further column of times as events."""
     label = next((name for name in ("label", "annotation", "event", "event_type", "name") if name in table), None)
     names = [usual] * len(table) if label is None else [_text(text) or usual for text in table[label]]
-    lasts = (table["stop_time"] - table["start_time"]).to_numpy(dtype=np.float64) if "stop_time" in table else 0.0
+    lasts: Any = (table["stop_time"] - table["start_time"]).to_numpy(dtype=np.float64) if "stop_time" in table else 0.0
     others = table.drop(columns=[begin, "stop_time"], errors="ignore")
     found = [others.assign(name=names, onset=table[begin].to_numpy(dtype=np.float64), duration=lasts)]
     for column in (str(name) for name in others if str(name).endswith("_time")):
