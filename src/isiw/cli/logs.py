@@ -39,7 +39,7 @@ def show_log(
 ) -> None:
     """Say who, when and with what, list the trials, and say what was found; works on a damaged log, too."""
     with errors_reported():
-        record = isiw.read_session(log)
+        record = isiw.read_session(log, channels=())
         say_unread(record)
         for fact in isiw.report.tables.first_facts(record):
             show(f"{fact.name + ':':10}{fact.value}")

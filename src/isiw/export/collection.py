@@ -18,7 +18,7 @@ from isiw.errors import InvalidValueError, LogError
 from isiw.findings import Kind
 from isiw.log.durable import kept_for, part_of
 from isiw.log.headers import Header
-from isiw.log.reader import SessionRecord, read_salvaged, read_session
+from isiw.log.reader import SessionRecord, read_salvaged, read_session, topics_of
 from isiw.log.records import Onset
 from isiw.log.salvage import only_in, salvage_file
 from isiw.log.schema import Event
@@ -201,17 +201,20 @@ class Part:
         return {"subject": self.subject, "session": self.session}
 
 
-def read_logs(source: str | Path) -> tuple[list[SessionRecord], list[str]]:
-    """The sessions of a log or a folder of logs, each by the log that tells most, and a sentence for each left out."""
+def read_logs(source: str | Path, channels: Iterable[str] | None = None) -> tuple[list[SessionRecord], list[str]]:
+    """The sessions of a log or a folder of logs, each by the log that tells most, and a sentence for each left out.
+
+    Of other `channels` than these no samples are read; with None all are.
+    """
     if not Path(source).is_dir():
-        return [read_session(source)], []
+        return [read_session(source, channels=channels)], []
     records: dict[str, SessionRecord] = {}
     left_out = []
     files = (file for file in Path(source).rglob("*.mcap*") if file.is_file())
     logs = (file for file in files if file.suffix in {".mcap", ".part"} or kept_for(file) is not None)
     for file in sorted(logs):
         try:
-            record = read_salvaged(salvage_file(file))
+            record = read_salvaged(salvage_file(file, topics_of(channels)))
         except LogError as error:
             left_out.append(f"{file.name} is left out: {error.what}.")
             continue

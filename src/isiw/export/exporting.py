@@ -15,6 +15,7 @@ from isiw.checks import choice
 from isiw.errors import InvalidValueError
 from isiw.export.bids import write_bids
 from isiw.export.collection import Part, log_losses, numbered, pseudonymised, read_logs, told_twice
+from isiw.export.emg import EMG
 from isiw.export.tables import write_tables
 
 
@@ -87,7 +88,7 @@ def export_logs(source: str | Path, folder: str | Path, to: str = "csv", *, pseu
         LogError: nothing can be read.
     """
     choice("the format of an export", to, FORMATS)
-    records, lacking = read_logs(source)
+    records, lacking = read_logs(source, None if to == "bids" else (EMG,))
     pseudonyms: Mapping[str, str] = {}
     if pseudonymise:
         records, pseudonyms = pseudonymised(records)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import re
 import struct
 import zlib
@@ -124,13 +125,17 @@ _MAGIC = b"\x89MCAP0\r\n"
 
 def counted_records(file: IO[bytes]) -> mcap.Statistics | None:
     """The counts of a file's index, if it agrees with its checksum, which the library leaves unchecked."""
-    file.seek(0)
-    data = file.read()
-    footer_at = len(data) - len(_MAGIC) - _FOOTER_BYTES
-    if footer_at < 0 or not data.endswith(_MAGIC):
+    end = file.seek(0, os.SEEK_END) - len(_MAGIC)
+    footer_at = end - _FOOTER_BYTES
+    if footer_at < 0:
         return None
-    index_at, _, checksum = struct.unpack_from("<QQI", data, footer_at + RECORD_HEAD_BYTES)
-    index = data[index_at : len(data) - len(_MAGIC)]
+    file.seek(footer_at)
+    footer = file.read()
+    index_at, _, checksum = struct.unpack_from("<QQI", footer, RECORD_HEAD_BYTES)
+    if not footer.endswith(_MAGIC) or index_at > end:
+        return None
+    file.seek(index_at)
+    index = file.read()[: -len(_MAGIC)]
     if zlib.crc32(index[:-4]) != checksum:
         return None
     try:

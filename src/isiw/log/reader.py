@@ -17,7 +17,7 @@ from isiw.log.headers import SCHEMA_VERSION, Header, ThresholdHeader
 from isiw.log.kinds import LogKind, continued_by, of_another_kind
 from isiw.log.records import Onset, Records, unknown_of
 from isiw.log.salvage import Salvage, salvage
-from isiw.log.schema import EstimateRecord, Event, Intent, PulseOutcome, Record
+from isiw.log.schema import EstimateRecord, Event, Intent, PulseOutcome, Record, waveform_topic
 from isiw.log.verdicts import VERDICTS, doubted_by, under_all
 from isiw.sentences import JUDGED_SINCE
 from isiw.signals.measures import Measures, measures
@@ -219,17 +219,24 @@ class SessionRecord(_StimuliRecord[Header]):
         return {name: channel for (number, name), channel in self.waveforms.items() if number == trial}
 
 
-def read_session(path: str | Path) -> SessionRecord:
+def read_session(path: str | Path, *, channels: Iterable[str] | None = None) -> SessionRecord:
     """Read a log, finished or not, whole or damaged; `losses` says what is missing.
 
     Args:
         path: the log, with or without `.part`.
+        channels: the channels whose samples are wanted, such as `["emg"]`; waveforms of others have none. All by
+            default; with fewer a log is read faster, and in less memory.
 
     Raises:
         LogError: no such file, not a log, or one from a newer version.
         DamagedLogError: a log of which not even the header can be read.
     """
-    return read_salvaged(salvage(path))
+    return read_salvaged(salvage(path, topics_of(channels)))
+
+
+def topics_of(channels: Iterable[str] | None) -> frozenset[str] | None:
+    """The topics whose samples are kept if these channels are wanted; None is all."""
+    return None if channels is None else frozenset(map(waveform_topic, channels))
 
 
 def read_salvaged(salvaged: Salvage) -> SessionRecord:

@@ -10,7 +10,7 @@ import itertools
 import re
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple, TypeVar
 
 from pydantic import ValidationError
@@ -136,8 +136,10 @@ class Records:
     def of(cls, salvaged: Salvage) -> Records:
         """The records of a log."""
         records = cls(salvaged, losses=list(salvaged.losses))
-        for message in salvaged.messages:
+        for at, message in enumerate(salvaged.messages):
             records.take(message)
+            if salvaged.topics_kept is not None:  # nothing else is made of it
+                salvaged.messages[at] = replace(message, data=b"")
         return records
 
     @property

@@ -19,7 +19,7 @@ from isiw.errors import DamagedLogError, LogError, os_errors
 from isiw.files import opened
 from isiw.log.blocks import RECORD_HEAD_BYTES, UNREADABLE, LostBlockError, Unpacking, counted_records, marked
 from isiw.log.durable import Fingerprint, log_of, part_of
-from isiw.log.schema import ANNOUNCEMENT, CHANNEL_IDS, Message
+from isiw.log.schema import ANNOUNCEMENT, CHANNEL_IDS, Message, is_of_isiw, without_samples
 from isiw.text.sanitize import counted
 
 _PERMISSIONS: Final = "Check its permissions and those of its folder."
@@ -29,10 +29,12 @@ _PERMISSIONS: Final = "Check its permissions and those of its folder."
 class Salvage:
     """All that was read of a log; `losses` are sentences, and topics are known even if their definition is lost.
 
-    With `end_lost` nobody knows how many stimuli there were; `counted` has the index's counts by topic.
+    With `end_lost` nobody knows how many stimuli there were; `counted` has the index's counts by topic. Of waveforms on
+    other `topics_kept` the samples are not kept; with None all are.
     """
 
     path: Path
+    topics_kept: frozenset[str] | None = None
     size: int = 0
     fingerprint: Fingerprint | None = None
     messages: list[Message] = field(default_factory=list)
@@ -57,8 +59,8 @@ def current_file(path: str | Path) -> Path:
     )
 
 
-def salvage(path: str | Path) -> Salvage:
-    """Read everything that can be read from a log.
+def salvage(path: str | Path, topics_kept: frozenset[str] | None = None) -> Salvage:
+    """Read everything that can be read from a log, of waveforms on other topics than these all but the samples.
 
     Where there are both `FILE.part` and `FILE`, the first is the second's continuation and is read; if it is not,
     the file that was named is.
@@ -68,7 +70,7 @@ def salvage(path: str | Path) -> Salvage:
     with os_errors(LogError, "the log cannot be read", path, _PERMISSIONS):
         current, closed = current_file(path), log_of(Path(path))
         if Path(path) == current or not closed.is_file():
-            return salvage_file(current)
+            return salvage_file(current, topics_kept)
         return _continuation(current, closed)
 
 
@@ -96,9 +98,9 @@ def only_in(found: Salvage, other: Salvage) -> int:
     return (own - others).total()
 
 
-def salvage_file(path: Path) -> Salvage:
-    """Read everything that can be read from one file, whatever else is beside it."""
-    found = Salvage(path)
+def salvage_file(path: Path, topics_kept: frozenset[str] | None = None) -> Salvage:
+    """Read everything that can be read from one file, whatever else is beside it; `topics_kept` as in `Salvage`."""
+    found = Salvage(path, topics_kept)
     with os_errors(LogError, "the log cannot be read", path, _PERMISSIONS), opened(path) as file:
         found.fingerprint = Fingerprint.of(file)
         found.size = found.fingerprint.size
@@ -234,7 +236,14 @@ class _Reading:
                 found.topics[record.id] = record.topic
             elif isinstance(record, mcap.Message) and record.channel_id in found.topics:
                 topic = found.topics[record.channel_id]
-                found.messages.append(Message(topic, record.data, record.log_time, record.sequence))
+                found.messages.append(Message(topic, self._kept(topic, record.data), record.log_time, record.sequence))
+
+    def _kept(self, topic: str, data: bytes) -> bytes:
+        """What is kept of a record."""
+        kept = self.found.topics_kept
+        if kept is None or topic in kept or is_of_isiw(topic):
+            return data
+        return without_samples(data) or data
 
 
 def _keep_attachment(attachment: mcap.Attachment, file: IO[bytes], start: int, found: Salvage) -> None:
