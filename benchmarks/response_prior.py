@@ -29,7 +29,7 @@ from benchmarks.tables import write_tables
 from isiw.models.particles.laws import HAND, NoiseShares
 from isiw.models.particles.prior import Prior
 from isiw.models.shared.scales import Scale
-from isiw.types import FloatArray
+from isiw.types import FloatArray, IntArray
 
 MEDIANS: Final = np.arange(-33.0, -14.9, 1.0)
 SDS: Final = np.arange(2.0, 10.1, 1.0)
@@ -74,7 +74,7 @@ class Evidence:
     """
 
     by_kind: FloatArray
-    persons: FloatArray
+    persons: IntArray
 
     @classmethod
     def of(cls, drawn: Sequence[Mapping[str, Draws]], persons: Iterable[int], prior: Prior) -> Evidence:
@@ -85,7 +85,7 @@ class Evidence:
         for point, rest_pct in enumerate(GRID.tolist()):
             law = mixtures(_with_hand(prior, rest_pct))["recruitment"]
             by_kind[point, :, recruitment] = [draws["recruitment"].log_evidence(law) for draws in drawn]
-        return cls(by_kind, np.array(list(persons)))
+        return cls(by_kind, np.array(list(persons), dtype=np.int64))
 
     def without(self, person: int) -> FloatArray:
         """That of all other persons."""

@@ -34,7 +34,7 @@ def made_up(tmp_path: Path) -> Path:
 
 def counted() -> Bank:
     """Amplitudes are numbers of pulses, by hundreds of their level."""
-    return Bank(1, "a", np.array([90.0, 100.0]), (np.arange(10) + 100.0, np.arange(10) + 200.0))
+    return Bank(1, "a", np.array([90.0, 100.0]), (np.linspace(100.0, 109.0, 10), np.linspace(200.0, 209.0, 10)))
 
 
 def test_both_halves_share_no_pulse_and_lose_none() -> None:
