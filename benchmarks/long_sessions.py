@@ -55,7 +55,12 @@ def run(name: str, trials: int, log: Path, *, waveforms: bool = False) -> np.nda
     limits = isiw.Limits.of_space(SPACE, max_pulses=trials + 1)
     try:
         isiw.Session(
-            device(waveforms=waveforms), unstopped(name, trials), log=log, limits=limits, on_trial=on_trial
+            device(waveforms=waveforms),
+            unstopped(name, trials),
+            log=log,
+            limits=limits,
+            safeguards=isiw.Safeguards(on_pause=lambda _: True),
+            on_trial=on_trial,
         ).run()
     except Interrupted:
         return 1e3 * np.diff(ended_s)

@@ -12,6 +12,7 @@ import pytest
 from isiw.signals import judge, tap
 from isiw.signals.courses import GRID_MS, STEP_MS, Courses, Span
 from isiw.signals.tap import TapResponses
+from isiw.signals.taps_alone import LEAST_WEIGHT
 from isiw.subjects.changes import TapResponse
 from isiw.trials import Stimulus, Trial, TrialTable
 from isiw.types import BoolArray, FloatArray
@@ -66,7 +67,7 @@ def plainly_subtracted(
     sizes = [float(wave[met] @ centred / (centred @ centred)) for wave in waves]
     parts = [size * shown * wave for size, shown, wave in zip(sizes, shows, waves, strict=True)]
     weights = [size**2 * shown for size, shown in zip(sizes, shows, strict=True)]
-    one = sum(parts) / np.maximum(sum(weights), tap.LEAST_WEIGHT)
+    one = sum(parts) / np.maximum(sum(weights), LEAST_WEIGHT)
     seen = outside & (shows.sum(axis=0) >= tap.LEAST_SHOWN) & (np.abs(one) > clear_mv)
     power = [float(((seen & shown) * one**2).sum()) for shown in shows]
     both = [each > 0.5 * max(power) for each in power]
@@ -76,7 +77,7 @@ def plainly_subtracted(
     if pieces <= 1 or sum(both) < tap.LEAST_BOTH:
         apart = sum((size - 1) ** 2 for size in sizes)
         return mean, others, (usual + apart) / (tap.USUAL_COUNTS + count - 1)
-    units = [(sum(parts) - part) / np.maximum(sum(weights) - weight, tap.LEAST_WEIGHT)
+    units = [(sum(parts) - part) / np.maximum(sum(weights) - weight, LEAST_WEIGHT)
              for part, weight in zip(parts, weights, strict=True)]  # fmt: skip
     shown = [size_shown(wave, unit, seen & at) for wave, unit, at in zip(waves, units, shows, strict=True)]
     larger = [size - 1 if is_both else 0.0 for size, is_both in zip(shown, both, strict=True)]
@@ -124,11 +125,11 @@ def test_sums_over_all_sweeps_come_to_what_a_look_at_each_sweep_does(seed: int, 
             if (found := plainly(taps, trial, 2 * told_by.get(trial.index, 0))) is not None:
                 told_by[trial.index] = found[0]
                 again, known = agree(taps, trial), known + 1
-                pairs = ((trial.mep_mv, again.mep_mv), (trial.tap_mv or 0.0, again.tap_mv or 0.0))
+                pairs = ((trial.mep_mv or 0.0, again.mep_mv or 0.0), (trial.tap_mv or 0.0, again.tap_mv or 0.0))
                 apart = [abs(new - old) > max(tap.SAME_MV, tap.SAME_SHARE * max(new, old)) for old, new in pairs]
                 expected |= {trial.index} if trial.counts and any(apart) else set()
         assert set(corrected) == expected
-        trials = trials.changed(lambda trial, by=corrected: by.get(trial.index, trial))
+        trials = TrialTable(tuple(corrected.get(trial.index, trial) for trial in trials))
         corrections += len(corrected)
     assert known > 40
     assert corrections or response is None

@@ -44,7 +44,9 @@ def kinds_plainly(series: tuple[Told, ...]) -> set[str]:
     outside = [one.outside for one in series[::-1][:since] if one.outside is not None]
     alike = next((n for n, one in enumerate(outside) if abs(one.at_ms - outside[0].at_ms) > places.ALIKE_MS), 99)
     isis_ms = [one.isi_ms for one in series[::-1][:since] if one.outside is not None][:alike]
-    if len(isis_ms) >= places.IN_A_ROW and (None in isis_ms or max(isis_ms) - min(isis_ms) >= places.DIFFERING_MS):
+    pairs_ms = [isi_ms for isi_ms in isis_ms if isi_ms is not None]
+    differ = len(pairs_ms) < len(isis_ms) or max(pairs_ms) - min(pairs_ms) >= places.DIFFERING_MS if isis_ms else False
+    if len(isis_ms) >= places.IN_A_ROW and differ:
         found.add("misplaced")
     return found
 

@@ -56,7 +56,7 @@ class Sums(NamedTuple):
 
     courses_mv: FloatArray
     weights: FloatArray
-    count: IntArray
+    shown: IntArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -106,7 +106,8 @@ class _Places(NamedTuple):
 
     @classmethod
     def none(cls) -> _Places:
-        return cls(np.zeros((0, 2), dtype=np.int64), *np.zeros((2, 0), dtype=np.int64), np.zeros(0, dtype=bool))
+        nothing = np.zeros(0, dtype=np.int64)
+        return cls(nothing.reshape(0, 2), nothing, nothing, nothing.astype(bool))
 
     def seen(self, by: Span) -> _Places:
         """The same after one more sweep, which shows so much."""
@@ -114,8 +115,12 @@ class _Places(NamedTuple):
 
     def appended(self, span: Span, count: int, *, is_free: bool) -> _Places:
         """The same and one more window."""
-        more = (np.array([span]), [count], [0], [is_free])
-        return _Places(*(np.concatenate(both) for both in zip(self, more, strict=True)))
+        return _Places(
+            np.vstack([self.spans, span]),
+            np.append(self.counts, count),
+            np.append(self.told_by, 0),
+            np.append(self.are_free, is_free),
+        )
 
     def due(self, *, rest: bool) -> BoolArray:
         """Those of which twice as much is known as their amplitudes rest on; new ones, if free of any response."""
@@ -283,7 +288,7 @@ def _subtracted(window: _MepWindow, courses: Courses, which: BoolArray, clear_mv
     others = (count * mean - shown) / (count - 1)
     sums = courses.sums(which, sizes)
     one = sums.courses_mv / np.maximum(sums.weights, LEAST_WEIGHT)
-    seen = window.is_outside & (sums.count >= LEAST_SHOWN) & (np.abs(one) > clear_mv)
+    seen = window.is_outside & (sums.shown >= LEAST_SHOWN) & (np.abs(one) > clear_mv)
     # A sweep says its size if it shows half as much of the response as the one that shows most.
     power = within(spans, seen * one**2)
     both = power > 0.5 * power.max()
