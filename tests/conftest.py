@@ -48,12 +48,10 @@ def one_thread() -> None:
 
 
 def _framed(_: object, to: str | Path | IO[Any], **_options: object) -> None:
-    if isinstance(to, io.TextIOBase):
-        to.write("<svg></svg>")
-    elif isinstance(to, io.BytesIO):
-        to.write(b"a picture")
-    else:
+    if isinstance(to, str | Path):
         Path(to).write_bytes(b"a picture")
+    else:
+        to.write("<svg></svg>" if isinstance(to, io.TextIOBase) else b"a picture")
 
 
 @pytest.fixture
