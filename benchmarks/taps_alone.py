@@ -22,7 +22,7 @@ import isiw
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
 from isiw.metrics import covers, f1
-from isiw.signals.tap import meets_response
+from isiw.signals.taps_alone import meets_response
 from isiw.studies import summary
 from isiw.subjects.subject import SimulatedSubject
 

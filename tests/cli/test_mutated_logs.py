@@ -33,7 +33,7 @@ def test_a_hundred_mutated_logs_are_shown_and_resumed_or_refused_in_words(
 
 
 def test_a_traceback_would_be_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(_path: object) -> None:
+    def broken(*_: object) -> None:
         raise RuntimeError("a fault of isiw")
 
     monkeypatch.setattr("isiw.log.reader.salvage", broken)

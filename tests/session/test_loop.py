@@ -5,6 +5,7 @@ import math
 import os
 import signal
 import threading
+import time
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, Never, cast
@@ -18,6 +19,7 @@ from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, LogError, StrategyError
 from isiw.findings import Kind
+from isiw.log.durable import log_exists
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import EstimateRecord, Intent
 from isiw.models.particles import ParticleModel
@@ -360,8 +362,18 @@ def test_without_a_writable_log_nothing_is_delivered(log: Path, monkeypatch: pyt
 def test_ctrl_c_at_any_time_leaves_an_intact_log(log: Path, monkeypatch: pytest.MonkeyPatch, delay_s: float) -> None:
     device = ScriptedDevice()
     session = Session(device, scripted_strategy(100_000), log=log, limits=Limits(0, 200, 0.0, 100_000))
-    timer = threading.Timer(delay_s, os.kill, (os.getpid(), signal.SIGINT))
     stage = device.stage
+
+    def interrupt() -> None:
+        # Not before the log is there, however slow the disk is: without a log nothing is delivered.
+        for _ in range(10_000):
+            if log_exists(log):
+                break
+            time.sleep(0.001)
+        time.sleep(delay_s)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    timer = threading.Thread(target=interrupt)
 
     def stage_and_start() -> None:
         # Not before the session runs, whatever else the machine does: outside it, Ctrl-C would end the tests.
