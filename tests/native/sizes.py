@@ -24,7 +24,8 @@ from isiw.models.particles.supra.prior import SupraPrior
 from isiw.models.shared.history import Circumstances, History, neutral
 from isiw.models.shared.scales import Scale
 from isiw.models.windows import grid_of
-from isiw.native.engine import Crowd, entropy_reductions, log_likelihoods, variance_reductions
+from isiw.native.engine import entropy_reductions, log_likelihoods, variance_reductions
+from isiw.native.law import Crowd
 from native.drawn import Case, seeds
 
 TRIALS = (0, 1, 2, 15, 16, 17, 63, 64, 65, 127, 128, 129, 257)

@@ -20,7 +20,9 @@ from isiw.models.particles.supra.predictions import SupraSample
 from isiw.models.shared.history import Circumstances
 from isiw.models.shared.tables import LEVELS
 from isiw.native import engine
-from isiw.native.engine import COLUMNS, FIELDS, UNKNOWN, Crowd, log_likelihoods
+from isiw.native.arrays import COLUMNS, FIELDS, UNKNOWN
+from isiw.native.engine import log_likelihoods
+from isiw.native.law import Crowd
 from isiw.window import LEAST_DEPRESSED_MV, least_excess_mv
 from native import reference
 from native.drawn import CASES, PLACES, Case, columns, seeds, trials

@@ -11,11 +11,11 @@ from benchmarks import sanitized
 BEYOND = """
 import numpy as np
 from benchmarks import sanitized
-from isiw.native import engine, library
+from isiw.native import arrays, library
 sanitized.take()
-sizes = engine.FIELDS, 23, 24
-arrays = [np.zeros(size, dtype=np.float32) for size in sizes]
-library.call("evoked_means", 1, 24, *(array.__array_interface__["data"][0] for array in arrays))
+sizes = arrays.FIELDS, 23, 24
+given = [np.zeros(size, dtype=np.float32) for size in sizes]
+library.call("evoked_means", 1, 24, *(array.__array_interface__["data"][0] for array in given))
 """
 
 pytestmark = pytest.mark.skipif(sanitized.compiler() is None, reason="no compiler with sanitizers here")

@@ -30,7 +30,9 @@ from isiw.models.particles.records import (
 from isiw.models.protocol import Observation
 from isiw.models.shared.history import Circumstances, History, neutral
 from isiw.models.shared.tables import systematic
-from isiw.native.engine import UNKNOWN, Crowd, elementary, log_likelihoods
+from isiw.native.arrays import UNKNOWN
+from isiw.native.engine import elementary, log_likelihoods
+from isiw.native.law import Crowd
 from isiw.types import FloatArray, Singles
 from native import reference
 from native.drawn import CASES, Case, columns, history, seeds, trials

@@ -14,7 +14,7 @@ from isiw.models.particles.records import FORM, NOISE, PRESENT, SHAPE, START, WI
 from isiw.models.shared.history import neutral
 from isiw.models.shared.tables import LEVELS
 from isiw.native import engine
-from isiw.native.engine import FIELDS
+from isiw.native.arrays import FIELDS
 from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse, ResponseCurve, TrialNoise
 from isiw.types import Array, ArrayLike, FloatArray, Singles
 from native import reference

@@ -35,7 +35,7 @@ from isiw.models.particles.supra.prior import LATENTS as SUPRA_LATENTS
 from isiw.models.particles.supra.prior import SupraPrior
 from isiw.models.shared.scales import Scale
 from isiw.models.shared.start import StartPrior
-from isiw.native.engine import Crowd
+from isiw.native.law import Crowd
 from isiw.priors.population import beside
 from isiw.types import Conditioning, FloatArray
 from native.drawn import Case

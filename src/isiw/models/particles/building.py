@@ -11,7 +11,8 @@ import numpy as np
 from isiw.design import DesignSpace
 from isiw.models.particles.mixture import Mixture
 from isiw.models.shared.start import StartPrior
-from isiw.native.engine import LANES, MEANINGS, Tables
+from isiw.native.arrays import LANES, MEANINGS
+from isiw.native.law import Tables
 from isiw.types import FloatArray, Singles
 
 PART_PROBABILITY: Final = (0.25, 0.30, 0.25, 0.20)

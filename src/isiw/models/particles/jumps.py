@@ -25,7 +25,7 @@ from isiw.models.particles.latents import (
 )
 from isiw.models.particles.noise import NoiseKind
 from isiw.models.particles.prior import Prior
-from isiw.native.engine import Law
+from isiw.native.law import Law
 
 JUMPS: Final = {
     "form": 0.09,

@@ -24,7 +24,7 @@ from isiw.models.particles.swarm import Moving, Swarm
 from isiw.models.protocol import Observation, PriorPerson
 from isiw.models.shared.tables import NOTED, SIMULATED, seeds, stream
 from isiw.models.windows import EXCLUDED_AT, SampledHypotheses, SampledProfiles, grid_of, profile_grid, sampled_estimate
-from isiw.native.engine import Crowd, Law
+from isiw.native.law import Crowd, Law
 from isiw.types import ArrayLike, FloatArray
 from isiw.window import Window
 

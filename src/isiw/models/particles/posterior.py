@@ -13,7 +13,7 @@ from isiw.design import DesignSpace
 from isiw.models.particles.swarm import Moving, Swarm
 from isiw.models.protocol import Observation
 from isiw.models.shared.history import History, observed
-from isiw.native.engine import Law
+from isiw.native.law import Law
 from isiw.types import Array, FloatArray, Singles
 
 

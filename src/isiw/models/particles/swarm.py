@@ -19,7 +19,8 @@ from isiw.models.particles.mixture import log_sum
 from isiw.models.particles.noise import recruits
 from isiw.models.shared.history import BY_CURVES, SHIFT, History
 from isiw.models.shared.tables import seeds
-from isiw.native.engine import Crowd, Law, log_likelihoods
+from isiw.native.engine import log_likelihoods
+from isiw.native.law import Crowd, Law
 from isiw.types import FloatArray, Singles
 
 LEAST_ESS = 0.01

@@ -11,7 +11,7 @@ from isiw.design import DesignSpace
 from isiw.models.particles.building import prior_tables
 from isiw.models.particles.latents import LATENTS as DEFAULT_LATENTS
 from isiw.models.particles.supra.prior import BLOCKS, LATENTS, SupraPrior
-from isiw.native.engine import Law
+from isiw.native.law import Law
 from isiw.types import BoolArray
 
 JUMPS: Final = {

@@ -1,0 +1,298 @@
+"""A model's prior and its moves as the engine has them, with its calls on particles, whose sizes are checked here."""
+
+from __future__ import annotations
+
+import ctypes
+from functools import cached_property
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from isiw.native.arrays import (
+    COLUMNS,
+    DOUBLE,
+    FIELDS,
+    FLAG,
+    KINDS,
+    LANES,
+    MEANINGS,
+    NATURAL,
+    SINGLE,
+    UNKNOWN,
+    WHOLE,
+    Seeds,
+    address,
+)
+from isiw.native.library import call
+from isiw.types import Array, BoolArray, FloatArray, IntArray, Singles
+
+_LAST_KINDS: Final = np.array([3, 4, 1, 1, 4])
+"""The last of each."""
+
+
+class Crowd(NamedTuple):
+    """Weighted particles of b people."""
+
+    values: Singles  # of latents, (b, p, d)
+    kinds: IntArray  # (b, p, k)
+    log_weights: FloatArray  # (b, p)
+    log_likelihood: Singles  # of the trials so far, (b, p)
+    densities: Singles  # log densities of blocks, as far as known, (b, p, blocks)
+
+    def copied(self) -> Crowd:
+        """The same, to be changed."""
+        log_weights, log_likelihood = self.log_weights.copy(), self.log_likelihood.copy()
+        return Crowd(self.values.copy(), self.kinds.copy(), log_weights, log_likelihood, self.densities.copy())
+
+
+class Tables(NamedTuple):
+    """What the engine knows of a model's prior and of its moves."""
+
+    at: IntArray  # of the latent of each of `MEANINGS`; d where the model has none, (m,)
+    spreads: Array  # usual SD of each latent, (d,)
+    first: IntArray  # latent of each block, (k,)
+    size: IntArray  # how many latents it has, (k,)
+    components: (
+        IntArray  # of its mixture, (k,); 0 for a start, negative for start and width that may be those of a place
+    )
+    log_shares: Array  # of the components, less the logs of their SDs, (k, c)
+    below: Array  # sums of the shares of earlier components, from the second on, (k, c)
+    means: Array  # of the latents in each component, (d, c)
+    sds: Array  # likewise, (d, c)
+    per_sds: Array  # 1 / SD, as dividers are slow, (d, c)
+    start_ms: Array  # knots of the density of a start, evenly spaced, (s,)
+    density: Array  # at the knots, (s,)
+    quantiles: Array  # probability of an earlier start, at the knots, (s,)
+    places: Array  # log share less the logs of the SDs, mean and SD of the start, then of the log width, (l, 5)
+    place_below: Array  # given a place, sums of the shares of earlier ones, (l,)
+    place_share: float  # probability of all places
+    apart: bool  # enhancement and depression may not overlap
+    state_of: IntArray  # weights of the kinds in the number of a particle's state, (kinds,)
+    shifted: BoolArray  # which latents a difference moves, by state and part, (states, parts, d)
+    parts: Array  # sums of the probabilities of earlier parts, (parts - 1,)
+    jumps: Array  # likewise of earlier jumps, (jumps - 1,)
+    redrawn: BoolArray  # which latents each jump draws again, (jumps, d)
+    renewed: BoolArray  # which kinds each jump draws again, (jumps, kinds)
+    of_profile: BoolArray  # the jump concerns nothing but a profile, which without facilitation means nothing, (jumps,)
+    kinds: Array  # sums of the probabilities of earlier values of each kind, (kinds, v - 1)
+    changed: int  # block of the latent that says when something changes; that of its size is the next
+
+
+class _Struct(ctypes.Structure):
+    """`Tables` of engine.h."""
+
+    _fields_ = [
+        *((name, ctypes.c_int64) for name in ("latents", "blocks", "width", "knots", "place_count")),
+        *((name, ctypes.c_int64) for name in ("states", "part_count", "jump_count", "kind_values")),
+        *((name, ctypes.c_void_p) for name in Tables._fields[: Tables._fields.index("place_share")]),
+        ("place_share", ctypes.c_float),
+        ("apart", ctypes.c_int32),
+        *((name, ctypes.c_void_p) for name in Tables._fields[Tables._fields.index("state_of") : -1]),
+        ("changed", ctypes.c_int64),
+    ]
+
+
+class Law:
+    """A model's prior and its moves, as the engine has them.
+
+    Args:
+        tables: what is known of both.
+
+    Raises:
+        ValueError: tables that do not fit each other.
+    """
+
+    def __init__(self, tables: Tables) -> None:
+        blocks, (latents, width), knots = len(tables.first), tables.means.shape, tables.start_ms
+        (states, parts, _), jumps, (_, values) = tables.shifted.shape, len(tables.jumps) + 1, tables.kinds.shape
+        shapes: dict[str, tuple[np.dtype[np.generic], tuple[int, ...]]] = {
+            "at": (WHOLE, (MEANINGS,)),
+            "spreads": (SINGLE, (latents,)),
+            **dict.fromkeys(("first", "size", "components"), (WHOLE, (blocks,))),
+            **dict.fromkeys(("log_shares", "below"), (SINGLE, (blocks, width))),
+            **dict.fromkeys(("means", "sds", "per_sds"), (SINGLE, (latents, width))),
+            **dict.fromkeys(("start_ms", "density", "quantiles"), (SINGLE, (len(knots),))),
+            "places": (SINGLE, (len(tables.places), 5)),
+            "place_below": (SINGLE, (len(tables.places),)),
+            "state_of": (WHOLE, (KINDS,)),
+            "shifted": (FLAG, (states, parts, latents)),
+            "parts": (SINGLE, (parts - 1,)),
+            "jumps": (SINGLE, (jumps - 1,)),
+            "redrawn": (FLAG, (jumps, latents)),
+            "renewed": (FLAG, (jumps, KINDS)),
+            "of_profile": (FLAG, (jumps,)),
+            "kinds": (SINGLE, (KINDS, values)),
+        }
+        self._arrays = {
+            name: np.array(getattr(tables, name), dtype=dtype, order="C") for name, (dtype, _) in shapes.items()
+        }
+        sizes = {"latents": latents, "blocks": blocks, "width": width, "knots": len(knots)}
+        sizes |= {"place_count": len(tables.places), "states": states, "part_count": parts, "jump_count": jumps}
+        self._struct = _Struct(
+            **sizes,
+            kind_values=values,
+            place_share=tables.place_share,
+            apart=tables.apart,
+            changed=tables.changed,
+            **{name: address(self._arrays[name], dtype, *shape) for name, (dtype, shape) in shapes.items()},
+        )
+        self.latents, self.blocks, self._last = (
+            latents,
+            blocks,
+            np.minimum(_LAST_KINDS, [3, 4, 1, 1, values]).astype(NATURAL),
+        )
+        self._require_indices(width, knots=len(knots), changed=tables.changed)
+
+    def _require_indices(self, width: int, *, knots: int, changed: int) -> None:
+        """Check what the engine reads arrays at."""
+        first, size, components, at = (self._arrays[name] for name in ("first", "size", "components", "at"))
+        within = (first >= 0).all() and (size >= 1).all() and (first + size <= self.latents).all()
+        within = within and (np.abs(components) <= width).all() and ((at >= 0) & (at <= self.latents)).all()
+        # A start and width of a place are the first two latents; a change, where there is one, is two blocks.
+        within = within and (first[components < 0] == 0).all() and (size[components < 0] == 2).all()
+        if self._arrays["renewed"][:, -1].any():
+            within = within and 0 <= changed < self.blocks - 1
+        if not within or knots < 2 or width % LANES or (_LAST_KINDS @ self._arrays["state_of"]) >= self._struct.states:
+            raise ValueError("the tables of a prior point beyond themselves")
+
+    @cached_property
+    def _at(self) -> int:
+        return ctypes.addressof(self._struct)
+
+    def meanings(self, values: Singles, kinds: IntArray, trials: int) -> Singles:
+        """Fields of particles after so many trials, or with their changes if it is negative, (b, p, fields)."""
+        people, particles = self._require_particles(values, kinds)
+        found = np.empty((people, particles, FIELDS), dtype=SINGLE)
+        arrays = address(values, SINGLE, *values.shape), address(kinds, WHOLE, *kinds.shape)
+        call("meanings", self._at, people, particles, *arrays, trials, address(found, SINGLE, *found.shape))
+        return found
+
+    def usual_weights(self, usual: Law, crowd: Crowd) -> FloatArray:
+        """Log weights of particles under another prior, which ISIs are chosen with, (b, p)."""
+        people, particles = self._require_crowd(crowd)
+        found = np.empty((people, particles), dtype=DOUBLE)
+        if usual.latents != self.latents:
+            raise ValueError("the other prior is of other latents")
+        arrays = self._values(crowd.values, crowd.kinds)
+        known = address(crowd.densities, SINGLE, people, particles, self.blocks)
+        weights = address(crowd.log_weights, DOUBLE, people, particles), address(found, DOUBLE, people, particles)
+        call("usual_weights", self._at, usual._at, people, particles, *arrays, known, *weights)
+        return found
+
+    def learn(self, columns: Singles, min_ess: float, sweeps: tuple[int, int], dice: Seeds, crowd: Crowd) -> FloatArray:
+        """Let particles learn the last of the trials, in place; what was found on the way, (b, 6).
+
+        Args:
+            columns: the trials, (b, n, columns).
+            min_ess: they are resampled where their effective sample size, as a share, is below it.
+            sweeps: how often they move where they were kept, and where they were resampled.
+            dice: seeds, which move on, (b,).
+            crowd: the particles, which change.
+
+        Returns:
+            Log likelihood of the trial, effective sample size before resampling as a share, shifts, those that were
+            accepted, jumps, and those that were accepted, (b, 6).
+        """
+        people, particles = self._require_crowd(crowd)
+        trials, found = columns.shape[1], np.empty((people, 6), dtype=DOUBLE)
+        if particles < 2 or not trials:
+            raise ValueError("particles move by differences of others, and learn from a trial")
+        call(
+            "learn",
+            self._at,
+            people,
+            particles,
+            trials,
+            address(columns, SINGLE, people, trials, COLUMNS),
+            min_ess,
+            *sweeps,
+            address(dice, NATURAL, people),
+            *self._values(crowd.values, crowd.kinds),
+            address(crowd.log_weights, DOUBLE, people, particles),
+            address(crowd.log_likelihood, SINGLE, people, particles),
+            address(crowd.densities, SINGLE, people, particles, self.blocks),
+            address(found, DOUBLE, people, 6),
+        )
+        return found
+
+    def represent(
+        self, values: Singles, kinds: IntArray, log_weights: FloatArray, size: int, trials: int
+    ) -> tuple[IntArray, Singles]:
+        """Equally weighted particles that stand for weighted ones: numbers (b, s), and fields after so many trials."""
+        people, particles = self._require_particles(values, kinds)
+        picks, fields = np.empty((people, size), dtype=WHOLE), np.empty((people, size, FIELDS), dtype=SINGLE)
+        weights = address(log_weights, DOUBLE, people, particles)
+        arrays = weights, address(picks, WHOLE, people, size), address(fields, SINGLE, *fields.shape)
+        call("represent", self._at, people, particles, size, trials, *self._values(values, kinds), *arrays)
+        return picks, fields
+
+    def _values(self, values: Singles, kinds: IntArray) -> tuple[int, int]:
+        return address(values, SINGLE, *values.shape), address(kinds, WHOLE, *kinds.shape)
+
+    def _require_crowd(self, crowd: Crowd) -> tuple[int, int]:
+        return self._require_particles(crowd.values, crowd.kinds)
+
+    def nothing_known(self, people: int, particles: int) -> Singles:
+        """Log densities of blocks of which none was worked out yet, (b, p, blocks)."""
+        return np.full((people, particles, self.blocks), UNKNOWN)
+
+    def draws(self, particles: int, seeds: Seeds) -> tuple[Singles, IntArray]:
+        """So many particles of the prior of each person: latents (b, p, d), and kinds (b, p, k).
+
+        Args:
+            particles: how many a person.
+            seeds: of each person, (b,) whole numbers of 64 bits without a sign.
+        """
+        people = len(seeds)
+        values = np.empty((people, particles, self.latents), dtype=SINGLE)
+        kinds = np.empty((people, particles, KINDS), dtype=WHOLE)
+        arrays = address(values, SINGLE, *values.shape), address(kinds, WHOLE, *kinds.shape)
+        call("draws", self._at, people, particles, address(seeds, NATURAL, people), *arrays)
+        return values, kinds
+
+    def sweeps(
+        self,
+        numbers: IntArray,
+        columns: Singles,
+        dice: Seeds,
+        state: tuple[Singles, IntArray, Singles, Singles],
+    ) -> Singles:
+        """Move each person's particles so many times (b,), in place; the counts of their moves, (b, 4).
+
+        Args:
+            numbers: how often each person's particles move, (b,).
+            columns: the trials, (b, n, columns).
+            dice: seeds, which move on, (b,) whole numbers of 64 bits without a sign.
+            state: latents, kinds, log likelihood and log densities of blocks of the particles, which change.
+
+        Returns:
+            Shifts, those that were accepted, jumps, and those that were accepted, (b, 4).
+        """
+        values, kinds, log_likelihood, densities = state
+        people, particles = self._require_particles(values, kinds)
+        trials, counts = columns.shape[1], np.zeros((people, 4), dtype=SINGLE)
+        if particles < 2:
+            raise ValueError("particles move by differences of others")
+        call(
+            "sweeps",
+            self._at,
+            people,
+            particles,
+            trials,
+            address(numbers, WHOLE, people),
+            address(columns, SINGLE, people, trials, COLUMNS),
+            address(dice, NATURAL, people),
+            address(values, SINGLE, *values.shape),
+            address(kinds, WHOLE, *kinds.shape),
+            address(log_likelihood, SINGLE, people, particles),
+            address(densities, SINGLE, people, particles, self.blocks),
+            address(counts, SINGLE, people, 4),
+        )
+        return counts
+
+    def _require_particles(self, values: Singles, kinds: IntArray) -> tuple[int, int]:
+        people, particles, latents = values.shape
+        within = latents == self.latents and kinds.shape == (people, particles, KINDS)
+        if not within or (kinds.view(NATURAL) > self._last).any():  # without a sign, what is below 0 is too large
+            raise ValueError("these are no particles of this prior")
+        return people, particles
