@@ -177,7 +177,7 @@ def test_moves_that_learn_nothing_leave_the_prior_as_it_is() -> None:
 def test_moved_particles_agree_with_plain_importance_sampling() -> None:
     # The reference weights 100,000 particles of the prior by the likelihood of all trials at once.
     trials = evenly(cohort("gaussian", 3, 0)[2], 6)[:4]
-    reference = after(ParticleModel(particles=100_000, moves=Moving(sweeps=0, min_ess=0.0)), trials)
+    reference = after(ParticleModel(particles=100_000, moves=Moving(sweeps=0, min_ess=0.0)), trials, 0)
     ess = 1.0 / np.exp(2 * reference.swarm.log_weights).sum()
     assert ess > 500
     expected = reference.estimate()
