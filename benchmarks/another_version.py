@@ -13,6 +13,7 @@ this version. The hit delay and the stimulus are stated if that version can use 
 from __future__ import annotations
 
 import importlib
+import inspect
 import re
 import shutil
 import sys
@@ -79,7 +80,9 @@ class Another:
             for session in sessions
         ]
         home = theirs if hasattr(theirs, "_Batch") else importlib.import_module(f"{PACKAGE}.studies.batch")
-        self.batch: Any = vars(home)["_Batch"](there, "cpu")
+        batch: Any = vars(home)["_Batch"]
+        on_a_device = "device" in inspect.signature(batch).parameters  # as versions with an engine in torch have it
+        self.batch: Any = batch(there, "cpu") if on_a_device else batch(there)
 
     def ask(self) -> list[Choice]:
         """Each person's next ISI."""
