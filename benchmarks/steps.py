@@ -61,7 +61,7 @@ class Noting(_Batch):
     """
 
     def __init__(self, sessions: Sequence[SimulatedSession]) -> None:
-        super().__init__(sessions, "cpu")
+        super().__init__(sessions)
         self.sessions, self.named, self.told = sessions, list[dict[str, object]](), 0
 
     def tell(self, responses: Sequence[Response]) -> None:

@@ -54,7 +54,8 @@ class PeakProfile(Checked):
         """Facilitation in 0–1 at ISIs counted from the impact [ms], same shape."""
         share = (np.asarray(isi_ms, dtype=np.float64) - self.start_ms) / self.width_ms - self.peak_at
         flank = np.where(share < 0, self.peak_at, 1.0 - self.peak_at)
-        return np.asarray(np.exp(-2.0 * np.abs(share / flank) ** self.exponent))
+        with np.errstate(over="ignore"):  # an ISI may be as far off as a number can be: nothing is facilitated there
+            return np.asarray(np.exp(-2.0 * np.abs(share / flank) ** self.exponent))
 
 
 @dataclass(frozen=True)
