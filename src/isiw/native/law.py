@@ -123,9 +123,10 @@ class Law:
             "of_profile": (FLAG, (jumps,)),
             "kinds": (SINGLE, (KINDS, values)),
         }
-        self._arrays = {
-            name: np.array(getattr(tables, name), dtype=dtype, order="C") for name, (dtype, _) in shapes.items()
-        }
+        with np.errstate(over="ignore"):
+            self._arrays = {
+                name: np.array(getattr(tables, name), dtype=dtype, order="C") for name, (dtype, _) in shapes.items()
+            }
         sizes = {"latents": latents, "blocks": blocks, "width": width, "knots": len(knots)}
         sizes |= {"place_count": len(tables.places), "states": states, "part_count": parts, "jump_count": jumps}
         self._struct = _Struct(

@@ -49,7 +49,8 @@ def prior_tables(
         count, span = components[block], slice(first[block], first[block] + size[block])
         log_shares[block, :count] = _log(mixture.shares) - np.log(mixture.sds).sum(-1)
         below[block, : count - 1] = mixture.shares.cumsum()[:-1]
-        means[span, :count], sds[span, :count] = mixture.means.T, mixture.sds.T
+        with np.errstate(over="ignore"):  # laws of absurd size become infinite in single precision
+            means[span, :count], sds[span, :count] = mixture.means.T, mixture.sds.T
     if places is not None:
         # Start and width are one block: anywhere, or in one of the places; only here do the constants matter.
         log_shares[1] += math.log1p(-places[0]) - 0.5 * math.log(2.0 * math.pi)
