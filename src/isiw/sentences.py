@@ -139,7 +139,7 @@ def tap_unmeasured(estimate: Estimate, first: StimulusWords = _EITHER) -> str:
 def at_a_trial(change: Change, trial: int | None) -> str:
     """A change during the session, whatever the ISI, and its trial; without a full stop."""
     if change.trial == 0:
-        return _unlike_given(change)
+        return f"The pulses given before and this session do not fit each other: {_unlike_given(change)}"
     more = change.size > (0.0 if change.kind == "intensity" else 1.0)
     if change.kind == "intensity":
         sizes = f"{abs(change.size):.0f} % RMT {'higher' if more else 'lower'}"
@@ -153,14 +153,12 @@ def at_a_trial(change: Change, trial: int | None) -> str:
 
 
 def _unlike_given(change: Change) -> str:
-    """That the trials of a session do not fit those that were given before it; without a full stop."""
-    said = "The pulses given before and this session do not fit each other: "
+    """By how much the trials of a session differ from those that were given before it; without a full stop."""
     if change.kind == "intensity":
         sizes = f"{abs(change.size):.0f} % RMT {'higher' if change.size > 0 else 'lower'}"
-        return (
-            f"{said}MEPs are as if the intensity were {sizes} (90 % interval {change.low:+.0f} to {change.high:+.0f})"
-        )
-    return f"{said}amplitudes are ×{change.size:.2g} now (90 % interval ×{change.low:.2g} to ×{change.high:.2g})"
+        interval = f"90 % interval {change.low:+.0f} to {change.high:+.0f}"
+        return f"MEPs are as if the intensity were {sizes} ({interval})"
+    return f"amplitudes are ×{change.size:.2g} now (90 % interval ×{change.low:.2g} to ×{change.high:.2g})"
 
 
 def finding(estimate: Estimate, first: StimulusWords, space: DesignSpace) -> str:

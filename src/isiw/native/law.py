@@ -137,11 +137,8 @@ class Law:
             changed=tables.changed,
             **{name: address(self._arrays[name], dtype, *shape) for name, (dtype, shape) in shapes.items()},
         )
-        self.latents, self.blocks, self._last = (
-            latents,
-            blocks,
-            np.minimum(_LAST_KINDS, [3, 4, 1, 1, values]).astype(NATURAL),
-        )
+        self.latents, self.blocks = latents, blocks
+        self._last = np.minimum(_LAST_KINDS, [3, 4, 1, 1, values]).astype(NATURAL)
         self._require_indices(width, knots=len(knots), changed=tables.changed)
 
     def _require_indices(self, width: int, *, knots: int, changed: int) -> None:
@@ -164,16 +161,16 @@ class Law:
         """Fields of particles after so many trials, or with their changes if it is negative, (b, p, fields)."""
         people, particles = self._require_particles(values, kinds)
         found = np.empty((people, particles, FIELDS), dtype=SINGLE)
-        arrays = address(values, SINGLE, *values.shape), address(kinds, WHOLE, *kinds.shape)
+        arrays = self._values(values, kinds)
         call("meanings", self._at, people, particles, *arrays, trials, address(found, SINGLE, *found.shape))
         return found
 
     def usual_weights(self, usual: Law, crowd: Crowd) -> FloatArray:
         """Log weights of particles under another prior, which ISIs are chosen with, (b, p)."""
-        people, particles = self._require_crowd(crowd)
+        people, particles = self._require_particles(crowd.values, crowd.kinds)
         found = np.empty((people, particles), dtype=DOUBLE)
-        if usual.latents != self.latents:
-            raise ValueError("the other prior is of other latents")
+        if usual.latents != self.latents or (usual._last != self._last).any():
+            raise ValueError("the other prior is of other latents or kinds")
         arrays = self._values(crowd.values, crowd.kinds)
         known = address(crowd.densities, SINGLE, people, particles, self.blocks)
         weights = address(crowd.log_weights, DOUBLE, people, particles), address(found, DOUBLE, people, particles)
@@ -194,7 +191,7 @@ class Law:
             Log likelihood of the trial, effective sample size before resampling as a share, shifts, those that were
             accepted, jumps, and those that were accepted, (b, 6).
         """
-        people, particles = self._require_crowd(crowd)
+        people, particles = self._require_particles(crowd.values, crowd.kinds)
         trials, found = columns.shape[1], np.empty((people, 6), dtype=DOUBLE)
         if particles < 2 or not trials:
             raise ValueError("particles move by differences of others, and learn from a trial")
@@ -221,6 +218,8 @@ class Law:
     ) -> tuple[IntArray, Singles]:
         """Equally weighted particles that stand for weighted ones: numbers (b, s), and fields after so many trials."""
         people, particles = self._require_particles(values, kinds)
+        if not particles:
+            raise ValueError("nothing stands for no particles")
         picks, fields = np.empty((people, size), dtype=WHOLE), np.empty((people, size, FIELDS), dtype=SINGLE)
         weights = address(log_weights, DOUBLE, people, particles)
         arrays = weights, address(picks, WHOLE, people, size), address(fields, SINGLE, *fields.shape)
@@ -229,9 +228,6 @@ class Law:
 
     def _values(self, values: Singles, kinds: IntArray) -> tuple[int, int]:
         return address(values, SINGLE, *values.shape), address(kinds, WHOLE, *kinds.shape)
-
-    def _require_crowd(self, crowd: Crowd) -> tuple[int, int]:
-        return self._require_particles(crowd.values, crowd.kinds)
 
     def nothing_known(self, people: int, particles: int) -> Singles:
         """Log densities of blocks of which none was worked out yet, (b, p, blocks)."""
@@ -247,7 +243,7 @@ class Law:
         people = len(seeds)
         values = np.empty((people, particles, self.latents), dtype=SINGLE)
         kinds = np.empty((people, particles, KINDS), dtype=WHOLE)
-        arrays = address(values, SINGLE, *values.shape), address(kinds, WHOLE, *kinds.shape)
+        arrays = self._values(values, kinds)
         call("draws", self._at, people, particles, address(seeds, NATURAL, people), *arrays)
         return values, kinds
 
@@ -283,8 +279,7 @@ class Law:
             address(numbers, WHOLE, people),
             address(columns, SINGLE, people, trials, COLUMNS),
             address(dice, NATURAL, people),
-            address(values, SINGLE, *values.shape),
-            address(kinds, WHOLE, *kinds.shape),
+            *self._values(values, kinds),
             address(log_likelihood, SINGLE, people, particles),
             address(densities, SINGLE, people, particles, self.blocks),
             address(counts, SINGLE, people, 4),
