@@ -161,7 +161,7 @@ class RecordedPerson:
     def single_pulses(self, count: int) -> list[tuple[float, float]]:
         """Pulses alone given first: intensity [% RMT] and amplitude [mV] of each, from the other half.
 
-        All levels in turn, in an order drawn anew each time round; of more pulses the first ones are the same.
+        All levels in turn, in a new random order each time round; of more pulses the first ones are the same.
 
         Args:
             count: how many.

@@ -1,4 +1,4 @@
-"""Tables of sessions with recorded people: errors by person, the worst of them, and what is believed of responses."""
+"""Tables of sessions with recorded people: errors by person, the worst of them, and probable kinds of noise."""
 
 from __future__ import annotations
 

@@ -122,16 +122,16 @@ PAIRS: list[tuple[Singles, ResponseCurve]] = [
 ]
 
 
-@pytest.mark.parametrize(("believed", "true"), PAIRS)
-def test_the_expected_mep_is_the_simulated_persons(believed: Singles, true: ResponseCurve) -> None:
-    levels, means = engine.evoked_means(believed, LEVELS)
+@pytest.mark.parametrize(("modelled", "true"), PAIRS)
+def test_the_expected_mep_is_the_simulated_persons(modelled: Singles, true: ResponseCurve) -> None:
+    levels, means = engine.evoked_means(modelled, LEVELS)
     expected = true.expected_evoked_mv(levels[0, 0].astype(float)) / FLOOR.median_mv
-    corner = 0.04 if believed[0, 0, records.ONSET] > 0 else 0.0  # a threshold lies somewhere between two nodes
+    corner = 0.04 if modelled[0, 0, records.ONSET] > 0 else 0.0  # a threshold lies somewhere between two nodes
     np.testing.assert_allclose(means[0, 0], expected, rtol=0.03 + corner, atol=2e-3)
 
 
-@pytest.mark.parametrize(("believed", "true"), PAIRS)
-def test_the_predicted_distribution_is_that_of_simulated_trials(believed: Singles, true: ResponseCurve) -> None:
+@pytest.mark.parametrize(("modelled", "true"), PAIRS)
+def test_the_predicted_distribution_is_that_of_simulated_trials(modelled: Singles, true: ResponseCurve) -> None:
     # Kolmogorov distance to 20,000 trials. The outliers that the model allows for account for 0.03 of it; sampling
     # for 0.01 (99.9 %); the rest is the log-normal approximation of floor plus response.
     rng = np.random.default_rng(5)
@@ -140,7 +140,7 @@ def test_the_predicted_distribution_is_that_of_simulated_trials(believed: Single
         floor = FLOOR.median_mv * np.exp(FLOOR.log_sd * rng.standard_normal(20_000))
         evoked = [true.sample_evoked_mv(level, TrialNoise(z), rng) for z in rng.standard_normal(20_000)]
         empirical = (floor + np.array(evoked) <= ends_mv[:, None]).mean(1)
-        believed_cdf = np.exp(log_likelihood(believed, np.full(24, level), np.full(24, -np.inf), np.log(ends_mv)))
+        believed_cdf = np.exp(log_likelihood(modelled, np.full(24, level), np.full(24, -np.inf), np.log(ends_mv)))
         assert np.abs(believed_cdf - empirical).max() < reference.OUTLIERS + 0.04
 
 
@@ -149,39 +149,39 @@ def densities(fields: Singles, level: float, log_mep: FloatArray) -> FloatArray:
 
 
 @pytest.mark.parametrize("level", FOUR)
-@pytest.mark.parametrize("believed", [pair[0] for pair in PAIRS])
-def test_the_density_integrates_to_one(believed: Singles, level: float) -> None:
+@pytest.mark.parametrize("modelled", [pair[0] for pair in PAIRS])
+def test_the_density_integrates_to_one(modelled: Singles, level: float) -> None:
     log_mep = np.linspace(math.log(0.001), math.log(5.0), 4001)
-    assert np.trapezoid(densities(believed, level, log_mep), log_mep) == pytest.approx(1.0, abs=5e-3)
+    assert np.trapezoid(densities(modelled, level, log_mep), log_mep) == pytest.approx(1.0, abs=5e-3)
 
 
-@pytest.mark.parametrize("believed", [pair[0] for pair in PAIRS])
-def test_the_density_of_a_trial_is_that_of_the_outcome_in_a_table(believed: Singles) -> None:
+@pytest.mark.parametrize("modelled", [pair[0] for pair in PAIRS])
+def test_the_density_of_a_trial_is_that_of_the_outcome_in_a_table(modelled: Singles) -> None:
     log_mep = np.log([0.008, 0.02, 0.05, 0.2])
-    levels, _ = engine.evoked_means(believed, LEVELS)
+    levels, _ = engine.evoked_means(modelled, LEVELS)
     cells = log_mep[np.newaxis].astype(np.float32), np.ones(4, dtype=np.float32)
-    table = engine.outcome_tables(believed, levels, LATER, *cells)[0, 0]
+    table = engine.outcome_tables(modelled, levels, LATER, *cells)[0, 0]
     for row in (1, 9, LEVELS - 1):
-        by_trial = densities(believed, float(levels[0, 0, row]), log_mep)
+        by_trial = densities(modelled, float(levels[0, 0, row]), log_mep)
         np.testing.assert_allclose(table[row], by_trial / by_trial.sum(), rtol=2e-3, atol=1e-5)
 
 
-@pytest.mark.parametrize("believed", [pair[0] for pair in PAIRS])
-def test_seen_and_not_seen_are_all_that_can_happen(believed: Singles) -> None:
+@pytest.mark.parametrize("modelled", [pair[0] for pair in PAIRS])
+def test_seen_and_not_seen_are_all_that_can_happen(modelled: Singles) -> None:
     levels, threshold = np.array(FOUR), np.full(4, math.log(0.03))
-    seen = np.exp(log_likelihood(believed, levels, threshold, np.full(4, np.inf)))
-    not_seen = np.exp(log_likelihood(believed, levels, np.full(4, -np.inf), threshold))
+    seen = np.exp(log_likelihood(modelled, levels, threshold, np.full(4, np.inf)))
+    not_seen = np.exp(log_likelihood(modelled, levels, np.full(4, -np.inf), threshold))
     np.testing.assert_allclose(seen + not_seen, 1.0, atol=1e-5)
     assert (np.diff(seen) > 0).all()
 
 
-@pytest.mark.parametrize(("believed", "curve"), PAIRS)
-def test_draws_have_the_distribution_that_the_likelihood_is_of(believed: Singles, curve: ResponseCurve) -> None:
+@pytest.mark.parametrize(("modelled", "curve"), PAIRS)
+def test_draws_have_the_distribution_that_the_likelihood_is_of(modelled: Singles, curve: ResponseCurve) -> None:
     del curve
     level = np.linspace(0.0, 1.0, 1000)
     isi_ms = isi_of(level).astype(np.float32)
-    log_mep = np.log(drawn_mep_mv(believed, isi_ms, np.random.default_rng(1)))
-    below = np.exp(log_likelihood(believed, level, np.full(1000, -np.inf), log_mep))
+    log_mep = np.log(drawn_mep_mv(modelled, isi_ms, np.random.default_rng(1)))
+    below = np.exp(log_likelihood(modelled, level, np.full(1000, -np.inf), log_mep))
     assert kstest(below, "uniform").pvalue > 0.01
 
 
@@ -198,13 +198,13 @@ def test_startle_and_drift_belong_to_the_trial_and_not_to_its_isi() -> None:
         np.testing.assert_allclose(*found, atol=1e-5)
 
 
-@pytest.mark.parametrize(("believed", "true"), PAIRS)
-def test_a_gain_is_the_gain_of_the_simulated_persons_trials(believed: Singles, true: ResponseCurve) -> None:
+@pytest.mark.parametrize(("modelled", "true"), PAIRS)
+def test_a_gain_is_the_gain_of_the_simulated_persons_trials(modelled: Singles, true: ResponseCurve) -> None:
     rng, log_gain_of_trial = np.random.default_rng(6), 0.5
     floor = FLOOR.median_mv * np.exp(FLOOR.log_sd * rng.standard_normal(20_000))
     evoked = [true.sample_evoked_mv(0.6, TrialNoise(z, log_gain_of_trial), rng) for z in rng.standard_normal(20_000)]
     log_mep = np.log(np.quantile(floor + evoked, [0.25, 0.5, 0.75]))
-    below = np.exp(log_likelihood(believed, np.full(3, 0.6), np.full(3, -np.inf), log_mep, log_gain_of_trial))
+    below = np.exp(log_likelihood(modelled, np.full(3, 0.6), np.full(3, -np.inf), log_mep, log_gain_of_trial))
     assert below.tolist() == pytest.approx([0.25, 0.5, 0.75], abs=0.05)
 
 
@@ -212,11 +212,11 @@ def test_a_gain_is_the_gain_of_the_simulated_persons_trials(believed: Singles, t
 @pytest.mark.parametrize("output_sd", [0.3, 0.5])
 def test_few_nodes_predict_what_many_do(spread: float, output_sd: float) -> None:
     # Divergence [nat a trial]; the means over such responses are in the decision record on nodes and moves.
-    believed = particle(NoiseKind.RECRUITMENT, log_ratio=math.log(16.0), spread=spread, output_sd=output_sd)
+    modelled = particle(NoiseKind.RECRUITMENT, log_ratio=math.log(16.0), spread=spread, output_sd=output_sd)
     log_mep = np.linspace(math.log(1e-3), math.log(2.0), 400)
     step = log_mep[1] - log_mep[0]
     for level in FOUR:
-        few, many = densities(believed, level, log_mep), _by_many_nodes(spread, output_sd, level, log_mep)
+        few, many = densities(modelled, level, log_mep), _by_many_nodes(spread, output_sd, level, log_mep)
         assert abs(many.sum() * step - 1) < 0.02
         assert (many * np.log(many / few)).sum() * step < 0.015
 

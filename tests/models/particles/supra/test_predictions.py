@@ -32,7 +32,7 @@ def latents_of(subject: SimulatedSubject) -> list[float]:
     """What a particle must believe to be right about a simulated person."""
     r, profile = instance(RecruitmentResponse, subject.response), instance(OpposedProfile, subject.profile)
     places = [_place(peak) for peak in (profile.facilitated, profile.depressed)]
-    believed = {
+    modelled = {
         "start_ms": places[0][0], "log_width_ms": places[0][1], "log_shift": math.log(r.boost_pct_rmt),
         "depressed_start_ms": places[1][0], "depressed_log_width_ms": places[1][1],
         "depressed_log_shift": math.log(r.boost_pct_rmt * profile.depth),
@@ -42,14 +42,14 @@ def latents_of(subject: SimulatedSubject) -> list[float]:
         "log_input_sd": math.log(r.slope_per_pct * r.sigma_x_pct_rmt), "log_sigma_y": math.log(r.sigma_y),
         "rest": r.intensity_pct_rmt - r.x50_pct_rmt,
     }  # fmt: skip
-    return [believed[name] for name in LATENTS]
+    return [modelled[name] for name in LATENTS]
 
 
 def _place(peak: PeakProfile) -> tuple[float, float]:
     return peak.start_ms, math.log(peak.width_ms)
 
 
-def believed(subjects: list[SimulatedSubject]) -> Singles:
+def modelled(subjects: list[SimulatedSubject]) -> Singles:
     values = np.array([[latents_of(subject) for subject in subjects]], dtype=np.float32)
     kinds = np.tile([0, NoiseKind.RECRUITMENT, 1, 1, 0], (1, len(subjects), 1))
     return law_of(SupraPrior(), SPACE).meanings(values, kinds, 0)
@@ -61,7 +61,7 @@ def subjects() -> list[SimulatedSubject]:
 
 
 def test_segments_and_profiles_are_those_of_the_simulated_person(subjects: list[SimulatedSubject]) -> None:
-    sample = SupraSample(believed(subjects), SPACE)
+    sample = SupraSample(modelled(subjects), SPACE)
     kinds = [(sample.window_masks(GRID_MS), "window"), (sample.depressed_masks(GRID_MS), "depressed")]
     for masks, kind in kinds:
         for subject, mask in zip(subjects, masks[0], strict=True):
@@ -72,7 +72,7 @@ def test_segments_and_profiles_are_those_of_the_simulated_person(subjects: list[
 
 
 def test_nothing_is_depressed_where_tms_alone_gives_no_mep(subjects: list[SimulatedSubject]) -> None:
-    silent = believed(subjects)
+    silent = modelled(subjects)
     silent[..., REST] -= 20.0
     assert not SupraSample(silent, SPACE).depressed_masks(GRID_MS).any()
 
@@ -80,7 +80,7 @@ def test_nothing_is_depressed_where_tms_alone_gives_no_mep(subjects: list[Simula
 def test_predicted_outcomes_are_smallest_in_the_depression(subjects: list[SimulatedSubject]) -> None:
     profile = instance(OpposedProfile, subjects[0].profile)
     middles_ms = [peak.start_ms + 0.5 * peak.width_ms for peak in (profile.depressed, profile.facilitated)]
-    mass = SupraSample(believed(subjects[:1]), SPACE).outcome_mass(np.array([*middles_ms, math.nan], dtype=np.float32))[
+    mass = SupraSample(modelled(subjects[:1]), SPACE).outcome_mass(np.array([*middles_ms, math.nan], dtype=np.float32))[
         0, 0
     ]
     assert mass.sum(-1) == pytest.approx(1.0, abs=1e-5)
@@ -92,7 +92,7 @@ def test_meps_drawn_by_the_likelihood_are_depressed(subjects: list[SimulatedSubj
     profile = instance(OpposedProfile, subjects[0].profile)
     inside_ms = profile.depressed.start_ms + 0.5 * profile.depressed.width_ms
     isi_ms = np.array([inside_ms] * 400 + [math.nan] * 400, dtype=np.float32)
-    fields = believed(subjects[:1])
+    fields = modelled(subjects[:1])
     assert facilitations(fields, isi_ms[:1]).item() == pytest.approx(-profile.depth, rel=1e-4)
     drawn_mv = drawn_mep_mv(fields, isi_ms, np.random.default_rng(1))
     assert np.median(drawn_mv[:400]) < np.median(drawn_mv[400:])
