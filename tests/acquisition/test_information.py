@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -155,6 +157,17 @@ def test_alternating_takes_turns_by_pairs_also_where_each_is_followed_by_tms_alo
         posterior = model.update(posterior, Observation.of([None], [0.02]))
     isi_ms = np.arange(0.0, 300.0, 50.0, dtype=np.float32)
     np.testing.assert_array_equal(Alternating()(posterior, isi_ms), chosen(posterior, isi_ms))
+
+
+@pytest.mark.parametrize("score", [MutualInformation(), WindowGain()])
+def test_what_is_foreseen_a_person_at_a_time_is_scored_as_the_distributions_of_all(
+    score: MutualInformation | WindowGain,
+) -> None:
+    model = ParticleModel(particles=100, thinned=30)
+    posterior = model.update(model.begin(VALVE_SPACE, 0, people=2), Observation.of([60.0, 90.0], [0.3, 0.05]))
+    given: Any = SimpleNamespace(outcome_mass=posterior.outcome_mass, window_masks=posterior.window_masks)
+    isi_ms = VALVE_SPACE.grid_ms[::9]
+    assert score(posterior, isi_ms) == pytest.approx(score(given, isi_ms), rel=1e-6)
 
 
 def test_the_window_can_be_asked_for_only_where_windows_are_sampled() -> None:

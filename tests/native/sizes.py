@@ -73,8 +73,10 @@ def predicted(case: Case, latents: Latents) -> None:
     sample = (SupraSample if case.supra else PersonSample)(case.fields(latents, 1), case.space, 1)
     isi_ms = grid_of(case.space)
     mass, masks = sample.outcome_mass(isi_ms), sample.window_masks(isi_ms)
-    entropy_reductions(mass)
-    variance_reductions(mass, masks)
+    for person, foreseen in enumerate(sample.foreseen(isi_ms)):
+        for each in (mass[person], foreseen):
+            entropy_reductions(each)
+            variance_reductions(each, masks[person])
     sample.expected_mep_mv(isi_ms)
 
 

@@ -6,6 +6,7 @@ it (stepwise uncertainty reduction for excursion sets [Bect2012; Chevalier2014])
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, ClassVar, Protocol
@@ -16,6 +17,7 @@ from isiw.acquisition.protocol import ForeseesWindows
 from isiw.checks import Checked, can, whole
 from isiw.models.protocol import (
     CountsPairs,
+    ForeseesOutcomes,
     Posterior,
     PredictsOutcomes,
     SamplesDepression,
@@ -33,6 +35,13 @@ def _entropy(mass: Array) -> Array:
     # Probabilities that are practically 0 add practically nothing.
     entropy: Array = -(np.log(np.maximum(mass, 1e-30)) * mass).sum(-1)
     return entropy
+
+
+def _foreseen(posterior: PredictsOutcomes, isi_ms: Array) -> Iterable[Singles | engine.Foreseen]:
+    """Distributions of each person's next MEP, as the engine takes them."""
+    if can(posterior, ForeseesOutcomes):
+        return posterior.foreseen(isi_ms)
+    return _for_the_engine(posterior.outcome_mass(isi_ms))
 
 
 def _for_the_engine(values: Array) -> Singles:
@@ -63,7 +72,7 @@ class MutualInformation:
 
     def __call__(self, posterior: PredictsOutcomes, isi_ms: Array) -> Array:
         """The information [nat], shape (b, t)."""
-        return engine.entropy_reductions(_for_the_engine(posterior.outcome_mass(isi_ms)))
+        return np.stack([engine.entropy_reductions(each) for each in _foreseen(posterior, isi_ms)])
 
 
 @dataclass(frozen=True)
@@ -104,7 +113,8 @@ class WindowGain:
         masks = posterior.window_masks(isi_ms)
         if can(posterior, SamplesDepression):
             masks = np.concatenate((masks, posterior.depressed_masks(isi_ms)), axis=-1)
-        return engine.variance_reductions(_for_the_engine(posterior.outcome_mass(isi_ms)), _for_the_engine(masks))
+        people = zip(_foreseen(posterior, isi_ms), _for_the_engine(masks), strict=True)
+        return np.stack([engine.variance_reductions(each, inside) for each, inside in people])
 
 
 @dataclass(frozen=True)

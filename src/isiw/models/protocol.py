@@ -11,7 +11,7 @@ the same order and equally weighted.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
@@ -19,6 +19,7 @@ import numpy as np
 
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
+from isiw.native.engine import Foreseen
 from isiw.types import Array, ArrayLike, FloatArray, Singles
 from isiw.window import Window
 
@@ -127,6 +128,14 @@ class PredictsOutcomes(Protocol):
         Returns:
             Given each posterior sample, shape (b, s, t, y), summing to 1 over y.
         """
+
+
+@runtime_checkable
+class ForeseesOutcomes(Protocol):
+    """Capability: the same distributions, a person at a time, as a compiled engine reads them."""
+
+    def foreseen(self, isi_ms: Array) -> Iterator[Foreseen]:
+        """Distributions of each person's next MEP at candidate ISIs [ms] (t,)."""
 
 
 @runtime_checkable

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,27 +105,45 @@ def window_runs(fields: Singles, levels: Singles, isi_ms: Singles) -> NDArray[np
     return runs
 
 
-def entropy_reductions(mass: Singles) -> Singles:
-    """Entropy of the mean of distributions (b, s, t, y) less their mean entropy [nat], (b, t)."""
-    people, samples, isis, outcomes = mass.shape
-    found = np.empty((people, isis), dtype=SINGLE)
-    for given, to in zip(mass, found, strict=True):
-        arrays = address(given, SINGLE, samples, isis, outcomes), address(to, SINGLE, isis)
-        call("entropy_reductions", samples, isis, outcomes, *arrays)
+class Foreseen(NamedTuple):
+    """Distributions of one person's next outcome at some ISIs: they lie between the rows of tables."""
+
+    fields: Singles  # the samples, (1, s, fields)
+    table: Singles  # distributions in the rows, (1, s, l, y)
+    levels: Singles  # facilitations at the ISIs, (1, s, t)
+
+
+def entropy_reductions(foreseen: Singles | Foreseen) -> Singles:
+    """Entropy of the mean of one person's distributions, (s, t, y) or foreseen, less their mean entropy [nat], (t,)."""
+    sizes, arrays = _foreseen(foreseen)
+    found = np.empty(sizes[2], dtype=SINGLE)
+    call("entropy_reductions", *sizes, *arrays, address(found, SINGLE, *found.shape))
     return found
 
 
-def variance_reductions(mass: Singles, masks: Singles) -> Singles:
-    """Variance of each ISI's membership in windows (b, s, g) less that after an outcome (b, s, t, y), summed, (b, t).
+def variance_reductions(foreseen: Singles | Foreseen, masks: Singles) -> Singles:
+    """Variance of each ISI's membership in one person's windows (s, g) less that after an outcome, summed, (t,).
 
-    Sampled windows are runs of ISIs, so that what changes from one ISI to the next is summed instead of all of them.
+    Distributions of the outcome are (s, t, y), or foreseen. Sampled windows are runs of ISIs, so that what changes from
+    one ISI to the next is summed instead of all of them.
     """
-    (people, samples, isis, outcomes), points = mass.shape, masks.shape[2]
-    found = np.empty((people, isis), dtype=SINGLE)
-    for given, inside, to in zip(mass, masks, found, strict=True):
-        arrays = address(given, SINGLE, samples, isis, outcomes), address(inside, SINGLE, samples, points)
-        call("variance_reductions", samples, isis, outcomes, points, *arrays, address(to, SINGLE, isis))
+    sizes, arrays = _foreseen(foreseen)
+    points, found = masks.shape[1], np.empty(sizes[2], dtype=SINGLE)
+    inside = address(masks, SINGLE, sizes[0], points)
+    call("variance_reductions", *sizes, points, *arrays, inside, address(found, SINGLE, *found.shape))
     return found
+
+
+def _foreseen(foreseen: Singles | Foreseen) -> tuple[tuple[int, int, int, int], tuple[int, int, int]]:
+    """Samples, rows, ISIs and outcomes, and where fields, table and facilitations begin."""
+    if not isinstance(foreseen, Foreseen):
+        samples, isis, outcomes = foreseen.shape
+        mass = address(foreseen, SINGLE, *foreseen.shape)
+        return (samples, 0, isis, outcomes), (mass, mass, mass)
+    fields, table, levels = foreseen
+    (_, samples, rows, outcomes), isis = table.shape, levels.shape[2]
+    arrays = address(fields, SINGLE, 1, samples, FIELDS), address(table, SINGLE, 1, samples, _rows(rows), outcomes)
+    return (samples, rows, isis, outcomes), (*arrays, address(levels, SINGLE, 1, samples, isis))
 
 
 ELEMENTARY: Final = ("exp", "exp2", "log", "per", "per_root", "between")

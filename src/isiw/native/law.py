@@ -104,7 +104,10 @@ class Law:
 
     def __init__(self, tables: Tables) -> None:
         blocks, (latents, width), knots = len(tables.first), tables.means.shape, tables.start_ms
-        (states, parts, _), jumps, (_, values) = tables.shifted.shape, len(tables.jumps) + 1, tables.kinds.shape
+        # Latents that do not move are whole vectors of any processor.
+        shifted = np.pad(tables.shifted, ((0, 0), (0, 0), (0, -latents % LANES)))
+        tables = tables._replace(shifted=shifted)
+        (states, parts, padded), jumps, (_, values) = tables.shifted.shape, len(tables.jumps) + 1, tables.kinds.shape
         shapes: dict[str, tuple[np.dtype[np.generic], tuple[int, ...]]] = {
             "at": (WHOLE, (MEANINGS,)),
             "spreads": (SINGLE, (latents,)),
@@ -115,7 +118,7 @@ class Law:
             "places": (SINGLE, (len(tables.places), 5)),
             "place_below": (SINGLE, (len(tables.places),)),
             "state_of": (WHOLE, (KINDS,)),
-            "shifted": (FLAG, (states, parts, latents)),
+            "shifted": (FLAG, (states, parts, padded)),
             "parts": (SINGLE, (parts - 1,)),
             "jumps": (SINGLE, (jumps - 1,)),
             "redrawn": (FLAG, (jumps, latents)),

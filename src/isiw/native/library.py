@@ -15,7 +15,7 @@ from isiw.native.stamp import require_built_of
 LEVELS: Final = ("x86-64-v4", "x86-64-v3", "x86-64-v2", "base")
 """What the library is compiled for, the fastest first: AVX-512, AVX2, SSE4.2, and processors that are no x86."""
 
-VERSION: Final = 5
+VERSION: Final = 6
 """Of the engine: it grows if the same draws come to other numbers."""
 
 _FILES: Final = {"Darwin": "_engine.dylib", "Windows": "_engine.dll"}
@@ -42,8 +42,8 @@ _SIGNATURES: Final = {
     "facilitations": "nnaaa",
     "edge_levels": "nnnsaaaa",
     "window_runs": "nnaaaa",
-    "entropy_reductions": "nnnaa",
-    "variance_reductions": "nnnnaaa",
+    "entropy_reductions": "nnnnaaaa",
+    "variance_reductions": "nnnnnaaaaa",
     "elementary": "snaaa",
 }
 """The functions in the order of `Engine` in engine.h, and what they take: numbers, and arrays."""

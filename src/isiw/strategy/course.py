@@ -14,7 +14,7 @@ from isiw.acquisition.protocol import AcquisitionFunction, FollowsPlan, own_plan
 from isiw.checks import can
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
-from isiw.lazy import Later
+from isiw.lazy import Later, WorkedOut
 from isiw.models.protocol import (
     ExpectsTheUsual,
     NotesChanges,
@@ -41,7 +41,20 @@ class Method:
     def begin(self, seed: int, people: int = 1) -> Course:
         """The course before the first trial."""
         posterior = self.model.begin(self.space, seed, people)
-        return Course(self, posterior, people, Estimates(posterior, 0))
+
+        def probabilities() -> tuple[float | None, ...]:
+            return tuple(posterior.estimate(person).probability for person in range(people))
+
+        # Of many people no second posterior is kept, which takes a quarter of a megabyte each.
+        before = Beforehand(Later(probabilities) if people == 1 else probabilities())
+        return Course(self, posterior, people, before)
+
+
+@dataclass(frozen=True, eq=False)
+class Beforehand:
+    """The probability of a window of each of b people before any trial."""
+
+    probabilities: WorkedOut[tuple[float | None, ...]] = field(default=WorkedOut("probabilities", ()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,15 +63,14 @@ class Estimates:
 
     posterior: Posterior | None
     pairs: int
+    beforehand: Beforehand
     made: dict[int, WindowEstimate] = field(default_factory=dict)
-    first: Estimates | None = None
 
     def estimate(self, person: int) -> WindowEstimate:
         """The estimate of the window of one person."""
         if person not in self.made and self.posterior is not None:
             estimate = self.posterior.estimate(person)
-            knows = self.first is not None and estimate.probability is not None
-            before = self.first.estimate(person).probability if self.first is not None and knows else None
+            before = None if estimate.probability is None else self.beforehand.probabilities[person]
             self.made[person] = estimate.noting(pairs=self.pairs, beforehand=before)
         return self.made[person]
 
@@ -78,7 +90,7 @@ class Course:
     method: Method
     posterior: Posterior
     people: int
-    first: Estimates
+    beforehand: Beforehand
     told: int = 0
     alone: int = 0
     earlier: tuple[Estimates, ...] = ()
@@ -125,7 +137,7 @@ class Course:
     @cached_property
     def estimates(self) -> Estimates:
         """The posterior now, with its estimates."""
-        return Estimates(self.posterior, self.known + self.paired_trials, first=self.first)
+        return Estimates(self.posterior, self.known + self.paired_trials, self.beforehand)
 
     @cached_property
     def past(self) -> tuple[Estimates, ...]:

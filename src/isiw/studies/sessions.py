@@ -26,7 +26,7 @@ from isiw.strategy.catalogue import known_settings, make_strategy
 from isiw.strategy.choice import Choice, instead_of_lost
 from isiw.strategy.course import Course, Method
 from isiw.strategy.outcomes import Outcome, Outcomes
-from isiw.strategy.stopping import StopDecision, stimuli_left
+from isiw.strategy.stopping import Budget, StopDecision, stimuli_left
 from isiw.strategy.strategy import Strategy
 from isiw.studies.execution import one_thread
 from isiw.studies.players import Alone, OwnCode, Player, Reported
@@ -299,8 +299,10 @@ class _Batch:
         self.players, acquisition = players, first.acquisition
         if any(player.acquisition != acquisition for player in players):
             acquisition = _EachTheirOwn([player.acquisition for player in players])
-        method = Method(first.space, first.model, acquisition, first.stopping, first.initial_ms, first.cost)
-        self.stopping = first.stopping
+        ignored = all(session.stopping == "ignored" for session in sessions)
+        # A rule that nobody asks need not look back, for which past posteriors would be kept.
+        self.stopping = Budget(sessions[0].trials) if ignored else first.stopping
+        method = Method(first.space, first.model, acquisition, self.stopping, first.initial_ms, first.cost)
         self.course = method.begin(first.seed, len(players))
         self.alone = dict[int, Course]()
         self.together = Outcomes(first.space.reference, first.amplitude_step_mv or 0.0)

@@ -115,5 +115,7 @@ class Latents(NamedTuple):
 
     def taken(self, picks: IntArray) -> Latents:
         """Some of the particles of each person, by their numbers (b, s), fields of shape (b, s, ...)."""
-        who = np.arange(len(picks))[:, np.newaxis]
-        return Latents(self.values[who, picks], self.kinds[who, picks])
+        people, particles, _ = self.values.shape
+        numbers = picks + particles * np.arange(people)[:, np.newaxis]  # of all people: one `take` is the fastest
+        values, kinds = (each.reshape(people * particles, -1).take(numbers, axis=0) for each in self)
+        return Latents(values, kinds)

@@ -5,7 +5,8 @@ Responses are worked out in tables by facilitation, between whose rows predictio
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
@@ -42,7 +43,13 @@ class TabledSample:
 
     def outcome_mass(self, isi_ms: Singles) -> Singles:
         """Predictive distribution of the next MEP under each particle, shape (b, s, t, y)."""
-        return engine.rows_between(self.fields, self._outcome_table, engine.facilitations(self.fields, isi_ms))
+        return engine.rows_between(self.fields, self.outcome_table, engine.facilitations(self.fields, isi_ms))
+
+    def foreseen(self, isi_ms: Singles) -> Iterator[engine.Foreseen]:
+        """The same, a person at a time: tables of many people are not kept at once."""
+        for person in range(len(self.fields)):
+            one = self if len(self.fields) == 1 else replace(self, fields=self.fields[person : person + 1])
+            yield engine.Foreseen(one.fields, one.outcome_table, engine.facilitations(one.fields, isi_ms))
 
     def mep_quantiles_mv(self, isi_ms: Singles, shares: FloatArray) -> FloatArray:
         """Quantiles of the next MEP [mV], shape (b, t, q)."""
@@ -90,7 +97,7 @@ class TabledSample:
         return _quantile(self._log_floor, 0.05) - 1.0, _quantile(top, 0.95) + 1.5
 
     @cached_property
-    def _outcome_table(self) -> Singles:
+    def outcome_table(self) -> Singles:
         """Probability of each outcome of the next trial in each row, shape (b, s, l, y)."""
         low, high = (end[:, np.newaxis] for end in self._log_ends)
         return engine.outcome_tables(self.fields, self._rows[0], self.order, low + _MIDDLES * (high - low), _WIDTHS)

@@ -35,11 +35,17 @@ INLINE float normal(uint64_t *dice) {
     return root_1(-2.0f * log_1(((float)(bits >> 32) + 1.0f) * 0x1p-32f)) * (2.0f * sine * sine - 1.0f);
 }
 
-/* A symmetric draw of mean 0 and SD 1, nearly normal: the sum of four uniform ones. */
-INLINE float blur(uint64_t *dice) {
-    uint64_t bits = random_bits(dice);
-    uint64_t sum = (bits & 0xFFFF) + ((bits >> 16) & 0xFFFF) + ((bits >> 32) & 0xFFFF) + (bits >> 48);
-    return ((float)sum - 131070.0f) * (1.7320508f / 65536.0f);
+/* Symmetric draws of mean 0 and SD 1, nearly normal, one for each number from the first on: the sum of four uniform
+ones, the bytes of a counter that is mixed (the finalizer of MurmurHash3: Appleby, 2008). */
+INLINE Reals blurs(uint64_t bits, int64_t first) {
+    Naturals z;
+    for (uint32_t lane = 0; lane < LANES; lane++) z[lane] = ((uint32_t)first + lane) * 0x9E3779B9u;
+    z = (z + (uint32_t)bits) ^ (uint32_t)(bits >> 32);
+    z = (z ^ (z >> 16)) * 0x85EBCA6Bu;
+    z = (z ^ (z >> 13)) * 0xC2B2AE35u;
+    z ^= z >> 16;
+    Naturals sum = (z & 255u) + ((z >> 8) & 255u) + ((z >> 16) & 255u) + (z >> 24);
+    return (whole_v((Wholes)sum) - 510.0f) * (1.7320508f / 256.0f);
 }
 
 /* One of so many, fewer than 2^32. */

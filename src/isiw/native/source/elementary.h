@@ -6,9 +6,8 @@ tests: below 3e-6, and 2e-5 for ndtr. */
 INLINE REAL NAME(exp2_within)(REAL x) { /* within 126 of 0 */
     REAL shifted = x + 12582912.0f;     /* 1.5 * 2^23: its last bits are the whole number next to x */
     REAL f = x - (shifted - 12582912.0f);
-    REAL power = 0.0013400429f + f * 0.0001546976f;
-    power = 0.0555032721f + f * (0.0096184373f + f * power);
-    power = 1.0f + f * (0.6931472067f + f * (0.2402264923f + f * power));
+    REAL power = 0.0096715126f + f * 0.0013264727f;
+    power = 1.0f + f * (0.6931469776f + f * (0.2402224209f + f * (0.0555073374f + f * power)));
     return NAME(float_of)(NAME(bits_of)(power) + NAME(to_exponent)(NAME(bits_of)(shifted)));
 }
 
@@ -30,29 +29,25 @@ INLINE REAL NAME(log)(REAL x) {
     WHOLE bits = NAME(bits_of)(NAME(most)(x, (REAL){0} + 1.1754944e-38f));
     WHOLE exponent = (bits - 0x3F3504F3) >> 23;
     REAL m = NAME(float_of)(bits - NAME(to_exponent)(exponent)) - 1.0f; /* from the root of 1/2 to that of 2, less 1 */
-    REAL tail = -1.2420140846e-1f + m * (1.1676998740e-1f + m * (-1.1514610310e-1f + m * 7.0376836292e-2f));
-    tail = 2.0000714765e-1f + m * (-1.6668057665e-1f + m * (1.4249322787e-1f + m * tail));
-    tail = 3.3333331174e-1f + m * (-2.4999993993e-1f + m * tail);
-    REAL square = m * m;
-    return m - 0.5f * square + square * m * tail + NAME(whole)(exponent) * 0.6931471805599453f;
+    REAL tail = 0.1990688319f + m * (-0.1724322495f + m * (0.1618050093f + m * -0.1008237725f));
+    tail = -0.5000032344f + m * (0.3333471491f + m * (-0.2497122849f + m * tail));
+    return m + m * m * tail + NAME(whole)(exponent) * 0.6931471805599453f;
 }
 
-/* 1 / x of a positive number, by Newton's method, as dividers are slow. With two steps, whose error is 8e-7, log
-likelihoods of 60 trials would be .001 nat off. */
+/* 1 / x of a positive number, as dividers are slow: a step of Newton's method from a guess, and one of Halley's. */
 INLINE REAL NAME(per)(REAL x) {
-    REAL y = NAME(float_of)(0x7EF311C7 - NAME(bits_of)(x));
-    y = y * (2.0f - x * y);
-    y = y * (2.0f - x * y);
-    return y * (2.0f - x * y);
+    REAL y = NAME(float_of)(0x7EF32E00 - NAME(bits_of)(x));
+    y = y * (2.0013f - x * y);
+    REAL off = 1.0f - x * y;
+    return y + y * (off + off * off);
 }
 
 /* 1 / root of a positive number, likewise. */
 INLINE REAL NAME(per_root)(REAL x) {
-    REAL half = 0.5f * x;
-    REAL y = NAME(float_of)(0x5F3759DF - (NAME(bits_of)(x) >> 1));
-    y = y * (1.5f - half * y * y);
-    y = y * (1.5f - half * y * y);
-    return y * (1.5f - half * y * y);
+    REAL y = NAME(float_of)(0x5F1FFFF9 - (NAME(bits_of)(x) >> 1));
+    y = y * (1.6819144f - 0.703952253f * x * y * y);
+    REAL off = 1.0f - x * y * y;
+    return y + y * (off * (0.5f + 0.375f * off));
 }
 
 /* Probability that a standard normal variable is below -z, for z of at least 0 (Chebyshev fit of erfc and its tail). */

@@ -29,7 +29,7 @@ typedef struct {
     float place_share;         /* probability of all places */
     int32_t apart;             /* enhancement and depression may not overlap */
     const int64_t *state_of;   /* weights of the kinds in the number of a particle's state, (KINDS,) */
-    const uint8_t *shifted;    /* which latents a difference moves, (states, part_count, latents) */
+    const uint8_t *shifted;    /* which latents a difference moves, (states, part_count, latents in whole vectors) */
     const float *parts;        /* sums of the probabilities of earlier parts, (part_count - 1,) */
     const float *jumps;        /* likewise of earlier jumps, (jump_count - 1,) */
     const uint8_t *redrawn;    /* which latents each jump draws again, (jump_count, latents) */
@@ -85,11 +85,14 @@ typedef struct {
     /* Windows as two runs of indices of ISIs: first, behind the last, (b, s, 4). */
     int (*window_runs)(int64_t samples, int64_t isis, const float *fields, const float *levels, const float *isi_ms,
                        int32_t *runs);
-    /* Entropy of the mean of distributions (s, t, y) less their mean entropy, (t,). */
-    int (*entropy_reductions)(int64_t samples, int64_t isis, int64_t outcomes, const float *mass, float *found);
+    /* Entropy of the mean of distributions less their mean entropy, (t,). They are a table (s, t, y), or with rows lie
+    between those of one (s, rows, y) at facilitations (s, t). */
+    int (*entropy_reductions)(int64_t samples, int64_t rows, int64_t isis, int64_t outcomes, const float *fields,
+                              const float *table, const float *levels, float *found);
     /* Variance of each point's membership in windows (s, g), less that expected after an outcome, (t,). */
-    int (*variance_reductions)(int64_t samples, int64_t isis, int64_t outcomes, int64_t points, const float *mass,
-                               const float *masks, float *found);
+    int (*variance_reductions)(int64_t samples, int64_t rows, int64_t isis, int64_t outcomes, int64_t points,
+                               const float *fields, const float *table, const float *levels, const float *masks,
+                               float *found);
     /* Elementary functions, for tests: exp, exp2, log, 1 / x, 1 / root x, and the probability that a standard normal
     variable is between x and y, number 0 to 5. */
     int (*elementary)(int32_t number, int64_t count, const float *x, const float *y, float *found);

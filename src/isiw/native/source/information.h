@@ -7,28 +7,54 @@
 
 #include "predictions.h"
 
-/* Negative entropy of a distribution, and the distribution added to a mean [nat]. */
-INLINE float negative_entropy(const float *mass, int64_t outcomes, float share, float *mean) {
+/* Distributions of the next outcome: given for each sample and ISI, (s, t, y), or with rows, as tables between whose
+rows (s, rows, y) they lie at facilitations (s, t). */
+typedef struct {
+    int64_t samples, rows, isis, outcomes;
+    const float *fields, *table, *levels;
+} Foreseen;
+
+/* Those at one ISI, (s, y). */
+static void foreseen_at(const Foreseen *of, int64_t t, float *found) {
+    for (int64_t s = 0; s < of->samples; s++) {
+        float *to = found + s * of->outcomes;
+        if (of->rows)
+            between_rows(of->table + s * of->rows * of->outcomes, of->rows, of->outcomes,
+                         of->fields[s * FIELDS + DEPTH], of->levels[s * of->isis + t], to);
+        else
+            memcpy(to, of->table + (s * of->isis + t) * of->outcomes, (size_t)of->outcomes * sizeof *to);
+    }
+}
+
+/* Negative entropies of distributions next to each other, summed [nat]. */
+static float negative_entropy(const float *mass, int64_t count) {
     Reals sum = all(0.0f);
-    for (int64_t y = 0; y < outcomes; y += LANES) {
-        Reals given = loaded(mass + y, outcomes - y);
+    for (int64_t i = 0; i < count; i += LANES) {
+        Reals given = loaded(mass + i, count - i);
         sum += given * log_v(most_v(given, all(1e-30f)));
-        if (mean) stored(loaded(mean + y, outcomes - y) + share * given, mean + y, outcomes - y);
     }
     return lanes_sum(sum);
 }
 
-static int entropy_reductions(int64_t samples, int64_t isis, int64_t outcomes, const float *mass, float *found) {
-    float *mean = calloc((size_t)(isis * outcomes + 1), sizeof *mean), share = 1.0f / (float)samples;
-    if (!mean) return -1;
-    memset(found, 0, (size_t)isis * sizeof *found);
-    for (int64_t s = 0; s < samples; s++)
-        for (int64_t t = 0; t < isis; t++) {
-            const float *given = mass + (s * isis + t) * outcomes;
-            found[t] += share * negative_entropy(given, outcomes, share, mean + t * outcomes);
-        }
-    for (int64_t t = 0; t < isis; t++) found[t] -= negative_entropy(mean + t * outcomes, outcomes, 0.0f, NULL);
-    free(mean);
+/* Add some numbers times a factor to others. */
+INLINE void added(float factor, const float *values, int64_t count, float *to) {
+    for (int64_t i = 0; i < count; i += LANES)
+        stored(loaded(to + i, count - i) + factor * loaded(values + i, count - i), to + i, count - i);
+}
+
+static int entropy_reductions(int64_t samples, int64_t rows, int64_t isis, int64_t outcomes, const float *fields,
+                              const float *table, const float *levels, float *found) {
+    Foreseen of = {samples, rows, isis, outcomes, fields, table, levels};
+    float *mass = malloc((size_t)((samples + 1) * outcomes + 1) * sizeof *mass), share = 1.0f / (float)samples;
+    if (!mass) return -1;
+    float *mean = mass + samples * outcomes;
+    for (int64_t t = 0; t < isis; t++) {
+        foreseen_at(&of, t, mass);
+        memset(mean, 0, (size_t)outcomes * sizeof *mean);
+        for (int64_t s = 0; s < samples; s++) added(share, mass + s * outcomes, outcomes, mean);
+        found[t] = share * negative_entropy(mass, samples * outcomes) - negative_entropy(mean, outcomes);
+    }
+    free(mass);
     return 0;
 }
 
@@ -55,20 +81,15 @@ static int64_t changes_of(const float *masks, int64_t samples, int64_t points, C
     return count;
 }
 
-/* Add some numbers times a factor to others. */
-INLINE void added(float factor, const float *values, int64_t count, float *to) {
-    for (int64_t i = 0; i < count; i += LANES)
-        stored(loaded(to + i, count - i) + factor * loaded(values + i, count - i), to + i, count - i);
-}
-
-/* Expected variance of all points that a trial at one candidate explains, by what changes from point to point. */
-static float explained(const float *mass, int64_t samples, int64_t isis, int64_t outcomes, const Change *changes,
-                       int64_t count, const float *mean, int64_t points, float *steps, float *all_of) {
+/* Expected variance of all points that a trial with these outcomes (s, y) explains, by what changes from point to
+point. */
+static float explained(const float *mass, int64_t samples, int64_t outcomes, const Change *changes, int64_t count,
+                       const float *mean, int64_t points, float *steps, float *all_of) {
     memset(steps, 0, (size_t)(points * outcomes) * sizeof *steps);
     memset(all_of, 0, (size_t)outcomes * sizeof *all_of);
-    for (int64_t s = 0; s < samples; s++) added(1.0f, mass + s * isis * outcomes, outcomes, all_of);
+    for (int64_t s = 0; s < samples; s++) added(1.0f, mass + s * outcomes, outcomes, all_of);
     for (int64_t i = 0; i < count; i++)
-        added(changes[i].rise, mass + changes[i].sample * isis * outcomes, outcomes, steps + changes[i].at * outcomes);
+        added(changes[i].rise, mass + changes[i].sample * outcomes, outcomes, steps + changes[i].at * outcomes);
     Reals found = all(0.0f);
     for (int64_t y = 0; y < outcomes; y += LANES) {
         Reals whole = loaded(all_of + y, outcomes - y), sum = all(0.0f), reduced = all(0.0f);
@@ -82,17 +103,20 @@ static float explained(const float *mass, int64_t samples, int64_t isis, int64_t
     return lanes_sum(found) / (float)samples;
 }
 
-static int variance_reductions(int64_t samples, int64_t isis, int64_t outcomes, int64_t points, const float *mass,
-                               const float *masks, float *found) {
+static int variance_reductions(int64_t samples, int64_t rows, int64_t isis, int64_t outcomes, int64_t points,
+                               const float *fields, const float *table, const float *levels, const float *masks,
+                               float *found) {
+    Foreseen of = {samples, rows, isis, outcomes, fields, table, levels};
     Change *changes = malloc((size_t)(samples * points + 1) * sizeof *changes);
-    float *room = malloc((size_t)(points + (points + 1) * outcomes + 1) * sizeof *room);
+    float *room = malloc((size_t)(points + (points + samples + 1) * outcomes + 1) * sizeof *room);
     int there = changes && room;
     if (there) {
-        float *mean = room, *all_of = room + points, *steps = all_of + outcomes;
+        float *mean = room, *all_of = room + points, *mass = all_of + outcomes, *steps = mass + samples * outcomes;
         int64_t count = changes_of(masks, samples, points, changes, mean);
-        for (int64_t t = 0; t < isis; t++)
-            found[t] =
-                explained(mass + t * outcomes, samples, isis, outcomes, changes, count, mean, points, steps, all_of);
+        for (int64_t t = 0; t < isis; t++) {
+            foreseen_at(&of, t, mass);
+            found[t] = explained(mass, samples, outcomes, changes, count, mean, points, steps, all_of);
+        }
     }
     free(changes), free(room);
     return there ? 0 : -1;

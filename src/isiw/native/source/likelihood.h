@@ -20,6 +20,8 @@ enum { NODES = 8, FACTOR_NODES = 5, GROUPS = 64 };
 #define BETWEEN_NODES (0.4 * 2.0 * NODE_REACH / (NODES - 1)) /* SD of what lies between the nodes */
 #define ON_NODES 0.9548330338069476                          /* SD of the nodes: the root of 1 - BETWEEN_NODES^2 */
 #define FAR_BELOW 15.0f                                      /* how far below saturation noise of constant CV sits */
+#define LOWEST_DRIVE (-50.0f)
+#define LOWEST_NOISE (-36.0f)
 #define CORNER 0.05f       /* how much of the variance between nodes rounds the corner at a threshold */
 #define STEEPEST_ROOT 0.2f /* where the log-gamma noise is steeper, its slope is cut */
 #define OUTLIERS 0.03f     /* probability of artefacts, log-uniform between 2 and 200 floors */
@@ -50,9 +52,18 @@ static void fill_nodes(void) {
     for (int k = 0; k < FACTOR_NODES; k++) factor_weight[k] = (float)(of_factor[k] / factors);
 }
 
+/* exp(-drive): sigmoid(a + b) = 1 / (1 + exp(-a) exp(-b)). Limits keep a product of two within single precision, and
+lie where a sigmoid is 0 or 1 for all that an MEP shows. */
+INLINE Reals odds_against(Reals drive, float lowest) {
+    return exp2_within_v(-1.4426950408889634f * least_v(most_v(drive, all(lowest)), all(40.0f)));
+}
+
+/* The same without a recruitment curve, whose drive is the log of the facilitation. */
+INLINE Reals odds_of_level(Reals level) { return per_v(most_v(level, all(1e-9f))); }
+
 /* A curve as its nodes have it. */
 typedef struct {
-    Reals at[NODES];      /* noise on the input */
+    Reals odds[NODES];    /* of the noise on the input, see odds_against */
     Reals between[NODES]; /* variance of what lies between, where the sigmoid is steepest */
 } Curve;
 
@@ -63,26 +74,27 @@ static Curve curve_of(const Particles *particles, int curved) {
     Curve made;
     if (curved) {
         for (int q = 0; q < NODES; q++) {
-            made.at[q] = spread * node_at[q];
+            made.odds[q] = odds_against(spread * node_at[q], LOWEST_NOISE);
             made.between[q] = spread * spread * (float)(BETWEEN_NODES * BETWEEN_NODES);
         }
         return made;
     }
-    Reals mean = all(0.0f);
+    Reals mean = all(0.0f), at[NODES];
     for (int q = 0; q < NODES; q++) {
         Reals root = 1.0f - spread * spread * (1.0f / 9.0f) + spread * (node_at[q] / 3.0f);
         Reals slope = (float)BETWEEN_NODES * spread / most_v(root, all(STEEPEST_ROOT));
-        made.at[q] = 3.0f * log_v(most_v(root, all(0.02f)));
+        at[q] = 3.0f * log_v(most_v(root, all(0.02f)));
         made.between[q] = slope * slope;
-        mean += node_weight[q] * exp_v(made.at[q] + 0.5f * made.between[q]);
+        mean += node_weight[q] * exp_v(at[q] + 0.5f * made.between[q]);
     }
-    for (int q = 0; q < NODES; q++) made.at[q] -= log_v(mean) + FAR_BELOW;
+    Reals below = log_v(mean) + FAR_BELOW;
+    for (int q = 0; q < NODES; q++) made.odds[q] = odds_against(at[q] - below, LOWEST_NOISE);
     return made;
 }
 
 /* What one trial is to the particles. */
 typedef struct {
-    Reals drive, scale, responds, known, floor_variance, output, start;
+    Reals odds, scale, responds, known, floor_variance, output, start;
 } Situation;
 
 /* Nodes are computed four at a time, each step for all four: the next step of one waits for its outcome, which takes
@@ -91,11 +103,10 @@ enum { TOGETHER_NODES = 4 };
 #define EACH_NODE _Pragma("GCC unroll 4") for (int q = 0; q < TOGETHER_NODES; q++)
 
 /* Means and inverse SDs of the log MEP over the floor at four nodes: the variance is that of each part by its share. */
-INLINE void components(const Situation *trial, const Reals *at, const Reals *between, int rectified, Reals *mean,
+INLINE void components(const Situation *trial, const Reals *odds, const Reals *between, int rectified, Reals *mean,
                        Reals *inverse_sd) {
     Reals share[TOGETHER_NODES], variance[TOGETHER_NODES], sum[TOGETHER_NODES];
-    EACH_NODE share[q] = 1.0f + exp_v(-(trial->drive + at[q]));
-    EACH_NODE share[q] = per_v(share[q]);
+    EACH_NODE share[q] = per_v(1.0f + trial->odds * odds[q]);
     if (rectified) { /* what lies between the nodes rounds the corner of the curve at its threshold */
         Reals rescaled = trial->scale * 0.5f * per_v(1.0f - trial->start), reach[TOGETHER_NODES];
         EACH_NODE {
@@ -124,7 +135,7 @@ INLINE Reals density(const Situation *trial, const Curve *curve, int rectified, 
     Reals evoked = all(0.0f);
     for (int first = 0; first < NODES; first += TOGETHER_NODES) {
         Reals mean[TOGETHER_NODES], inverse_sd[TOGETHER_NODES], bell[TOGETHER_NODES];
-        components(trial, curve->at + first, curve->between + first, rectified, mean, inverse_sd);
+        components(trial, curve->odds + first, curve->between + first, rectified, mean, inverse_sd);
         EACH_NODE bell[q] = bell_v((mean[q] - log_mep) * inverse_sd[q]);
         EACH_NODE evoked += node_weight[first + q] * inverse_sd[q] * bell[q];
     }
@@ -148,7 +159,7 @@ INLINE Reals mass_between(const Situation *trial, const Curve *curve, int rectif
     Reals evoked = all(0.0f);
     for (int first = 0; first < NODES; first += TOGETHER_NODES) {
         Reals mean[TOGETHER_NODES], inverse_sd[TOGETHER_NODES];
-        components(trial, curve->at + first, curve->between + first, rectified, mean, inverse_sd);
+        components(trial, curve->odds + first, curve->between + first, rectified, mean, inverse_sd);
         EACH_NODE {
             Reals inside = normal_between((low - mean[q]) * inverse_sd[q], (high - mean[q]) * inverse_sd[q]);
             evoked += node_weight[first + q] * inside;
@@ -188,7 +199,7 @@ static Group group_of(const Particles *particles, int curved, int rectified) {
     return made;
 }
 
-/* The situation of a trial, but for the drive, at a node of the factor of known parts. */
+/* The situation of a trial, but for what drives it, at a node of the factor of known parts. */
 INLINE Situation situation_of(const Group *group, const Trial *trial, float factor_at, Wholes changed) {
     const Reals *of = group->particles->of;
     Situation made = {.output = group->output, .start = of[ONSET], .floor_variance = group->floor_variance};
@@ -205,8 +216,8 @@ INLINE Situation situation_of(const Group *group, const Trial *trial, float fact
     return made;
 }
 
-/* The drive of a trial, and the probability of a response, at an ISI. */
-INLINE void drive_at(const Group *group, const Trial *trial, float isi_ms, Wholes changed, Situation *made) {
+/* What drives a trial, and the probability of a response, at an ISI. */
+INLINE void driven_at(const Group *group, const Trial *trial, float isi_ms, Wholes changed, Situation *made) {
     const Reals *of = group->particles->of;
     Reals level = facilitation(&group->profiles, all(isi_ms)) * trial->of[FACTOR];
     if (group->any_fading) {
@@ -215,13 +226,14 @@ INLINE void drive_at(const Group *group, const Trial *trial, float isi_ms, Whole
         level *= exp2_v(-absolute(of[FADING]) * age);
     }
     if (group->curved) {
-        made->drive = of[REST] + of[BOOST] * level + of[SLOPE] * trial->of[SHIFT];
-        if (group->any_step) made->drive += pick(changed, of[STEP_DRIVE], all(0.0f));
+        Reals drive = of[REST] + of[BOOST] * level + of[SLOPE] * trial->of[SHIFT];
+        if (group->any_step) drive += pick(changed, of[STEP_DRIVE], all(0.0f));
+        made->odds = odds_against(drive, LOWEST_DRIVE);
         return;
     }
-    made->drive = log_v(most_v(level, all(1e-9f)));
+    made->odds = odds_of_level(level);
     if (group->any_switch) {
-        made->drive = pick(group->switches, all(0.0f), made->drive);
+        made->odds = pick(group->switches, all(1.0f), made->odds);
         made->responds = pick(group->switches, of[LEAST] + (of[MOST] - of[LEAST]) * level, all(1.0f));
     }
     if (group->any_missing)
@@ -242,7 +254,7 @@ INLINE Reals of_trial(const Group *group, const Trial *trial, float factor_at, i
     Reals low = (interval ? most_1(trial->of[LOW], -EVER) : trial->of[LOW]) - floor;
     Reals high = least_1(trial->of[HIGH], EVER) - floor;
     for (int node = 0; node < (uncertain ? 3 : 1); node++) {
-        drive_at(group, trial, trial->of[ISI] + shift[node] * trial->of[ISI_SD], changed, &made);
+        driven_at(group, trial, trial->of[ISI] + shift[node] * trial->of[ISI_SD], changed, &made);
         Reals found = interval ? mass_between(&made, &group->curve, rectified, low, high)
                                : density(&made, &group->curve, rectified, low);
         likelihood = uncertain ? likelihood + share[node] * found : found;
@@ -327,27 +339,51 @@ static int trials_of(const float *columns, int64_t count, Trial *trials) {
     return shares;
 }
 
+/* Shapes of profiles whose particles are computed side by side as far as whole vectors allow: what one of them needs is
+worked out for all lanes. */
+enum { ONE_PEAK, A_PLATEAU, TWO_PEAKS, GROUPS_OF_SHAPES };
+
+INLINE int shape_group(const float *fields) {
+    return fields[SHAPE] == PLATEAU ? A_PLATEAU : fields[SHAPE] == TWO_PEAK ? TWO_PEAKS : ONE_PEAK;
+}
+
+/* Log likelihood of a person's trials under at most a vector of particles, whose noise is of one group. */
+static void some_likelihood(const float *fields, const int64_t *numbers, int count_of, int of_noise,
+                            const Trial *trials, int64_t count, int shares, float *found) {
+    Particles some;
+    double of_lane[LANES];
+    for (int lane = 0; lane < LANES; lane++) { /* lanes that are left over repeat the last particle */
+        const float *one = fields + numbers[lane < count_of ? lane : count_of - 1] * FIELDS;
+        for (int field = 0; field < FIELDS; field++) some.of[field][lane] = one[field];
+    }
+    lanes_likelihood(&some, of_noise, trials, count, shares, of_lane);
+    for (int lane = 0; lane < count_of; lane++) found[numbers[lane]] = (float)of_lane[lane];
+}
+
 /* Log likelihood of a person's trials under some of their particles (p, FIELDS); wanted says which, NULL is all. */
 static void person_likelihood(const float *fields, int64_t particles, const uint8_t *wanted, const Trial *trials,
                               int64_t count, int shares, float *found) {
-    for (int of_noise = 0; of_noise < GROUPS_OF_NOISE; of_noise++) {
-        int64_t lane_of[LANES];
+    int64_t waiting[GROUPS_OF_NOISE][GROUPS_OF_SHAPES][LANES];
+    int waits[GROUPS_OF_NOISE][GROUPS_OF_SHAPES] = {{0}};
+    for (int64_t i = 0; i < particles; i++) {
+        if (wanted && !wanted[i]) continue;
+        int noise = noise_group(fields + i * FIELDS), shape = shape_group(fields + i * FIELDS);
+        waiting[noise][shape][waits[noise][shape]++] = i;
+        if (waits[noise][shape] < LANES) continue;
+        some_likelihood(fields, waiting[noise][shape], LANES, noise, trials, count, shares, found);
+        waits[noise][shape] = 0;
+    }
+    for (int noise = 0; noise < GROUPS_OF_NOISE; noise++) {
+        int64_t left[LANES];
         int lanes = 0;
-        for (int64_t i = 0; i <= particles; i++) {
-            if (i < particles && (!wanted || wanted[i]) && noise_group(fields + i * FIELDS) == of_noise)
-                lane_of[lanes++] = i;
-            if (lanes == LANES || (lanes && i == particles)) {
-                Particles some;
-                double of_lane[LANES];
-                for (int lane = 0; lane < LANES; lane++) { /* lanes that are left over repeat the last particle */
-                    const float *one = fields + lane_of[lane < lanes ? lane : lanes - 1] * FIELDS;
-                    for (int field = 0; field < FIELDS; field++) some.of[field][lane] = one[field];
-                }
-                lanes_likelihood(&some, of_noise, trials, count, shares, of_lane);
-                for (int lane = 0; lane < lanes; lane++) found[lane_of[lane]] = (float)of_lane[lane];
+        for (int shape = 0; shape < GROUPS_OF_SHAPES; shape++)
+            for (int i = 0; i < waits[noise][shape]; i++) {
+                left[lanes++] = waiting[noise][shape][i];
+                if (lanes < LANES) continue;
+                some_likelihood(fields, left, LANES, noise, trials, count, shares, found);
                 lanes = 0;
             }
-        }
+        if (lanes) some_likelihood(fields, left, lanes, noise, trials, count, shares, found);
     }
 }
 

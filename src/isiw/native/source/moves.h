@@ -150,9 +150,13 @@ static double shift(const Chain *chain, uint64_t *dice, const float *theirs, int
     const float *one = theirs + latents * one_of(dice, others), *other = theirs + latents * one_of(dice, others);
     float scale = uniform(dice) < WHOLE_DIFFERENCE ? 1.0f : 0.15f + 0.7f * uniform(dice);
     double ratio = 0.0;
-    for (int64_t latent = 0; latent < latents; latent++)
-        if (moves[latent])
-            z[latent] += scale * (one[latent] - other[latent]) + BLUR * tables->spreads[latent] * blur(dice);
+    uint64_t bits = random_bits(dice);
+    for (int64_t at = 0; at < latents; at += LANES) { /* all latents, as those that move are at no place of their own */
+        int64_t left = latents - at;
+        Reals apart = scale * (loaded(one + at, left) - loaded(other + at, left));
+        apart += BLUR * loaded(tables->spreads + at, left) * blurs(bits, at);
+        stored(pick(flags(moves + at), loaded(z + at, left) + apart, loaded(z + at, left)), z + at, left);
+    }
     for (int64_t block = 0; block < tables->blocks; block++) {
         int touched = 0;
         for (int64_t latent = tables->first[block]; latent < tables->first[block] + tables->size[block]; latent++)
@@ -203,7 +207,7 @@ static void propose(const Chain *chain, const Proposals *to, int64_t i, const fl
         same = tables->of_profile[number] && !kinds[OF_PRESENT] && !chosen[OF_PRESENT];
     } else {
         int64_t part = which(uniform(dice), tables->parts, tables->part_count - 1);
-        const uint8_t *moves = tables->shifted + (state * tables->part_count + part) * tables->latents;
+        const uint8_t *moves = tables->shifted + (state * tables->part_count + part) * in_lanes(tables->latents);
         for (int64_t latent = 0; latent < tables->latents; latent++) same &= !moves[latent];
         if (same)
             for (int64_t block = 0; block < tables->blocks; block++) found[block] = UNKNOWN;
@@ -227,7 +231,7 @@ static void accept(const Tables *tables, const Proposals *to, int64_t i, State *
     int sort = to->jumped[i] ? 2 : 0;
     state->counts[sort] += 1.0f;
     double ratio = (double)to->after[i] - *log_likelihood + to->ratio[i];
-    if (!(log(fmax(uniform(to->dice + i), 1e-30f)) < ratio)) return;
+    if (!(log_1(most_1(uniform(to->dice + i), 1e-30f)) < ratio)) return;
     state->counts[sort + 1] += 1.0f;
     *log_likelihood = to->after[i];
     memcpy(state->values + particle * tables->latents, to->z + i * (tables->latents + 1),

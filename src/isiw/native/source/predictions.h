@@ -76,12 +76,12 @@ static void components_of(const float *fields, float gain, const float *levels, 
                       .scale = exp_v(particle.of[LOG_RATIO] + (gain + (curved ? 0.0f : FAR_BELOW)))};
     for (int64_t row = 0; row < rows; row += LANES) {
         Reals level = loaded(levels + row, rows - row);
-        made.drive = curved  ? particle.of[REST] + particle.of[BOOST] * level
-                     : whole ? all(0.0f)
-                             : log_v(most_v(level, all(1e-9f)));
+        made.odds = curved  ? odds_against(particle.of[REST] + particle.of[BOOST] * level, LOWEST_DRIVE)
+                    : whole ? all(1.0f)
+                            : odds_of_level(level);
         for (int first = 0; first < NODES; first += TOGETHER_NODES) {
             Reals mean[TOGETHER_NODES], inverse_sd[TOGETHER_NODES];
-            components(&made, curve.at + first, curve.between + first, rectified, mean, inverse_sd);
+            components(&made, curve.odds + first, curve.between + first, rectified, mean, inverse_sd);
             for (int q = 0; q < TOGETHER_NODES; q++) {
                 stored(mean[q], means + (first + q) * rows + row, rows - row);
                 stored(inverse_sd[q], sds + (first + q) * rows + row, rows - row);
@@ -129,16 +129,24 @@ static int outcome_tables(int64_t people, int64_t samples, int64_t rows, int64_t
     return 0;
 }
 
+/* What lies between the rows of a table (rows, y) at a facilitation, (y,). */
+INLINE void between_rows(const float *table, int64_t rows, int64_t outcomes, float depth, float level, float *found) {
+    float position = position_of(level, depth, rows);
+    int64_t row = row_below(position, rows);
+    const float *first = table + row * outcomes, *second = first + outcomes;
+    float share = position - (float)row;
+    for (int64_t y = 0; y < outcomes; y += LANES) {
+        Reals low = loaded(first + y, outcomes - y), high = loaded(second + y, outcomes - y);
+        stored(low + share * (high - low), found + y, outcomes - y);
+    }
+}
+
 static int rows_between(int64_t samples, int64_t rows, int64_t isis, int64_t outcomes, const float *fields,
                         const float *table, const float *levels, float *found) {
     for (int64_t i = 0; i < samples; i++)
-        for (int64_t t = 0; t < isis; t++) {
-            float position = position_of(levels[i * isis + t], fields[i * FIELDS + DEPTH], rows);
-            int64_t row = row_below(position, rows);
-            const float *first = table + (i * rows + row) * outcomes, *second = first + outcomes;
-            float share = position - (float)row, *blend = found + (i * isis + t) * outcomes;
-            for (int64_t y = 0; y < outcomes; y++) blend[y] = first[y] + share * (second[y] - first[y]);
-        }
+        for (int64_t t = 0; t < isis; t++)
+            between_rows(table + i * rows * outcomes, rows, outcomes, fields[i * FIELDS + DEPTH], levels[i * isis + t],
+                         found + (i * isis + t) * outcomes);
     return 0;
 }
 

@@ -115,50 +115,68 @@ static float start_at(const Tables *tables, float quantile) {
     return tables->start_ms[low] + share * (tables->start_ms[high] - tables->start_ms[low]);
 }
 
-/* Log of a sum of exponentials that grows. */
+/* Log density of the latents of a place: of start and log width. */
+INLINE float log_place(const Tables *tables, int64_t place, const float *z) {
+    const float *law = tables->places + 5 * place;
+    float a = (z[0] - law[1]) / law[2], b = (z[1] - law[3]) / law[4];
+    return law[0] - 0.5f * (a * a + b * b);
+}
+
+/* Log densities of the latents first to behind under some components of a block's mixture, which are lanes. */
+INLINE Reals log_components(const Tables *tables, int64_t block, int64_t k, int64_t first, int64_t behind,
+                            const float *z) {
+    Reals squares = all(0.0f);
+    for (int64_t latent = first; latent < behind; latent++) {
+        Reals distance = z[latent] - loaded(tables->means + latent * tables->width + k, LANES);
+        distance *= loaded(tables->per_sds + latent * tables->width + k, LANES);
+        squares += distance * distance;
+    }
+    return loaded(tables->log_shares + block * tables->width + k, LANES) - 0.5f * squares;
+}
+
+/* Log of a sum of exponentials, of which the largest is not known beforehand. */
 typedef struct {
     float most, sum;
 } LogSum;
 
-/* Add the exponentials of the first lanes. */
-INLINE void add_logs(LogSum *to, Reals parts, int64_t count) {
-    float most = to->most;
-    for (int lane = 0; lane < count; lane++) most = most_1(most, parts[lane]);
-    Reals shares = exp_v(parts - most);
-    to->sum *= exp_1(to->most - most), to->most = most;
-    for (int lane = 0; lane < count; lane++) to->sum += shares[lane];
+static void add_log(LogSum *to, float part) {
+    float most = most_1(to->most, part);
+    to->sum = to->sum * exp_1(to->most - most) + exp_1(part - most), to->most = most;
 }
 
-/* Log density of the latents of a block but for a constant; -inf where there can be none. The components of its mixture
-are lanes. */
+/* Log density of the latents of a block but for a constant; -inf where there can be none. */
 static float log_block(const Tables *tables, int64_t block, const float *z) {
-    int64_t first = tables->first[block], size = tables->size[block], components = tables->components[block];
+    int64_t first = tables->first[block], behind = first + tables->size[block], components = tables->components[block];
     int64_t count = components < 0 ? -components : components, width = tables->width;
-    float anywhere = 0.0f;
+    int64_t places = components < 0 ? tables->place_count : 0;
+    float anywhere = 0.0f, usual = tables->log_shares[block * width], sum = 0.0f;
     if (components <= 0) { /* a start, and with places its width */
         float density = start_density(tables, z[first]);
         anywhere = density == 0.0f ? NEVER : log_1(density);
-        first++, size = components < 0 ? 1 : 0;
+        if (components == 0) return density == 0.0f ? -INFINITY : anywhere;
+        first++, behind = first + 1;
     }
-    LogSum sum = {NEVER, 0.0f};
-    for (int64_t k = 0; k < count; k += LANES) {
-        Reals squares = all(0.0f);
-        for (int64_t latent = first; latent < first + size; latent++) {
-            Reals distance = z[latent] - loaded(tables->means + latent * width + k, LANES);
-            distance *= loaded(tables->per_sds + latent * width + k, LANES);
+    if (count == 1) { /* of one component no lanes are needed */
+        float squares = 0.0f;
+        for (int64_t latent = first; latent < behind; latent++) {
+            float distance = (z[latent] - tables->means[latent * width]) * tables->per_sds[latent * width];
             squares += distance * distance;
         }
-        Reals parts = loaded(tables->log_shares + block * width + k, LANES) - 0.5f * squares + anywhere;
-        if (count == 1 && components > 0) return parts[0];
-        add_logs(&sum, parts, count - k < LANES ? count - k : LANES);
+        if (!places) return usual - 0.5f * squares + anywhere;
     }
-    if (components == 0) return anywhere > NEVER * 0.5f ? anywhere : -INFINITY;
-    for (int64_t place = 0; components < 0 && place < tables->place_count; place++) {
-        const float *law = tables->places + 5 * place;
-        float a = (z[0] - law[1]) / law[2], b = (z[1] - law[3]) / law[4];
-        add_logs(&sum, all(law[0] - 0.5f * (a * a + b * b)), 1);
+    if (count <= LANES) { /* as shares of the largest share of the first, unless all are next to nothing */
+        Reals shares = exp_v(log_components(tables, block, 0, first, behind, z) - usual + anywhere);
+        for (int64_t k = 0; k < count; k++) sum += shares[k];
+        for (int64_t place = 0; place < places; place++) sum += exp_1(log_place(tables, place, z) - usual);
+        if (sum > 1e-30f) return usual + log_1(sum);
     }
-    return sum.most > NEVER * 0.5f ? sum.most + log_1(sum.sum) : -INFINITY;
+    LogSum slow = {NEVER, 0.0f};
+    for (int64_t k = 0; k < count; k += LANES) {
+        Reals parts = log_components(tables, block, k, first, behind, z) + anywhere;
+        for (int64_t lane = 0; lane < LANES && k + lane < count; lane++) add_log(&slow, parts[lane]);
+    }
+    for (int64_t place = 0; place < places; place++) add_log(&slow, log_place(tables, place, z));
+    return slow.most > NEVER * 0.5f ? slow.most + log_1(slow.sum) : -INFINITY;
 }
 
 /* Draw the latents of a block from the prior. */

@@ -128,6 +128,17 @@ INLINE void stored(Reals some, float *values, int64_t left) {
 #endif
 }
 
+/* Which of a vector's bytes are not 0, as a comparison would say it. */
+INLINE Wholes flags(const uint8_t *bytes) {
+    typedef int8_t Bytes __attribute__((vector_size(LANES)));
+    Bytes some;
+    memcpy(&some, bytes, sizeof some);
+    return __builtin_convertvector(some, Wholes) != 0;
+}
+
+/* A number of numbers that fills vectors of any processor. */
+INLINE int64_t in_lanes(int64_t count) { return (count + 15) / 16 * 16; }
+
 /* Sum of the lanes, in their order. */
 INLINE float lanes_sum(Reals some) {
     float sum = 0.0f;
