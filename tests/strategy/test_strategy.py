@@ -475,7 +475,7 @@ def test_an_isi_of_a_batch_that_is_told_twice_is_odd() -> None:
 
 def test_what_is_asked_after_a_batch_takes_its_place(particles: Strategy) -> None:
     batch = particles.ask_batch(3)
-    particles.tell(batch[2], 0.3)
+    particles.tell(batch[2], 0.05)
     since_ms = particles.ask()
     assert min(abs(since_ms - isi_ms) for isi_ms in batch) > VALVE_SPACE.tolerance_ms
     assert warnings_of(particles, since_ms) == []
