@@ -188,7 +188,11 @@ _BAND: Final = (0.05, 0.5, 0.95)
 
 
 def _band_mv(profiles: SampledProfiles) -> FloatArray:
-    band_mv: FloatArray = np.quantile(profiles.mep_mv, _BAND, axis=0).astype(float)
+    # As `np.quantile` interpolates, which takes three times as long for so few samples.
+    place = (len(profiles.mep_mv) - 1) * np.array(_BAND)
+    low, high = np.floor(place).astype(int), np.ceil(place).astype(int)
+    ordered = np.partition(profiles.mep_mv, np.unique((low, high)), axis=0)
+    band_mv: FloatArray = ordered[low] + (place - low)[:, np.newaxis] * (ordered[high] - ordered[low]).astype(float)
     return band_mv
 
 

@@ -62,7 +62,7 @@ def prior_tables(
     law: dict[str, Any] = {"at": where, "spreads": spreads, "log_shares": log_shares, "below": below}
     law |= {"means": means, "sds": sds, "per_sds": 1.0 / sds}
     law |= {"first": np.array(first), "size": np.array(size), "components": np.array(components)}
-    law |= dict(zip(("start_ms", "density", "quantiles"), start.knots(space), strict=True)) | _of_places(places)
+    law |= dict(zip(("start_ms", "density", "quantiles"), start.knots(space)[:3], strict=True)) | _of_places(places)
     made = moves | {"changed": int(np.searchsorted(law["first"], where[27]))}
     made |= {"parts": _edges(PART_PROBABILITY, len(PART_PROBABILITY))}
     made |= {"jumps": _edges(moves["jumps"], len(moves["jumps"]))}

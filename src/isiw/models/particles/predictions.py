@@ -53,8 +53,12 @@ class TabledSample:
 
     def mep_quantiles_mv(self, isi_ms: Singles, shares: FloatArray) -> FloatArray:
         """Quantiles of the next MEP [mV], shape (b, t, q)."""
-        below = self.outcome_mass(isi_ms).mean(1, dtype=float).cumsum(-1)
-        ends = np.array([[np.interp(shares, np.append(0.0, own), _ENDS) for own in of_isis] for of_isis in below])
+        below = np.zeros((len(self.fields), len(isi_ms), len(_ENDS)))
+        np.cumsum(self.outcome_mass(isi_ms).mean(1), axis=-1, dtype=float, out=below[..., 1:])
+        cell = np.clip((below[..., np.newaxis, :] < shares[:, np.newaxis]).sum(-1) - 1, 0, len(_ENDS) - 2)
+        before, behind = (np.take_along_axis(below, at, axis=-1) for at in (cell, cell + 1))
+        within = np.clip((shares - before) / np.maximum(behind - before, np.finfo(float).tiny), 0.0, 1.0)
+        ends = _ENDS[cell] + within * (_ENDS[cell + 1] - _ENDS[cell])
         low, high = (end[:, np.newaxis, np.newaxis] for end in self._log_ends)
         quantiles_mv: FloatArray = np.exp(low + ends * (high - low))
         return quantiles_mv

@@ -80,6 +80,7 @@ class Knots(NamedTuple):
     start_ms: FloatArray  # evenly spaced
     density: FloatArray  # [1/ms]
     below: FloatArray  # probability of an earlier start
+    usual: FloatArray  # probability that a start is of the usual span, whatever the rig
 
 
 @dataclass(frozen=True)
@@ -111,17 +112,14 @@ class StartPrior(Checked):
 
     def log_density(self, start_ms: Array, space: DesignSpace) -> FloatArray:
         """Log density at some starts, same shape; -inf where no start can be."""
-        knots_ms, density, _ = self.knots(space)
+        knots_ms, density, *_ = self.knots(space)
         at = np.log(np.maximum(np.interp(start_ms, knots_ms, density), LEAST_DENSITY))
         return np.where((start_ms >= knots_ms[0]) & (start_ms <= knots_ms[-1]), at, -np.inf)
 
     def usual(self, start_ms: Array, space: DesignSpace) -> FloatArray:
         """Probability that some starts are of the usual span, whatever the rig, same shape."""
-        spans = np.stack([span.share * span.density(start_ms) for span in self.in_space(space)])
-        usual = spans[:: len(self.spans)].sum(0)  # the first of all spans is there once for each kind of rig
-        even = self.p_anywhere / (space.high_ms - space.low_ms + BEFORE_MS)
-        among = np.maximum((1.0 - self.p_anywhere) * spans.sum(0) + even, LEAST_DENSITY)  # 0 where no start can be
-        share: FloatArray = (1.0 - self.p_anywhere) * usual / among
+        knots = self.knots(space)
+        share: FloatArray = np.interp(start_ms, knots.start_ms, knots.usual, left=0.0, right=0.0)
         return share
 
     def as_usual(self, kept: float) -> StartPrior:
@@ -162,14 +160,16 @@ def _with_any_hit_delay(span: Span, share: float) -> Span:
 def _knots(space: DesignSpace, prior: StartPrior) -> Knots:
     low_ms, high_ms = space.low_ms - BEFORE_MS, space.high_ms
     knots_ms = np.linspace(low_ms, high_ms, min(MAX_KNOTS, math.ceil((high_ms - low_ms) / KNOT_MS) + 1))
-    expected = np.sum([span.share * span.density(knots_ms) for span in prior.in_space(space)], axis=0)
+    spans = (1.0 - prior.p_anywhere) * np.stack([span.share * span.density(knots_ms) for span in prior.in_space(space)])
     even = np.full_like(knots_ms, 1.0 / (high_ms - low_ms))
-    mixed = (1.0 - prior.p_anywhere) * expected + prior.p_anywhere * even
+    mixed = spans.sum(0) + prior.p_anywhere * even
+    # The first of all spans is there once for each kind of rig.
+    usual = spans[:: len(prior.spans)].sum(0) / np.maximum(mixed, LEAST_DENSITY)
     below = _integral(knots_ms, mixed)
     if below[-1] < LEAST_MASS:
         mixed, below = even, _integral(knots_ms, even)
     # Given that it lies in the range: the further that is from where starts usually are, the more "anywhere" counts.
-    return Knots(knots_ms, mixed / below[-1], below / below[-1])
+    return Knots(knots_ms, mixed / below[-1], below / below[-1], usual)
 
 
 def _integral(x: FloatArray, y: FloatArray) -> FloatArray:
