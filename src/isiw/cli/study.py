@@ -104,7 +104,7 @@ def learn(
         isiw.priors.write_lab_prior(lab, output, overwrite=overwrite)
         _print(lab, isiw.priors.compared(lab))
         if imported := [record.path.name for record in done if record.header.imported]:
-            show(isiw.session.imported_sentence(imported))
+            show(isiw.log.imported_sentence(imported))
         show(f"prior: {output}")
         show(f"Run a session with it, and with your rig's CONFIG: {command('run', 'CONFIG', '--prior', output)}")
         exit_if_damaged([f"{record.path.name}: {loss}" for record in done for loss in record.losses])

@@ -177,7 +177,7 @@ def _require_used(context: typer.Context, *, kept: bool, by_hand: bool) -> None:
 
 
 def _resuming(log: Path) -> str:
-    return isiw.session.LogKind.THRESHOLD.continued_by(log)
+    return isiw.log.LogKind.THRESHOLD.continued_by(log)
 
 
 def _run(recorder: ThresholdRecorder, log: Path) -> None:
@@ -241,7 +241,7 @@ def interval(  # noqa: PLR0913, PLR0917 - an option each
     look: Annotated[bool, typer.Option("--show", help="Print what is in this log.")] = False,  # noqa: FBT002 - a flag
 ) -> None:
     """Produce time intervals by two key presses, with feedback after each, at a terminal; see docs/interval.md."""
-    way_on = isiw.session.LogKind.PRODUCTION.continued_by(log)
+    way_on = isiw.log.LogKind.PRODUCTION.continued_by(log)
     with errors_reported(f"Interrupted. Every trial whose feedback was shown is kept; resume with: {way_on}"):
         if resume or look:
             named = ("session", "mode", "trials", "subject", "seed")
@@ -258,7 +258,7 @@ def interval(  # noqa: PLR0913, PLR0917 - an option each
 def _end(record: ProductionRecord) -> None:
     """Say how a task ended; a hidden target stays hidden while trials are left."""
     if record.left:
-        way_on = isiw.session.LogKind.PRODUCTION.continued_by(record.path)
+        way_on = isiw.log.LogKind.PRODUCTION.continued_by(record.path)
         show(f"{len(record.left)} trials are left; resume with: {way_on}", style="bold")
     else:
         _say(record)

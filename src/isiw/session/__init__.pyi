@@ -1,0 +1,15 @@
+from . import threshold_loops as threshold_loops
+from .console import PROGRESS_HEADINGS as PROGRESS_HEADINGS
+from .console import aligned as aligned
+from .console import progress_row as progress_row
+from .judging import estimate_again as estimate_again
+from .loop import Session as Session
+from .recorder import Recorder as Recorder
+from .resume import open_session as open_session
+from .resume import resume as resume
+from .sink import SessionResult as SessionResult
+from .sink import SessionUpdate as SessionUpdate
+from .threshold import ThresholdRecorder as ThresholdRecorder
+from .threshold import open_threshold as open_threshold
+from .threshold import read_threshold as read_threshold
+from .threshold import resume_threshold as resume_threshold
