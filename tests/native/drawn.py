@@ -100,9 +100,7 @@ def trials(number: int, rng: np.random.Generator, *, known_log_sd: float = 0.0) 
                 known_mv=known_mv,
                 known_sd_mv=0.5 * known_mv,
                 known_log_sd=known_log_sd * rng.random(),
-                log_offset=rng.choice([0.0, 0.2]),
                 shift_pct_rmt=rng.choice([0.0, -5.0]),
-                enhancement=rng.choice([1.0, 0.6]),
                 log_by_curves=rng.choice([math.nan, math.nan, -1.3]),
             )
         )
@@ -114,7 +112,7 @@ def columns(told: list[reference.Trial]) -> Singles:
     made = [
         [
             *(trial.isi_ms, trial.isi_sd_ms, trial.low, trial.high, trial.order, trial.known_mv, trial.known_sd_mv),
-            *(trial.known_log_sd, trial.log_offset, trial.shift_pct_rmt, trial.enhancement, trial.log_by_curves),
+            *(trial.known_log_sd, trial.shift_pct_rmt, trial.log_by_curves),
         ]
         for trial in told
     ]

@@ -54,9 +54,7 @@ class Trial:
     known_mv: float = 0.0
     known_sd_mv: float = 0.0
     known_log_sd: float = 0.0
-    log_offset: float = 0.0
     shift_pct_rmt: float = 0.0
-    enhancement: float = 1.0
     log_by_curves: float = math.nan  # log likelihood under kinds of noise that know no other intensity
 
 
@@ -227,7 +225,7 @@ def outcome_of(particle: Particle, trial: Trial, level: float, factor: float = 1
     drive, chance = drive_and_chance(particle, level * particle.enhancement(order), shift_pct_rmt)
     startle = STARTUP[order] if order < len(STARTUP) else 0.0
     log_ratio = log_ratio_of(particle) + (0.0 if particle.curved else FAR_BELOW)
-    log_ratio += z["drift"] * (1.0 - PERSISTENCE**order) + z["startup"] * startle + trial.log_offset
+    log_ratio += z["drift"] * (1.0 - PERSISTENCE**order) + z["startup"] * startle
     log_ratio += particle.changed(order, LEVEL)
     spread, between = nodes_of(particle)
     share, onset = scipy.special.expit(drive + spread), onset_of(particle)
@@ -261,7 +259,7 @@ def likelihood(particle: Particle, trial: Trial, factor: float = 1.0) -> float:
         return math.exp(trial.log_by_curves)
     floor, found = log_floor_of(particle, trial.order), 0.0
     for at, weight in ISI_NODES if trial.isi_sd_ms > 0 else ((0.0, 1.0),):
-        level = trial.enhancement * particle.facilitation(trial.isi_ms + at * trial.isi_sd_ms)
+        level = particle.facilitation(trial.isi_ms + at * trial.isi_sd_ms)
         law = outcome_of(particle, trial, level, factor)
         exact = trial.low == trial.high
         found += weight * (law.density(trial.low - floor) if exact else law.mass(trial.low - floor, trial.high - floor))
@@ -345,7 +343,7 @@ def log_mixture(mixture: Any, x: Sequence[float]) -> float:
 
 def log_place(prior: Any, space: Any, z: Latents) -> float:
     """Log density of start and width: anywhere, or in one of the prior's places."""
-    knots_ms, start_density, _ = prior.profile.start.knots(space)
+    knots_ms, start_density, *_ = prior.profile.start.knots(space)
     width = log_mixture(prior.mixtures["width"], [z["log_width_ms"]])
     anywhere = math.log(max(np.interp(z["start_ms"], knots_ms, start_density), 1e-30)) + width
     joint = prior.profile.joint(space)

@@ -48,7 +48,7 @@ def history(trials: int, seed: int, particular: str = "") -> History:
     high[sort == 3] = np.inf
     made[:, 1], made[:, 2], made[:, 3] = np.where(rng.random(trials) < 0.3, 3.0, 0.0), low, high
     if particular == "known":
-        made[:, 5:] = Circumstances(0.05, 0.02, 0.6, 0.1, 5.0, 0.7)
+        made[:, 5:] = Circumstances(0.05, 0.02, 0.6, 5.0)
     return History(made[np.newaxis])
 
 

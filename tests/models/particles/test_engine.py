@@ -202,14 +202,6 @@ def with_field(fields: Singles, field: int, values: Any) -> Singles:
 
 
 @pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
-def test_an_offset_is_a_larger_response(kind: NoiseKind) -> None:
-    fields, told = of_kind(kind)
-    larger = with_field(fields, LOG_RATIO, fields[..., LOG_RATIO] + 0.4)
-    got = likelihood(fields, with_circumstances(told, log_offset=0.4))
-    np.testing.assert_allclose(got, likelihood(larger, told), atol=1e-3)
-
-
-@pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
 def test_a_stronger_pulse_moves_up_a_recruitment_curve_and_is_nothing_to_others(kind: NoiseKind) -> None:
     fields, told = of_kind(kind)
     higher = with_field(fields, REST, fields[..., REST] + 5.0 * fields[..., SLOPE])
@@ -225,14 +217,6 @@ def test_what_curves_alone_have_a_law_of_is_to_other_kinds_as_curves_predict_it(
     curved = kind in {NoiseKind.RECRUITMENT, NoiseKind.RECTIFIED}
     expected = likelihood(fields, with_circumstances(told, shift_pct_rmt=5.0)) if curved else -1.5 * told.trials
     np.testing.assert_allclose(got, expected, rtol=1e-5)
-
-
-@pytest.mark.parametrize("kind", [NoiseKind.RECRUITMENT, NoiseKind.RECTIFIED])
-def test_half_an_enhancement_is_half_a_boost(kind: NoiseKind) -> None:
-    fields, told = of_kind(kind)
-    weaker = with_field(fields, BOOST, 0.5 * fields[..., BOOST])
-    got = likelihood(fields, with_circumstances(told, enhancement=0.5))
-    np.testing.assert_allclose(got, likelihood(weaker, told), atol=1e-3)
 
 
 def test_a_mistaken_known_part_is_paid_for_once_and_not_in_each_trial() -> None:
@@ -257,13 +241,6 @@ def test_a_mistaken_known_part_is_paid_for_once_and_not_in_each_trial() -> None:
     assert 2.0 < at_one_isi < 4.0
     assert at_eight == pytest.approx(8 * at_one_isi, rel=0.1)
     assert closed > 1.2 * at_eight
-
-
-def test_a_conditioning_stimulus_without_any_enhancement_is_tms_alone() -> None:
-    fields, told = of_kind(NoiseKind.MISSING)
-    alone = History(with_field(told.columns, 0, np.nan))
-    got = likelihood(fields, with_circumstances(told, enhancement=0.0))
-    np.testing.assert_array_equal(got, likelihood(fields, alone))
 
 
 @pytest.mark.parametrize("sd_mv", [0.0, 0.02])

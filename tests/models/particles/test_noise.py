@@ -10,7 +10,7 @@ from scipy.stats import kstest, norm
 from isiw.models.particles import records
 from isiw.models.particles.noise import NoiseKind
 from isiw.models.particles.predictions import drawn_mep_mv
-from isiw.models.particles.records import FORM, NOISE, PRESENT, SHAPE, START, WIDTH
+from isiw.models.particles.records import FORM, LOG_RATIO, NOISE, PRESENT, SHAPE, START, WIDTH
 from isiw.models.shared.history import neutral
 from isiw.models.shared.tables import LEVELS
 from isiw.native import engine
@@ -61,8 +61,10 @@ def isi_of(level: Array) -> FloatArray:
 def log_likelihood(fields: Singles, level: Array, low: Array, high: Array, log_offset: float = 0.0) -> FloatArray:
     """Log likelihood of one trial each, (n,)."""
     made = np.tile(neutral(LATER + 1)[LATER], (len(level), 1, 1))
-    made[:, 0, 0], made[:, 0, 2], made[:, 0, 3], made[:, 0, 8] = isi_of(level), low, high, log_offset
-    return engine.log_likelihoods(np.tile(fields, (len(level), 1, 1)), made)[:, 0].astype(float)
+    made[:, 0, 0], made[:, 0, 2], made[:, 0, 3] = isi_of(level), low, high
+    larger = np.tile(fields, (len(level), 1, 1))
+    larger[..., LOG_RATIO] += log_offset
+    return engine.log_likelihoods(larger, made)[:, 0].astype(float)
 
 
 class AllOrNone:

@@ -23,9 +23,7 @@ class Circumstances(NamedTuple):
     known_mv: float = 0.0  # a part of the amplitude that is not the pulse's, such as the tap's own response
     known_sd_mv: float = 0.0  # from trial to trial
     known_log_sd: float = 0.0  # of a factor that trials of nearly the same ISI share, natural log
-    log_offset: float = 0.0  # by how much evoked MEPs are larger than usual, natural log
     shift_pct_rmt: float = 0.0  # by how much the pulse is stronger than usual
-    enhancement: float = 1.0  # the share of its usual enhancement that the conditioning stimulus has
     log_by_curves: float = math.nan  # log density for kinds of noise without a law of other intensities
 
 
@@ -40,7 +38,7 @@ class History:
     """The trials so far; amplitudes are intervals of log mV, which are points if the amplitude is known.
 
     The columns are those of a trial in the compiled engine: realised ISI (NaN is TMS alone) and its SD [ms], lower and
-    upper end of the log MEP, how many trials came before, and the fields of `Circumstances`, shape (b, n, 12).
+    upper end of the log MEP, how many trials came before, and the fields of `Circumstances`, shape (b, n, 10).
     """
 
     columns: Singles

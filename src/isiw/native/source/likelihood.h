@@ -203,7 +203,7 @@ static Group group_of(const Particles *particles, int curved, int rectified) {
 INLINE Situation situation_of(const Group *group, const Trial *trial, float factor_at, Wholes changed) {
     const Reals *of = group->particles->of;
     Situation made = {.output = group->output, .start = of[ONSET], .floor_variance = group->floor_variance};
-    Reals gain = group->log_ratio + of[DRIFT] * trial->relaxed + of[STARTLED] * trial->startle + trial->of[OFFSET];
+    Reals gain = group->log_ratio + of[DRIFT] * trial->relaxed + of[STARTLED] * trial->startle;
     if (group->any_step) gain += pick(changed, of[STEP], all(0.0f));
     made.scale = exp_v(gain), made.known = all(0.0f), made.responds = all(1.0f);
     if (trial->of[KNOWN] != 0.0f || trial->of[KNOWN_SD] != 0.0f) {
@@ -219,7 +219,7 @@ INLINE Situation situation_of(const Group *group, const Trial *trial, float fact
 /* What drives a trial, and the probability of a response, at an ISI. */
 INLINE void driven_at(const Group *group, const Trial *trial, float isi_ms, Wholes changed, Situation *made) {
     const Reals *of = group->particles->of;
-    Reals level = facilitation(&group->profiles, all(isi_ms)) * trial->of[FACTOR];
+    Reals level = facilitation(&group->profiles, all(isi_ms)) * trial->tapped;
     if (group->any_fading) {
         float number = trial->of[ORDER];
         Reals age = pick(of[FADING] > 0.0f, all(number), all(most_1(40.0f - number, 0.0f)));
@@ -331,7 +331,8 @@ static int trials_of(const float *columns, int64_t count, Trial *trials) {
     for (int64_t i = 0; i < count; i++) {
         Trial *trial = trials + i;
         memcpy(trial->of, columns + i * COLUMNS, sizeof trial->of);
-        if (isnan(trial->of[ISI])) trial->of[ISI] = trial->of[FACTOR] = 0.0f;
+        trial->tapped = isnan(trial->of[ISI]) ? 0.0f : 1.0f;
+        if (trial->tapped == 0.0f) trial->of[ISI] = 0.0f;
         gain_of(trial->of[ORDER], &trial->startle, &trial->relaxed);
         shares |= trial->of[KNOWN_LOG_SD] > 0.0f;
         trial->of_curves = !isnan(trial->of[BY_CURVES]);

@@ -48,9 +48,7 @@ enum {
     KNOWN,        /* a part of the amplitude that is not the pulse's [mV] */
     KNOWN_SD,     /* from trial to trial [mV] */
     KNOWN_LOG_SD, /* of a factor that trials of nearly the same ISI share */
-    OFFSET,       /* by how much evoked MEPs are larger */
     SHIFT,        /* by how much the pulse is stronger [% RMT] */
-    FACTOR,       /* the share of its usual enhancement that the conditioning stimulus has */
     BY_CURVES,    /* log density for kinds of noise that know no other intensity; not a number where they know it */
     COLUMNS
 };
@@ -69,6 +67,7 @@ typedef struct {
 typedef struct {
     float of[COLUMNS];
     float startle, relaxed; /* the two parts of its gain, see gain_of */
+    float tapped;           /* 0 for TMS alone, else 1 */
     int of_curves;          /* whether recruitment curves alone have a law of it */
 } Trial;
 
