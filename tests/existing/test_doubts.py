@@ -93,6 +93,13 @@ ASKED: dict[str, tuple[pd.DataFrame, dict[str, Any], str]] = {
     "muscles below each other": (pd.concat([table().assign(isi_ms=ISIS + np.linspace(0, 1, 36))] * 2), {}, "2 times"),
     "a few rows of another coil": (table(coil=of(["sham", *["real"] * 7])), {}, "'coil'"),
     "a few rows a person": (table(code=of([f"VP{n}" for n in range(9)])), {}, "'code'.*and 6 others"),
+    "a mean below the trials": (pd.concat([table().assign(Nr=range(36)), means("mep_mv", Nr="Mittelwert")[:1]]), {},
+                                "row 37 of the column 'Nr' .* is none of a trial"),
+    "each row twice": (pd.concat([table()] * 2), {}, "or each row twice"),
+    "areas": (renamed(mep_mv="MEP area (mV*ms)"), {"columns": {"mep": "MEP area (mV*ms)"}, "units": ("mV",)}, "mV·ms"),
+    "latencies": (renamed(mep_mv="onset (ms)"), {"columns": {"mep": "onset (ms)"}, "units": ("mV",)}, "no amplitudes"),
+    "ISIs in samples": (renamed(isi_ms="ISI (samples)"), {"units": ("ms",)}, "a unit of no ISIs; got 'samples'"),
+    "two columns of what is lost": (table(rejected=of([""]), artefact=of(["", "x"])), {}, "rejected or artefact"),
     "a value that is not there": (long("muscle", ["FCR", "FDI"]), {"where": {"muscle": "APB"}}, "one of FCR, FDI"),
 }  # fmt: skip
 
@@ -294,12 +301,16 @@ def test_rectified_emg_is_said(tmp_path: Path) -> None:
     assert read_people(as_edf(tmp_path), KNOWN)[0].notes == ()
 
 
-def test_numbers_that_excel_shows_in_per_cent_are_relative(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("shown", "name", "says"),
+    [("0.0%", "MEP", r"'MEP \(%\)' .* relative"), ('0.0" µV"', "mep_mv", "two units; got 'uV and mV'")],
+)
+def test_what_excel_shows_behind_numbers_is_their_unit(shown: str, name: str, says: str, tmp_path: Path) -> None:
     with pd.ExcelWriter(tmp_path / "P01.xlsx", engine="openpyxl") as book:
-        renamed(mep_mv="MEP").to_excel(book, index=False)
+        renamed(mep_mv=name).to_excel(book, index=False)
         for cells in book.book.active.iter_rows(min_row=2, min_col=2):
-            cells[0].number_format = "0.0%"
-    with pytest.raises(IsiwError, match=r"'MEP \(%\)' are relative"):
+            cells[0].number_format = shown
+    with pytest.raises(IsiwError, match=says):
         read_people(tmp_path / "P01.xlsx", IMPACT.saying(units=("mV",)))
 
 

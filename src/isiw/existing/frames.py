@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -203,12 +204,18 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
     chosen = (with_trials or filled or list(sheets))[0]
     rows = sheets[chosen]
     for cells in islice(book.book[chosen].iter_rows(), _LINES) if rows else ():
-        shown = [isinstance(cell.value, int | float) and "%" in str(cell.number_format) for cell in cells]
+        shown = [_shown_in(cell.number_format) if isinstance(cell.value, int | float) else "" for cell in cells]
         if any(shown):  # Excel shows 1.2 as 120 %
-            rows[0] = [f"{name} (%)" if in_per_cent else name
-                       for name, in_per_cent in zip_longest(rows[0], shown[: len(rows[0])])]  # fmt: skip
+            rows[0] = [f"{name} ({unit})" if unit else name
+                       for name, unit in zip_longest(rows[0], shown[: len(rows[0])])]  # fmt: skip
             break
     return _table(rows, layout)
+
+
+def _shown_in(number_format: str) -> str:
+    """What Excel shows behind a number: the sign of per cent, or a unit."""
+    words = [word.strip() for word in re.findall(r'"([^"]*)"', number_format)]
+    return "%" if "%" in number_format else next((word for word in words if word.casefold() in UNIT_WORDS), "")
 
 
 def read_arrays(path: Path) -> dict[str, Any]:

@@ -26,7 +26,9 @@ UNIT_WORDS: Final[Mapping[str, str]] = {
     "seconds": "s", "us": "us", "µs": "us", "μs": "us", "microsecond": "us", "microseconds": "us",
     "millisekunden": "ms", "sekunden": "s", "v": "V", "volt": "V", "volts": "V", "mv": "mV", "millivolt": "mV",
     "millivolts": "mV", "uv": "uV", "µv": "uV", "μv": "uV", "microv": "uV", "microvolt": "uV", "microvolts": "uV",
-    "mikrovolt": "uV", "nv": "nV", "nanovolt": "nV", "nanovolts": "nV",
+    "mikrovolt": "uV", "nv": "nV", "nanovolt": "nV", "nanovolts": "nV", "sample": "samples", "samples": "samples",
+    "frames": "samples", "mvms": "mV·ms", "mv*ms": "mV·ms", "mv·ms": "mV·ms", "uvms": "uV·ms", "uv*ms": "uV·ms",
+    "µvms": "uV·ms", "µv*ms": "uV·ms", "µv·ms": "uV·ms", "μv·ms": "uV·ms",
 }  # fmt: skip
 """Units as files write them, in lower case."""
 

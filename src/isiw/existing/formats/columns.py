@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Final, Literal
 
@@ -32,12 +33,11 @@ def read(path: Path, layout: Layout) -> Contents:
         require_one("column", source, name, frame, remedy)
     breaks = frame.iloc[:, 0].astype(str).str.endswith("=").to_numpy()
     frame, block = frame[~breaks], np.cumsum(breaks)[~breaks]
-    pauses_s, first_block = dict[int, float](), frame[block == block[:1]]
-    for place, name in enumerate(frame.columns):
-        if name not in layout.channels.values() and (clock := clock_of(first_block.iloc[:, place], name, rate_hz)):
+    pauses_s, blocks = dict[int, float](), np.flatnonzero(np.diff(block, prepend=-1)).tolist()
+    for (begin, end), (place, name) in product(pairwise([*blocks, len(frame)]), enumerate(frame.columns)):
+        if name not in layout.channels.values() and (clock := clock_of(frame.iloc[begin:end, place], name, rate_hz)):
             require_rate(rate_hz, clock[0], f"the column {name!r} of {source}")
             pauses_s = pauses_s or clock[1]
-    blocks = np.flatnonzero(np.diff(block, prepend=-1)).tolist()
     stretches = parted(blocks if len(blocks) > 1 else pauses_s, len(block), rate_hz, pauses_s)
     tracks = list[Track]()
     for key, name in layout.channels.items():
@@ -69,7 +69,7 @@ def require_rate(stated_hz: float, found_hz: float, where: str) -> None:
             f"the sampling rate is not the one that {where} says",
             got=f"{stated_hz:g} Hz",
             expected=f"{found_hz:g} Hz",
-            remedy="Correct rate_hz in the layout.",
+            remedy="Correct rate_hz in the layout; what has another rate must be a file of its own.",
         )
 
 
