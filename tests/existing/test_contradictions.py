@@ -12,8 +12,8 @@ import pytest
 import scipy.io
 
 import isiw
-from existing.test_recordings import KNOWN, NAMES, raw
 from existing.test_waves import COLUMNS, EMG_MV, TRIGGERS, lines, read, trigger
+from existing.writers import KNOWN, NAMES, raw
 from isiw.errors import InvalidValueError
 from isiw.existing.delivered import Delivered
 from isiw.existing.layout import Layout

@@ -12,19 +12,20 @@ import pandas as pd
 import pytest
 import scipy.io
 
-from existing.test_recordings import (
+from existing.test_waves import EMG_MV, lines, trigger
+from existing.writers import (
     ISIS_MS,
     KNOWN,
     NAMES,
     RATE_HZ,
-    as_brainvision,
     as_edf,
     epochs,
+    pulsed,
     raw,
     recording,
     require_as_written,
+    with_stim,
 )
-from existing.test_waves import EMG_MV, lines, trigger
 from isiw.errors import IsiwError
 from isiw.existing.layout import Layout
 from isiw.existing.reading import read_people
@@ -81,6 +82,8 @@ ASKED: dict[str, tuple[pd.DataFrame, dict[str, Any], str]] = {
                                       "means of several trials.*beside 'sd'"),
     "means beside how many they are of": (means("mep_mv", n_averaged=10), {}, "beside 'n_averaged'"),
     "means with limits of their confidence": (means("mep_mv", ci_lower=0.1, ci_upper=2.0), {}, "beside 'ci_lower'"),
+    "means by how many they are of": (renamed(mep_mv="MEP, n=10"), {"columns": {"mep": "MEP, n=10"}, "units": ("mV",)},
+                                      "means of several"),
     "means in one word": (renamed(mep_mv="mepmean"), {"columns": {"mep": "mepmean"}, "units": ("mV",)}, "means of"),
     **{name: (renamed(mep_mv=name), {"columns": {"mep": name}, "units": ("uV",)}, "relative")
        for name in ("MEPnorm", "zMEP", "MEP (a.u.)", "MEP/control", "mep_x_baseline", "MEP fold change", "MEP_Mmax")},
@@ -221,25 +224,11 @@ def test_a_trigger_of_the_tap_that_is_found_twice_is_one(later_s: float) -> None
 
 
 def test_an_annotation_of_bad_data_leaves_the_events_of_a_stim_channel(tmp_path: Path) -> None:
-    emg_mv, stimuli = recording()
-    stim = np.zeros_like(emg_mv)
-    for at_s, name in stimuli:
-        stim[round(at_s * RATE_HZ)] = int(name[-1])
-    made = mne.io.RawArray(np.array([1e-3 * emg_mv, stim]), mne.create_info(["FCR", "STI"], RATE_HZ, ["emg", "stim"]))
+    made = with_stim(pulsed(1))
     made.set_annotations(mne.Annotations([12.5], [0.5], ["BAD_movement"]))
     made.save(tmp_path / "P01_raw.fif")
     layout = Layout(reference="impact", markers={"tap": "1", "pulse": "2"}, unmarked="alone")
     require_as_written(read_people(tmp_path / "P01_raw.fif", layout)[0])
-
-
-@pytest.mark.parametrize("unit", ["mv", "microV", "nV"])
-def test_a_unit_of_brainvision_is_read_as_the_header_writes_it(unit: str, tmp_path: Path) -> None:
-    path = as_brainvision(tmp_path)
-    factor = {"mv": 1e3, "nV": 1e-3}.get(unit, 1.0)
-    text = path.read_text(encoding="utf-8").replace(",0.001,µV", f",{0.001 / factor:g},{unit}")
-    assert unit in text
-    path.write_text(text, encoding="utf-8")
-    require_as_written(read_people(path, KNOWN)[0])
 
 
 def eeglab(path: Path, scale: float, *more: dict[str, Any], cut: slice = slice(0)) -> Path:
@@ -331,14 +320,11 @@ def test_a_second_tap_or_pulse_is_asked_about(marks: str, later_s: float, says: 
 
 
 def test_codes_of_triggers_that_overlap_are_told_apart_in_fif_and_in_bdf(tmp_path: Path) -> None:
-    emg_mv, stimuli = recording()
-    codes = np.zeros(len(emg_mv))
-    for at_s, name in stimuli:
-        codes[round(at_s * RATE_HZ) :][:200] += int(name[-1])  # for 50 ms, and ISIs are from 30 ms on
-    made = mne.io.RawArray(np.array([1e-3 * emg_mv, codes]), mne.create_info(["FCR", "STI"], RATE_HZ, ["emg", "stim"]))
+    codes = pulsed(200)  # for 50 ms, and ISIs are from 30 ms on
+    made = with_stim(codes)
     layout = Layout(reference="impact", markers={"tap": "1", "pulse": "2"}, channels={"emg": "FCR"}, unmarked="alone")
     require_as_written(read_people(made, layout)[0])
-    longer = as_status(tmp_path, np.tile([1e3 * emg_mv, codes], 20))  # than one piece
+    longer = as_status(tmp_path, np.tile([1e3 * EMG_MV, codes], 20))  # than one piece
     (person,) = read_people(longer, layout)
     assert [trial.isi_ms for trial in person.trials] == pytest.approx([*ISIS_MS, None] * 20, abs=0.3)
 
@@ -366,14 +352,9 @@ def as_status(path: Path, values: np.ndarray) -> Path:
 
 
 def test_a_trigger_whose_level_turns_at_each_stimulus_is_asked_about() -> None:
-    emg_mv, stimuli = recording()
-    turns = np.zeros_like(emg_mv)
-    for at_s, name in stimuli:
-        if name == NAMES["pulse"]:
-            turns[round(at_s * RATE_HZ) :] = 5.0 - turns[-1]
-    held = mne.io.RawArray(np.array([1e-3 * emg_mv, turns]), mne.create_info(["FCR", "TTL"], RATE_HZ, "emg"))
+    turns = 5.0 * (np.cumsum(pulsed(1, NAMES["pulse"], 1.0)) % 2)
     with pytest.raises(IsiwError, match="which of its edges are stimuli"):
-        read_people(held, Layout(reference="impact", channels={"emg": "FCR", "pulse": "TTL"}))
+        read_people(with_stim(turns, "emg"), Layout(reference="impact", channels={"emg": "FCR", "pulse": "STI"}))
 
 
 @pytest.mark.parametrize("change", [lambda emg: np.abs(emg) - 0.02, lambda emg: -np.abs(emg)])

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 ALL: Final = "*"
 """What `where` says of a column whose values are to be analysed together."""
 
-_MEANS: Final = re.compile("means?|average|avg|median|mittel(wert)?|moyenne")
+_MEANS: Final = re.compile(r"means?|average|avg|median|mittel(wert)?|moyenne|\bn ?= ?\d+")
 _SPREADS: Final = frozenset({"sd", "std", "stdev", "stddev", "se", "sem", "stderr", "cv", "sds", "stdabw",
                              "standarddeviation", "standarderror", "ci", "iqr", "var"})  # fmt: skip
 _SUMS: Final = frozenset({"sum", "total", "grand mean", "summe", "gesamt"})
@@ -83,9 +83,9 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, source:
     rows = list(zip(map(str, isi.cells), *(map(str, cells) for cells in kinds), strict=True))
     once = len(rows) > 2 and len({*rows}) == len(rows)
     for name, cells in others.items():
-        if odd := next((n for n, cell in enumerate(cells) if isinstance(cell, str) and _is_sum(cell)), None):
+        if odd := next(filter(_is_sum, {cell for cell in cells if isinstance(cell, str)}), None):
             remedy = "Delete the row if it is a sum or a mean; if it is a trial, write something else."
-            raise Column(name, cells, of=source).refused(odd, "is none of a trial", remedy)
+            raise Column(name, cells, of=source).refused(cells.index(odd), "is none of a trial", remedy)
     if _MEANS.search(_words(mep.name)) or (spreads and (numbers or once)) or (counted_in and once):
         beside = (spreads or counted_in)[:1]
         raise InvalidValueError(

@@ -129,6 +129,8 @@ class Layout(Checked):
         for quantity in (ISI_UNITS_MS, EMG_UNITS):
             if len(several := {*self.units} & quantity.keys()) > 1:
                 raise InvalidValueError("two units of one quantity are stated", got=sorted(several), expected="one")
+        if len(names := {*self.channels.values()}) < len(self.channels):
+            raise InvalidValueError("one channel is stated for two things", got=sorted(names), remedy="Leave one out.")
         if both := sorted(self.markers.keys() & self.channels.keys()):
             raise InvalidValueError(f"both a marker and a channel are stated for {both[0]}", remedy="Leave one out.")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import fields, replace
 from pathlib import Path
@@ -16,7 +16,7 @@ from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.existing import formats, frames, recordings, tables
 from isiw.existing.apart import read_apart
-from isiw.existing.cells import Column, is_missing
+from isiw.existing.cells import is_missing
 from isiw.existing.dates import dates_of, latest_of, times_of
 from isiw.existing.delivered import Delivered, anywhere, read_log, renumbered
 from isiw.existing.doubts import ALL, require_codes, require_isis, require_one_kind, require_one_row_each, require_short
@@ -177,9 +177,6 @@ def people_of(
     rows = [n for n in columns.chosen(layout) if not all(is_missing(cells[n]) for cells in given)]
     if not rows:
         raise InvalidValueError(f"{source} has no trials", remedy="Are the right columns named?")
-    if limits is not None:
-        kinds = zip(_kinds(columns["subject"], rows), _kinds(columns["day"], rows), strict=True)
-        require_visits(limits, source, kinds, parted="day" in columns.of or "date" not in columns.of)
     subjects = [columns["subject"].text(row) for row in rows]
     require_codes(subjects, rows, columns)
     if any(subjects) and not all(subjects):
@@ -193,7 +190,7 @@ def people_of(
         (own, subject, day) for subject, theirs in people.items() for day, own in _days(columns, theirs, dates).items()
     ]
     if limits is not None:
-        require_visits(limits, source, (visit for visit, (own, _, _) in enumerate(visits) for _ in own))
+        require_visits(limits, source, [len(own) for own, _, _ in visits])
     found = []
     for own, subject, day in sorted(visits, key=lambda visit: visit[0][0]):
         begun = dates[own[0]].isoformat(timespec="microseconds") if own[0] in dates else ""
@@ -201,11 +198,6 @@ def people_of(
         given_by = latest_of([columns["date"].text(row) for row in own], [dates.get(row) for row in own])
         found.append(replace(person, visit=replace(person.visit, day=day), created=begun, given_by=given_by))
     return found
-
-
-def _kinds(column: Column, rows: Sequence[int]) -> Iterator[str]:
-    """What tells the cells of some rows from each other, found faster than what they say."""
-    return (cell if isinstance(cell := column.cells[row], str) else column.text(row) for row in rows)
 
 
 def _days(

@@ -42,7 +42,7 @@ Found = tuple[Stimulus, Sweep, Mapping[str, Any]]
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Channels of a file by what they hold, the EMG's unit, and events."""
+    """Channels of a file by what they hold, of which the EMG is in mV and has a unit in the file, and events."""
 
     tracks: Mapping[str, Track]
     unit: str
@@ -65,6 +65,7 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
     if known not in {None, unit}:
         notes = (*notes, f"{contents.source} says {said}, and {unit} is used, as stated.")
     signals = {key: track for key, track in tracks.items() if key not in MARKERS}
+    signals["emg"] = signals["emg"].scaled(EMG_UNITS[unit])
     recording = Recording(signals, unit, events, contents.source, notes)
     if contents.trials is not None and contents.pulse_at_s is not None:
         return _of_rows(contents, recording, layout, subject)
@@ -119,7 +120,7 @@ def _of_rows(contents: Contents, recording: Recording, layout: Layout, subject: 
         stretch = emg.stretches[row]
         at_tap = round(stretch.start_s + zero_s, 6) in about_tap
         pulse_ms = 1e3 * zero_s + ((isi_ms or 0.0) if at_tap else 0.0)
-        values = EMG_UNITS[recording.unit] * emg.read(stretch.first, stretch.first + stretch.samples)
+        values = emg.read(stretch.first, stretch.first + stretch.samples)
         begins: dict[str, Any] = {begin: None if isi_ms is None else -isi_ms}
         meant = Stimulus(number, None if isi_ms is None else max(isi_ms, 0.0))
         sweep = Sweep({"emg": Channel(values, emg.rate_hz, "mV", -pulse_ms)}, t_tms_ms=0.0, **begins)
@@ -222,8 +223,7 @@ def _cut(recording: Recording, span_s: tuple[float, float], pulse_s: float, orig
         if stretch is not None:
             own_s, values = track.cut(stretch, *span_s)
             start_s = own_s if name == "emg" else start_s
-            factor, unit = (EMG_UNITS[recording.unit], "mV") if name == "emg" else (1.0, "V")
-            cut[name] = Channel(factor * values, track.rate_hz, unit, 1e3 * (own_s - start_s))
+            cut[name] = Channel(values, track.rate_hz, "mV" if name == "emg" else "V", 1e3 * (own_s - start_s))
     origin_ms = None if origin_s is None else 1e3 * (origin_s - start_s)
     begin: dict[str, Any] = {"t_valve_ms" if key == "valve" else "t_hit_ms": origin_ms}
     return Sweep(cut, t_tms_ms=1e3 * (pulse_s - start_s), **begin)

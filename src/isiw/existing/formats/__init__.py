@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from isiw.errors import ConfigError, InvalidValueError
-from isiw.existing.formats import acq, cfs, columns, edf, eeglab, matlab, mne_files, nwb, smr, statistics, windows, xdf
+from isiw.existing.formats import acq, columns, edf, eeglab, installed, matlab, mne_files, nwb, smr, statistics, xdf
 from isiw.existing.formats.contents import Contents
 from isiw.existing.layout import Layout
 
@@ -42,12 +42,12 @@ FORMATS: Final = (
     Format("FIF", (".fif", ".fif.gz"), mne_files.read, _MNE, "mne"),
     Format("XDF", (".xdf", ".xdfz"), xdf.read, _XDF, "pyxdf"),
     Format("AcqKnowledge", (".acq",), acq.read, _ACQ, "bioread"),
-    Format("Spike2", (".smr",), smr.read, windows.SMRX, "neo"),
+    Format("Spike2", (".smr",), smr.read, installed.SMRX, "neo"),
     Format("NWB", (".nwb",), nwb.read, "Is it a file of NWB 2, and complete?", "pynwb"),
     Format("SPSS and Stata", (".sav", ".zsav", ".por", ".dta"), statistics.read, _TABLE, "pyreadstat", is_table=True),
-    Format("Signal", (".cfs",), cfs.read, cfs.WAY_IN),
-    Format("Spike2 from version 8 on", (".smrx",), windows.smrx, windows.SMRX),
-    Format("LabChart", (".adicht",), windows.adicht, windows.ADICHT),
+    Format("Signal", (".cfs",), installed.cfs, installed.CFS),
+    Format("Spike2 from version 8 on", (".smrx",), installed.smrx, installed.SMRX),
+    Format("LabChart", (".adicht",), installed.adicht, installed.ADICHT),
     Format("CNT, GDF and MFF", (".cnt", ".gdf", ".mff"), mne_files.read, _MNE, "mne"),
 )
 

@@ -41,7 +41,7 @@ def read(path: Path, layout: Layout) -> Contents:
     stretches = parted(blocks if len(blocks) > 1 else pauses_s, len(block), rate_hz, pauses_s)
     tracks = list[Track]()
     for key, name in layout.channels.items():
-        if key != "events" and name not in {track.name for track in tracks}:
+        if key != "events":
             values = _numbers(frame, name, layout, source)
             unit, kind = unit_said(name, EMG_UNITS) or "", "stim" if key in MARKERS else ""
             tracks.append(Track.of_values(name, rate_hz, stretches, values, unit, kind))
@@ -78,10 +78,10 @@ def clock_of(cells: pd.Series, name: str, rate_hz: float) -> tuple[float, dict[i
     times = pd.to_numeric(cells.astype(str).str.replace(",", "."), errors="coerce").to_numpy(dtype=np.float64)
     steps = np.diff(times)
     usual = float(np.median(steps)) if len(steps) > 1 else 0.0
-    late = np.flatnonzero(steps > 1.5 * usual)
+    late = np.flatnonzero((steps > 1.5 * usual) | (steps < 0))  # or they begin again, and nobody knows how much later
     if not 0 < len(late) < _FEW * len(steps):
         late = late[:0]
-    over = steps[late] - usual
+    over = np.maximum(steps[late] - usual, 0.0)
     steps[late] = usual
     step = float(steps.mean()) if len(steps) > 1 else 0.0
     if not step > 0 or not np.all(np.abs(np.cumsum(steps - step)) <= 1.01 * step):  # they may be rounded
