@@ -74,6 +74,8 @@ ASKED: dict[str, tuple[pd.DataFrame, dict[str, Any], str]] = {
     "means by their name": (renamed(mep_mv="avg_mep_mv"), {"columns": {"mep": "avg_mep_mv"}}, "means of several"),
     "per cent with a unit": (renamed(mep_mv="MEP %"), {"columns": {"mep": "MEP %"}, "units": ("mV",)},
                              "relative to others"),
+    "per cent below the name": (pd.concat([pd.DataFrame({"isi_ms": ["ms"], "MEP": ["%"]}), renamed(mep_mv="MEP")]),
+                                {"units": ("mV",)}, "relative"),
     "normalised": (renamed(mep_mv="norm mep"), {"columns": {"mep": "norm mep"}, "units": ("mV",)}, "relative"),
     "logarithms": (renamed(mep_mv="log10 MEP"), {"columns": {"mep": "log10 MEP"}, "units": ("mV",)}, "got 'log10'"),
     "numbers of samples": (table().assign(isi_ms=np.linspace(810, 1900, 36)), {}, "longer than those of paired"),
@@ -119,6 +121,16 @@ def test_a_table_that_is_not_of_single_trials_is_asked_about(kind: str, suffix: 
     with pytest.raises(IsiwError, match=expected) as refused:
         read_people(path, Layout(**{"reference": "impact", **said}))
     assert len(str(refused.value)) < 500
+
+
+def test_means_are_known_by_the_name_of_a_file_or_a_sheet_and_by_a_title(tmp_path: Path) -> None:
+    text = means("mep_mv").to_csv(index=False)
+    (tmp_path / "P01_means.csv").write_text(text)
+    (tmp_path / "P02.csv").write_text(f"Mean MEP at each ISI\n{text}")
+    means("mep_mv").to_excel(tmp_path / "P03.xlsx", sheet_name="Mittelwerte", index=False)
+    for path in tmp_path.iterdir():
+        with pytest.raises(IsiwError, match=r"are means of several trials.*beside '(means?|mittelwerte)'"):
+            read_people(path, IMPACT)
 
 
 def test_what_was_asked_about_can_be_said() -> None:

@@ -26,6 +26,8 @@ ALL: Final = "*"
 """What `where` says of a column whose values are to be analysed together."""
 
 _MEANS: Final = re.compile(r"means?|average|avg|median|mittel(wert)?|moyenne|\bn ?= ?\d+")
+_TITLES: Final = re.compile(r"\b(means?|averages?|averaged|avg|mittelwerte?)\b")
+"""What the names of files and sheets, and titles, say of means."""
 _SPREADS: Final = frozenset({"sd", "std", "stdev", "stddev", "se", "sem", "stderr", "cv", "sds", "stdabw",
                              "standarddeviation", "standarderror", "ci", "iqr", "var"})  # fmt: skip
 _SUMS: Final = frozenset({"sum", "total", "grand mean", "summe", "gesamt"})
@@ -86,8 +88,9 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, source:
         if odd := next(filter(_is_sum, {cell for cell in cells if isinstance(cell, str)}), None):
             remedy = "Delete the row if it is a sum or a mean; if it is a trial, write something else."
             raise Column(name, cells, of=source).refused(cells.index(odd), "is none of a trial", remedy)
-    if _MEANS.search(_words(mep.name)) or (spreads and (numbers or once)) or (counted_in and once):
-        beside = (spreads or counted_in)[:1]
+    title = _TITLES.search(_words(f"{source} {frame.attrs.get('title', '')}")) if once else None
+    if title or _MEANS.search(_words(mep.name)) or (spreads and (numbers or once)) or (counted_in and once):
+        beside = (spreads or counted_in or ([title[0]] if title else []))[:1]
         raise InvalidValueError(
             f"the rows of {source} are means of several trials, by the column {mep.name!r}"
             + "".join(f" beside {name!r}" for name in beside),

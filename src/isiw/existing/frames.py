@@ -70,13 +70,14 @@ def _texts(content: bytes, layout: Layout) -> pd.DataFrame:
     if "\0" in text:
         raise InvalidValueError("the file is no text, and so no table that can be read", remedy="Is it the right one?")
     lines = _lines(text)[layout.skip_lines :]
-    lines = lines[0 if layout.names else _first(lines, layout) :]
+    first = 0 if layout.names else _first(lines, layout)
+    title, lines = " ".join(lines[:first]), lines[first:]
     if lines and lines[0].startswith("#"):  # each part of the file begins so, with names of its own
         ends = (n for n, line in enumerate(lines) if n and line.startswith("#"))
         lines = [lines[0].lstrip("# "), *lines[1 : next(ends, None)]]
     lines = [line for line in lines if not line.startswith("# ")]
     separator = layout.separator or _separator(lines[0] if lines else "")
-    return _table([row for row in _split(lines, separator) if row], layout)
+    return _table([row for row in _split(lines, separator) if row], layout, title)
 
 
 def _lines(text: str) -> list[str]:
@@ -109,8 +110,8 @@ def _is_header(cells: Sequence[Any], layout: Layout) -> bool:
     )
 
 
-def _table(rows: Rows, layout: Layout) -> pd.DataFrame:
-    """Rows as a table: below the names, or below those that are stated."""
+def _table(rows: Rows, layout: Layout, title: str) -> pd.DataFrame:
+    """Rows as a table that knows its title: below the names, or below those that are stated."""
     if not rows and not layout.names:
         raise InvalidValueError("the file is empty, and no table that can be read", remedy="Is it the right one?")
     head = layout.names or ["" if is_missing(cell) else str(cell).strip() for cell in rows[0]]
@@ -126,7 +127,9 @@ def _table(rows: Rows, layout: Layout) -> pd.DataFrame:
     numbered = all(len(row) == len(names) + 1 and str(row[0]) == str(n) for n, row in enumerate(body, 1))
     if numbered and not all(is_missing(row[-1]) for row in body):  # those end with the sign that separates cells
         body = [row[1:] for row in body]  # R numbers its rows without naming the column of these numbers
-    return pd.DataFrame([_cells(row, names, number) for number, row in enumerate(body, 1)], columns=names)
+    table = pd.DataFrame([_cells(row, names, number) for number, row in enumerate(body, 1)], columns=names)
+    table.attrs["title"] = title
+    return table
 
 
 def _cells(row: Sequence[Any], names: Sequence[str], number: int) -> list[Any]:
@@ -209,7 +212,7 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
             rows[0] = [f"{name} ({unit})" if unit else name
                        for name, unit in zip_longest(rows[0], shown[: len(rows[0])])]  # fmt: skip
             break
-    return _table(rows, layout)
+    return _table(rows, layout, chosen)
 
 
 def _shown_in(number_format: str) -> str:

@@ -21,15 +21,19 @@ ISI_UNITS_MS: Final[Mapping[str, float]] = {"ms": 1.0, "s": 1e3, "us": 1e-3, "µ
 EMG_UNITS: Final[Mapping[str, float]] = {**EMG_UNITS_MV, "nV": 1e-6}
 """One of each unit that files of others have, in mV."""
 
-UNIT_WORDS: Final[Mapping[str, str]] = {
-    "ms": "ms", "msec": "ms", "millisecond": "ms", "milliseconds": "ms", "s": "s", "sec": "s", "second": "s",
-    "seconds": "s", "us": "us", "µs": "us", "μs": "us", "microsecond": "us", "microseconds": "us",
-    "millisekunden": "ms", "sekunden": "s", "v": "V", "volt": "V", "volts": "V", "mv": "mV", "millivolt": "mV",
-    "millivolts": "mV", "uv": "uV", "µv": "uV", "μv": "uV", "microv": "uV", "microvolt": "uV", "microvolts": "uV",
-    "mikrovolt": "uV", "nv": "nV", "nanovolt": "nV", "nanovolts": "nV", "sample": "samples", "samples": "samples",
-    "frames": "samples", "mvms": "mV·ms", "mv*ms": "mV·ms", "mv·ms": "mV·ms", "uvms": "uV·ms", "uv*ms": "uV·ms",
-    "µvms": "uV·ms", "µv*ms": "uV·ms", "µv·ms": "uV·ms", "μv·ms": "uV·ms",
-}  # fmt: skip
+_WORDS: Final = {
+    "ms": "ms msec msecs millisec millisecond milliseconds millisekunden",
+    "s": "s sec secs second seconds sekunden",
+    "us": "us µs μs microsecond microseconds",
+    "V": "v volt volts",
+    "mV": "mv mvolt mvolts millivolt millivolts",
+    "uV": "uv µv μv microv uvolt uvolts µvolt µvolts microvolt microvolts mikrovolt",
+    "nV": "nv nvolt nanovolt nanovolts",
+    "samples": "sample samples frames",
+    "mV·ms": "mvms mv*ms mv·ms uvms uv*ms uv·ms µvms µv*ms µv·ms μv·ms",  # of areas, and of no amplitude
+    "%": "%",
+}
+UNIT_WORDS: Final[Mapping[str, str]] = {word: unit for unit, words in _WORDS.items() for word in words.split()}
 """Units as files write them, in lower case."""
 
 COLUMNS: Final[Mapping[str, tuple[str, ...]]] = {
