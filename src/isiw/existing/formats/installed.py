@@ -41,7 +41,7 @@ def _reader(module: str, install: str, way_in: str, *, on_windows: bool = False)
     try:
         return library(module, "import")
     except ConfigError as error:
-        raise ConfigError(f"{module} is not installed", remedy=f"{install}. Or: {way_in}") from error
+        raise ConfigError(f"{module.partition('.')[0]} is not installed", remedy=f"{install}. Or: {way_in}") from error
 
 
 def cfs(path: Path, _layout: Layout) -> Contents:
