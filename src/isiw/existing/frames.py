@@ -22,8 +22,8 @@ from isiw.files import opened
 from isiw.lazy import pd, scipy
 from isiw.text.named_code import library
 
-TEXTS: Final = {".csv", ".tsv", ".txt", ".dat", ".tab"}
-WORKBOOKS: Final = {".xlsx", ".xlsm"}
+TEXTS: Final = (".csv", ".tsv", ".txt", ".dat", ".tab")
+WORKBOOKS: Final = (".xlsx", ".xlsm")
 
 _LINES: Final = 100
 """Within so many lines the columns' names are sought."""
