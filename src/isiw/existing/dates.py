@@ -59,9 +59,10 @@ def times_of(texts: Sequence[str]) -> list[float]:
 def _moments(texts: Sequence[str], *, day_first: bool) -> pd.Series:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # that other dates of the column do not begin with the day
-        cells, said = pd.Series(texts, dtype=object), {"errors": "coerce", "utc": True, "dayfirst": day_first}
-        read = pd.to_datetime(cells, **said)  # as the first one is written, which is fast
-        return read.where(read.notna(), pd.to_datetime(cells[read.isna()], format="mixed", **said))
+        cells = pd.Series(texts, dtype=object)
+        read = pd.to_datetime(cells, errors="coerce", utc=True, dayfirst=day_first)  # as the first one, which is fast
+        others = pd.to_datetime(cells[read.isna()], errors="coerce", utc=True, format="mixed", dayfirst=day_first)
+        return read.where(read.notna(), others)
 
 
 def _day_first(texts: Iterable[str]) -> bool | None:
