@@ -121,11 +121,11 @@ def pulsed(width: int, name: str = "", high: float = 0.0) -> np.ndarray:
     return codes
 
 
-def epochs(said: Any = None) -> Any:
-    """Epochs about the pulses, whose metadata say the ISIs, or what is said."""
+def epochs(said: Any = None, **besides: Any) -> Any:
+    """Epochs about the pulses, whose metadata say the ISIs and what is said besides, or something else."""
     whole = raw()
     events, _ = mne.events_from_annotations(whole, {NAMES["pulse"]: 2})
-    metadata = pd.DataFrame({"isi_ms": [*ISIS_MS, np.nan]} if said is None else said)
+    metadata = pd.DataFrame({"isi_ms": [*ISIS_MS, np.nan], **besides} if said is None else said)
     return mne.Epochs(whole, events, tmin=-0.3, tmax=0.1, baseline=None, preload=True, metadata=metadata)
 
 
