@@ -9,7 +9,7 @@ import pytest
 
 import isiw as library
 from existing.conftest import reads_here
-from existing.test_recordings import as_edf
+from existing.writers import as_edf
 
 if TYPE_CHECKING:
     from cli.conftest import Command

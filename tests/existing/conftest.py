@@ -24,10 +24,11 @@ def _read_here(
     look: bool = False,
 ) -> Answer:
     assert not also
+    contents = reading.contents_in(path, layout, limits)
     if look:
-        seen: Answer = looking.seen_in(path, layout, limits, lambda _rows: None)
+        seen: Answer = looking.seen_in(contents, path, layout, limits)
         return seen
-    return Answer(reading.people_in(path, layout, subject, limits), {})
+    return Answer(reading.people_of_contents(contents, path, layout, subject, limits), {})
 
 
 def reads_here(patch: pytest.MonkeyPatch) -> None:

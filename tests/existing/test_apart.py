@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 import scipy.io
 
-from existing.test_recordings import KNOWN, WRITERS, as_brainvision, as_eeglab, require_as_written
+from existing.writers import KNOWN, RECORDINGS, as_brainvision, as_eeglab, require_as_written
 from isiw.errors import InvalidValueError
 from isiw.existing import Layout, ReadingLimits, read_people
 from isiw.existing.batch import Way, read_files
@@ -42,9 +42,9 @@ def test_what_is_wrong_with_a_file_is_said_as_if_it_were_read_here(tmp_path: Pat
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", WRITERS)
+@pytest.mark.parametrize("kind", ["BrainVision", "EDF", "BDF", "FIF", "EEGLAB", "epochs of FIF"])
 def test_recordings_are_read_apart_as_they_are_here(kind: str, tmp_path: Path) -> None:
-    (person,) = read_people(WRITERS[kind](tmp_path), KNOWN)
+    (person,) = read_people(RECORDINGS[kind](tmp_path), KNOWN)
     require_as_written(person)
 
 

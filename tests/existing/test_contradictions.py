@@ -5,31 +5,24 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import mne
 import numpy as np
 import pandas as pd
 import pytest
 import scipy.io
 
 import isiw
-from existing.test_recordings import KNOWN, NAMES, raw
+from existing.test_tables import IMPACT, trials_of
 from existing.test_waves import COLUMNS, EMG_MV, TRIGGERS, lines, read, trigger
+from existing.writers import KNOWN, NAMES, epochs, raw
 from isiw.errors import InvalidValueError
 from isiw.existing.delivered import Delivered
 from isiw.existing.layout import Layout
 from isiw.existing.reading import read_people
 
-IMPACT = Layout(reference="impact")
-
 
 def of_text(text: str, folder: Path, **said: Any) -> list[Delivered]:
     (folder / "P01.csv").write_text(text, encoding="utf-8")
     return read_people(folder / "P01.csv", Layout(**{"reference": "impact", **said}))
-
-
-def trials_of(people: list[Delivered]) -> list[tuple[float | None, float | None]]:
-    (person,) = people
-    return [(trial.isi_ms, trial.mep_mv) for trial in person.trials]
 
 
 @pytest.mark.parametrize(
@@ -143,14 +136,6 @@ def test_sweeps_that_are_marked_as_bad_do_not_count() -> None:
     recording.annotations.append(third_s - 0.1, 0.3, "BAD_cough")
     (person,) = read_people(recording, KNOWN)
     assert [trial.told for trial in person.trials] == [True, True, False, True, True, True]
-
-
-def epochs(**metadata: Any) -> mne.Epochs:
-    recording = raw()
-    events, ids = mne.events_from_annotations(recording, regexp=NAMES["pulse"])
-    isis_ms = [30.0, 60.0, 90.0, 120.0, 45.0, None]
-    columns = pd.DataFrame({"isi_ms": isis_ms, **metadata})
-    return mne.Epochs(recording, events, ids, -0.4, 0.1, baseline=None, preload=True, metadata=columns)
 
 
 def test_the_metadata_of_epochs_are_read_as_the_columns_of_a_table() -> None:

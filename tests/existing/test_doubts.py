@@ -12,19 +12,20 @@ import pandas as pd
 import pytest
 import scipy.io
 
-from existing.test_recordings import (
+from existing.test_waves import EMG_MV, lines, trigger
+from existing.writers import (
     ISIS_MS,
     KNOWN,
     NAMES,
     RATE_HZ,
-    as_brainvision,
     as_edf,
     epochs,
+    pulsed,
     raw,
     recording,
     require_as_written,
+    with_stim,
 )
-from existing.test_waves import EMG_MV, lines, trigger
 from isiw.errors import IsiwError
 from isiw.existing.layout import Layout
 from isiw.existing.reading import read_people
@@ -73,6 +74,8 @@ ASKED: dict[str, tuple[pd.DataFrame, dict[str, Any], str]] = {
     "means by their name": (renamed(mep_mv="avg_mep_mv"), {"columns": {"mep": "avg_mep_mv"}}, "means of several"),
     "per cent with a unit": (renamed(mep_mv="MEP %"), {"columns": {"mep": "MEP %"}, "units": ("mV",)},
                              "relative to others"),
+    "per cent below the name": (pd.concat([pd.DataFrame({"isi_ms": ["ms"], "MEP": ["%"]}), renamed(mep_mv="MEP")]),
+                                {"units": ("mV",)}, "relative"),
     "normalised": (renamed(mep_mv="norm mep"), {"columns": {"mep": "norm mep"}, "units": ("mV",)}, "relative"),
     "logarithms": (renamed(mep_mv="log10 MEP"), {"columns": {"mep": "log10 MEP"}, "units": ("mV",)}, "got 'log10'"),
     "numbers of samples": (table().assign(isi_ms=np.linspace(810, 1900, 36)), {}, "longer than those of paired"),
@@ -81,6 +84,8 @@ ASKED: dict[str, tuple[pd.DataFrame, dict[str, Any], str]] = {
                                       "means of several trials.*beside 'sd'"),
     "means beside how many they are of": (means("mep_mv", n_averaged=10), {}, "beside 'n_averaged'"),
     "means with limits of their confidence": (means("mep_mv", ci_lower=0.1, ci_upper=2.0), {}, "beside 'ci_lower'"),
+    "means by how many they are of": (renamed(mep_mv="MEP, n=10"), {"columns": {"mep": "MEP, n=10"}, "units": ("mV",)},
+                                      "means of several"),
     "means in one word": (renamed(mep_mv="mepmean"), {"columns": {"mep": "mepmean"}, "units": ("mV",)}, "means of"),
     **{name: (renamed(mep_mv=name), {"columns": {"mep": name}, "units": ("uV",)}, "relative")
        for name in ("MEPnorm", "zMEP", "MEP (a.u.)", "MEP/control", "mep_x_baseline", "MEP fold change", "MEP_Mmax")},
@@ -93,6 +98,13 @@ ASKED: dict[str, tuple[pd.DataFrame, dict[str, Any], str]] = {
     "muscles below each other": (pd.concat([table().assign(isi_ms=ISIS + np.linspace(0, 1, 36))] * 2), {}, "2 times"),
     "a few rows of another coil": (table(coil=of(["sham", *["real"] * 7])), {}, "'coil'"),
     "a few rows a person": (table(code=of([f"VP{n}" for n in range(9)])), {}, "'code'.*and 6 others"),
+    "a mean below the trials": (pd.concat([table().assign(Nr=range(36)), means("mep_mv", Nr="Mittelwert")[:1]]), {},
+                                "row 37 of the column 'Nr' .* is none of a trial"),
+    "each row twice": (pd.concat([table()] * 2), {}, "or each row twice"),
+    "areas": (renamed(mep_mv="MEP area (mV*ms)"), {"columns": {"mep": "MEP area (mV*ms)"}, "units": ("mV",)}, "mV·ms"),
+    "latencies": (renamed(mep_mv="onset (ms)"), {"columns": {"mep": "onset (ms)"}, "units": ("mV",)}, "no amplitudes"),
+    "ISIs in samples": (renamed(isi_ms="ISI (samples)"), {"units": ("ms",)}, "a unit of no ISIs; got 'samples'"),
+    "two columns of what is lost": (table(rejected=of([""]), artefact=of(["", "x"])), {}, "rejected or artefact"),
     "a value that is not there": (long("muscle", ["FCR", "FDI"]), {"where": {"muscle": "APB"}}, "one of FCR, FDI"),
 }  # fmt: skip
 
@@ -109,6 +121,16 @@ def test_a_table_that_is_not_of_single_trials_is_asked_about(kind: str, suffix: 
     with pytest.raises(IsiwError, match=expected) as refused:
         read_people(path, Layout(**{"reference": "impact", **said}))
     assert len(str(refused.value)) < 500
+
+
+def test_means_are_known_by_the_name_of_a_file_or_a_sheet_and_by_a_title(tmp_path: Path) -> None:
+    text = means("mep_mv").to_csv(index=False)
+    (tmp_path / "P01_means.csv").write_text(text)
+    (tmp_path / "P02.csv").write_text(f"Mean MEP at each ISI\n{text}")
+    means("mep_mv").to_excel(tmp_path / "P03.xlsx", sheet_name="Mittelwerte", index=False)
+    for path in tmp_path.iterdir():
+        with pytest.raises(IsiwError, match=r"are means of several trials.*beside '(means?|mittelwerte)'"):
+            read_people(path, IMPACT)
 
 
 def test_what_was_asked_about_can_be_said() -> None:
@@ -214,25 +236,11 @@ def test_a_trigger_of_the_tap_that_is_found_twice_is_one(later_s: float) -> None
 
 
 def test_an_annotation_of_bad_data_leaves_the_events_of_a_stim_channel(tmp_path: Path) -> None:
-    emg_mv, stimuli = recording()
-    stim = np.zeros_like(emg_mv)
-    for at_s, name in stimuli:
-        stim[round(at_s * RATE_HZ)] = int(name[-1])
-    made = mne.io.RawArray(np.array([1e-3 * emg_mv, stim]), mne.create_info(["FCR", "STI"], RATE_HZ, ["emg", "stim"]))
+    made = with_stim(pulsed(1))
     made.set_annotations(mne.Annotations([12.5], [0.5], ["BAD_movement"]))
     made.save(tmp_path / "P01_raw.fif")
     layout = Layout(reference="impact", markers={"tap": "1", "pulse": "2"}, unmarked="alone")
     require_as_written(read_people(tmp_path / "P01_raw.fif", layout)[0])
-
-
-@pytest.mark.parametrize("unit", ["mv", "microV", "nV"])
-def test_a_unit_of_brainvision_is_read_as_the_header_writes_it(unit: str, tmp_path: Path) -> None:
-    path = as_brainvision(tmp_path)
-    factor = {"mv": 1e3, "nV": 1e-3}.get(unit, 1.0)
-    text = path.read_text(encoding="utf-8").replace(",0.001,µV", f",{0.001 / factor:g},{unit}")
-    assert unit in text
-    path.write_text(text, encoding="utf-8")
-    require_as_written(read_people(path, KNOWN)[0])
 
 
 def eeglab(path: Path, scale: float, *more: dict[str, Any], cut: slice = slice(0)) -> Path:
@@ -294,12 +302,16 @@ def test_rectified_emg_is_said(tmp_path: Path) -> None:
     assert read_people(as_edf(tmp_path), KNOWN)[0].notes == ()
 
 
-def test_numbers_that_excel_shows_in_per_cent_are_relative(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("shown", "name", "says"),
+    [("0.0%", "MEP", r"'MEP \(%\)' .* relative"), ('0.0" µV"', "mep_mv", "two units; got 'uV and mV'")],
+)
+def test_what_excel_shows_behind_numbers_is_their_unit(shown: str, name: str, says: str, tmp_path: Path) -> None:
     with pd.ExcelWriter(tmp_path / "P01.xlsx", engine="openpyxl") as book:
-        renamed(mep_mv="MEP").to_excel(book, index=False)
+        renamed(mep_mv=name).to_excel(book, index=False)
         for cells in book.book.active.iter_rows(min_row=2, min_col=2):
-            cells[0].number_format = "0.0%"
-    with pytest.raises(IsiwError, match=r"'MEP \(%\)' are relative"):
+            cells[0].number_format = shown
+    with pytest.raises(IsiwError, match=says):
         read_people(tmp_path / "P01.xlsx", IMPACT.saying(units=("mV",)))
 
 
@@ -320,14 +332,11 @@ def test_a_second_tap_or_pulse_is_asked_about(marks: str, later_s: float, says: 
 
 
 def test_codes_of_triggers_that_overlap_are_told_apart_in_fif_and_in_bdf(tmp_path: Path) -> None:
-    emg_mv, stimuli = recording()
-    codes = np.zeros(len(emg_mv))
-    for at_s, name in stimuli:
-        codes[round(at_s * RATE_HZ) :][:200] += int(name[-1])  # for 50 ms, and ISIs are from 30 ms on
-    made = mne.io.RawArray(np.array([1e-3 * emg_mv, codes]), mne.create_info(["FCR", "STI"], RATE_HZ, ["emg", "stim"]))
+    codes = pulsed(200)  # for 50 ms, and ISIs are from 30 ms on
+    made = with_stim(codes)
     layout = Layout(reference="impact", markers={"tap": "1", "pulse": "2"}, channels={"emg": "FCR"}, unmarked="alone")
     require_as_written(read_people(made, layout)[0])
-    longer = as_status(tmp_path, np.tile([1e3 * emg_mv, codes], 20))  # than one piece
+    longer = as_status(tmp_path, np.tile([1e3 * EMG_MV, codes], 20))  # than one piece
     (person,) = read_people(longer, layout)
     assert [trial.isi_ms for trial in person.trials] == pytest.approx([*ISIS_MS, None] * 20, abs=0.3)
 
@@ -355,14 +364,9 @@ def as_status(path: Path, values: np.ndarray) -> Path:
 
 
 def test_a_trigger_whose_level_turns_at_each_stimulus_is_asked_about() -> None:
-    emg_mv, stimuli = recording()
-    turns = np.zeros_like(emg_mv)
-    for at_s, name in stimuli:
-        if name == NAMES["pulse"]:
-            turns[round(at_s * RATE_HZ) :] = 5.0 - turns[-1]
-    held = mne.io.RawArray(np.array([1e-3 * emg_mv, turns]), mne.create_info(["FCR", "TTL"], RATE_HZ, "emg"))
+    turns = 5.0 * (np.cumsum(pulsed(1, NAMES["pulse"], 1.0)) % 2)
     with pytest.raises(IsiwError, match="which of its edges are stimuli"):
-        read_people(held, Layout(reference="impact", channels={"emg": "FCR", "pulse": "TTL"}))
+        read_people(with_stim(turns, "emg"), Layout(reference="impact", channels={"emg": "FCR", "pulse": "STI"}))
 
 
 @pytest.mark.parametrize("change", [lambda emg: np.abs(emg) - 0.02, lambda emg: -np.abs(emg)])

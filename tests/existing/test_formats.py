@@ -14,11 +14,17 @@ import mne
 import numpy as np
 import pytest
 import pyxdf
+import scipy.io
 
-from existing.test_recordings import ISIS_MS, KNOWN, MEPS_MV, RATE_HZ, as_edf, recording, require_as_written
 from existing.writers import (
+    ISIS_MS,
+    KNOWN,
+    MEPS_MV,
+    NAMES,
+    RATE_HZ,
     RECORDINGS,
     WORDS,
+    as_edf,
     as_matlab_73,
     as_nwb,
     as_smr,
@@ -27,6 +33,9 @@ from existing.writers import (
     chunk,
     header,
     named_events,
+    pulsed,
+    recording,
+    require_as_written,
     without_records,
 )
 from isiw.errors import IsiwError
@@ -37,8 +46,8 @@ from isiw.existing.layout import Layout
 from isiw.existing.reading import read_people
 
 NAMED = Layout(reference="impact", channels={"emg": "FCR"}, unmarked="alone")
-MARKED = {"EDF", "BDF", "epochs"}
-"""Formats whose files have the names of `NAMES`, in place of words that are known."""
+WORDED = {"XDF", "AcqKnowledge", "Spike2", "NWB"}
+"""Formats whose files have words that are known, in place of the names of `NAMES`."""
 
 
 def read(path: Path, layout: Layout = NAMED) -> Delivered:
@@ -48,7 +57,7 @@ def read(path: Path, layout: Layout = NAMED) -> Delivered:
 
 @pytest.mark.parametrize("kind", RECORDINGS)
 def test_a_recording_of_each_format_is_read_back(kind: str, tmp_path: Path) -> None:
-    layout = KNOWN if kind.split(maxsplit=1)[0] in MARKED else NAMED
+    layout = NAMED if kind.split(maxsplit=1)[0] in WORDED else KNOWN
     if kind.startswith("NWB"):
         layout = layout.saying(channels={"emg": "EMG FCR"})
     require_as_written(read(RECORDINGS[kind](tmp_path), layout))
@@ -131,10 +140,12 @@ def test_what_pyxdf_says_of_clocks_is_said(tmp_path: Path) -> None:
     assert read(as_xdf(tmp_path)).notes == ()
 
 
-def test_a_table_of_matlab_73_is_read_and_its_sweeps_too(tmp_path: Path) -> None:
-    path = as_matlab_73(tmp_path / "P01.mat", isi_ms=ISIS_MS, mep_mv=MEPS_MV)
-    person = read(path, Layout(reference="impact"))
-    assert [(trial.isi_ms, trial.mep_mv) for trial in person.trials] == list(zip(ISIS_MS, MEPS_MV, strict=True))
+def test_a_table_of_matlab_is_read_and_sweeps_of_version_73_too(tmp_path: Path) -> None:
+    path, vectors = tmp_path / "P01.mat", {"isi_ms": ISIS_MS, "mep_mv": MEPS_MV}
+    scipy.io.savemat(path, {**vectors, "rate": 4000.0})
+    for written in (path, as_matlab_73(tmp_path / "P02.mat", **vectors)):
+        found = [(trial.isi_ms, trial.mep_mv) for trial in read(written, Layout(reference="impact")).trials]
+        assert found == list(zip(ISIS_MS, MEPS_MV, strict=True))
     firsts = [round((at_s - 0.4) * RATE_HZ) for at_s, name in named_events() if name == "TMS"]
     sweeps = np.array([recording()[0][first : first + 2400] for first in firsts])
     path = as_matlab_73(path, emg=sweeps, isi_ms=[*ISIS_MS, np.nan], fs=4000.0)
@@ -242,22 +253,24 @@ def test_spike2_8_is_read_by_sonpy_on_windows(tmp_path: Path, monkeypatch: pytes
     require_as_written(read(tmp_path / "P01.smrx"))
 
 
-@pytest.mark.parametrize("suffix", [".xdf", ".acq", ".smr", ".nwb", ".sav", ".dta", ".set", ".edf"])
-def test_a_file_that_is_none_of_its_format_is_refused_in_a_sentence(suffix: str, tmp_path: Path) -> None:
-    (tmp_path / f"P01{suffix}").write_bytes(b"none of this format, and long enough to be something else" * 20)
-    with pytest.raises(IsiwError, match=r"cannot be read|no data of EEGLAB") as refused:
+FORMATS = [".xdf", ".acq", ".smr", ".nwb", ".sav", ".dta", ".set", ".edf", ".bdf", ".vhdr", "_raw.fif", ".mat", ".doc",
+           ".xlsx", ".parquet"]  # fmt: skip
+
+
+@pytest.mark.parametrize("content", [b"", b"none of this format, and long enough to be something else" * 20])
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_a_file_that_is_none_of_its_format_is_refused_in_a_sentence(
+    suffix: str, content: bytes, tmp_path: Path
+) -> None:
+    (tmp_path / f"P01{suffix}").write_bytes(content)
+    with pytest.raises(IsiwError, match=r"cannot be read|no data of EEGLAB|without a password") as refused:
         read(tmp_path / f"P01{suffix}")
     assert "\n" not in str(refused.value)
 
 
 @pytest.mark.parametrize("inverted", [False, True])
 def test_a_trigger_in_a_channel_is_a_marker_in_any_format(inverted: bool) -> None:  # noqa: FBT001
-    emg_mv, stimuli = recording()
-    rows = [1e-3 * emg_mv]
-    for word in WORDS.values():
-        rows.append(np.zeros_like(emg_mv))
-        for at_s, name in stimuli:
-            rows[-1][round(at_s * RATE_HZ) :][: 40 if WORDS[name] == word else 0] = 5.0
+    rows = [1e-3 * recording()[0], *(pulsed(40, name, 5.0) for name in NAMES.values())]
     rows[1] = 5.0 - rows[1] if inverted else rows[1]
     held = mne.io.RawArray(np.array(rows), mne.create_info(["FCR", "hammer", "stimulator"], RATE_HZ, "emg"))
     channels = {"emg": "FCR", "tap": "hammer", "pulse": "stimulator"}

@@ -14,7 +14,7 @@ import pytest
 
 from isiw.errors import InvalidValueError
 from isiw.existing import Delivered, Layout, ReadingLimits, read_people, reading
-from isiw.existing.answer import Answer, read_answer, write_error, write_people
+from isiw.existing.answer import Answer, read_answer, write_answer, write_error
 from isiw.existing.gate import Gate, require_no_links
 from isiw.existing.layout import letters
 from isiw.existing.limits import LARGEST_FACTOR, require_file, seconds_for
@@ -83,7 +83,7 @@ def test_names_of_columns_that_nobody_reads_are_handed_back_once_for_all_people(
     table = TrialTable((Trial(0, Status.ACCEPTED, 10.0, isi_ms=10.0, mep_mv=0.3),))
     unused = tuple(f"{number}{'n' * 1000}" for number in range(20))
     people = [Delivered(table, "impact", subject=f"P{number}", unused=unused) for number in range(50)]
-    write_people(tmp_path, people, {})
+    write_answer(tmp_path, Answer(people, {}), {})
     assert (tmp_path / "answer.json").stat().st_size < 100_000
     read = read_answer(tmp_path)
     assert isinstance(read, Answer)
@@ -184,7 +184,7 @@ def test_what_the_process_hands_back_is_what_was_read(tmp_path: Path) -> None:
     channel = Channel(np.array([0.1, np.nan, -2.0]), 4000.0, "mV", -5.0)
     one = Delivered(TrialTable(trials), "impact", subject="é/1", visit=Visit(day=2), sweeps={1: {"emg": channel}},
                     blocks={1: "b"}, unused=("note",))  # fmt: skip
-    write_people(tmp_path, [one, one], {"P01.csv": "0" * 64}, {"lines": ["a channel"]})
+    write_answer(tmp_path, Answer([one, one], {"lines": ["a channel"]}), {"P01.csv": "0" * 64})
     answer = read_answer(tmp_path)
     assert isinstance(answer, Answer)
     assert answer.said == {"lines": ["a channel"]}

@@ -10,8 +10,7 @@ import edfio
 import numpy as np
 import pandas as pd
 
-from existing.test_recordings import RATE_HZ, as_edf, as_fif, recording
-from existing.writers import without_records
+from existing.writers import RATE_HZ, as_edf, as_fif, recording, without_records
 from isiw.existing.layout import Layout
 from isiw.existing.look import look
 

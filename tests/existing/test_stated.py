@@ -12,8 +12,8 @@ import pytest
 import scipy.io
 
 import isiw
-from existing.test_recordings import ISIS_MS, KNOWN, MEPS_MV, NAMES, as_brainvision, as_edf, as_epochs, epochs, raw
 from existing.test_waves import EMG_MV, lines, trigger
+from existing.writers import ISIS_MS, KNOWN, MEPS_MV, NAMES, as_brainvision, as_edf, as_epochs, epochs, raw
 from isiw.errors import IsiwError
 from isiw.existing.layout import Layout
 from isiw.existing.reading import read_people
@@ -113,4 +113,6 @@ def test_one_thing_is_stated_once() -> None:
         Layout(units=("mV", "uV"))
     with pytest.raises(IsiwError, match="both a marker and a channel"):
         Layout(markers=NAMES, channels={"tap": "Hammer"})
+    with pytest.raises(IsiwError, match="one channel is stated for two things"):
+        Layout(channels={"tap": "TMS", "pulse": "TMS"})
     assert Layout(units=("mV", "s")).saying(units=("uV",)).units == ("uV", "s")

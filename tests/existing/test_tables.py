@@ -318,22 +318,12 @@ def test_a_broken_table_ends_in_a_sentence_that_says_what_to_do(kind: str, tmp_p
     assert "\n" not in str(refused.value)
 
 
-@pytest.mark.parametrize(
-    ("name", "content", "says"),
-    [
-        *(("a.xlsx", old, "without a password") for old in (b"", b"no workbook", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1")),
-        ("a.parquet", b"none", "cannot be read as Parquet"),
-        ("a.doc", b"x", "this cannot be read"),
-        ("b.csv", None, "no such file"),
-    ],
-)
-def test_a_file_that_is_none_of_its_kind_is_refused(
-    name: str, content: bytes | None, says: str, tmp_path: Path
-) -> None:
-    if content is not None:
-        (tmp_path / name).write_bytes(content)
-    with pytest.raises(IsiwError, match=says):
-        read_people(tmp_path / name, IMPACT)
+def test_a_file_that_is_not_there_or_is_an_older_workbook_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(IsiwError, match="no such file"):
+        read_people(tmp_path / "b.csv", IMPACT)
+    (tmp_path / "a.xlsx").write_bytes(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1")
+    with pytest.raises(IsiwError, match="without a password"):
+        read_people(tmp_path / "a.xlsx", IMPACT)
 
 
 @pytest.mark.parametrize(

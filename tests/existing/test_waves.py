@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import scipy.io
 
-from existing.test_recordings import ISIS_MS, MEPS_MV, NAMES, RATE_HZ, recording, require_as_written
+from existing.writers import ISIS_MS, MEPS_MV, NAMES, RATE_HZ, recording, require_as_written
 from isiw.errors import IsiwError
 from isiw.existing.delivered import Delivered
 from isiw.existing.layout import read_layout
@@ -90,6 +90,13 @@ def test_blocks_are_sweeps(tmp_path: Path) -> None:
     person = read(tmp_path, content, f"rate_hz = 4000\n{COLUMNS}[channels]\n{TRIGGERS}")
     require_as_written(person)
     assert {len(sweep["emg"].values) for sweep in person.sweeps.values()} == {2400}
+    bare = content.replace(LABCHART, "")  # whose times begin again
+    require_as_written(read(tmp_path, bare, f"rate_hz = 4000\n{COLUMNS}[channels]\n{TRIGGERS}"))
+    with pytest.raises(IsiwError, match=r"'time' of P01\.txt says; got '2000 Hz'; expected 4000 Hz"):
+        read(tmp_path, bare, f"rate_hz = 2000\n{COLUMNS}[channels]\n{TRIGGERS}")
+    slower = "".join(lines(EMG_MV, tap, pulse, last=2400).splitlines(keepends=True)[::2])  # a block of 2 kHz
+    with pytest.raises(IsiwError, match=r"'time' of P01\.txt says; got '4000 Hz'; expected 2000 Hz"):
+        read(tmp_path, content + LABCHART + slower, f"rate_hz = 4000\n{COLUMNS}[channels]\n{TRIGGERS}")
 
 
 def test_a_part_of_a_file_is_a_table_with_names_of_its_own(tmp_path: Path) -> None:

@@ -7,18 +7,135 @@ from __future__ import annotations
 
 import datetime as dt
 import struct
+import warnings
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import edfio
 import h5py
+import mne
 import numpy as np
 import pandas as pd
+import pybv
 import pyreadstat
+import pytest
 import scipy.io
 from bioread import headers as bh
 
-from existing.test_recordings import ISIS_MS, MEPS_MV, NAMES, RATE_HZ, as_edf, epochs, recording
+from isiw.existing.delivered import Delivered
+from isiw.existing.layout import Layout
+
+RATE_HZ = 4000.0
+ISIS_MS = (30.0, 60.0, 90.0, 120.0, 45.0)
+MEPS_MV = (0.4, 0.9, 1.6, 0.25, 0.7)
+NAMES = {"tap": "S  1", "pulse": "S  2"}
+KNOWN = Layout(reference="impact", markers=NAMES, channels={"emg": "FCR"}, unmarked="alone")
+
+mne.set_log_level("ERROR")
+
+
+def recording(scale: float = 1.0) -> tuple[np.ndarray, list[tuple[float, str]]]:
+    """EMG [mV] with an MEP of known amplitude after each pulse, and the times of taps and pulses [s]."""
+    rng, seconds = np.random.default_rng(1), 2.0 * (len(ISIS_MS) + 2)
+    emg_mv = 1e-3 * rng.standard_normal(round(seconds * RATE_HZ))
+    events = []
+    for number, (isi_ms, mep_mv) in enumerate(zip((*ISIS_MS, None), (*MEPS_MV, 0.3), strict=True)):
+        tap_s = 1.0 + 2.0 * number
+        pulse_s = tap_s if isi_ms is None else tap_s + isi_ms / 1e3
+        events += [] if isi_ms is None else [(tap_s, NAMES["tap"])]
+        events.append((pulse_s, NAMES["pulse"]))
+        first = round((pulse_s + 0.018) * RATE_HZ)
+        wave = np.sin(np.linspace(0.0, 2.0 * np.pi, round(0.012 * RATE_HZ)))
+        emg_mv[first : first + len(wave)] += 0.5 * mep_mv * wave / np.abs(wave).max()
+    return scale * emg_mv, events
+
+
+def raw(scale: float = 1.0, kind: str = "emg") -> Any:
+    emg_mv, events = recording(scale)
+    info = mne.create_info(["FCR", "EEG 1"], RATE_HZ, [kind, "eeg"])
+    made = mne.io.RawArray(np.stack([1e-3 * emg_mv, np.zeros_like(emg_mv)]), info)
+    onsets, names = zip(*events, strict=True)
+    return made.set_annotations(mne.Annotations(onsets, 0.0, names))
+
+
+def as_brainvision(path: Path, unit: str = "µV") -> Path:
+    emg_mv, events = recording()
+    samples = [
+        {"onset": round(at_s * RATE_HZ), "duration": 1, "description": int(name[-1]), "type": "Stimulus"}
+        for at_s, name in events
+    ]
+    pybv.write_brainvision(
+        data=1e-3 * np.stack([emg_mv, 0 * emg_mv]), sfreq=RATE_HZ, ch_names=["FCR", "EEG 1"], fname_base="P01",
+        folder_out=path, events=samples, resolution=1e-3, unit="µV",
+    )  # fmt: skip
+    said = f",{0.001 / {'mv': 1e3, 'nV': 1e-3}.get(unit, 1.0):g},{unit}"
+    header = path / "P01.vhdr"
+    header.write_text(header.read_text(encoding="utf-8").replace(",0.001,µV", said), encoding="utf-8")
+    return header
+
+
+def as_edf(
+    path: Path, dimension: str = "uV", scale: float = 1e3, *, bdf: bool = False, record_s: float | None = None
+) -> Path:
+    emg_mv, events = recording()
+    signal: Any = edfio.BdfSignal if bdf else edfio.EdfSignal
+    signals = [
+        signal(
+            scale * values, RATE_HZ, label=label, physical_dimension=dimension, physical_range=(-4 * scale, 4 * scale)
+        )
+        for label, values in (("FCR", emg_mv), ("EEG 1", 0 * emg_mv))
+    ]
+    notes = [edfio.EdfAnnotation(at_s, None, name) for at_s, name in events]
+    kind: Any = edfio.Bdf if bdf else edfio.Edf
+    made = kind(signals, annotations=notes, data_record_duration=record_s)
+    target = path / f"P01.{'bdf' if bdf else 'edf'}"
+    made.write(target)
+    return target
+
+
+def as_fif(path: Path) -> Path:
+    raw().save(path / "P01_raw.fif")
+    return path / "P01_raw.fif"
+
+
+def as_eeglab(path: Path) -> Path:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        mne.export.export_raw(path / "P01.set", raw(kind="eeg"))
+    return path / "P01.set"
+
+
+def with_stim(codes: np.ndarray, kind: str = "stim") -> Any:
+    """The recording with a channel called STI in place of annotations."""
+    info = mne.create_info(["FCR", "STI"], RATE_HZ, ["emg", kind])
+    return mne.io.RawArray(np.stack([1e-3 * recording()[0], codes]), info)
+
+
+def pulsed(width: int, name: str = "", high: float = 0.0) -> np.ndarray:
+    """Pulses of so many samples at stimuli of a name, or at all; each is as high as its number, or as is said."""
+    codes = np.zeros_like(recording()[0])
+    for at_s, stimulus in recording()[1]:
+        codes[round(at_s * RATE_HZ) :][:width] += (high or int(stimulus[-1])) if name in stimulus else 0.0
+    return codes
+
+
+def epochs(said: Any = None, **besides: Any) -> Any:
+    """Epochs about the pulses, whose metadata say the ISIs and what is said besides, or something else."""
+    whole = raw()
+    events, _ = mne.events_from_annotations(whole, {NAMES["pulse"]: 2})
+    metadata = pd.DataFrame({"isi_ms": [*ISIS_MS, np.nan], **besides} if said is None else said)
+    return mne.Epochs(whole, events, tmin=-0.3, tmax=0.1, baseline=None, preload=True, metadata=metadata)
+
+
+def as_epochs(path: Path, *, metadata: bool = True) -> Path:
+    """Epochs in a file; without metadata their annotations say what came when."""
+    made = epochs()
+    made.metadata = made.metadata if metadata else None
+    made.save(path / "P01-epo.fif")
+    return path / "P01-epo.fif"
+
 
 WORDS = {NAMES["tap"]: "tap", NAMES["pulse"]: "TMS"}
 
@@ -198,14 +315,6 @@ def as_eeglab_epochs(path: Path) -> Path:
     return path / "P01.set"
 
 
-def as_fif_epochs(path: Path) -> Path:
-    """Epochs about the pulse without metadata, whose annotations say what came when."""
-    made = epochs()
-    made.metadata = None
-    made.save(path / "P01-epo.fif")
-    return path / "P01-epo.fif"
-
-
 def without_records(path: Path, *left_out: int) -> Path:
     """An EDF+ file of which some records were not recorded, as EDF+D has it."""
     content = path.read_bytes()
@@ -229,7 +338,14 @@ RECORDINGS: Mapping[str, Callable[[Path], Path]] = {
     "NWB": as_nwb,
     "NWB with timestamps": lambda path: as_nwb(path, stamped=True),
     "epochs of EEGLAB": as_eeglab_epochs,
-    "epochs of FIF without metadata": as_fif_epochs,
+    "epochs of FIF": as_epochs,
+    "epochs of FIF without metadata": lambda path: as_epochs(path, metadata=False),
+    "FIF": as_fif,
+    "EEGLAB": as_eeglab,
+    "BrainVision": as_brainvision,
+    **{f"BrainVision in {unit}": partial(as_brainvision, unit=unit) for unit in ("mv", "microV", "nV")},
+    "EDF": as_edf,
+    "BDF": lambda path: as_edf(path, bdf=True),
     "EDF in mv": lambda path: as_edf(path, "mv", 1.0),
     "EDF in microV": lambda path: as_edf(path, "microV", 1e3),
     "EDF in nV": lambda path: as_edf(path, "nV", 1e6),
@@ -263,3 +379,11 @@ def as_statistics(path: Path, label: str = "Peak to peak (µV)") -> Path:
     else:
         pyreadstat.write_sav(frame, str(path), **said)
     return path
+
+
+def require_as_written(person: Delivered) -> None:
+    pairs = [trial for trial in person.trials if trial.isi_ms is not None]
+    assert [trial.isi_ms for trial in pairs] == pytest.approx(ISIS_MS, abs=1000 / RATE_HZ)
+    assert [trial.mep_mv for trial in pairs] == pytest.approx(MEPS_MV, rel=0.01)
+    assert [trial.is_control for trial in person.trials] == [False] * 5 + [True]
+    assert all(trial.told for trial in person.trials)

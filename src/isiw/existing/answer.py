@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from functools import cache
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, Final, NamedTuple, get_type_hints
 
 import numpy as np
@@ -53,13 +52,11 @@ class Answer(NamedTuple):
     said: Mapping[str, Any]
 
 
-def write_people(
-    folder: Path, people: Sequence[Delivered], hashes: Mapping[str, str], said: Mapping[str, Any] = MappingProxyType({})
-) -> None:
+def write_answer(folder: Path, found: Answer, hashes: Mapping[str, str]) -> None:
     """Write what was read into a folder."""
     written, channels, unused = [], [], dict[tuple[str, ...], int]()
     with (folder / SAMPLES).open("wb") as samples:
-        for number, person in enumerate(people):
+        for number, person in enumerate(found.people):
             for trial, sweep in person.sweeps.items():
                 for name, channel in sweep.items():
                     np.ascontiguousarray(channel.values, dtype="<f8").tofile(samples)
@@ -67,7 +64,7 @@ def write_people(
                                      channel.t0_ms])  # fmt: skip
             own = _person().model_construct(**{**vars(person), "files": hashes, "unused": ()}).model_dump_json()
             written.append([own, unused.setdefault(person.unused, len(unused))])  # everybody of a table has the same
-    _write(folder, {"people": written, "unused": [*unused], "channels": channels, "said": dict(said)})
+    _write(folder, {"people": written, "unused": [*unused], "channels": channels, "said": found.said})
 
 
 def write_error(folder: Path, error: BaseException) -> None:

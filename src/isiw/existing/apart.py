@@ -77,12 +77,18 @@ def read_apart(
     most_s = _START_S + _WAITS * seconds_for(limits, path, table=is_table, rows=rows)
     with tempfile.TemporaryDirectory(prefix="isiw-") as folder:
         status = _run({**request, "answer": folder}, most_s)
-        if status == 0:
-            found = answer.read_answer(Path(folder))
-            if isinstance(found, answer.Answer):
-                return found
-            raise _failed(path, limits, found)
-    raise _ended(path, limits, status, seconds)
+        found = answer.read_answer(Path(folder)) if status == 0 else {}
+    if isinstance(found, answer.Answer):
+        return found
+    if status is None or status == -getattr(signal, "SIGXCPU", 0):
+        raise passed(path.name, "takes too long to read", None, seconds, " s of processor time")
+    if found.get("memory") or status == -getattr(signal, "SIGKILL", 0):  # by the system, if memory is short
+        raise passed(path.name, "takes too much memory to read", None, limits.memory_mb, " MB")
+    raise InvalidValueError(
+        f"{path.name} cannot be read: {found.get('fault', 'what reads it ended without an answer')}",
+        got=None if found else f"status {status}",
+        remedy="Is the file damaged? Save it again, as CSV if there is no other way. If it is large, say --larger 2.",
+    )
 
 
 def _run(request: Mapping[str, Any], most_s: float) -> int | None:
@@ -104,30 +110,3 @@ def _run(request: Mapping[str, Any], most_s: float) -> int | None:
             process.kill()
             raise
     return process.returncode
-
-
-def _ended(path: Path, limits: ReadingLimits, status: int | None, seconds: float) -> InvalidValueError:
-    """The error that a process ended without an answer."""
-    if status is None or status == -getattr(signal, "SIGXCPU", 0):
-        return passed(path.name, "takes too long to read", None, seconds, " s of processor time")
-    if status == -getattr(signal, "SIGKILL", 0):  # by the system, if memory is short
-        return _too_large(path, limits)
-    return InvalidValueError(
-        f"{path.name} cannot be read: what reads it ended without an answer",
-        got=f"status {status}",
-        remedy="Is the file damaged? Save it again, as CSV if there is no other way. If it is large, say --larger 2.",
-    )
-
-
-def _failed(path: Path, limits: ReadingLimits, found: Mapping[str, Any]) -> InvalidValueError:
-    """The error that a process failed in a way of its own."""
-    if found["memory"]:
-        return _too_large(path, limits)
-    return InvalidValueError(
-        f"{path.name} cannot be read: {found['fault']}",
-        remedy="Is the file damaged? Save it again, as CSV if there is no other way.",
-    )
-
-
-def _too_large(path: Path, limits: ReadingLimits) -> InvalidValueError:
-    return passed(path.name, "takes too much memory to read", None, limits.memory_mb, " MB")

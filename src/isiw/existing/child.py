@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from isiw.existing.gate import Gate, require_no_links
 from isiw.existing.layout import Layout
 from isiw.existing.limits import ReadingLimits, limit_memory, limit_time, seconds_for
 from isiw.existing.look import seen_in
-from isiw.existing.reading import people_in
+from isiw.existing.reading import contents_in, people_of_contents
 from isiw.lazy import pd
 from isiw.text.named_code import library
 from isiw.text.toml_files import checked
@@ -43,18 +43,16 @@ def _answer(request: Mapping[str, Any], folder: Path) -> None:
     sys.addaudithook(gate)
     try:
         require_no_links(path)
+        contents = contents_in(path, layout, limits)
+        if contents.trials is not None:  # for so many rows, of which trials are made, there is more time
+            limit_time(seconds_for(limits, path, table=True, rows=len(contents.trials)))
         if request["look"]:
-            people, said = seen_in(path, layout, limits, _limit_time_of(path, limits))
+            found = seen_in(contents, path, layout, limits)
         else:
-            people, said = people_in(path, layout, request["subject"], limits, _limit_time_of(path, limits)), {}
+            found = answer.Answer(people_of_contents(contents, path, layout, request["subject"], limits), {})
     finally:
         gate.require_nothing_refused()
-    answer.write_people(folder, people, gate.hashes(), said)
-
-
-def _limit_time_of(path: Path, limits: ReadingLimits) -> Callable[[int], None]:
-    """Trials are made of rows that are read: for how many there are, there is more time."""
-    return lambda rows: limit_time(seconds_for(limits, path, table=True, rows=rows))
+    answer.write_answer(folder, found, gate.hashes())
 
 
 def _load_libraries(path: Path) -> list[Path]:

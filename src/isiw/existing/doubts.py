@@ -25,9 +25,12 @@ if TYPE_CHECKING:
 ALL: Final = "*"
 """What `where` says of a column whose values are to be analysed together."""
 
-_MEANS: Final = re.compile("means?|average|avg|median|mittel(wert)?|moyenne")
+_MEANS: Final = re.compile(r"means?|average|avg|median|mittel(wert)?|moyenne|\bn ?= ?\d+")
+_TITLES: Final = re.compile(r"\b(means?|averages?|averaged|avg|mittelwerte?)\b")
+"""What the names of files and sheets, and titles, say of means."""
 _SPREADS: Final = frozenset({"sd", "std", "stdev", "stddev", "se", "sem", "stderr", "cv", "sds", "stdabw",
                              "standarddeviation", "standarderror", "ci", "iqr", "var"})  # fmt: skip
+_SUMS: Final = frozenset({"sum", "total", "grand mean", "summe", "gesamt"})
 _BESIDE: Final = frozenset({"mep", "amplitude", "of", "lower", "upper", "low", "high", "mv", "uv", "v", "95"})
 """Words that may stand beside those of spreads."""
 _NUMBERS: Final = frozenset({"n", "count", "ntrials", "trials", "ntrial", "nobs", "nsweeps", "sweeps", "anzahl", "nmep",
@@ -81,14 +84,25 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, source:
     kinds = [cells for name, cells in others.items() if name != isi.name and 3 * len({*map(str, cells)}) <= len(cells)]
     rows = list(zip(map(str, isi.cells), *(map(str, cells) for cells in kinds), strict=True))
     once = len(rows) > 2 and len({*rows}) == len(rows)
-    if _MEANS.search(_words(mep.name)) or (spreads and (numbers or once)) or (counted_in and once):
-        beside = (spreads or counted_in)[:1]
+    for name, cells in others.items():
+        if odd := next(filter(_is_sum, {cell for cell in cells if isinstance(cell, str)}), None):
+            remedy = "Delete the row if it is a sum or a mean; if it is a trial, write something else."
+            raise Column(name, cells, of=source).refused(cells.index(odd), "is none of a trial", remedy)
+    title = _TITLES.search(_words(f"{source} {frame.attrs.get('title', '')}")) if once else None
+    if title or _MEANS.search(_words(mep.name)) or (spreads and (numbers or once)) or (counted_in and once):
+        beside = (spreads or counted_in or ([title[0]] if title else []))[:1]
         raise InvalidValueError(
             f"the rows of {source} are means of several trials, by the column {mep.name!r}"
             + "".join(f" beside {name!r}" for name in beside),
             expected="a row for each trial, since the scatter of single trials says how sure a window is",
             remedy="Export the single trials; if these are, rename the column.",
         )
+
+
+def _is_sum(cell: str) -> bool:
+    """True if a cell says that its row is of several trials."""
+    word = cell.strip().rstrip(":").casefold()
+    return word in _SPREADS or word in _SUMS or _MEANS.fullmatch(word) is not None
 
 
 def _are_counts(column: Column) -> bool:
@@ -166,15 +180,22 @@ def require_one_row_each(columns: Columns, rows: Sequence[int], layout: Layout) 
         return
     runs = [len([*each]) for _, each in groupby(texts)]
     times, half = math.gcd(*runs), len(texts) // 2
-    again = texts[:half] == texts[half:] and not all(  # realised ISIs do not come again
-        round(columns["isi"].number(row) or 0.0, 3).is_integer()
-        for row in rows
-        if not columns.tms_alone(row, layout.alone)
+    meps = [columns["mep"].text(row) for row in rows]
+    again = (
+        texts[:half] == texts[half:]
+        and (  # neither realised ISIs nor amplitudes come again
+            meps[:half] == meps[half:]
+            or not all(
+                round(columns["isi"].number(row) or 0.0, 3).is_integer()
+                for row in rows
+                if not columns.tms_alone(row, layout.alone)
+            )
+        )
     )
     if (times > 1 and len(runs) > len({*texts})) or (again and len({*texts}) > 2):
         raise InvalidValueError(
             f"the ISIs of {columns['isi'].of} come {times if times > 1 else 2} times each, as if there was a row for "
-            "each of several muscles",
+            "each of several muscles, or each row twice",
             got=", ".join(texts[: 2 * max(times, 2)]),
             remedy="Leave one row for each trial; if each row is one, number them in a column called trial.",
         )

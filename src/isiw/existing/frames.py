@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -21,8 +22,8 @@ from isiw.files import opened
 from isiw.lazy import pd, scipy
 from isiw.text.named_code import library
 
-TEXTS: Final = {".csv", ".tsv", ".txt", ".dat", ".tab"}
-WORKBOOKS: Final = {".xlsx", ".xlsm"}
+TEXTS: Final = (".csv", ".tsv", ".txt", ".dat", ".tab")
+WORKBOOKS: Final = (".xlsx", ".xlsm")
 
 _LINES: Final = 100
 """Within so many lines the columns' names are sought."""
@@ -69,13 +70,14 @@ def _texts(content: bytes, layout: Layout) -> pd.DataFrame:
     if "\0" in text:
         raise InvalidValueError("the file is no text, and so no table that can be read", remedy="Is it the right one?")
     lines = _lines(text)[layout.skip_lines :]
-    lines = lines[0 if layout.names else _first(lines, layout) :]
+    first = 0 if layout.names else _first(lines, layout)
+    title, lines = " ".join(lines[:first]), lines[first:]
     if lines and lines[0].startswith("#"):  # each part of the file begins so, with names of its own
         ends = (n for n, line in enumerate(lines) if n and line.startswith("#"))
         lines = [lines[0].lstrip("# "), *lines[1 : next(ends, None)]]
     lines = [line for line in lines if not line.startswith("# ")]
     separator = layout.separator or _separator(lines[0] if lines else "")
-    return _table([row for row in _split(lines, separator) if row], layout)
+    return _table([row for row in _split(lines, separator) if row], layout, title)
 
 
 def _lines(text: str) -> list[str]:
@@ -108,8 +110,8 @@ def _is_header(cells: Sequence[Any], layout: Layout) -> bool:
     )
 
 
-def _table(rows: Rows, layout: Layout) -> pd.DataFrame:
-    """Rows as a table: below the names, or below those that are stated."""
+def _table(rows: Rows, layout: Layout, title: str) -> pd.DataFrame:
+    """Rows as a table that knows its title: below the names, or below those that are stated."""
     if not rows and not layout.names:
         raise InvalidValueError("the file is empty, and no table that can be read", remedy="Is it the right one?")
     head = layout.names or ["" if is_missing(cell) else str(cell).strip() for cell in rows[0]]
@@ -125,7 +127,9 @@ def _table(rows: Rows, layout: Layout) -> pd.DataFrame:
     numbered = all(len(row) == len(names) + 1 and str(row[0]) == str(n) for n, row in enumerate(body, 1))
     if numbered and not all(is_missing(row[-1]) for row in body):  # those end with the sign that separates cells
         body = [row[1:] for row in body]  # R numbers its rows without naming the column of these numbers
-    return pd.DataFrame([_cells(row, names, number) for number, row in enumerate(body, 1)], columns=names)
+    table = pd.DataFrame([_cells(row, names, number) for number, row in enumerate(body, 1)], columns=names)
+    table.attrs["title"] = title
+    return table
 
 
 def _cells(row: Sequence[Any], names: Sequence[str], number: int) -> list[Any]:
@@ -203,12 +207,18 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
     chosen = (with_trials or filled or list(sheets))[0]
     rows = sheets[chosen]
     for cells in islice(book.book[chosen].iter_rows(), _LINES) if rows else ():
-        shown = [isinstance(cell.value, int | float) and "%" in str(cell.number_format) for cell in cells]
+        shown = [_shown_in(cell.number_format) if isinstance(cell.value, int | float) else "" for cell in cells]
         if any(shown):  # Excel shows 1.2 as 120 %
-            rows[0] = [f"{name} (%)" if in_per_cent else name
-                       for name, in_per_cent in zip_longest(rows[0], shown[: len(rows[0])])]  # fmt: skip
+            rows[0] = [f"{name} ({unit})" if unit else name
+                       for name, unit in zip_longest(rows[0], shown[: len(rows[0])])]  # fmt: skip
             break
-    return _table(rows, layout)
+    return _table(rows, layout, chosen)
+
+
+def _shown_in(number_format: str) -> str:
+    """What Excel shows behind a number: the sign of per cent, or a unit."""
+    words = [word.strip() for word in re.findall(r'"([^"]*)"', number_format)]
+    return "%" if "%" in number_format else next((word for word in words if word.casefold() in UNIT_WORDS), "")
 
 
 def read_arrays(path: Path) -> dict[str, Any]:

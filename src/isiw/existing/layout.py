@@ -21,13 +21,19 @@ ISI_UNITS_MS: Final[Mapping[str, float]] = {"ms": 1.0, "s": 1e3, "us": 1e-3, "µ
 EMG_UNITS: Final[Mapping[str, float]] = {**EMG_UNITS_MV, "nV": 1e-6}
 """One of each unit that files of others have, in mV."""
 
-UNIT_WORDS: Final[Mapping[str, str]] = {
-    "ms": "ms", "msec": "ms", "millisecond": "ms", "milliseconds": "ms", "s": "s", "sec": "s", "second": "s",
-    "seconds": "s", "us": "us", "µs": "us", "μs": "us", "microsecond": "us", "microseconds": "us",
-    "millisekunden": "ms", "sekunden": "s", "v": "V", "volt": "V", "volts": "V", "mv": "mV", "millivolt": "mV",
-    "millivolts": "mV", "uv": "uV", "µv": "uV", "μv": "uV", "microv": "uV", "microvolt": "uV", "microvolts": "uV",
-    "mikrovolt": "uV", "nv": "nV", "nanovolt": "nV", "nanovolts": "nV",
-}  # fmt: skip
+_WORDS: Final = {
+    "ms": "ms msec msecs millisec millisecond milliseconds millisekunden",
+    "s": "s sec secs second seconds sekunden",
+    "us": "us µs μs microsecond microseconds",
+    "V": "v volt volts",
+    "mV": "mv mvolt mvolts millivolt millivolts",
+    "uV": "uv µv μv microv uvolt uvolts µvolt µvolts microvolt microvolts mikrovolt",
+    "nV": "nv nvolt nanovolt nanovolts",
+    "samples": "sample samples frames",
+    "mV·ms": "mvms mv*ms mv·ms uvms uv*ms uv·ms µvms µv*ms µv·ms μv·ms",  # of areas, and of no amplitude
+    "%": "%",
+}
+UNIT_WORDS: Final[Mapping[str, str]] = {word: unit for unit, words in _WORDS.items() for word in words.split()}
 """Units as files write them, in lower case."""
 
 COLUMNS: Final[Mapping[str, tuple[str, ...]]] = {
@@ -127,6 +133,8 @@ class Layout(Checked):
         for quantity in (ISI_UNITS_MS, EMG_UNITS):
             if len(several := {*self.units} & quantity.keys()) > 1:
                 raise InvalidValueError("two units of one quantity are stated", got=sorted(several), expected="one")
+        if len(names := {*self.channels.values()}) < len(self.channels):
+            raise InvalidValueError("one channel is stated for two things", got=sorted(names), remedy="Leave one out.")
         if both := sorted(self.markers.keys() & self.channels.keys()):
             raise InvalidValueError(f"both a marker and a channel are stated for {both[0]}", remedy="Leave one out.")
 

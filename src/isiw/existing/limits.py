@@ -7,8 +7,7 @@ import math
 import os
 import re
 import zipfile
-from collections import Counter
-from collections.abc import Hashable, Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import islice
 from pathlib import Path
@@ -161,47 +160,37 @@ def _require_lines(limits: ReadingLimits, source: str, file: IO[bytes]) -> None:
 
 def require_table(limits: ReadingLimits, frame: pd.DataFrame, source: str) -> None:
     """Raise if a table has too many rows, columns or cells, or too long a name or text."""
-    for what, got, most in (
+    names = "has too long a name of a column", map(str, frame.columns), limits.name_length
+    texts = (
+        (f"has too long a text in the column {name!r}", cells.tolist(), limits.cell_length)
+        for name, cells in frame.items()
+        if not pd.api.types.is_numeric_dtype(cells)
+    )
+    _require_most(
+        source,
         ("has too many columns", frame.shape[1], limits.columns),
         ("has too many rows", frame.shape[0], limits.rows),
         ("has too many cells", frame.size, limits.cells),
-    ):
+    )
+    for what, cells, most in (names, *texts):
+        longest = max((len(cell) for cell in cells if isinstance(cell, str | bytes)), default=0)
+        if longest > most:
+            raise passed(source, what, f"{longest} characters", most, " characters")
+
+
+def require_visits(limits: ReadingLimits, source: str, trials: Sequence[int]) -> None:
+    """Raise if a table is of too many visits, or has too many trials of one, of which each has so many."""
+    _require_most(
+        source,
+        ("has too many people and days", len(trials), limits.visits),
+        ("has too many trials of one person and day", max(trials, default=0), limits.trials),
+    )
+
+
+def _require_most(source: str, *counts: tuple[str, int, int]) -> None:
+    for what, got, most in counts:
         if got > most:
             raise passed(source, what, got, most)
-    longest_name = max((len(str(name)) for name in frame.columns), default=0)
-    if longest_name > limits.name_length:
-        raise passed(
-            source, "has too long a name of a column", f"{longest_name} characters", limits.name_length, " characters"
-        )
-    for name, cells in frame.items():
-        if pd.api.types.is_numeric_dtype(cells):
-            continue
-        longest = max((len(cell) for cell in cells.tolist() if isinstance(cell, str | bytes)), default=0)
-        if longest > limits.cell_length:
-            raise passed(
-                source,
-                f"has too long a text in the column {name!r}",
-                f"{longest} characters",
-                limits.cell_length,
-                " characters",
-            )
-
-
-def require_visits(limits: ReadingLimits, source: str, visits: Iterable[Hashable], *, parted: bool = True) -> None:
-    """Raise if a table is of too many visits, or has too many trials of one.
-
-    Args:
-        limits: the most that is read.
-        source: the table in words.
-        visits: of each trial, what differs between people and visits.
-        parted: whether it differs between all visits of a person, so that trials can be counted.
-    """
-    trials = Counter(visits)
-    if len(trials) > limits.visits:
-        raise passed(source, "has too many people and days", len(trials), limits.visits)
-    most = max(trials.values(), default=0)
-    if parted and most > limits.trials:
-        raise passed(source, "has too many trials of one person and day", most, limits.trials)
 
 
 def limit_memory(memory_mb: float) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import permutations
@@ -23,7 +23,7 @@ from isiw.existing.frames import named
 from isiw.existing.layout import Layout
 from isiw.existing.limits import ReadingLimits
 from isiw.existing.markers import marked, names_of, times_of
-from isiw.existing.reading import contents_in, people_of_contents
+from isiw.existing.reading import people_of_contents
 from isiw.existing.tables import Columns
 from isiw.text.sanitize import command, counted
 from isiw.types import FloatArray, Reference
@@ -86,9 +86,8 @@ def look(
     return Look(tuple(said["lines"]), said["command"], said["missing"], *(sweeps or [None]))
 
 
-def seen_in(path: Path, layout: Layout, limits: ReadingLimits, on_rows: Callable[[int], object]) -> Answer:
-    """The people in a file, as far as they can be read, and what is said of it, found by this process."""
-    contents = contents_in(path, layout, limits, on_rows)
+def seen_in(contents: Contents, path: Path, layout: Layout, limits: ReadingLimits) -> Answer:
+    """The people in a file, as far as they can be read, and what is said of its contents."""
     triggers = {} if len(contents.events) else dict(_triggers(contents))
     proposed = _with_markers(contents, triggers, layout)
     people, missing = list[Delivered](), ""

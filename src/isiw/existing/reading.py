@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import fields, replace
 from pathlib import Path
@@ -16,7 +16,7 @@ from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.existing import formats, frames, recordings, tables
 from isiw.existing.apart import read_apart
-from isiw.existing.cells import Column, is_missing
+from isiw.existing.cells import is_missing
 from isiw.existing.dates import dates_of, latest_of, times_of
 from isiw.existing.delivered import Delivered, anywhere, read_log, renumbered
 from isiw.existing.doubts import ALL, require_codes, require_isis, require_one_kind, require_one_row_each, require_short
@@ -36,12 +36,6 @@ from isiw.visit import Visit
 
 _STRONGEST_PCT_RMT: Final = 300.0
 """No stimulator reaches more in a person whose threshold can be found [% RMT]."""
-
-_OF_FILES: Final[Mapping[str, Mapping[str, None]]] = {
-    **dict.fromkeys(frames.TEXTS, dict.fromkeys(("skip_lines", "names", "separator"))),
-    **dict.fromkeys(frames.WORKBOOKS, dict.fromkeys(("skip_lines", "names", "sheet"))),
-}
-"""What of a layout is of files with a suffix alone."""
 
 
 def read_people(
@@ -81,24 +75,12 @@ def read_people(
     return read_apart(path, layout, subject, limits or ReadingLimits(), also).people
 
 
-def people_in(
-    path: Path,
-    layout: Layout,
-    subject: str,
-    limits: ReadingLimits,
-    on_rows: Callable[[int], object] = lambda _rows: None,
-) -> list[Delivered]:
-    """The people whose trials a file holds, read by this process, which is informed how many rows a table has."""
-    return people_of_contents(contents_in(path, layout, limits, on_rows), path, layout, subject, limits)
-
-
-def contents_in(path: Path, layout: Layout, limits: ReadingLimits, on_rows: Callable[[int], object]) -> Contents:
-    """What a file holds, within limits."""
+def contents_in(path: Path, layout: Layout, limits: ReadingLimits) -> Contents:
+    """What a file holds, within limits, read by this process."""
     require_file(limits, path, text=path.suffix.lower() in frames.TEXTS)
     contents = formats.read(path, layout)
     if contents.trials is not None:
         require_table(limits, contents.trials, path.name)
-        on_rows(len(contents.trials))
     return contents
 
 
@@ -115,9 +97,9 @@ def people_of_contents(
 
 def _require_used(contents: Contents, path: Path | None, layout: Layout) -> None:
     """Raise if something is stated that contents of this kind have no use for."""
-    in_columns = path is not None and formats.format_of(path).is_table
-    used: dict[str, AbstractSet[str] | None] = dict.fromkeys(("reference", "units", "longest_isi_ms"))
-    used |= _OF_FILES.get("" if path is None else path.suffix.lower(), {})
+    of_path = None if path is None else formats.format_of(path)
+    in_columns, options = (False, ()) if of_path is None else (of_path.is_table, of_path.options)
+    used: dict[str, AbstractSet[str] | None] = dict.fromkeys(("reference", "units", "longest_isi_ms", *options))
     if contents.trials is not None:
         used |= dict.fromkeys(("columns", "where", "alone", "decimal"))
     if contents.tracks:
@@ -177,9 +159,6 @@ def people_of(
     rows = [n for n in columns.chosen(layout) if not all(is_missing(cells[n]) for cells in given)]
     if not rows:
         raise InvalidValueError(f"{source} has no trials", remedy="Are the right columns named?")
-    if limits is not None:
-        kinds = zip(_kinds(columns["subject"], rows), _kinds(columns["day"], rows), strict=True)
-        require_visits(limits, source, kinds, parted="day" in columns.of or "date" not in columns.of)
     subjects = [columns["subject"].text(row) for row in rows]
     require_codes(subjects, rows, columns)
     if any(subjects) and not all(subjects):
@@ -193,7 +172,7 @@ def people_of(
         (own, subject, day) for subject, theirs in people.items() for day, own in _days(columns, theirs, dates).items()
     ]
     if limits is not None:
-        require_visits(limits, source, (visit for visit, (own, _, _) in enumerate(visits) for _ in own))
+        require_visits(limits, source, [len(own) for own, _, _ in visits])
     found = []
     for own, subject, day in sorted(visits, key=lambda visit: visit[0][0]):
         begun = dates[own[0]].isoformat(timespec="microseconds") if own[0] in dates else ""
@@ -201,11 +180,6 @@ def people_of(
         given_by = latest_of([columns["date"].text(row) for row in own], [dates.get(row) for row in own])
         found.append(replace(person, visit=replace(person.visit, day=day), created=begun, given_by=given_by))
     return found
-
-
-def _kinds(column: Column, rows: Sequence[int]) -> Iterator[str]:
-    """What tells the cells of some rows from each other, found faster than what they say."""
-    return (cell if isinstance(cell := column.cells[row], str) else column.text(row) for row in rows)
 
 
 def _days(

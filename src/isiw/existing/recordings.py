@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any, Final
 
@@ -40,17 +40,6 @@ Found = tuple[Stimulus, Sweep, Mapping[str, Any]]
 """What was given, what was recorded of it, and what the file says of it."""
 
 
-@dataclass(frozen=True, eq=False)
-class Recording:
-    """Channels of a file by what they hold, the EMG's unit, and events."""
-
-    tracks: Mapping[str, Track]
-    unit: str
-    events: pd.DataFrame
-    source: str
-    notes: tuple[str, ...] = ()
-
-
 def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
     """The trials of what a file holds, whose sweeps are cut already or are yet to be cut out."""
     held = {"emg": None, **dict.fromkeys(key for key in layout.channels if key != "events")}
@@ -65,10 +54,13 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
     if known not in {None, unit}:
         notes = (*notes, f"{contents.source} says {said}, and {unit} is used, as stated.")
     signals = {key: track for key, track in tracks.items() if key not in MARKERS}
-    recording = Recording(signals, unit, events, contents.source, notes)
-    if contents.trials is not None and contents.pulse_at_s is not None:
-        return _of_rows(contents, recording, layout, subject)
-    return delivered_of(recording, sweeps_of(recording, layout), layout, subject)
+    signals["emg"] = signals["emg"].scaled(EMG_UNITS[unit])  # in mV
+    contents = replace(contents, events=events, notes=notes)
+    layout.required_reference(contents.source)
+    if contents.trials is None or contents.pulse_at_s is None:
+        return delivered_of(contents, unit, sweeps_of(contents, signals, layout), layout, subject)
+    sweeps, columns, person = _of_rows(contents, signals["emg"], layout)
+    return replace(delivered_of(contents, unit, sweeps, layout, person or subject), unused=columns.unused)
 
 
 def track_of(contents: Contents, key: str, layout: Layout) -> Track:
@@ -92,22 +84,21 @@ def track_of(contents: Contents, key: str, layout: Layout) -> Track:
     return fitting[0]
 
 
-def _of_rows(contents: Contents, recording: Recording, layout: Layout, subject: str) -> Delivered:
-    """The trials of sweeps that a row each says the ISI of."""
-    layout.required_reference(recording.source)
+def _of_rows(contents: Contents, emg: Track, layout: Layout) -> tuple[list[Found], Columns, str]:
+    """Sweeps that a row each says the ISI of, the columns of these, and whose they are, if that is said."""
     told = replace(layout, alone="") if layout.alone is None and contents.empty_is_alone else layout
-    columns = Columns.found(named(contents.trials), told, recording.source, needed=("isi",))
-    emg, zero_s = recording.tracks["emg"], contents.pulse_at_s or 0.0
+    columns = Columns.found(named(contents.trials), told, contents.source, needed=("isi",))
+    zero_s = contents.pulse_at_s or 0.0
     if len(emg.stretches) != columns.rows:
         raise InvalidValueError(
-            f"{recording.source} does not say the ISI of each sweep",
+            f"{contents.source} does not say the ISI of each sweep",
             got=f"{columns.rows} rows and {len(emg.stretches)} sweeps",
         )
-    known, names = {*layout.markers.values()}, names_of(recording.events)
+    known, names = {*layout.markers.values()}, names_of(contents.events)
     if known and {*names}.isdisjoint(known | {re.sub(r"\D", "", one) for one in known}):  # MNE may keep the number
         got, expected = ", ".join(sorted(known)), f"one of {', '.join(names)}"
-        raise InvalidValueError(f"no sweep of {recording.source} is marked so", got=got, expected=expected)
-    about_tap = {round(at, 6) for at in marked(recording.events, origin_key(layout), layout)}
+        raise InvalidValueError(f"no sweep of {contents.source} is marked so", got=got, expected=expected)
+    about_tap = {round(at, 6) for at in marked(contents.events, origin_key(layout), layout)}
     rows = columns.chosen(told)
     columns.require_said(rows, told.alone)
     begin = "t_hit_ms" if layout.reference == "impact" else "t_valve_ms"
@@ -119,15 +110,14 @@ def _of_rows(contents: Contents, recording: Recording, layout: Layout, subject: 
         stretch = emg.stretches[row]
         at_tap = round(stretch.start_s + zero_s, 6) in about_tap
         pulse_ms = 1e3 * zero_s + ((isi_ms or 0.0) if at_tap else 0.0)
-        values = EMG_UNITS[recording.unit] * emg.read(stretch.first, stretch.first + stretch.samples)
+        values = emg.read(stretch.first, stretch.first + stretch.samples)
         begins: dict[str, Any] = {begin: None if isi_ms is None else -isi_ms}
         meant = Stimulus(number, None if isi_ms is None else max(isi_ms, 0.0))
         sweep = Sweep({"emg": Channel(values, emg.rate_hz, "mV", -pulse_ms)}, t_tms_ms=0.0, **begins)
         lost = layout.unmarked == "lost" and not columns["isi"].text(row)
         sweeps.append((meant, sweep, {"excluded": columns.lost(row) is not None, "lost": lost}))
-    require_short([one[0].isi_ms for one in sweeps if one[0].isi_ms is not None], layout, recording.source)
-    found = delivered_of(recording, sweeps, layout, _only_one(columns, rows, recording.source) or subject)
-    return replace(found, unused=columns.unused)
+    require_short([one[0].isi_ms for one in sweeps if one[0].isi_ms is not None], layout, contents.source)
+    return sweeps, columns, _only_one(columns, rows, contents.source)
 
 
 def _only_one(columns: Columns, rows: Sequence[int], source: str) -> str:
@@ -148,9 +138,9 @@ def origin_key(layout: Layout) -> str:
     return "tap" if layout.reference == "impact" else "valve"
 
 
-def delivered_of(recording: Recording, sweeps: Sequence[Found], layout: Layout, subject: str) -> Delivered:
+def delivered_of(contents: Contents, unit: str, sweeps: Sequence[Found], layout: Layout, subject: str) -> Delivered:
     """The sweeps as trials, judged as in a session."""
-    reference = layout.required_reference(recording.source)
+    reference = layout.required_reference(contents.source)
     signals = SignalLimits() if layout.mep_window_ms is None else SignalLimits(mep_window_ms=layout.mep_window_ms)
     trials: list[Trial] = []
     for stimulus, sweep, said in sweeps:
@@ -162,11 +152,11 @@ def delivered_of(recording: Recording, sweeps: Sequence[Found], layout: Layout, 
     if trials and not any(trial.told for trial in trials):
         reasons = sorted({str(trial.reason) for trial in trials if trial.reason})
         raise InvalidValueError(
-            f"no sweep of {recording.source} counts",
+            f"no sweep of {contents.source} counts",
             got=", ".join(reasons) or "excluded ones",
             remedy=" ".join(
                 [
-                    *recording.notes,
+                    *contents.notes,
                     "Is the EMG channel the right one, its unit right, and the marker of the pulse? Is the EMG at rest",
                     f"without mains hum, at most {signals.background_uv:g} µV RMS? See docs/timing.md.",
                 ]
@@ -177,31 +167,30 @@ def delivered_of(recording: Recording, sweeps: Sequence[Found], layout: Layout, 
         renumbered(trials),
         reference,
         subject=subject,
-        source=recording.source,
+        source=contents.source,
         signals=signals,
-        units=("ms", recording.unit),
+        units=("ms", unit),
         sweeps={number: sweep.channels for number, (_, sweep, _) in enumerate(sweeps) if sweep.channels},
-        notes=(*recording.notes, *is_rectified(emg)),
+        notes=(*contents.notes, *is_rectified(emg)),
     )
 
 
-def sweeps_of(recording: Recording, layout: Layout) -> list[Found]:
+def sweeps_of(contents: Contents, signals: Mapping[str, Track], layout: Layout) -> list[Found]:
     """A stretch of the recording for each pulse, with what came before it."""
-    layout.required_reference(recording.source)
-    pulses = pulses_of(recording.events, origin_key(layout), layout, recording.source)
+    pulses = pulses_of(contents.events, origin_key(layout), layout, contents.source)
     if any(after.at_s - before.at_s < _AFTER_MS / 1e3 for before, after in pairwise(pulses)):
         raise InvalidValueError(
-            f"two pulses of {recording.source} are less than {_AFTER_MS:g} ms apart",
+            f"two pulses of {contents.source} are less than {_AFTER_MS:g} ms apart",
             remedy="Is the marker of the pulse the right one? Say --marker pulse=NAME.",
         )
     longest_s = max((pulse.isi_s or 0.0 for pulse in pulses), default=0.0)
-    events, found = recording.events, list[Found]()
+    events, found = contents.events, list[Found]()
     bad = events[events["name"].astype(str).str.lower().str.startswith("bad")]  # as MNE takes them
     for number, pulse in enumerate(pulses):
         begin_s = pulse.at_s - _BEFORE_MS / 1e3 - longest_s
         span_s = pulse.sweep_s or (begin_s, pulse.at_s + _AFTER_MS / 1e3)
         origin_s = None if pulse.isi_s is None else pulse.at_s - pulse.isi_s
-        sweep = _cut(recording, span_s, pulse.at_s, origin_s, origin_key(layout))
+        sweep = _cut(signals, span_s, pulse.at_s, origin_s, origin_key(layout))
         said: dict[str, Any] = {**pulse.said, "lost": pulse.lost}
         judged_s = min(pulse.at_s - _BEFORE_MS / 1e3, origin_s or pulse.at_s), pulse.at_s + _AFTER_MS / 1e3
         if ((bad["onset"] <= judged_s[1]) & (bad["onset"] + bad["duration"] >= judged_s[0])).any():
@@ -213,17 +202,18 @@ def sweeps_of(recording: Recording, layout: Layout) -> list[Found]:
     return found
 
 
-def _cut(recording: Recording, span_s: tuple[float, float], pulse_s: float, origin_s: float | None, key: str) -> Sweep:
+def _cut(
+    signals: Mapping[str, Track], span_s: tuple[float, float], pulse_s: float, origin_s: float | None, key: str
+) -> Sweep:
     """What all channels have of a stretch without a gap, whose clock begins at the first sample of the EMG."""
     cut: dict[str, Channel] = {}
     start_s = span_s[0]
-    for name, track in recording.tracks.items():
+    for name, track in signals.items():
         stretch = track.at(pulse_s)
         if stretch is not None:
             own_s, values = track.cut(stretch, *span_s)
             start_s = own_s if name == "emg" else start_s
-            factor, unit = (EMG_UNITS[recording.unit], "mV") if name == "emg" else (1.0, "V")
-            cut[name] = Channel(factor * values, track.rate_hz, unit, 1e3 * (own_s - start_s))
+            cut[name] = Channel(values, track.rate_hz, "mV" if name == "emg" else "V", 1e3 * (own_s - start_s))
     origin_ms = None if origin_s is None else 1e3 * (origin_s - start_s)
     begin: dict[str, Any] = {"t_valve_ms" if key == "valve" else "t_hit_ms": origin_ms}
     return Sweep(cut, t_tms_ms=1e3 * (pulse_s - start_s), **begin)

@@ -18,6 +18,8 @@ from isiw.text.sanitize import counted
 _VAGUE: Final = frozenset({"interval", "delay", "soa", "amplitude", "amp", "peaktopeak", "peaktopeakamplitude",
                            "emgpeaktopeak", "p2pamplitude", "ptpamplitude", "p2p", "ptp"})  # fmt: skip
 """Names of columns that may also be of the interval between trials, or of the stimulus: two of them are asked about."""
+_VERDICTS: Final = frozenset({"status", "exclude"})
+"""Of which two columns may say what one does not."""
 
 
 @dataclass(frozen=True)
@@ -185,7 +187,7 @@ def _named(key: str, names: list[str], layout: Layout, source: str) -> str | Non
     free = [(name, letters(name)) for name in names if name not in layout.columns.values()]
     fitting = {known: [name for name, plain in free if plain == known] for known in COLUMNS[key]}
     found = [known for known in COLUMNS[key] if fitting[known]]
-    rivals = [known for known in found if known == found[0] or {known, found[0]} <= _VAGUE]
+    rivals = [known for known in found if known == found[0] or {known, found[0]} <= _VAGUE or key in _VERDICTS]
     several = [name for known in rivals for name in fitting[known]]
     if len(several) > 1:
         raise InvalidValueError(
@@ -215,5 +217,10 @@ def unit_said(name: str, known: Mapping[str, float]) -> str | None:
 def _required_unit(what: str, column: Column, layout: Layout, known: Mapping[str, float]) -> str:
     """The column's unit, as it is stated or as its name says."""
     some = ", ".join(filter(None, map(column.text, range(min(5, len(column.cells)))))) or None
+    if (other := unit_said(column.name, dict.fromkeys({*UNIT_WORDS.values()} - known.keys(), 1.0))) is not None:
+        remedy = "Name the right column: --column KEY=NAME; if it is the right one, correct its name."
+        raise InvalidValueError(
+            f"the column {column.name!r} of {column.of} says a unit of no {what}", got=other, remedy=remedy
+        )
     what = f"the {what} of {column.of} in the column {column.name!r}"
     return required_unit(layout, known, unit_said(column.name, known), what, some)

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from isiw.errors import ConfigError, InvalidValueError
-from isiw.existing.formats import acq, cfs, columns, edf, eeglab, matlab, mne_files, nwb, smr, statistics, windows, xdf
+from isiw.existing.formats import acq, columns, edf, eeglab, installed, matlab, mne_files, nwb, smr, statistics, xdf
 from isiw.existing.formats.contents import Contents
+from isiw.existing.frames import TEXTS, WORKBOOKS
 from isiw.existing.layout import Layout
 
 
@@ -22,6 +23,7 @@ class Format(NamedTuple):
     way_in: str
     library: str = ""
     is_table: bool = False
+    options: tuple[str, ...] = ()  # what of a layout is of such files alone
 
 
 _TABLE: Final = "Save it as CSV, with the columns' names in the first line."
@@ -32,8 +34,10 @@ _XDF: Final = "Record again with LabRecorder, or save the streams as EDF+."
 _ACQ: Final = "In AcqKnowledge: File, Save As, text (.txt) or MATLAB (.mat), and a layout."
 
 FORMATS: Final = (
-    Format("text", (".csv", ".tsv", ".txt", ".dat", ".tab"), columns.read, _TABLE, is_table=True),
-    Format("Excel", (".xlsx", ".xlsm"), columns.read, _TABLE, "openpyxl", is_table=True),
+    Format("text", TEXTS, columns.read, _TABLE, is_table=True, options=("skip_lines", "names", "separator")),
+    Format(
+        "Excel", WORKBOOKS, columns.read, _TABLE, "openpyxl", is_table=True, options=("skip_lines", "names", "sheet")
+    ),
     Format("Parquet", (".parquet",), columns.read, _TABLE, "pyarrow", is_table=True),
     Format("MATLAB", (".mat",), matlab.read, "In MATLAB: save('P01.mat', 'isi_ms', 'mep_mv', '-v7').", is_table=True),
     Format("EDF and BDF", (".edf", ".bdf"), edf.read, "Export it again, as EDF+."),
@@ -42,12 +46,12 @@ FORMATS: Final = (
     Format("FIF", (".fif", ".fif.gz"), mne_files.read, _MNE, "mne"),
     Format("XDF", (".xdf", ".xdfz"), xdf.read, _XDF, "pyxdf"),
     Format("AcqKnowledge", (".acq",), acq.read, _ACQ, "bioread"),
-    Format("Spike2", (".smr",), smr.read, windows.SMRX, "neo"),
+    Format("Spike2", (".smr",), smr.read, installed.SMRX, "neo"),
     Format("NWB", (".nwb",), nwb.read, "Is it a file of NWB 2, and complete?", "pynwb"),
     Format("SPSS and Stata", (".sav", ".zsav", ".por", ".dta"), statistics.read, _TABLE, "pyreadstat", is_table=True),
-    Format("Signal", (".cfs",), cfs.read, cfs.WAY_IN),
-    Format("Spike2 from version 8 on", (".smrx",), windows.smrx, windows.SMRX),
-    Format("LabChart", (".adicht",), windows.adicht, windows.ADICHT),
+    Format("Signal", (".cfs",), installed.cfs, installed.CFS),
+    Format("Spike2 from version 8 on", (".smrx",), installed.smrx, installed.SMRX),
+    Format("LabChart", (".adicht",), installed.adicht, installed.ADICHT),
     Format("CNT, GDF and MFF", (".cnt", ".gdf", ".mff"), mne_files.read, _MNE, "mne"),
 )
 

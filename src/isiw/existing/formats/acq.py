@@ -43,7 +43,9 @@ def read(path: Path, _layout: Layout) -> Contents:
     for index, channel in enumerate(held.channels):
         rate_hz = float(channel.samples_per_second)
         stretches = parted((round(at / base_hz * rate_hz) for at in cuts), int(channel.point_count), rate_hz)
-        tracks.append(Track(channel.name.strip(), rate_hz, stretches, partial(_part, numbers, index), channel.units))
+        part = partial(_part, numbers, index)
+        track = Track(channel.name.strip(), rate_hz, stretches, part, channel.units)
+        tracks.append(track.scaled(float(channel.raw_scale_factor), float(channel.raw_offset)))
     whole = parted(cuts, max((at for at, _ in placed), default=0) + 1, base_hz)
     rows = [
         (one.text.strip() or str(one.type).replace("None", "marker"), time_of(at, whole, base_hz), 0.0)
@@ -54,6 +56,4 @@ def read(path: Path, _layout: Layout) -> Contents:
 
 
 def _part(numbers: Any, index: int, first: int, last: int) -> FloatArray:
-    channel = numbers(index)
-    values: FloatArray = np.asarray(channel.raw_data[first:last], dtype=np.float64)
-    return values * float(channel.raw_scale_factor) + float(channel.raw_offset)
+    return np.asarray(numbers(index).raw_data[first:last], dtype=np.float64)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Final, Literal
 
@@ -32,16 +33,15 @@ def read(path: Path, layout: Layout) -> Contents:
         require_one("column", source, name, frame, remedy)
     breaks = frame.iloc[:, 0].astype(str).str.endswith("=").to_numpy()
     frame, block = frame[~breaks], np.cumsum(breaks)[~breaks]
-    pauses_s, first_block = dict[int, float](), frame[block == block[:1]]
-    for place, name in enumerate(frame.columns):
-        if name not in layout.channels.values() and (clock := clock_of(first_block.iloc[:, place], name, rate_hz)):
+    pauses_s, blocks = dict[int, float](), np.flatnonzero(np.diff(block, prepend=-1)).tolist()
+    for (begin, end), (place, name) in product(pairwise([*blocks, len(frame)]), enumerate(frame.columns)):
+        if name not in layout.channels.values() and (clock := clock_of(frame.iloc[begin:end, place], name, rate_hz)):
             require_rate(rate_hz, clock[0], f"the column {name!r} of {source}")
             pauses_s = pauses_s or clock[1]
-    blocks = np.flatnonzero(np.diff(block, prepend=-1)).tolist()
     stretches = parted(blocks if len(blocks) > 1 else pauses_s, len(block), rate_hz, pauses_s)
     tracks = list[Track]()
     for key, name in layout.channels.items():
-        if key != "events" and name not in {track.name for track in tracks}:
+        if key != "events":
             values = _numbers(frame, name, layout, source)
             unit, kind = unit_said(name, EMG_UNITS) or "", "stim" if key in MARKERS else ""
             tracks.append(Track.of_values(name, rate_hz, stretches, values, unit, kind))
@@ -69,7 +69,7 @@ def require_rate(stated_hz: float, found_hz: float, where: str) -> None:
             f"the sampling rate is not the one that {where} says",
             got=f"{stated_hz:g} Hz",
             expected=f"{found_hz:g} Hz",
-            remedy="Correct rate_hz in the layout.",
+            remedy="Correct rate_hz in the layout; what has another rate must be a file of its own.",
         )
 
 
@@ -78,10 +78,10 @@ def clock_of(cells: pd.Series, name: str, rate_hz: float) -> tuple[float, dict[i
     times = pd.to_numeric(cells.astype(str).str.replace(",", "."), errors="coerce").to_numpy(dtype=np.float64)
     steps = np.diff(times)
     usual = float(np.median(steps)) if len(steps) > 1 else 0.0
-    late = np.flatnonzero(steps > 1.5 * usual)
+    late = np.flatnonzero((steps > 1.5 * usual) | (steps < 0))  # or they begin again, and nobody knows how much later
     if not 0 < len(late) < _FEW * len(steps):
         late = late[:0]
-    over = steps[late] - usual
+    over = np.maximum(steps[late] - usual, 0.0)
     steps[late] = usual
     step = float(steps.mean()) if len(steps) > 1 else 0.0
     if not step > 0 or not np.all(np.abs(np.cumsum(steps - step)) <= 1.01 * step):  # they may be rounded

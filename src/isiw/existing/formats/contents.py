@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from operator import itemgetter
 from pathlib import Path
 from types import MappingProxyType
@@ -51,6 +52,11 @@ def time_of(sample: float, stretches: Sequence[Stretch], rate_hz: float) -> floa
     return stretch.start_s + (sample - stretch.first) / rate_hz
 
 
+def part_of(values: Any, first: int, last: int) -> FloatArray:
+    """Numbers that are in memory, or are read when they are chosen, from one sample to before another."""
+    return np.asarray(values[first:last], dtype=np.float64)
+
+
 @dataclass(frozen=True, eq=False)
 class Track:
     """A channel of a file, whose samples are read when they are needed."""
@@ -67,11 +73,11 @@ class Track:
         cls, name: str, rate_hz: float, stretches: Iterable[Stretch], values: Any, unit: str, kind: str = ""
     ) -> Track:
         """A channel in memory."""
+        return cls(name, rate_hz, tuple(stretches), partial(part_of, values), unit, kind)
 
-        def part(first: int, last: int) -> FloatArray:
-            return np.asarray(values[first:last], dtype=np.float64)
-
-        return cls(name, rate_hz, tuple(stretches), part, unit, kind)
+    def scaled(self, gain: float, offset: float = 0.0) -> Track:
+        """The same, each number times a gain, and an offset added."""
+        return replace(self, read=lambda first, last: gain * self.read(first, last) + offset)
 
     def at(self, time_s: float) -> Stretch | None:
         """The stretch that a time is in; None in a gap."""

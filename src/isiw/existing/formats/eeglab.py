@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.existing.formats.contents import Contents, Track, events_of, parted, time_of
+from isiw.existing.formats.contents import Contents, Track, events_of, part_of, parted, time_of
 from isiw.existing.layout import EMG_UNITS, Layout
 from isiw.files import opened
 from isiw.text.named_code import library
@@ -35,13 +35,14 @@ def read(path: Path, layout: Layout) -> Contents:
               for one in events if _name(one.get("type")) == "boundary"}  # fmt: skip
     cuts: Iterable[int] = range(samples, trials * samples, samples) if trials > 1 else pauses
     stretches = parted(cuts, trials * samples, rate_hz, {} if trials > 1 else pauses)
-    tracks = []
-    for n in range(int(eeg["nbchan"])):
+    tracks, count, data = [], int(eeg["nbchan"]), eeg["data"]
+    whole = None if isinstance(data, str) else np.reshape(data, (count, -1), order="F")
+    for n in range(count):
         place = places[n] if n < len(places) else {}
         label = str(place.get("labels") or f"channel {n + 1}")
-        kind = str(place.get("type") or "").casefold() if isinstance(place.get("type"), str) else ""
-        track = Track(label, rate_hz, stretches, partial(_values, eeg, path, n), "uV", kind)
-        tracks.append(track)
+        kind = place["type"].casefold() if isinstance(place.get("type"), str) else ""
+        read = partial(_beside, path, data, count, n) if whole is None else partial(part_of, whole[n])
+        tracks.append(Track(label, rate_hz, stretches, read, "uV", kind))
     rows = [
         (
             _name(one["type"]),
@@ -55,23 +56,13 @@ def read(path: Path, layout: Layout) -> Contents:
     return Contents(path.name, tuple(tracks), events_of(rows), notes=notes).with_bids(path)
 
 
-def _values(eeg: Mapping[str, Any], path: Path, channel: int, first: int, last: int) -> FloatArray:
-    """Numbers of a channel, which are in this file, or in one beside it."""
-    count, data = int(eeg["nbchan"]), eeg["data"]
-    if isinstance(data, str):
-        beside = path.with_name(Path(data.replace("\\", "/")).name)  # a folder of another computer is not meant
-        with opened(beside if beside.exists() else path.parent / data) as file:
-            file.seek(4 * count * first)
-            return (
-                np.frombuffer(file.read(4 * count * (last - first)), "<f4")
-                .reshape(-1, count)[:, channel]
-                .astype(np.float64)
-            )
-    values = np.asarray(data)
-    if count == 1 and (values.ndim == 1 or values.shape[0] != 1 or values.ndim < 2):
-        values = values[None]
-    flat = values[channel] if values.ndim < 3 else values[channel].T.ravel()
-    return np.asarray(flat[first:last], dtype=np.float64)
+def _beside(path: Path, name: str, count: int, channel: int, first: int, last: int) -> FloatArray:
+    """Numbers of a channel, of so many, in the file beside this one."""
+    beside = path.with_name(Path(name.replace("\\", "/")).name)  # a folder of another computer is not meant
+    with opened(beside if beside.exists() else path.parent / name) as file:
+        file.seek(4 * count * first)
+        whole = np.frombuffer(file.read(4 * count * (last - first)), "<f4")
+    return whole[channel::count].astype(np.float64)
 
 
 def _listed(value: Any) -> list[Mapping[str, Any]]:

@@ -58,8 +58,9 @@ def _channels(series: Any, held: Any) -> Iterator[Track]:
         factor = float(series.conversion or 1.0) * (1.0 if of_each is None else float(of_each[channel]))
         name = series.name if count < 2 else f"{series.name} {channel + 1}"
         place = channel if count else None
-        part = partial(_part, series, held, place, factor, float(series.offset or 0.0))
-        yield Track(name, rate_hz, stretches, part, str(series.unit or ""), "emg" if "emg" in name.casefold() else "")
+        part, kind = partial(_part, series, held, place), "emg" if "emg" in name.casefold() else ""
+        track = Track(name, rate_hz, stretches, part, str(series.unit or ""), kind)
+        yield track.scaled(factor, float(series.offset or 0.0))
 
 
 def _codes(series: Any) -> list[tuple[str, float, float]] | None:
@@ -73,11 +74,9 @@ def _codes(series: Any) -> list[tuple[str, float, float]] | None:
     return [(f"{code}", at, 0.0) for code, at in zip(series.data[:].tolist(), times_s.tolist(), strict=True)]
 
 
-def _part(
-    series: Any, _held: Any, channel: int | None, factor: float, offset: float, first: int, last: int
-) -> FloatArray:
+def _part(series: Any, _held: Any, channel: int | None, first: int, last: int) -> FloatArray:
     values = series.data[first:last] if channel is None else series.data[first:last, channel]
-    return np.asarray(values, dtype=np.float64) * factor + offset
+    return np.asarray(values, dtype=np.float64)
 
 
 def _text(value: Any) -> str:

@@ -30,20 +30,19 @@ def read(path: Path, _layout: Layout) -> Contents:
         starts = [float(raw.get_signal_t_start(0, n, index)) for n in segments]
         firsts = np.cumsum([0, *sizes]).tolist()
         stretches = tuple(Stretch(*each) for each in zip(firsts, sizes, starts, strict=False) if each[1])
-        scaled = partial(_part, raw, index, firsts, float(channel["gain"]), float(channel["offset"]))
-        tracks.append(
-            Track(str(channel["name"]), float(channel["sampling_rate"]), stretches, scaled, str(channel["units"]))
-        )
+        name, unit, part = str(channel["name"]), str(channel["units"]), partial(_part, raw, index, firsts)
+        track = Track(name, float(channel["sampling_rate"]), stretches, part, unit)
+        tracks.append(track.scaled(float(channel["gain"]), float(channel["offset"])))
     rows = [row for index in range(len(raw.header["event_channels"])) for row in _events(raw, index)]
     return Contents(path.name, tuple(tracks), events_of(rows))
 
 
-def _part(raw: Any, index: int, firsts: list[int], gain: float, offset: float, first: int, last: int) -> FloatArray:
+def _part(raw: Any, index: int, firsts: list[int], first: int, last: int) -> FloatArray:
     """Numbers of a channel, of the segment in which they are."""
     segment = int(np.searchsorted(firsts, first, side="right")) - 1
     begin = firsts[segment]
     chunk = raw.get_analogsignal_chunk(0, segment, first - begin, last - begin, index)
-    return np.asarray(chunk[:, 0], dtype=np.float64) * gain + offset
+    return np.asarray(chunk[:, 0], dtype=np.float64)
 
 
 def _events(raw: Any, index: int) -> list[tuple[str, float, float]]:

@@ -1,10 +1,11 @@
-"""Formats whose only readers are for Windows: Spike2 from version 8 on (.smrx), and LabChart (.adicht)."""
+"""Formats whose readers their users install: Signal (.cfs), and on Windows Spike2 8 (.smrx) and LabChart (.adicht)."""
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -14,31 +15,59 @@ from isiw.existing.layout import Layout
 from isiw.text.named_code import library
 from isiw.types import FloatArray
 
-SMRX = (
+CFS: Final = (
+    "In Signal: File, Export As, Text file (.txt), the frames one below the other, or MATLAB data (.mat). A layout "
+    "says what is what: docs/your-data.md."
+)
+SMRX: Final = (
     "In Spike2: File, Export As, Spreadsheet text (.txt), a row a sample, EMG and triggers as columns; or "
     "File, Export As, an older Spike2 file (.smr). A layout says what is what: docs/your-data.md."
 )
-ADICHT = (
+ADICHT: Final = (
     "In LabChart: File, Export, LabChart text (.txt), with block header, time and comments; or MATLAB (.mat). A "
     "layout says what is what: docs/your-data.md."
 )
+_FRAME: Final = 0x7FFE
+"""BioSig's type of an event where a new frame begins."""
+
 _WAVES, _EVENTS, _MARKS, _TEXTS = {1, 9}, {2, 3}, {5}, {8}
+"""sonpy's types of channels."""
 
 
-def _on_windows(module: str, package: str, remedy: str) -> Any:
-    """The reader, on Windows where it is installed; elsewhere how to export the file."""
-    if sys.platform != "win32":
-        raise ConfigError("this format has no reader but on Windows", got=sys.platform, remedy=remedy)
+def _reader(module: str, install: str, way_in: str, *, on_windows: bool = False) -> Any:
+    """The reader, where it is installed; elsewhere how to install it, or how to export the file."""
+    if on_windows and sys.platform != "win32":
+        raise ConfigError("this format has no reader but on Windows", got=sys.platform, remedy=way_in)
     try:
         return library(module, "import")
     except ConfigError as error:
-        said = f"pip install {package}; its licence is its own. Or: {remedy}"
-        raise ConfigError(f"{package} is not installed", remedy=said) from error
+        raise ConfigError(f"{module.partition('.')[0]} is not installed", remedy=f"{install}. Or: {way_in}") from error
+
+
+def cfs(path: Path, _layout: Layout) -> Contents:
+    """The frames and markers of a file of Signal, by BioSig; each frame is a sweep."""
+    biosig = _reader("biosig", "Install BioSig for Python, whose licence is GPL-3", CFS)
+    said, values = json.loads(biosig.header(str(path.resolve()))), np.asarray(biosig.data(str(path.resolve())))
+    rate_hz, count = float(said["Samplingrate"]), len(values)
+    events = [(int(one["TYP"], 16), float(one["POS"]), one) for one in said.get("EVENT", ())]
+    frames = parted((round(at * rate_hz) for kind, at, _ in events if kind == _FRAME), count, rate_hz)
+    tracks = [
+        Track.of_values(one["Label"], rate_hz, frames, values[:, index], one.get("PhysicalUnit", ""))
+        for index, one in enumerate(said["CHANNEL"][: values.shape[1]])
+    ]
+    rows = [("sweep", frame.start_s, frame.samples / rate_hz) for frame in frames if len(frames) > 1]
+    rows += [
+        (str(one.get("Description") or kind), time_of(at * rate_hz, frames, rate_hz), 0.0)
+        for kind, at, one in events
+        if kind != _FRAME
+    ]
+    return Contents(path.name, tuple(tracks), events_of(rows))
 
 
 def smrx(path: Path, _layout: Layout) -> Contents:
     """The waveforms, events and markers of a file of Spike2 8 and later, by CED's sonpy."""
-    held = _on_windows("sonpy.lib", "sonpy", SMRX).SonFile(str(path), bReadOnly=True)
+    sonpy = _reader("sonpy.lib", "pip install sonpy, whose licence is its own", SMRX, on_windows=True)
+    held = sonpy.SonFile(str(path), bReadOnly=True)
     tick_s, end = held.GetTimeBase(), held.MaxTime()
     tracks, rows = list[Track](), list[tuple[str, float, float]]()
     for channel in range(held.MaxChannels()):
@@ -65,7 +94,8 @@ def smrx(path: Path, _layout: Layout) -> Contents:
 
 def adicht(path: Path, _layout: Layout) -> Contents:
     """The channels and comments of a file of LabChart, by adi-reader; its records are apart."""
-    held = _on_windows("adi", "adi-reader", ADICHT).read_file(str(path))
+    adi = _reader("adi", "pip install adi-reader, whose licence is its own", ADICHT, on_windows=True)
+    held = adi.read_file(str(path))
     tracks, rows = list[Track](), list[tuple[str, float, float]]()
     for channel in held.channels:
         parts = [np.asarray(channel.get_data(n + 1), dtype=np.float64) for n in range(channel.n_records)]
