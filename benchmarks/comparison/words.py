@@ -1,0 +1,223 @@
+"""What follows from the comparison: three sentences and two tables, all of them made of its figures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Final
+
+import pandas as pd
+
+from benchmarks.comparison.measures import CRITERIA, JUDGED, SHOWN
+from benchmarks.comparison.rows import EVEN, GUESS
+from isiw.studies import differences
+
+MAIN: Final = "recruitment"
+DEFAULT: Final = "default"
+CRITERION: Final = 0.7
+EARLY, LATE = JUDGED
+OFTEN: Final = 0.05
+"""A larger share that is sure and wrong is named."""
+
+NAMES: Final[Mapping[str, str]] = {
+    GUESS: "one fixed window for everybody, no stimulus",
+    EVEN: "evenly spaced ISIs",
+    "random": "random ISIs",
+    "nr": "the dissertation's nonlinear regression",
+    "gpr": "the dissertation's Gaussian process",
+    "svmr": "the dissertation's support vectors",
+    "pf": "the dissertation's particle filter",
+    DEFAULT: "**isiw's default**",
+}
+"""What the rows of README's table are called, in their order."""
+
+PEOPLE: Final[Mapping[str, str]] = {
+    "recruitment": "noise as near threshold (`recruitment`)",
+    "gaussian": "constant-CV noise (`gaussian`)",
+}
+
+
+def sentences(table: pd.DataFrame, rows: pd.DataFrame) -> list[str]:
+    """What follows: what choosing saves, how the ways to choose differ, and whom not to trust.
+
+    Args:
+        table: as `measures.table_of` gives it.
+        rows: the rows that it was made of.
+    """
+    main = table[table["cohort"] == MAIN].set_index("strategy")
+    compared = differences(rows[(rows["cohort"] == MAIN) & (rows["strategy"] != GUESS)], DEFAULT)
+    defaults = table[table["strategy"] == DEFAULT].set_index("cohort", drop=False)
+    cohorts = [MAIN, *(cohort for cohort in defaults.index if cohort != MAIN)]
+    savings = "; ".join(saving(defaults.loc[cohort].to_dict()) for cohort in cohorts)
+    return [
+        f"{savings[0].upper()}{savings[1:]}.",
+        choosing(compared[compared["trial"] == EARLY]),
+        trusting(main),
+    ]
+
+
+def saving(line: Mapping[str, Any]) -> str:
+    """How many stimuli isiw's default needs to a lasting F1, against even ISIs.
+
+    Args:
+        line: that of the default with a cohort, with the columns of `measures.table_of`.
+    """
+    who, wanted = f"on {line['people']} people of `{line['cohort']}`", f"a mean F1 of {CRITERION:g}".replace("0.", ".")
+    reached, even, ratio, low, high = (
+        line[f"{key}_{CRITERION}"] for key in ("stimuli", "even", "ratio", "low", "high")
+    )
+    if math.isinf(reached):
+        return f"{who} the default does not keep {wanted} within {line['trials']} stimuli"
+    has = f"{who} the default keeps {wanted} from {reached:.0f} stimuli on, evenly spaced ISIs"
+    if math.isinf(even):
+        return f"{has} not within {line['trials']}"
+    found, ends = f"{has} from {even:.0f}", _interval(low, high)
+    if low <= 1.0 <= high:
+        return f"{found}, which may be chance (ratio {short(ratio)}, {ends})"
+    return f"{found}: {_percent(abs(1.0 - ratio))} {'fewer' if ratio < 1.0 else 'more'} (ratio {short(ratio)}, {ends})"
+
+
+def choosing(compared: pd.DataFrame) -> str:
+    """How many other rows are above and below the default, and the best of them.
+
+    Args:
+        compared: as `isiw.studies.differences` gives it against the default, of one cohort and mark.
+    """
+    known = compared[compared["low"].notna()]
+    if not len(known):
+        return f"Of the ways to choose and to estimate nothing can be said after {EARLY} stimuli: too few people."
+    below, above = known[known["high"] < 0], known[known["low"] > 0]
+    best = known.loc[known["difference"].idxmax()]
+    named = f" ({_listed(above['strategy'])})" if len(above) else ""
+    return (
+        f"After {EARLY} stimuli, of {len(known)} other ways to choose and to estimate, {len(below)} have a lower mean F1 "
+        f"than the default on the same people of `{MAIN}`, {len(above)} a higher one{named}, and "
+        f"{len(known) - len(below) - len(above)} cannot be told from it (intervals that hold together with 95 %); the best "
+        f"of the others is `{best['strategy']}` ({signed(best['difference'])}, {signed(best['low'])} to "
+        f"{signed(best['high'])}, {best['people']} people)."
+    )
+
+
+def trusting(main: pd.DataFrame) -> str:
+    """Whose answers are often sure and wrong, and who is no better than the fixed window.
+
+    Args:
+        main: the table of one cohort by strategy.
+    """
+    wrong = main[f"wrong_{EARLY}"].dropna()
+    often = wrong[wrong > OFTEN].sort_values(ascending=False)
+    own = f"{_percent(wrong[DEFAULT])} of the default's answers are sure and wrong" if DEFAULT in wrong else ""
+    many = ", ".join(f"`{name}` {_percent(share)}" for name, share in often.items() if name != DEFAULT)
+    said = f"more than {_percent(OFTEN)} of those of {many}" if many else f"of no row more than {_percent(OFTEN)}"
+    late = main[f"f1_{LATE}"]
+    guess = late[GUESS]
+    rest = late.drop(GUESS)
+    beaten = rest[rest <= guess]
+    no_better = f"not above it are {_listed(beaten.index)}" if len(beaten) else "every row is above it"
+    return (
+        f"After {EARLY} stimuli {own}, {said}; one fixed window for everybody has an F1 of {short(guess)} without any "
+        f"stimulus, and after {LATE} stimuli {no_better}."
+    )
+
+
+def _listed(names: Iterable[Any]) -> str:
+    return ", ".join(f"`{name}`" for name in names)
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %"
+
+
+def _interval(low: float, high: float) -> str:
+    return "too few people for an interval" if math.isnan(low) else f"95 % interval {short(low)} to {short(high)}"
+
+
+def short(value: float) -> str:
+    """A number with two digits behind the point, as .72; — if there is none."""
+    if not math.isfinite(value):
+        return "–"
+    text = f"{value:.2f}"
+    return text.removeprefix("0") if text.startswith("0.") else text
+
+
+def signed(value: float) -> str:
+    """The same with its sign."""
+    return ("−" if value < 0 else "+") + short(abs(value))
+
+
+def compared_rows(rows: pd.DataFrame, cohort: str) -> pd.DataFrame:
+    """The rows of README's table of one cohort, of the people whom all of its methods examined.
+
+    Args:
+        rows: all rows, those of the fixed window, too.
+        cohort: the cohort.
+    """
+    shown = rows[(rows["cohort"] == cohort) & rows["strategy"].isin(list(NAMES))]
+    people = shown.groupby("person")["strategy"].nunique()
+    return shown[shown["person"].isin(people.index[people == shown["strategy"].nunique()])]
+
+
+def readme_table(tables: Mapping[str, pd.DataFrame]) -> str:
+    """README's table.
+
+    Args:
+        tables: by cohort the table of `compared_rows`, as `measures.table_of` gives it.
+    """
+    head = [
+        "people",
+        "method",
+        *(f"{mark} stimuli" for mark in SHOWN),
+        f"to a lasting F1 of {CRITERION:g}".replace("0.", "."),
+    ]
+    lines = [head, ["---"] * len(head)]
+    for cohort, table in tables.items():
+        by_name = table.set_index("strategy")
+        for place, name in enumerate(name for name in NAMES if name in by_name.index):
+            line = by_name.loc[name]
+            who = f"{line['people']}: {PEOPLE[cohort]}" if place == 0 else ""
+            means = [short(line[f"f1_{mark}"]) for mark in SHOWN]
+            lines.append([who, NAMES[name], *means, "" if name == GUESS else stimuli(line, CRITERION)])
+    return "\n".join(f"| {' | '.join(line)} |".replace("|  |", "| |") for line in lines)
+
+
+def stimuli(line: pd.Series, criterion: float) -> str:
+    """Stimuli to a lasting F1; a dash if it is not reached."""
+    found = line[f"stimuli_{criterion}"]
+    return "not reached" if not math.isfinite(found) else f"{found:.0f}"
+
+
+def ratio_of(line: Mapping[str, Any], criterion: float) -> str:
+    """The ratio to even ISIs as a cell of a table."""
+    bound, ratio = line[f"bound_{criterion}"], line[f"ratio_{criterion}"]
+    if bound == "unknown" or line["strategy"] in {EVEN, GUESS}:
+        return "–"
+    if bound:
+        return f"{'<' if bound == 'below' else '>'} {short(ratio)}"
+    return f"{short(ratio)} ({short(line[f'low_{criterion}'])} to {short(line[f'high_{criterion}'])})"
+
+
+def readable(table: pd.DataFrame) -> pd.DataFrame:
+    """The table of one cohort as it is read, the best after `EARLY` stimuli first.
+
+    Args:
+        table: as `measures.table_of` gives it.
+    """
+    lines = table.sort_values(f"f1_{EARLY}", ascending=False).to_dict("records")
+    return pd.DataFrame([_read(line) for line in lines])
+
+
+def _read(line: Mapping[str, Any]) -> dict[str, str]:
+    f1 = {f"F1 at {mark}": f"{short(line[f'f1_{mark}'])} ± {short(line[f'f1_{mark}_se'])}" for mark in SHOWN}
+    ratios = {f"stimuli to {each:g}, / even".replace("0.", "."): ratio_of(line, each) for each in CRITERIA}
+    both: Sequence[tuple[str, str]] = (("expected − actual F1", "excess"), ("edges covered", "coverage"))
+    judged = {name: " / ".join(_cell(line, key, mark) for mark in JUDGED) for name, key in both}
+    wrong = " / ".join("–" if math.isnan(w := line[f"wrong_{mark}"]) else _percent(w) for mark in JUDGED)
+    spent = line["processor_ms"]
+    cost = {"ms a trial": "–" if math.isnan(spent) else f"{spent:.1f}" if spent < 10 else f"{spent:.0f}"}
+    names = {"strategy": line["strategy"], "people": str(line["people"])}
+    return names | f1 | ratios | judged | {"sure and wrong": wrong} | cost
+
+
+def _cell(line: Mapping[str, Any], key: str, mark: int) -> str:
+    value = float(line[f"{key}_{mark}"])
+    return "–" if math.isnan(value) else signed(value) if key == "excess" else short(value)
