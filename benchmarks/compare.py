@@ -1,9 +1,9 @@
 """Every strategy, and every acquisition function with every family of models, on the same people.
 
     python -m benchmarks.compare --quick
-    python -m benchmarks.compare --out benchmarks/results/compare
+    python -m benchmarks.compare --out benchmarks/results/compare --picture docs/images/results.svg
 
-writes tables and three sentences (Markdown), all figures (JSON) and a picture (SVG), and prints README's table. Rows
+writes tables and three sentences (Markdown), all figures and README's table (JSON), and a picture (SVG). Rows
 are kept in a folder beside them as sessions finish: the same command continues where it was interrupted. `--first 50`
 ends each row after its first fifty people, `--parts` and `--cohorts` run some rows only; the tables are made of all
 that is in the folder, and say how many people each row has. Recorded people need the folder that ISIW_SHARED_DATA
@@ -25,7 +25,7 @@ from benchmarks.comparison.measures import table_of
 from benchmarks.comparison.picture import picture
 from benchmarks.comparison.rows import chosen, parts
 from benchmarks.comparison.running import COHORTS, Plan, processor_ms, rows_of, run_part, timed
-from benchmarks.comparison.words import PEOPLE, compared_rows, readable, readme_table, sentences
+from benchmarks.comparison.words import PEOPLE, compared_rows, readable, readme_table, savings, sentences
 from benchmarks.provenance import facts_of
 from benchmarks.quick import understood
 from benchmarks.tables import write_tables
@@ -43,7 +43,9 @@ acquisition function; `guess` is one window for everybody, chosen on 1,000 other
 the same eleven)."""
 
 
-def write(rows: pd.DataFrame, processor: dict[str, float], facts: dict[str, object], out: Path) -> None:
+def write(
+    rows: pd.DataFrame, processor: dict[str, float], facts: dict[str, object], out: Path, drawn: Path | None = None
+) -> None:
     """Tables, sentences and picture.
 
     Args:
@@ -51,19 +53,20 @@ def write(rows: pd.DataFrame, processor: dict[str, float], facts: dict[str, obje
         processor: processor time of a trial by strategy [ms].
         facts: command, versions and seed.
         out: path of the results, without suffix.
+        drawn: the picture's path; without it beside the results.
     """
     table = table_of(rows, processor)
     said = sentences(table, rows)
     shown = {cohort: compared_rows(rows, cohort) for cohort in PEOPLE if cohort in set(table["cohort"])}
     tables = {cohort: table_of(own, processor) for cohort, own in shown.items()}
-    readme = readme_table(tables)
+    readme = f"{savings(table, tables)}\n\n{readme_table(tables)}"
     write_tables({"All rows": table}, facts, out, said=said, readme=readme)
     blocks = [f"## `{name}`\n\n{readable(own).to_markdown(index=False)}" for name, own in table.groupby("cohort")]
     made = "\n".join(f"- {key}: `{value}`" for key, value in facts.items())
     follows = "\n".join(f"- {sentence}" for sentence in said)
     text = "\n\n".join(["# Strategies compared", made, "## What follows", follows, COLUMNS, *blocks])
     out.with_suffix(".md").write_text(f"{text}\n", encoding="utf-8")
-    save_figure(picture(shown, tables), out.with_suffix(".svg"), overwrite=True)
+    save_figure(picture(shown, tables), drawn or out.with_suffix(".svg"), overwrite=True)
     print(text, readme, sep="\n\n")
 
 
@@ -81,6 +84,7 @@ def main(  # noqa: PLR0913, PLR0917 - an option each
     workers: Annotated[int, typer.Option(help="Processes.")] = 1,
     dask: Annotated[str, typer.Option(help="Address of a Dask scheduler, instead of processes.")] = "",
     out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("compare"),
+    drawn: Annotated[Path | None, typer.Option("--picture", help="Path of the picture; beside the results.")] = None,
 ) -> None:
     """Compare strategies on the same people."""
     executor = DaskCluster(dask) if dask else Processes(workers)
@@ -94,7 +98,7 @@ def main(  # noqa: PLR0913, PLR0917 - an option each
             if wanted:
                 processor_ms(plan, part)
     facts = facts_of("compare", "numpy", "torch", seed=seed, space="valve, 0–500 ms", people_wanted=people)
-    write(with_guess(rows_of(plan, every)), timed(plan), facts, out)
+    write(with_guess(rows_of(plan, every)), timed(plan), facts, out, drawn)
 
 
 if __name__ == "__main__":

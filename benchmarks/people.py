@@ -20,7 +20,7 @@ import pandas as pd
 import typer
 from rich.progress import Progress
 
-from benchmarks.acquisition import run, run_oracle, space_of
+from benchmarks.beside_oracle import run, run_oracle, space_of
 from benchmarks.oracle import simulate_oracle, simulate_second_oracle
 from benchmarks.provenance import facts_of
 from benchmarks.quick import understood

@@ -67,7 +67,8 @@ def ratio(own_f1: FloatArray, even_f1: FloatArray, marks: Sequence[int], criteri
         low, high = np.nanquantile(again, ENDS, method="nearest")
     bound = {(True, True): "", (True, False): "below", (False, True): "above", (False, False): "unknown"}
     reached = (math.isfinite(own), math.isfinite(even))
-    found = math.nan if even == 0 or not any(reached) else min(own, last) / min(even, last)
+    at_once = even < min(mark for mark in marks if mark > 0)  # before the first mark, little is known of when
+    found = math.nan if at_once or not any(reached) else min(own, last) / min(even, last)
     said = "unknown" if math.isnan(found) else bound[reached]
     return {"stimuli": own, "even": even, "ratio": found, "low": float(low), "high": float(high), "bound": said}
 

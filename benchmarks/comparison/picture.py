@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from benchmarks.comparison.rows import EVEN, GUESS
-from benchmarks.comparison.words import CRITERION, MAIN, NAMES, PEOPLE, short
+from benchmarks.comparison.words import CRITERION, MAIN, NAMES, PEOPLE
 from isiw.plots.comparison import draw_curve
 from isiw.plots.style import INK, explain, strategy_colours, tidied
 from isiw.studies import summarise
@@ -75,7 +75,7 @@ def _draw_ratios(axes: Axes, table: pd.DataFrame, colours: Mapping[str, str]) ->
             axes.plot(ends, (place, place), color=colour, lw=2)
         axes.plot(ratio, place, {"": "o", "below": "<", "above": ">"}[bound], color=colour, ms=7)
     axes.axvline(1.0, color=INK, lw=1, ls=(0, (4, 3)))
-    axes.set_yticks(range(len(shown)), [name for name in shown], fontsize=8)
+    axes.set_yticks(range(len(shown)), shown, fontsize=8)
     axes.set(xlim=(0, 3), ylim=(-0.6, len(shown) - 0.4))
-    axes.set_xlabel(f"stimuli to a lasting F1 of {short(CRITERION)}, even ISIs = 1", fontsize=9)
+    axes.set_xlabel(f"stimuli to a lasting F1 of {CRITERION}, even ISIs = 1", fontsize=9)
     axes.set_title(MAIN, fontsize=9, loc="left", color=INK)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
@@ -64,7 +64,7 @@ class Plan:
     trials: int
     seed: int
     first: int = 0
-    executor: Executor = Processes(1)
+    executor: Executor = field(default_factory=Processes)
 
     def study(self, part: Part, cohort: str) -> Study:
         """The study of a part with one cohort; that of recorded people names another cohort."""

@@ -6,7 +6,9 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
+import numpy as np
 import pandas as pd
+from scipy.stats import binomtest
 
 from benchmarks.comparison.measures import CRITERIA, JUDGED, SHOWN
 from benchmarks.comparison.rows import EVEN, GUESS
@@ -46,33 +48,43 @@ def sentences(table: pd.DataFrame, rows: pd.DataFrame) -> list[str]:
     """
     main = table[table["cohort"] == MAIN].set_index("strategy")
     compared = differences(rows[(rows["cohort"] == MAIN) & (rows["strategy"] != GUESS)], DEFAULT)
-    defaults = table[table["strategy"] == DEFAULT].set_index("cohort", drop=False)
-    cohorts = [MAIN, *(cohort for cohort in defaults.index if cohort != MAIN)]
-    savings = "; ".join(saving(defaults.loc[cohort].to_dict()) for cohort in cohorts)
     return [
-        f"{savings[0].upper()}{savings[1:]}.",
+        savings(table, [MAIN, *(cohort for cohort in table["cohort"].unique() if cohort != MAIN)]),
         choosing(compared[compared["trial"] == EARLY]),
         trusting(main),
     ]
 
 
+def savings(table: pd.DataFrame, cohorts: Iterable[str]) -> str:
+    """How many stimuli isiw's default needs against even ISIs, with each of some cohorts.
+
+    Args:
+        table: as `measures.table_of` gives it.
+        cohorts: the cohorts.
+    """
+    defaults = table[table["strategy"] == DEFAULT].set_index("cohort", drop=False)
+    found = "; ".join(saving(defaults.loc[cohort].to_dict()) for cohort in cohorts if cohort in defaults.index)
+    return f"{found[0].upper()}{found[1:]}."
+
+
 def saving(line: Mapping[str, Any]) -> str:
-    """How many stimuli isiw's default needs to a lasting F1, against even ISIs.
+    """How many stimuli isiw's default needs to a lasting F1, against even ISIs: to the largest F1 that both reach.
 
     Args:
         line: that of the default with a cohort, with the columns of `measures.table_of`.
     """
-    who, wanted = f"on {line['people']} people of `{line['cohort']}`", f"a mean F1 of {CRITERION:g}".replace("0.", ".")
-    reached, even, ratio, low, high = (
-        line[f"{key}_{CRITERION}"] for key in ("stimuli", "even", "ratio", "low", "high")
-    )
+    both = [each for each in CRITERIA if line[f"bound_{each}"] == ""]
+    wanted = both[-1] if both else CRITERIA[0]
+    names = ("stimuli", "even", "ratio", "low", "high")
+    reached, even, ratio, low, high = (line[f"{name}_{wanted}"] for name in names)
+    who, f1 = f"on {line['people']} people of `{line['cohort']}`", f"a mean F1 of {_criterion(wanted)}"
     if math.isinf(reached):
-        return f"{who} the default does not keep {wanted} within {line['trials']} stimuli"
-    has = f"{who} the default keeps {wanted} from {reached:.0f} stimuli on, evenly spaced ISIs"
+        return f"{who} the default does not keep {f1} within {line['trials']} stimuli"
+    has = f"{who} the default keeps {f1} from {reached:.0f} stimuli on, evenly spaced ISIs"
     if math.isinf(even):
         return f"{has} not within {line['trials']}"
     found, ends = f"{has} from {even:.0f}", _interval(low, high)
-    if low <= 1.0 <= high:
+    if math.isnan(low) or low <= 1.0 <= high:
         return f"{found}, which may be chance (ratio {short(ratio)}, {ends})"
     return f"{found}: {_percent(abs(1.0 - ratio))} {'fewer' if ratio < 1.0 else 'more'} (ratio {short(ratio)}, {ends})"
 
@@ -89,12 +101,12 @@ def choosing(compared: pd.DataFrame) -> str:
     below, above = known[known["high"] < 0], known[known["low"] > 0]
     best = known.loc[known["difference"].idxmax()]
     named = f" ({_listed(above['strategy'])})" if len(above) else ""
+    rest = len(known) - len(below) - len(above)
     return (
-        f"After {EARLY} stimuli, of {len(known)} other ways to choose and to estimate, {len(below)} have a lower mean F1 "
-        f"than the default on the same people of `{MAIN}`, {len(above)} a higher one{named}, and "
-        f"{len(known) - len(below) - len(above)} cannot be told from it (intervals that hold together with 95 %); the best "
-        f"of the others is `{best['strategy']}` ({signed(best['difference'])}, {signed(best['low'])} to "
-        f"{signed(best['high'])}, {best['people']} people)."
+        f"After {EARLY} stimuli, of {len(known)} other ways to choose and to estimate, {len(below)} have a lower mean "
+        f"F1 than the default on the same people of `{MAIN}`, {len(above)} a higher one{named}, and {rest} cannot be "
+        f"told from it (intervals that hold together with 95 %); the best of the others is `{best['strategy']}` "
+        f"({signed(best['difference'])}, {signed(best['low'])} to {signed(best['high'])}, {best['people']} people)."
     )
 
 
@@ -105,10 +117,13 @@ def trusting(main: pd.DataFrame) -> str:
         main: the table of one cohort by strategy.
     """
     wrong = main[f"wrong_{EARLY}"].dropna()
-    often = wrong[wrong > OFTEN].sort_values(ascending=False)
+    people = main["people"].reindex(wrong.index)
+    chance = [binomtest(round(w * n), n, OFTEN, "greater").pvalue for w, n in zip(wrong, people, strict=True)]
+    often = wrong[np.array(chance) < OFTEN].sort_values(ascending=False)
     own = f"{_percent(wrong[DEFAULT])} of the default's answers are sure and wrong" if DEFAULT in wrong else ""
-    many = ", ".join(f"`{name}` {_percent(share)}" for name, share in often.items() if name != DEFAULT)
-    said = f"more than {_percent(OFTEN)} of those of {many}" if many else f"of no row more than {_percent(OFTEN)}"
+    many = ", ".join(f"`{name}` ({_percent(share)})" for name, share in often.items() if name != DEFAULT)
+    beyond = f"more than {_percent(OFTEN)}, beyond chance,"
+    said = f"{beyond} of those of {many}" if many else f"{beyond} of no other row's"
     late = main[f"f1_{LATE}"]
     guess = late[GUESS]
     rest = late.drop(GUESS)
@@ -163,27 +178,25 @@ def readme_table(tables: Mapping[str, pd.DataFrame]) -> str:
     Args:
         tables: by cohort the table of `compared_rows`, as `measures.table_of` gives it.
     """
-    head = [
-        "people",
-        "method",
-        *(f"{mark} stimuli" for mark in SHOWN),
-        f"to a lasting F1 of {CRITERION:g}".replace("0.", "."),
-    ]
-    lines = [head, ["---"] * len(head)]
+    kept = f"stimuli until F1 stays at {' / '.join(map(_criterion, CRITERIA))}"
+    lines = [["people", "method", *(f"F1 after {mark}" for mark in SHOWN), kept], ["---"] * (3 + len(SHOWN))]
     for cohort, table in tables.items():
         by_name = table.set_index("strategy")
         for place, name in enumerate(name for name in NAMES if name in by_name.index):
             line = by_name.loc[name]
             who = f"{line['people']}: {PEOPLE[cohort]}" if place == 0 else ""
             means = [short(line[f"f1_{mark}"]) for mark in SHOWN]
-            lines.append([who, NAMES[name], *means, "" if name == GUESS else stimuli(line, CRITERION)])
+            needed = " / ".join(_stimuli(line[f"stimuli_{each}"]) for each in CRITERIA)
+            lines.append([who, NAMES[name], *means, "" if name == GUESS else needed])
     return "\n".join(f"| {' | '.join(line)} |".replace("|  |", "| |") for line in lines)
 
 
-def stimuli(line: pd.Series, criterion: float) -> str:
-    """Stimuli to a lasting F1; a dash if it is not reached."""
-    found = line[f"stimuli_{criterion}"]
-    return "not reached" if not math.isfinite(found) else f"{found:.0f}"
+def _stimuli(found: float) -> str:
+    return f"{found:.0f}" if math.isfinite(found) else "–"
+
+
+def _criterion(f1: float) -> str:
+    return f"{f1:g}".removeprefix("0")
 
 
 def ratio_of(line: Mapping[str, Any], criterion: float) -> str:
@@ -208,7 +221,7 @@ def readable(table: pd.DataFrame) -> pd.DataFrame:
 
 def _read(line: Mapping[str, Any]) -> dict[str, str]:
     f1 = {f"F1 at {mark}": f"{short(line[f'f1_{mark}'])} ± {short(line[f'f1_{mark}_se'])}" for mark in SHOWN}
-    ratios = {f"stimuli to {each:g}, / even".replace("0.", "."): ratio_of(line, each) for each in CRITERIA}
+    ratios = {f"stimuli to {_criterion(each)} / even": ratio_of(line, each) for each in CRITERIA}
     both: Sequence[tuple[str, str]] = (("expected − actual F1", "excess"), ("edges covered", "coverage"))
     judged = {name: " / ".join(_cell(line, key, mark) for mark in JUDGED) for name, key in both}
     wrong = " / ".join("–" if math.isnan(w := line[f"wrong_{mark}"]) else _percent(w) for mark in JUDGED)
