@@ -12,6 +12,7 @@ names. People of seeds below 1,000 are for work.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -23,7 +24,7 @@ from rich.progress import Progress
 from benchmarks.comparison.guess import with_guess
 from benchmarks.comparison.measures import table_of
 from benchmarks.comparison.picture import picture
-from benchmarks.comparison.rows import chosen, parts
+from benchmarks.comparison.rows import Part, chosen, parts
 from benchmarks.comparison.running import COHORTS, Plan, processor_ms, rows_of, run_part, timed
 from benchmarks.comparison.words import PEOPLE, compared_rows, readable, readme_table, savings, sentences
 from benchmarks.provenance import facts_of
@@ -33,6 +34,7 @@ from isiw.plots.style import save_figure
 from isiw.studies import DaskCluster, Processes
 
 SEED = 130_000
+WHOLE = "python -m benchmarks.compare --out benchmarks/results/compare --picture docs/images/results.svg"
 COLUMNS = """\
 People are the same in all rows, the first ones where a row has fewer. F1: mean ± standard error. Stimuli to a lasting
 mean F1 of .7, .8, .9 as a ratio to those at even ISIs on the same people, with its 95 % interval by a bootstrap over
@@ -70,6 +72,25 @@ def write(
     print(text, readme, sep="\n\n")
 
 
+def unfinished(plan: Plan, every: Sequence[Part], rows: pd.DataFrame) -> dict[str, str]:
+    """What there is to say if not all was run: how much is there, and the command that runs the rest.
+
+    Args:
+        plan: people and trials.
+        every: the parts.
+        rows: what was run.
+    """
+    wanted = sum(
+        plan.study(part, cohort).people * len(part.strategies)
+        for part in every
+        for cohort in COHORTS
+        if cohort in (part.cohorts or COHORTS)
+    )
+    there = len(rows[["cohort", "strategy", "person"]].drop_duplicates())
+    said = f"{there} of {wanted} sessions were run; the column people says how many of each row"
+    return {} if there == wanted else {"not finished": said, "the rest by": WHOLE}
+
+
 def main(  # noqa: PLR0913, PLR0917 - an option each
     people: Annotated[int, typer.Option(help="People of each cohort.")] = 200,
     slow_people: Annotated[int, typer.Option(help="People for rows that take .1 s a trial or more.")] = 40,
@@ -97,8 +118,9 @@ def main(  # noqa: PLR0913, PLR0917 - an option each
                 run_part(plan, part, cohort, lambda _key, bar=bar: progress.advance(bar))
             if wanted:
                 processor_ms(plan, part)
-    facts = facts_of("compare", "numpy", "torch", seed=seed, space="valve, 0–500 ms", people_wanted=people)
-    write(with_guess(rows_of(plan, every)), timed(plan), facts, out, drawn)
+    rows = rows_of(plan, every)
+    facts = facts_of("compare", "numpy", "torch", seed=seed, space="valve, 0–500 ms", **unfinished(plan, every, rows))
+    write(with_guess(rows), timed(plan), facts, out, drawn)
 
 
 if __name__ == "__main__":

@@ -50,7 +50,7 @@ def guessed_f1(cohort: str, people: int, seed: int, others: int = OTHER_PEOPLE) 
 
 
 def with_guess(rows: pd.DataFrame, others: int = OTHER_PEOPLE) -> pd.DataFrame:
-    """Rows, and those of the fixed window for the people who were examined at even ISIs.
+    """Rows, and those of the fixed window for the people who were examined at even ISIs, if they are at hand.
 
     Args:
         rows: of strategies, with the columns of a study.
@@ -58,6 +58,8 @@ def with_guess(rows: pd.DataFrame, others: int = OTHER_PEOPLE) -> pd.DataFrame:
     """
     found = [rows]
     for cohort, even in rows[rows["strategy"] == EVEN].groupby("cohort"):
+        if cohort == RECORDED and not recordings().is_dir():
+            continue
         guessed = guessed_f1(str(cohort), int(even["person"].max()) + 1, int(even["seed"].iloc[0]), others)
         same = even.assign(strategy=GUESS, f1=guessed[even["person"]], **dict.fromkeys(UNKNOWN, np.nan))
         found.append(same.assign(reported_window=True, answered=True))

@@ -181,9 +181,14 @@ def rows_of(plan: Plan, every: Sequence[Part]) -> pd.DataFrame:
     Args:
         plan: the folder.
         every: the parts.
+
+    Raises:
+        SystemExit: there are none.
     """
-    found = [_read(plan.folder_of(part, cohort)) for cohort in COHORTS for part in every]
-    return pd.concat([table for table in found if len(table)], ignore_index=True)
+    read = [_read(plan.folder_of(part, cohort)) for cohort in COHORTS for part in every]
+    if not (found := [table for table in read if len(table)]):
+        raise SystemExit(f"{plan.folder} has no rows yet.")
+    return pd.concat(found, ignore_index=True)
 
 
 def _read(folder: Path) -> pd.DataFrame:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import replace
@@ -18,8 +19,10 @@ from benchmarks.comparison.running import RECORDED, Plan, recorded_units, rows_o
 from benchmarks.comparison.words import choosing, compared_rows, readme_table, saving, sentences, trusting
 
 import isiw
+from isiw.strategy.catalogue import measured_of
 from isiw.studies import StudyStrategy, Unit
 
+RESULTS = Path(__file__).parents[2] / "benchmarks" / "results" / "compare.json"
 MARKS = (0, 10, 20, 40)
 FAST = Part("few", (StudyStrategy("random", {"particles": 20}), StudyStrategy("even", {"particles": 20})), batch=1)
 
@@ -191,3 +194,16 @@ def test_a_comparison_with_one_person_says_that_it_cannot() -> None:
     assert "too few people" in choosing(pd.DataFrame({"low": [math.nan], "difference": [0.1]}))
     main = pd.DataFrame({"wrong_20": [0.5, math.nan], "f1_40": [0.7, 0.6], "people": 2}, index=["default", GUESS])
     assert "50 % of the default's answers" in trusting(main)
+
+
+def test_what_a_gaussian_process_says_of_itself_is_what_was_measured() -> None:
+    rows = pd.DataFrame(json.loads(RESULTS.read_text(encoding="utf-8"))["All rows"])
+    named = [name for name in isiw.list_strategies() if name.startswith("gp-")]
+    own = rows[(rows["cohort"] == "recruitment") & rows["strategy"].isin(named)]
+    assert sorted(own["strategy"]) == sorted(named)
+    for name in named:
+        said = measured_of(name)
+        assert said is not None
+        assert said.sessions == own["people"].sum()
+        assert said.coverage == pytest.approx(own["coverage_20"].mean(), abs=0.005)
+        assert said.excess_f1 == pytest.approx(own["excess_20"].mean(), abs=0.005)
