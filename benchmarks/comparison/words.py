@@ -12,6 +12,7 @@ from scipy.stats import binomtest
 
 from benchmarks.comparison.measures import CRITERIA, JUDGED, SHOWN
 from benchmarks.comparison.rows import EVEN, GUESS
+from benchmarks.comparison.running import RECORDED
 from isiw.studies import differences
 
 MAIN: Final = "recruitment"
@@ -28,7 +29,7 @@ NAMES: Final[Mapping[str, str]] = {
     "nr": "the dissertation's nonlinear regression",
     "gpr": "the dissertation's Gaussian process",
     "svmr": "the dissertation's support vectors",
-    "pf": "the dissertation's particle filter",
+    "pf": "the dissertation's particle filter (no answer before 30)",
     DEFAULT: "**isiw's default**",
 }
 """What the rows of README's table are called, in their order."""
@@ -77,13 +78,18 @@ def saving(line: Mapping[str, Any]) -> str:
     wanted = both[-1] if both else CRITERIA[0]
     names = ("stimuli", "even", "ratio", "low", "high")
     reached, even, ratio, low, high = (line[f"{name}_{wanted}"] for name in names)
-    who, f1 = f"on {line['people']} people of `{line['cohort']}`", f"a mean F1 of {_criterion(wanted)}"
+    who = f"on {line['people']} simulated people of `{line['cohort']}`"
+    if line["cohort"] == RECORDED:
+        who = f"on {line['people']} simulated windows of people whose MEPs were recorded"
+    f1 = f"a mean F1 of {_criterion(wanted)}"
     if math.isinf(reached):
         return f"{who} the default does not keep {f1} within {line['trials']} stimuli"
     has = f"{who} the default keeps {f1} from {reached:.0f} stimuli on, evenly spaced ISIs"
     if math.isinf(even):
         return f"{has} not within {line['trials']}"
     found, ends = f"{has} from {even:.0f}", _interval(low, high)
+    if math.isnan(ratio):
+        return f"{found}, which is too early to compare"
     if math.isnan(low) or low <= 1.0 <= high:
         return f"{found}, which may be chance (ratio {short(ratio)}, {ends})"
     return f"{found}: {_percent(abs(1.0 - ratio))} {'fewer' if ratio < 1.0 else 'more'} (ratio {short(ratio)}, {ends})"
@@ -124,11 +130,9 @@ def trusting(main: pd.DataFrame) -> str:
     many = ", ".join(f"`{name}` ({_percent(share)})" for name, share in often.items() if name != DEFAULT)
     beyond = f"more than {_percent(OFTEN)}, beyond chance,"
     said = f"{beyond} of those of {many}" if many else f"{beyond} of no other row's"
-    late = main[f"f1_{LATE}"]
-    guess = late[GUESS]
-    rest = late.drop(GUESS)
-    beaten = rest[rest <= guess]
-    no_better = f"not above it are {_listed(beaten.index)}" if len(beaten) else "every row is above it"
+    guess, late = main[f"f1_{EARLY}"][GUESS], main[f"f1_{LATE}"].drop(GUESS).dropna()
+    beaten = late[late <= guess]
+    no_better = f"not above it are {_listed(beaten.index)}" if len(beaten) else f"each of {len(late)} rows is above it"
     return (
         f"After {EARLY} stimuli {own}, {said}; one fixed window for everybody has an F1 of {short(guess)} without any "
         f"stimulus, and after {LATE} stimuli {no_better}."
@@ -161,15 +165,16 @@ def signed(value: float) -> str:
 
 
 def compared_rows(rows: pd.DataFrame, cohort: str) -> pd.DataFrame:
-    """The rows of README's table of one cohort, of the people whom all of its methods examined.
+    """The rows of README's table of one cohort: those of the default's people; a method that met fewer is left out.
 
     Args:
         rows: all rows, those of the fixed window, too.
         cohort: the cohort.
     """
     shown = rows[(rows["cohort"] == cohort) & rows["strategy"].isin(list(NAMES))]
-    people = shown.groupby("person")["strategy"].nunique()
-    return shown[shown["person"].isin(people.index[people == shown["strategy"].nunique()])]
+    people = set(shown.loc[shown["strategy"] == DEFAULT, "person"])
+    met = shown.groupby("strategy")["person"].agg(lambda persons: people <= set(persons))
+    return shown[shown["strategy"].isin(met.index[met]) & shown["person"].isin(people)]
 
 
 def readme_table(tables: Mapping[str, pd.DataFrame]) -> str:

@@ -95,7 +95,7 @@ def said(means: Mapping[str, tuple[float, ...]]) -> list[str]:
 
 def test_the_sentences_have_the_figures() -> None:
     first, second, third = said(FOUND)
-    assert "on 20 people of `recruitment`" in first.lower()
+    assert "on 20 simulated people of `recruitment`" in first.lower()
     assert "from 10 stimuli on, evenly spaced ISIs from 20: 50 % fewer (ratio .50" in first
     assert "of 2 other ways" in second
     assert "2 have a lower mean F1" in second
@@ -111,7 +111,7 @@ def test_other_figures_are_another_sentence() -> None:
     assert "more (ratio 2" in first
     assert "2 a higher one (`even`, `nr`)" in second
     assert "of no other row's" in third
-    assert "every row is above it" in third
+    assert "each of 3 rows is above it" in third
     assert "does not keep" in said(FOUND | {"default": FOUND["nr"]})[0]
     assert "evenly spaced ISIs not within 40" in said(FOUND | {EVEN: FOUND["nr"]})[0]
 
@@ -121,12 +121,15 @@ def test_a_saving_that_may_be_chance_is_called_so() -> None:
     found = {"stimuli": 9.0, "even": 10.0, "ratio": 0.9, "low": 0.4, "high": 1.3, "bound": ""}
     line |= {f"{name}_0.7": value for name, value in found.items()} | {"bound_0.8": "unknown", "bound_0.9": "below"}
     assert "may be chance" in saving(line)
+    assert "too early to compare" in saving(line | {"ratio_0.7": math.nan})
 
 
-def test_readmes_table_is_of_the_people_that_all_rows_have() -> None:
+def test_readmes_table_has_the_methods_that_met_all_people_of_the_default() -> None:
     rows = rows_with(FOUND)
     fewer = rows[(rows["strategy"] != "nr") | (rows["person"] < 5)]
     shown = compared_rows(fewer, "recruitment")
+    assert set(shown["strategy"]) == {"default", EVEN, GUESS}
+    shown = compared_rows(rows[(rows["strategy"] != "default") | (rows["person"] < 5)], "recruitment")
     assert set(shown["person"]) == set(range(5))
     text = readme_table({"recruitment": table_of(shown, {})})
     assert "| 5: noise as near threshold" in text
@@ -192,7 +195,9 @@ def test_the_matrix_repeats_no_named_strategy() -> None:
 
 def test_a_comparison_with_one_person_says_that_it_cannot() -> None:
     assert "too few people" in choosing(pd.DataFrame({"low": [math.nan], "difference": [0.1]}))
-    main = pd.DataFrame({"wrong_20": [0.5, math.nan], "f1_40": [0.7, 0.6], "people": 2}, index=["default", GUESS])
+    main = pd.DataFrame(
+        {"wrong_20": [0.5, math.nan], "f1_20": [0.7, 0.6], "f1_40": [0.7, 0.6], "people": 2}, index=["default", GUESS]
+    )
     assert "50 % of the default's answers" in trusting(main)
 
 
