@@ -5,8 +5,7 @@
 
 The oracle knows a person's response and that there is a window. Here the default's own model is given the cohort's
 laws as its prior, first with "no window" as probable as the default has it, then knowing that there is one. Uniform
-laws are told by their SD, and artefacts it goes on expecting. The same people as in `benchmarks/acquisition.py` with
-the same seed; what it writes is told in the same way.
+laws are told by their SD, and artefacts it goes on expecting.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ import pandas as pd
 import typer
 from rich.progress import Progress
 
-from benchmarks.acquisition import MARKS, run, run_oracle, write
+from benchmarks.beside_oracle import MARKS, run, run_oracle, write
 from benchmarks.provenance import facts_of
 from benchmarks.quick import understood
 from isiw.studies import Study, StudyStrategy

@@ -11,7 +11,6 @@ seeds below 1,000 are for work.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -21,11 +20,11 @@ import pandas as pd
 import typer
 from rich.progress import Progress
 
-from benchmarks.acquisition import run, run_oracle, space_of
+from benchmarks.beside_oracle import run, run_oracle, space_of
 from benchmarks.oracle import simulate_oracle, simulate_second_oracle
 from benchmarks.provenance import facts_of
 from benchmarks.quick import understood
-from benchmarks.tables import write_tables
+from benchmarks.tables import kept, write_tables
 from benchmarks.zero_trials import without_any_trial
 from isiw.models.particles.prior import Prior
 from isiw.strategy.stopping import StopKind
@@ -109,13 +108,6 @@ def _means(groups: pd.core.groupby.DataFrameGroupBy, names: list[str]) -> pd.Dat
     errors = groups[names].sem().add_suffix("_se")
     both = pd.concat([groups.size().rename("n"), means, errors], axis=1)
     return both[["n", *(column for name in names for column in (name, f"{name}_se"))]]
-
-
-def kept(path: Path, run_all: Callable[[], pd.DataFrame]) -> pd.DataFrame:
-    """Rows from a file in the study's folder, so that a run that was interrupted does not repeat them."""
-    if not path.is_file():
-        run_all().to_parquet(path)
-    return pd.read_parquet(path)
 
 
 def main(  # noqa: PLR0913, PLR0917 - an option each

@@ -23,7 +23,6 @@ __all__ = ["FOLDER", "QUICK", "expanded", "understood"]
 FOLDER: Final = Path("benchmarks/results/quick")
 
 QUICK: Final[Mapping[str, str]] = {
-    "acquisition": "--cohorts gaussian,recruitment --people 4 --other-people 2 --oracle-people 2 --trials 10 --out OUT",
     "another_day": "--people 4 --earlier-trials 8 --trials 8 --out OUT",
     "another_version compare": "--out OUT",
     "another_version run": "--cohorts gaussian --people 2 --out OUT",
@@ -34,6 +33,8 @@ QUICK: Final[Mapping[str, str]] = {
     "before_and_now stops": "--out OUT",
     "bounds": "--sessions 20",
     "calibration": "--replications 4 --trials 5 --people 1 --out OUT",
+    "compare": "--people 2 --slow-people 1 --trials 20 --cohorts recruitment,gaussian "
+    "--parts named,regressions,particles,botorch --out OUT",
     "deaths": "--kills 9 --out OUT",
     "dissertation": "--few --out OUT",
     "fair_opponent": "--people 3 --trials 12 --out OUT",
@@ -62,7 +63,6 @@ QUICK: Final[Mapping[str, str]] = {
     "raw_sweeps rigs": "--people 4",
     "raw_sweeps sizes": "",
     "read_files": "--minutes 1 --rows 2000",
-    "readme_results": "--out OUT",
     "recorded_cohort": "--people 10 --trials 10 --workers 1 --out OUT",
     "reduction.redraw": "--out OUT",
     "replayed": "--people 2 --sessions 1",

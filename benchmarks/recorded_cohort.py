@@ -32,7 +32,7 @@ from benchmarks.recorded_law import KnowsTheLaw
 from benchmarks.recorded_people import RecordedPerson, recordings
 from benchmarks.recorded_tables import tables_of
 from benchmarks.response_prior import Fit, read_folds
-from benchmarks.tables import write_tables
+from benchmarks.tables import kept, write_tables
 from isiw.errors import ImplausibleDataWarning
 from isiw.studies import Failure, Processes
 
@@ -122,14 +122,12 @@ class Chunk:
 
     def run(self) -> pd.DataFrame:
         """Their rows, from the file if it is there."""
-        if not self.file.is_file():
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", ImplausibleDataWarning)
-                rows = pd.DataFrame([row for session in self.sessions for row in session.rows()])
-            unfinished = self.file.with_suffix(".unfinished")
-            rows.to_parquet(unfinished)
-            unfinished.replace(self.file)
-        return pd.read_parquet(self.file)
+        return kept(self.file, self._made)
+
+    def _made(self) -> pd.DataFrame:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ImplausibleDataWarning)
+            return pd.DataFrame([row for session in self.sessions for row in session.rows()])
 
 
 def chunks(

@@ -3,12 +3,27 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import pandas as pd
 
-__all__ = ["write_table", "write_tables"]
+__all__ = ["kept", "write_table", "write_tables"]
+
+
+def kept(path: Path, run: Callable[[], pd.DataFrame]) -> pd.DataFrame:
+    """Rows from a file, so that what was interrupted does not repeat them; without it they are made, and kept whole.
+
+    Args:
+        path: the file.
+        run: makes the rows.
+    """
+    if not path.is_file():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        unfinished = path.with_suffix(".unfinished")
+        run().to_parquet(unfinished)
+        unfinished.replace(path)
+    return pd.read_parquet(path)
 
 
 def write_table(table: pd.DataFrame, facts: Mapping[str, object], out: Path) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from benchmarks.readme_results import reproduction
+from benchmarks.reduction.redraw import reproduction
 
 import isiw
 from isiw.config import load_config

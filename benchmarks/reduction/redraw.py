@@ -2,14 +2,15 @@
 
     python -m benchmarks.reduction.redraw
 
-That of the online experiment needs what the tables leave out, single trials; it is drawn when the whole reproduction
-is run.
+It prints the paragraph, too, that stands between the `reproduction` marks of `docs/performance.md`. The figure of the
+online experiment needs what the tables leave out, single trials; it is drawn when the whole reproduction is run.
 """
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
+from textwrap import fill
 from typing import Annotated
 
 import pandas as pd
@@ -44,6 +45,15 @@ def redrawn(results: Path = RESULTS) -> dict[str, Figure]:
     }
 
 
+def reproduction(results: Path = RESULTS) -> str:
+    """What the reproduction of the dissertation says first.
+
+    Args:
+        results: folder of the tables.
+    """
+    return fill(json.loads((results / "trial_reduction.json").read_text(encoding="utf-8"))["opening"], 120)
+
+
 def main(out: Annotated[Path, typer.Option(help="Folder of the figures.")] = RESULTS) -> None:
     """Draw the figures again."""
     out.mkdir(parents=True, exist_ok=True)
@@ -51,6 +61,7 @@ def main(out: Annotated[Path, typer.Option(help="Folder of the figures.")] = RES
         for axes in figure.axes:
             axes.title.set_fontsize(9)
         figure.savefig(out / f"{name}.png", dpi=DPI)
+    print(reproduction())
 
 
 if __name__ == "__main__":

@@ -256,6 +256,15 @@ def test_that_what_comes_first_can_be_stated_is_said_if_no_window_is_named(
     assert ('Do: state what comes first (conditioning = "tap" or "electrical")' in statement) == said
 
 
+@pytest.mark.parametrize(("name", "said"), [("gp-straddle", True), ("gp-ei", True), ("default", False), ("", False)])
+def test_a_strategy_that_claims_more_than_it_keeps_names_its_measured_coverage(
+    record: SessionRecord, name: str, *, said: bool
+) -> None:
+    text = final_statement(run_by(record, name, delay_ms=None))
+    assert (f"Warning: {name} claims more than it keeps" in text) is said
+    assert ("its 90 % intervals held 70 % of the true edges" in text) is said
+
+
 @pytest.mark.parametrize(("name", "said"), [("gp-straddle", True), ("default", False), ("", False)])
 def test_what_a_strategy_for_taps_says_of_an_electrical_pulse_is_not_to_be_relied_on(
     record: SessionRecord, name: str, *, said: bool

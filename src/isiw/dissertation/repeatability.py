@@ -28,6 +28,9 @@ from isiw.signals.waveforms import as_waveforms, crossing_before, first_true, re
 from isiw.trials import Sweep
 from isiw.types import ArrayLike, FloatArray
 
+_LEAST_FREEDOM = 2
+"""Repeats of an ISI behind its first trial that an SD needs: that of two trials says next to nothing."""
+
 FULL_RANGE_DEG = 178.0
 """A turn that counts as the full range of 180°: ten noise SDs of a coarse angle sensor less."""
 
@@ -116,18 +119,20 @@ class TimingStudy:
     def error_table(self) -> pd.DataFrame:
         """The ISI error, realised minus commanded, by commanded ISI.
 
-        Mistrials, with a realised ISI below 0 or none at all, are counted and left out of the statistics (5.3.1).
+        Mistrials, with a realised ISI below 0 or none at all, are counted and left out of the statistics (5.3.1). An
+        ISI with fewer than three trials has no SD (NaN).
         """
         trials = pd.DataFrame({"isi_ms": self.commanded_ms, "error_ms": self.realised_ms - self.commanded_ms})
         trials["mistrial"] = ~(self.realised_ms >= 0)
         trials = trials.dropna(subset="isi_ms")
         trials["accepted_ms"] = trials["error_ms"].mask(trials["mistrial"])
-        return trials.groupby("isi_ms").agg(
+        table = trials.groupby("isi_ms").agg(
             n=("accepted_ms", "count"),
             mean_ms=("accepted_ms", "mean"),
             sd_ms=("accepted_ms", "std"),
             mistrials=("mistrial", "sum"),
         )
+        return table.assign(sd_ms=table["sd_ms"].mask(table["n"] <= _LEAST_FREEDOM))
 
     @property
     def mistrials(self) -> int:
@@ -148,10 +153,12 @@ class TimingStudy:
 
     @property
     def pooled_sd_ms(self) -> float:
-        """SD of the ISI error, each set's mean removed (5.2.1) [ms]; NaN if no ISI has two accepted trials."""
-        table = self.error_table[self.error_table["n"] > 1]
-        left = (table["n"] - 1).sum()
-        return float(np.sqrt((table["sd_ms"] ** 2 * (table["n"] - 1)).sum() / left)) if left > 0 else float("nan")
+        """SD of the ISI error, each set's mean removed (5.2.1) [ms]; NaN of one ISI that came twice, or of none."""
+        accepted = (self.realised_ms >= 0) & np.isfinite(self.commanded_ms)
+        sets, errors = self.commanded_ms[accepted], (self.realised_ms - self.commanded_ms)[accepted]
+        apart = [errors[sets == isi] - errors[sets == isi].mean() for isi in np.unique(sets)]
+        left = len(errors) - len(apart)
+        return math.sqrt(sum(float(part @ part) for part in apart) / left) if left >= _LEAST_FREEDOM else math.nan
 
 
 def hit_delay_ms(study: TimingStudy) -> tuple[float, float] | None:
@@ -270,7 +277,7 @@ def timing_report(study: TimingStudy) -> str:
             for isi, n, mean, sd, mistrials in errors.itertuples()
         ]
         pooled = f"Pooled SD of the ISI error: {study.pooled_sd_ms:.2f} ms."
-        unknown = "No ISI has two accepted trials, so the SD of its error is not known."
+        unknown = "No ISI has three accepted trials, nor have two ISIs two, so the SD of the error is not known."
         known = unknown if np.isnan(study.pooled_sd_ms) else pooled
         lines += ["", f"{known} Mistrials: {study.mistrials}."]
     hit_delay = hit_delay_ms(study)

@@ -1,30 +1,17 @@
-"""Strategies × cohorts × paired people → F1 by trial, coverage, false decisions and latency, the oracle beside them.
-
-    python -m benchmarks.acquisition --out benchmarks/results/acquisition
-
-writes a table (Markdown), its figures with versions, command and seeds (JSON), and a picture (PNG). Sessions run side
-by side, and are kept in a folder as they finish: the same command goes on where it was interrupted. Reported people
-come from seed 10,000 on; seeds below 1,000 are for work.
-"""
+"""Studies beside the oracle: F1 by trial, coverage, false decisions and latency, for `people` and `limits`."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
 import pandas as pd
-import typer
 from rich.progress import Progress
 
 from benchmarks.oracle import SPANS, simulate_oracle
-from benchmarks.provenance import facts_of
-from benchmarks.quick import understood
 from benchmarks.tables import write_tables
-from benchmarks.zero_trials import fixed_windows
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.metrics import trials_to_criterion
 from isiw.plots.comparison import study_figure
@@ -33,13 +20,11 @@ from isiw.studies import (
     Processes,
     SimulatedSession,
     Study,
-    StudyStrategy,
     conduct,
     paired_sessions,
     run_study,
     summarise,
 )
-from isiw.subjects.cohorts import COHORTS
 
 MARKS = (0, 5, 10, 12, 15, 20, 25, 30, 40, 60, 80)
 CRITERIA = (0.8, 0.9, 0.95)
@@ -118,12 +103,11 @@ def reached(table: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-def write(rows: pd.DataFrame, facts: dict[str, object], out: Path, fixed: pd.DataFrame | None = None) -> None:
-    """Tables and picture; `fixed` is what is reached without any trial, where that was measured."""
+def write(rows: pd.DataFrame, facts: dict[str, object], out: Path) -> None:
+    """Tables and picture."""
     table = summary(rows)
     tables = {
         "F1 by trial": table,
-        "The best fixed window: F1 without any trial": pd.DataFrame() if fixed is None else fixed,
         "Pairs delivered from which on mean F1 is kept (among the marked trials)": reached(table),
         "False decisions": decisions(rows),
         "At the stopping rule": at_stopping(rows),
@@ -131,19 +115,6 @@ def write(rows: pd.DataFrame, facts: dict[str, object], out: Path, fixed: pd.Dat
     tables = {title: part for title, part in tables.items() if not part.empty}
     write_tables(tables, facts, out)
     save_figure(study_figure(table), out.with_suffix(".png"), overwrite=True)
-
-
-def redraw(out: Path) -> None:
-    """The picture of results that are there, drawn again."""
-    records = json.loads(out.with_suffix(".json").read_text(encoding="utf-8"))["F1 by trial"]
-    save_figure(study_figure(pd.DataFrame(records)), out.with_suffix(".png"), overwrite=True)
-
-
-def strategy_of(text: str) -> StudyStrategy:
-    """`NAME`, or `NAME:ACQUISITION` for the same model with another acquisition function."""
-    name, _, acquisition = text.partition(":")
-    settings = {"acquisition": acquisition} if acquisition else {}
-    return StudyStrategy(name, settings, label=f"{name}+{acquisition}" if acquisition else name)
 
 
 def space_of(text: str) -> DesignSpace:
@@ -180,61 +151,3 @@ def run_oracle(
         return pd.DataFrame()
     bar = progress.add_task("oracle", total=len(sessions))
     return run_study(sessions, workers=workers, run=simulate, on_done=lambda _s, _r: progress.advance(bar))
-
-
-def main(  # noqa: PLR0913, PLR0917 - a command's options are its arguments
-    strategies: Annotated[str, typer.Option(help="Comma-separated; NAME or NAME:ACQUISITION.")] = "default",
-    others: Annotated[str, typer.Option(help="The same, with the first --other-people only.")] = (
-        "particles-mi,gpr,nr,svmr,pf"
-    ),
-    cohorts: Annotated[str, typer.Option(help="Cohorts, comma-separated.")] = ",".join(COHORTS),
-    people: Annotated[int, typer.Option(help="People a cohort.")] = 200,
-    other_people: Annotated[int, typer.Option(help="People a cohort for the others.")] = 50,
-    oracle_people: Annotated[int, typer.Option(help="People a cohort for the oracle, at most.")] = 200,
-    trials: Annotated[int, typer.Option(help="Trials a session.")] = 60,
-    seed: Annotated[int, typer.Option(help="Seed of the cohorts.")] = 10_000,
-    space: Annotated[str, typer.Option(help="valve or impact, or with another high end [ms]: 300 or impact:300.")] = (
-        "valve"
-    ),
-    amplitude: Annotated[float, typer.Option(help="Factor on all amplitudes.")] = 1.0,
-    workers: Annotated[int, typer.Option(help="Processes.")] = 2,
-    out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("acquisition"),
-    *,
-    stopping: Annotated[bool, typer.Option(help="Note when the stopping rule fires: an estimate a trial.")] = True,
-    only_draw: Annotated[bool, typer.Option(help="Draw the results again that are there; run nothing.")] = False,
-) -> None:
-    """Compare strategies on paired simulated people."""
-    if only_draw:
-        redraw(out)
-        return
-    names = cohorts.split(",")
-    study = Study(
-        strategies=tuple(strategy_of(text) for text in strategies.split(",")),
-        cohorts=tuple(names),
-        people=people,
-        seed=seed,
-        trials=trials,
-        marks=tuple(mark for mark in MARKS if mark <= trials),
-        space=space_of(space),
-        amplitude=amplitude,
-        stopping="noted" if stopping else "ignored",
-        engine="batched",
-    )
-    studies = [study]
-    if others:
-        rest = tuple(strategy_of(text) for text in others.split(","))
-        studies.append(replace(study, strategies=rest, people=min(people, other_people)))
-    folder = out.with_suffix(".parts")
-    with Progress() as progress:
-        tables = [run(part, folder / str(number), workers, progress) for number, part in enumerate(studies)]
-        if amplitude == 1.0:
-            tables.append(run_oracle(replace(study, people=min(people, oracle_people)), workers, progress))
-    fixed = fixed_windows(names, people, seed, study.space)
-    facts = facts_of("acquisition", "torch", "numpy", seed=seed, people=people)
-    write(pd.concat(tables, ignore_index=True), facts, out, fixed)
-    print(out.with_suffix(".md").read_text())
-
-
-if __name__ == "__main__":
-    understood("acquisition")
-    typer.run(main)

@@ -1,0 +1,129 @@
+"""Every strategy, and every acquisition function with every family of models, on the same people.
+
+    python -m benchmarks.compare --quick
+    python -m benchmarks.compare --out benchmarks/results/compare --picture docs/images/results.svg
+
+writes tables and three sentences (Markdown), all figures and README's table (JSON), and a picture (SVG). Rows
+are kept in a folder beside them as sessions finish: the same command continues where it was interrupted. `--first 50`
+ends each row after its first fifty people, `--parts` and `--cohorts` run some rows only; the tables are made of all
+that is in the folder, and say how many people each row has. Recorded people need the folder that ISIW_SHARED_DATA
+names. People of seeds below 1,000 are for work.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import pandas as pd
+import typer
+from rich.progress import Progress
+
+from benchmarks.comparison.guess import with_guess
+from benchmarks.comparison.measures import table_of
+from benchmarks.comparison.picture import picture
+from benchmarks.comparison.rows import Part, chosen, parts
+from benchmarks.comparison.running import COHORTS, Plan, processor_ms, rows_of, run_part, timed
+from benchmarks.comparison.words import PEOPLE, compared_rows, readable, readme_table, savings, sentences
+from benchmarks.provenance import facts_of
+from benchmarks.quick import understood
+from benchmarks.tables import write_tables
+from isiw.plots.style import save_figure
+from isiw.studies import DaskCluster, Processes
+
+SEED = 130_000
+WHOLE = "python -m benchmarks.compare --out benchmarks/results/compare --picture docs/images/results.svg"
+COLUMNS = """\
+People are the same in all rows, the first ones where a row has fewer. F1: mean ± standard error. Stimuli to a lasting
+mean F1 of .7, .8, .9 as a ratio to those at even ISIs on the same people, with its 95 % interval by a bootstrap over
+people; `<` and `>` where only one of both reached it. Of what follows, values after 20 / 40 stimuli: expected minus
+actual F1; share of the true edges in the 90 % intervals; *sure and wrong* expects at least .7, and .35 more than it
+has. Processor time is that of one session alone, ask and tell. `family+function` is a family's model with an
+acquisition function; `guess` is one window for everybody, chosen on 1,000 other people (those of `kim11-measured` are
+the same eleven)."""
+
+
+def write(
+    rows: pd.DataFrame, processor: dict[str, float], facts: dict[str, object], out: Path, drawn: Path | None = None
+) -> None:
+    """Tables, sentences and picture.
+
+    Args:
+        rows: of all that was run, and of the fixed window.
+        processor: processor time of a trial by strategy [ms].
+        facts: command, versions and seed.
+        out: path of the results, without suffix.
+        drawn: the picture's path; without it beside the results.
+    """
+    table = table_of(rows, processor)
+    said = sentences(table, rows)
+    shown = {cohort: compared_rows(rows, cohort) for cohort in PEOPLE if cohort in set(table["cohort"])}
+    tables = {cohort: table_of(own, processor) for cohort, own in shown.items()}
+    readme = f"{savings(table, tables)}\n\n{readme_table(tables)}"
+    write_tables({"All rows": table}, facts, out, said=said, readme=readme)
+    blocks = [f"## `{name}`\n\n{readable(own).to_markdown(index=False)}" for name, own in table.groupby("cohort")]
+    made = "\n".join(f"- {key}: `{value}`" for key, value in facts.items())
+    follows = "\n".join(f"- {sentence}" for sentence in said)
+    text = "\n\n".join(["# Strategies compared", made, "## What follows", follows, COLUMNS, *blocks])
+    out.with_suffix(".md").write_text(f"{text}\n", encoding="utf-8")
+    save_figure(picture(shown, tables), drawn or out.with_suffix(".svg"), overwrite=True)
+    print(text, readme, sep="\n\n")
+
+
+def unfinished(plan: Plan, every: Sequence[Part], rows: pd.DataFrame) -> dict[str, str]:
+    """What there is to say if not all was run: how much is there, and the command that runs the rest.
+
+    Args:
+        plan: people and trials.
+        every: the parts.
+        rows: what was run.
+    """
+    wanted = sum(
+        plan.study(part, cohort).people * len(part.strategies)
+        for part in every
+        for cohort in COHORTS
+        if cohort in (part.cohorts or COHORTS)
+    )
+    there = len(rows[["cohort", "strategy", "person"]].drop_duplicates())
+    said = f"{there} of {wanted} sessions were run; the column people says how many of each row"
+    return {} if there == wanted else {"not finished": said, "the rest by": WHOLE}
+
+
+def main(  # noqa: PLR0913, PLR0917 - an option each
+    people: Annotated[int, typer.Option(help="People of each cohort.")] = 200,
+    slow_people: Annotated[int, typer.Option(help="People for rows that take .1 s a trial or more.")] = 40,
+    reference_people: Annotated[int, typer.Option(help="People for NUTS, half a minute a trial.")] = 2,
+    trials: Annotated[int, typer.Option(help="Pairs a session.")] = 60,
+    seed: Annotated[int, typer.Option(help="Seed of the people.")] = SEED,
+    first: Annotated[int, typer.Option(help="End each row after so many people; 0 for all.")] = 0,
+    only: Annotated[str, typer.Option("--parts", help="Parts to run, comma-separated; all if empty.")] = "",
+    cohorts: Annotated[str, typer.Option(help="Cohorts to run, comma-separated; none to write tables only.")] = (
+        ",".join(COHORTS)
+    ),
+    workers: Annotated[int, typer.Option(help="Processes.")] = 1,
+    dask: Annotated[str, typer.Option(help="Address of a Dask scheduler, instead of processes.")] = "",
+    out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("compare"),
+    drawn: Annotated[Path | None, typer.Option("--picture", help="Path of the picture; beside the results.")] = None,
+) -> None:
+    """Compare strategies on the same people."""
+    executor = DaskCluster(dask) if dask else Processes(workers)
+    plan = Plan(out.with_suffix(".rows"), people, trials, seed, first, executor)
+    every, wanted = parts(slow_people, reference_people), [name for name in cohorts.split(",") if name]
+    with Progress() as progress:
+        for part in chosen(every, [name for name in only.split(",") if name]):
+            for cohort in wanted:
+                bar = progress.add_task(f"{part.name} on {cohort}", total=None)
+                run_part(plan, part, cohort, lambda _key, bar=bar: progress.advance(bar))
+            if wanted:
+                processor_ms(plan, part)
+    rows = rows_of(plan, every)
+    facts = facts_of("compare", "numpy", "torch", seed=seed, space="valve, 0–500 ms", **unfinished(plan, every, rows))
+    write(with_guess(rows), timed(plan), facts, out, drawn)
+
+
+if __name__ == "__main__":
+    understood("compare")
+    np.seterr(all="raise", under="ignore")
+    typer.run(main)

@@ -1,0 +1,1 @@
+"""The comparison of strategies, acquisition functions and families of models on the same people: parts of `compare`."""
