@@ -20,7 +20,7 @@ from isiw.models.particles.noise import recruits
 from isiw.models.particles.prior import Prior
 from isiw.models.shared.history import BY_CURVES, History
 from isiw.native.engine import log_likelihoods
-from isiw.native.law import Crowd
+from isiw.native.law import Crowd, Law
 from isiw.types import FloatArray, Singles
 
 AT_THE_BOUNDARY: Final = 2
@@ -31,6 +31,9 @@ STAKED: Final = np.array([0.25, 0.8])
 
 LARGEST: Final = 20.0
 """Log of the largest factor that is told."""
+
+EACH: Final = 4
+"""One in so many particles predicts; what all of them would say differs by less than a bet pays for."""
 
 NARROWEST: Final = 1e-3
 """A probability of a smaller amplitude is known to this: particles have no finer tails."""
@@ -73,7 +76,7 @@ class Bets:
         return Bets(log_won, np.maximum(self.most, log_sum(log_won) - np.log(log_won.shape[1])))
 
 
-def probability_below(trial: History, crowd: Crowd, fields: Singles) -> FloatArray:
+def probability_below(trial: History, crowd: Crowd, law: Law) -> FloatArray:
     """Predictive probabilities of an amplitude below the lower and the upper end of a trial's, (b, 2).
 
     Recruitment curves alone predict a pulse at another intensity than the pairs' (decision 45).
@@ -81,10 +84,11 @@ def probability_below(trial: History, crowd: Crowd, fields: Singles) -> FloatArr
     Args:
         trial: the trial of each person.
         crowd: the weighted particles before it.
-        fields: what they mean, (b, p, fields).
+        law: what they mean.
     """
-    elsewhere = ~np.isnan(trial.columns[..., BY_CURVES])
-    weights = np.exp(crowd.log_weights) * (~elsewhere | recruits(crowd.kinds[..., 1]))
+    values, kinds, log_weights = (np.ascontiguousarray(part[:, ::EACH]) for part in crowd[:3])
+    fields, elsewhere = law.meanings(values, kinds, -1), ~np.isnan(trial.columns[..., BY_CURVES])
+    weights = np.exp(log_weights) * (~elsewhere | recruits(kinds[..., 1]))
     columns, ends = trial.columns.copy(), trial.columns[..., 2:4]
     columns[..., 2], columns[..., BY_CURVES] = -np.inf, np.nan
 

@@ -129,7 +129,7 @@ class Swarm:
         """The particles after one more trial: weighed, resampled where too few carry the posterior, and moved."""
         trial = self._as_curves_have_it(trial, law)
         history = self.history.appended(trial)
-        below = probability_below(trial, self.crowd, law.meanings(*self.latents, -1))
+        below = probability_below(trial, self.crowd, law)
         kept, resampled = (moves.sweeps_after(history.trials, resampled=worn) for worn in (False, True))
         crowd, dice = self.crowd.copied(), seeds(seed, history.trials, len(self.evidence))
         found = law.learn(history.columns, moves.min_ess, (kept, resampled), dice, crowd)
