@@ -86,9 +86,9 @@ def probability_below(trial: History, crowd: Crowd, law: Law) -> FloatArray:
         crowd: the weighted particles before it.
         law: what they mean.
     """
-    values, kinds, log_weights = (np.ascontiguousarray(part[:, ::EACH]) for part in crowd[:3])
+    values, kinds = np.ascontiguousarray(crowd.values[:, ::EACH]), np.ascontiguousarray(crowd.kinds[:, ::EACH])
     fields, elsewhere = law.meanings(values, kinds, -1), ~np.isnan(trial.columns[..., BY_CURVES])
-    weights = np.exp(log_weights) * (~elsewhere | recruits(kinds[..., 1]))
+    weights = np.exp(crowd.log_weights[:, ::EACH]) * (~elsewhere | recruits(kinds[..., 1]))
     columns, ends = trial.columns.copy(), trial.columns[..., 2:4]
     columns[..., 2], columns[..., BY_CURVES] = -np.inf, np.nan
 
