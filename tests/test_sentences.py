@@ -227,8 +227,6 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
                 "1 counts (the electrical pulse alone does not); mistrials: 1 outcome unknown."
             ),
         ),
-        (sentences.fit(2, 9), "The fit had trouble in 2 of 9 trials; isiw show lists them."),
-        (sentences.doubt(3, "Equal."), "Doubt since trial 3: Equal."),
         (sentences.truth(None, None, None), "This simulated person in fact has no window."),
         (
             sentences.truth(Window(10, 40), None, 0.0),

@@ -83,6 +83,7 @@ MEANINGS: Final[Mapping[str, Mapping[str, str]]] = {
         "beforehand": "probability of a window before the first trial.",
         "tap_may_explain": "whether the tap's own response may be what is larger within the window.",
         "tap_is_likely": "whether the tap alone was measured there and evokes as much.",
+        "misfit": "what amplitudes say against the law of responses, as `isiw.change.Misfit`.",
         "trial": "the trial after which this was known.",
         "predicted_low_mv": "lower end of the band of nine of ten next MEPs at the ISIs of the profile [mV].",
         "predicted_high_mv": "its upper end [mV].",

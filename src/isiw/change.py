@@ -1,4 +1,4 @@
-"""A change in the course of a session, as an estimate has it."""
+"""What an estimate says against its own law: a change in the course of a session, and that the law does not fit."""
 
 from __future__ import annotations
 
@@ -55,3 +55,35 @@ class Change:
     def is_sure(self) -> bool:
         """True if it is said outright."""
         return self.probability >= SURE_OF_A_CHANGE
+
+
+AGAINST_A_LAW: Final = 100.0
+"""What a bet of 1 against the law of responses must have been worth for the law to be doubted."""
+
+AGAINST_A_CURVE: Final = 50.0
+"""The Bayes factor from which on pulses given alone and pairs are said not to fit; both are wrong in .03 at most."""
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """What amplitudes say against the law of responses that an estimate rests on.
+
+    Args:
+        law: what a bet of 1 against it has been worth at most; where the law is right, it ever reaches x with
+            probability 1 / x at most.
+        curve: the Bayes factor of pairs that do not follow the recruitment curve of pulses given alone over pairs that
+            do; None if none were given at another intensity.
+    """
+
+    law: float
+    curve: float | None = None
+
+    @property
+    def of_law(self) -> bool:
+        """True if the law is doubted."""
+        return self.law >= AGAINST_A_LAW
+
+    @property
+    def of_curve(self) -> bool:
+        """True if pulses given alone and pairs do not fit each other."""
+        return self.curve is not None and self.curve >= AGAINST_A_CURVE

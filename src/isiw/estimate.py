@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from isiw import sentences
-from isiw.change import Change
+from isiw.change import Change, Misfit
 from isiw.checks import Checked, Share, number
 from isiw.errors import InvalidValueError
 from isiw.findings import lacking
@@ -94,8 +94,7 @@ class WindowEstimate(Checked):
         silent: whether no trial that it rests on showed an MEP, so that nothing is known about a window.
         in_doubt: whether realised ISIs were reported that are far from those asked, and nobody has confirmed them; then
             there is no window.
-        depressed: the ISIs that depress the MEP, as far as they are reported; None if there are none, or if
-            nobody looked for them.
+        depressed: the ISIs that depress the MEP, as reported; None if there are none, or if nobody looked for them.
         depressed_probability: probability that there are any; None if the model does not look for them.
         change: what probably changed during the session, whatever the ISI; None if nothing did, or it is not sought.
         time_alone: probability that there is no window, but amplitudes changed with time; None if the model lacks it.
@@ -103,6 +102,7 @@ class WindowEstimate(Checked):
         tap_may_explain: whether the tap's own response may be what is larger within the window, as nobody knows what
             the tap alone does there, or it evokes as much.
         tap_is_likely: whether it was measured what the tap alone does there, and it evokes as much.
+        misfit: what amplitudes say against the law of responses; None if the model does not doubt it.
 
     Raises:
         InvalidValueError: a probability outside 0–1, or a window or a depression reported against it.
@@ -135,6 +135,7 @@ class WindowEstimate(Checked):
     beforehand: float | None = None
     tap_may_explain: bool = False
     tap_is_likely: bool = False
+    misfit: WorkedOut[Misfit | None] = field(default=WorkedOut("misfit", None))
 
     def noting(self, **facts: Any) -> WindowEstimate:
         """The same with other facts; what is still to be worked out remains so."""
@@ -255,8 +256,7 @@ class WindowEstimate(Checked):
         """Median and 90 % band of the expected MEP at some ISIs.
 
         Args:
-            isi_ms: ISIs [ms], shape (t,). Beyond `grid_ms`, as where a sweep has not come yet, the values at its ends
-                are repeated: there they are no estimate.
+            isi_ms: ISIs [ms], shape (t,). Beyond `grid_ms` the values at its ends are repeated: they are no estimate.
 
         Returns:
             The band [mV], or None if the method has none.
@@ -305,7 +305,7 @@ class Reported(BaseModel):
 
 
 _SAME: Final = ("probability", "expected_f1", "depressed_probability", "change", "beforehand", "tap_may_explain",
-                "tap_is_likely")  # fmt: skip
+                "tap_is_likely", "misfit")  # fmt: skip
 """Figures that an estimate with samples has by the same names."""
 
 
@@ -318,7 +318,7 @@ class Estimate(Reported):
     depresses the MEP, and `depressed_probability` is that there are any; None if nobody looked for them. `change` is
     what probably changed during the session, whatever the ISI. `beforehand` is the probability of a window before the
     first trial. `tap_may_explain` says whether the tap's own response may be what is larger within the window, and
-    `tap_is_likely` that the tap alone was measured there and evokes as much.
+    `tap_is_likely` that the tap alone was measured there and evokes as much; `misfit` what speaks against the law.
     """
 
     start_beyond: float | None = None
@@ -333,6 +333,7 @@ class Estimate(Reported):
     beforehand: float | None = None
     tap_may_explain: bool = False
     tap_is_likely: bool = False
+    misfit: Misfit | None = None
 
     @classmethod
     def of(cls, estimate: WindowEstimate, **more: Any) -> Self:

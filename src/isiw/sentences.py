@@ -75,7 +75,7 @@ def in_short(estimate: Estimate) -> str:
         return str(estimate.window or "no answer yet")
     if estimate.probability is not None and estimate.probability >= 0.5:
         return "window not reported"
-    return "no window" if rules_out(estimate.probability) else "undecided"
+    return "no window" if rules_out(estimate.probability) and not law_is_doubted(estimate) else "undecided"
 
 
 def titled(estimate: Estimate) -> str:
@@ -85,10 +85,15 @@ def titled(estimate: Estimate) -> str:
 
 
 def is_guess(estimate: Estimate) -> bool:
-    """True if a window is reported that the trials hardly speak for, so that it is undecided whether there is one."""
+    """True if a window is reported that the trials hardly speak for, or by a law that they speak against."""
     factor = bayes_factor(estimate.probability, estimate.beforehand)
     unsure = factor is not None and factor < LEAST_FACTOR and not _is_sure(estimate)
-    return estimate.window is not None and unsure
+    return estimate.window is not None and (unsure or law_is_doubted(estimate))
+
+
+def law_is_doubted(estimate: Estimate) -> bool:
+    """True if amplitudes speak against the law of responses, so that its answer is undecided."""
+    return estimate.misfit is not None and estimate.misfit.of_law
 
 
 def _chance(estimate: Estimate) -> str:
@@ -170,7 +175,8 @@ def finding(estimate: Estimate, first: StimulusWords, space: DesignSpace) -> str
     chance = _chance(estimate)
     undecided = f"It is undecided whether there is a window{chance}"
     if window is None:
-        return f"No window was found{chance}." if rules_out(probability) else f"{undecided}."
+        found = rules_out(probability) and not law_is_doubted(estimate)
+        return f"No window was found{chance}." if found else f"{undecided}."
     if is_guess(estimate):
         return f"{undecided}; the best guess is {window} {after}."
     enhances = f"The {first.name} {'' if probability >= SURE else 'probably '}enhances the MEP"
@@ -345,16 +351,6 @@ def few_outside(outside: int, pairs: int, alone: int) -> str:
     measured = f"{outside} of {pairs} pairs outside the window, {counted(alone, 'pulse')} of TMS alone"
     remedy = "add TMS alone next time ([protocol] tms_alone), or widen the range of ISIs"
     return f"The baseline is poorly measured ({measured}): {remedy}."
-
-
-def fit(troubled: int, trials: int) -> str:
-    """In how many trials the fit had trouble."""
-    return f"The fit had trouble in {troubled} of {trials} trials; isiw show lists them." if troubled else ""
-
-
-def doubt(trial: int | None, text: str) -> str:
-    """A doubt while the session ran."""
-    return f"Doubt since trial {trial}: {text}"
 
 
 def truth(true: Window | None, found: Window | None, f1: float | None) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from isiw import sentences
+from isiw.change import Misfit
 from isiw.design import DesignSpace
 from isiw.log.headers import StrategyRecipe
 from isiw.log.reader import SessionRecord, read_session
@@ -301,7 +302,7 @@ def test_isis_that_count_from_the_impact_need_no_hit_delay(record: SessionRecord
 def test_trials_in_which_the_fit_had_trouble_are_counted(record: SessionRecord) -> None:
     troubles = tuple(Event(kind="fit", trial=trial, text="no descent") for trial in (0, 2, 2))
     statement = final_statement(replace(record, history=(*troubles, *record.history)))
-    assert sentences.fit(2, 4) in statement
+    assert "The fit had trouble in 2 of 4 trials; isiw show lists them." in statement
     assert "The fit" not in final_statement(record)
 
 
@@ -388,3 +389,22 @@ def test_a_usual_statement_has_at_most_90_words(tmp_path: Path) -> None:
         assert len(statement.split()) <= 90
         for part in ("Do: deliver the tap alone", "(90 % each)", "argest MEP at 64 ms", "Expected F1: 0.85", "4 count"):
             assert part in statement
+
+
+def test_amplitudes_that_the_law_does_not_expect_are_said_and_leave_it_undecided(record: SessionRecord) -> None:
+    doubted = Misfit(law=120.0)
+    found = final_statement(with_estimate(record, probability=0.99, segments_ms=(30.0, 90.0), misfit=doubted))
+    none = final_statement(with_estimate(record, probability=0.01, segments_ms=(), misfit=doubted))
+    for statement in (found, none):
+        assert statement.startswith("It is undecided whether there is a window")
+        assert statement.count("The MEPs vary otherwise than the law of responses expects") == 1
+    right = final_statement(with_estimate(record, probability=0.01, segments_ms=(), misfit=Misfit(2.0, 0.1)))
+    assert right.startswith("No window was found")
+    assert "Warning: The MEPs vary otherwise" not in right
+
+
+def test_pulses_alone_that_do_not_fit_the_pairs_are_said_and_the_window_stays(record: SessionRecord) -> None:
+    estimate = {"probability": 0.99, "segments_ms": (30.0, 90.0), "misfit": Misfit(law=2.0, curve=60.0)}
+    statement = final_statement(with_estimate(record, **estimate))
+    assert "The pulses given alone and the pairs do not fit each other" in statement
+    assert "undecided" not in statement

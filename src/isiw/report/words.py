@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from isiw import sentences
+from isiw.change import Misfit
 from isiw.estimate import Estimate
 from isiw.findings import Kind
 from isiw.log.headers import Header
@@ -130,7 +131,7 @@ def findings(record: SessionRecord) -> list[Said]:
         [
             *answer_and_warnings(estimate, record.header, told),
             Said("at rest", Role.WARNING, nothing_stood_out(told, sought_ms) or ""),
-            *(Said("doubt", Role.WARNING, sentences.doubt(event.trial, event.text)) for event in doubts),
+            *(Said("doubt", Role.WARNING, f"Doubt since trial {event.trial}: {event.text}") for event in doubts),
             Said("edges", Role.DETAIL, sentences.edges(estimate, space)),
             Said("best ISI", Role.DETAIL, sentences.best_isi(estimate)),
             Said("excluded", Role.DETAIL, sentences.excluded(estimate)),
@@ -147,6 +148,7 @@ def answer_and_warnings(estimate: Estimate, header: Header, told: Sequence[Trial
     expected = (estimate.grid_ms, estimate.profile_mv) if estimate.profile_mv else None
     against = {
         "tap": sentences.tap_likely(estimate, first),
+        "misfit": _misfit(estimate.misfit),
         "contradiction": contradiction(window, told, without_probability=estimate.probability is None),
         "few outside": no_comparison(window, told),
         "changed with time": changed_with_time(window, told, expected),
@@ -154,6 +156,16 @@ def answer_and_warnings(estimate: Estimate, header: Header, told: Sequence[Trial
     }
     answer = Said("answer", Role.ANSWER, sentences.finding(estimate, first, header.space))
     return [answer, *(Said(name, Role.WARNING, text) for name, text in against.items() if text)]
+
+
+def _misfit(found: Misfit | None) -> str:
+    """That amplitudes do not follow the law of responses, or the pairs not the curve of pulses given alone."""
+    if found is not None and found.of_law:
+        return "The MEPs vary otherwise than the law of responses expects, so that the window may be wrong."
+    if found is not None and found.of_curve:
+        fit = "The pulses given alone and the pairs do not fit each other: the window rests on the pairs."
+        return f"{fit} Are muscle, coil, gain and the scale of intensities the same?"
+    return ""
 
 
 def _depression(record: SessionRecord) -> str:
@@ -174,7 +186,8 @@ def counts_sentence(record: SessionRecord) -> str:
 def fit_sentence(record: SessionRecord) -> str:
     """In how many trials the fit had trouble; empty if it never had."""
     troubled = {event.trial for event in record.events if event.kind == "fit"}
-    return sentences.fit(len(troubled), len(record.table))
+    said = f"The fit had trouble in {len(troubled)} of {len(record.table)} trials; isiw show lists them."
+    return said if troubled else ""
 
 
 def _lacks(record: SessionRecord, setting: str) -> bool:

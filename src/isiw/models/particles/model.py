@@ -9,12 +9,14 @@ from typing import Annotated
 
 import numpy as np
 
+from isiw.change import Misfit
 from isiw.checks import MOST_OF_A_KIND, Checked, NonNegative, Positive, Share, whole
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
 from isiw.lazy import Later
 from isiw.models.particles.jumps import law_of
 from isiw.models.particles.latents import Latents, latents_of
+from isiw.models.particles.misfit import against_curve
 from isiw.models.particles.mixture import log_sum
 from isiw.models.particles.noise import recruits
 from isiw.models.particles.posterior import SwarmPosterior
@@ -159,6 +161,9 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
             unusual=Later(lambda: prior.unusual(latents, self.space)),
             change=Later(lambda: prior.change(latents).named(self.trials)),
             time_alone=Later(lambda: float((prior.of_time(latents, self.trials) & ~latents.present).mean())),
+            misfit=Later(
+                lambda: Misfit(self.swarm.bets.worth(person), against_curve(prior, latents, self.swarm.history))
+            ),
         )
 
 

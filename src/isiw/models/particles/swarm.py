@@ -15,6 +15,7 @@ import numpy as np
 
 from isiw.checks import Checked, Natural, Share
 from isiw.models.particles.latents import Latents
+from isiw.models.particles.misfit import Bets, probability_below
 from isiw.models.particles.mixture import log_sum
 from isiw.models.particles.noise import recruits
 from isiw.models.shared.history import BY_CURVES, SHIFT, History
@@ -92,6 +93,7 @@ class Swarm:
     crowd: Crowd  # which nobody changes
     evidence: FloatArray  # log marginal likelihood of the history [nat], (b,)
     history: History
+    bets: Bets  # against the law
     health: Health | None = None  # after the last trial; None before the first
 
     @classmethod
@@ -101,7 +103,7 @@ class Swarm:
         equal = np.full((people, particles), -math.log(particles))
         nothing = np.zeros((people, particles), dtype=np.float32)
         crowd = Crowd(values, kinds, equal, nothing, law.nothing_known(people, particles))
-        return cls(crowd, np.zeros(people), History.empty(people))
+        return cls(crowd, np.zeros(people), History.empty(people), Bets.none(people))
 
     @property
     def latents(self) -> Latents:
@@ -125,19 +127,21 @@ class Swarm:
 
     def after(self, trial: History, law: Law, moves: Moving, seed: int) -> Swarm:
         """The particles after one more trial: weighed, resampled where too few carry the posterior, and moved."""
-        history = self.history.appended(self._as_curves_have_it(trial, law))
+        trial = self._as_curves_have_it(trial, law)
+        history = self.history.appended(trial)
+        below = probability_below(trial, self.crowd, law)
         kept, resampled = (moves.sweeps_after(history.trials, resampled=worn) for worn in (False, True))
         crowd, dice = self.crowd.copied(), seeds(seed, history.trials, len(self.evidence))
         found = law.learn(history.columns, moves.min_ess, (kept, resampled), dice, crowd)
         with np.errstate(invalid="ignore"):  # where there were no moves, no share of them was accepted
             health = Health(found[:, 1], found[:, 3] / found[:, 2], found[:, 5] / found[:, 4])
-        return Swarm(crowd, self.evidence + found[:, 0], history, health)
+        return Swarm(crowd, self.evidence + found[:, 0], history, self.bets.after(below), health)
 
     def weighed(self, trial: History, law: Law) -> Swarm:
         """The same particles, weighed by one more trial as well."""
         history, crowd = self.history.appended(self._as_curves_have_it(trial, law)), self.crowd.copied()
         found = law.learn(history.columns, 0.0, (0, 0), np.zeros(len(self.evidence), dtype=np.uint64), crowd)
-        return Swarm(crowd, self.evidence + found[:, 0], history)
+        return Swarm(crowd, self.evidence + found[:, 0], history, self.bets)
 
     def _as_curves_have_it(self, trial: History, law: Law) -> History:
         """A trial of TMS alone at another intensity, with the density that recruitment curves predict (decision 45)."""

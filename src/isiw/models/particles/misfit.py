@@ -1,0 +1,129 @@
+"""The model's own doubt: bets against its law, paid by what each amplitude's predictive distribution says of it.
+
+Where the law is right, the probability of a smaller amplitude is uniform, whatever came before, and no bet on another
+distribution can be expected to win. The mean of several bets is then a nonnegative martingale that starts at 1: it
+ever reaches 1 / a with probability a at most, whenever a session stops [Ville1939; Shafer2021].
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from isiw.models.particles.changes import INTENSITY_PCT, MATTERS
+from isiw.models.particles.latents import Latents
+from isiw.models.particles.mixture import log_sum
+from isiw.models.particles.noise import recruits
+from isiw.models.particles.prior import Prior
+from isiw.models.shared.history import BY_CURVES, History
+from isiw.native.engine import log_likelihoods
+from isiw.native.law import Crowd, Law
+from isiw.types import FloatArray, Singles
+
+AT_THE_BOUNDARY: Final = 2
+"""By so many trials the place of a change may be off."""
+
+STAKED: Final = np.array([0.25, 0.8])
+"""Shares of a stake that are bet, the rest being kept: of a law that is a little wrong, and of one that is far off."""
+
+LARGEST: Final = 20.0
+"""Log of the largest factor that is told."""
+
+EACH: Final = 4
+"""One in so many particles predicts; what all of them would say differs by less than a bet pays for."""
+
+NARROWEST: Final = 1e-3
+"""A probability of a smaller amplitude is known to this: particles have no finer tails."""
+
+
+def _laws(below: FloatArray) -> FloatArray:
+    """Distributions that are bet on, in amplitudes larger, smaller, less and more alike than expected, (4, ...)."""
+    spread = 2.0 / np.pi * np.arcsin(np.sqrt(below))
+    return np.stack((below**2, 1.0 - (1.0 - below) ** 2, spread, below**2 * (3.0 - 2.0 * below)))
+
+
+@dataclass(frozen=True, eq=False)
+class Bets:
+    """The bets against the law of b people."""
+
+    log_won: FloatArray  # log of what each stake has become, (b, k)
+    most: FloatArray  # log of the largest mean of them so far, (b,)
+
+    @classmethod
+    def none(cls, people: int) -> Bets:
+        """Before the first amplitude."""
+        return cls(np.zeros((people, 4 * len(STAKED))), np.zeros(people))
+
+    def worth(self, person: int) -> float:
+        """What a bet of 1 against one person's law has been worth at most."""
+        return math.exp(min(self.most[person], LARGEST))
+
+    def after(self, below: FloatArray) -> Bets:
+        """After one more amplitude of each person.
+
+        Args:
+            below: predictive probabilities of less than its lower end, and than its upper one, (b, 2).
+        """
+        half = np.maximum(0.5 * (below[:, 1] - below[:, 0]), 0.5 * NARROWEST)
+        middle = np.clip(below.mean(-1), half, 1.0 - half)
+        low, high = middle - half, middle + half
+        paid = (_laws(high) - _laws(low)) / (high - low)  # (4, b)
+        kept = 1.0 + STAKED[:, np.newaxis, np.newaxis] * (paid - 1.0)
+        log_won = self.log_won + np.log(np.maximum(kept, NARROWEST)).reshape(self.log_won.shape[1], -1).T
+        return Bets(log_won, np.maximum(self.most, log_sum(log_won) - np.log(log_won.shape[1])))
+
+
+def probability_below(trial: History, crowd: Crowd, law: Law) -> FloatArray:
+    """Predictive probabilities of an amplitude below the lower and the upper end of a trial's, (b, 2).
+
+    Recruitment curves alone predict a pulse at another intensity than the pairs' (decision 45).
+
+    Args:
+        trial: the trial of each person.
+        crowd: the weighted particles before it.
+        law: what they mean.
+    """
+    values, kinds = np.ascontiguousarray(crowd.values[:, ::EACH]), np.ascontiguousarray(crowd.kinds[:, ::EACH])
+    fields, elsewhere = law.meanings(values, kinds, -1), ~np.isnan(trial.columns[..., BY_CURVES])
+    weights = np.exp(crowd.log_weights[:, ::EACH]) * (~elsewhere | recruits(kinds[..., 1]))
+    columns, ends = trial.columns.copy(), trial.columns[..., 2:4]
+    columns[..., 2], columns[..., BY_CURVES] = -np.inf, np.nan
+
+    def below(end: Singles) -> FloatArray:
+        columns[..., 3] = end
+        mass: FloatArray = np.exp(log_likelihoods(fields, columns), dtype=float)
+        return np.asarray((weights * mass).sum(-1) / np.maximum(weights.sum(-1), 1e-300))
+
+    high = below(ends[..., 1])
+    point = (ends[..., 0] == ends[..., 1]).all()
+    return np.stack((high if point else below(ends[..., 0]), high), axis=-1)
+
+
+def against_curve(prior: Prior, latents: Latents, history: History) -> float | None:
+    """The Bayes factor of pairs that do not follow the curve of pulses given alone, over pairs that do.
+
+    They do not follow it where the noise has no recruitment curve, of which those pulses say nothing, or where
+    something changed between the two. The odds before the pairs are the prior's (decision 45).
+
+    Args:
+        prior: the prior over people.
+        latents: equally weighted particles of one person, (1, p).
+        history: the trials.
+
+    Returns:
+        None where no pulse was given alone at another intensity.
+    """
+    elsewhere = np.flatnonzero(~np.isnan(history.columns[0, :, BY_CURVES]))
+    if not len(elsewhere):
+        return None
+    change, given = prior.change(latents), elsewhere[-1] + 1
+    stepped = np.abs(change.log_gain) + np.abs(change.log_scale) + np.abs(change.shift_pct_rmt) / INTENSITY_PCT
+    changed = (np.abs(change.after - given) <= AT_THE_BOUNDARY) & (stepped > MATTERS)
+    follows = (recruits(latents.noise) & ~changed).sum()
+    beforehand = prior.noise.recruitment + prior.noise.rectified
+    if not beforehand:
+        return None
+    return float((latents.noise.size - follows + 0.5) / (follows + 0.5) * beforehand / (1.0 - beforehand + 1e-9))
