@@ -192,11 +192,9 @@ def test_startle_and_drift_belong_to_the_trial_and_not_to_its_isi() -> None:
     drifting, steady = particle(NoiseKind.CONSTANT_CV, drift=0.4, startled=0.5), particle(NoiseKind.CONSTANT_CV)
     expected = {0: 0.145, 1: 0.100 + 0.4 * 0.03, 2: 0.4 * (1 - 0.97**2), 500: 0.4}
     for order, log_gain in expected.items():
-        one, other = (neutral(501)[np.newaxis, order : order + 1].copy() for _ in range(2))
-        one[..., 0] = other[..., 0] = 0.5
-        one[..., 2:4] = other[..., 2:4] = math.log(0.1)
-        other[..., 8] = log_gain
-        found = engine.log_likelihoods(drifting, one), engine.log_likelihoods(steady, other)
+        told, larger = neutral(501)[np.newaxis, order : order + 1].copy(), steady.copy()
+        told[..., 0], told[..., 2:4], larger[..., LOG_RATIO] = 0.5, math.log(0.1), steady[..., LOG_RATIO] + log_gain
+        found = engine.log_likelihoods(drifting, told), engine.log_likelihoods(larger, told)
         np.testing.assert_allclose(*found, atol=1e-5)
 
 
