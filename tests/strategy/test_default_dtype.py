@@ -28,7 +28,7 @@ def _default_restored() -> Iterator[None]:
 def answers(name: str, *defaults: torch.dtype) -> list[Any]:
     """Asks, scores and estimates of a session whose script sets torch's default before each trial."""
     torch.set_default_dtype(defaults[0])
-    at_once = {"initial_trials": 1} if name.startswith("gp-") else {}
+    at_once: dict[str, Any] = {"initial_trials": 1} if name.startswith("gp-") else {}
     strategy = make_strategy(name, seed=3, **quick(name), **at_once)
     given: list[Any] = []
     for default, mep_mv in zip(defaults, MEPS_MV, strict=True):
