@@ -62,6 +62,13 @@ def frames_alone(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 
 
 @pytest.fixture
+def few_sweeps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A lab's prior is learnt in little time, for tests that are not about its numbers."""
+    monkeypatch.setattr("isiw.priors.population.SWEEPS", 60)
+    monkeypatch.setattr("isiw.priors.population.BURN_IN", 20)
+
+
+@pytest.fixture
 def space() -> DesignSpace:
     from scripted import SPACE  # noqa: PLC0415 - it imports torch
 

@@ -2,10 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Final
 
-SEARCHED_LITTLE: Final[dict[str, Any]] = {
+_PARTICLES: Final = {"particles": 100}
+_PROCESS: Final = {"samples": 64}
+_SEARCHED: Final = {
     "samples": 64,
     "effort": {"scouts": 96, "starts": 4, "steps": 8, "draws": 150, "fits": 3, "enough": 100},
 }
-"""Of the strategies whose model is fitted."""
+QUICK: Final[Mapping[str, dict[str, Any]]] = {
+    **dict.fromkeys(("default", "particles-window", "particles-mi", "even", "random", "supra-threshold"), _PARTICLES),
+    **dict.fromkeys(("parametric-mi", "parametric-window"), _SEARCHED),
+    **dict.fromkeys(("gp-straddle", "gp-variance", "gp-ei"), _PROCESS),
+    "gpr": {"samples": 16, "max_fit_iterations": 10},
+    "svmr": {"committee": 3},
+}
+"""By the strategy's name; the others are quick as they are."""
+
+
+def quick(name: str) -> dict[str, Any]:
+    """Of a named strategy."""
+    return QUICK.get(name, {})

@@ -56,7 +56,6 @@ def test_each_person_of_a_file_gets_a_log_and_called_again_nothing_is_made_twice
 
 
 @pytest.mark.slow
-@pytest.mark.needs_pictures
 @pytest.mark.usefixtures("read_here")
 def test_what_reads_logs_reads_imported_ones_and_says_what_they_are(isiw: Command, people: Path) -> None:
     isiw("analyse", people, "--reference", "impact", "--config", "few.toml", "-o", "logs")
@@ -144,7 +143,6 @@ def test_a_session_is_run_with_earlier_trials(isiw: Command, people: Path) -> No
     assert "not those of the session" in refused.output
 
 
-@pytest.mark.needs_pictures
 def test_a_file_is_replayed_for_one_person(isiw: Command, people: Path) -> None:
     words = ("replay", people, "--reference", "impact", "--strategy", "random", "--seeds", "1", "--trials", "6")
     result = isiw(*words, "--only", "A", "-o", "a.png")

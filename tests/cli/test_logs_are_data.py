@@ -11,8 +11,6 @@ from benchmarks.log_mutations import messages_of, write_messages
 import isiw as library
 from cli.conftest import Command
 
-pytestmark = pytest.mark.needs_pictures  # what a stranger wrote is drawn, too
-
 SPACE = library.DesignSpace(0, 500, reference="valve")
 
 

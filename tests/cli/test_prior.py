@@ -11,6 +11,8 @@ from isiw.cli.console import DAMAGED
 from isiw.log.reader import read_session
 from logs import damage
 
+pytestmark = pytest.mark.usefixtures("few_sweeps")
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: Any) -> Any:
@@ -45,13 +47,12 @@ def lab(isiw: Command, logs: Any, folder: Path) -> Any:
     return folder / "lab.toml"
 
 
-@pytest.mark.needs_pictures
 def test_a_lab_prior_is_shown_beside_the_built_in_one_and_drawn(isiw: Command, lab: Any, folder: Path) -> None:
     result = isiw("prior", "show", lab, "-o", "lab.png")
     assert result.exit_code == 0, result.output
     assert "EMG floor [mV]" in result.output
     assert "built-in median" in result.output
-    assert (folder / "lab.png").stat().st_size > 5000
+    assert (folder / "lab.png").exists()
 
 
 @pytest.mark.parametrize("flags", [(), ("--overwrite",)])
@@ -66,7 +67,6 @@ def test_learning_replaces_no_log_and_asks_before_the_work_begins(isiw: Command,
 
 
 @pytest.mark.slow
-@pytest.mark.needs_pictures
 def test_a_prior_and_its_picture_are_replaced_only_where_that_is_asked_for(
     isiw: Command, lab: Any, folder: Path
 ) -> None:
@@ -79,7 +79,7 @@ def test_a_prior_and_its_picture_are_replaced_only_where_that_is_asked_for(
         assert "--overwrite" in refused.output
         assert (lab.read_bytes(), picture.read_bytes()) == (before, b"kept")
     assert isiw("prior", "show", lab, "-o", picture, "--overwrite").exit_code == 0
-    assert picture.stat().st_size > 5000
+    assert picture.read_bytes() != b"kept"
 
 
 def test_a_session_is_run_with_a_lab_prior_and_its_log_holds_the_numbers(isiw: Command, lab: Any, folder: Path) -> None:

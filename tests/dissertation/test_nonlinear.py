@@ -136,7 +136,7 @@ def test_a_search_that_gives_up_says_so_and_its_best_curve_stands_in() -> None:
 @pytest.mark.parametrize("space", [VALVE_SPACE, IMPACT_SPACE], ids=["valve", "impact"])
 @pytest.mark.parametrize("peaks", [1, 2])
 def test_the_model_conforms(space: DesignSpace, peaks: int) -> None:
-    check_model(lambda: RegressionModel(NonlinearRegression(peaks=peaks)), space, order_tolerance_ms=1.0)
+    check_model(lambda: RegressionModel(NonlinearRegression(peaks=peaks, samples=16)), space, order_tolerance_ms=1.0)
 
 
 @pytest.mark.parametrize("scale", [10.0, 1.0, 0.03])

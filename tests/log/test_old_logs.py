@@ -15,7 +15,7 @@ import isiw
 from isiw.errors import OtherVersionsWarning
 from isiw.findings import Kind
 from isiw.native.library import version
-from isiw.plots import save_session_plot
+from isiw.plots import session_figure
 from isiw.report import final_statement
 from isiw.session.replay import strategy_of
 from isiw.session.sink import SessionUpdate
@@ -79,9 +79,10 @@ def test_it_opens_whole(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", LOGS)
-def test_it_is_drawn(name: str, tmp_path: Path) -> None:
-    record = isiw.read_session(FOLDER / log_of(name))
-    assert save_session_plot(record, tmp_path / "session.png").stat().st_size > 5000
+def test_it_is_drawn(name: str) -> None:
+    figure = session_figure(isiw.read_session(FOLDER / log_of(name)))
+    figure.draw_without_rendering()  # what is drawn differs, not how a file is written
+    assert figure.axes[0].has_data()
 
 
 @pytest.mark.parametrize("name", LOGS)

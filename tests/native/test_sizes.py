@@ -18,7 +18,10 @@ given = [np.zeros(size, dtype=np.float32) for size in sizes]
 library.call("evoked_means", 1, 24, *(array.__array_interface__["data"][0] for array in given))
 """
 
-pytestmark = pytest.mark.skipif(sanitized.compiler() is None, reason="no compiler with sanitizers here")
+pytestmark = [
+    pytest.mark.skipif(sanitized.compiler() is None, reason="no compiler with sanitizers here"),
+    pytest.mark.slow,
+]
 
 
 @pytest.fixture

@@ -21,14 +21,15 @@ from known import known
 from scripted import SPACE, ScriptedDevice, scripted_strategy
 
 
-@pytest.fixture
-def record(tmp_path: Path) -> SessionRecord:
+@pytest.fixture(scope="module")
+def record(tmp_path_factory: pytest.TempPathFactory) -> SessionRecord:
+    log = tmp_path_factory.mktemp("session") / "s.mcap"
     device = ScriptedDevice(
         lambda s: Measurement(0.02 * s.trial, s.isi_ms, background_rms_uv=50.0 if s.trial == 1 else 2.0)
     )
-    Session(device, scripted_strategy(6), log=tmp_path / "s.mcap").run()
-    exclude(tmp_path / "s.mcap", 4, "sneezed")
-    return read_session(tmp_path / "s.mcap")
+    Session(device, scripted_strategy(6), log=log).run()
+    exclude(log, 4, "sneezed")
+    return read_session(log)
 
 
 def labels(figure: Figure) -> set[str]:

@@ -29,6 +29,8 @@ from logs import damage
 from native.drawn import Case
 from priors.logged import gaussian_person, write_log
 
+pytestmark = pytest.mark.usefixtures("few_sweeps")  # but for `lab`, whose numbers are looked at
+
 TRIALS = 14
 
 

@@ -59,6 +59,7 @@ def test_one_odd_person_does_not_bend_the_law() -> None:
     assert with_one.members < 12.5
 
 
+@pytest.mark.usefixtures("few_sweeps")
 def test_nobody_teaches_a_law_of_what_their_particles_do_not_use() -> None:
     assert population_of(people_at(6.0, 10), used=False).laws["x"].members == 0
 

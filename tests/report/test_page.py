@@ -173,7 +173,6 @@ def test_a_session_without_a_trial_has_a_page(record: SessionRecord) -> None:
     assert "No trial has been completed." in Page(report_page(empty)).words
 
 
-@pytest.mark.needs_pictures
 def test_a_page_replaces_nothing_unasked(record: SessionRecord, tmp_path: Path) -> None:
     (tmp_path / "r.html").write_text("precious")
     with pytest.raises(InvalidValueError, match="not overwritten unasked"):

@@ -11,19 +11,10 @@ import numpy as np
 import pytest
 import torch
 
-from isiw.models.gp import GaussianProcess
-from isiw.models.parametric import ParametricModel
-from isiw.models.particles import ParticleModel
-from isiw.models.particles.supra import SupraModel
-from isiw.strategy.catalogue import list_strategies, make_strategy, settings_for
+from isiw.strategy.catalogue import list_strategies, make_strategy
+from quick import quick
 
 MEPS_MV = (0.1, 0.0)
-QUICK: dict[type, dict[str, Any]] = {
-    ParticleModel: {"particles": 64},
-    SupraModel: {"particles": 64},
-    ParametricModel: {"samples": 64, "effort": {"scouts": 64, "starts": 2, "draws": 100, "enough": 50.0}},
-    GaussianProcess: {"samples": 64, "initial_trials": 1},
-}
 SINGLE, DOUBLE = torch.float32, torch.float64
 
 
@@ -37,7 +28,8 @@ def _default_restored() -> Iterator[None]:
 def answers(name: str, *defaults: torch.dtype) -> list[Any]:
     """Asks, scores and estimates of a session whose script sets torch's default before each trial."""
     torch.set_default_dtype(defaults[0])
-    strategy = make_strategy(name, seed=3, **QUICK.get(type(settings_for(name).model), {}))
+    at_once: dict[str, Any] = {"initial_trials": 1} if name.startswith("gp-") else {}
+    strategy = make_strategy(name, seed=3, **quick(name), **at_once)
     given: list[Any] = []
     for default, mep_mv in zip(defaults, MEPS_MV, strict=True):
         torch.set_default_dtype(default)

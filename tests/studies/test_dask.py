@@ -36,6 +36,7 @@ def test_a_study_has_identical_rows_on_a_cluster(tmp_path: Path, cluster: LocalC
     pd.testing.assert_frame_equal(timeless(there.rows()), timeless(here.rows()))
 
 
+@pytest.mark.slow  # as all that share the cluster
 def test_what_raises_on_a_cluster_is_a_failure_among_the_results(client: Client) -> None:
     results = dict(DaskCluster(client).results(double, range(5)))
     assert instance(Failure, results.pop(3)).error == "ValueError: three is too many"

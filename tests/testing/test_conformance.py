@@ -26,7 +26,7 @@ from isiw.testing import check_acquisition, check_model, check_strategy
 from isiw.testing.suites import Trials, trials_that_break_things, usual_trials
 from isiw.types import Array, FloatArray
 from isiw.window import Window
-from quick import SEARCHED_LITTLE
+from quick import quick
 
 FEW: dict[str, Any] = {"particles": 100}
 NAMES = sorted(list_strategies())
@@ -34,13 +34,6 @@ FITTED = ("parametric-", "gp-", "supra-", "particles-")
 """Strategies that take seconds begin so; the particle model itself is checked with the default."""
 SLOW_FITS = [pytest.param(name, marks=pytest.mark.slow) if name.startswith(FITTED) else name for name in NAMES]
 SCORING = sorted(name for name, make in ACQUISITIONS.items() if ProposesIsi not in make(0).needs)
-
-
-def settings_of(name: str) -> dict[str, Any]:
-    """Settings with which a strategy is quick."""
-    if name.startswith("parametric"):
-        return SEARCHED_LITTLE
-    return FEW if name in {"default", "even", "random", "supra-threshold"} or name.startswith("particles") else {}
 
 
 @cache  # a posterior never changes
@@ -72,7 +65,7 @@ def test_every_acquisition_function_scores_what_breaks_things(name: str) -> None
 
 @pytest.mark.parametrize("name", SLOW_FITS)
 def test_every_named_strategy_conforms(name: str) -> None:
-    check_strategy(lambda: make_strategy(name, seed=1, **settings_of(name)), trials=8)
+    check_strategy(lambda: make_strategy(name, seed=1, **quick(name)), trials=8)
 
 
 @pytest.mark.long
@@ -84,7 +77,7 @@ def test_every_named_strategy_conforms_over_forty_trials(name: str) -> None:
 @pytest.mark.parametrize("name", SLOW_FITS)
 @pytest.mark.parametrize("people", ["recruitment", "nonresponder"])
 def test_every_named_strategy_finishes_a_session_of_forty_trials(name: str, people: str) -> None:
-    strategy = make_strategy(name, seed=1, **settings_of(name))
+    strategy = make_strategy(name, seed=1, **quick(name))
     responder = cohort(people, 1, 3)[0].begin(3)
     for _ in range(40):
         response = responder.respond(strategy.ask(), VALVE_SPACE.reference)

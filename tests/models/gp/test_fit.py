@@ -71,7 +71,7 @@ def test_the_evidence_is_a_density_of_log_amplitudes(transform: Transform) -> No
     # Summed over all amplitudes that the next trial may have, the predictive density is 1.
     centre, unit = {"log": (-3.0, 0.3), "sqrt": (0.3, 0.02), "none": (0.09, 0.005)}[transform]
     fixed = replace(FIXED, centre=centre, unit=unit)
-    scale, log_meps = Standardisation(transform, 1e-6, centre, unit), np.linspace(-7.0, 1.0, 801)
+    scale, log_meps = Standardisation(transform, 1e-6, centre, unit), np.linspace(-7.0, 1.0, 161)
     told = [PersonTrials(np.array([250.0]), np.array([math.exp(x)]), NOBODY) for x in log_meps]
     densities = np.exp([fit(ProcessSettings("rbf", prior=PRIOR, fixed=fixed), scale, one).log_evidence for one in told])
     assert densities.sum() * (log_meps[1] - log_meps[0]) == pytest.approx(1.0, abs=1e-3)

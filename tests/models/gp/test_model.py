@@ -74,9 +74,9 @@ def estimate(model: GaussianProcess, trials: Trials) -> WindowEstimate:
     [
         {},
         {"process": ProcessSettings(kernel="rbf")},
-        {"process": ProcessSettings(noise="by-isi")},
+        {"process": ProcessSettings(noise="by-isi", max_evaluations=40)},
         {"process": ProcessSettings(hyperparameters="map")},
-        {"transform": "sqrt", "process": ProcessSettings(noise="by-isi", hyperparameters="map")},
+        {"transform": "sqrt", "process": ProcessSettings(noise="by-isi", hyperparameters="map", max_evaluations=40)},
         {"transform": "none", "floor": FloorTreatment("raw")},
         {"floor": FloorTreatment("zeroed")},
         {"process": ProcessSettings(fixed=FIXED)},
@@ -84,12 +84,12 @@ def estimate(model: GaussianProcess, trials: Trials) -> WindowEstimate:
     ids=str,
 )
 def test_it_conforms(changed: dict[str, Any]) -> None:
-    check_model(lambda: replace(FEW, **changed), VALVE_SPACE)
+    check_model(lambda: replace(FEW, samples=16, **changed), VALVE_SPACE)
 
 
 def test_it_conforms_from_the_impact_and_in_a_narrow_space() -> None:
     for space in (IMPACT_SPACE, DesignSpace(20, 60, reference="impact")):
-        check_model(lambda: FEW, space)
+        check_model(lambda: replace(FEW, samples=16), space)
 
 
 def test_it_has_the_capabilities_that_it_says() -> None:
