@@ -200,7 +200,7 @@ def test_of_two_that_go_on_at_once_one_does_and_the_other_is_told_why(
         else:
             won.append(name)
 
-    for _ in range(40):
+    for _ in range(100):
         runners = [threading.Thread(target=resume, args=(name,)) for name in ("one", "other")]
         for runner in runners:
             runner.start()
