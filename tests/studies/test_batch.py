@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -48,6 +49,17 @@ def one_at_a_time(batch: Sequence[SimulatedSession]) -> pd.DataFrame:
 def test_a_batch_of_one_is_that_session(strategy: str) -> None:
     batch = sessions(strategy, 1, first=2, trials=8)  # one more than any initial design has
     pd.testing.assert_frame_equal(timeless(simulate_batch(batch)), timeless(one_at_a_time(batch)))
+
+
+def test_people_side_by_side_take_less_than_a_megabyte_each() -> None:
+    batch = [SimulatedSession("default", "recruitment", person, 5, 3, (3,)) for person in range(12)]
+    simulate_batch(batch[:1])  # what is kept for all people
+    tracemalloc.start()
+    try:
+        simulate_batch(batch)
+        assert tracemalloc.get_traced_memory()[1] < 1e6 * len(batch)
+    finally:
+        tracemalloc.stop()
 
 
 @pytest.mark.parametrize("strategy", EVERY)
