@@ -39,7 +39,7 @@ from isiw.trials import TrialTable
 from isiw.visit import Visit, VisitProtocol
 
 BELIEF_VERSION: Final = 6
-ENGINE_VERSION: Final = 3
+ENGINE_VERSION: Final = 4
 """Which belief a session learns by, and which engine computes it, for its header."""
 
 _PACKAGES = ("numpy", "torch", "botorch", "gpytorch")
