@@ -129,7 +129,7 @@ def test_a_mistrial_counts_and_is_left_out_of_the_statistics() -> None:
     nothing = np.full(5, np.nan)
     events = TapEvents(nothing, nothing, nothing, nothing, nothing)
     table = TimingStudy("five taps", events, commanded, np.array([11.0, 9.5, -3.0, np.nan, 5.0])).error_table
-    assert table.loc[10.0, ["n", "mean_ms", "mistrials"]].tolist() == [2, pytest.approx(0.25), 2]
+    assert list(table.loc[10.0, ["n", "mean_ms", "mistrials"]]) == [2, pytest.approx(0.25), 2]
 
 
 def test_an_event_that_was_never_found_is_not_in_the_table() -> None:
