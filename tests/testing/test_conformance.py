@@ -123,7 +123,7 @@ class Broken:
                 return after if after.trials > 1 else posterior
             case "predicts backwards":
                 return after
-        return self.model.update(posterior, replace(observation, mep_mv=observation.mep_mv * after.trials**2))
+        return self.model.update(posterior, replace(observation, mep_mv=observation.mep_mv * after.trials**4))
 
 
 @pytest.mark.parametrize(
