@@ -161,7 +161,8 @@ def answer_and_warnings(estimate: Estimate, header: Header, told: Sequence[Trial
 def _misfit(found: Misfit | None) -> str:
     """That amplitudes do not follow the law of responses, or the pairs not the curve of pulses given alone."""
     if found is not None and found.of_law:
-        return "The MEPs vary otherwise than the law of responses expects, so that the window may be wrong."
+        wrong = "The MEPs vary otherwise than the law of responses expects, so that the window may be wrong."
+        return f"{wrong} Look at the sweeps: are there artefacts, or pulses without a response?"
     if found is not None and found.of_curve:
         fit = "The pulses given alone and the pairs do not fit each other: the window rests on the pairs."
         return f"{fit} Are muscle, coil, gain and the scale of intensities the same?"
