@@ -37,6 +37,7 @@ NAMES: Final[Mapping[str, str]] = {
 PEOPLE: Final[Mapping[str, str]] = {
     "recruitment": "noise as near threshold (`recruitment`)",
     "gaussian": "constant-CV noise (`gaussian`)",
+    "recorded": "responses that were recorded (`recorded`)",
 }
 
 
