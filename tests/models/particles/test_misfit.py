@@ -5,9 +5,12 @@ import pytest
 
 import isiw
 from isiw.change import Misfit
+from isiw.design import VALVE_SPACE
 from isiw.estimate import WindowEstimate
 from isiw.models.particles import ParticleModel
+from isiw.models.particles.laws import NoiseShares
 from isiw.models.particles.misfit import Bets, probability_below
+from isiw.models.particles.prior import Prior
 from isiw.models.protocol import Observation
 from isiw.models.shared.history import observed
 from isiw.types import FloatArray
@@ -88,6 +91,18 @@ def test_pulses_alone_that_the_pairs_contradict_are_said_not_to_fit_and_others_a
         misfit = known(examined(silent_mv, tuple(zip(over_pct.tolist(), growing_mv.tolist(), strict=True))).misfit)
         assert misfit.of_curve == contradicts
         assert math.isfinite(known(misfit.curve))
+
+
+@pytest.mark.parametrize("without", [0.0, 1e-6])
+def test_a_prior_of_hardly_anything_but_curves_does_not_speak_against_one(without: float) -> None:
+    noise = NoiseShares(constant_cv=without, missing=0, recruitment=1 - without, all_or_none=0, rectified=0)
+    model = ParticleModel(Prior(noise=noise), particles=100)
+    posterior = model.begin(VALVE_SPACE, 0)
+    for pct_rmt, mep_mv in ((100.0, 0.05), (120.0, 0.4)):
+        told = Observation.of([None], [mep_mv], shift_pct_rmt=[pct_rmt - model.pairs_pct_rmt])
+        posterior = model.update(posterior, told)
+    posterior = model.update(posterior, Observation.of([60.0], [0.05]))
+    assert not known(posterior.estimate().misfit).of_curve
 
 
 def test_what_is_doubted_is_a_matter_of_the_figures_alone() -> None:

@@ -114,7 +114,8 @@ def against_curve(prior: Prior, latents: Latents, history: History) -> float | N
         history: the trials.
 
     Returns:
-        None where no pulse was given alone at another intensity.
+        None where no pulse was given alone at another intensity, or the prior leaves no choice between noise with a
+        curve and noise without.
     """
     elsewhere = np.flatnonzero(~np.isnan(history.columns[0, :, BY_CURVES]))
     if not len(elsewhere):
@@ -123,7 +124,9 @@ def against_curve(prior: Prior, latents: Latents, history: History) -> float | N
     stepped = np.abs(change.log_gain) + np.abs(change.log_scale) + np.abs(change.shift_pct_rmt) / INTENSITY_PCT
     changed = (np.abs(change.after - given) <= AT_THE_BOUNDARY) & (stepped > MATTERS)
     follows = (recruits(latents.noise) & ~changed).sum()
-    beforehand = prior.noise.recruitment + prior.noise.rectified
-    if not beforehand:
+    with_curve = prior.noise.recruitment + prior.noise.rectified
+    without = prior.noise.constant_cv + prior.noise.missing + prior.noise.all_or_none
+    if not with_curve or not without:
         return None
-    return float((latents.noise.size - follows + 0.5) / (follows + 0.5) * beforehand / (1.0 - beforehand + 1e-9))
+    # Where no particle speaks against the curve nothing does, however improbable that was beforehand.
+    return float((latents.noise.size - follows) / (follows + 0.5) * with_curve / without)
