@@ -37,8 +37,8 @@ from isiw.report.evidence import ENOUGH_ON_EACH_SIDE, changed_with_time
 from isiw.report.words import Role, Said, in_lines, statement
 from isiw.session import examination
 from isiw.session.loop import Session
-from isiw.signals.rig import Evidence, told_of
-from isiw.signals.watch import Doubts, findings
+from isiw.signals.amplitudes import Doubts, Evidence, told_of
+from isiw.signals.watch import findings
 from isiw.subjects.cohorts import person_of
 from isiw.subjects.subject import SimulatedSubject
 from isiw.trials import Status, Trial, TrialTable

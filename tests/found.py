@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from isiw.findings import Finding
-from isiw.signals.rig import Evidence, Told
+from isiw.signals.amplitudes import Evidence, Told
 from isiw.signals.watch import findings
 from isiw.trials import Measurement, Sweep, Trial
 

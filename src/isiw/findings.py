@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from types import MappingProxyType
 from typing import Final
 
 from isiw.errors import InvalidValueError, IsiwError
@@ -86,6 +87,29 @@ class Kind(StrEnum):
 
 MISTRIALS: Final = tuple(Kind)[: tuple(Kind).index(Kind.OUTCOME_UNKNOWN) + 1]
 """Why a delivered trial is not told. The list is closed."""
+
+REMEDIES: Mapping[Kind, str] = MappingProxyType(
+    {
+        Kind.NO_IMPACT: "Check the air supply, the valve, and the accelerometer on the hammer.",
+        Kind.NO_PULSE: "Check that the stimulator is charged and armed, and that its trigger is recorded.",
+        Kind.TMS_BEFORE_IMPACT: "Check the hit delay that the rig assumes, and the sampling rate.",
+        Kind.BACKGROUND_ACTIVITY: (
+            "Ask the person to relax the muscle; check the electrodes and the ground, and look for mains hum. Where "
+            "the tap alone evokes a reflex before the pulse, begin the space at larger ISIs. If the muscle is to be "
+            "contracted, say so: contracted = true under [signals]."
+        ),
+        Kind.SATURATION: "Lower the amplifier's gain, or keep cables away from the coil.",
+        Kind.MISSING_CHANNEL: (
+            "Check that the EMG is recorded, and not blanked, from 50 ms before to 50 ms after the pulse."
+        ),
+        Kind.TOO_LITTLE_REST: "Let the sweep begin earlier: the EMG at rest says whether the muscle is relaxed.",
+        Kind.ISI_OFF: "Check how the rig times the pulse, the reference of its ISIs, and the sampling rate.",
+        Kind.IMPLAUSIBLE: "Check the unit and the gain of the EMG.",
+        Kind.REJECTED: "See the notes in the log.",
+        Kind.OUTCOME_UNKNOWN: "Check whether the device is connected and answers.",
+    }
+)
+"""What to do about a mistrial of each reason."""
 
 
 @dataclass(frozen=True)

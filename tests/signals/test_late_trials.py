@@ -10,8 +10,8 @@ import pytest
 
 from isiw.design import DesignSpace
 from isiw.signals import places, watch
+from isiw.signals.amplitudes import Evidence, Response, Told
 from isiw.signals.limits import SignalLimits
-from isiw.signals.rig import Evidence, Response, Told
 from isiw.signals.watch import Watch
 from isiw.strategy.outcomes import Outcome, Outcomes, found_step_mv
 from isiw.trials import Measurement, Status, Trial

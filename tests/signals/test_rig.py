@@ -12,9 +12,8 @@ import pytest
 from found import fault_of
 from isiw.design import DesignSpace
 from isiw.devices.simulated import SimulatedDevice
-from isiw.findings import MISTRIALS, Finding, Kind, Severity
+from isiw.findings import MISTRIALS, REMEDIES, Finding, Kind, Severity
 from isiw.signals import judge
-from isiw.signals.rig import REMEDIES
 from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial
 from known import instance
 from wrong_rigs import KINDS, SPACE, WRONG, WrongRig, doubled, rig

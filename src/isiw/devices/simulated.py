@@ -17,7 +17,7 @@ from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, readine
 from isiw.devices.robot.waveforms import scale_of_mep
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.lazy import pd
-from isiw.signals.mep import MEP_WINDOW_MS
+from isiw.signals.limits import MEP_WINDOW_MS
 from isiw.subjects.subject import Response
 from isiw.trials import MOST_ISI_SD_MS, Channel, Measurement, Stimulus, Sweep, Trial, TrialTable
 from isiw.types import BoolArray, Conditioning, FloatArray, Reference

@@ -13,8 +13,7 @@ import numpy as np
 from isiw import sentences
 from isiw.findings import IN_DOUBT, NO_MEP
 from isiw.log.reader import SessionRecord
-from isiw.signals.rig import told_of
-from isiw.signals.watch import stopped_after
+from isiw.signals.amplitudes import stopped_after, told_of
 from isiw.trials import Trial
 from isiw.types import ArrayLike, FloatArray
 from isiw.window import Window

@@ -12,7 +12,7 @@ from isiw.devices.clock import ROUNDING_S, Clock, Pacing
 from isiw.devices.protocol import Readiness
 from isiw.errors import ClockWarning, InvalidValueError
 from isiw.estimate import WindowEstimate
-from isiw.findings import IN_DOUBT, Finding, Kind, Severity
+from isiw.findings import IN_DOUBT, REMEDIES, Finding, Kind, Severity
 from isiw.log.headers import Header
 from isiw.log.pulses import Ages
 from isiw.log.schema import Event, Intent
@@ -22,10 +22,9 @@ from isiw.session.assembly import Earlier
 from isiw.session.examination import Examination, examination_of
 from isiw.session.judging import Judging
 from isiw.session.sink import Sink
+from isiw.signals.amplitudes import Doubts, odd_amplitudes, told_of
 from isiw.signals.limits import isi_far, require_plausible, require_plausible_range
 from isiw.signals.reported import unconfirmed
-from isiw.signals.rig import REMEDIES, Evidence, told_of
-from isiw.signals.watch import Doubts, findings
 from isiw.strategy.outcomes import Outcome
 from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
@@ -251,9 +250,8 @@ class Recorder(Recording[Trial], Judging):
         self._conclude(trial)
         if self._put_in_doubt():
             return
-        evidence = Evidence(told=told_of(self.trials), detection_limit_mv=self._detection_limit_mv)
-        off = isi_far(isi_ms, asked.isi_ms, self.strategy.space)
-        self._doubts = self._doubts.after((off, *findings(evidence)))
+        off, odd = isi_far(isi_ms, asked.isi_ms, space), odd_amplitudes(told_of(self.trials), self._detection_limit_mv)
+        self._doubts = self._doubts.after((off, *odd))
         if self._doubts.new is not None:
             self._warn(self._doubts.new)
 

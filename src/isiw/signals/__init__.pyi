@@ -9,8 +9,8 @@ from .impact import impact_times as impact_times
 from .judgement import judge as judge
 from .judgement import judge_measurement as judge_measurement
 from .judgement import wrong_isi as wrong_isi
+from .limits import MEP_WINDOWS_MS as MEP_WINDOWS_MS
 from .limits import SignalLimits as SignalLimits
-from .mep import MEP_WINDOWS_MS as MEP_WINDOWS_MS
 from .mep import background_rms as background_rms
 from .mep import mep_amplitude as mep_amplitude
 from .mep import mep_amplitudes as mep_amplitudes

@@ -8,12 +8,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from isiw.signals.mep import TAP_MS
+from isiw.signals.limits import TAP_MS
 from isiw.types import BoolArray, FloatArray, IntArray
 
 STEP_MS: Final = 0.25
-HIT_DELAY_MS, APART_MS = 180.0, 40.0
-"""From the valve command to the hit, usually, and how far from that it may be."""
+APART_MS = 40.0
+"""How far from the usual delay of the hit it may be."""
 
 GRID_MS: Final = np.arange(-APART_MS, TAP_MS + APART_MS, STEP_MS)
 _ROOM: Final = 16

@@ -18,6 +18,7 @@ from isiw.signals.impact import impact_time
 from isiw.signals.limits import (
     ACCELERATION_UNITS,
     EMG_UNITS_MV,
+    TAP_MS,
     SignalLimits,
     before_impact,
     implausible_amplitude,
@@ -25,7 +26,7 @@ from isiw.signals.limits import (
     require_agreement,
     tap_with_tms_alone,
 )
-from isiw.signals.mep import TAP_MS, TAP_SPAN_MS, at_rest, disturbance, known_background_rms, mep_amplitudes
+from isiw.signals.mep import TAP_SPAN_MS, at_rest, disturbance, known_background_rms, mep_amplitudes
 from isiw.signals.waveforms import is_blanked, is_recording, is_saturated
 from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial
 from isiw.types import FloatArray

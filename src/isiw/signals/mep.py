@@ -8,14 +8,13 @@ rest, and go on below the MEP.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from isiw.errors import InvalidValueError
 from isiw.findings import Kind
+from isiw.signals.limits import MEP_WINDOW_MS, TAP_MS
 from isiw.signals.waveforms import (
     PULSE_GUARD_MS,
     as_waveforms,
@@ -28,12 +27,6 @@ from isiw.signals.waveforms import (
 )
 from isiw.trials import Channel, Trial
 from isiw.types import ArrayLike, BoolArray, FloatArray, IntArray
-
-MEP_WINDOW_MS = (15.0, 35.0)
-"""Where the MEP of the forearm is sought [ms after the pulse] [Kim2020, 5.2.3]."""
-
-MEP_WINDOWS_MS: Mapping[str, tuple[float, float]] = MappingProxyType({"forearm": MEP_WINDOW_MS, "hand": (15.0, 50.0)})
-"""Windows by muscle group. In hand muscles the onset is near 23 ms and the second turn may lie beyond 35 ms."""
 
 PRESENT_MV = 0.05  # the field's convention [Rossini2015]; 1.7 % of resting sweeps exceed it
 BACKGROUND_MS = 100.0
@@ -278,9 +271,6 @@ REST_S: Final = 0.3
 
 LEAST_S: Final = 0.06
 """Three periods: in fewer, slow drift looks like hum."""
-
-TAP_MS: Final = 150.0
-"""How long after the hit the tap may move the EMG, its reflexes included [ms]."""
 
 LEAST_MV, SPAN_S = 0.01, 0.1
 """The least hum from peak to peak, and the least drift in the EMG that says whether a muscle is at rest."""

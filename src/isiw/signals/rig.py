@@ -1,4 +1,4 @@
-"""What is known after each trial, and what one trial says is likely wrong with a rig.
+"""What one trial and its sweep say is likely wrong with a rig.
 
 Nobody is accused without a sign: if a sweep shows none, the reason of the mistrial stands for itself.
 """
@@ -6,73 +6,19 @@ Nobody is accused without a sign: if a sweep shows none, the reason of the mistr
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from types import MappingProxyType
-from typing import Final, NamedTuple
+from dataclasses import replace
 
 import numpy as np
 
 from isiw.design import DesignSpace
-from isiw.findings import REST_UV, Finding, Kind, Severity
+from isiw.findings import REMEDIES, REST_UV, Finding, Kind, Severity
+from isiw.signals.amplitudes import Evidence
 from isiw.signals.impact import impact_time
 from isiw.signals.judgement import of_one_length
-from isiw.signals.limits import ARTEFACT_MS, EMG_UNITS_MV, SignalLimits, implausible_amplitude
-from isiw.signals.mep import MIN_BACKGROUND_MS, Disturbance
+from isiw.signals.limits import ARTEFACT_MS, EMG_UNITS_MV, implausible_amplitude
+from isiw.signals.mep import MIN_BACKGROUND_MS
 from isiw.signals.waveforms import PULSE_GUARD_MS, is_recording, samples
-from isiw.trials import Channel, Measurement, Sweep, Trial
-
-OF_REST: Final = 8.0
-"""Peak-to-peak amplitude of EMG at rest over its RMS, at most: some 6 within the window of an MEP. In 330 recorded and
-simulated sweeps without an MEP it was 7.3 outside of it at most."""
-
-
-class Response(NamedTuple):
-    """A response outside the MEP window: its centre [ms after the pulse], and its peak-to-peak amplitude [mV]."""
-
-    at_ms: float
-    size_mv: float
-
-
-@dataclass(frozen=True)
-class Told:
-    """A trial that counts, as the checks of several trials look at it."""
-
-    mep_mv: float  # 0 is below the detection limit
-    isi_ms: float | None = None  # None for TMS alone
-    rest_uv: float | None = None  # RMS before the pulse
-    outside: Response | None = None  # the largest clear one outside the MEP window
-    cut_ms: tuple[float, float] | None = None  # of the response after the pulse, if it is larger behind the window
-    disturbance: Disturbance | None = None  # which was subtracted
-    is_tail: bool = False  # the window holds the end of a larger artefact before it
-    only_falls: bool = False  # the EMG in the window only falls, as a slow decay does and no MEP
-    repeats: bool = False  # its EMG is that of the trial before, sample by sample
-
-    @property
-    def stands_out(self) -> bool:
-        """Whether its amplitude is above the detection limit, and larger than EMG at rest may be."""
-        return self.mep_mv > OF_REST * (self.rest_uv or 0.0) / 1000
-
-
-def told_of(trials: Iterable[Trial]) -> tuple[Told, ...]:
-    """Those of some trials that count and have an amplitude, at the intensity of the pairs."""
-    comparable = (t for t in trials if t.told and t.intensity_pct_rmt is None)
-    return tuple(Told(t.mep_mv, t.isi_ms, t.background_rms_uv) for t in comparable if t.mep_mv is not None)
-
-
-_USUAL_LIMITS: Final = SignalLimits()
-
-
-@dataclass(frozen=True, eq=False)
-class Evidence:
-    """What is known after a trial; what is not known is None or empty."""
-
-    trial: Trial | None = None
-    answer: Sweep | Measurement | None = None
-    limits: SignalLimits = _USUAL_LIMITS
-    told: Sequence[Told] = ()  # the trials that count so far
-    detection_limit_mv: float | None = None
-
+from isiw.trials import Channel, Sweep, Trial
 
 DRIVEN_MS = 25.0
 """How long a hammer is driven before its impact, at least."""
@@ -98,29 +44,6 @@ QUICK_MS, QUICK_SAMPLES = 3.0, 4
 """What is steep for longer than this, and than so many samples, may be a movement, however long after the pulse."""
 
 CLEAR = 20.0
-
-REMEDIES: Mapping[Kind, str] = MappingProxyType(
-    {
-        Kind.NO_IMPACT: "Check the air supply, the valve, and the accelerometer on the hammer.",
-        Kind.NO_PULSE: "Check that the stimulator is charged and armed, and that its trigger is recorded.",
-        Kind.TMS_BEFORE_IMPACT: "Check the hit delay that the rig assumes, and the sampling rate.",
-        Kind.BACKGROUND_ACTIVITY: (
-            "Ask the person to relax the muscle; check the electrodes and the ground, and look for mains hum. Where "
-            "the tap alone evokes a reflex before the pulse, begin the space at larger ISIs. If the muscle is to be "
-            "contracted, say so: contracted = true under [signals]."
-        ),
-        Kind.SATURATION: "Lower the amplifier's gain, or keep cables away from the coil.",
-        Kind.MISSING_CHANNEL: (
-            "Check that the EMG is recorded, and not blanked, from 50 ms before to 50 ms after the pulse."
-        ),
-        Kind.TOO_LITTLE_REST: "Let the sweep begin earlier: the EMG at rest says whether the muscle is relaxed.",
-        Kind.ISI_OFF: "Check how the rig times the pulse, the reference of its ISIs, and the sampling rate.",
-        Kind.IMPLAUSIBLE: "Check the unit and the gain of the EMG.",
-        Kind.REJECTED: "See the notes in the log.",
-        Kind.OUTCOME_UNKNOWN: "Check whether the device is connected and answers.",
-    }
-)
-"""What to do about a mistrial of each reason."""
 
 
 def too_early_by_chance(trial: Trial, space: DesignSpace) -> bool:

@@ -8,10 +8,9 @@ from functools import cached_property
 
 from isiw.design import DesignSpace
 from isiw.findings import IN_DOUBT, Finding
+from isiw.signals.amplitudes import Doubts, Told, odd_amplitudes
 from isiw.signals.limits import isi_far
 from isiw.signals.reported import doubtful_from, is_far, unconfirmed
-from isiw.signals.rig import Evidence, Told
-from isiw.signals.watch import Doubts, findings
 from isiw.strategy.outcomes import Outcome
 
 
@@ -52,6 +51,5 @@ class Reported:
             reported = replace(self, asked=(*self.asked, (len(pulses) - 1, far)))
         of_pairs = [one for one in pulses if one.intensity_pct_rmt is None]
         told = [Told(one.mep_mv, one.isi_ms) for one in of_pairs if one.mep_mv is not None]
-        evidence = Evidence(told=told, detection_limit_mv=detection_limit_mv)
-        odd = (IN_DOUBT if reported.doubted else found, *findings(evidence))
+        odd = (IN_DOUBT if reported.doubted else found, *odd_amplitudes(told, detection_limit_mv))
         return replace(reported, doubts=self.doubts.after(odd))

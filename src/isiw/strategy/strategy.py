@@ -13,8 +13,8 @@ from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError
 from isiw.estimate import WindowEstimate
 from isiw.findings import lacking
 from isiw.models.protocol import Posterior, PredictsMeps, ReportsTrouble, ResponseModel, pairs_pct_rmt_of
+from isiw.signals.amplitudes import is_silent
 from isiw.signals.limits import require_plausible, require_plausible_range
-from isiw.signals.watch import is_silent
 from isiw.strategy.choice import Asked, Choice, Cost, instead_of_lost
 from isiw.strategy.course import Method
 from isiw.strategy.outcomes import Details, Outcome, Outcomes
