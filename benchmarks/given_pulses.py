@@ -112,7 +112,7 @@ def session(subject: SimulatedSubject, seed: int, strategy: Strategy) -> dict[st
     responder, truth, found = subject.begin(seed), subject.window(SPACE), dict[str, float]()
     for pair in range(1, MARKS[-1] + 1):
         response = responder.respond(strategy.ask(), SPACE.reference)
-        strategy.learn(response.isi_ms, response.mep_mv)
+        strategy.learn(Trial.of(response.isi_ms, response.mep_mv))
         if pair in MARKS:
             estimate = strategy.estimate()
             misfit, change = estimate.misfit, estimate.change

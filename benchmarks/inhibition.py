@@ -32,6 +32,7 @@ from isiw import DesignSpace, VisitProtocol, make_strategy
 from isiw.metrics import f1
 from isiw.subjects import RecruitmentResponse, SimulatedSubject, cohort
 from isiw.subjects.responses import OpposedProfile
+from isiw.trials import Trial
 
 SPACE: Final = DesignSpace(0, 120, reference="impact")
 MARKS: Final = (20, 40, 60)
@@ -63,7 +64,7 @@ def by_strategy(subject: SimulatedSubject, name: str, seed: int) -> Iterator[dic
     for trial in range(MARKS[-1]):
         isi_ms = strategy.ask() if PROTOCOL.control(trial, seed) is None else None
         response = person.respond(isi_ms, SPACE.reference)
-        strategy.learn(response.isi_ms, response.mep_mv)
+        strategy.learn(Trial.of(response.isi_ms, response.mep_mv))
         if trial + 1 in MARKS:
             found = strategy.estimate()
             segments = {"enhanced": found.window, "depressed": found.depressed}

@@ -221,7 +221,7 @@ def plain(people: int, seed: int, minutes: float) -> Iterator[str]:
         while not strategy.decision().stop:
             stimulus = isiw.Stimulus(strategy.delivered, strategy.ask())
             trial = isiw.signals.judge(rig.deliver(stimulus), stimulus, SPACE)
-            strategy.learn(trial.isi_ms, trial.mep_mv)
+            strategy.learn(trial)
         f1s = [isiw.metrics.f1(estimate, truth, SPACE) for estimate in (result.estimate, strategy.estimate())]
         differences.append(f1s[0] - f1s[1])
     yield f"{len(differences)} people: F1 {told(np.array(differences))} (SE), {lost} trials lost"

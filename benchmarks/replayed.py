@@ -16,6 +16,7 @@ import numpy as np
 import isiw
 from benchmarks.quick import understood
 from isiw.existing import Delivered, replay
+from isiw.trials import Trial
 
 SPACE = isiw.DesignSpace(0, 320, 5, reference="impact")
 TRIALS_PER_ISI = 20
@@ -51,7 +52,7 @@ def examined(person: isiw.subjects.SimulatedSubject, seed: int) -> list[float]:
         answer = responder.respond(asked_ms, "impact")
         while not SPACE.admits(answer.isi_ms):  # a mistrial, of which a replay has none either
             answer = responder.respond(asked_ms, "impact")
-        strategy.learn(answer.isi_ms, answer.mep_mv)
+        strategy.learn(Trial.of(answer.isi_ms, answer.mep_mv))
         if number in AT:
             scores.append(isiw.metrics.f1(strategy.estimate(), truth, SPACE))
     return scores

@@ -35,9 +35,9 @@ from isiw.log.reader import SessionRecord
 from isiw.log.schema import EstimateRecord, Event
 from isiw.report.evidence import ENOUGH_ON_EACH_SIDE, changed_with_time
 from isiw.report.words import Role, Said, in_lines, statement
-from isiw.session import examination
 from isiw.session.loop import Session
-from isiw.signals.amplitudes import Doubts, Evidence, told_of
+from isiw.signals.amplitudes import Doubts, told_of
+from isiw.signals.rig import Evidence
 from isiw.signals.watch import findings
 from isiw.subjects.cohorts import person_of
 from isiw.subjects.subject import SimulatedSubject
@@ -79,7 +79,7 @@ def session(cohort: str, seed: int) -> dict[str, Any]:
         outcome = responder.respond(asked_ms, space.reference)
         trial = Trial(len(trials), Status.ACCEPTED, asked_ms, isi_ms=outcome.isi_ms, mep_mv=outcome.mep_mv)
         trials = trials.appended(trial)
-        examination.learn(strategy, trial)
+        strategy.learn(trial)
         doubts = doubts.after(findings(Evidence(told=told_of(trials), detection_limit_mv=strategy.detection_limit_mv)))
         raised += [] if doubts.new is None else [(trial.index, f"{doubts.new}")]
     last = EstimateRecord.after(len(trials) - 1, strategy.estimate(), strategy.decision(), None)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from isiw.findings import Finding
-from isiw.signals.amplitudes import Evidence, Told
+from isiw.signals.amplitudes import Told
+from isiw.signals.rig import Evidence
 from isiw.signals.watch import findings
 from isiw.trials import Measurement, Sweep, Trial
 

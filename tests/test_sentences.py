@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from isiw import sentences
+from isiw import sentences, summary
 from isiw.design import DesignSpace
 from isiw.estimate import Edge, Estimate
 from isiw.findings import NO_MEP, Kind
@@ -89,15 +89,15 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
             ),
         ),
         (sentences.edges(NONE, SPACE), ""),
-        (sentences.tap_likely(SURE, TAP), ""),
-        (sentences.tap_unmeasured(SURE, TAP), ""),
+        (summary.tap_likely(SURE, TAP), ""),
+        (summary.tap_unmeasured(SURE, TAP), ""),
         (
-            sentences.tap_unmeasured(Estimate(**FOUND, tap_may_explain=True), TAP),
+            summary.tap_unmeasured(Estimate(**FOUND, tap_may_explain=True), TAP),
             "Deliver the tap alone at these ISIs too ([protocol] tap_alone); the muscle may answer it.",
         ),
-        (sentences.tap_unmeasured(Estimate(**FOUND, tap_may_explain=True, tap_is_likely=True), TAP), ""),
+        (summary.tap_unmeasured(Estimate(**FOUND, tap_may_explain=True, tap_is_likely=True), TAP), ""),
         (
-            sentences.tap_likely(Estimate(**FOUND, tap_may_explain=True, tap_is_likely=True), TAP),
+            summary.tap_likely(Estimate(**FOUND, tap_may_explain=True, tap_is_likely=True), TAP),
             (
                 "The tap alone evokes as much at these ISIs: the window is probably the muscle's response to the tap "
                 "itself, and not the MEP."
@@ -257,7 +257,7 @@ def test_a_sentence_about_a_result_reads(said: str, words: str) -> None:
 def test_an_edge_is_said_in_a_cell_with_signs_for_what_lies_beyond_the_range() -> None:
     edges = [Edge(), Edge(12, 10.4, 14), Edge(12, -math.inf, 14), Edge(12, 10, math.inf), Edge(None, *[-math.inf] * 2)]
     assert [sentences.interval_cell(edge) for edge in edges] == ["", "10–14", "<–14", "10–>", "<"]
-    assert [sentences.edge_text(edge_ms) for edge_ms in (-math.inf, 12.4, math.inf)] == [
+    assert [summary.edge_text(edge_ms) for edge_ms in (-math.inf, 12.4, math.inf)] == [
         "before the range",
         "12 ms",
         "beyond the range",
@@ -268,8 +268,8 @@ def test_a_window_is_named_in_short_also_if_there_is_none() -> None:
     not_reported = Estimate(probability=0.9)
     found = [SURE, NONE, Estimate(probability=0.3), not_reported, Estimate(probability=None), SWEPT]
     short = ["30–160 ms", "no window", "undecided", "window not reported", "no answer yet", "no window"]
-    assert [sentences.in_short(estimate) for estimate in found] == short
-    assert [sentences.titled(estimate) for estimate in found[:2]] == ["Window 30–160 ms", "No window"]
+    assert [summary.in_short(estimate) for estimate in found] == short
+    assert [summary.titled(estimate) for estimate in found[:2]] == ["Window 30–160 ms", "No window"]
 
 
 def test_a_trial_is_named_by_what_was_asked_and_what_came_of_it() -> None:

@@ -14,6 +14,7 @@ from benchmarks.reduction.wrong import MISREAD, MISREAD_SETTINGS
 from benchmarks.waveform_loop import Pair, robot, session_of
 from isiw.design import IMPACT_SPACE, DesignSpace
 from isiw.subjects import SimulatedSubject
+from isiw.trials import Trial
 from isiw.types import FloatArray
 from isiw.window import Window
 
@@ -88,7 +89,7 @@ def _asked(strategy: isiw.Strategy, answer: Answer) -> Iterator[tuple[float, flo
 def _learnt(strategy: isiw.Strategy, trials: Iterable[tuple[float, float]]) -> Iterator[tuple[float, float]]:
     """The trials of a session that is over, each learnt by the strategy."""
     for trial in trials:
-        strategy.learn(*trial)
+        strategy.learn(Trial.of(*trial))
         yield trial
 
 

@@ -18,7 +18,7 @@ from isiw.dissertation.incremental import SweepModel, SweepPosterior, SweepRule
 from isiw.dissertation.strategies import SWEEP
 from isiw.estimate import WindowEstimate
 from isiw.models.shared.history import AmplitudeHistory
-from isiw.strategy.stopping import Progress
+from isiw.strategy.decisions import Progress
 from isiw.subjects.responses import RecruitmentResponse
 from isiw.subjects.subject import Responder, SimulatedSubject
 from isiw.types import FloatArray

@@ -19,7 +19,7 @@ from benchmarks.reduction.recorded import BASELINES, STEP_MS, SWEPT, TRIALS_PER_
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.estimate import WindowEstimate
 from isiw.signals import wrong_isi
-from isiw.strategy.stopping import stimuli_left
+from isiw.strategy.decisions import stimuli_left
 from isiw.subjects.cohorts import cohort
 from isiw.types import BoolArray, FloatArray
 from isiw.window import Window

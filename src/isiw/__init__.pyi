@@ -61,7 +61,7 @@ from .session.rig import Safeguards as Safeguards
 from .strategy.catalogue import list_settings as list_settings
 from .strategy.catalogue import list_strategies as list_strategies
 from .strategy.catalogue import make_strategy as make_strategy
-from .strategy.stopping import StopDecision as StopDecision
+from .strategy.decisions import StopDecision as StopDecision
 from .strategy.strategy import Strategy as Strategy
 from .trials import Channel as Channel
 from .trials import Measurement as Measurement

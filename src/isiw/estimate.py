@@ -9,7 +9,7 @@ from typing import Any, Final, NamedTuple, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from isiw import sentences
+from isiw import summary
 from isiw.change import Change, Misfit
 from isiw.checks import Checked, Share, number
 from isiw.errors import InvalidValueError
@@ -357,7 +357,7 @@ class Estimate(Reported):
         return cls(**figures, **edges, **_profile(estimate), **more)
 
     def __str__(self) -> str:
-        return sentences.summary(self)
+        return summary.summary(self)
 
     @property
     def has_answer(self) -> bool:

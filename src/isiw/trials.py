@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property, partial
-from typing import Annotated, ClassVar, Final
+from typing import Annotated, Any, ClassVar, Final
 
 import numpy as np
 
@@ -259,6 +259,17 @@ class Trial(Checked):
             Kind.OUTCOME_UNKNOWN,
             tap_alone=stimulus.tap_alone,
         )
+
+    @classmethod
+    def of(cls, isi_ms: float | None, mep_mv: float | None, **known: Any) -> Trial:
+        """An accepted trial that was delivered as it was asked.
+
+        Args:
+            isi_ms: the realised ISI [ms]; None for TMS alone.
+            mep_mv: amplitude of its MEP [mV].
+            **known: what else is known of it, as the fields are called; without an `index` it is trial 0.
+        """
+        return cls(known.pop("index", 0), Status.ACCEPTED, isi_ms, isi_ms=isi_ms, mep_mv=mep_mv, **known)
 
     @property
     def counts(self) -> bool:

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from isiw.acquisition.fixed import EvenSpacing, IncrementalSweep, OwnProposal, RandomIsi, SobolIsi, golden_index
-from isiw.acquisition.protocol import AcquisitionFunction, FollowsPlan, best_candidate
+from isiw.acquisition.fixed import EvenSpacing, IncrementalSweep, OwnProposal, RandomIsi, SobolIsi
+from isiw.acquisition.protocol import AcquisitionFunction, FollowsPlan, best_candidate, golden_index
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate

@@ -15,6 +15,7 @@ from isiw.errors import InvalidValueError
 from isiw.models.shared.history import FloorTreatment
 from isiw.strategy.catalogue import make_strategy
 from isiw.testing import check_model
+from isiw.trials import Trial
 from isiw.window import Window
 from known import known
 from models.told_trials import bell_mv, observation, told
@@ -129,7 +130,7 @@ def test_a_strategy_steps_by_5_ms_after_twelve_trials_whatever_the_range(space: 
     asked = []
     for _ in range(30):
         asked.append(strategy.ask())
-        strategy.learn(asked[-1], 0.01)
+        strategy.learn(Trial.of(asked[-1], 0.01))
     assert asked == [0.0] * 12 + [5.0] * 12 + [10.0] * 6
 
 
@@ -143,7 +144,7 @@ def test_in_a_coarser_space_each_of_its_isis_has_twelve_trials() -> None:
 def test_tms_alone_does_not_move_the_sweep_on() -> None:
     strategy = make_strategy("incremental")
     for _ in range(12):
-        strategy.learn(None, 0.01)
+        strategy.learn(Trial.of(None, 0.01))
     assert strategy.ask_batch(13) == [0.0] * 12 + [5.0]
 
 
@@ -153,7 +154,7 @@ def test_the_sweep_ends_when_it_has_left_the_window_behind() -> None:
     while not strategy.decision().stop:
         isi_ms = strategy.ask()
         strategy.learn(
-            isi_ms, 0.01 * float(np.exp(0.1 * rng.standard_normal())) + float(bell_mv(isi_ms, mean_ms=150.0))
+            Trial.of(isi_ms, 0.01 * float(np.exp(0.1 * rng.standard_normal())) + float(bell_mv(isi_ms, mean_ms=150.0)))
         )
     assert "passed the window" in strategy.decision().reason
     window = strategy.estimate().window

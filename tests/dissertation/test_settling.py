@@ -10,7 +10,8 @@ import pytest
 from isiw.dissertation.strategies import Converging, Passing, Settling
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
-from isiw.strategy.stopping import AnyOf, Budget, Progress, looks_back
+from isiw.strategy.decisions import Progress, looks_back
+from isiw.strategy.stopping import AnyOf, Budget
 from isiw.window import Window
 
 

@@ -13,6 +13,7 @@ from isiw.existing.analysis import analysed
 from isiw.existing.delivered import Delivered
 from isiw.existing.layout import Layout
 from isiw.existing.reading import read_people
+from isiw.trials import Trial
 
 SPACE = isiw.DesignSpace(0, 200, 5, reference="impact")
 FEW: dict[str, Any] = {"particles": 100}
@@ -36,7 +37,7 @@ def test_trials_that_exist_say_what_a_strategy_that_was_told_them_says() -> None
     isis_ms, meps_mv = told()
     strategy = isiw.make_strategy(space=SPACE, seed=5, **FEW)
     for isi_ms, mep_mv in zip(isis_ms, meps_mv, strict=True):
-        strategy.learn(isi_ms, mep_mv)
+        strategy.learn(Trial.of(isi_ms, mep_mv))
     analysis = isiw.analyse(isis_ms, meps_mv, space=SPACE, seed=5, **FEW)
     assert str(analysis.estimate) == str(strategy.estimate())
     assert analysis.estimate.pairs == len(isis_ms)
@@ -159,7 +160,7 @@ def test_a_strategy_learns_earlier_trials_before_its_first_ask_alone_and_no_budg
     assert strategy.estimate().pairs == 6
     again = strategy.restarted()
     assert again.ask() == strategy.ask()
-    strategy.learn(strategy.ask(), 0.1)
+    strategy.learn(Trial.of(strategy.ask(), 0.1))
     assert not strategy.decision().stop
     with pytest.raises(StrategyError, match="before the first ask"):
         strategy.learn_all(trials)

@@ -7,7 +7,7 @@ import pytest
 from isiw.findings import Kind
 from isiw.log.records import with_kinds
 from isiw.log.schema import EstimateRecord, Event, EventKind, Record, decode, encode
-from isiw.strategy.stopping import StopKind
+from isiw.strategy.decisions import StopKind
 
 
 def earlier(topic: str, record: Record, lacking: str) -> Record:

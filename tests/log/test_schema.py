@@ -28,7 +28,7 @@ from isiw.log.schema import (
     topic_of,
 )
 from isiw.log.writer import LogWriter
-from isiw.strategy.stopping import StopDecision
+from isiw.strategy.decisions import StopDecision
 from isiw.strategy.threshold import ThresholdEstimate
 from isiw.trials import Channel, Status, Trial
 from isiw.window import Window

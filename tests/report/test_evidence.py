@@ -14,7 +14,7 @@ from isiw import sentences
 from isiw.errors import LogError
 from isiw.findings import NO_MEP
 from isiw.report.evidence import changed_with_time, contradiction, growth, no_comparison, nothing_stood_out, p_of_larger
-from isiw.strategy.stopping import StopDecision, StopKind
+from isiw.strategy.decisions import StopDecision, StopKind
 from isiw.trials import Status, Trial
 from isiw.window import Window
 from scripted import scripted_strategy
@@ -204,12 +204,12 @@ def test_zeros_below_a_high_detection_limit_are_a_finding(
 def test_a_strategy_finds_nothing_without_an_mep_and_goes_on() -> None:
     strategy = isiw.make_strategy("default", particles=200, max_trials=80)
     for _ in range(70):
-        strategy.learn(strategy.ask(), 0.0)
+        strategy.learn(Trial.of(strategy.ask(), 0.0))
     estimate = strategy.estimate()
     assert (estimate.probability or 1.0) < (estimate.beforehand or 0.0) / 4
     assert str(estimate) == str(NO_MEP)
     assert strategy.decision() == StopDecision(stop=False, reason=str(NO_MEP), kind=StopKind.TOO_LITTLE)
-    strategy.learn(strategy.ask(), 0.2)
+    strategy.learn(Trial.of(strategy.ask(), 0.2))
     assert strategy.estimate().rests_on_data
 
 

@@ -442,7 +442,7 @@ def test_a_trial_that_was_logged_and_could_not_be_learnt_closes_its_session(
 
     isi_ms = done(client.post(f"{session}/ask"))["isi_ms"]
     outcome = {"trial": 0, "isi_ms": isi_ms, "mep_mv": 0.1}
-    monkeypatch.setattr("isiw.session.examination.learn", refusing)
+    monkeypatch.setattr("isiw.strategy.strategy.Strategy.learn", refusing)
     assert "not to be learnt" in refused(client.post(f"{session}/tell", json=outcome), 500, "InternalError")["message"]
     monkeypatch.undo()
     refused(client.post(f"{session}/tell", json=outcome), 409, "NotOpen")
@@ -461,7 +461,7 @@ def test_a_call_that_waited_for_one_that_broke_the_session_is_told_that_it_is_no
     session = sessions.opened("P07")
     with session.alone():
         asked = session.ask(AskRequest())
-    monkeypatch.setattr("isiw.session.examination.learn", refusing)
+    monkeypatch.setattr("isiw.strategy.strategy.Strategy.learn", refusing)
     kinds = []
     for _ in range(2):
         with pytest.raises(Refusal) as caught, session.alone():

@@ -1,6 +1,6 @@
 import pytest
 
-from isiw import sentences
+from isiw import summary
 from isiw.change import Change
 from isiw.findings import Kind
 from isiw.session.examination import change_found
@@ -49,4 +49,4 @@ def test_a_change_that_is_not_sure_is_not_said() -> None:
 
 def test_an_estimate_says_what_changed() -> None:
     change = Change("enhancement", 0.95, 2.1, 1.6, 3.0)
-    assert sentences.at_a_trial(change, None).startswith("The enhancement has grown")
+    assert summary.at_a_trial(change, None).startswith("The enhancement has grown")

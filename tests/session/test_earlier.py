@@ -136,7 +136,7 @@ def test_the_window_is_taken_over_whatever_the_level_was(factor: float) -> None:
         strategy.learn_all(earlier(factor=factor))
         responder = subject.begin(4)
         for isi_ms in (130.0, 20.0, 120.0, 180.0, 140.0, 60.0):
-            strategy.learn(isi_ms, responder.respond(isi_ms, "impact").mep_mv)
+            strategy.learn(Trial.of(isi_ms, responder.respond(isi_ms, "impact").mep_mv))
         found.append(isiw.metrics.f1(strategy.estimate().window, subject.window(SPACE), SPACE))
     assert sum(found) / len(found) > 0.8
 
@@ -145,7 +145,7 @@ def test_at_the_same_level_they_are_learnt_as_if_they_were_the_sessions_own() ->
     trials = [trial for trial in earlier(10) if trial.isi_ms is not None and SPACE.admits(trial.isi_ms)]
     told, known = (isiw.make_strategy(space=SPACE, seed=2, **SETTINGS) for _ in range(2))
     for trial in trials:
-        told.learn(trial.isi_ms, trial.mep_mv)
+        told.learn(Trial.of(trial.isi_ms, trial.mep_mv))
     known.learn_all(trials, same_level=True)
     assert str(known.estimate()) == str(told.estimate())
     assert known.spent == 0

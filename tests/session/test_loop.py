@@ -27,7 +27,7 @@ from isiw.session.loop import Session
 from isiw.session.sink import SessionUpdate
 from isiw.signals import SignalLimits
 from isiw.strategy.catalogue import make_strategy
-from isiw.strategy.settings.common import Recipe
+from isiw.strategy.recipe import Recipe
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial
 from known import instance, known

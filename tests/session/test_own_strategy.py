@@ -16,11 +16,12 @@ from isiw.session.sink import SessionUpdate
 from isiw.session.threshold import open_threshold, read_threshold
 from isiw.strategy.strategy import Strategy
 from isiw.strategy.threshold import IntensityRange, make_threshold_search
+from isiw.trials import Trial
 from scripted import ScriptedDevice, scripted_strategy
 
 TOLD: dict[str, Callable[[Strategy], None]] = {
     "a pair": lambda strategy: strategy.tell(100.0, 0.1),
-    "a tap alone": lambda strategy: strategy.learn_tap(100.0, 0.1),
+    "a tap alone": lambda strategy: strategy.tell(100.0, 0.1, pulse=False),
     "a mistrial": lambda strategy: strategy.count_mistrial(),
 }
 
@@ -85,7 +86,7 @@ def test_a_strategy_that_is_told_from_within_a_session_ends_it(log: Path) -> Non
     strategy, device = scripted_strategy(9), ScriptedDevice()
 
     def on_trial(_: SessionUpdate) -> None:
-        strategy.learn(100.0, 0.1)
+        strategy.learn(Trial.of(100.0, 0.1))
 
     with pytest.raises(StrategyError, match="not this session's"):
         Session(device, strategy, log=log, on_trial=on_trial).run()

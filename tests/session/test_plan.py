@@ -17,7 +17,7 @@ from isiw.report.words import final_statement, truth_sentence
 from isiw.session.loop import Session
 from isiw.session.resume import open_session
 from isiw.strategy.catalogue import list_strategies, make_strategy
-from isiw.strategy.stopping import StopKind
+from isiw.strategy.decisions import StopKind
 from isiw.subjects.cohorts import person_of
 from isiw.visit import VisitProtocol
 from isiw.window import Window

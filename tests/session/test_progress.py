@@ -16,7 +16,7 @@ from isiw.session.console import PROGRESS_HEADINGS, PROGRESS_LEGEND, fitted, pro
 from isiw.session.loop import Session
 from isiw.session.sink import SessionUpdate
 from isiw.session.terminal import COLUMNS
-from isiw.strategy.stopping import StopDecision
+from isiw.strategy.decisions import StopDecision
 from isiw.text.stimuli import STIMULI
 from isiw.trials import Status, Trial
 from isiw.window import Window

@@ -646,13 +646,14 @@ def test_a_killed_loop_loses_nothing(log: Path) -> None:
 
 def interrupted_once(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     """The next call of a function of the recorder ends in Ctrl-C."""
-    called = getattr(examination, name)
+    place = Strategy if name == "learn" else examination
+    called = getattr(place, name)
 
     def stopped(*_: object) -> None:
-        monkeypatch.setattr(examination, name, called)
+        monkeypatch.setattr(place, name, called)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(examination, name, stopped)
+    monkeypatch.setattr(place, name, stopped)
 
 
 @pytest.mark.parametrize("name", ["relearned", "learn"])

@@ -20,7 +20,7 @@ from isiw.session.loop import Session
 from isiw.session.resume import resume
 from isiw.session.rig import Safeguards
 from isiw.session.sink import SessionUpdate
-from isiw.strategy.stopping import StopKind
+from isiw.strategy.decisions import StopKind
 from isiw.trials import Measurement, Stimulus
 from scripted import ScriptedDevice, scripted_strategy
 

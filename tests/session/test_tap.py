@@ -88,7 +88,7 @@ def test_earlier_amplitudes_are_corrected_in_the_log_and_learnt_again(log: Path)
         assert known(trial.mep_mv) - (trial.tap_mv or 0.0) < 0.15
     fresh = few()
     for trial in record.table:
-        fresh.learn(trial.isi_ms, trial.mep_mv, mep_sd_mv=trial.mep_sd_mv, tap_mv=trial.tap_mv)
+        fresh.learn(trial)
     assert fresh.estimate().probability == session.strategy.estimate().probability
 
 

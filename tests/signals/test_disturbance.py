@@ -8,9 +8,9 @@ import pytest
 from isiw.design import DesignSpace
 from isiw.findings import Kind, Severity
 from isiw.signals import SignalLimits, judge
-from isiw.signals.amplitudes import Evidence
 from isiw.signals.mep import at_rest, disturbance
 from isiw.signals.places import told_by
+from isiw.signals.rig import Evidence
 from isiw.signals.watch import findings
 from isiw.trials import Channel, Stimulus, Sweep, Trial
 from known import known

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from isiw.design import DesignSpace
-from isiw.signals import places, watch
-from isiw.signals.amplitudes import Evidence, Response, Told
+from isiw.signals import amplitudes, places
+from isiw.signals.amplitudes import Response, Told, large, silent, small, stopped
 from isiw.signals.limits import SignalLimits
 from isiw.signals.watch import Watch
 from isiw.strategy.outcomes import Outcome, Outcomes, found_step_mv
@@ -29,16 +29,16 @@ def kinds_plainly(series: tuple[Told, ...]) -> set[str]:
     """What is found in some amplitudes by going through all of them."""
     found, meps_mv = set[str](), [one.mep_mv for one in series]
     seen = [mep_mv for mep_mv in meps_mv if mep_mv > 0]
-    if len(meps_mv) >= watch.SILENT_FROM_THE_START and watch.is_silent(meps_mv):
+    if len(meps_mv) >= amplitudes.SILENT_FROM_THE_START and amplitudes.is_silent(meps_mv):
         found.add("silent")
-    if watch.stopped_after([one.isi_ms for one in series], [one.stands_out for one in series]) is not None:
+    if amplitudes.stopped_after([one.isi_ms for one in series], [one.stands_out for one in series]) is not None:
         found.add("stopped")
-    if len(seen) >= watch.IN_A_ROW and max(seen[-watch.IN_A_ROW :]) < watch.SMALL_MV:
+    if len(seen) >= amplitudes.IN_A_ROW and max(seen[-amplitudes.IN_A_ROW :]) < amplitudes.SMALL_MV:
         found.add("small")
-    if len(seen) >= watch.IN_A_ROW and statistics.geometric_mean(seen[-watch.IN_A_ROW :]) >= watch.LARGE_MV:
-        earlier = seen[: -watch.IN_A_ROW]
-        usual_mv = statistics.geometric_mean(seen[-watch.IN_A_ROW :])
-        if not earlier or usual_mv / statistics.median(earlier) >= watch.JUMP:
+    usual_mv = statistics.geometric_mean(seen[-amplitudes.IN_A_ROW :]) if len(seen) >= amplitudes.IN_A_ROW else 0.0
+    if usual_mv >= amplitudes.LARGE_MV:
+        earlier = seen[: -amplitudes.IN_A_ROW]
+        if not earlier or usual_mv / statistics.median(earlier) >= amplitudes.JUMP:
             found.add("large")
     since = next((n for n, one in enumerate(series[::-1]) if one.rest_uv and one.stands_out), len(series))
     outside = [one.outside for one in series[::-1][:since] if one.outside is not None]
@@ -53,15 +53,15 @@ def kinds_plainly(series: tuple[Told, ...]) -> set[str]:
 
 def test_what_is_odd_is_found_as_by_a_look_at_all_amplitudes() -> None:
     rng, met = np.random.default_rng(0), set[str]()
-    checks = {"silent": watch.silent, "stopped": watch.stopped, "small": watch.small, "large": watch.large}
+    checks = {check.__name__: check for check in (silent, stopped, small, large)}
     for _ in range(400):
         quiet = rng.random() < 0.3
         series = tuple(told(rng) for _ in range(rng.integers(1, 25)))
         series += tuple(Told(0.0, 20.0) for _ in range(rng.integers(0, 60))) if quiet else ()
         series += (Told(6.0, 20.0),) * 3 if rng.random() < 0.2 else ()
         series = tuple(Told(0.0, one.isi_ms) for one in series) if rng.random() < 0.1 else series
-        evidence, plain = Evidence(told=series), kinds_plainly(series)
-        found = {name for name, check in checks.items() if check(evidence) is not None}
+        plain = kinds_plainly(series)
+        found = {name for name, check in checks.items() if check(series) is not None}
         assert found == plain - {"misplaced"}
         isis_ms = [isi_ms for isi_ms, _ in places._last_alike(series)]  # noqa: SLF001 - what it is found by
         follows = len(isis_ms) >= places.IN_A_ROW and places._follow_the_pulse(isis_ms)  # noqa: SLF001 - the same

@@ -12,8 +12,9 @@ from isiw.design import DesignSpace
 from isiw.devices.simulated import RecordedPerson, Simulation, load_recordings
 from isiw.findings import Finding, Kind
 from isiw.signals import SignalLimits, judge
-from isiw.signals.amplitudes import Evidence, Told
+from isiw.signals.amplitudes import Told
 from isiw.signals.places import told_by
+from isiw.signals.rig import Evidence
 from isiw.signals.watch import findings
 from isiw.subjects.cohorts import cohort
 from isiw.trials import Channel, Stimulus, Sweep

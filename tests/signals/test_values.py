@@ -5,7 +5,7 @@ import pytest
 from isiw.design import IMPACT_SPACE
 from isiw.errors import InvalidValueError
 from isiw.findings import Kind
-from isiw.signals.limits import implausible_amplitude, implausible_scale, require_plausible
+from isiw.signals.plausible import implausible_amplitude, implausible_scale, require_plausible
 
 
 @pytest.mark.parametrize("mep_mv", [0.0, 0.0005, 0.008, 0.3, 12.0, 25.0])

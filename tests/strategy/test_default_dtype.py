@@ -12,6 +12,7 @@ import pytest
 import torch
 
 from isiw.strategy.catalogue import list_strategies, make_strategy
+from isiw.trials import Trial
 from quick import quick
 
 MEPS_MV = (0.1, 0.0)
@@ -35,8 +36,8 @@ def answers(name: str, *defaults: torch.dtype) -> list[Any]:
         torch.set_default_dtype(default)
         asked_ms, choice = strategy.ask(), strategy.choice
         given += [asked_ms, None if choice is None or choice.scores is None else choice.scores]
-        strategy.learn(asked_ms, mep_mv, isi_sd_ms=1.0)
-        strategy.learn(None, 0.01)
+        strategy.learn(Trial.of(asked_ms, mep_mv, isi_sd_ms=1.0))
+        strategy.learn(Trial.of(None, 0.01))
         given += astuple(strategy.estimate())
     return given
 

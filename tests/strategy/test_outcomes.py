@@ -61,8 +61,8 @@ def test_a_step_that_is_found_is_learnt_as_one_that_was_stated() -> None:
     sizes = 0.02 * np.random.default_rng(1).integers(1, 12, 10)
     found, stated = strategy(), strategy(amplitude_step_mv=0.02)
     for isi_ms, mep_mv in zip(ISIS_MS, sizes.tolist(), strict=True):
-        found.learn(isi_ms, mep_mv)
-        stated.learn(isi_ms, mep_mv)
+        found.learn(Trial.of(isi_ms, mep_mv))
+        stated.learn(Trial.of(isi_ms, mep_mv))
     assert found.estimate().probability == stated.estimate().probability
     assert found.ask() == stated.ask()
 
@@ -104,7 +104,7 @@ def test_a_tap_alone_uses_up_no_budget_and_what_was_told_before_it_is_learnt_aga
         before.tell(isi_ms, mep_mv, pulse=False)
     for isi_ms, mep_mv in pulses:
         for one in (before, after, without):
-            one.learn(isi_ms, mep_mv)
+            one.learn(Trial.of(isi_ms, mep_mv))
     for isi_ms, mep_mv in taps:
         after.tell(isi_ms, mep_mv, pulse=False)
     assert before.spent == after.spent == 20
@@ -117,7 +117,7 @@ def test_a_window_that_the_tap_could_explain_is_reported_with_that_sentence() ->
     pulses = [(isi_ms, 0.3 if 10 <= isi_ms <= 50 else 0.01) for isi_ms in ISIS_MS] * 2
     one = strategy()
     for isi_ms, mep_mv in pulses:
-        one.learn(isi_ms, mep_mv)
+        one.learn(Trial.of(isi_ms, mep_mv))
     assert one.estimate().window is not None
     assert "Deliver the tap or electrical pulse alone at these ISIs too" in f"{one.estimate()}"
 

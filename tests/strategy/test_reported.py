@@ -12,8 +12,9 @@ from isiw.errors import ImplausibleDataWarning, InvalidValueError
 from isiw.estimate import WindowEstimate
 from isiw.findings import IN_DOUBT, Kind
 from isiw.strategy.catalogue import make_strategy
-from isiw.strategy.stopping import StopKind
+from isiw.strategy.decisions import StopKind
 from isiw.strategy.strategy import Strategy
+from isiw.trials import Trial
 
 SPACE = DesignSpace(20, 320, reference="impact")
 
@@ -79,7 +80,7 @@ def test_once_they_are_confirmed_all_isis_count_and_are_not_asked_about_again() 
         warnings.simplefilter("ignore", ImplausibleDataWarning)
         for number in range(told + 6):
             asked.append(other.ask())
-            other.learn(asked[-1] / 2, mep_mv(asked[-1]))
+            other.learn(Trial.of(asked[-1] / 2, mep_mv(asked[-1])))
             if number >= told:
                 strategy.ask()
                 strategy.tell(asked[-1] / 2, mep_mv(asked[-1]), confirm=number == told)

@@ -18,10 +18,12 @@ from isiw.dissertation.strategies import Settling
 from isiw.errors import InvalidValueError, OutOfSpaceError, StrategyError
 from isiw.models.protocol import Posterior
 from isiw.strategy.catalogue import make_strategy
-from isiw.strategy.settings.common import Recipe
-from isiw.strategy.stopping import Budget, Progress, StopDecision
+from isiw.strategy.decisions import Progress, StopDecision
+from isiw.strategy.recipe import Recipe
+from isiw.strategy.stopping import Budget
 from isiw.strategy.strategy import Strategy
 from isiw.testing.suites import same_estimates
+from isiw.trials import Trial
 from isiw.types import Array
 from known import known
 from scripted import scripted_strategy
@@ -221,7 +223,7 @@ def test_pairs_and_mistrials_use_up_one_budget_and_control_trials_none() -> None
     strategy.count_mistrial()
     assert not strategy.decision().stop
     strategy.tell(None, 0.1)
-    strategy.count_control()
+    strategy.tell(100.0, 0.1, pulse=False)
     assert (strategy.delivered, strategy.spent) == (4, 2)
     assert not strategy.decision().stop
     strategy.tell(strategy.ask(), 0.1)
@@ -304,7 +306,7 @@ def test_the_initial_isis_come_first_and_a_mistrial_repeats_one() -> None:
 def settled_after(strategy: Strategy, trials: int) -> bool:
     """Whether the edges have settled after so many more pairs, each of which moves them by 1 ms."""
     for _ in range(trials):
-        strategy.learn(strategy.ask(), 0.02)
+        strategy.learn(Trial.of(strategy.ask(), 0.02))
     return strategy.decision().stop
 
 
@@ -322,7 +324,7 @@ def test_tms_alone_does_not_settle_the_edges() -> None:
     strategy = Strategy(usual.space, usual.model, usual.acquisition, Settling())
     settled_after(strategy, 4)
     for _ in range(5):
-        strategy.learn(None, 0.02)
+        strategy.learn(Trial.of(None, 0.02))
         assert not strategy.decision().stop
     assert settled_after(strategy, 1)
 
@@ -331,8 +333,8 @@ def test_tms_alone_is_none_of_the_forty_pairs_from_which_on_a_small_gain_stops()
     usual = scripted_strategy()
     strategy = Strategy(usual.space, usual.model, usual.acquisition, Least())
     for _ in range(5):
-        strategy.learn(None, 0.02)
-    strategy.learn(100.0, 0.02)
+        strategy.learn(Trial.of(None, 0.02))
+    strategy.learn(Trial.of(100.0, 0.02))
     assert strategy.decision().reason == "1 of 1"
 
 
@@ -388,8 +390,8 @@ def test_a_batch_of_a_sweep_goes_on_with_it_whatever_the_model() -> None:
     sweep = IncrementalSweep(step_ms=5.0, trials_per_isi=2)
     strategy = Strategy(usual.space, usual.model, sweep, usual.stopping, initial_ms=(200.0,))
     assert strategy.ask_batch(6) == [200.0, 0.0, 5.0, 5.0, 10.0, 10.0]
-    strategy.learn(200.0, 0.02)
-    strategy.learn(None, 0.02)
+    strategy.learn(Trial.of(200.0, 0.02))
+    strategy.learn(Trial.of(None, 0.02))
     assert strategy.ask_batch(2) == [0.0, 5.0]
 
 
@@ -442,7 +444,7 @@ def test_pulses_that_give_no_mep_any_more_are_told_with_one_warning() -> None:
 def test_what_was_judged_before_is_learnt_as_it_is() -> None:
     strategy = scripted_strategy()
     strategy.ask()
-    strategy.learn(100.0, 50.0)
+    strategy.learn(Trial.of(100.0, 50.0))
     assert strategy.delivered == 1
 
 

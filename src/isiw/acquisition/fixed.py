@@ -8,18 +8,12 @@ from typing import ClassVar
 
 import numpy as np
 
+from isiw.acquisition.protocol import golden_index
 from isiw.checks import Checked, Count, Positive
 from isiw.design import DesignSpace
 from isiw.lazy import scipy
 from isiw.models.protocol import Posterior, ProposesIsi
 from isiw.types import Array, Singles
-
-_GOLDEN = (5**0.5 - 1) / 2
-
-
-def golden_index(trial: int, candidates: int) -> int:
-    """The candidate of a trial in an order that fills the range evenly, however long it goes on."""
-    return int((0.5 + trial * _GOLDEN) % 1.0 * candidates)
 
 
 def _only(index: int, isi_ms: Array) -> Singles:

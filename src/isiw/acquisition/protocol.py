@@ -19,6 +19,8 @@ from isiw.models.protocol import (
 )
 from isiw.types import Array, IntArray
 
+_GOLDEN = (5**0.5 - 1) / 2
+
 
 class ForeseesProfiles(PredictsOutcomes, SamplesProfiles, Protocol):
     """A posterior of profiles that predicts the next MEP."""
@@ -91,6 +93,11 @@ def require_scores(acquisition: AcquisitionFunction, scores: object, candidates:
     if given.shape not in {(candidates,), (1, candidates), (people, candidates)}:
         raise StrategyError(what, got=given.shape, expected=f"scores of {shape}")
     return given if given.dtype.kind == "f" else given.astype(float)
+
+
+def golden_index(trial: int, candidates: int) -> int:
+    """The candidate of a trial in an order that fills the range evenly, however long it goes on."""
+    return int((0.5 + trial * _GOLDEN) % 1.0 * candidates)
 
 
 def best_candidate(scores: Array, first: int = 0) -> IntArray:

@@ -18,7 +18,7 @@ from isiw.dissertation.profiles import paired
 from isiw.errors import InvalidValueError
 from isiw.findings import AMPLITUDE_MV
 from isiw.lazy import pd
-from isiw.signals.limits import require_amplitude
+from isiw.signals.plausible import require_amplitude
 from isiw.trials import RESPONSE_MV, Trial
 from isiw.types import ArrayLike, FloatArray
 from isiw.window import Window

@@ -19,8 +19,9 @@ from isiw.dissertation.incremental import SweepModel
 from isiw.dissertation.nonlinear import NonlinearRegression
 from isiw.dissertation.regression import GaussianProcessRegression, RegressionModel, SupportVectorRegression
 from isiw.models.shared.history import FloorTreatment
+from isiw.strategy.decisions import Progress, StopDecision, StopKind, StoppingRule
 from isiw.strategy.settings.common import AcquisitionName, Settings
-from isiw.strategy.stopping import AnyOf, Budget, Progress, StopDecision, StopKind, StoppingRule
+from isiw.strategy.stopping import AnyOf, Budget
 
 
 @dataclass(frozen=True)

@@ -33,10 +33,10 @@ from isiw.report.page import save_report
 from isiw.report.words import final_statement
 from isiw.session.assembly import header_of
 from isiw.session.examination import estimate_record
-from isiw.signals.limits import before_impact
+from isiw.signals.plausible import before_impact
 from isiw.signals.watch import Watch
 from isiw.strategy.catalogue import make_strategy
-from isiw.strategy.stopping import StopKind
+from isiw.strategy.decisions import StopKind
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Measurement, Status, Sweep, Trial, TrialTable
 from isiw.types import ArrayLike, FloatArray
@@ -255,7 +255,7 @@ def _history(delivered: Delivered, strategy: Strategy, header: Header) -> Iterat
         if trial.index in delivered.blocks:
             yield Event(kind="note", trial=trial.index, text=f"Block {delivered.blocks[trial.index]} begins.")
         yield trial
-        strategy.learn_all([trial], same_level=True)
+        strategy.learn(trial)
         times_ms = trial.t_valve_ms, trial.t_tms_ms, trial.t_hit_ms
         channels = delivered.sweeps.get(trial.index)
         answer = Measurement(trial.mep_mv or 0.0, trial.isi_ms) if channels is None else Sweep(channels, *times_ms)

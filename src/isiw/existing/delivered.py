@@ -16,7 +16,8 @@ from isiw.design import MOST_ISIS, DesignSpace
 from isiw.errors import InvalidValueError, LogError
 from isiw.existing.layout import EMG_UNITS, ISI_UNITS_MS
 from isiw.findings import AMPLITUDE_MV, Kind
-from isiw.signals.limits import SignalLimits, implausible_scale
+from isiw.signals.limits import SignalLimits
+from isiw.signals.plausible import implausible_scale
 from isiw.text.sanitize import counted
 from isiw.trials import Channel, Trial, TrialTable
 from isiw.types import Conditioning, Reference

@@ -179,7 +179,7 @@ def _run(
         nearest = np.flatnonzero(gaps_ms <= gaps_ms.min() + 1e-9)
         trial = left.pop(int(rng.choice(nearest)))
         far_ms.append(float(gaps_ms.min()))
-        strategy.learn(trial.isi_ms, trial.mep_mv, isi_sd_ms=trial.isi_sd_ms)
+        strategy.learn(trial)
         windows.append(strategy.estimate().window)
         if stopped is None and strategy.decision().stop:
             stopped = len(windows)

@@ -19,11 +19,11 @@ from isiw.log.records import Onset, Records, unknown_of
 from isiw.log.salvage import Salvage, salvage
 from isiw.log.schema import EstimateRecord, Event, Intent, PulseOutcome, Record, waveform_topic
 from isiw.log.verdicts import VERDICTS, doubted_by, under_all
-from isiw.sentences import JUDGED_SINCE
 from isiw.signals.amplitudes import is_silent
 from isiw.signals.measures import Measures, measures
 from isiw.signals.tap import TapResponses
-from isiw.strategy.stopping import StopDecision
+from isiw.strategy.decisions import StopDecision
+from isiw.summary import JUDGED_SINCE
 from isiw.text.stimuli import TAP, StimulusWords, meanings
 from isiw.trials import Channel, Stimulus, Sweep, Trial, TrialTable
 

@@ -22,7 +22,7 @@ from isiw.log.headers import AnyHeader, Production, first_fault, header_in_parts
 from isiw.log.salvage import Salvage
 from isiw.log.schema import EstimateRecord, Event, Intent, Message, PulseOutcome, Record, Waveform, decode
 from isiw.log.writer import CONFIGURATION
-from isiw.strategy.stopping import StopKind
+from isiw.strategy.decisions import StopKind
 from isiw.text.sanitize import counted
 from isiw.text.toml_files import parsed, read_json
 from isiw.trials import Channel, Trial

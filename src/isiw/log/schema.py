@@ -36,7 +36,7 @@ from isiw.estimate import Estimate, WindowEstimate
 from isiw.findings import Kind
 from isiw.log.headers import ANY_HEADER, AnyHeader, Header, LogRecord, Production, ProductionHeader, ThresholdHeader
 from isiw.log.moments import Moment
-from isiw.strategy.stopping import StopDecision, StopKind
+from isiw.strategy.decisions import StopDecision, StopKind
 from isiw.strategy.threshold.pulses import ThresholdEstimate
 from isiw.text.toml_files import refuse_doubled
 from isiw.trials import Channel, Stimulus, Trial

@@ -12,7 +12,7 @@ from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.findings import Finding, Kind, Severity
 from isiw.log.schema import Correction, Event, EventKind
-from isiw.signals.limits import implausible_amplitude
+from isiw.signals.plausible import implausible_amplitude
 from isiw.signals.reported import doubtful_from, is_far
 from isiw.trials import Trial, TrialTable
 

@@ -13,15 +13,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
-from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
-from isiw.native.engine import Foreseen
 from isiw.types import Array, ArrayLike, FloatArray, Singles
 from isiw.window import Window
+
+if TYPE_CHECKING:
+    from isiw.native.engine import Foreseen
 
 Values: TypeAlias = Array | Sequence[float | None] | Sequence[bool | None]
 """One value a person, as an array or plain; None is not known."""

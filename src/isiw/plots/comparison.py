@@ -30,7 +30,8 @@ from isiw.plots.style import (
     strategy_colours,
     tidied,
 )
-from isiw.sentences import TOO_LITTLE, in_short
+from isiw.sentences import TOO_LITTLE
+from isiw.summary import in_short
 from isiw.text.stimuli import words_of
 from isiw.types import FloatArray
 

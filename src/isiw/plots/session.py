@@ -29,7 +29,7 @@ from isiw.plots.style import (
     session_name,
     tidied,
 )
-from isiw.sentences import titled
+from isiw.summary import titled
 from isiw.text.sanitize import counted
 from isiw.trials import Trial
 from isiw.types import FloatArray

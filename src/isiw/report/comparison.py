@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from isiw import sentences
+from isiw import sentences, summary
 from isiw.estimate import Edge, Estimate
 from isiw.log.kinds import imported_sentence
 from isiw.log.reader import SessionRecord
@@ -28,7 +28,7 @@ def comparison_table(records: Sequence[SessionRecord]) -> str:
     rows = [HEADINGS, *comparison_rows(records)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
-    since = [f"{_whose(r)}: {sentences.JUDGED_SINCE}" for r in records if r.estimates and r.is_judged_since]
+    since = [f"{_whose(r)}: {summary.JUDGED_SINCE}" for r in records if r.estimates and r.is_judged_since]
     imported = imported_sentence([_whose(record) for record in records if record.header.imported])
     return "\n".join([*lines, *since, *filter(None, [imported])])
 
@@ -43,7 +43,7 @@ def comparison_rows(records: Sequence[SessionRecord]) -> list[tuple[str, ...]]:
         if last is None:
             rows.append((*who, chance, sentences.TOO_LITTLE, "", ""))
         else:
-            rows.append((*who, chance, sentences.in_short(last), _cell(last, last.start), _cell(last, last.end)))
+            rows.append((*who, chance, summary.in_short(last), _cell(last, last.start), _cell(last, last.end)))
     return rows
 
 
@@ -53,7 +53,7 @@ def _cell(estimate: Estimate, edge: Edge) -> str:
     if edge.low_ms is None or edge.high_ms is None:
         return "–"
     if edge.low_ms == edge.high_ms:
-        return sentences.edge_text(edge.low_ms)
+        return summary.edge_text(edge.low_ms)
     if math.isinf(edge.low_ms) or math.isinf(edge.high_ms):
         return f"before {edge.high_ms:.0f} ms" if math.isinf(edge.low_ms) else f"after {edge.low_ms:.0f} ms"
     return f"{sentences.interval_cell(edge)} ms"
@@ -110,7 +110,7 @@ def comparison_page(records: Sequence[SessionRecord], differences: Sequence[Diff
             {
                 "subject": record.header.subject or "an unnamed subject",
                 "log": record.path.name,
-                "findings": [*finding_sentences(record), *([sentences.JUDGED_SINCE] if record.is_judged_since else [])],
+                "findings": [*finding_sentences(record), *([summary.JUDGED_SINCE] if record.is_judged_since else [])],
                 "counts": counts_sentence(record),
                 "facts": first_facts(record),
             }

@@ -13,8 +13,8 @@ from isiw.log.reader import SessionRecord
 from isiw.log.schema import EstimateRecord
 from isiw.report.tables import trial_row
 from isiw.report.words import answer_and_warnings
-from isiw.sentences import tap_unmeasured
 from isiw.signals.limits import EMG_UNITS_MV
+from isiw.summary import tap_unmeasured
 from isiw.text import plain
 from isiw.trials import Channel, Trial
 from isiw.types import FloatArray

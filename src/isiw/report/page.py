@@ -30,7 +30,7 @@ from isiw.report.tables import (
     trial_row,
 )
 from isiw.report.words import fit_sentence, statement
-from isiw.sentences import JUDGED_SINCE
+from isiw.summary import JUDGED_SINCE
 from isiw.text import plain
 from isiw.text.named_code import library
 from isiw.window import Window

@@ -8,7 +8,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import NamedTuple
 
-from isiw import sentences
+from isiw import sentences, summary
 from isiw.change import Misfit
 from isiw.estimate import Estimate
 from isiw.findings import Kind
@@ -19,7 +19,7 @@ from isiw.metrics import f1
 from isiw.report.evidence import changed_with_time, contradiction, no_comparison, nothing_measured, nothing_stood_out
 from isiw.session.examination import change_found
 from isiw.strategy.catalogue import known_settings, list_strategies, measured_of
-from isiw.strategy.stopping import OF_THE_WINDOW, StopKind
+from isiw.strategy.decisions import OF_THE_WINDOW, StopKind
 from isiw.text.sanitize import command, counted
 from isiw.text.stimuli import TAP, StimulusWords
 from isiw.trials import Trial
@@ -83,7 +83,7 @@ def statement(record: SessionRecord, config: Path | None = None) -> list[Said]:
         said += [
             Said("expects a tap", Role.WARNING, expects),
             Said("measured", Role.WARNING, _measured(record)),
-            Said("judged since", Role.WARNING, sentences.JUDGED_SINCE if record.is_judged_since else ""),
+            Said("judged since", Role.WARNING, summary.JUDGED_SINCE if record.is_judged_since else ""),
             Said("counts", Role.DETAIL, counts_sentence(record)),
             Said("fit", Role.DETAIL, fit_sentence(record)),
             Said("reason", Role.DETAIL, "" if last.stop and last.stop_kind is StopKind.ABSENT else reason),
@@ -110,7 +110,7 @@ def _todo(record: SessionRecord, config: Path | None) -> list[tuple[str, str]]:
         todo += [
             ("stimulus", _unstated_stimulus(record)),
             ("intensity", _unstated_intensity(record)),
-            ("tap alone", "" if nothing else sentences.tap_unmeasured(last, record.header.stimulus)),
+            ("tap alone", "" if nothing else summary.tap_unmeasured(last, record.header.stimulus)),
             ("hit delay", _unstated_hit_delay(record)),
         ]
     return [(name, text) for name, text in todo if text]
@@ -147,7 +147,7 @@ def answer_and_warnings(estimate: Estimate, header: Header, told: Sequence[Trial
     window, first = estimate.window, header.stimulus
     expected = (estimate.grid_ms, estimate.profile_mv) if estimate.profile_mv else None
     against = {
-        "tap": sentences.tap_likely(estimate, first),
+        "tap": summary.tap_likely(estimate, first),
         "misfit": _misfit(estimate.misfit),
         "contradiction": contradiction(window, told, without_probability=estimate.probability is None),
         "few outside": no_comparison(window, told),
@@ -225,7 +225,7 @@ def _unstated_intensity(record: SessionRecord) -> str:
 def _unstated_stimulus(record: SessionRecord) -> str:
     """That windows after an electrical pulse are often missed if it is not stated, if no window is named."""
     header, last = record.header, record.estimates[-1]
-    named = last.window is not None and not sentences.is_guess(last)
+    named = last.window is not None and not summary.is_guess(last)
     may_be_electrical = header.conditioning == "tap" and header.space.reference == "impact"
     if named or not may_be_electrical or not record.rests_on_data or not _lacks(record, "conditioning"):
         return ""

@@ -13,7 +13,7 @@ from isiw.errors import IsiwError, LimitExceededError, LogError, RequestError, e
 from isiw.estimate import Estimate, Reported
 from isiw.findings import Kind
 from isiw.session.state import State
-from isiw.strategy.stopping import StopDecision
+from isiw.strategy.decisions import StopDecision
 from isiw.text import plain
 from isiw.trials import Status, Trial
 

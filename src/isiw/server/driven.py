@@ -26,7 +26,7 @@ from isiw.server.requests import (
 )
 from isiw.session.recorder import Recorder
 from isiw.session.state import state_of
-from isiw.strategy.stopping import StopDecision, StopKind
+from isiw.strategy.decisions import StopDecision, StopKind
 from isiw.trials import Status, Trial
 
 BUSY_S: Final = 5.0

@@ -33,7 +33,7 @@ from isiw.session.steps import Steps
 from isiw.signals.limits import SignalLimits
 from isiw.signals.tap import TapResponses
 from isiw.signals.watch import Watch
-from isiw.strategy.stopping import stimuli_left
+from isiw.strategy.decisions import stimuli_left
 from isiw.strategy.strategy import Strategy
 from isiw.trials import TrialTable
 from isiw.visit import Visit, VisitProtocol

@@ -13,7 +13,7 @@ from typing import Any, Final, Generic, NamedTuple, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 
-from isiw import checks, sentences
+from isiw import checks, summary
 from isiw.change import Change
 from isiw.errors import LimitExceededError, StrategyError, error_text
 from isiw.findings import Finding, Kind, Severity
@@ -21,8 +21,7 @@ from isiw.log.schema import EstimateRecord, Event, EventKind, Intent, Record
 from isiw.log.verdicts import changed_after, doubted_by, excluded_by, is_logged, or_remark, under_all
 from isiw.session.sink import Sink
 from isiw.strategy.choice import candidate_isis
-from isiw.strategy.outcomes import details_of
-from isiw.strategy.stopping import StopDecision
+from isiw.strategy.decisions import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Trial, TrialTable
 from isiw.types import FloatArray
@@ -255,7 +254,7 @@ class _WindowLearner:
         return self.strategy.delivered == len(trials)
 
     def learn(self, trial: Trial) -> None:
-        learn(self.strategy, trial)
+        self.strategy.learn(trial)
 
     def trouble_with(self, trial: Trial) -> str | None:
         return self.strategy.trouble if trial.told else None
@@ -305,28 +304,14 @@ def change_found(change: Change | None, told: Sequence[Trial]) -> Finding | None
     remedy = "" if at is None else "Did the coil or an electrode move, or was a gain or the intensity changed?"
     if change.trial == 0:
         remedy = "Are muscle, coil, gain and the scale of intensities the same? The window allows for the change."
-    return Finding(Kind.CHANGED, Severity.DOUBT, sentences.at_a_trial(change, at), remedy)
-
-
-def learn(strategy: Strategy, trial: Trial) -> None:
-    """Tell a strategy one trial, or count it if there is nothing to tell."""
-    if trial.told:
-        strategy.learn(trial.isi_ms, None if trial.mep_interval_mv else trial.mep_mv, **details_of(trial))
-    elif trial.counts and trial.isi_ms is not None:  # a tap alone with an amplitude
-        strategy.learn_tap(trial.isi_ms, trial.mep_mv)
-    elif trial.is_control:
-        strategy.count_control(trial.mep_mv if trial.tap_alone and trial.counts else None)
-    elif trial.excluded and trial.reason is None:
-        strategy.count_excluded()
-    else:
-        strategy.count_mistrial()
+    return Finding(Kind.CHANGED, Severity.DOUBT, summary.at_a_trial(change, at), remedy)
 
 
 def relearned(strategy: Strategy, trials: Iterable[Trial], changes: Sequence[int] = ()) -> Strategy:
     """The same strategy, which has learnt all trials from the beginning, and what changed after some of them."""
     again = strategy.restarted()
     for trial in trials:
-        learn(again, trial)
+        again.learn(trial)
         if trial.index in changes:
             again.note_change()
     return again

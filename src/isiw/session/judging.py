@@ -15,7 +15,7 @@ from isiw.log.salvage import salvage
 from isiw.log.schema import Event
 from isiw.log.verdicts import LOOKED_AT, MANY_CHANGES, acceptance, change, doubted_by, exclusion, inclusion
 from isiw.log.writer import LogWriter
-from isiw.session.examination import WindowExamination, estimate_record, learn
+from isiw.session.examination import WindowExamination, estimate_record
 from isiw.session.replay import strategy_of
 from isiw.strategy.strategy import Strategy
 from isiw.trials import TrialTable
@@ -131,7 +131,7 @@ def estimate_again(
     made = strategy_of(record.header) if strategy is None else strategy.restarted()
     trials = sorted([*record.table, *record.unknown_trials], key=lambda trial: trial.index)
     for number, trial in enumerate(trials, start=1):
-        learn(made, trial)
+        made.learn(trial)
         replayed(number)
     made.in_doubt = record.in_doubt
     last = record.table[-1].index

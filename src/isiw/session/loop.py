@@ -23,7 +23,7 @@ from isiw.session.sink import Follower, SessionResult, Wait
 from isiw.session.state import Fault, State, state_of
 from isiw.session.steps import ended, paused
 from isiw.session.terminal import goes_on, is_terminal, somebody_there
-from isiw.strategy.stopping import StopDecision
+from isiw.strategy.decisions import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.trials import TrialTable
 

@@ -10,7 +10,7 @@ from isiw.log.schema import Correction
 from isiw.log.verdicts import correction
 from isiw.session.examination import WindowExamination
 from isiw.signals.tap import TapResponses
-from isiw.strategy.stopping import OF_THE_WINDOW, StopDecision, stimuli_left
+from isiw.strategy.decisions import OF_THE_WINDOW, StopDecision, stimuli_left
 from isiw.trials import Sweep, Trial
 from isiw.visit import PAIRS_FIRST
 

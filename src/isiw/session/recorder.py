@@ -23,10 +23,10 @@ from isiw.session.examination import Examination, examination_of
 from isiw.session.judging import Judging
 from isiw.session.sink import Sink
 from isiw.signals.amplitudes import Doubts, odd_amplitudes, told_of
-from isiw.signals.limits import isi_far, require_plausible, require_plausible_range
+from isiw.signals.plausible import isi_far, require_plausible, require_plausible_range
 from isiw.signals.reported import unconfirmed
+from isiw.strategy.decisions import StopDecision
 from isiw.strategy.outcomes import Outcome
-from isiw.strategy.stopping import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Status, Stimulus, Trial, TrialTable, require_alone
 

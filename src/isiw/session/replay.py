@@ -21,7 +21,7 @@ from isiw.log.schema import Event, Intent
 from isiw.log.verdicts import MANY_CHANGES, VERDICTS, changed_after, under
 from isiw.log.writer import LogWriter
 from isiw.session.assembly import BELIEF_VERSION, ENGINE_VERSION, Earlier, versions
-from isiw.session.examination import learn, relearned
+from isiw.session.examination import relearned
 from isiw.signals.limits import SignalLimits
 from isiw.signals.tap import TapResponses
 from isiw.strategy.catalogue import remade_strategy, settings_for
@@ -78,7 +78,7 @@ def replay(
                 _require_other_versions(entry, asked_ms, record.header)
                 differing.append(entry.trial)
         elif isinstance(entry, Trial):
-            learn(strategy, entry)
+            strategy.learn(entry)
             learned.append(entry)
             replayed(len(learned))
         elif isinstance(entry, Event) and entry.kind in {*VERDICTS, "change"}:
@@ -88,7 +88,7 @@ def replay(
     strategy = relearned(strategy, learned, changes) if judged else strategy
     unknown = record.unknown_trials
     for trial in unknown:
-        learn(strategy, trial)
+        strategy.learn(trial)
     strategy.in_doubt = record.in_doubt
     table = TrialTable(tuple(sorted((*learned, *unknown), key=lambda trial: trial.index)))
     return Replayed(strategy, table, unknown, tuple(differing), len(table) if differing or not verify else first)

@@ -14,7 +14,7 @@ from isiw.errors import InvalidValueError, error_text
 from isiw.estimate import WindowEstimate
 from isiw.log.schema import Record
 from isiw.log.writer import LogWriter
-from isiw.strategy.stopping import StopDecision
+from isiw.strategy.decisions import StopDecision
 from isiw.trials import Trial, TrialTable
 
 

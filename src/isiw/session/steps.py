@@ -22,7 +22,7 @@ from isiw.session.state import Fault
 from isiw.signals.judgement import judge, judge_measurement
 from isiw.signals.tap import TapResponses
 from isiw.signals.watch import Watch
-from isiw.strategy.stopping import StopDecision, StopKind, stimuli_left
+from isiw.strategy.decisions import StopDecision, StopKind, stimuli_left
 from isiw.strategy.strategy import Strategy
 from isiw.text.sanitize import shown
 from isiw.trials import Measurement, Stimulus, Sweep, Trial

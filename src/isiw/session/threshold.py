@@ -23,7 +23,7 @@ from isiw.log.writer import LogWriter
 from isiw.session.assembly import begun, require_parts
 from isiw.session.examination import Examination
 from isiw.session.recorder import Recording
-from isiw.strategy.stopping import StopDecision
+from isiw.strategy.decisions import StopDecision
 from isiw.strategy.threshold.curve import CurvePulses
 from isiw.strategy.threshold.pulses import Pulse, ThresholdEstimate
 from isiw.strategy.threshold.search import ThresholdSearch, make_threshold_search

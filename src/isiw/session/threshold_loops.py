@@ -13,7 +13,7 @@ from isiw.devices.protocol import DeviceInfo
 from isiw.errors import ConfigError, InvalidValueError, LimitExceededError
 from isiw.log.headers import ThresholdHeader
 from isiw.session.threshold import ThresholdRecorder, open_threshold
-from isiw.strategy.stopping import StopDecision
+from isiw.strategy.decisions import StopDecision
 from isiw.strategy.threshold.pulses import place_text
 from isiw.strategy.threshold.search import ThresholdSearch
 from isiw.subjects.thresholds import StimulatedPerson, threshold_cohort

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from isiw.findings import ENOUGH_PAIRS, Finding, Kind, Severity
 from isiw.lazy import scipy
-from isiw.signals.limits import SignalLimits
-from isiw.trials import RESPONSE_MV, Measurement, Sweep, Trial
+from isiw.trials import RESPONSE_MV, Trial
 
 if TYPE_CHECKING:
     from isiw.signals.mep import Disturbance
@@ -58,20 +57,6 @@ def told_of(trials: Iterable[Trial]) -> tuple[Told, ...]:
     return tuple(Told(t.mep_mv, t.isi_ms, t.background_rms_uv) for t in comparable if t.mep_mv is not None)
 
 
-_USUAL_LIMITS: Final = SignalLimits()
-
-
-@dataclass(frozen=True, eq=False)
-class Evidence:
-    """What is known after a trial; what is not known is None or empty."""
-
-    trial: Trial | None = None
-    answer: Sweep | Measurement | None = None
-    limits: SignalLimits = _USUAL_LIMITS
-    told: Sequence[Told] = ()  # the trials that count so far
-    detection_limit_mv: float | None = None
-
-
 SMALL_MV, LARGE_MV = 8e-4, 4.0
 """Of several in a row, the largest is never smaller, and their geometric mean is hardly ever larger from the start."""
 
@@ -98,9 +83,9 @@ def _doubt(kind: Kind, text: str, remedy: str) -> Finding:
     return Finding(kind, Severity.DOUBT, text, remedy)
 
 
-def equal(evidence: Evidence) -> Finding | None:
+def equal(told: Sequence[Told]) -> Finding | None:
     """Amplitudes that are one like the other."""
-    meps_mv = [one.mep_mv for one in evidence.told[-max(in_a_row for in_a_row, _ in ALIKE) :]]
+    meps_mv = [one.mep_mv for one in told[-max(in_a_row for in_a_row, _ in ALIKE) :]]
     last = meps_mv[-EQUAL_IN_A_ROW:]
     if len(last) == EQUAL_IN_A_ROW and len(set(last)) == 1 and last[0] > 0:
         text = f"The last {EQUAL_IN_A_ROW} amplitudes are exactly equal ({last[0]:g} mV)"
@@ -114,22 +99,18 @@ def equal(evidence: Evidence) -> Finding | None:
     return None
 
 
-def silent(evidence: Evidence) -> Finding | None:
+def silent(told: Sequence[Told]) -> Finding | None:
     """No MEP from the start on."""
-    told = evidence.told
     if len(told) < SILENT_FROM_THE_START or any(one.mep_mv for one in told):
-        return None
-    if _zeros_are_usual(evidence.detection_limit_mv):
         return None
     text = f"None of the first {len(told)} pulses evoked an MEP: every amplitude is 0"
     ask = "Does the stimulator fire? Is the EMG recorded? Is the intensity high enough?"
     return _doubt(Kind.SILENT, text, ask)
 
 
-def stopped(evidence: Evidence) -> Finding | None:
+def stopped(told: Sequence[Told]) -> Finding | None:
     """No MEP any more, though there were some."""
-    told = evidence.told
-    if _zeros_are_usual(evidence.detection_limit_mv) or any(one.stands_out for one in told[-STOPPED_IN_A_ROW:]):
+    if any(one.stands_out for one in told[-STOPPED_IN_A_ROW:]):
         return None
     first = stopped_after([one.isi_ms for one in told], [one.stands_out for one in told])
     if first is None:
@@ -138,21 +119,21 @@ def stopped(evidence: Evidence) -> Finding | None:
     return _doubt(Kind.STOPPED, text, "Does the stimulator still fire? Is the coil still in place?")
 
 
-def small(evidence: Evidence) -> Finding | None:
+def small(told: Sequence[Told]) -> Finding | None:
     """Amplitudes below EMG at rest."""
-    last = _last_seen_mv(evidence.told)
+    last = _last_seen_mv(told)
     if len(last) < IN_A_ROW or max(last) >= SMALL_MV:
         return None
     text = f"The last {IN_A_ROW} amplitudes are below {1e3 * max(last):.2g} µV, less than EMG at rest has"
     return _doubt(Kind.SMALL, text, "Are they in V? Or is the amplifier off, or its gain applied twice?")
 
 
-def large(evidence: Evidence) -> Finding | None:
+def large(told: Sequence[Told]) -> Finding | None:
     """Amplitudes that are large from the start, or larger by more than any muscle changes."""
-    last = _last_seen_mv(evidence.told)
+    last = _last_seen_mv(told)
     if len(last) < IN_A_ROW or (usual_mv := statistics.geometric_mean(last)) < LARGE_MV:
         return None
-    earlier = [one.mep_mv for one in evidence.told if one.mep_mv > 0][:-IN_A_ROW]
+    earlier = [one.mep_mv for one in told if one.mep_mv > 0][:-IN_A_ROW]
     if not earlier:
         text = f"The first {IN_A_ROW} amplitudes are {usual_mv:.2g} mV in the mean, more than most muscles give"
         return _doubt(Kind.LARGE, text, "Are they in µV? Divide by 1000.")
@@ -198,10 +179,6 @@ def _zeros_are_usual(detection_limit_mv: float | None) -> bool:
     return detection_limit_mv is not None and detection_limit_mv >= MANY_BELOW_MV
 
 
-OF_AMPLITUDES: Final = (equal, silent, stopped, small, large)
-"""Checks of amplitudes alone, the surest first."""
-
-
 def odd_amplitudes(told: Sequence[Told], detection_limit_mv: float | None = None) -> Iterator[Finding]:
     """What is odd about the amplitudes so far, in the order of the checks.
 
@@ -209,8 +186,8 @@ def odd_amplitudes(told: Sequence[Told], detection_limit_mv: float | None = None
         told: the trials that count so far.
         detection_limit_mv: below which an amplitude is 0 [mV]; None if it is unknown.
     """
-    evidence = Evidence(told=told, detection_limit_mv=detection_limit_mv)
-    yield from filter(None, (find(evidence) for find in OF_AMPLITUDES))
+    of_zeros = () if _zeros_are_usual(detection_limit_mv) else (silent, stopped)
+    yield from filter(None, (find(told) for find in (equal, *of_zeros, small, large)))
 
 
 @dataclass(frozen=True)

@@ -15,18 +15,15 @@ from isiw.design import DesignSpace
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.findings import MISTRIALS, Kind
 from isiw.signals.impact import impact_time
-from isiw.signals.limits import (
-    ACCELERATION_UNITS,
-    EMG_UNITS_MV,
-    TAP_MS,
-    SignalLimits,
+from isiw.signals.limits import ACCELERATION_UNITS, EMG_UNITS_MV, TAP_MS, SignalLimits
+from isiw.signals.mep import TAP_SPAN_MS, at_rest, disturbance, known_background_rms, mep_amplitudes
+from isiw.signals.plausible import (
     before_impact,
     implausible_amplitude,
     pulse_with_tap_alone,
     require_agreement,
     tap_with_tms_alone,
 )
-from isiw.signals.mep import TAP_SPAN_MS, at_rest, disturbance, known_background_rms, mep_amplitudes
 from isiw.signals.waveforms import is_blanked, is_recording, is_saturated
 from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial
 from isiw.types import FloatArray

@@ -14,10 +14,10 @@ from itertools import takewhile
 import numpy as np
 
 from isiw.findings import Finding, Kind, Severity
-from isiw.signals.amplitudes import OF_REST, Evidence, Response, Told
+from isiw.signals.amplitudes import OF_REST, Response, Told
 from isiw.signals.limits import ARTEFACT_MS, EMG_UNITS_MV, SignalLimits
 from isiw.signals.mep import SPAN_S, Disturbance, at_rest, disturbance
-from isiw.signals.rig import tap_span_ms
+from isiw.signals.rig import Evidence, tap_span_ms
 from isiw.trials import Sweep, Trial
 from isiw.types import BoolArray, FloatArray
 

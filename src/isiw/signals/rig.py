@@ -6,19 +6,36 @@ Nobody is accused without a sign: if a sweep shows none, the reason of the mistr
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
 from isiw.design import DesignSpace
 from isiw.findings import REMEDIES, REST_UV, Finding, Kind, Severity
-from isiw.signals.amplitudes import Evidence
+from isiw.signals.amplitudes import Told
 from isiw.signals.impact import impact_time
 from isiw.signals.judgement import of_one_length
-from isiw.signals.limits import ARTEFACT_MS, EMG_UNITS_MV, implausible_amplitude
+from isiw.signals.limits import ARTEFACT_MS, EMG_UNITS_MV, SignalLimits
 from isiw.signals.mep import MIN_BACKGROUND_MS
+from isiw.signals.plausible import implausible_amplitude
 from isiw.signals.waveforms import PULSE_GUARD_MS, is_recording, samples
-from isiw.trials import Channel, Sweep, Trial
+from isiw.trials import Channel, Measurement, Sweep, Trial
+
+_USUAL_LIMITS: Final = SignalLimits()
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What is known after a trial; what is not known is None or empty."""
+
+    trial: Trial | None = None
+    answer: Sweep | Measurement | None = None
+    limits: SignalLimits = _USUAL_LIMITS
+    told: Sequence[Told] = ()  # the trials that count so far
+    detection_limit_mv: float | None = None
+
 
 DRIVEN_MS = 25.0
 """How long a hammer is driven before its impact, at least."""

@@ -12,10 +12,10 @@ from typing import Final
 from isiw.design import DesignSpace
 from isiw.findings import REMEDIES, Finding, Kind, Severity
 from isiw.signals import places, rig
-from isiw.signals.amplitudes import OF_AMPLITUDES, Doubts, Evidence, Told, told_of
+from isiw.signals.amplitudes import Doubts, Told, odd_amplitudes, told_of
 from isiw.signals.limits import SignalLimits
 from isiw.signals.places import told_by
-from isiw.signals.rig import too_early_by_chance
+from isiw.signals.rig import Evidence, too_early_by_chance
 from isiw.trials import Measurement, Sweep, Trial, TrialTable
 from isiw.types import FloatArray
 
@@ -25,17 +25,8 @@ OF_SWEEP: Final = (rig.unusable_emg, rig.wrong_acceleration, rig.no_origin, rig.
 OF_TRIAL: Final = (rig.wrong_level, rig.lost_trial)
 """Checks of the last trial, be there a sweep or not."""
 
-OF_TOLD: Final = (
-    places.repeated,
-    *OF_AMPLITUDES,
-    places.hum,
-    places.drift,
-    places.misplaced,
-    places.cut_off,
-    places.artefact,
-    places.decay,
-)
-"""Checks of the trials that count so far."""
+OF_SWEEPS: Final = (places.hum, places.drift, places.misplaced, places.cut_off, places.artefact, places.decay)
+"""Checks of what the sweeps of the trials that count so far show."""
 
 
 def findings(evidence: Evidence) -> Iterator[Finding]:
@@ -46,7 +37,9 @@ def findings(evidence: Evidence) -> Iterator[Finding]:
     if trial is not None:
         yield from filter(None, (find(trial, evidence) for find in OF_TRIAL))
     if evidence.told:
-        yield from filter(None, (find(evidence) for find in OF_TOLD))
+        yield from filter(None, [places.repeated(evidence)])
+        yield from odd_amplitudes(evidence.told, evidence.detection_limit_mv)
+        yield from filter(None, (find(evidence) for find in OF_SWEEPS))
 
 
 EARLY_IN_A_ROW: Final = 9

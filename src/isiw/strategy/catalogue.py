@@ -12,9 +12,9 @@ from isiw.design import VALVE_SPACE, DesignSpace, require_space
 from isiw.errors import StrategyError, did_you_mean
 from isiw.models.particles.profile import ProfilePrior
 from isiw.models.protocol import profile_of
+from isiw.strategy.recipe import Recipe
 from isiw.strategy.settings.common import (
     DescribedSetting,
-    Recipe,
     Settings,
     described,
     settings_from,

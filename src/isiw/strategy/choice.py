@@ -10,11 +10,10 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from isiw.acquisition.fixed import golden_index
-from isiw.acquisition.protocol import AcquisitionFunction, best_candidate, require_scores
+from isiw.acquisition.protocol import AcquisitionFunction, best_candidate, golden_index, require_scores
 from isiw.design import DesignSpace
 from isiw.models.protocol import Posterior
-from isiw.signals.limits import off_by
+from isiw.signals.plausible import off_by
 from isiw.types import Array, Singles
 
 ASKED_AGAIN = 2

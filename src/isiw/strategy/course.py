@@ -24,7 +24,7 @@ from isiw.models.protocol import (
     ResponseModel,
 )
 from isiw.strategy.choice import Choice, Cost, best_choices, evenly_spaced
-from isiw.strategy.stopping import Progress, StopDecision, StoppingRule, looks_back
+from isiw.strategy.decisions import Progress, StopDecision, StoppingRule, looks_back
 
 
 @dataclass(frozen=True)

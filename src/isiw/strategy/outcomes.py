@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Final, TypedDict
+from typing import Final
 
 import numpy as np
 
@@ -33,28 +33,6 @@ BY_CHANCE, LEAST_DIFFERENT = 1e-6, 3
 
 NEAR_A_STEP: Final = 1e-6
 """An amplitude is a multiple of a step if it is as near to one, in steps."""
-
-
-class Details(TypedDict, total=False):
-    """Details of an outcome besides its amplitude; see `Strategy.tell`."""
-
-    response: bool | None
-    isi_sd_ms: float
-    mep_sd_mv: float
-    mep_interval_mv: tuple[float, float] | None
-    tap_mv: float | None
-    intensity_pct_rmt: float | None
-
-
-def details_of(trial: Trial) -> Details:
-    """The details of a trial's outcome besides ISI and amplitude."""
-    return {
-        "isi_sd_ms": trial.isi_sd_ms,
-        "mep_sd_mv": trial.mep_sd_mv,
-        "mep_interval_mv": trial.mep_interval_mv,
-        "tap_mv": trial.tap_mv,
-        "intensity_pct_rmt": trial.intensity_pct_rmt,
-    }
 
 
 SEEN_MV: Final = 0.01
@@ -84,7 +62,16 @@ class Outcome(Checked):
     @classmethod
     def of(cls, trial: Trial) -> Outcome:
         """The outcome of a trial that was judged before."""
-        return cls(trial.isi_ms, None if trial.mep_interval_mv else trial.mep_mv, **details_of(trial))
+        return cls(
+            trial.isi_ms,
+            None if trial.mep_interval_mv else trial.mep_mv,
+            None,
+            trial.isi_sd_ms,
+            trial.mep_sd_mv,
+            trial.mep_interval_mv,
+            trial.tap_mv,
+            trial.intensity_pct_rmt,
+        )
 
 
 @dataclass(frozen=True)

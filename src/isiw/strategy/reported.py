@@ -9,7 +9,7 @@ from functools import cached_property
 from isiw.design import DesignSpace
 from isiw.findings import IN_DOUBT, Finding
 from isiw.signals.amplitudes import Doubts, Told, odd_amplitudes
-from isiw.signals.limits import isi_far
+from isiw.signals.plausible import isi_far
 from isiw.signals.reported import doubtful_from, is_far, unconfirmed
 from isiw.strategy.outcomes import Outcome
 

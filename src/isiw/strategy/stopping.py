@@ -1,74 +1,26 @@
-"""When to stop: rules, frozen settings that compose with `AnyOf`, answer a `Progress` with a decision and a reason."""
+"""Stopping rules: frozen settings that compose with `AnyOf`."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from enum import StrEnum
 from functools import partial
-from typing import Annotated, Final, Protocol, runtime_checkable
+from typing import Annotated, Final
 
-from isiw.checks import Checked, Count, Positive, Share, can, number
+from isiw.checks import Checked, Count, Positive, Share, number
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
-from isiw.findings import Finding, Kind
+from isiw.strategy.decisions import (
+    OF_THE_WINDOW,
+    Progress,
+    StopDecision,
+    StopKind,
+    StoppingRule,
+    looks_back,
+    stimuli_left,
+)
 from isiw.text.sanitize import counted
 from isiw.window import SURE
-
-
-class StopKind(StrEnum):
-    """The grounds of a decision."""
-
-    BUDGET = "budget"
-    LIMIT = "limit"
-    KNOWN = "window known"
-    ABSENT = "no window"
-    SMALL_GAIN = "small gain"
-    SETTLED = "settled"
-    TOO_LITTLE = "too little measured"
-    PAUSED = "paused"
-    THRESHOLD = "threshold"
-    OWN = "a user's own rule"
-
-    def stop(self, reason: str) -> StopDecision:
-        """The decision to stop, for this reason."""
-        return StopDecision(stop=True, reason=reason, kind=self)
-
-    def go_on(self, reason: str) -> StopDecision:
-        """The decision to continue, for this reason."""
-        return StopDecision(stop=False, reason=reason, kind=self)
-
-
-OF_THE_WINDOW: Final = frozenset(
-    {StopKind.KNOWN, StopKind.ABSENT, StopKind.SMALL_GAIN, StopKind.SETTLED, StopKind.TOO_LITTLE}
-)
-"""Decisions that say something about the window; they mean nothing if too little was measured."""
-
-
-@dataclass(frozen=True)
-class StopDecision:
-    """The decision to stop or not, with its reason.
-
-    Args:
-        stop: whether to stop.
-        reason: why, or why not, in full sentences.
-        kind: what it rests on.
-    """
-
-    stop: bool
-    reason: str
-    kind: StopKind = StopKind.OWN
-
-
-@dataclass(frozen=True)
-class Progress:
-    """A session's delivered pairs, mistrials included, those learnt, and the estimates now and before."""
-
-    delivered: int
-    told: int
-    estimate: WindowEstimate
-    past: tuple[WindowEstimate, ...] = ()
-
 
 MOST_BY_TIME: Final = 0.05
 """No session stops on a window while changes with time explain it all with more probability than this."""
@@ -82,31 +34,6 @@ def _stop_unless_by_time(kind: StopKind, estimate: WindowEstimate, reason: str) 
         "It is too early to stop: that amplitudes have changed with time, and there is no window, has probability "
         f"{estimate.time_alone:.2f}."
     )
-
-
-def for_lack(decision: StopDecision, found: Finding | None) -> StopDecision:
-    """The decision if something is lacking to speak of a window; in doubt none but a budget stops."""
-    if found is None or (decision.stop and (found.kind is not Kind.ISIS_FAR or decision.kind is StopKind.BUDGET)):
-        return decision
-    return StopKind.TOO_LITTLE.go_on(f"{found}")
-
-
-class StoppingRule(Protocol):
-    """A rule: from progress to a decision.
-
-    One that needs past estimates says how many by an attribute `looks_back`; `HasBudget` is what it may say besides.
-    """
-
-    def __call__(self, progress: Progress) -> StopDecision:
-        """Decide whether to stop."""
-
-
-@runtime_checkable
-class HasBudget(Protocol):
-    """Capability: a rule that stops after so many stimuli at the latest."""
-
-    def stimuli_left(self, delivered: int) -> int | None:
-        """Number that it still allows after so many; None if it sets no budget after all."""
 
 
 @dataclass(frozen=True)
@@ -272,14 +199,3 @@ class AnyOf:
         kinds = [decision.kind for decision in decisions]
         kind = next((kind for kind in kinds if kind in OF_THE_WINDOW), kinds[0])
         return kind.go_on(" ".join(reasons))
-
-
-def stimuli_left(rule: StoppingRule, delivered: int) -> int | None:
-    """Number of stimuli that a rule's budget still allows; None if it sets none."""
-    return rule.stimuli_left(delivered) if can(rule, HasBudget) else None
-
-
-def looks_back(rule: StoppingRule) -> int:
-    """Number of past estimates that a rule needs."""
-    past: int = getattr(rule, "looks_back", 0)
-    return past

@@ -4,23 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Unpack
 
 from isiw.acquisition.protocol import AcquisitionFunction, greedy_batch, require_acquisition
 from isiw.checks import amplitude, deadline, flag, number, whole
 from isiw.design import DesignSpace, require_space
 from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError, warn
 from isiw.estimate import WindowEstimate
-from isiw.findings import lacking
 from isiw.models.protocol import Posterior, PredictsMeps, ReportsTrouble, ResponseModel, pairs_pct_rmt_of
-from isiw.signals.amplitudes import is_silent
-from isiw.signals.limits import require_plausible, require_plausible_range
+from isiw.signals.plausible import require_plausible, require_plausible_range
 from isiw.strategy.choice import Asked, Choice, Cost, instead_of_lost
 from isiw.strategy.course import Method
-from isiw.strategy.outcomes import Details, Outcome, Outcomes
+from isiw.strategy.decisions import StopDecision, StoppingRule, stimuli_left
+from isiw.strategy.known import Known
+from isiw.strategy.outcomes import Outcome, Outcomes
+from isiw.strategy.recipe import Recipe
 from isiw.strategy.reported import Reported
-from isiw.strategy.settings.common import Recipe
-from isiw.strategy.stopping import StopDecision, StoppingRule, for_lack, stimuli_left
 from isiw.trials import Trial, require_alone
 from isiw.types import FloatArray
 
@@ -248,16 +246,15 @@ class Strategy:
         plain_mv = None if mep_mv is None else number("mep_mv", mep_mv, least=0)
         if not flag("pulse", pulse):
             require_alone(intensity_pct_rmt, plain_ms, tap_alone=True)
-            self.learn_tap(plain_ms, plain_mv)
+            self._tell_tap(plain_ms, plain_mv)
             return
         asked_ms = None if plain_ms is None else self._asked.meant_ms(plain_ms, plain_mv, self.space)
         require_plausible(plain_ms, plain_mv, asked_ms, self.space, isi_sd_ms)
-        more = Details(response=response, isi_sd_ms=isi_sd_ms, mep_sd_mv=mep_sd_mv, mep_interval_mv=mep_interval_mv)
-        more["intensity_pct_rmt"] = intensity_pct_rmt
-        outcome = Outcome(isi_ms, mep_mv, **more)
+        realised_ms = None if isi_ms is None else self.space.check_realised(isi_ms)
+        outcome = Outcome(realised_ms, mep_mv, response, isi_sd_ms, mep_sd_mv, mep_interval_mv, None, intensity_pct_rmt)
         require_plausible_range(outcome.mep_sd_mv, outcome.mep_interval_mv)
         reported = self._reported if plain_ms is None else self._reported.confirmed_by(confirm=flag("confirm", confirm))
-        self.learn(isi_ms, mep_mv, **more)
+        self._learn(outcome)
         self._reported = reported.after(self._outcomes.pulses, asked_ms, self.detection_limit_mv)
         self._leave_out(self._reported.doubted)
         if self._reported.new is not None:
@@ -271,21 +268,29 @@ class Strategy:
         self._outcomes, self.in_doubt = replace(self._outcomes, doubted=doubted), bool(doubted)
         self._course, self._asked = self._course.again(self.seed, self._outcomes.observations), self._asked.again()
 
-    def learn(self, isi_ms: float | None, mep_mv: float | None = None, **more: Unpack[Details]) -> None:
-        """Learn from one trial that was judged before, as a session does: as `tell`, however implausible.
+    def learn(self, trial: Trial) -> None:
+        """Learn what there is to learn from one trial, however implausible, and count what it uses up.
+
+        Everything that delivers, replays or reads trials learns them by this.
 
         Args:
-            isi_ms: as for `tell` [ms].
-            mep_mv: as for `tell` [mV].
-            **more: as for `tell`, and `tap_mv`: what is left of the tap's own response in the amplitude, in the mean
-                [mV]; None if it is unknown.
+            trial: a trial that was judged: a pair, TMS alone or a tap alone, also one that was lost or excluded.
 
         Raises:
-            InvalidValueError: an amplitude that no amplifier gives, or other values that `tell` refuses.
-            OutOfSpaceError: as for `tell`.
-            StrategyError: as for `tell`.
+            StrategyError: a kind of outcome that the model cannot learn from.
         """
-        self._learn(Outcome(None if isi_ms is None else self.space.check_realised(isi_ms), mep_mv, **more))
+        if trial.told:
+            self._learn(Outcome.of(trial))
+        elif trial.counts and trial.isi_ms is not None and trial.mep_mv is not None:
+            self._learn_tap(trial.isi_ms, trial.mep_mv)
+        elif trial.is_control:
+            self._controls += 1
+            if trial.counts and trial.mep_mv is not None:  # what a tap alone evoked, at any time
+                self._outcomes = self._outcomes.after_tap(None, trial.mep_mv)
+        elif trial.excluded and trial.reason is None:  # it was not lost
+            self._mistrials, self._lost = self._mistrials + 1, 0
+        else:
+            self.count_mistrial()
 
     def learn_all(self, trials: Iterable[Trial], *, same_level: bool = False) -> None:
         """Learn trials that were delivered before the first ask, at whatever ISIs; no plan and no budget counts them.
@@ -325,23 +330,17 @@ class Strategy:
         self._outcomes, self._asked = outcomes, self._asked.after(outcome.isi_ms)
         self._lost = 0 if outcome.isi_ms is not None else self._lost
 
-    def learn_tap(self, isi_ms: float | None, mep_mv: float | None) -> None:
-        """Learn from a tap alone, whatever was learnt before it.
-
-        Args:
-            isi_ms: as for `tell` [ms].
-            mep_mv: as for `tell` [mV].
-
-        Raises:
-            InvalidValueError: no ISI or no amplitude, or one that no amplifier gives.
-            OutOfSpaceError: as for `tell`.
-        """
+    def _tell_tap(self, isi_ms: float | None, mep_mv: float | None) -> None:
         if isi_ms is None or mep_mv is None:
             raise InvalidValueError(
                 "a tap alone needs the ISI at which the MEP window would lie, and the amplitude of what it holds",
                 got=(isi_ms, mep_mv),
             )
-        outcomes = self._outcomes.after_tap(self.space.check_realised(isi_ms), amplitude("mep_mv", mep_mv))
+        self._learn_tap(self.space.check_realised(isi_ms), amplitude("mep_mv", mep_mv))
+
+    def _learn_tap(self, isi_ms: float, mep_mv: float) -> None:
+        """Learn from a tap alone, whatever was learnt before it."""
+        outcomes = self._outcomes.after_tap(isi_ms, mep_mv)
         if outcomes.pulses:
             self._course = self._course.again(self.seed, outcomes.observations)
             self._asked = self._asked.again()
@@ -367,21 +366,14 @@ class Strategy:
         if other is not None and not self._course.plans_ahead:
             self._asked, self._lost = replace(self._asked, choice=other, fallback=other.fallback), 0
 
-    def count_excluded(self) -> None:
-        """Count a delivered stimulus whose outcome an operator excluded: it uses up budget, and was not lost."""
-        self._mistrials, self._lost = self._mistrials + 1, 0
-
-    def count_control(self, tap_mv: float | None = None) -> None:
-        """Count a control trial that teaches nothing of a window; `tap_mv` is what a tap alone evoked, at any time."""
-        self._controls += 1
-        self._outcomes = self._outcomes if tap_mv is None else self._outcomes.after_tap(None, tap_mv)
+    @property
+    def _known(self) -> Known:
+        limit_mv, lost = self.detection_limit_mv, self._mistrials
+        return Known(self._course, self._outcomes, limit_mv, mistrials=lost, in_doubt=self.in_doubt)
 
     def estimate(self) -> WindowEstimate:
         """The present estimate of the window."""
-        estimate = self._course.estimate()
-        noted = self._outcomes.about_the_tap(estimate.window) | {"silent": self._is_silent}
-        estimate = estimate.noting(**noted) if any(noted.values()) else estimate
-        return estimate.doubted() if self.in_doubt else estimate
+        return self._known.estimate()
 
     def prediction_mv(self) -> tuple[FloatArray, FloatArray] | None:
         """The ends [mV] between which nine of ten MEPs lie at `estimate().grid_ms`, (t,) each; None if unknown."""
@@ -389,11 +381,4 @@ class Strategy:
 
     def decision(self) -> StopDecision:
         """The decision to stop now or not, with its reason."""
-        silent = self._is_silent
-        decision = self._course.decision(mistrials=self._mistrials, silent=silent)
-        return for_lack(decision, lacking(None, silent=silent, in_doubt=self.in_doubt))
-
-    @property
-    def _is_silent(self) -> bool:
-        meps_mv = [one.mep_mv for one in self._outcomes.pulses if one.mep_mv is not None]
-        return is_silent(meps_mv, self.detection_limit_mv)
+        return self._known.decision()

@@ -21,10 +21,11 @@ from isiw.estimate import WindowEstimate
 from isiw.models.protocol import ResponseModel
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.choice import Choice
-from isiw.strategy.stopping import StopDecision, StopKind, StoppingRule
+from isiw.strategy.decisions import StopDecision, StopKind, StoppingRule
 from isiw.strategy.strategy import Strategy
 from isiw.subjects.subject import Response
 from isiw.text.named_code import named_code, require_fitting
+from isiw.trials import Trial
 from isiw.window import Window
 
 OWN: Final = "own"
@@ -75,8 +76,10 @@ class Alone:
     def tell(self, responses: Sequence[Response]) -> None:
         """Learn from one trial."""
         (response,) = responses
-        learn = self.player.tell if self._strategy is None else self._strategy.learn
-        learn(response.isi_ms, response.mep_mv, isi_sd_ms=response.isi_sd_ms)
+        if self._strategy is None:
+            self.player.tell(response.isi_ms, response.mep_mv, isi_sd_ms=response.isi_sd_ms)
+        else:
+            self._strategy.learn(Trial.of(response.isi_ms, response.mep_mv, isi_sd_ms=response.isi_sd_ms))
 
     def count_mistrial(self, _: int, lost: Choice) -> Choice:
         """Count a pair of stimuli that was delivered in vain, and say what is asked instead."""

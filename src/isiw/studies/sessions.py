@@ -25,8 +25,10 @@ from isiw.signals import wrong_isi
 from isiw.strategy.catalogue import known_settings, make_strategy
 from isiw.strategy.choice import Choice, instead_of_lost
 from isiw.strategy.course import Course, Method
+from isiw.strategy.decisions import StopDecision, stimuli_left
+from isiw.strategy.known import Known
 from isiw.strategy.outcomes import Outcome, Outcomes
-from isiw.strategy.stopping import Budget, StopDecision, stimuli_left
+from isiw.strategy.stopping import Budget
 from isiw.strategy.strategy import Strategy
 from isiw.studies.execution import one_thread
 from isiw.studies.players import Alone, OwnCode, Player, Reported
@@ -337,17 +339,16 @@ class _Batch:
         self.lost[person] = 0
         return other
 
-    def _course_of(self, person: int) -> tuple[Course, int]:
-        """The course that a person is in, and their number there."""
-        return (self.alone[person], 0) if person in self.alone else (self.course, person)
+    def _known(self, person: int) -> Known:
+        course, number = (self.alone[person], 0) if person in self.alone else (self.course, person)
+        limit_mv = self.players[person].detection_limit_mv
+        return Known(course, self.outcomes[person], limit_mv, number, self.mistrials[person])
 
     def estimate(self, person: int) -> WindowEstimate:
-        course, number = self._course_of(person)
-        return course.estimate(number)
+        return self._known(person).estimate()
 
     def decision(self, person: int) -> StopDecision:
-        course, number = self._course_of(person)
-        return course.decision(number, self.mistrials[person])
+        return self._known(person).decision()
 
     def trouble(self) -> bool | None:
         """Whose fit failed is not known; only whether any did."""

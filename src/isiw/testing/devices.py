@@ -22,8 +22,8 @@ from isiw.log.schema import waveform_topic
 from isiw.session.rig import Rig, Safeguards, exclusive, own_reference
 from isiw.session.sink import Sink
 from isiw.signals import SignalLimits, judge, judge_measurement
-from isiw.signals.amplitudes import Evidence, Told
-from isiw.signals.rig import too_early_by_chance
+from isiw.signals.amplitudes import Told
+from isiw.signals.rig import Evidence, too_early_by_chance
 from isiw.signals.watch import findings
 from isiw.testing.device_table import (
     OF_TIMING,

@@ -25,9 +25,10 @@ from isiw.models.protocol import (
     SamplesProfiles,
     SamplesWindows,
 )
-from isiw.strategy.stopping import StopDecision
+from isiw.strategy.decisions import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.text.sanitize import shown
+from isiw.trials import Trial
 from isiw.types import Singles
 
 Trials = tuple[tuple[float | None, float], ...]
@@ -300,7 +301,7 @@ def _check_refusals(strategy: Strategy) -> None:
 
 def _check_telling(strategy: Strategy, told: Trials, when: str) -> None:
     for isi_ms, mep_mv in told:
-        strategy.learn(isi_ms, mep_mv)
+        strategy.learn(Trial.of(isi_ms, mep_mv))
     require(strategy.ask() in strategy.space.grid_ms, f"ask answers an ISI on the grid {when}")
     check_estimate(strategy.estimate(), strategy.space, when)
     decision = strategy.decision()
@@ -320,7 +321,7 @@ def _asks(strategy: Strategy, told: Trials) -> list[float]:
     asked = []
     for isi_ms, mep_mv in told:
         asked.append(strategy.ask())
-        strategy.learn(isi_ms, mep_mv)
+        strategy.learn(Trial.of(isi_ms, mep_mv))
     return [*asked, strategy.ask()]
 
 

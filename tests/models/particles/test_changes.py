@@ -16,10 +16,12 @@ from isiw.models.particles.latents import LATENTS, Latents, latents_of
 from isiw.models.protocol import Observation
 from isiw.models.shared.history import History
 from isiw.native.engine import log_likelihoods
-from isiw.sentences import at_a_trial
-from isiw.strategy.stopping import ExpectedF1, Progress
+from isiw.strategy.decisions import Progress
+from isiw.strategy.stopping import ExpectedF1
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.responses import RecruitmentResponse
+from isiw.summary import at_a_trial
+from isiw.trials import Trial
 from known import known
 from native.drawn import CASES, history
 
@@ -154,7 +156,7 @@ def test_of_people_without_a_window_whose_amplitudes_rise_hardly_any_is_sure_to_
         strategy = isiw.make_strategy("default", seed=seed, space=VALVE_SPACE)
         for trial in range(40):
             response = responder.respond(strategy.ask(), "valve")
-            strategy.learn(response.isi_ms, response.mep_mv * (5.0 if trial >= 14 else 1.0))
+            strategy.learn(Trial.of(response.isi_ms, response.mep_mv * (5.0 if trial >= 14 else 1.0)))
         estimate = strategy.estimate()
         sure += (estimate.probability or 0.0) >= 0.9
         named += estimate.change is not None and estimate.change.is_sure

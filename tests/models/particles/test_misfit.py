@@ -13,6 +13,7 @@ from isiw.models.particles.misfit import Bets, probability_below
 from isiw.models.particles.prior import Prior
 from isiw.models.protocol import Observation
 from isiw.models.shared.history import observed
+from isiw.trials import Trial
 from isiw.types import FloatArray
 from known import known
 
@@ -68,9 +69,9 @@ def examined(amplitudes_mv: FloatArray, pulses: tuple[tuple[float, float], ...] 
     """The estimate after pulses alone and then pairs at ISIs all over the range."""
     strategy = isiw.make_strategy(seed=0, hit_delay_ms=(180.0, 6.0), particles=300)
     for intensity_pct_rmt, mep_mv in pulses:
-        strategy.learn(None, mep_mv, intensity_pct_rmt=intensity_pct_rmt)
+        strategy.learn(Trial.of(None, mep_mv, intensity_pct_rmt=intensity_pct_rmt))
     for pair, mep_mv in enumerate(amplitudes_mv.tolist()):
-        strategy.learn(float(61 * pair % 501), mep_mv)
+        strategy.learn(Trial.of(float(61 * pair % 501), mep_mv))
     return strategy.estimate()
 
 

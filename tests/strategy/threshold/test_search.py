@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from isiw.errors import ConfigError, InvalidValueError, LimitExceededError
-from isiw.strategy.stopping import StopDecision
+from isiw.strategy.decisions import StopDecision
 from isiw.strategy.threshold import (
     IntensityRange,
     Pulse,

@@ -29,7 +29,8 @@ def stream(seed: int, step: int) -> np.random.Generator:
 
 def seeds(seed: int, step: int, people: int) -> Seeds:
     """Seeds of the engine's draws for each person at a step, (b,)."""
-    return np.random.SeedSequence((seed, step)).generate_state(people, np.uint64).astype(np.uint64)
+    own = (np.random.SeedSequence((seed + person, step)) for person in range(people))
+    return np.array([sequence.generate_state(1, np.uint64)[0] for sequence in own], dtype=np.uint64)
 
 
 def normal_below(z: Array) -> FloatArray:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass, field, fields, is_dataclass, replace
+from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from functools import cache, partial
 from numbers import Integral
 from typing import Annotated, Any, Final, Protocol, TypeAlias, get_args, get_origin, get_type_hints
@@ -32,7 +32,8 @@ from isiw.checks import (
 from isiw.design import DesignSpace
 from isiw.errors import ConfigError, StrategyError, did_you_mean
 from isiw.models.protocol import ResponseModel
-from isiw.strategy.stopping import AnyOf, Budget, CredibleWidth, ExpectedF1, NoWindow, SmallGain, StoppingRule
+from isiw.strategy.decisions import StoppingRule
+from isiw.strategy.stopping import AnyOf, Budget, CredibleWidth, ExpectedF1, NoWindow, SmallGain
 from isiw.text.toml_files import checked
 
 KNOWN: Final = {
@@ -45,21 +46,6 @@ KNOWN: Final = {
     "conditioning": (("model", "prior", "profile", "conditioning"),),
 }
 """Short keys of what is known of the rig and the person; they stand for fields deep in a model's prior."""
-
-
-@dataclass(frozen=True)
-class Recipe:
-    """The name, seed and settings of a strategy, from which a log can make it again.
-
-    Args:
-        name: its name in the catalogue; empty for a strategy built from a user's own objects.
-        seed: the seed of all its randomness.
-        settings: the settings it was made with, as TOML values.
-    """
-
-    name: str
-    seed: int
-    settings: Mapping[str, Any] = field(default_factory=dict)
 
 
 class AskingPart(Protocol):

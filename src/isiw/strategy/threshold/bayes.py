@@ -19,7 +19,7 @@ import numpy as np
 
 from isiw.checks import Checked, Count, Positive, ascending, number, whole
 from isiw.lazy import scipy
-from isiw.strategy.stopping import StopDecision, StopKind
+from isiw.strategy.decisions import StopDecision, StopKind
 from isiw.strategy.threshold.pulses import IntensityRange, Pulse, ThresholdEstimate
 from isiw.trials import RESPONSE_MV
 from isiw.types import FloatArray

@@ -11,7 +11,7 @@ import numpy as np
 
 from isiw.checks import Checked, Count, Natural, Positive
 from isiw.errors import InvalidValueError, LimitExceededError
-from isiw.strategy.stopping import StopDecision, StopKind
+from isiw.strategy.decisions import StopDecision, StopKind
 from isiw.strategy.threshold.bayes import BayesThreshold
 from isiw.strategy.threshold.pulses import IntensityRange, Pulse, ThresholdEstimate
 

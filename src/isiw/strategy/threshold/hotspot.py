@@ -11,7 +11,7 @@ import numpy as np
 
 from isiw.checks import Checked, Count, Positive
 from isiw.lazy import scipy
-from isiw.strategy.stopping import StopDecision, StopKind
+from isiw.strategy.decisions import StopDecision, StopKind
 from isiw.strategy.threshold.bayes import DISTANCES_PCT, RecruitmentBelief, log_likelihood
 from isiw.strategy.threshold.pulses import IntensityRange, Pulse, ThresholdEstimate
 from isiw.types import FloatArray

@@ -11,7 +11,7 @@ import numpy as np
 
 from isiw.checks import Amplitude, Checked, Flag, number
 from isiw.errors import InvalidValueError, LimitExceededError
-from isiw.strategy.stopping import StopDecision, StopKind
+from isiw.strategy.decisions import StopDecision, StopKind
 from isiw.trials import RESPONSE_MV
 from isiw.types import FloatArray
 

@@ -8,8 +8,8 @@ from typing import Any, Final
 
 from isiw.checks import choice, number
 from isiw.errors import InvalidValueError
-from isiw.signals.limits import implausible_scale, require_amplitude
-from isiw.strategy.stopping import StopDecision, StopKind
+from isiw.signals.plausible import implausible_scale, require_amplitude
+from isiw.strategy.decisions import StopDecision, StopKind
 from isiw.strategy.threshold.bayes import BayesThreshold, FiveOfTen, MaximumLikelihood
 from isiw.strategy.threshold.curve import CurvePulses
 from isiw.strategy.threshold.hotspot import BayesHotSpot

@@ -1,0 +1,174 @@
+"""Whether an amplitude, an ISI and times can be true, of any muscle and any rig."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+from isiw.checks import number
+from isiw.design import DesignSpace
+from isiw.errors import DeviceError, IsiwError
+from isiw.findings import AMPLITUDE_MV, Finding, Kind, Severity, refused
+from isiw.trials import MOST_ISI_SD_MS, Measurement, Stimulus, Trial
+
+AT_REST_MV = 2e-3
+"""EMG at rest has hardly ever less, since the noise of electrodes and amplifier alone has a few µV peak-to-peak; an MEP
+of up to 2 mV in V has less."""
+
+CUT_OFF_MS: Final = 2.0
+"""Pulse, event and ISI, each cut off to whole ms, disagree by less; a rig that is wrong about one of them, by more."""
+
+_OR_NONE: Final = "An amplitude below the detection limit is 0."
+
+
+def implausible_amplitude(mep_mv: float) -> Finding | None:
+    """Why an amplitude [mV] cannot be an MEP's, and the likely slip; None where it can, as 0 always can."""
+    if mep_mv == 0 or AMPLITUDE_MV.least <= mep_mv <= AMPLITUDE_MV.most:
+        return None
+    slip = AMPLITUDE_MV.slip(mep_mv)
+    if mep_mv > AMPLITUDE_MV.most:
+        return _implausible(f"{mep_mv:.4g} mV is more than any muscle gives", f"{slip}")
+    return _implausible(f"{mep_mv:.2g} mV is less than any amplifier's noise", f"{slip} {_OR_NONE}")
+
+
+def _implausible(why: str, remedy: str) -> Finding:
+    return Finding(Kind.IMPLAUSIBLE, Severity.REFUSED, f"the amplitude cannot be an MEP's: {why}", remedy)
+
+
+def implausible_scale(meps_mv: Sequence[float]) -> Finding | None:
+    """Why amplitudes at rest cannot be in mV, and the likely slip; None if one is as large as EMG at rest."""
+    largest_mv = max(meps_mv, default=0.0)
+    if not 0 < largest_mv < AT_REST_MV:
+        return None
+    return _implausible(f"{largest_mv:.2g} mV is less than EMG at rest has", f"{AMPLITUDE_MV.slip(0.0)} {_OR_NONE}")
+
+
+def require_amplitude(mep_mv: float, besides: Finding | None = None) -> None:
+    """Refuse an amplitude that no muscle gives."""
+    found = implausible_amplitude(mep_mv) or besides
+    if found is not None:
+        raise refused(found, mep_mv)
+
+
+def require_plausible_range(sd_mv: float, ends_mv: tuple[float, float] | None) -> None:
+    """Refuse an end of an interval that no muscle gives, and an SD that no amplitudes of a muscle have [mV]."""
+    for end_mv in ends_mv or ():
+        if AMPLITUDE_MV.most < end_mv < math.inf:
+            require_amplitude(end_mv)
+    if 2 * sd_mv > AMPLITUDE_MV.most:  # the SD of anything is at most half of its range
+        slip = AMPLITUDE_MV.slip(2 * sd_mv)
+        raise refused(_implausible(f"an SD of {sd_mv:.4g} mV is more than any muscle gives", f"{slip}"), sd_mv)
+
+
+def off_by(isi_ms: float, asked_ms: float, space: DesignSpace) -> bool:
+    """Whether an ISI [ms] is farther than the space's tolerance from the one that was asked [ms]."""
+    return abs(isi_ms - asked_ms) > space.tolerance_ms
+
+
+def isi_far(isi_ms: float | None, asked_ms: float | None, space: DesignSpace) -> Finding | None:
+    """That a realised ISI is far from the one asked, which may be right; None where it is not."""
+    if isi_ms is None or asked_ms is None or not off_by(isi_ms, asked_ms, space):
+        return None
+    text = f"The realised ISI of {isi_ms:g} ms is far from the {asked_ms:g} ms that were asked"
+    return Finding(Kind.ISI_FAR, Severity.DOUBT, text, f"Is it counted from the {space.reference}, and in ms?")
+
+
+def require_plausible(
+    isi_ms: float | None,
+    mep_mv: float | None,
+    asked_ms: float | None,
+    space: DesignSpace,
+    isi_sd_ms: float = 0.0,
+) -> None:
+    """Refuse what cannot be true of one trial, or is a mistrial."""
+    if isi_ms is not None and asked_ms is not None and off_by(isi_ms, asked_ms, space):
+        found = _misplaced_value(isi_ms, mep_mv, asked_ms, space)
+        if found is not None:
+            raise refused(found, (isi_ms, mep_mv), f"an ISI near the {asked_ms:g} ms that were asked")
+    if mep_mv is not None:
+        require_amplitude(mep_mv)
+    if isi_ms is not None and before_impact(isi_ms, space.low_ms if asked_ms is None else asked_ms, space):
+        raise refused(_EARLY, f"{isi_ms:g} ms")
+    if number("isi_sd_ms", isi_sd_ms, least=0) > MOST_ISI_SD_MS:
+        raise refused(_VAGUE, f"an SD of {isi_sd_ms:g} ms", f"at most {MOST_ISI_SD_MS:g} ms")
+
+
+_EARLY: Final = Finding(
+    Kind.TMS_BEFORE_IMPACT,
+    Severity.REFUSED,
+    "the magnetic pulse came before the impact, so the trial is a mistrial",
+    'Count it as one: session.mistrial("TMS before impact"), or strategy.count_mistrial(). If this happens often, '
+    "begin the design space at a larger ISI.",
+)
+
+_VAGUE: Final = Finding(
+    Kind.VAGUE_ISI,
+    Severity.REFUSED,
+    "the realised ISI is too uncertain to learn from",
+    "Measure the impact; or count the trial as a mistrial.",
+)
+
+
+def before_impact(isi_ms: float, commanded_isi_ms: float, space: DesignSpace) -> bool:
+    """Whether a pulse came before the impact that it should have followed; such a trial is a mistrial."""
+    return space.reference == "impact" and isi_ms < 0 <= commanded_isi_ms
+
+
+def _misplaced_value(isi_ms: float, mep_mv: float | None, asked_ms: float, space: DesignSpace) -> Finding | None:
+    """That the ISI that was asked is in the amplitude's place, or in seconds; None where it is not."""
+    if mep_mv is not None and mep_mv > abs(isi_ms) and not off_by(mep_mv, asked_ms, space):
+        remedy = "Tell the ISI first: tell(isi_ms, mep_mv)."
+        return Finding(Kind.ORDER, Severity.REFUSED, "the ISI and the amplitude seem to be swapped", remedy)
+    if not off_by(1000 * isi_ms, asked_ms, space):
+        remedy = "Tell it in ms: multiply by 1000."
+        return Finding(Kind.IN_SECONDS, Severity.REFUSED, "the realised ISI seems to be in seconds", remedy)
+    return None
+
+
+def timed_isi_ms(told: Measurement | Trial, space: DesignSpace) -> float | None:
+    """The ISI by the times of the pulse and of the event that it counts from [ms]; None where one is not told."""
+    start_ms = told.t_hit_ms if space.reference == "impact" else told.t_valve_ms
+    return None if start_ms is None or told.t_tms_ms is None else told.t_tms_ms - start_ms
+
+
+def contradicts_its_times(told: Measurement | Trial, space: DesignSpace) -> bool:
+    """Whether the realised ISI is another one than the times say."""
+    timed_ms = timed_isi_ms(told, space)
+    return timed_ms is not None and told.isi_ms is not None and abs(timed_ms - told.isi_ms) >= CUT_OFF_MS
+
+
+def require_agreement(measurement: Measurement, stimulus: Stimulus, space: DesignSpace) -> None:
+    """Refuse a measurement whose times are not those of the trial that was commanded, or of the ISI that it tells."""
+    alone = stimulus.isi_ms is None
+    if alone and not stimulus.tap_alone and measurement.t_hit_ms is not None:
+        raise tap_with_tms_alone(measurement.t_hit_ms)
+    if stimulus.tap_alone and measurement.t_tms_ms is not None:
+        raise pulse_with_tap_alone(measurement.t_tms_ms)
+    if contradicts_its_times(measurement, space):
+        event = "impact" if space.reference == "impact" else "valve command"
+        raise _of_device(
+            Kind.TIMES,
+            "the times that the device reports contradict the ISI that it reports",
+            f"a pulse {timed_isi_ms(measurement, space):g} ms after the {event}, and a realised ISI of "
+            f"{measurement.isi_ms:g} ms",
+            "Report the realised ISI, never the wanted one. Are its times in ms, on one clock, of this trial?",
+            f"the same to within {CUT_OFF_MS:g} ms",
+        )
+
+
+def tap_with_tms_alone(hit_ms: float) -> IsiwError:
+    """That a tap hit at this time with TMS alone: a response to both would be taken for one to the pulse."""
+    text, got = "the device reports a tap where TMS alone was commanded", f"an impact at {hit_ms:g} ms"
+    remedy = "Does the valve stay open? Leave t_hit_ms and t_valve_ms out where nothing hits."
+    return _of_device(Kind.TAP_UNWANTED, text, got, remedy)
+
+
+def pulse_with_tap_alone(pulse_ms: float) -> IsiwError:
+    """That a pulse came at this time with a tap alone."""
+    text = "the device reports a magnetic pulse where a tap alone was commanded"
+    return _of_device(Kind.PULSE_UNWANTED, text, f"one at {pulse_ms:g} ms")
+
+
+def _of_device(kind: Kind, text: str, got: str, remedy: str = "", expected: str | None = None) -> IsiwError:
+    return refused(Finding(kind, Severity.REFUSED, text, remedy), got, expected, DeviceError)

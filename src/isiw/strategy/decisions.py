@@ -1,0 +1,101 @@
+"""When to stop: a rule answers a `Progress` with a decision and its reason; those of isiw are in `stopping`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final, Protocol, runtime_checkable
+
+from isiw.checks import can
+from isiw.estimate import WindowEstimate
+from isiw.findings import Finding, Kind
+
+
+class StopKind(StrEnum):
+    """The grounds of a decision."""
+
+    BUDGET = "budget"
+    LIMIT = "limit"
+    KNOWN = "window known"
+    ABSENT = "no window"
+    SMALL_GAIN = "small gain"
+    SETTLED = "settled"
+    TOO_LITTLE = "too little measured"
+    PAUSED = "paused"
+    THRESHOLD = "threshold"
+    OWN = "a user's own rule"
+
+    def stop(self, reason: str) -> StopDecision:
+        """The decision to stop, for this reason."""
+        return StopDecision(stop=True, reason=reason, kind=self)
+
+    def go_on(self, reason: str) -> StopDecision:
+        """The decision to continue, for this reason."""
+        return StopDecision(stop=False, reason=reason, kind=self)
+
+
+OF_THE_WINDOW: Final = frozenset(
+    {StopKind.KNOWN, StopKind.ABSENT, StopKind.SMALL_GAIN, StopKind.SETTLED, StopKind.TOO_LITTLE}
+)
+"""Decisions that say something about the window; they mean nothing if too little was measured."""
+
+
+@dataclass(frozen=True)
+class StopDecision:
+    """The decision to stop or not, with its reason.
+
+    Args:
+        stop: whether to stop.
+        reason: why, or why not, in full sentences.
+        kind: what it rests on.
+    """
+
+    stop: bool
+    reason: str
+    kind: StopKind = StopKind.OWN
+
+
+@dataclass(frozen=True)
+class Progress:
+    """A session's delivered pairs, mistrials included, those learnt, and the estimates now and before."""
+
+    delivered: int
+    told: int
+    estimate: WindowEstimate
+    past: tuple[WindowEstimate, ...] = ()
+
+
+def for_lack(decision: StopDecision, found: Finding | None) -> StopDecision:
+    """The decision if something is lacking to speak of a window; in doubt none but a budget stops."""
+    if found is None or (decision.stop and (found.kind is not Kind.ISIS_FAR or decision.kind is StopKind.BUDGET)):
+        return decision
+    return StopKind.TOO_LITTLE.go_on(f"{found}")
+
+
+class StoppingRule(Protocol):
+    """A rule: from progress to a decision.
+
+    One that needs past estimates says how many by an attribute `looks_back`; `HasBudget` is what it may say besides.
+    """
+
+    def __call__(self, progress: Progress) -> StopDecision:
+        """Decide whether to stop."""
+
+
+@runtime_checkable
+class HasBudget(Protocol):
+    """Capability: a rule that stops after so many stimuli at the latest."""
+
+    def stimuli_left(self, delivered: int) -> int | None:
+        """Number that it still allows after so many; None if it sets no budget after all."""
+
+
+def stimuli_left(rule: StoppingRule, delivered: int) -> int | None:
+    """Number of stimuli that a rule's budget still allows; None if it sets none."""
+    return rule.stimuli_left(delivered) if can(rule, HasBudget) else None
+
+
+def looks_back(rule: StoppingRule) -> int:
+    """Number of past estimates that a rule needs."""
+    past: int = getattr(rule, "looks_back", 0)
+    return past

@@ -1,0 +1,126 @@
+"""The words in which an estimate prints itself; what more is said about a result is in `sentences`."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final
+
+from isiw.change import Change
+from isiw.text.stimuli import STIMULI, StimulusWords, words_of
+from isiw.window import LEAST_FACTOR, SURE, bayes_factor, rules_out
+
+if TYPE_CHECKING:
+    from isiw.estimate import Estimate
+
+_EITHER: Final = words_of(STIMULI)
+
+JUDGED_SINCE: Final = "Trials were excluded or included after this estimate; isiw estimate LOG computes it again."
+
+
+def edge_text(edge_ms: float) -> str:
+    """An edge, or on which side of the range it lies."""
+    if math.isinf(edge_ms):
+        return "before the range" if edge_ms < 0 else "beyond the range"
+    return f"{edge_ms:.0f} ms"
+
+
+def in_short(estimate: Estimate) -> str:
+    """The reported window, or what there is in its place."""
+    if estimate.window is not None or not estimate.has_answer:
+        return str(estimate.window or "no answer yet")
+    if estimate.probability is not None and estimate.probability >= 0.5:
+        return "window not reported"
+    return "no window" if rules_out(estimate.probability) and not law_is_doubted(estimate) else "undecided"
+
+
+def titled(estimate: Estimate) -> str:
+    """The same for the head of a picture or a summary."""
+    window = f"{'Undecided, perhaps' if is_guess(estimate) else 'Window'} {estimate.window}"
+    return window if estimate.window else in_short(estimate).capitalize()
+
+
+def is_guess(estimate: Estimate) -> bool:
+    """True if a window is reported that the trials hardly speak for, or by a law that they speak against."""
+    factor = bayes_factor(estimate.probability, estimate.beforehand)
+    unsure = factor is not None and factor < LEAST_FACTOR and not is_sure(estimate)
+    return estimate.window is not None and (unsure or law_is_doubted(estimate))
+
+
+def law_is_doubted(estimate: Estimate) -> bool:
+    """True if amplitudes speak against the law of responses, so that its answer is undecided."""
+    return estimate.misfit is not None and estimate.misfit.of_law
+
+
+def chance(estimate: Estimate) -> str:
+    """The probability of a window and the Bayes factor, in brackets; empty if no probability is known."""
+    if estimate.probability is None:
+        return ""
+    said, factor = "", bayes_factor(estimate.probability, estimate.beforehand)
+    if factor is not None:
+        size = "above 100" if factor > 100 else "below 0.01" if factor < 0.01 else f"{factor:.2g}"
+        said = f", Bayes factor {size}"
+    of = "probability" if estimate.window is not None and not is_guess(estimate) else "probability of a window:"
+    return f" ({of} {estimate.probability:.2f}{said})"
+
+
+def summary(estimate: Estimate) -> str:
+    """A window in a line, each of its edges in another where they are known, and where the MEP is depressed."""
+    found, lead = in_short(estimate), "Undecided, if there is a window" if is_guess(estimate) else "Window"
+    lines = [f"{found.capitalize() if estimate.window is None else f'{lead}: {found}'}{chance(estimate)}"]
+    for name, edge in (("Start", estimate.start), ("End", estimate.end)):
+        if estimate.window is not None and edge.low_ms is not None and edge.high_ms is not None:
+            median = "" if edge.median_ms is None else edge_text(edge.median_ms)
+            lines.append(f"{name}: {median}, 90 % interval {edge_text(edge.low_ms)} to {edge_text(edge.high_ms)}")
+    if (depressed := estimate.depressed_probability) is not None:
+        nothing = "nowhere" if rules_out(depressed) else "undecided"
+        lines.append(f"Depressed: {estimate.depressed or nothing} (probability of it: {depressed:.2f})")
+    if estimate.change is not None and estimate.change.is_sure:
+        lines.append(f"{at_a_trial(estimate.change, estimate.change.trial)}.")
+    return "\n".join((*lines, *filter(None, (tap_likely(estimate), tap_unmeasured(estimate)))))
+
+
+def tap_likely(estimate: Estimate, first: StimulusWords = _EITHER) -> str:
+    """That the first stimulus's own response is probably what is larger within a window, as it was measured there."""
+    if not (estimate.tap_may_explain and estimate.tap_is_likely):
+        return ""
+    return (
+        f"The {first.alone} evokes as much at these ISIs: the window is probably the muscle's response to the "
+        f"{first.name} itself, and not the MEP."
+    )
+
+
+def tap_unmeasured(estimate: Estimate, first: StimulusWords = _EITHER) -> str:
+    """The way to learn the first stimulus's own response within a window, if it was not measured."""
+    if not estimate.tap_may_explain or estimate.tap_is_likely:
+        return ""
+    return f"Deliver the {first.alone} at these ISIs too ([protocol] tap_alone); the muscle may answer it."
+
+
+def at_a_trial(change: Change, trial: int | None) -> str:
+    """A change during the session, whatever the ISI, and its trial; without a full stop."""
+    if change.trial == 0:
+        return f"The pulses given before and this session do not fit each other: {_unlike_given(change)}"
+    more = change.size > (0.0 if change.kind == "intensity" else 1.0)
+    if change.kind == "intensity":
+        sizes = f"{abs(change.size):.0f} % RMT {'higher' if more else 'lower'}"
+        interval = f"90 % interval {change.low:+.0f} to {change.high:+.0f}"
+        return f"From trial {trial} on MEPs are as if the intensity were {sizes} ({interval}), at all ISIs"
+    sizes = f"×{change.size:.2g} (90 % interval ×{change.low:.2g} to ×{change.high:.2g})"
+    if change.kind == "enhancement":
+        word = "grown" if more else "faded"
+        return f"The enhancement has {word} during the session, {sizes}; the window is that of now"
+    return f"Amplitudes {'rose' if more else 'fell'} {sizes} at trial {trial}, at all ISIs"
+
+
+def _unlike_given(change: Change) -> str:
+    """By how much the trials of a session differ from those that were given before it; without a full stop."""
+    if change.kind == "intensity":
+        sizes = f"{abs(change.size):.0f} % RMT {'higher' if change.size > 0 else 'lower'}"
+        interval = f"90 % interval {change.low:+.0f} to {change.high:+.0f}"
+        return f"MEPs are as if the intensity were {sizes} ({interval})"
+    return f"amplitudes are ×{change.size:.2g} now (90 % interval ×{change.low:.2g} to ×{change.high:.2g})"
+
+
+def is_sure(estimate: Estimate) -> bool:
+    """True if a reported window goes without saying "if there is one"."""
+    return estimate.probability is None or estimate.probability >= SURE
