@@ -51,8 +51,8 @@ from .existing.analysis import Analysis as Analysis
 from .existing.analysis import analyse as analyse
 from .log.reader import read_session as read_session
 from .server.live.page import watch as watch
-from .session.judging import exclude as exclude
-from .session.judging import include as include
+from .session.afterwards import exclude as exclude
+from .session.afterwards import include as include
 from .session.loop import Session as Session
 from .session.recorder import Recorder as Recorder
 from .session.resume import open_session as open_session

@@ -18,7 +18,7 @@ from isiw.export import export_logs
 from isiw.export.tables import session_facts
 from isiw.log.headers import StrategyRecipe
 from isiw.log.reader import TRIAL_COLUMNS, read_session
-from isiw.session.judging import exclude
+from isiw.session.afterwards import exclude
 from isiw.session.loop import Session
 from isiw.session.resume import open_session
 from isiw.visit import Visit

@@ -20,7 +20,7 @@ from isiw.log.reader import read_session
 from isiw.log.salvage import Salvage, salvage, salvage_file
 from isiw.log.schema import Event
 from isiw.log.writer import LogWriter
-from isiw.session.judging import exclude
+from isiw.session.afterwards import exclude
 from isiw.session.loop import Session
 from log.written import write_trials
 from scripted import ScriptedDevice, scripted_strategy

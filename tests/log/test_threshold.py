@@ -14,8 +14,8 @@ from isiw.log.schema import PulseOutcome
 from isiw.log.writer import LogWriter
 from isiw.session import open_threshold, read_threshold, resume_threshold
 from isiw.session.threshold import search_of
-from isiw.session.threshold_loops import run_simulated
 from isiw.strategy.threshold import IntensityRange, make_threshold_search
+from isiw.studies.threshold import run_simulated
 
 FOLDER = Path(__file__).parents[1] / "data" / "logs" / "threshold"
 LOGS = sorted(path.name for path in FOLDER.glob("*.mcap*"))

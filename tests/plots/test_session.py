@@ -12,7 +12,7 @@ from isiw.errors import InvalidValueError
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import EstimateRecord
 from isiw.plots.session import BELOW_THE_MEAN, save_session_plot, session_figure
-from isiw.session.judging import exclude
+from isiw.session.afterwards import exclude
 from isiw.session.loop import Session
 from isiw.strategy.catalogue import make_strategy
 from isiw.trials import Measurement, Trial

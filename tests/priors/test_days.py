@@ -16,7 +16,7 @@ from isiw.errors import DamagedLogError, InvalidValueError, LogError
 from isiw.log.reader import read_session
 from isiw.models.particles.prior import Prior
 from isiw.priors.days import recalled
-from isiw.session.judging import exclude
+from isiw.session.afterwards import exclude
 from isiw.strategy.catalogue import make_strategy
 from isiw.subjects.responses import GainResponse, PeakProfile
 from isiw.subjects.subject import SimulatedSubject

@@ -12,7 +12,7 @@ from isiw.plots.session import session_figure
 from isiw.priors import Difference
 from isiw.report.comparison import comparison_page, comparison_sentence, comparison_table
 from isiw.sentences import later, moved
-from isiw.session.judging import exclude
+from isiw.session.afterwards import exclude
 from isiw.session.loop import Session
 from isiw.summary import JUDGED_SINCE
 from scripted import ScriptedDevice, scripted_strategy

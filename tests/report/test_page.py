@@ -14,7 +14,7 @@ from isiw.errors import ConfigError, InvalidValueError
 from isiw.log.reader import SessionRecord, read_session
 from isiw.report.page import report_page, save_report
 from isiw.report.words import finding_sentences
-from isiw.session.judging import exclude
+from isiw.session.afterwards import exclude
 from isiw.summary import JUDGED_SINCE
 from isiw.trials import Trial
 from isiw.window import Window

@@ -9,7 +9,7 @@ from isiw.findings import Kind
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import Event, Intent, Record
 from isiw.report.tables import counted_rows, event_rows, lost_rows, trial_row
-from isiw.session.judging import exclude
+from isiw.session.afterwards import exclude
 from isiw.session.loop import Session
 from isiw.trials import Measurement, Status, Trial
 from scripted import ScriptedDevice, scripted_strategy

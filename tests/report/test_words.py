@@ -15,7 +15,7 @@ from isiw.log.headers import StrategyRecipe
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import EstimateRecord, Event, Intent
 from isiw.report.words import TRIAL_HEADINGS, counts_sentence, final_statement, trial_rows, truth_sentence
-from isiw.session.judging import exclude
+from isiw.session.afterwards import exclude
 from isiw.session.loop import Session
 from isiw.strategy.decisions import StopKind
 from isiw.trials import Channel, Measurement, Status, Trial

@@ -18,7 +18,7 @@ from isiw.devices.clock import VirtualClock
 from isiw.devices.limits import Limits
 from isiw.errors import DeviceError, NotDelivered
 from isiw.log.reader import read_session
-from isiw.session.judging import exclude
+from isiw.session.afterwards import exclude
 from isiw.session.loop import Session
 from isiw.session.resume import resume
 from isiw.session.rig import Safeguards

@@ -15,7 +15,7 @@ import pytest
 
 from isiw.errors import LogError
 from isiw.log.reader import SessionRecord, read_session
-from isiw.session.judging import exclude
+from isiw.session.afterwards import exclude
 from isiw.session.loop import Session
 from isiw.session.resume import resume
 from scripted import ScriptedDevice, scripted_strategy

@@ -34,8 +34,8 @@ from isiw.log.schema import EstimateRecord, Event, Intent
 from isiw.log.writer import LogWriter
 from isiw.report import final_statement
 from isiw.session import examination
+from isiw.session.afterwards import exclude
 from isiw.session.examination import relearned
-from isiw.session.judging import exclude
 from isiw.session.loop import Session
 from isiw.session.recorder import Recorder
 from isiw.session.resume import open_session, resume

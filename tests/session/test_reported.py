@@ -15,7 +15,7 @@ from isiw.findings import IN_DOUBT, Kind
 from isiw.log.reader import SessionRecord, read_session
 from isiw.plots import session_figure
 from isiw.report import final_statement
-from isiw.session.judging import estimate_again, exclude
+from isiw.session.afterwards import estimate_again, exclude
 from isiw.session.recorder import Recorder
 from isiw.session.resume import open_session
 from isiw.strategy.catalogue import make_strategy

@@ -22,7 +22,7 @@ from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Intent, decode
 from isiw.log.writer import LogWriter
-from isiw.session.judging import exclude
+from isiw.session.afterwards import exclude
 from isiw.session.loop import Session
 from isiw.session.replay import strategy_of
 from isiw.session.resume import open_session, resume

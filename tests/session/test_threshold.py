@@ -17,8 +17,8 @@ from isiw.log.pulses import earlier_pulse_ages
 from isiw.log.schema import Intent, PulseOutcome, ThresholdBelief
 from isiw.session import ThresholdRecorder, open_session, open_threshold, read_threshold, resume_threshold
 from isiw.session.threshold import search_of
-from isiw.session.threshold_loops import open_simulated, run_simulated
 from isiw.strategy.threshold import IntensityRange, MaximumLikelihood, ThresholdSearch, make_threshold_search
+from isiw.studies.threshold import open_simulated, run_simulated
 from scripted import FakeRealClock, ScriptedDevice, scripted_strategy
 
 SIMULATED = DeviceInfo("nobody", "impact", simulated=True)

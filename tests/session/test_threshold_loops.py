@@ -14,8 +14,9 @@ from isiw.log.pulses import pulse_ages
 from isiw.log.salvage import salvage
 from isiw.session import ThresholdRecorder, open_threshold, read_threshold, resume_threshold
 from isiw.session.threshold import search_of
-from isiw.session.threshold_loops import amplitude_of, open_simulated, run_by_hand, run_simulated
+from isiw.session.threshold_loops import amplitude_of, run_by_hand
 from isiw.strategy.threshold import IntensityRange, make_threshold_search
+from isiw.studies.threshold import open_simulated, run_simulated
 from isiw.subjects.thresholds import StimulatedResponder, threshold_cohort
 from known import known
 

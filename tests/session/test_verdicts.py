@@ -21,7 +21,7 @@ from isiw.log.reader import read_session
 from isiw.log.schema import EstimateRecord, Event, Intent
 from isiw.log.verdicts import LOOKED_AT
 from isiw.report import final_statement
-from isiw.session.judging import exclude, include
+from isiw.session.afterwards import exclude, include
 from isiw.session.loop import Session
 from isiw.session.resume import open_session, resume
 from isiw.session.rig import Safeguards

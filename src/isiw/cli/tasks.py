@@ -157,7 +157,7 @@ def threshold(  # noqa: PLR0913, PLR0917 - an option each
             if by_hand:
                 recorder = isiw.session.open_threshold(search, log, **options)
             else:
-                recorder = isiw.session.threshold_loops.open_simulated(search, log, cohort=cohort, seed=seed, **options)
+                recorder = isiw.studies.threshold.open_simulated(search, log, cohort=cohort, seed=seed, **options)
             _run(recorder, log)
         _say_what_is_there(log)
 
@@ -184,7 +184,7 @@ def _run(recorder: ThresholdRecorder, log: Path) -> None:
     try:
         with recorder:
             if recorder.header.device.simulated:
-                isiw.session.threshold_loops.run_simulated(recorder, show)
+                isiw.studies.threshold.run_simulated(recorder, show)
             else:
                 isiw.session.threshold_loops.run_by_hand(recorder, _typed, show)
     except isiw.errors.LimitExceededError:
@@ -211,7 +211,7 @@ def _say_what_is_there(log: Path) -> None:
         show("For more pulses begin a new log with --max-pulses.")
     else:
         show(f"Not over: {decision.reason} Resume with: {_resuming(log)}")
-    person = isiw.session.threshold_loops.simulated_person(record.header)
+    person = isiw.studies.threshold.simulated_person(record.header)
     if person is not None:
         spot, whose = person.hot_spot, "The simulated person's true"
         if search.place_mm is None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 import time
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple, Self
@@ -52,3 +53,16 @@ def boot_s() -> float | None:
     if sys.platform == "linux":
         return round(time.clock_gettime(time.CLOCK_BOOTTIME), 3)
     return None
+
+
+@dataclass(frozen=True)
+class Ages:
+    """How long ago some stimuli were given.
+
+    Args:
+        ages_s: of each, the oldest first [s].
+        doubts: a sentence for each thing that is wrong with the clock by which that is known.
+    """
+
+    ages_s: tuple[float, ...] = ()
+    doubts: tuple[str, ...] = ()

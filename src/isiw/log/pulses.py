@@ -10,7 +10,6 @@ import datetime as dt
 import math
 import os
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -18,7 +17,7 @@ from isiw.errors import DamagedLogError, LogError
 from isiw.files import is_mcap, opened
 from isiw.log.durable import kept_for, log_exists, log_of
 from isiw.log.headers import Header
-from isiw.log.moments import Moment
+from isiw.log.moments import Ages, Moment
 from isiw.log.reader import of_production, read_any
 from isiw.log.salvage import Salvage, holds, salvage
 from isiw.log.schema import Event, Intent, Message, Record, decode
@@ -36,19 +35,6 @@ _NOTABLE_S: Final = 60.0
 
 _HEAD_BYTES: Final = 1 << 18
 """Within so many first bytes every log says, without compression, in which start of the computer it was written."""
-
-
-@dataclass(frozen=True)
-class Ages:
-    """How long ago some stimuli were given.
-
-    Args:
-        ages_s: of each, the oldest first [s].
-        doubts: a sentence for each thing that is wrong with the clock by which that is known.
-    """
-
-    ages_s: tuple[float, ...] = ()
-    doubts: tuple[str, ...] = ()
 
 
 class Given(NamedTuple):

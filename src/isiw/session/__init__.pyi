@@ -1,8 +1,8 @@
 from . import threshold_loops as threshold_loops
+from .afterwards import estimate_again as estimate_again
 from .console import PROGRESS_HEADINGS as PROGRESS_HEADINGS
 from .console import aligned as aligned
 from .console import progress_row as progress_row
-from .judging import estimate_again as estimate_again
 from .loop import Session as Session
 from .recorder import Recorder as Recorder
 from .resume import open_session as open_session

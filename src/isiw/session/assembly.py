@@ -5,8 +5,7 @@ from __future__ import annotations
 import importlib.metadata
 import os
 import platform
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
@@ -20,11 +19,10 @@ from isiw.devices.protocol import Device
 from isiw.errors import InvalidValueError, StrategyError
 from isiw.log.durable import log_of
 from isiw.log.headers import Header, StrategyRecipe
-from isiw.log.pulses import Ages
-from isiw.log.schema import Event, Record, now
-from isiw.log.writer import LogWriter
+from isiw.log.schema import now
 from isiw.native.library import version as engine_version
 from isiw.session.console import OperatorConsole
+from isiw.session.earlier import Earlier
 from isiw.session.examination import WindowExamination, examination_of
 from isiw.session.pausing import Pausing
 from isiw.session.rig import Rig, Safeguards, require_matching
@@ -35,7 +33,6 @@ from isiw.signals.tap import TapResponses
 from isiw.signals.watch import Watch
 from isiw.strategy.decisions import stimuli_left
 from isiw.strategy.strategy import Strategy
-from isiw.trials import TrialTable
 from isiw.visit import Visit, VisitProtocol
 
 BELIEF_VERSION: Final = 6
@@ -44,19 +41,6 @@ ENGINE_VERSION: Final = 4
 
 _PACKAGES = ("numpy", "torch", "botorch", "gpytorch")
 _version = cache(importlib.metadata.version)  # which reads a file
-
-
-@dataclass(frozen=True)
-class Earlier:
-    """Where an earlier run ended, and the header's fields that stay; without `first_records` there was none."""
-
-    open_log: Callable[[Header], LogWriter]
-    trials: TrialTable = field(default_factory=TrialTable)
-    events: tuple[Event, ...] = ()
-    kept: Mapping[str, Any] = field(default_factory=dict)
-    first_records: Sequence[Record] = ()
-    ages: Callable[[], Ages] = Ages
-    taps: Callable[[SignalLimits], TapResponses] = lambda signals: TapResponses(signals.mep_window_ms)
 
 
 def versions() -> dict[str, str]:
@@ -237,5 +221,6 @@ def assembled(
     if earlier.first_records:
         paused_for = [event.finding for event in earlier.events if event.kind == "pause" and event.finding is not None]
         watch = watch.resumed(earlier.trials, paused_for)
-    steps = Steps(examination, rig, sink, pausing, watch, header, safeguards.backoffs_s, earlier.taps(header.signals))
+    taps = earlier.taps(header.signals) if earlier.taps else TapResponses(header.signals.mep_window_ms)
+    steps = Steps(examination, rig, sink, pausing, watch, header, safeguards.backoffs_s, taps)
     return Parts(path, header, limits, safeguards, sink, rig, examination, pausing, steps)

@@ -15,8 +15,9 @@ from isiw.log.headers import Header
 from isiw.log.pulses import earlier_pulse_ages
 from isiw.log.schema import Event
 from isiw.log.writer import LogWriter
-from isiw.session.assembly import Earlier, Options, assembled, require_fitting, require_untold
+from isiw.session.assembly import Options, assembled, require_fitting, require_untold
 from isiw.session.console import OperatorConsole, Table
+from isiw.session.earlier import Earlier
 from isiw.session.judging import Judging
 from isiw.session.pausing import Pause
 from isiw.session.sink import Follower, SessionResult, Wait

@@ -14,13 +14,15 @@ from isiw.devices.protocol import DeviceInfo
 from isiw.errors import ConfigError, DeviceError, InvalidValueError, OtherVersionsWarning, StrategyError, warn
 from isiw.log.headers import SCHEMA_VERSION, Header, StrategyRecipe
 from isiw.log.kinds import OWN_LOOP
-from isiw.log.pulses import Ages, pulse_ages
+from isiw.log.moments import Ages
+from isiw.log.pulses import pulse_ages
 from isiw.log.reader import SessionRecord
 from isiw.log.salvage import Salvage
 from isiw.log.schema import Event, Intent
 from isiw.log.verdicts import MANY_CHANGES, VERDICTS, changed_after, under
 from isiw.log.writer import LogWriter
-from isiw.session.assembly import BELIEF_VERSION, ENGINE_VERSION, Earlier, versions
+from isiw.session.assembly import BELIEF_VERSION, ENGINE_VERSION, versions
+from isiw.session.earlier import Earlier
 from isiw.session.examination import relearned
 from isiw.signals.limits import SignalLimits
 from isiw.signals.tap import TapResponses

@@ -1,25 +1,17 @@
-"""Two loops around a logged search for the motor threshold: a simulated person, and an operator at the keyboard."""
+"""The loop around a logged search for the motor threshold whose pulses an operator gives and types."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
-from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from isiw.checks import text
-from isiw.devices.protocol import DeviceInfo
-from isiw.errors import ConfigError, InvalidValueError, LimitExceededError
-from isiw.log.headers import ThresholdHeader
-from isiw.session.threshold import ThresholdRecorder, open_threshold
+from isiw.errors import InvalidValueError, LimitExceededError
+from isiw.session.threshold import ThresholdRecorder
 from isiw.strategy.decisions import StopDecision
 from isiw.strategy.threshold.pulses import place_text
-from isiw.strategy.threshold.search import ThresholdSearch
-from isiw.subjects.thresholds import StimulatedPerson, threshold_cohort
-
-_SIMULATED = "isiw_threshold"
-"""The name under which a log keeps who is simulated."""
 
 ANSWERS: Final = (
     "After each pulse type the MEP's amplitude in mV (0.08, or 80 uV); y or n if you only saw on the screen whether it "
@@ -34,44 +26,6 @@ SURELY_MV: Final = 2.0
 
 _AMPLITUDE: Final = re.compile(r"(\d+(?:[.,]\d*)?|[.,]\d+)\s*(mv|uv|µv|μv)?", re.IGNORECASE | re.ASCII)
 _THOUSANDS: Final = re.compile(r"[.,][0-9]{3}$")
-
-
-def open_simulated(
-    search: ThresholdSearch, log: str | Path, *, cohort: str, seed: int, **options: Any
-) -> ThresholdRecorder:
-    """Open a search for the threshold of a simulated person of a cohort, who is kept in the log."""
-    threshold_cohort(cohort, 1, seed)
-    config = {_SIMULATED: {"cohort": cohort, "seed": seed}}
-    return open_threshold(
-        search, log, device=DeviceInfo("a simulated person", "impact", simulated=True), config=config, **options
-    )
-
-
-def simulated_person(header: ThresholdHeader) -> StimulatedPerson | None:
-    """The simulated person of a log; None if nobody, or somebody else's person, was simulated."""
-    drawn = header.config.get(_SIMULATED) if header.device.simulated else None
-    if drawn is None:
-        return None
-    if not isinstance(drawn, Mapping) or not {"cohort", "seed"} <= set(drawn):
-        raise ConfigError("the log does not say who is simulated", got=drawn, expected="a cohort and a seed")
-    return threshold_cohort(drawn["cohort"], 1, drawn["seed"])[0]
-
-
-def run_simulated(recorder: ThresholdRecorder, say: Callable[[str], None]) -> StopDecision:
-    """Stimulate the simulated person of a log until the search is over."""
-    person = simulated_person(recorder.header)
-    if person is None:
-        raise ConfigError("the log is of no simulated person", got=recorder.header.device.name)
-    responder = person.begin(recorder.header.config[_SIMULATED]["seed"])
-    for outcome in recorder.outcomes:  # so that the person's noise goes on where it was
-        if outcome.intensity_pct_mso is not None:
-            responder.respond(outcome.intensity_pct_mso, *(outcome.place_mm or ()))
-    while not (decision := recorder.decision()).stop:
-        intensity = recorder.ask()
-        mep_mv = responder.respond(intensity, *(recorder.place_mm or ()))
-        recorder.tell(mep_mv)
-        say(f"Pulse {recorder.given}: {intensity:g} % MSO{_at(recorder)}, MEP {mep_mv:.3f} mV. {recorder.estimate()}")
-    return decision
 
 
 def run_by_hand(recorder: ThresholdRecorder, read: Callable[[str], str], say: Callable[[str], None]) -> StopDecision:
@@ -100,10 +54,13 @@ def _answer(recorder: ThresholdRecorder, read: Callable[[str], str], say: Callab
             if _typed(read, f"{limit} {_LAST_WORD}") == "u":
                 _take_back(recorder, say)
         raise
-    return _typed(read, f"Pulse {recorder.given + 1}: set {intensity:g} % MSO{_at(recorder)}, give one pulse. MEP: ")
+    return _typed(
+        read, f"Pulse {recorder.given + 1}: set {intensity:g} % MSO{at_place(recorder)}, give one pulse. MEP: "
+    )
 
 
-def _at(recorder: ThresholdRecorder) -> str:
+def at_place(recorder: ThresholdRecorder) -> str:
+    """Where the coil is, for a line on the screen; empty if it stays."""
     return f", coil {place_text(recorder.place_mm)}" if recorder.place_mm else ""
 
 

@@ -1,5 +1,6 @@
 from . import running as running
 from . import store as store
+from . import threshold as threshold
 from .execution import DaskCluster as DaskCluster
 from .execution import Failure as Failure
 from .execution import Processes as Processes

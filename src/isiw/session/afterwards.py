@@ -1,0 +1,98 @@
+"""Verdicts on the trials of a log that nobody writes, and its estimate made again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import isiw
+from isiw.errors import LogError
+from isiw.log.kinds import require_session
+from isiw.log.reader import read_salvaged
+from isiw.log.salvage import salvage
+from isiw.log.schema import Event
+from isiw.log.verdicts import exclusion, inclusion
+from isiw.log.writer import LogWriter
+from isiw.session.examination import estimate_record
+from isiw.session.replay import strategy_of
+from isiw.strategy.strategy import Strategy
+from isiw.trials import TrialTable
+
+
+def estimate_again(
+    path: str | Path, strategy: Strategy | None = None, *, replayed: Callable[[int], None] = lambda _: None
+) -> None:
+    """Compute a session's estimate from its trials as they count now, and append it to the log. Delivers nothing.
+
+    Args:
+        path: the log, with or without `.part`; no session may be writing it.
+        strategy: needed if the session's strategy was built from a user's own objects: the same again.
+        replayed: called after each trial with how many the strategy knows.
+
+    Raises:
+        LogError: no such log, one without trials, or one that is still being written.
+        DamagedLogError: the log's end is missing; resume the session first.
+        StrategyError: the strategy cannot be made again.
+    """
+    salvaged = salvage(path)
+    record = read_salvaged(salvaged)
+    record.require_end()
+    record.require_read()
+    if not record.table:
+        raise LogError("there is no trial to estimate from", got=str(record.path))
+    made = strategy_of(record.header) if strategy is None else strategy.restarted()
+    trials = sorted([*record.table, *record.unknown_trials], key=lambda trial: trial.index)
+    for number, trial in enumerate(trials, start=1):
+        made.learn(trial)
+        replayed(number)
+    made.in_doubt = record.in_doubt
+    last = record.table[-1].index
+    said = f"Estimated again with isiw {isiw.__version__} from the trials as they count now."
+    with LogWriter.continuing(path, salvaged, record.header) as log:
+        log.append(Event(kind="note", trial=last, text=" ".join([said, *record.losses])))
+        log.append(estimate_record(made, last, made.decision(), None))
+
+
+def exclude(path: str | Path, trial: int, reason: str) -> None:
+    """Exclude a trial afterwards: an event is appended to the log, nothing is erased. Resuming learns without it.
+
+    Args:
+        path: the log, with or without `.part`.
+        trial: the trial's number.
+        reason: why, for whoever reads the log.
+
+    Raises:
+        LogError: no such log, or it is still being written.
+        DamagedLogError: the log's end is missing; resume the session first.
+        InvalidValueError: no such trial, or one that counts for nothing anyway.
+    """
+    _judge(path, lambda trials, events: exclusion(trials, trial, reason, events=events))
+
+
+def include(path: str | Path, trial: int) -> None:
+    """Let a trial count again that was excluded: an event is appended to the log. Resuming learns with it.
+
+    Args:
+        path: the log, with or without `.part`.
+        trial: the trial's number.
+
+    Raises:
+        LogError: no such log, or it is still being written.
+        DamagedLogError: the log's end is missing; resume the session first.
+        InvalidValueError: no excluded trial has this number.
+    """
+    _judge(path, lambda trials, _: inclusion(trials, trial))
+
+
+def _judge(path: str | Path, verdict: Callable[[TrialTable, Sequence[Event]], Event]) -> None:
+    salvaged = salvage(path)
+    record = read_salvaged(salvaged)
+    require_session(record.path, record.header)
+    event = verdict(record.table, record.events)
+    record.require_end()
+    if record.losses:  # then the header may be written again
+        record.require_read()
+    with LogWriter.continuing(path, salvaged, record.header) as log:
+        log.append(event)
+        if record.losses:
+            log.append(Event(kind="fault", trial=event.trial, text=" ".join(record.losses)))
