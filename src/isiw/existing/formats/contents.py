@@ -154,6 +154,14 @@ class Track:
             last = float(values[-1])
 
 
+def text_of(*values: Any) -> str:
+    """What an event is called, by its texts and codes; a whole number has no decimal sign."""
+    each = (value.decode("utf-8", "replace") if isinstance(value, bytes) else value for value in values)
+    return " ".join(
+        f"{value:.15g}" if isinstance(value, int | float | np.number) else f"{value}" for value in each
+    ).strip()
+
+
 def events_of(rows: Iterable[Sequence[Any]]) -> pd.DataFrame:
     """Events as a table, by their times: what each is called, when it was [s], and how long it lasted [s]."""
     return pd.DataFrame(sorted(map(tuple, rows), key=itemgetter(1)), columns=["name", "onset", "duration"])
