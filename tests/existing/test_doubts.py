@@ -101,7 +101,7 @@ ASKED: dict[str, tuple[pd.DataFrame, dict[str, Any], str]] = {
     "a mean below the trials": (pd.concat([table().assign(Nr=range(36)), means("mep_mv", Nr="Mittelwert")[:1]]), {},
                                 "row 37 of the column 'Nr' .* is none of a trial"),
     "each row twice": (pd.concat([table()] * 2), {}, "or each row twice"),
-    "areas": (renamed(mep_mv="MEP area (mV*ms)"), {"columns": {"mep": "MEP area (mV*ms)"}, "units": ("mV",)}, "mV·ms"),
+    "areas": (renamed(mep_mv="MEP area (mV*ms)"), {"columns": {"mep": "MEP area (mV*ms)"}, "units": ("mV",)}, "of another measure"),
     "latencies": (renamed(mep_mv="onset (ms)"), {"columns": {"mep": "onset (ms)"}, "units": ("mV",)}, "no amplitudes"),
     "ISIs in samples": (renamed(isi_ms="ISI (samples)"), {"units": ("ms",)}, "a unit of no ISIs; got 'samples'"),
     "two columns of what is lost": (table(rejected=of([""]), artefact=of(["", "x"])), {}, "rejected or artefact"),
