@@ -118,11 +118,13 @@ class Columns:
                     remedy=f'Say --column "{key}=NAME"; if the names are not in the first line, describe the file: '
                     "--layout FILE.",
                 )
-        columns = {}
+        columns, of_units = {}, set[str]()
         for key, name in held.items():
             if name is not None:
                 said, cells = without_unit_in_cells(name, frame.iloc[:, names.index(name)].tolist())
-                columns[key] = Column(said, cells, of=source)
+                beside = units_beside(key, name, frame)
+                columns[key] = Column("".join([said, *(f" ({unit})" for unit in beside.values())]), cells, of=source)
+                of_units |= beside.keys()
         columns, units = _scaled(columns, layout)
         if (subject := columns.pop("subject", None)) is not None:
             is_id = "subject" not in layout.columns and letters(subject.name) == "id"
@@ -135,7 +137,7 @@ class Columns:
         beside = {
             name: Column(name, frame.iloc[:, place].tolist(), of=source)
             for place, name in enumerate(names)
-            if name not in held.values() and name.strip()
+            if name not in {*held.values(), *of_units} and name.strip()
         }
         if (condition := columns.get("condition")) is not None:  # which may tell pairs from each other, too
             alone = ALONE | TAP_ALONE
@@ -196,6 +198,20 @@ def _named(key: str, names: list[str], layout: Layout, source: str) -> str | Non
             remedy=f'Say --column "{key}={several[0]}".' if len(set(several)) > 1 else "Rename one of them.",
         )
     return several[0] if several else None
+
+
+def units_beside(key: str, name: str, frame: pd.DataFrame) -> dict[str, str]:
+    """Units that columns beside another say of it, such as `isi_unit`, by their names."""
+    known, found = (EMG_UNITS if key in {"mep", "emg", "background"} else ISI_UNITS_MS), dict[str, str]()
+    for place, other in enumerate(map(str, frame.columns)):
+        of = re.fullmatch("(.*?)units?", letters(other))
+        if of is None or not (letters(name).startswith(of[1]) or of[1] in COLUMNS.get(key, ())):
+            continue
+        for text in dict.fromkeys(frame.iloc[:, place].dropna().astype(str)):
+            unit = UNIT_WORDS.get(text.strip().casefold())
+            if unit is not None and (of[1] or unit in known):  # a unit of no column is of those that may have it
+                found[other] = unit if found.get(other) in {None, unit} else f"{found[other]}) ({unit}"
+    return found
 
 
 def unit_said(name: str, known: Mapping[str, float]) -> str | None:
