@@ -174,7 +174,9 @@ def require_codes(texts: Sequence[str], rows: Sequence[int], columns: Columns) -
     for text, row in zip(texts, rows, strict=True):
         if text != (first := spelled.setdefault(plain(text), text)):
             remedy = "Write one person's code in one way; if they are two people, give them codes that differ in more."
-            raise columns.of["subject"].refused(row, f"differs from {first!r} in capitals or signs alone", remedy)
+            raise columns.of["subject"].refused(
+                row, f"differs from {first!r} in capitals, blanks or hyphens alone", remedy
+            )
 
 
 def require_one_unit(key: str, column: Column, rows: Sequence[int]) -> None:
