@@ -138,15 +138,20 @@ def test_sweeps_that_are_marked_as_bad_do_not_count() -> None:
     assert [trial.told for trial in person.trials] == [True, True, False, True, True, True]
 
 
+def silent(**said: Any) -> Any:
+    """Epochs whose annotations say nothing."""
+    return epochs(**said).set_annotations(None)
+
+
 def test_the_metadata_of_epochs_are_read_as_the_columns_of_a_table() -> None:
     (person,) = read_people(epochs(exclude=[0, 1, 0, 0, 0, 0], note="x"), KNOWN)
     assert [trial.told for trial in person.trials] == [True, False, True, True, True, True]
     assert person.unused == ("note",)
     with pytest.raises(InvalidValueError, match="several people"):
         read_people(epochs(subject=[*"AABBBB"]), KNOWN)
-    (person,) = read_people(epochs(condition=["paired"] * 4 + ["single"] * 2, isi_ms=[30.0, 60, 90, 120, 0, 0]), KNOWN)
+    (person,) = read_people(silent(condition=["paired"] * 4 + ["single"] * 2, isi_ms=[30.0, 60, 90, 120, 0, 0]), KNOWN)
     assert [trial.isi_ms is None for trial in person.trials] == [False] * 4 + [True] * 2
-    (person,) = read_people(epochs(isi_ms=[30.0, 60, 90, 120, -45, -45]), KNOWN)
+    (person,) = read_people(silent(isi_ms=[30.0, 60, 90, 120, -45, -45]), KNOWN)
     assert [str(trial.reason or "") for trial in person.trials][-2:] == ["TMS before impact"] * 2
 
 

@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.existing.cells import Column
+from isiw.existing.cells import Column, plain
+from isiw.existing.delivered import LONGEST_ISI_MS
 from isiw.existing.layout import Layout, letters
+from isiw.findings import AMPLITUDE_MV
 from isiw.lazy import pd
 from isiw.text.sanitize import counted
 from isiw.types import FloatArray
@@ -41,6 +43,21 @@ _RELATIVE: Final = re.compile(
     r"\bz\b|\bz ?scores?|\blog\d*\b|\bln\b|\bsqrt\b|\ba ?\. ?u\b|\barb|\bfold\b|\bchange\b|\bdelta\b|[δΔ]|\bdiff|"
     rf"\bfa[ck]tor\b|facilitation|inhibition|m ?max\b|([/÷]|\b(x|times|div|by|vs)\b) ?{_BASES}\b"
 )
+_OTHERWISE: Final = {
+    "mep": (
+        (_RELATIVE, "are relative to others", "peak-to-peak amplitudes in mV, µV or V"),
+        (re.compile(r"\b(base|zero|0|onset)\w* ?(-|to)* ?peak|\bhalf\b|\barea\b|\bauc\b|\brms\b|integra|rectif|latenc"),
+         "are of another measure", "amplitudes from peak to peak"),
+    ),
+    "isi": (
+        (re.compile(r"\b(codes?|index|idx|levels?|bins?|class|category|nr|no|number|stufe)\b"),
+         "are numbers of something", "the intervals themselves, in ms or s"),
+    ),
+}  # fmt: skip
+"""What the name of a column says of its numbers if they are no amplitudes or ISIs, and what is expected."""
+_POSSIBLE: Final = {"isi": (1.0, LONGEST_ISI_MS), "mep": (AMPLITUDE_MV.least, AMPLITUDE_MV.most)}
+"""Between which ISIs [ms] and amplitudes [mV] are."""
+_FEW: Final = 3
 _ROWS_A_WORD: Final = 4
 _ROWS_A_NUMBER: Final = 6
 """With fewer rows for each of its words or numbers a column does not tell kinds of trials from each other."""
@@ -62,15 +79,16 @@ def doubtful_words(text: str) -> list[str]:
     return [found[0] for pattern in (_RELATIVE, _MEANS) if (found := pattern.search(_words(text)))]
 
 
-def require_absolute(name: str, source: str) -> None:
-    """Raise if a column's name says that its amplitudes are relative to others, whatever unit is stated."""
-    if found := _RELATIVE.search(_words(name)):
-        raise InvalidValueError(
-            f"the amplitudes of {source} in the column {name!r} are relative to others",
-            got=found[0].strip(),
-            expected="peak-to-peak amplitudes in mV, µV or V",
-            remedy="Name the column that holds these: --column mep=NAME.",
-        )
+def require_of_kind(key: str, what: str, name: str, source: str) -> None:
+    """Raise if a column's name says that its numbers are something else, whatever unit is stated."""
+    for pattern, are, expected in _OTHERWISE[key]:
+        if found := pattern.search(_words(name)):
+            raise InvalidValueError(
+                f"the {what} of {source} in the column {name!r} {are}",
+                got=found[0].strip(),
+                expected=expected,
+                remedy=f"Name the column that holds these: --column {key}=NAME.",
+            )
 
 
 def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, source: str) -> None:
@@ -140,7 +158,8 @@ def is_rectified(sweeps: Sequence[FloatArray]) -> list[str]:
 
 
 def require_codes(texts: Sequence[str], rows: Sequence[int], columns: Columns) -> None:
-    """Raise if a code NA may be a person's initials, or stand for no code."""
+    """Raise if a code NA may be a person's initials, or stand for no code, or if one code is written in two ways."""
+    spelled = dict[str, str]()
     others = {text for text in texts if text and text.upper() != "NA"}
     if (
         others
@@ -151,6 +170,29 @@ def require_codes(texts: Sequence[str], rows: Sequence[int], columns: Columns) -
         if first is not None:
             remedy = "If NA is a person's code, write another one, such as N.A.; if the code is missing, fill it in."
             raise columns.of["subject"].refused(rows[first], "may be a code, or stand for none", remedy)
+
+    for text, row in zip(texts, rows, strict=True):
+        if text != (first := spelled.setdefault(plain(text), text)):
+            remedy = "Write one person's code in one way; if they are two people, give them codes that differ in more."
+            raise columns.of["subject"].refused(
+                row, f"differs from {first!r} in capitals, blanks or hyphens alone", remedy
+            )
+
+
+def require_one_unit(key: str, column: Column, rows: Sequence[int]) -> None:
+    """Raise if some numbers cannot be what they are, are about a thousand times the others, and none lies between."""
+    least, most = _POSSIBLE[key]
+    numbers = np.sort([number for row in rows if (number := column.number(row)) and number > 0])
+    apart = int(np.argmax(np.diff(np.log(numbers)))) + 1 if len(numbers) > 2 * _FEW else 0
+    low, high = numbers[:apart], numbers[apart:]
+    if min(len(low), len(high)) < _FEW or not (low[-1] < least or high[0] > most) or high[0] < 8 * low[-1]:
+        return
+    if 300 < np.median(high) / np.median(low) < 3000:
+        raise InvalidValueError(
+            f"the column {column.name!r} of {column.of} seems to be in two units",
+            got=f"{len(low)} up to {low[-1] / column.factor:g} and {len(high)} from {high[0] / column.factor:g} on",
+            remedy="Write all of them in one.",
+        )
 
 
 def require_isis(columns: Columns, rows: Sequence[int], layout: Layout) -> None:

@@ -21,6 +21,7 @@ from isiw.existing.tables import require_one
 from isiw.files import opened
 from isiw.lazy import pd, scipy
 from isiw.text.named_code import library
+from isiw.text.sanitize import counted
 
 TEXTS: Final = (".csv", ".tsv", ".txt", ".dat", ".tab")
 WORKBOOKS: Final = (".xlsx", ".xlsm")
@@ -32,6 +33,14 @@ _HEAD: Final = 40
 """So many bytes show how a text is encoded."""
 
 _BLANKS: Final = r"\s+"
+
+_COUNT: Final = "If these trials count, show them as the others; if not, mark them in a column called exclude."
+_SHOWN_OTHERWISE: Final = (
+    (r'<row (?=[^>/]*hidden="(?:1|true)")[^>/]*?r="(\d+)"[^>/]*>', "hidden", _COUNT),
+    (r'<c r="[A-Z]+(\d+)"[^>]*><f[^>]*(?:/>|>[^<]*</f>)(?:<v ?/>|<v></v>)?</c>', "without the result of a formula",
+     "Open the workbook in Excel or LibreOffice, and save it."),
+)  # fmt: skip
+"""In a sheet's XML, rows that Excel shows otherwise than as their cells say, and what to do."""
 
 Rows = Sequence[Sequence[Any]]
 
@@ -69,15 +78,19 @@ def _texts(content: bytes, layout: Layout) -> pd.DataFrame:
     text = _decoded(content)
     if "\0" in text:
         raise InvalidValueError("the file is no text, and so no table that can be read", remedy="Is it the right one?")
-    lines = _lines(text)[layout.skip_lines :]
+    every = _lines(text)
+    lines = every[layout.skip_lines :]
     first = 0 if layout.names else _first(lines, layout)
+    head = "".join(every[: layout.skip_lines + first])
     title, lines = " ".join(lines[:first]), lines[first:]
     if lines and lines[0].startswith("#"):  # each part of the file begins so, with names of its own
         ends = (n for n, line in enumerate(lines) if n and line.startswith("#"))
         lines = [lines[0].lstrip("# "), *lines[1 : next(ends, None)]]
     lines = [line for line in lines if not line.startswith("# ")]
     separator = layout.separator or _separator(lines[0] if lines else "")
-    return _table([row for row in _split(lines, separator) if row], layout, title)
+    table = _table([row for row in _split(lines, separator) if row], layout, title)
+    table.attrs["head"] = head
+    return table
 
 
 def _lines(text: str) -> list[str]:
@@ -183,10 +196,10 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
     book = pd.ExcelFile(io.BytesIO(content), engine="openpyxl")
     if layout.sheet is not None:
         require_one("sheet", "the workbook", layout.sheet, book.sheet_names)
-    sheets = dict[str, list[list[Any]]]()
+    sheets, whole = dict[str, list[list[Any]]](), dict[str, list[list[Any]]]()
     for name in [layout.sheet] if layout.sheet is not None else book.sheet_names:
         cells = book.parse(name, header=None, dtype=object, keep_default_na=False).to_numpy().tolist()
-        rows = cells[layout.skip_lines :]
+        whole[str(name)], rows = cells, cells[layout.skip_lines :]
         first = next((n for n, row in enumerate(rows[:_LINES]) if _is_header(row, layout)), 0)
         sheets[str(name)] = rows if layout.names else rows[first:]
     with_trials = [name for name, rows in sheets.items() if rows and _is_header(rows[0], layout)]
@@ -206,6 +219,7 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
         )
     chosen = (with_trials or filled or list(sheets))[0]
     rows = sheets[chosen]
+    _require_whole(book.book, chosen, len(whole[chosen]) - len(rows) + (0 if layout.names else 1))
     for cells in islice(book.book[chosen].iter_rows(), _LINES) if rows else ():
         shown = [_shown_in(cell.number_format) if isinstance(cell.value, int | float) else "" for cell in cells]
         if any(shown):  # Excel shows 1.2 as 120 %
@@ -213,6 +227,23 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
                        for name, unit in zip_longest(rows[0], shown[: len(rows[0])])]  # fmt: skip
             break
     return _table(rows, layout, chosen)
+
+
+def _require_whole(book: Any, sheet: str, head: int) -> None:
+    """Raise if Excel shows rows below the head of a sheet otherwise than its cells are read."""
+    with book[sheet]._get_source() as file:  # noqa: SLF001 - openpyxl does not read it in another way, row by row
+        content = file.read()
+    fonts = {n for n, font in enumerate(book._fonts) if font.strike}  # noqa: SLF001 - the same
+    styles = [str(n) for n, style in enumerate(book._cell_styles) if style.fontId in fonts]  # noqa: SLF001 - the same
+    crossed = rf'<c r="[A-Z]+(\d+)" s="(?:{"|".join(styles)})"[^>/]*>' if styles else "(?!)"
+    for pattern, are, remedy in (*_SHOWN_OTHERWISE, (crossed, "crossed out", _COUNT)):
+        found = dict.fromkeys(int(number) for number in re.findall(pattern.encode(), content))
+        if rows := [str(row) for row in found if row > head]:
+            raise InvalidValueError(
+                f"{counted(len(rows), 'row')} of the sheet {sheet!r} {'is' if len(rows) == 1 else 'are'} {are}",
+                got=f"row {', '.join(rows[:5])}{' and others' if len(rows) > 5 else ''}",
+                remedy=remedy,
+            )
 
 
 def _shown_in(number_format: str) -> str:
@@ -251,6 +282,7 @@ def of_vectors(arrays: Mapping[str, Any], layout: Layout) -> pd.DataFrame:
     """The vectors in a file of MATLAB that are as long as that of the ISIs, or the longest, as columns of a table."""
     squeezed = {name: array.squeeze() if array.size > 1 else array for name, array in arrays.items()}
     vectors = {name: array for name, array in squeezed.items() if array.ndim == 1}
+    texts = {name: str(array.item()) for name, array in arrays.items() if array.size == 1 and array.dtype.kind in "UO"}
     of_isis = {name for name in vectors if name == layout.columns.get("isi") or letters(name) in COLUMNS["isi"]}
     longest = max((len(vectors[name]) for name in of_isis or vectors), default=0)
     if longest == 0:
@@ -259,4 +291,6 @@ def of_vectors(arrays: Mapping[str, Any], layout: Layout) -> pd.DataFrame:
             got=", ".join(arrays) or "nothing that can be read",
             remedy="Save vectors: save('P01.mat', 'isi_ms', 'mep_mv', '-v7').",
         )
-    return pd.DataFrame({name: vector for name, vector in vectors.items() if len(vector) == longest})
+    chosen = {name: vector for name, vector in vectors.items() if len(vector) == longest}
+    units = {name: text for name, text in texts.items() if letters(name).endswith(("unit", "units"))}
+    return pd.DataFrame({**chosen, **units})

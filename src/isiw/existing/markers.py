@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
@@ -75,7 +76,10 @@ def _fitting(events: pd.DataFrame, key: str, layout: Layout) -> list[str]:
         return [key]
     if (stated := layout.markers.get(key)) is None:
         return [name for name in names if _plain(name) in _KNOWN[key]]
-    return [name for name in names if stated == name] or [name for name in names if _plain(stated) == _plain(name)]
+    number = re.sub(r"\D", "", stated)  # of which MNE may keep no more
+    fits = ([name for name in names if known(name)] for known in
+            (stated.__eq__, lambda name: _plain(stated) == _plain(name), number.__eq__))  # fmt: skip
+    return next(filter(None, fits), [])
 
 
 def _marker(events: pd.DataFrame, key: str, layout: Layout, source: str) -> str | None:

@@ -14,12 +14,11 @@ from typing import Any, Final
 from isiw.checks import MOST_MEP_MV
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.existing import formats, frames, recordings, tables
+from isiw.existing import doubts, formats, frames, recordings, tables
 from isiw.existing.apart import read_apart
 from isiw.existing.cells import is_missing
 from isiw.existing.dates import dates_of, latest_of, times_of
 from isiw.existing.delivered import Delivered, anywhere, read_log, renumbered
-from isiw.existing.doubts import ALL, require_codes, require_isis, require_one_kind, require_one_row_each, require_short
 from isiw.existing.formats import mne_files
 from isiw.existing.formats.contents import Contents
 from isiw.existing.layout import CHANNELS, EMG_UNITS, Layout
@@ -160,7 +159,7 @@ def people_of(
     if not rows:
         raise InvalidValueError(f"{source} has no trials", remedy="Are the right columns named?")
     subjects = [columns["subject"].text(row) for row in rows]
-    require_codes(subjects, rows, columns)
+    doubts.require_codes(subjects, rows, columns)
     if any(subjects) and not all(subjects):
         empty = rows[subjects.index("")]
         raise columns.of["subject"].refused(empty, "is empty", "Write the person's code into each row.")
@@ -208,8 +207,10 @@ def _person(
 ) -> Delivered:
     _require_ascending(columns, rows)
     columns.require_said(rows, layout.alone)
-    require_one_kind(columns, rows, layout, columns["isi"].of)
-    require_isis(columns, rows, layout)
+    doubts.require_one_kind(columns, rows, layout, columns["isi"].of)
+    doubts.require_isis(columns, rows, layout)
+    for key in ("isi", "mep"):
+        doubts.require_one_unit(key, columns[key], [row for row in rows if not columns.tms_alone(row, layout.alone)])
     space, signals = anywhere(reference), SignalLimits()
     trials = [_trial(columns, row, number, layout, space, signals) for number, row in enumerate(rows)]
     trials, paired_pct_rmt = _with_intensities(trials, columns, rows)
@@ -219,10 +220,12 @@ def _person(
         before = set[str]()
         for n in begun:
             if blocks[n] and blocks[n] in before:
-                remedy = f'If it tells muscles apart, say --where "{name}={blocks[n]}", or --where "{name}={ALL}".'
+                remedy = (
+                    f'If it tells muscles apart, say --where "{name}={blocks[n]}", or --where "{name}={doubts.ALL}".'
+                )
                 raise columns["block"].refused(rows[n], "comes back after another block", remedy)
             before.add(blocks[n])
-    require_one_row_each(columns, rows, layout)
+    doubts.require_one_row_each(columns, rows, layout)
     found = Delivered(
         renumbered(trials),
         reference,
@@ -233,7 +236,7 @@ def _person(
         blocks={n: blocks[n] for n in begun if n},
         visit=Visit(intensity_pct_rmt=paired_pct_rmt),
     )
-    require_short([trial.isi_ms for trial in trials if trial.isi_ms is not None], layout, columns["isi"].of)
+    doubts.require_short([trial.isi_ms for trial in trials if trial.isi_ms is not None], layout, columns["isi"].of)
     return found
 
 

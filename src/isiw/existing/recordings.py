@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any, Final
 
+import numpy as np
+
 from isiw.errors import InvalidValueError
-from isiw.existing.cells import is_missing
+from isiw.existing.cells import Column, is_missing
 from isiw.existing.delivered import Delivered, anywhere, renumbered
 from isiw.existing.doubts import is_rectified, require_short
 from isiw.existing.formats.columns import require_rate
-from isiw.existing.formats.contents import Contents, Track, events_of
+from isiw.existing.formats.contents import APART_S, Contents, Track, events_of
 from isiw.existing.frames import named
 from isiw.existing.layout import EMG_UNITS, MARKERS, UNIT_WORDS, Layout, required_unit
 from isiw.existing.markers import marked, names_of, pulses_of
@@ -24,9 +25,11 @@ from isiw.lazy import pd
 from isiw.signals.judgement import judge
 from isiw.signals.limits import SignalLimits
 from isiw.trials import Channel, Status, Stimulus, Sweep, Trial
+from isiw.types import FloatArray
 
 _BEFORE_MS: Final = 150.0
 _AFTER_MS: Final = 100.0
+_APART_MS: Final = 2.0
 """What is cut out of a continuous recording: from so long before the longest ISI to so long after the pulse."""
 
 OF_SWEEPS: Final[Mapping[str, AbstractSet[str]]] = {
@@ -94,12 +97,8 @@ def _of_rows(contents: Contents, emg: Track, layout: Layout) -> tuple[list[Found
             f"{contents.source} does not say the ISI of each sweep",
             got=f"{columns.rows} rows and {len(emg.stretches)} sweeps",
         )
-    known, names = {*layout.markers.values()}, names_of(contents.events)
-    if known and {*names}.isdisjoint(known | {re.sub(r"\D", "", one) for one in known}):  # MNE may keep the number
-        got, expected = ", ".join(sorted(known)), f"one of {', '.join(names)}"
-        raise InvalidValueError(f"no sweep of {contents.source} is marked so", got=got, expected=expected)
-    about_tap = {round(at, 6) for at in marked(contents.events, origin_key(layout), layout)}
-    rows = columns.chosen(told)
+    rows, keys = columns.chosen(told), (origin_key(layout), "pulse", "alone")
+    marks = {key: np.array(marked(contents.events, key, layout)) for key in keys}
     columns.require_said(rows, told.alone)
     begin = "t_hit_ms" if layout.reference == "impact" else "t_valve_ms"
     sweeps: list[Found] = []
@@ -108,7 +107,7 @@ def _of_rows(contents: Contents, emg: Track, layout: Layout) -> tuple[list[Found
             raise columns["isi"].refused(row, "is of a tap alone, whose sweep has no pulse", "Leave that sweep out.")
         isi_ms = None if columns.tms_alone(row, told.alone) else columns["isi"].number(row)
         stretch = emg.stretches[row]
-        at_tap = round(stretch.start_s + zero_s, 6) in about_tap
+        at_tap = _is_tap(contents, marks, stretch.start_s, columns["isi"], row, isi_ms)
         pulse_ms = 1e3 * zero_s + ((isi_ms or 0.0) if at_tap else 0.0)
         values = emg.read(stretch.first, stretch.first + stretch.samples)
         begins: dict[str, Any] = {begin: None if isi_ms is None else -isi_ms}
@@ -118,6 +117,30 @@ def _of_rows(contents: Contents, emg: Track, layout: Layout) -> tuple[list[Found
         sweeps.append((meant, sweep, {"excluded": columns.lost(row) is not None, "lost": lost}))
     require_short([one[0].isi_ms for one in sweeps if one[0].isi_ms is not None], layout, contents.source)
     return sweeps, columns, _only_one(columns, rows, contents.source)
+
+
+def _is_tap(
+    contents: Contents, marks: Mapping[str, FloatArray], start_s: float, isi: Column, row: int, isi_ms: float | None
+) -> bool:
+    """True if a sweep is about the tap, and not about the pulse; raise if its events are not those of its row."""
+    (key, taps_s), (_, pulses_s), _ = within = [
+        (name, (times_s - start_s)[(times_s >= start_s) & (times_s < start_s + APART_S / 2)])
+        for name, times_s in marks.items()
+    ]
+    zero_s = contents.pulse_at_s or 0.0
+    at_zero = [name for name, times_s in within if np.isclose(times_s, zero_s, rtol=0, atol=1e-6).any()]
+    if len(contents.events) and not at_zero:
+        raise InvalidValueError(
+            f"it is not known what comes at time 0 of the sweeps of {contents.source}",
+            got=" or ".join(names_of(contents.events)),
+            remedy=f"Say which marker is of the pulse and which of the tap: --marker pulse=NAME --marker {key}=NAME.",
+        )
+    if len(pulses_s) == len(taps_s) == 1:
+        seen_ms = 1e3 * float(pulses_s[0] - taps_s[0])
+        if isi_ms is None or abs(seen_ms - isi_ms) > _APART_MS:
+            what = f"is not the ISI of the events in that sweep, {seen_ms:.1f} ms"
+            raise isi.refused(row, what, "Correct one of them, or leave the metadata or the annotations out.")
+    return key in at_zero
 
 
 def _only_one(columns: Columns, rows: Sequence[int], source: str) -> str:

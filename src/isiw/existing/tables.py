@@ -9,7 +9,7 @@ from typing import Final
 
 from isiw.errors import InvalidValueError, did_you_mean
 from isiw.existing.cells import ALONE, TAP_ALONE, Column, plain, says_alone, with_decimals, without_unit_in_cells
-from isiw.existing.doubts import ALL, require_absolute, require_single_trials
+from isiw.existing.doubts import ALL, require_of_kind, require_single_trials
 from isiw.existing.layout import COLUMNS, EMG_UNITS, ISI_UNITS_MS, UNIT_WORDS, Layout, letters, required_unit
 from isiw.findings import Kind
 from isiw.lazy import pd
@@ -17,9 +17,9 @@ from isiw.text.sanitize import counted
 
 _VAGUE: Final = frozenset({"interval", "delay", "soa", "amplitude", "amp", "peaktopeak", "peaktopeakamplitude",
                            "emgpeaktopeak", "p2pamplitude", "ptpamplitude", "p2p", "ptp"})  # fmt: skip
-"""Names of columns that may also be of the interval between trials, or of the stimulus: two of them are asked about."""
-_VERDICTS: Final = frozenset({"status", "exclude"})
-"""Of which two columns may say what one does not."""
+"""Names of columns that may also be of the interval between trials, or of the stimulus, and give way to others."""
+_ASKED: Final = frozenset({"isi", "mep", "status", "exclude"})
+"""Of which there may be two columns, that say different things."""
 
 
 @dataclass(frozen=True)
@@ -118,11 +118,13 @@ class Columns:
                     remedy=f'Say --column "{key}=NAME"; if the names are not in the first line, describe the file: '
                     "--layout FILE.",
                 )
-        columns = {}
+        columns, of_units = {}, set[str]()
         for key, name in held.items():
             if name is not None:
                 said, cells = without_unit_in_cells(name, frame.iloc[:, names.index(name)].tolist())
-                columns[key] = Column(said, cells, of=source)
+                beside = units_beside(key, name, frame)
+                columns[key] = Column("".join([said, *(f" ({unit})" for unit in beside.values())]), cells, of=source)
+                of_units |= beside.keys()
         columns, units = _scaled(columns, layout)
         if (subject := columns.pop("subject", None)) is not None:
             is_id = "subject" not in layout.columns and letters(subject.name) == "id"
@@ -135,7 +137,7 @@ class Columns:
         beside = {
             name: Column(name, frame.iloc[:, place].tolist(), of=source)
             for place, name in enumerate(names)
-            if name not in held.values() and name.strip()
+            if name not in {*held.values(), *of_units} and name.strip()
         }
         if (condition := columns.get("condition")) is not None:  # which may tell pairs from each other, too
             alone = ALONE | TAP_ALONE
@@ -150,11 +152,10 @@ def _scaled(columns: Mapping[str, Column], layout: Layout) -> tuple[dict[str, Co
     columns = dict(columns)
     numeric = ("isi", "mep", "asked", "isi_sd", "background", "intensity")
     columns |= with_decimals({key: columns[key] for key in numeric if key in columns}, layout.decimal)
-    isi_unit = _required_unit("ISIs", columns["isi"], layout, ISI_UNITS_MS)
+    isi_unit = _required_unit("isi", "ISIs", columns["isi"], layout, ISI_UNITS_MS)
     factors, mep_unit = {"isi": ISI_UNITS_MS[isi_unit]}, "mV"
     if "mep" in columns:
-        require_absolute(columns["mep"].name, columns["mep"].of)
-        mep_unit = _required_unit("amplitudes", columns["mep"], layout, EMG_UNITS)
+        mep_unit = _required_unit("mep", "amplitudes", columns["mep"], layout, EMG_UNITS)
         factors["mep"] = EMG_UNITS[mep_unit]
     for key in ("asked", "isi_sd"):
         if key in columns:
@@ -187,7 +188,8 @@ def _named(key: str, names: list[str], layout: Layout, source: str) -> str | Non
     free = [(name, letters(name)) for name in names if name not in layout.columns.values()]
     fitting = {known: [name for name, plain in free if plain == known] for known in COLUMNS[key]}
     found = [known for known in COLUMNS[key] if fitting[known]]
-    rivals = [known for known in found if known == found[0] or {known, found[0]} <= _VAGUE or key in _VERDICTS]
+    is_vague = bool(found) and found[0] in _VAGUE
+    rivals = [known for known in found if known == found[0] or (key in _ASKED and (known in _VAGUE) == is_vague)]
     several = [name for known in rivals for name in fitting[known]]
     if len(several) > 1:
         raise InvalidValueError(
@@ -196,6 +198,20 @@ def _named(key: str, names: list[str], layout: Layout, source: str) -> str | Non
             remedy=f'Say --column "{key}={several[0]}".' if len(set(several)) > 1 else "Rename one of them.",
         )
     return several[0] if several else None
+
+
+def units_beside(key: str, name: str, frame: pd.DataFrame) -> dict[str, str]:
+    """Units that columns beside another say of it, such as `isi_unit`, by their names."""
+    known, found = (EMG_UNITS if key in {"mep", "emg", "background"} else ISI_UNITS_MS), dict[str, str]()
+    for place, other in enumerate(map(str, frame.columns)):
+        of = re.fullmatch("(.*?)units?", letters(other))
+        if of is None or not (letters(name).startswith(of[1]) or of[1] in COLUMNS.get(key, ())):
+            continue
+        for text in dict.fromkeys(frame.iloc[:, place].dropna().astype(str)):
+            unit = UNIT_WORDS.get(text.strip().casefold())
+            if unit is not None and (of[1] or unit in known):  # a unit of no column is of those that may have it
+                found[other] = unit if found.get(other) in {None, unit} else f"{found[other]}) ({unit}"
+    return found
 
 
 def unit_said(name: str, known: Mapping[str, float]) -> str | None:
@@ -214,8 +230,9 @@ def unit_said(name: str, known: Mapping[str, float]) -> str | None:
     return next(reversed(found or usual), None)
 
 
-def _required_unit(what: str, column: Column, layout: Layout, known: Mapping[str, float]) -> str:
-    """The column's unit, as it is stated or as its name says."""
+def _required_unit(key: str, what: str, column: Column, layout: Layout, known: Mapping[str, float]) -> str:
+    """The column's unit, as it is stated or as its name says, which must not say that it is something else."""
+    require_of_kind(key, what, column.name, column.of)
     some = ", ".join(filter(None, map(column.text, range(min(5, len(column.cells)))))) or None
     if (other := unit_said(column.name, dict.fromkeys({*UNIT_WORDS.values()} - known.keys(), 1.0))) is not None:
         remedy = "Name the right column: --column KEY=NAME; if it is the right one, correct its name."

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from itertools import pairwise, product
 from pathlib import Path
 from typing import Final, Literal
@@ -13,11 +14,16 @@ from isiw.errors import InvalidValueError
 from isiw.existing import frames
 from isiw.existing.cells import Column, is_missing, with_decimals
 from isiw.existing.formats.contents import Contents, Track, events_of, parted, time_of
-from isiw.existing.layout import EMG_UNITS, ISI_UNITS_MS, MARKERS, Layout
+from isiw.existing.layout import EMG_UNITS, ISI_UNITS_MS, MARKERS, UNIT_WORDS, Layout
 from isiw.existing.tables import require_one, unit_said
 from isiw.lazy import pd
 from isiw.types import FloatArray
 
+_PERIOD: Final = re.compile(
+    r"(?=interval\W|[\d.]+\s*\w+/sample)(?:interval\W+)?(\d[\d.e-]*)\s*([a-zµ]+)", re.IGNORECASE
+)
+_RATE: Final = re.compile(r"(?:rate|sampl|frequency)[^\n\d]*(\d[\d.]*)\s*(k?)Hz", re.IGNORECASE)
+"""What the lines above samples say of the time between them, or of their rate."""
 _FEW: Final = 0.01
 """With a larger share of steps that are longer than usual, times have no pauses but are rounded."""
 
@@ -28,6 +34,7 @@ def read(path: Path, layout: Layout) -> Contents:
     if "emg" not in layout.channels:
         return Contents(source, trials=frame)
     rate_hz = required(layout, "rate_hz", f"the sampling rate of {source}")
+    _require_head(frame.attrs.get("head", ""), rate_hz, source)
     remedy = "If no line holds their names, write names = [...] into the layout."
     for name in layout.channels.values():
         require_one("column", source, name, frame, remedy)
@@ -89,9 +96,30 @@ def clock_of(cells: pd.Series, name: str, rate_hz: float) -> tuple[float, dict[i
     unit = unit_said(name, ISI_UNITS_MS)
     if unit is None and math.isclose(step, 1.0, rel_tol=1e-6):
         return None
-    rates = [1e3 / (step * per_ms) for known, per_ms in ISI_UNITS_MS.items() if unit in {None, known}]
-    found_hz = min(rates, key=lambda rate: abs(math.log(rate / rate_hz)))
+    found_hz = _rate_of(step, unit, rate_hz)
     return found_hz, dict(zip((late + 1).tolist(), (over / step / found_hz).tolist(), strict=True))
+
+
+def _rate_of(step: float, unit: str | None, rate_hz: float) -> float:
+    """The rate at which samples are so far from each other; without a unit, the one that is nearest to another."""
+    rates = [1e3 / (step * per_ms) for known, per_ms in ISI_UNITS_MS.items() if unit in {None, known}]
+    return min(rates, key=lambda rate: abs(math.log(rate / rate_hz)))
+
+
+def require_period(stated_hz: float, period: float, unit: str | None, where: str) -> None:
+    """Raise if the time from one sample to the next is not that of the rate that is stated."""
+    found_hz = _rate_of(period, unit, stated_hz)
+    if unit is not None or 0.1 < found_hz / stated_hz < 10:  # or else it is of something else
+        require_rate(stated_hz, found_hz, where)
+
+
+def _require_head(head: str, rate_hz: float, source: str) -> None:
+    """Raise if the lines above the samples say another rate."""
+    for number, word in _PERIOD.findall(head):
+        if (unit := UNIT_WORDS.get(word.casefold())) in ISI_UNITS_MS and float(number):
+            require_period(rate_hz, float(number), unit, f"the head of {source}")
+    for number, kilo in _RATE.findall(head):
+        require_rate(rate_hz, float(number) * (1e3 if kilo else 1.0), f"the head of {source}")
 
 
 def _numbers(frame: pd.DataFrame, name: str, layout: Layout, source: str) -> FloatArray:

@@ -13,6 +13,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from isiw.errors import InvalidValueError
+from isiw.existing.layout import UNIT_WORDS
 from isiw.lazy import pd
 from isiw.types import FloatArray
 
@@ -78,6 +79,13 @@ class Track:
     def scaled(self, gain: float, offset: float = 0.0) -> Track:
         """The same, each number times a gain, and an offset added."""
         return replace(self, read=lambda first, last: gain * self.read(first, last) + offset)
+
+    def with_unit(self, said: Any) -> Track:
+        """The same, whose unit is also said elsewhere; two that differ are no unit that is known."""
+        known = UNIT_WORDS.get(str(said).strip().casefold())
+        if known is None or known == UNIT_WORDS.get(self.unit.strip().casefold(), known):
+            return replace(self, unit=self.unit or known or "")
+        return replace(self, unit=f"{self.unit} in one place, and {said} in another")
 
     def at(self, time_s: float) -> Stretch | None:
         """The stretch that a time is in; None in a gap."""
@@ -154,6 +162,14 @@ class Track:
             last = float(values[-1])
 
 
+def text_of(*values: Any) -> str:
+    """What an event is called, by its texts and codes; a whole number has no decimal sign."""
+    each = (value.decode("utf-8", "replace") if isinstance(value, bytes) else value for value in values)
+    return " ".join(
+        f"{value:.15g}" if isinstance(value, int | float | np.number) else f"{value}" for value in each
+    ).strip()
+
+
 def events_of(rows: Iterable[Sequence[Any]]) -> pd.DataFrame:
     """Events as a table, by their times: what each is called, when it was [s], and how long it lasted [s]."""
     return pd.DataFrame(sorted(map(tuple, rows), key=itemgetter(1)), columns=["name", "onset", "duration"])
@@ -186,9 +202,29 @@ class Contents:
     notes: tuple[str, ...] = ()  # what the operator should know of how it was read
 
     def with_bids(self, path: Path) -> Contents:
-        """The same with the events that BIDS has in a file beside a recording, if there is one."""
-        beside = path.with_name(f"{path.stem.rpartition('_')[0]}_events.tsv")
-        if not beside.is_file() or beside.name == "_events.tsv":
-            return self
-        frame = pd.read_csv(beside, sep="\t", na_values=["n/a"])
-        return replace(self, events=frame.rename(columns={"trial_type" if "trial_type" in frame else "value": "name"}))
+        """The same with the events and the units of channels that BIDS has in files beside a recording."""
+        channels, events = (_beside(path, what) for what in ("channels", "events"))
+        units = {
+            str(name): unit for name, unit in zip(channels.get("name", ()), channels.get("units", ()), strict=False)
+        }
+        tracks = tuple(one.with_unit(units.get(one.name)) for one in self.tracks)
+        if not len(events):
+            return replace(self, tracks=tracks)
+        if "sample" in events and tracks:
+            off = (events["onset"] * tracks[0].rate_hz - events["sample"]).abs().median()
+            if off > 0.1 * tracks[0].rate_hz:
+                raise InvalidValueError(
+                    f"the onsets of events beside {self.source} are not those of their samples",
+                    got=f"a difference of {off:.0f} samples",
+                    expected=f"seconds, at {tracks[0].rate_hz:g} Hz",
+                    remedy="Correct the onsets, or the samples, in the file of events.",
+                )
+        name = "trial_type" if "trial_type" in events else "value"
+        return replace(self, tracks=tracks, events=events.rename(columns={name: "name"}))
+
+
+def _beside(path: Path, what: str) -> pd.DataFrame:
+    """A table that BIDS has beside a recording; an empty one if there is none."""
+    beside = path.with_name(f"{path.stem.rpartition('_')[0]}_{what}.tsv")
+    is_there = beside.is_file() and "_" in path.stem
+    return pd.read_csv(beside, sep="\t", na_values=["n/a"]) if is_there else pd.DataFrame()

@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.existing.formats.contents import Contents, Track, events_of, part_of, parted, time_of
+from isiw.existing.formats.contents import Contents, Track, events_of, part_of, parted, text_of, time_of
 from isiw.existing.layout import EMG_UNITS, Layout
 from isiw.files import opened
 from isiw.text.named_code import library
@@ -32,7 +32,7 @@ def read(path: Path, layout: Layout) -> Contents:
     places = _listed(eeg.get("chanlocs"))
     events = [one for one in _listed(eeg.get("event")) if not _empty(one.get("latency"))]
     pauses = {math.ceil(float(one["latency"]) - 1.0): _number(one.get("duration")) / rate_hz
-              for one in events if _name(one.get("type")) == "boundary"}  # fmt: skip
+              for one in events if text_of(one.get("type")) == "boundary"}  # fmt: skip
     cuts: Iterable[int] = range(samples, trials * samples, samples) if trials > 1 else pauses
     stretches = parted(cuts, trials * samples, rate_hz, {} if trials > 1 else pauses)
     tracks, count, data = [], int(eeg["nbchan"]), eeg["data"]
@@ -45,12 +45,12 @@ def read(path: Path, layout: Layout) -> Contents:
         tracks.append(Track(label, rate_hz, stretches, read, "uV", kind))
     rows = [
         (
-            _name(one["type"]),
+            text_of(one["type"]),
             time_of(float(one["latency"]) - 1.0, stretches, rate_hz),
             _number(one.get("duration")) / rate_hz,
         )
         for one in events
-        if _name(one.get("type")) != "boundary"
+        if text_of(one.get("type")) != "boundary"
     ]
     notes = () if layout.unit_of(EMG_UNITS) else (_ASSUMED,)
     return Contents(path.name, tuple(tracks), events_of(rows), notes=notes).with_bids(path)
@@ -58,7 +58,7 @@ def read(path: Path, layout: Layout) -> Contents:
 
 def _beside(path: Path, name: str, count: int, channel: int, first: int, last: int) -> FloatArray:
     """Numbers of a channel, of so many, in the file beside this one."""
-    beside = path.with_name(Path(name.replace("\\", "/")).name)  # a folder of another computer is not meant
+    beside = path.withtext_of(Path(name.replace("\\", "/")).name)  # a folder of another computer is not meant
     with opened(beside if beside.exists() else path.parent / name) as file:
         file.seek(4 * count * first)
         whole = np.frombuffer(file.read(4 * count * (last - first)), "<f4")
@@ -82,8 +82,3 @@ def _empty(value: Any) -> bool:
 
 def _number(value: Any) -> float:
     return 0.0 if _empty(value) or isinstance(value, str) or not math.isfinite(float(value)) else float(value)
-
-
-def _name(value: Any) -> str:
-    """What an event is called; a whole number has no decimal sign."""
-    return f"{value:g}" if isinstance(value, int | float | np.number) else str(value).strip()

@@ -16,6 +16,7 @@ from isiw.existing.layout import EMG_UNITS, Layout, letters
 from isiw.lazy import pd
 
 _RATES: Final = frozenset({"fs", "srate", "samplerate", "samplingrate", "samplingfrequency", "sfreq", "rate", "ratehz"})
+_PERIODS: Final = frozenset({"interval", "samplinginterval", "sampleinterval", "dt"})
 
 
 def read(path: Path, layout: Layout) -> Contents:
@@ -44,9 +45,12 @@ def _sweeps(arrays: Mapping[str, Any], layout: Layout, source: str) -> Contents:
     for other, array in arrays.items():
         if array.size == 1 and letters(other) in _RATES and array.dtype.kind in "fiu":
             columns.require_rate(rate_hz, float(array.item()), f"{other!r} of {source}")
+        if array.size == 1 and letters(other) in _PERIODS and array.dtype.kind in "fiu" and array.item() > 0:
+            columns.require_period(rate_hz, float(array.item()), None, f"{other!r} of {source}")
         if array.size == sweeps.size // count != count:
             _require_zero(other, array.ravel(), rate_hz, pulse_at_ms, source)
-    unit = tables.unit_said(name, EMG_UNITS) or ""
+    said = "".join([name, *(f" ({unit})" for unit in tables.units_beside("emg", name, beside).values())])
+    unit = tables.unit_said(said, EMG_UNITS) or ""
     flat = (sweeps if sweeps.shape[0] == count else sweeps.T).ravel()
     stretches = parted(range(0, flat.size, flat.size // count), flat.size, rate_hz)
     track = Track.of_values(name, rate_hz, stretches, flat, unit)

@@ -81,17 +81,22 @@ def of_epochs(epochs: Any, source: str = "the epochs") -> Contents:
     stretches = parted(range(0, length * len(epochs), length), length * len(epochs), rate_hz)
     flat = {index: values.ravel() for index, values in data.items()}
     tracks = tuple(_tracks(epochs, stretches, lambda index, first, last: flat[index][first:last]))
-    if epochs.metadata is not None:
-        names, zero_s = {code: name for name, code in epochs.event_id.items()}, -float(epochs.tmin)
-        zeros = (
-            (names[code], one.start_s + zero_s, 0.0) for code, one in zip(epochs.events[:, 2], stretches, strict=True)
-        )
-        return Contents(source, tracks, events_of(zeros), epochs.metadata, zero_s, empty_is_alone=True)
+    zero_s = -float(epochs.tmin)
     noted = [
-        (str(one[2]), stretch.start_s + float(one[0]) - float(epochs.tmin), float(one[1]))
+        (str(one[2]), stretch.start_s + float(one[0]) + zero_s, float(one[1]))
         for stretch, each in zip(stretches, epochs.get_annotations_per_epoch(), strict=True)
         for one in each
     ]
+    if epochs.metadata is not None:
+        names, known = (
+            {code: name for name, code in epochs.event_id.items()},
+            {(one[0], round(one[1], 6)) for one in noted},
+        )
+        zeros = [
+            (names[code], one.start_s + zero_s, 0.0) for code, one in zip(epochs.events[:, 2], stretches, strict=True)
+        ]
+        events = events_of([*noted, *(one for one in zeros if (one[0], round(one[1], 6)) not in known)])
+        return Contents(source, tracks, events, epochs.metadata, zero_s, empty_is_alone=True)
     if not noted:
         raise InvalidValueError(
             f"{source} do not hold the ISIs",

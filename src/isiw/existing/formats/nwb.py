@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from isiw.existing.formats.contents import Contents, Stretch, Track, events_of
+from isiw.existing.formats.contents import Contents, Stretch, Track, events_of, text_of
 from isiw.existing.formats.stamps import clocked
 from isiw.existing.layout import Layout
 from isiw.lazy import pd
@@ -26,7 +26,7 @@ def read(path: Path, _layout: Layout) -> Contents:
     for one in objects:
         if isinstance(one, pynwb.misc.AnnotationSeries):
             texts, times_s = one.data[:], one.timestamps[:]
-            events.append(events_of((_text(text), float(at), 0.0) for text, at in zip(texts, times_s, strict=True)))
+            events.append(events_of((text_of(text), float(at), 0.0) for text, at in zip(texts, times_s, strict=True)))
         elif isinstance(one, pynwb.epoch.TimeIntervals):
             tables.append(one.to_dataframe())
             events.append(_events(tables[-1], "start_time", "sweep"))
@@ -79,14 +79,10 @@ def _part(series: Any, _held: Any, channel: int | None, first: int, last: int) -
     return np.asarray(values, dtype=np.float64)
 
 
-def _text(value: Any) -> str:
-    return value.decode("utf-8") if isinstance(value, bytes) else str(value)
-
-
 def _events(table: pd.DataFrame, begin: str, usual: str) -> pd.DataFrame:
     """The rows of a table of times by their labels, and each further column of times as events."""
     label = next((name for name in ("label", "annotation", "event", "event_type", "name") if name in table), None)
-    names = [usual] * len(table) if label is None else [_text(text) or usual for text in table[label]]
+    names = [usual] * len(table) if label is None else [text_of(text) or usual for text in table[label]]
     lasts: Any = (table["stop_time"] - table["start_time"]).to_numpy(dtype=np.float64) if "stop_time" in table else 0.0
     others = table.drop(columns=[begin, "stop_time"], errors="ignore")
     found = [others.assign(name=names, onset=table[begin].to_numpy(dtype=np.float64), duration=lasts)]

@@ -17,12 +17,16 @@ _ENOUGH_S: Final = 10.0
 """A stretch that is longer says at which rate its samples were really taken."""
 
 
+_SCATTER_S: Final = 2e-3
+"""Times that scatter more are said."""
+
+
 class Clocked(NamedTuple):
-    """The rate at which samples were really taken, their stretches, and how far the times scatter about these [s]."""
+    """The rate at which samples were really taken, their stretches, and a note if the times scatter about these."""
 
     rate_hz: float
     stretches: tuple[Stretch, ...]
-    scatter_s: float
+    notes: tuple[str, ...]
 
 
 def clocked(
@@ -56,7 +60,9 @@ def clocked(
         start_s = float(np.median(times_s[span] - even_s))
         stretches.append(Stretch(first, last - first, start_s))
         scatter.append(np.abs(times_s[span] - even_s - start_s))
-    return Clocked(1.0 / period_s, tuple(stretches), float(np.quantile(np.concatenate(scatter), 0.95)))
+    scatter_s = float(np.quantile(np.concatenate(scatter), 0.95))
+    note = f"The times of {what} scatter by {1e3 * scatter_s:.1f} ms: MEPs may lie elsewhere."
+    return Clocked(1.0 / period_s, tuple(stretches), (note,) if scatter_s > _SCATTER_S else ())
 
 
 def _gaps(late_s: FloatArray, places: list[int], span: tuple[int, int], around: int, least_s: float) -> list[int]:

@@ -1,0 +1,112 @@
+"""What a file, or one beside it, says besides its numbers: it is used, or asked about where it contradicts them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import mne
+import numpy as np
+import openpyxl
+import pandas as pd
+import pytest
+import scipy.io
+
+from existing.test_doubts import table
+from existing.test_tables import IMPACT
+from existing.test_waves import EMG_MV, lines, trigger
+from existing.writers import ISIS_MS, KNOWN, NAMES, RATE_HZ, as_edf, epochs, raw, recording, require_as_written
+from isiw.errors import IsiwError
+from isiw.existing.layout import Layout
+from isiw.existing.reading import read_people
+
+
+def shown(path: Path, change: Callable[[Any], None]) -> Path:
+    """A workbook whose sheet was changed in Excel."""
+    with pd.ExcelWriter(path, engine="openpyxl") as book:
+        table().to_excel(book, index=False, sheet_name="Data")
+        change(book.sheets["Data"])
+    return path
+
+
+def crossed_out(sheet: Any) -> None:
+    for cell in sheet[7]:
+        cell.font = openpyxl.styles.Font(strike=True)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda sheet: [setattr(sheet.row_dimensions[row], "hidden", True) for row in (5, 9)],
+         "2 rows of the sheet 'Data' are hidden; got 'row 5, 9'.*called exclude"),
+        (crossed_out, "1 row of the sheet 'Data' is crossed out; got 'row 7'"),
+        (lambda sheet: sheet.__setitem__("B4", "=1/2"), "1 row .* without the result of a formula; got 'row 4'"),
+    ],
+)  # fmt: skip
+def test_rows_that_excel_shows_otherwise_than_they_are_read_are_asked_about(
+    change: Callable[[Any], None], says: str, tmp_path: Path
+) -> None:
+    with pytest.raises(IsiwError, match=says):
+        read_people(shown(tmp_path / "P01.xlsx", change), IMPACT)
+    hidden_head = shown(tmp_path / "P02.xlsx", lambda sheet: setattr(sheet.row_dimensions[1], "hidden", True))
+    assert len(read_people(hidden_head, IMPACT)[0].trials) == 36
+
+
+def test_a_unit_beside_numbers_is_theirs_in_a_table_and_in_a_structure_of_matlab(tmp_path: Path) -> None:
+    numbers: dict[str, Any] = {"isi": [0.03, 0.06, 0.09], "isi_unit": "s", "mep": [400.0, 900.0, 160.0]}
+    scipy.io.savemat(tmp_path / "P01.mat", {"trials": {**numbers, "mep_units": "uV"}})
+    scipy.io.savemat(tmp_path / "P02.mat", {"P02": {**numbers, "isi_unit": "sec", "unit": "uV"}})
+    for source in (tmp_path / "P01.mat", tmp_path / "P02.mat", pd.DataFrame({**numbers, "mep_unit": "uV"})):
+        (person,) = read_people(source, IMPACT)
+        assert [trial.isi_ms for trial in person.trials] == pytest.approx([30, 60, 90])
+        assert [trial.mep_mv for trial in person.trials] == pytest.approx([0.4, 0.9, 0.16])
+        assert person.unused == ()
+
+
+def test_epochs_that_contradict_their_events_are_asked_about() -> None:
+    for isis_ms in ([30.0, 60, 90, 120, 85, np.nan], [30.0, 60, 90, 120, np.nan, np.nan]):
+        with pytest.raises(IsiwError, match=r"row 5 .* is not the ISI of the events in that sweep, 45\.0 ms"):
+            read_people(epochs(isi_ms=isis_ms), KNOWN)
+    found, _ = mne.events_from_annotations(raw(), {NAMES["tap"]: 1})
+    held = pd.DataFrame({"isi_ms": ISIS_MS})
+    about = mne.Epochs(raw(), found, {"stim": 1}, -0.3, 0.3, baseline=None, preload=True, metadata=held)
+    with pytest.raises(
+        IsiwError, match=r"what comes at time 0 of the sweeps of the epochs; got 'stim'.*--marker pulse"
+    ):
+        read_people(about.set_annotations(None), Layout("impact", channels={"emg": "FCR"}))
+
+
+@pytest.mark.parametrize("head", ["Interval=\t0.00025 s\n", "0.25 msec/sample\n", "Sampling rate: 4 kHz\n"])
+def test_a_rate_above_the_samples_or_beside_sweeps_is_compared_with_the_one_that_is_stated(
+    head: str, tmp_path: Path
+) -> None:
+    rows = lines(EMG_MV, trigger("tap"), trigger("pulse")).splitlines(keepends=True)
+    (tmp_path / "P01.txt").write_text(head + "".join(row.partition("\t")[2] for row in rows))
+    channels = {"emg": "EMG", "tap": "Hammer", "pulse": "TMS"}
+    layout = Layout("impact", rate_hz=2000.0, channels=channels, unmarked="alone", units=("mV",), skip_lines=1,
+                    names=tuple(channels.values()), separator="\t")  # fmt: skip
+    with pytest.raises(IsiwError, match=r"the head of P01\.txt says; got '2000 Hz'; expected 4000 Hz"):
+        read_people(tmp_path / "P01.txt", layout)
+    require_as_written(read_people(tmp_path / "P01.txt", layout.saying(rate_hz=4000.0))[0])
+    scipy.io.savemat(tmp_path / "P01.mat", {"emg": np.zeros((3, 99)), "isi_ms": [1, 2, 3], "interval": 0.25})
+    sweeps = Layout("impact", rate_hz=2000.0, pulse_at_ms=9.0, units=("mV",), channels={"emg": "emg"})
+    with pytest.raises(IsiwError, match=r"'interval' of P01\.mat says"):
+        read_people(tmp_path / "P01.mat", sweeps)
+
+
+def test_files_of_bids_beside_a_recording_that_contradict_it_are_asked_about(tmp_path: Path) -> None:
+    path = as_edf(tmp_path).rename(tmp_path / "sub-01_emg.edf")
+    pd.DataFrame({"name": ["FCR"], "units": ["mV"]}).to_csv(tmp_path / "sub-01_channels.tsv", sep="\t", index=False)
+    with pytest.raises(IsiwError, match="got 'uV in one place, and mV in another'"):
+        read_people(path, KNOWN)
+    require_as_written(read_people(path, KNOWN.saying(units=("uV",)))[0])
+    events = pd.DataFrame([(at_s, round(at_s * RATE_HZ), name) for at_s, name in sorted(recording()[1])])
+    events = events.set_axis(["onset", "sample", "trial_type"], axis=1).assign(duration=0.0)
+    for factor, asks in ((1.0, ""), (1e3, "the onsets of events beside sub-01_emg.edf are not those of their samples")):
+        events.assign(onset=factor * events["onset"]).to_csv(tmp_path / "sub-01_events.tsv", sep="\t", index=False)
+        if asks:
+            with pytest.raises(IsiwError, match=asks):
+                read_people(path, KNOWN)
+        else:
+            require_as_written(read_people(path, KNOWN.saying(units=("uV",)))[0])
