@@ -1,4 +1,4 @@
-"""A process that dies at any one of its file operations, as by kill -9 or by a power cut."""
+"""What a process leaves on the disk that dies at any one of its file operations, as by kill -9 or by a power cut."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import builtins
 import enum
 import os
 import stat
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
@@ -14,10 +13,6 @@ from pathlib import Path
 from typing import Any, Self
 
 import pytest
-
-from forked import fork
-
-DIED = 77
 
 
 class Ending(enum.StrEnum):
@@ -28,22 +23,28 @@ class Ending(enum.StrEnum):
     POWER_CUT = "none of the bytes stays, and no name"
 
 
+Left = tuple[tuple[str, bytes], ...]
+"""Names and bytes of the files in a folder."""
+
+
 @dataclass
 class Disk:
-    """Counts the file operations in a folder, and lets the process die at one of them.
+    """Notes at each file operation in a folder what would be left if the process died there.
+
+    A file holds what was written to the operating system: what waits in a buffer of the process dies with it.
 
     Args:
         folder: the folder; its files are synced.
         shadow: a folder beside it, for what the disk would still have.
-        last: the operation to die at, counted from 0: its beginning is an even number, its end the odd one behind.
-        ending: what becomes of what was not synced.
+        outside: what no ending reaches, and is noted with the rest.
     """
 
     folder: Path
     shadow: Path
-    last: int
-    ending: Ending
+    outside: Callable[[], bytes]
     steps: int = 0
+    left: dict[tuple[Ending, Left, bytes], int] = field(default_factory=dict)
+    """What the endings leave, and at which operation for the first time."""
     _sizes: dict[int, int] = field(default_factory=dict)
     _names: dict[str, int] = field(default_factory=dict)
 
@@ -66,15 +67,14 @@ class Disk:
         return opened
 
     def _step(self, act: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
-        self._die_if_due()
+        self._note()
         result = act(*args, **kwargs)
-        self._die_if_due()
+        self._note()
         return result
 
-    def _die_if_due(self) -> None:
-        if self.steps == self.last:
-            self._forget()
-            os._exit(DIED)
+    def _note(self) -> None:
+        for ending in Ending:
+            self.left.setdefault((ending, self._after(ending), self.outside()), self.steps)
         self.steps += 1
 
     def _fsync(self, usual: Callable[[int], None], handle: int) -> None:
@@ -91,19 +91,21 @@ class Disk:
             if not (kept := self.shadow / str(inode)).exists():
                 _link(self.folder / name, kept)
 
-    def _forget(self) -> None:
-        if self.ending is Ending.POWER_CUT:
-            for path in self.folder.iterdir():
-                _unlink(path)
-            for name, inode in self._names.items():
-                _link(self.shadow / str(inode), self.folder / name)
-        if self.ending is not Ending.KILLED:
-            for path in self.folder.iterdir():
-                synced, size = self._sizes.get(path.stat().st_ino, 0), path.stat().st_size
-                os.truncate(path, synced if self.ending is Ending.POWER_CUT else (synced + size) // 2)
+    def _after(self, ending: Ending) -> Left:
+        files = {path.name: path for path in self.folder.iterdir()}
+        if ending is Ending.POWER_CUT:
+            files = {name: self.shadow / str(inode) for name, inode in self._names.items()}
+        return tuple((name, self._kept(files[name], ending)) for name in sorted(files))
+
+    def _kept(self, path: Path, ending: Ending) -> bytes:
+        content, synced = path.read_bytes(), self._sizes.get(path.stat().st_ino, 0)
+        if ending is Ending.KILLED:
+            return content
+        size = synced if ending is Ending.POWER_CUT else (synced + len(content)) // 2
+        return content[:size].ljust(size, b"\0")
 
 
-_link, _unlink = os.link, os.unlink
+_link = os.link
 
 
 class _Watched:
@@ -126,30 +128,3 @@ class _Watched:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-def run_until(step: int, ending: Ending, folder: Path, shadow: Path, act: Callable[[], object]) -> int | None:
-    """Do something in a process that dies at a step; None where it died, else how many steps it took."""
-    reading, writing = os.pipe()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # of forking beside idle threads
-        child = fork()
-    if child == 0:
-        disk = Disk(folder, shadow, step, ending)
-        try:
-            with pytest.MonkeyPatch.context() as patch:
-                disk.install(patch)
-                act()
-            os.write(writing, str(disk.steps).encode())
-        except BaseException as error:  # noqa: BLE001 - told to the parent
-            os.write(writing, f"{type(error).__name__}: {error}".encode())
-        finally:
-            os._exit(0)
-    os.close(writing)
-    with os.fdopen(reading, "rb") as pipe:
-        said = pipe.read().decode()
-    _, status = os.waitpid(child, 0)
-    if os.waitstatus_to_exitcode(status) == DIED:
-        return None
-    assert said.isdigit(), said
-    return int(said)
