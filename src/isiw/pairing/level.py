@@ -18,13 +18,13 @@ import numpy as np
 from isiw.checks import Checked, Positive, number
 from isiw.lazy import scipy
 from isiw.models.shared.scales import AnyLaw, PositiveLaw, Scale
-from isiw.pairing.law import LATENTS, Pulses, Scores, curvatures, scores
+from isiw.pairing.law import LATENTS, Pulses, curvatures, scores
 from isiw.types import FloatArray, IntArray
 
 STRETCH: Final = 10
 """Pulses that are taken to have one level."""
 
-_STEPS, _TOLERANCE = 60, 1e-3
+_MOST_STEPS, _TOLERANCE, _LEAST_SHARE = 60, 1e-3, 1e-3
 _CURVE: Final = len(LATENTS) - 1
 
 
@@ -86,21 +86,20 @@ class Posterior(NamedTuple):
     weights: FloatArray  # of the sizes, (d,)
     means: FloatArray  # of changes, natural log, (d, blocks + 1)
     sds: FloatArray  # (d, blocks + 1)
-    latents: FloatArray  # the mode: the curve's, then the levels of the stretches
-    drift: float  # expected SD of the drift, natural log
+    pulse_log_sd: float  # with which one pulse shows the level, natural log
 
-    def interval(self, which: int, mass: float) -> tuple[float, float]:
-        """The central interval of one change."""
+    def interval(self, which: int, mass: float) -> tuple[float, float, float]:
+        """The median of one change, and the ends of its central interval."""
         tail = (1.0 - mass) / 2.0
-        return self._quantile(which, tail), self._quantile(which, 1.0 - tail)
-
-    def median(self, which: int) -> float:
-        """The median of one change."""
-        return self._quantile(which, 0.5)
+        return self._quantile(which, 0.5), self._quantile(which, tail), self._quantile(which, 1.0 - tail)
 
     def below(self, which: int, change: float) -> float:
         """The probability that one change is below a value."""
         return float(self.weights @ scipy.special.ndtr((change - self.means[:, which]) / self.sds[:, which]))
+
+    def given(self, size: int) -> Posterior:
+        """The posterior if the drift has one of the sizes."""
+        return Posterior(np.ones(1), self.means[[size]], self.sds[[size]], self.pulse_log_sd)
 
     def _quantile(self, which: int, p: float) -> float:
         ends = self.means[:, which] + np.array([[-9.0], [9.0]]) * self.sds[:, which]
@@ -138,110 +137,116 @@ def _kept(persistence: float, at: FloatArray) -> FloatArray:
     return kept
 
 
-def posterior(pulses: Pulses, stretches: Stretches, prior: LevelPrior) -> Posterior:
-    """The posterior of the changes from n pulses."""
-    drifts, chances = np.array(prior.drifts).T
-    laws = [_level_law(prior, stretches, drift) for drift in drifts]
-    usual = int(np.argmax(np.isclose(drifts, 0.3))) if np.isclose(drifts, 0.3).any() else len(drifts) // 2
-    mode, precision = _mode(pulses, stretches, prior, laws[usual])
-    return _mixed(prior, laws, (drifts, chances), mode, precision)
+class _Quadratic(NamedTuple):
+    """The log likelihood about a point."""
 
-
-class _Mode(NamedTuple):
     at: FloatArray
-    gradient: FloatArray  # of the log likelihood there
     value: float
+    gradient: FloatArray
+    precision: FloatArray  # its negative curvature
 
 
-def _mode(pulses: Pulses, stretches: Stretches, prior: LevelPrior, law: _LevelLaw) -> tuple[_Mode, FloatArray]:
-    """The mode of curve and levels, and the negative curvature of the log likelihood there."""
-    mean, sd = prior.curve
-    centre = np.concatenate((mean, np.full(len(stretches.block), prior.largest_mv.log_law[0])))
-    inverse = np.zeros((len(centre), len(centre)))
-    inverse[:_CURVE, :_CURVE] = np.diag(sd**-2.0)
-    inverse[_CURVE:, _CURVE:] = np.linalg.inv(law.covariance)
-    indices = np.concatenate(
-        (np.tile(np.arange(_CURVE), (len(pulses.log_mep), 1)), _CURVE + stretches.of_pulse[:, None]), axis=1
-    )
+def posterior(pulses: Pulses, stretches: Stretches, prior: LevelPrior) -> Posterior:
+    """The posterior of the changes.
 
-    def found(at: FloatArray) -> Scores:
-        return scores(pulses, at[indices])
+    Args:
+        pulses: n pulses of one person.
+        stretches: which of them have one level.
+        prior: what is known beforehand.
+    """
+    laws = [_level_law(prior, stretches, size) for size, _ in prior.drifts]
+    centre = np.concatenate((prior.curve[0], np.full(len(stretches.block), prior.largest_mv.log_law[0])))
+    likelihood = _Likelihood(pulses, stretches, len(centre))
+    # The middle size is near enough to each of the others for one point to expand about.
+    start = np.concatenate((centre[:_CURVE], _first_levels(pulses, stretches, prior)))
+    about = likelihood.about(_mode(likelihood, centre, _inverse(prior, laws[len(laws) // 2]), start))
+    found = [_given(about, centre, prior, law) for law in laws]
+    logs = np.array([log_evidence for log_evidence, _, _ in found]) + np.log([chance for _, chance in prior.drifts])
+    weights = np.exp(logs - logs.max())
+    shown = about.precision[_CURVE:, _CURVE:].trace() / len(pulses.log_mep)
+    means, sds = (np.array([one[part] for one in found]) for part in (1, 2))
+    return Posterior(weights / weights.sum(), means, sds, float(1.0 / np.sqrt(max(shown, 1e-3))))
 
-    def log_prior(at: FloatArray) -> float:
-        away = at - centre
-        return float(-0.5 * away @ inverse @ away)
 
-    at = centre.copy()
-    at[_CURVE:] = _first_levels(pulses, stretches, prior)
-    now = found(at)
-    value = float(now.value.sum()) + log_prior(at)
-    damping = 1.0
-    for _ in range(_STEPS):
-        each = np.zeros((len(pulses.log_mep), len(at)))
-        np.put_along_axis(each, indices, now.gradient, axis=1)
+class _Likelihood:
+    """The log likelihood of pulses by the curve's latents and the levels of the stretches."""
+
+    def __init__(self, pulses: Pulses, stretches: Stretches, size: int) -> None:
+        self._pulses, self.size = pulses, size
+        curve = np.tile(np.arange(_CURVE), (len(pulses.log_mep), 1))
+        self._indices = np.concatenate((curve, _CURVE + stretches.of_pulse[:, None]), axis=1)
+
+    def scores(self, at: FloatArray) -> tuple[float, FloatArray]:
+        """The log likelihood, and each pulse's derivatives, (n, size)."""
+        found = scores(self._pulses, at[self._indices])
+        each = np.zeros((len(self._indices), self.size))
+        np.put_along_axis(each, self._indices, found.gradient, axis=1)
+        return float(found.value.sum()), each
+
+    def about(self, at: FloatArray) -> _Quadratic:
+        """The quadratic that it is near a point; where it curves upwards it is taken as flat."""
+        value, each = self.scores(at)
+        precision = np.zeros((self.size, self.size))
+        np.add.at(
+            precision,
+            (self._indices[:, :, None], self._indices[:, None, :]),
+            -curvatures(self._pulses, at[self._indices]),
+        )
+        values, vectors = np.linalg.eigh(precision)
+        return _Quadratic(at, value, each.sum(axis=0), vectors * np.maximum(values, 0.0) @ vectors.T)
+
+
+def _mode(likelihood: _Likelihood, centre: FloatArray, inverse: FloatArray, start: FloatArray) -> FloatArray:
+    """The mode of the posterior, by steps with the outer product of the scores for the curvature [Berndt1974]."""
+
+    def found(at: FloatArray) -> tuple[float, FloatArray]:
+        value, each = likelihood.scores(at)
+        return value - 0.5 * float((at - centre) @ inverse @ (at - centre)), each
+
+    at, (value, each), share = start, found(start), 1.0
+    for _ in range(_MOST_STEPS):
         slope = each.sum(axis=0) - inverse @ (at - centre)
         step = np.linalg.solve(each.T @ each + inverse, slope)
         if slope @ step < _TOLERANCE:
             break
-        damping = min(1.0, 2.0 * damping)
-        while damping > 1e-3:
-            tried = at + damping * step
-            then = found(tried)
-            reached = float(then.value.sum()) + log_prior(tried)
-            if reached > value:
-                break
-            damping /= 2.0
-        else:
+        share = min(1.0, 2.0 * share)
+        reached, scored = found(at + share * step)
+        while reached <= value and share > _LEAST_SHARE:
+            share /= 2.0
+            reached, scored = found(at + share * step)
+        if reached <= value:
             break
-        at, now, value = tried, then, reached
-    curved = curvatures(pulses, at[indices])
-    precision = np.zeros((len(at), len(at)))
-    np.add.at(precision, (indices[:, :, None], indices[:, None, :]), -curved)
-    values, vectors = np.linalg.eigh(precision)
-    precision = vectors * np.maximum(values, 0.0) @ vectors.T
-    gradient = np.zeros(len(at))
-    np.add.at(gradient, indices, now.gradient)
-    return _Mode(at, gradient, float(now.value.sum())), precision
+        at, value, each = at + share * step, reached, scored
+    return at
 
 
 def _first_levels(pulses: Pulses, stretches: Stretches, prior: LevelPrior) -> FloatArray:
     """Levels to begin from: the mean log MEP of a stretch, less what the usual curve has at its intensities."""
     slope, x50 = prior.slope_per_pct.median, prior.x50_pct_rmt.median
-    log_share = -np.log1p(np.exp(-slope * (pulses.intensity_pct - x50)))
-    count = np.bincount(stretches.of_pulse)
-    return np.bincount(stretches.of_pulse, pulses.log_mep - log_share) / count
+    log_share = -np.logaddexp(0.0, -slope * (pulses.intensity_pct - x50))
+    return np.bincount(stretches.of_pulse, pulses.log_mep - log_share) / np.bincount(stretches.of_pulse)
 
 
-def _mixed(
-    prior: LevelPrior,
-    laws: list[_LevelLaw],
-    sizes: tuple[FloatArray, FloatArray],
-    mode: _Mode,
-    precision: FloatArray,
-) -> Posterior:
-    """The mixture over sizes of the drift, the log likelihood taken as quadratic about the mode."""
-    mean, sd = prior.curve
-    centre = np.concatenate((mean, np.full(len(mode.at) - _CURVE, prior.largest_mv.log_law[0])))
-    weights, means, sds = [], [], []
-    for law, chance in zip(laws, sizes[1], strict=True):
-        inverse = np.zeros_like(precision)
-        inverse[:_CURVE, :_CURVE] = np.diag(sd**-2.0)
-        levels = np.linalg.inv(law.covariance)
-        inverse[_CURVE:, _CURVE:] = levels
-        both = precision + inverse
-        linear = mode.gradient + precision @ mode.at + inverse @ centre
-        covariance = np.linalg.inv(both)
-        at = covariance @ linear
-        sign, log_det = np.linalg.slogdet(both)
-        away, off = at - mode.at, at - centre
-        fit = mode.value + mode.gradient @ away - 0.5 * away @ precision @ away - 0.5 * off @ inverse @ off
-        log_prior_det = np.linalg.slogdet(law.covariance)[1]
-        weights.append(np.log(chance) + fit - 0.5 * (log_det + log_prior_det) if sign > 0 else -np.inf)
-        gain = law.with_changes @ levels
-        means.append(gain @ (at[_CURVE:] - centre[_CURVE:]))
-        left = law.of_changes - np.einsum("bs,bs->b", gain, law.with_changes)
-        known = np.einsum("bs,st,bt->b", gain, covariance[_CURVE:, _CURVE:], gain)
-        sds.append(np.sqrt(left + known))
-    chances = np.exp(np.array(weights) - max(weights))
-    chances /= chances.sum()
-    return Posterior(chances, np.array(means), np.array(sds), mode.at, float(chances @ sizes[0]))
+def _inverse(prior: LevelPrior, law: _LevelLaw) -> FloatArray:
+    """The inverse covariance of curve and levels."""
+    size = _CURVE + len(law.covariance)
+    inverse = np.zeros((size, size))
+    inverse[:_CURVE, :_CURVE] = np.diag(prior.curve[1] ** -2.0)
+    inverse[_CURVE:, _CURVE:] = np.linalg.inv(law.covariance)
+    return inverse
+
+
+def _given(
+    about: _Quadratic, centre: FloatArray, prior: LevelPrior, law: _LevelLaw
+) -> tuple[float, FloatArray, FloatArray]:
+    """With one size of the drift: the log evidence, but for what all sizes share, means and SDs of the changes."""
+    inverse = _inverse(prior, law)
+    covariance = np.linalg.inv(about.precision + inverse)
+    at = covariance @ (about.gradient + about.precision @ about.at + inverse @ centre)
+    away, off = at - about.at, at - centre
+    fit = about.value + about.gradient @ away - 0.5 * (away @ about.precision @ away + off @ inverse @ off)
+    spread = np.linalg.slogdet(covariance)[1] - np.linalg.slogdet(law.covariance)[1]
+    gain = law.with_changes @ inverse[_CURVE:, _CURVE:]
+    left = law.of_changes - np.einsum("bs,bs->b", gain, law.with_changes)
+    known = np.einsum("bs,st,bt->b", gain, covariance[_CURVE:, _CURVE:], gain)
+    return float(fit + 0.5 * spread), gain @ off[_CURVE:], np.sqrt(left + known)
