@@ -1,3 +1,5 @@
+from .after_effects import AFTER_EFFECTS as AFTER_EFFECTS
+from .after_effects import with_after_effects as with_after_effects
 from .changes import Change as Change
 from .changes import Plasticity as Plasticity
 from .changes import TapResponse as TapResponse

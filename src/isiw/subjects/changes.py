@@ -12,26 +12,60 @@ from typing import Final
 
 import numpy as np
 
-from isiw.checks import Checked, Count, NonNegative, Number, Positive
+from isiw.checks import Checked, Count, NonNegative, Number, Positive, Share
 from isiw.errors import InvalidValueError
 from isiw.types import FloatArray
 
 
 @dataclass(frozen=True)
 class Plasticity(Checked):
-    """Dependence of a person's gain on the pairs that they have had.
+    """Dependence of a person's gain on the pairs that they have had: the after-effect of pairs, for TMS alone, too.
+
+    A pair moves the log gain towards a limit, by a share 1 - exp(-u / pairs) of what is left, u its facilitation: so it
+    saturates. Without pairs it returns to what it was, by half in `half_life_min`.
 
     Args:
         limit: change of the log gain after very many pairs, natural log; above 0 the MEPs grow, below 0 they shrink.
         pairs: after so many pairs at the best ISI, 63 % of the change has come.
+        least: facilitation from which on a pair counts as one inside the window; others move the gain to `outside`.
+        outside: change of the log gain after very many pairs outside the window, each as strong as one at the best ISI.
+        half_life_min: time in which half of the change is lost [min]; None if it stays.
+        turns_after: after so many pairs at the best ISI further ones push to the opposite of the limit; None if they
+            do not.
     """
 
     limit: Number
     pairs: Positive = 100.0
+    least: Share = 0.0
+    outside: Number = 0.0
+    half_life_min: Positive | None = None
+    turns_after: Positive | None = None
 
     def log_gain(self, dose: float) -> float:
-        """The addition to the log gain after a dose: the facilitation, in 0–1, of all pairs so far, summed."""
+        """The addition to the log gain after a dose: the facilitation, in 0–1, of all pairs so far, summed.
+
+        Of pairs inside the window, before the gain turns or is lost with time.
+        """
         return -self.limit * math.expm1(-dose / self.pairs)
+
+    def after(self, log_gain: float, facilitation: float, dose: float) -> float:
+        """The change of the log gain after one more pair.
+
+        Args:
+            log_gain: the change before it, natural log.
+            facilitation: of the pair, at most 1.
+            dose: the facilitation of all pairs inside the window before it, summed.
+        """
+        inside = facilitation > 0 and facilitation >= self.least
+        strength = facilitation if inside else float(self.least > 0)
+        limit = self.limit if inside else self.outside
+        if inside and self.turns_after is not None and dose >= self.turns_after:
+            limit = -limit
+        return limit + (log_gain - limit) * math.exp(-strength / self.pairs)
+
+    def left(self, log_gain: float, minutes: float) -> float:
+        """What is left of a change of the log gain after some time without pairs [min]."""
+        return log_gain if self.half_life_min is None else log_gain * 2.0 ** (-minutes / self.half_life_min)
 
 
 MEP_WINDOW_MS: Final = (15.0, 35.0)

@@ -187,14 +187,32 @@ class Responder:
         self._trials = 0
         self._input_z = self._rng.standard_normal()
         self._walk = 0.0
-        self._dose = 0.0
+        self._dose, self._after_effect = 0.0, 0.0
+
+    @property
+    def after_effect(self) -> float:
+        """The change of the log gain by the pairs so far, natural log."""
+        return self._after_effect
+
+    def wait(self, minutes: float) -> None:
+        """Let time go by without a stimulus, in which an after-effect may be lost [min]."""
+        if self.subject.plasticity is not None:
+            minutes = number("minutes", minutes, least=0)
+            self._after_effect = self.subject.plasticity.left(self._after_effect, minutes)
 
     @property
     def trials(self) -> int:
         """Number of stimuli that were answered."""
         return self._trials
 
-    def respond(self, isi_ms: float | None, reference: Reference, *, pulse: bool = True) -> Response:
+    def respond(
+        self,
+        isi_ms: float | None,
+        reference: Reference,
+        *,
+        pulse: bool = True,
+        intensity_pct_rmt: float | None = None,
+    ) -> Response:
         """Answer one pair of stimuli, or one of them alone.
 
         Args:
@@ -202,9 +220,12 @@ class Responder:
             reference: the event that the ISI counts from. From the valve command the hit delay's variation stays
                 unseen; from the impact it moves the realised ISI, which is reported.
             pulse: whether the magnetic pulse is given; without it, the amplitude is of what the MEP window would hold.
+            intensity_pct_rmt: intensity of the pulse, of a person with a recruitment curve [% RMT]; by default that of
+                their pairs.
 
         Raises:
-            InvalidValueError: an ISI that is not finite, or an unknown reference.
+            InvalidValueError: an ISI that is not finite, an unknown reference, or an intensity of somebody who has no
+                recruitment curve.
         """
         isi_ms = None if isi_ms is None else number("an ISI [ms]", isi_ms)
         choice("the reference", reference, get_args(Reference))
@@ -213,10 +234,11 @@ class Responder:
         facilitation = 0.0
         if from_impact_ms is not None and pulse:
             facilitation = float(self.subject.facilitation(np.asarray(from_impact_ms), "impact", self._trials))
-        self._dose += max(0.0, facilitation)
+        if from_impact_ms is not None and pulse:
+            self._remember(facilitation)
         subject, rng = self.subject, self._rng
         floor_mv = subject.response.floor.median_mv * np.exp(subject.response.floor.log_sd * rng.standard_normal())
-        evoked_mv = self._response().sample_evoked_mv(facilitation, noise, rng) if pulse else 0.0
+        evoked_mv = self._response(intensity_pct_rmt).sample_evoked_mv(facilitation, noise, rng) if pulse else 0.0
         mep_mv = self._with_tap_mv(evoked_mv, noise, from_impact_ms) + floor_mv
         if rng.random() < subject.outlier_probability:
             mep_mv = rng.uniform(*OUTLIERS_MV)
@@ -226,9 +248,24 @@ class Responder:
         unseen_ms = 0.0 if subject.jitter_told or isi_ms is None else subject.isi_jitter_ms
         return Response(told_ms, float(mep_mv), unseen_ms)
 
-    def _response(self) -> ResponseCurve:
+    def _remember(self, facilitation: float) -> None:
+        """What a pair leaves behind."""
+        plasticity = self.subject.plasticity
+        if plasticity is not None:
+            self._after_effect = plasticity.after(self._after_effect, facilitation, self._dose)
+            self._dose += max(0.0, facilitation) if facilitation >= plasticity.least else 0.0
+
+    def _response(self, intensity_pct_rmt: float | None) -> ResponseCurve:
         """The response at the intensity of this trial."""
         change, response = self.subject.change, self.subject.response
+        if intensity_pct_rmt is not None:
+            if not isinstance(response, RecruitmentResponse):
+                raise InvalidValueError(
+                    "only an MEP on a recruitment curve depends on the intensity",
+                    got=type(response).__name__,
+                    expected=RecruitmentResponse.__name__,
+                )
+            response = replace(response, intensity_pct_rmt=intensity_pct_rmt)
         if change is None or not isinstance(response, RecruitmentResponse):
             return response
         added_pct = change.share(self._trials) * change.intensity_pct_rmt
@@ -280,7 +317,7 @@ class Responder:
             startup = subject.drift.startup
             log_gain = self._walk + (startup[self._trials] if self._trials < len(startup) else 0.0)
         if subject.plasticity is not None:
-            log_gain += subject.plasticity.log_gain(self._dose)
+            log_gain += self._after_effect
         self._trials += 1
         if subject.change is not None:
             log_gain += subject.change.share(self._trials) * subject.change.log_gain
