@@ -1,5 +1,6 @@
 from . import threshold_loops as threshold_loops
 from .afterwards import estimate_again as estimate_again
+from .afterwards import open_arm as open_arm
 from .console import PROGRESS_HEADINGS as PROGRESS_HEADINGS
 from .console import aligned as aligned
 from .console import progress_row as progress_row

@@ -28,3 +28,4 @@ class Earlier:
     first_records: Sequence[Record] = ()
     ages: Callable[[], Ages] = Ages
     taps: Callable[[SignalLimits], TapResponses] | None = None
+    ago_s: Callable[[int], float | None] = lambda _: None

@@ -74,6 +74,7 @@ class Strategy:
         self.earlier: tuple[Trial, ...] = ()  # learnt before the first ask
         self.same_level, self.earlier_given = True, 0  # stimuli, also of trials from which nothing was learnt
         self.in_doubt, self._asked, self._reported = False, Asked(), Reported(space)
+        self.only_counts = False  # in an intervention, which changes what a search would learn of as if it stayed
 
     def __str__(self) -> str:
         name = f"Strategy {self.recipe.name!r}" if self.recipe.name else "Strategy"
@@ -90,7 +91,7 @@ class Strategy:
         how = {"initial_ms": self.initial_ms, "cost": self.cost, "seed": self.seed, "recipe": self.recipe}
         again = Strategy(self.space, self.model, self.acquisition, self.stopping, **how)  # type: ignore[arg-type]
         again.learn_all(self.earlier, same_level=self.same_level)
-        again.earlier_given = self.earlier_given
+        again.earlier_given, again.only_counts = self.earlier_given, self.only_counts
         return again
 
     @property
@@ -279,7 +280,9 @@ class Strategy:
         Raises:
             StrategyError: a kind of outcome that the model cannot learn from.
         """
-        if trial.told:
+        if self.only_counts:
+            self._controls += 1
+        elif trial.told:
             self._learn(Outcome.of(trial))
         elif trial.counts and trial.isi_ms is not None and trial.mep_mv is not None:
             self._learn_tap(trial.isi_ms, trial.mep_mv)
