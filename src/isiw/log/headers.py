@@ -39,7 +39,7 @@ from isiw.signals.limits import SignalLimits
 from isiw.strategy.threshold.pulses import IntensityRange
 from isiw.text.stimuli import STIMULI, StimulusWords
 from isiw.trials import Trial
-from isiw.types import Conditioning
+from isiw.types import Conditioning, Reference
 from isiw.visit import Visit, VisitProtocol
 
 PRODUCTION_VERSION: Final = 1
@@ -160,6 +160,24 @@ class _Header(LogRecord):
     config: dict[str, Any] = Field(default_factory=dict)
 
 
+class FirstStep(LogRecord):
+    """The profile of a session below the motor threshold, which a search above it goes on from [Kim2020, 8.1.3].
+
+    Args:
+        log: the name of its log.
+        intensity_pct_rmt: its intensity [% RMT]; None if it was not noted.
+        reference: what its ISIs count from.
+        grid_ms: ISIs [ms].
+        profile_mv: the median of the expected MEP at each [mV].
+    """
+
+    log: str
+    intensity_pct_rmt: float | None = None
+    reference: Reference
+    grid_ms: tuple[float, ...]
+    profile_mv: tuple[float, ...]
+
+
 class Header(_Header):
     """The header of a session, written before anything else, and again before it goes on: the last one holds.
 
@@ -168,6 +186,7 @@ class Header(_Header):
     one is of trials that were delivered without isiw, and `source` says where they are from: it was no session, and has
     no intents; `given_by` is when all of them had been given, as ISO 8601 in UTC, if their dates say so. `earlier` are
     trials that were learnt before the first ask, and `earlier_given` is how many stimuli these and lost ones were.
+    `first_step` is the profile below the motor threshold that a search above it goes on from.
     """
 
     kind: Literal["session", "imported"] = "session"
@@ -187,6 +206,7 @@ class Header(_Header):
     earlier: tuple[Trial, ...] = ()
     earlier_given: int = 0
     earlier_same_level: bool = False
+    first_step: FirstStep | None = None
 
     @field_validator("given_by")
     @classmethod

@@ -19,7 +19,7 @@ from isiw.devices.limits import USUAL_ITI_S, Limits
 from isiw.devices.protocol import Device
 from isiw.errors import InvalidValueError, StrategyError
 from isiw.log.durable import log_of
-from isiw.log.headers import Header, StrategyRecipe
+from isiw.log.headers import FirstStep, Header, StrategyRecipe
 from isiw.log.pulses import Ages
 from isiw.log.schema import Event, Record, now
 from isiw.log.writer import LogWriter
@@ -180,6 +180,8 @@ class _Described(TypedDict, total=False):
 class Options(Changeable, _Described, total=False):
     """Options of a session that begins."""
 
+    first_step: FirstStep | None
+
 
 class OwnLoopOptions(_Described, total=False):
     """Options of a session whose loop is the lab's own."""
@@ -226,6 +228,7 @@ def assembled(
         timeout_s=patience("timeout_s", options.get("timeout_s", 30.0)),
         ask_deadline_s=deadline("ask_deadline_s", options.get("ask_deadline_s")),
         config=dict(options.get("config") or {}),
+        first_step=options.get("first_step"),
     ).model_copy(update=dict(earlier.kept))
     if safeguards.earlier_logs is not None and not header.subject:
         raise InvalidValueError(
