@@ -83,6 +83,7 @@ QUICK: Final[Mapping[str, str]] = {
     "trial_cost": "--trials 60",
     "trial_reduction": "--few --processes 1 --out OUT",
     "trial_way": "",
+    "two_steps": "--people 1 --out OUT",
     "vane": "--out OUT",
     "waveform_loop": "--people 2 --sessions 1 --trials 15",
     "zero_trials": "--people 20",

@@ -15,7 +15,16 @@ from hypothesis import strategies as st
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
-from isiw.metrics import covers, edge_error_ms, edge_ranks, f1, f1_of_masks, trials_to_criterion, true_edges_ms
+from isiw.metrics import (
+    covers,
+    edge_error_ms,
+    edge_ranks,
+    f1,
+    f1_of_masks,
+    profile_correlation,
+    trials_to_criterion,
+    true_edges_ms,
+)
 from isiw.types import ArrayLike
 from isiw.window import Window
 from known import known
@@ -199,3 +208,18 @@ def test_without_samples_a_rank_says_nothing() -> None:
     rng = np.random.default_rng(2)
     ranks = [edge_ranks(estimate, Window(40, 60), DesignSpace(0, 100, reference="impact"), rng) for _ in range(500)]
     assert scipy.stats.kstest(np.ravel(ranks), "uniform").pvalue > 1e-3
+
+
+def test_profiles_correlate_at_the_isis_that_they_share() -> None:
+    own_ms, own_mv = [0.0, 10.0, 20.0, 30.0], [0.0, 1.0, 2.0, 3.0]
+    found = profile_correlation(own_ms, own_mv, [5.0, 15.0, 25.0, 90.0], [1.0, 2.0, 3.0, -9.0])
+    assert found.isis == 3
+    assert found.r == pytest.approx(1.0)
+    assert math.isnan(profile_correlation(own_ms, [1.0] * 4, own_ms, own_mv).r)
+
+
+def test_profiles_that_share_no_isis_or_do_not_ascend_have_no_correlation() -> None:
+    with pytest.raises(InvalidValueError, match="too few ISIs in common"):
+        profile_correlation([0.0, 1.0, 2.0], [1.0, 2.0, 3.0], [5.0, 6.0, 7.0], [1.0, 2.0, 3.0])
+    with pytest.raises(InvalidValueError, match="ISIs that ascend"):
+        profile_correlation([0.0, 2.0, 1.0], [1.0, 2.0, 3.0], [0.0, 1.0, 2.0], [1.0, 2.0, 3.0])

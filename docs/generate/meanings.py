@@ -53,6 +53,7 @@ MEANINGS: Final[Mapping[str, Mapping[str, str]]] = {
         "earlier": "trials that were learnt before the first ISI was chosen.",
         "earlier_given": "how many stimuli these and lost ones were; `max_pulses` counts them.",
         "earlier_same_level": "whether electrodes, coil and intensity are those of the earlier trials.",
+        "first_step": "of a search above the threshold: the profile below it that it goes on from; None for none.",
     },
     "/intent": {
         "trial": _TRIAL,

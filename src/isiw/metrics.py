@@ -1,9 +1,10 @@
-"""Measures of an estimate: F1, edge errors, coverage, and the trial from which a criterion is met."""
+"""Measures of an estimate: F1, edge errors, coverage, correlation, and the trial from which a criterion is met."""
 
 from __future__ import annotations
 
 import math
 from types import NoneType
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -12,6 +13,21 @@ from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
 from isiw.types import ArrayLike, BoolArray, FloatArray
 from isiw.window import Interval, Window
+
+LEAST_ISIS: Final = 3
+"""Profiles with fewer ISIs in common have no correlation."""
+
+
+class ProfileCorrelation(NamedTuple):
+    """Correlation of two profiles.
+
+    Args:
+        r: Pearson's r; NaN if one of them is the same everywhere.
+        isis: at how many ISIs.
+    """
+
+    r: float
+    isis: int
 
 
 def f1_of_masks(estimated: ArrayLike, true: ArrayLike) -> FloatArray:
@@ -78,6 +94,43 @@ def covers(
         for (low, high), edge in zip(intervals, true_edges_ms(truth, space), strict=True)
     )
     return start, end
+
+
+def profile_correlation(
+    isi_ms: ArrayLike, mep_mv: ArrayLike, other_isi_ms: ArrayLike, other_mep_mv: ArrayLike
+) -> ProfileCorrelation:
+    """Correlation of two profiles (Pearson's r), such as an estimated and a measured one [Kim2020, Fig. 4.23].
+
+    It is taken at those ISIs of the second profile that the first one spans, at which the first is interpolated.
+
+    Args:
+        isi_ms: ISIs of the first profile, ascending [ms], shape (t,).
+        mep_mv: its MEP at each [mV], shape (t,).
+        other_isi_ms: ISIs of the second, such as those of a sweep [ms], shape (n,).
+        other_mep_mv: its MEP at each [mV], shape (n,).
+
+    Raises:
+        InvalidValueError: shapes that do not fit, values that are not finite, ISIs that do not ascend, or fewer than
+            three common ISIs.
+    """
+    (own_ms, own_mv), (at_ms, other_mv) = (_profile(*each) for each in ((isi_ms, mep_mv), (other_isi_ms, other_mep_mv)))
+    both = (at_ms >= own_ms[0]) & (at_ms <= own_ms[-1])
+    if both.sum() < LEAST_ISIS:
+        raise InvalidValueError(
+            "the profiles have too few ISIs in common", got=int(both.sum()), expected=f"at least {LEAST_ISIS}"
+        )
+    first, second = np.interp(at_ms[both], own_ms, own_mv), other_mv[both]
+    flat = min(np.ptp(first), np.ptp(second)) == 0.0
+    return ProfileCorrelation(math.nan if flat else float(np.corrcoef(first, second)[0, 1]), int(both.sum()))
+
+
+def _profile(isi_ms: ArrayLike, mep_mv: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    at_ms, sizes_mv = np.asarray(isi_ms, dtype=float), np.asarray(mep_mv, dtype=float)
+    if at_ms.ndim != 1 or at_ms.shape != sizes_mv.shape or not len(at_ms):
+        raise InvalidValueError("each ISI of a profile has one MEP", got=(at_ms.shape, sizes_mv.shape))
+    if not (np.isfinite(at_ms).all() and np.isfinite(sizes_mv).all() and (np.diff(at_ms) > 0).all()):
+        raise InvalidValueError("a profile has finite MEPs at ISIs that ascend", got=at_ms.tolist())
+    return at_ms, sizes_mv
 
 
 def edge_ranks(

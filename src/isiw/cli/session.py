@@ -40,7 +40,8 @@ Earlier = Annotated[
     list[Path] | None,
     typer.Option(
         help="The log of an earlier session of the same person, or of the search for the threshold just before, whose "
-        "pulses teach the recruitment curve; repeat it for several, earliest first."
+        "pulses teach the recruitment curve; repeat it for several, earliest first. With the strategy supra-threshold, "
+        "of a session below the threshold, about whose window it looks."
     ),
 ]
 Live = Annotated[

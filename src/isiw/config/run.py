@@ -59,7 +59,8 @@ class RunConfig(Section):
         log: the file of the log; by default a new one in `isiw-sessions`.
         prior: a lab's prior, as `isiw prior learn` writes it.
         after: logs of earlier sessions of the same person, earliest first, and of searches for the threshold just
-            before, whose pulses teach the recruitment curve.
+            before, whose pulses teach the recruitment curve. With the strategy `supra-threshold`, sessions below the
+            threshold, in whose window it looks.
         earlier: logs of earlier trials of this visit, or tables (.csv) of pulses of TMS alone with the columns
             `intensity_pct_rmt` and `mep_mv`, which are learnt before the first ISI.
     """

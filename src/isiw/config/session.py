@@ -5,6 +5,8 @@ from __future__ import annotations
 import itertools
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from datetime import datetime, timedelta
 from functools import partial
 from importlib import resources
 from pathlib import Path
@@ -20,13 +22,15 @@ from isiw.errors import ConfigError, StrategyError
 from isiw.files import write_output
 from isiw.intervention import Intervention
 from isiw.log.durable import log_exists
-from isiw.log.headers import RUN_KEY
+from isiw.log.headers import RUN_KEY, FirstStep
 from isiw.log.kinds import imported_sentence
 from isiw.log.reader import SessionRecord, ThresholdRecord, read_session
 from isiw.log.schema import now
 from isiw.models.particles.prior import Prior
-from isiw.priors import after, read_lab_prior
-from isiw.priors.days import require_each_once, require_whole
+from isiw.models.particles.supra.prior import SupraPrior
+from isiw.priors import above, after, read_lab_prior
+from isiw.priors.above import SAME_VISIT, profile_below
+from isiw.priors.days import DayToDay, require_each_once, require_whole
 from isiw.session.given import given_pulses
 from isiw.session.loop import Session
 from isiw.strategy.catalogue import known_settings, make_strategy, settings_for
@@ -34,6 +38,9 @@ from isiw.subjects.cohorts import person_of
 from isiw.text.named_code import named_code, require_fitting
 from isiw.trials import Trial
 from isiw.visit import Visit, VisitProtocol
+
+SAME_VISIT_H: Final = 12.0
+"""Sessions that began within so many hours are one visit, where no day is noted [h]."""
 
 TEMPLATE_FILES = ("rig.py", "session.toml", "test_rig.py")
 """The files that `write_rig_template` writes."""
@@ -78,6 +85,10 @@ def settings_with_prior(config: RunConfig, device: DeviceInfo) -> dict[str, Any]
             "strategy.settings.prior and a prior from earlier sessions exclude each other",
             remedy="Give only one of them.",
         )
+    if looks_above(config.strategy.name) and earlier:
+        lab = None if config.prior is None else read_lab_prior(config.prior).joined()
+        _require_people(config, earlier, device, any_intensity=True)
+        return settings | {"prior": above(*earlier, prior=lab, law=_law(config, earlier))}
     if not learns_from_earlier(config.strategy.name):
         raise StrategyError(
             f"the strategy {config.strategy.name} learns nothing from earlier sessions",
@@ -92,11 +103,35 @@ def settings_with_prior(config: RunConfig, device: DeviceInfo) -> dict[str, Any]
 
 def learns_from_earlier(name: str) -> bool:
     """True if a strategy has a prior for what earlier sessions teach."""
+    return _has_prior(name, Prior())
+
+
+def looks_above(name: str) -> bool:
+    """True if a strategy has a prior for the search above the threshold, the second of two steps."""
+    return _has_prior(name, SupraPrior())
+
+
+def _has_prior(name: str, kind: Prior | SupraPrior) -> bool:
     try:
-        settings_for(name, prior=Prior())
+        settings_for(name, prior=kind)
     except StrategyError:  # no prior, or that of another model
         return False
     return True
+
+
+def first_step(config: RunConfig) -> FirstStep | None:
+    """The profile of the session below the threshold, the first of two steps; None if this is no second step."""
+    earlier = sessions_after(config)
+    return profile_below(earlier[-1]) if earlier and looks_above(config.strategy.name) else None
+
+
+def _law(config: RunConfig, earlier: Sequence[SessionRecord]) -> DayToDay:
+    """How a person differs from the last session: another day, or the same visit where nothing noted says otherwise."""
+    day, last = config.visit.day, earlier[-1].header
+    if day is not None and last.visit.day is not None:
+        return SAME_VISIT if day == last.visit.day else DayToDay()
+    apart = now() - datetime.fromisoformat(last.created)
+    return SAME_VISIT if apart < timedelta(hours=SAME_VISIT_H) else DayToDay()
 
 
 def _require_people(
@@ -104,6 +139,8 @@ def _require_people(
     records: Sequence[SessionRecord | ThresholdRecord],
     device: DeviceInfo,
     simulated: Sequence[str] = (),
+    *,
+    any_intensity: bool = False,
 ) -> None:
     """Raise if sessions, or what else was simulated, cannot teach anything of the person who will be examined."""
     nobodys = [*simulated, *(str(record.path) for record in records if record.header.device.simulated)]
@@ -116,7 +153,8 @@ def _require_people(
     require_same_person(config, records)
     for record in records:
         if isinstance(record, SessionRecord):
-            _require_like(config, record.header.visit, record.path)
+            visit = record.header.visit
+            _require_like(config, replace(visit, intensity_pct_rmt=None) if any_intensity else visit, record.path)
 
 
 def earlier_trials(config: RunConfig, device: DeviceInfo) -> tuple[Trial, ...]:
@@ -285,6 +323,7 @@ def session_for(config: RunConfig, intervention: Intervention | None = None) -> 
         visit=config.visit.noted(),
         protocol=config.protocol if intervention is None else VisitProtocol(taps_first=0),
         intervention=intervention,
+        first_step=first_step(config),
     )
 
 

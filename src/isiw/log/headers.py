@@ -40,7 +40,7 @@ from isiw.signals.limits import SignalLimits
 from isiw.strategy.threshold.pulses import IntensityRange
 from isiw.text.stimuli import STIMULI, StimulusWords
 from isiw.trials import Trial
-from isiw.types import Conditioning
+from isiw.types import Conditioning, Reference
 from isiw.visit import Visit, VisitProtocol
 
 PRODUCTION_VERSION: Final = 1
@@ -161,6 +161,24 @@ class _Header(LogRecord):
     config: dict[str, Any] = Field(default_factory=dict)
 
 
+class FirstStep(LogRecord):
+    """The profile of a session below the motor threshold, which a search above it goes on from [Kim2020, 8.1.3].
+
+    Args:
+        log: the name of its log.
+        intensity_pct_rmt: its intensity [% RMT]; None if it was not noted.
+        reference: what its ISIs count from.
+        grid_ms: ISIs [ms].
+        profile_mv: the median of the expected MEP at each [mV].
+    """
+
+    log: str
+    intensity_pct_rmt: float | None = None
+    reference: Reference
+    grid_ms: tuple[float, ...]
+    profile_mv: tuple[float, ...]
+
+
 class Header(_Header):
     """The header of a session, written before anything else, and again before it goes on: the last one holds.
 
@@ -171,6 +189,7 @@ class Header(_Header):
     trials that were learnt before the first ask, and `earlier_given` is how many stimuli these and lost ones were.
     An "intervention" uses a window that was found before, and searches for none; an older isiw does not know the kind,
     and so continues none as if it were a search.
+    `first_step` is the profile below the motor threshold that a search above it goes on from.
     """
 
     kind: Literal["session", "imported", "intervention"] = "session"
@@ -191,6 +210,7 @@ class Header(_Header):
     earlier_given: int = 0
     earlier_same_level: bool = False
     intervention: Intervention | None = None
+    first_step: FirstStep | None = None
 
     @field_validator("given_by")
     @classmethod

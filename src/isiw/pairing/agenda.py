@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from isiw.acquisition.fixed import golden_index
+from isiw.acquisition.protocol import golden_index
 from isiw.errors import InvalidValueError
 from isiw.intervention import Arm, Intervention, Part, Slot
 from isiw.pairing.following import Followed

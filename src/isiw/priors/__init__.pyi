@@ -1,4 +1,5 @@
 from . import file as file
+from .above import above as above
 from .days import DayToDay as DayToDay
 from .days import after as after
 from .days import moved as moved

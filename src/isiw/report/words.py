@@ -10,13 +10,14 @@ from typing import Final, NamedTuple
 
 from isiw import sentences, summary
 from isiw.change import Misfit
+from isiw.errors import InvalidValueError
 from isiw.estimate import Estimate
 from isiw.findings import Kind
 from isiw.intervention import Intervention, Part
 from isiw.log.headers import Header
 from isiw.log.kinds import continued_by
 from isiw.log.reader import SessionRecord, require_records
-from isiw.metrics import f1
+from isiw.metrics import f1, profile_correlation
 from isiw.report.evidence import changed_with_time, contradiction, no_comparison, nothing_measured, nothing_stood_out
 from isiw.session.examination import change_found
 from isiw.strategy.catalogue import known_settings, list_strategies, measured_of
@@ -159,6 +160,7 @@ def findings(record: SessionRecord) -> list[Said]:
             Said("excluded", Role.DETAIL, sentences.excluded(estimate)),
             Said("expected F1", Role.DETAIL, sentences.expected_f1(estimate)),
             Said("depression", Role.DETAIL, _depression(record)),
+            Said("first step", Role.DETAIL, _first_step(record)),
             Said("unusual", Role.DETAIL, sentences.unusual(estimate)),
         ]
     )
@@ -194,6 +196,19 @@ def _misfit(found: Misfit | None) -> str:
 def _depression(record: SessionRecord) -> str:
     header = record.header
     return sentences.depression(record.estimates[-1], header.stimulus.name, header.visit.intensity_pct_rmt)
+
+
+def _first_step(record: SessionRecord) -> str:
+    """How the profile correlates with that of the session below the threshold, where this went on from one."""
+    first, last = record.header.first_step, record.estimates[-1]
+    if first is None or not last.profile_mv or first.reference != record.header.space.reference:
+        return ""
+    try:
+        r, isis = profile_correlation(first.grid_ms, first.profile_mv, last.grid_ms, last.profile_mv)
+    except InvalidValueError:  # they share no ISIs
+        return ""
+    at = "below the threshold" if first.intensity_pct_rmt is None else f"at {first.intensity_pct_rmt:g} % of RMT"
+    return f"The profile correlates with that {at} ({first.log}) by {r:.2f}, over {isis} ISIs."
 
 
 def finding_sentences(record: SessionRecord) -> list[str]:

@@ -19,7 +19,7 @@ from isiw.devices.protocol import Device
 from isiw.errors import InvalidValueError, StrategyError
 from isiw.intervention import Intervention
 from isiw.log.durable import log_of
-from isiw.log.headers import Header, StrategyRecipe
+from isiw.log.headers import FirstStep, Header, StrategyRecipe
 from isiw.log.schema import now
 from isiw.native.library import version as engine_version
 from isiw.pairing.agenda import Agenda
@@ -177,6 +177,7 @@ class Options(Changeable, _Described, total=False):
     """Options of a session that begins."""
 
     intervention: Intervention | None
+    first_step: FirstStep | None
 
 
 class OwnLoopOptions(_Described, total=False):
@@ -226,6 +227,7 @@ def assembled(
         ask_deadline_s=deadline("ask_deadline_s", options.get("ask_deadline_s")),
         config=dict(options.get("config") or {}),
         **({} if intervention is None else {"kind": "intervention", "intervention": intervention}),
+        first_step=options.get("first_step"),
     ).model_copy(update=dict(earlier.kept))
     if safeguards.earlier_logs is not None and not header.subject:
         raise InvalidValueError(

@@ -50,6 +50,7 @@ class Session(Judging):
         safeguards: what is done about faults, pauses and earlier sessions.
         visit: what is noted about the visit, for the log.
         protocol: intervals, control trials, blocks and rests.
+        first_step: the profile below the motor threshold that a search above it goes on from, for the log.
 
     Raises:
         DeviceError: the device counts its ISIs from another event than the space, or states another detection limit

@@ -233,7 +233,8 @@ def _session_resumed(
     strategy, earlier = taken_up(salvaged, record, strategy, limits, options)
     if isinstance(device, HasMemory):
         device.resume_after([Stimulus(t.index, t.commanded_isi_ms, t.tap_alone) for t in earlier.trials])
-    kept = ("subject", "config", "visit", "protocol", "signals", "timeout_s", "ask_deadline_s", "intervention")
+    kept: tuple[str, ...] = ("subject", "config", "visit", "protocol", "signals", "timeout_s", "ask_deadline_s")
+    kept += ("intervention", "first_step")
     said: Any = {name: getattr(header, name) for name in kept}
     said |= {name: value for name, value in options.items() if name in Changeable.__annotations__ and value is not None}
     return Session(device, strategy, log=record.path, earlier=earlier, **said | {"limits": limits})
