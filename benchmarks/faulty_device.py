@@ -18,8 +18,9 @@ from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, require
 from isiw.errors import DeviceError, NotDelivered
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Event, Intent
+from isiw.sweeps import Channel, Measurement, Sweep
 from isiw.testing.suites import require
-from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep
+from isiw.trials import Status, Stimulus
 
 _HOT_C = 90.0
 _COOL_C = 25.0

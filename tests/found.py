@@ -8,7 +8,8 @@ from isiw.findings import Finding
 from isiw.signals.amplitudes import Told
 from isiw.signals.rig import Evidence
 from isiw.signals.watch import findings
-from isiw.trials import Measurement, Sweep, Trial
+from isiw.sweeps import Measurement, Sweep
+from isiw.trials import Trial
 
 
 def fault_of(answer: Sweep | Measurement, trial: Trial) -> Finding | None:

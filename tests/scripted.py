@@ -15,7 +15,8 @@ from isiw.estimate import WindowEstimate
 from isiw.models.protocol import Observation
 from isiw.strategy.stopping import Budget
 from isiw.strategy.strategy import Strategy
-from isiw.trials import Measurement, Stimulus
+from isiw.sweeps import Measurement
+from isiw.trials import Stimulus
 from isiw.types import Array
 from isiw.window import Window
 from known import instance

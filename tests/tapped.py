@@ -11,7 +11,8 @@ from isiw.devices.protocol import DeviceInfo
 from isiw.signals import judge
 from isiw.signals.tap import TapResponses
 from isiw.subjects.changes import TapResponse
-from isiw.trials import Channel, Stimulus, Sweep, Trial
+from isiw.sweeps import Channel, Sweep
+from isiw.trials import Stimulus, Trial
 
 IMPACT = DesignSpace(0, 320, reference="impact")
 

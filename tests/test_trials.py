@@ -12,7 +12,8 @@ import pytest
 
 from isiw.errors import InvalidValueError
 from isiw.findings import Kind
-from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial, TrialTable
+from isiw.sweeps import Channel, Measurement, Sweep
+from isiw.trials import Status, Stimulus, Trial, TrialTable
 
 NOT_FINITE = [math.nan, math.inf, -math.inf]
 

@@ -13,7 +13,8 @@ from isiw.devices.robot.tapper import Tapper, TapperSettings
 from isiw.devices.simulated import SimulatedDevice
 from isiw.findings import Kind
 from isiw.subjects.cohorts import cohort
-from isiw.trials import Channel, Stimulus, Sweep
+from isiw.sweeps import Channel, Sweep
+from isiw.trials import Stimulus
 from isiw.types import Reference
 
 SPACE = DesignSpace(0, 320, reference="impact")

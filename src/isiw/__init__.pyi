@@ -63,10 +63,10 @@ from .strategy.catalogue import list_strategies as list_strategies
 from .strategy.catalogue import make_strategy as make_strategy
 from .strategy.decisions import StopDecision as StopDecision
 from .strategy.strategy import Strategy as Strategy
-from .trials import Channel as Channel
-from .trials import Measurement as Measurement
+from .sweeps import Channel as Channel
+from .sweeps import Measurement as Measurement
+from .sweeps import Sweep as Sweep
 from .trials import Stimulus as Stimulus
-from .trials import Sweep as Sweep
 from .trials import Trial as Trial
 from .trials import TrialTable as TrialTable
 from .visit import Visit as Visit

@@ -21,8 +21,9 @@ from benchmarks.simulated_board import Port, device_of_the_page
 
 import isiw
 from isiw.errors import DeviceError, NotDelivered
+from isiw.sweeps import Measurement
 from isiw.testing import check_device
-from isiw.trials import Measurement, Stimulus
+from isiw.trials import Stimulus
 
 SPACE = isiw.DesignSpace(0, 120, reference="valve")
 

@@ -15,8 +15,9 @@ from benchmarks.simulated_board import HZ, Board, Port, board, compiled, device_
 
 import isiw
 from isiw.errors import DeviceError, NotDelivered
+from isiw.sweeps import Measurement
 from isiw.testing import check_device
-from isiw.trials import Measurement, Stimulus
+from isiw.trials import Stimulus
 
 pytestmark = pytest.mark.skipif(bool(lacking()), reason=f"needs {lacking()}")
 

@@ -6,7 +6,8 @@ import pytest
 
 from isiw.devices.protocol import CallbackDevice, DeviceInfo
 from isiw.errors import DeviceError
-from isiw.trials import Measurement, Stimulus
+from isiw.sweeps import Measurement
+from isiw.trials import Stimulus
 
 
 class Rig:

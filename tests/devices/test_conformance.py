@@ -28,9 +28,10 @@ from isiw.session.rig import exclusive
 from isiw.signals.impact import impact_time
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.subject import Response
+from isiw.sweeps import Channel, Measurement, Sweep
 from isiw.testing import check_device
 from isiw.testing.device_table import Delivery, deflections_ms, late_deflection
-from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial, TrialTable
+from isiw.trials import Status, Stimulus, Trial, TrialTable
 from isiw.types import Reference
 from known import instance, known
 from wrong_rigs import NAMED, WRONG, WrongRig, rig

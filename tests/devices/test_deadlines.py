@@ -12,7 +12,8 @@ import pytest
 from isiw.devices.deadlines import Deadlines, PunctualDevice
 from isiw.devices.protocol import Readiness
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, NotDelivered, StillArmedError
-from isiw.trials import Measurement, Stimulus
+from isiw.sweeps import Measurement
+from isiw.trials import Stimulus
 from scripted import ScriptedDevice
 
 MakePunctual: TypeAlias = Callable[..., PunctualDevice]

@@ -10,7 +10,8 @@ from isiw.devices.limited import LimitedDevice
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo, Readiness
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, NotDelivered
-from isiw.trials import Measurement, Stimulus
+from isiw.sweeps import Measurement
+from isiw.trials import Stimulus
 from scripted import ScriptedDevice
 
 LIMITS = Limits(low_ms=0, high_ms=200, min_iti_s=5.0, max_pulses=3)

@@ -11,7 +11,8 @@ from isiw.devices.simulated import RecordedPerson, Recordings, SimulatedDevice, 
 from isiw.errors import DeviceError
 from isiw.signals.judgement import judge
 from isiw.subjects.subject import Response
-from isiw.trials import Status, Stimulus, Sweep
+from isiw.sweeps import Sweep
+from isiw.trials import Status, Stimulus
 from isiw.types import FloatArray, Reference
 from known import instance, known
 

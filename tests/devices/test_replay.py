@@ -17,7 +17,8 @@ from isiw.session.sink import SessionResult
 from isiw.strategy.catalogue import make_strategy
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.subject import SimulatedSubject
-from isiw.trials import Measurement, Status, Stimulus, Trial, TrialTable
+from isiw.sweeps import Measurement
+from isiw.trials import Status, Stimulus, Trial, TrialTable
 from known import instance
 
 TABLE = TrialTable(

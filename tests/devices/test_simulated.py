@@ -4,7 +4,8 @@ from isiw.devices.protocol import DeviceInfo
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import DeviceError
 from isiw.subjects.subject import Response
-from isiw.trials import Measurement, Stimulus
+from isiw.sweeps import Measurement
+from isiw.trials import Stimulus
 from known import instance, known
 
 

@@ -27,7 +27,8 @@ from isiw.log.reader import read_session
 from isiw.session.loop import Session
 from isiw.signals import TapEvents
 from isiw.signals.impact import VALVE_MS
-from isiw.trials import Stimulus, Sweep
+from isiw.sweeps import Sweep
+from isiw.trials import Stimulus
 from isiw.visit import VisitProtocol
 from known import instance, known
 from scripted import scripted_strategy

@@ -19,9 +19,10 @@ from isiw.existing.gate import Gate, require_no_links
 from isiw.existing.layout import letters
 from isiw.existing.limits import LARGEST_FACTOR, require_file, seconds_for
 from isiw.existing.tables import Columns, unit_said
+from isiw.sweeps import Channel
 from isiw.text.sanitize import read_number
 from isiw.text.toml_files import DoubledKeyError, once_each
-from isiw.trials import Channel, Status, Trial, TrialTable
+from isiw.trials import Status, Trial, TrialTable
 from isiw.visit import Visit
 
 IMPACT = Layout(reference="impact")

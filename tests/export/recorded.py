@@ -11,7 +11,8 @@ import numpy as np
 from isiw.findings import Kind
 from isiw.log.schema import EstimateRecord, Event, Intent, Record, Waveform
 from isiw.log.writer import LogWriter
-from isiw.trials import Channel, Status, Trial
+from isiw.sweeps import Channel
+from isiw.trials import Status, Trial
 from isiw.visit import Visit
 from log.written import make_header
 

@@ -22,8 +22,9 @@ from isiw.export import export_logs
 from isiw.export.emg import Layout, Run
 from isiw.findings import Kind
 from isiw.log.reader import read_session
+from isiw.sweeps import Channel
 from isiw.text.stimuli import STIMULI
-from isiw.trials import Channel, Status, Stimulus, Trial
+from isiw.trials import Status, Stimulus, Trial
 from isiw.visit import Visit
 
 OLD_LOGS = Path(__file__).parents[1] / "data" / "logs"

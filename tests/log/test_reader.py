@@ -15,7 +15,7 @@ from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Intent, Waveform
 from isiw.log.writer import LogWriter
-from isiw.trials import Channel
+from isiw.sweeps import Channel
 from log.written import write_trials
 
 

@@ -14,7 +14,8 @@ from isiw.log.reader import SessionRecord, read_session
 from isiw.log.salvage import current_file, holds, only_in, salvage
 from isiw.log.schema import Intent, Waveform
 from isiw.log.writer import LogWriter
-from isiw.trials import Channel, Status, Trial
+from isiw.sweeps import Channel
+from isiw.trials import Status, Trial
 from log.written import write_trials
 
 

@@ -14,7 +14,7 @@ import isiw
 from isiw.log.reader import read_session
 from isiw.log.schema import Waveform, encode, without_samples
 from isiw.log.writer import LogWriter
-from isiw.trials import Channel
+from isiw.sweeps import Channel
 from log.written import make_header, write_trials
 
 PEAK = """

@@ -30,7 +30,8 @@ from isiw.log.schema import (
 from isiw.log.writer import LogWriter
 from isiw.strategy.decisions import StopDecision
 from isiw.strategy.threshold import ThresholdEstimate
-from isiw.trials import Channel, Status, Trial
+from isiw.sweeps import Channel
+from isiw.trials import Status, Trial
 from isiw.window import Window
 from known import instance
 from log.written import make_header

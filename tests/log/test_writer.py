@@ -17,7 +17,7 @@ from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Waveform
 from isiw.log.writer import LogWriter
 from isiw.session.resume import open_session
-from isiw.trials import Channel
+from isiw.sweeps import Channel
 from log.written import write_trials
 from logs import blocks_of, damage
 from scripted import scripted_strategy

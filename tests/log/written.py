@@ -14,7 +14,8 @@ from isiw.log.headers import Header, StrategyRecipe
 from isiw.log.schema import Intent, Waveform
 from isiw.log.writer import LogWriter
 from isiw.signals.limits import SignalLimits
-from isiw.trials import Channel, Status, Trial
+from isiw.sweeps import Channel
+from isiw.trials import Status, Trial
 
 SPACE = DesignSpace(0, 200, reference="impact")
 

@@ -15,7 +15,8 @@ from isiw.plots.session import BELOW_THE_MEAN, save_session_plot, session_figure
 from isiw.session.afterwards import exclude
 from isiw.session.loop import Session
 from isiw.strategy.catalogue import make_strategy
-from isiw.trials import Measurement, Trial
+from isiw.sweeps import Measurement
+from isiw.trials import Trial
 from isiw.window import Window
 from known import known
 from scripted import SPACE, ScriptedDevice, scripted_strategy

@@ -22,7 +22,7 @@ from isiw.priors import Difference
 from isiw.report.comparison import save_comparison
 from isiw.report.page import save_report
 from isiw.session.resume import open_session
-from isiw.trials import Channel
+from isiw.sweeps import Channel
 from known import known
 from report.sessions import HOSTILE, tapped
 from scripted import scripted_strategy

@@ -12,7 +12,7 @@ from isiw.log.schema import EstimateRecord
 from isiw.report.words import final_statement
 from isiw.sentences import depression
 from isiw.session.loop import Session
-from isiw.trials import Measurement
+from isiw.sweeps import Measurement
 from isiw.visit import Visit
 from known import instance
 from scripted import ScriptedDevice, scripted_strategy

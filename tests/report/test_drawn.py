@@ -15,7 +15,7 @@ from isiw.log.reader import SessionRecord
 from isiw.log.schema import EstimateRecord
 from isiw.report.drawn import MOST_NEAR, MOST_WHOLE, drawn
 from isiw.report.words import final_statement
-from isiw.trials import Channel
+from isiw.sweeps import Channel
 from known import known
 from report.sessions import pulsed, tapped
 

@@ -11,7 +11,8 @@ from isiw.log.schema import Event, Intent, Record
 from isiw.report.tables import counted_rows, event_rows, lost_rows, trial_row
 from isiw.session.afterwards import exclude
 from isiw.session.loop import Session
-from isiw.trials import Measurement, Status, Trial
+from isiw.sweeps import Measurement
+from isiw.trials import Status, Trial
 from scripted import ScriptedDevice, scripted_strategy
 
 

@@ -18,7 +18,8 @@ from isiw.report.words import TRIAL_HEADINGS, counts_sentence, final_statement, 
 from isiw.session.afterwards import exclude
 from isiw.session.loop import Session
 from isiw.strategy.decisions import StopKind
-from isiw.trials import Channel, Measurement, Status, Trial
+from isiw.sweeps import Channel, Measurement
+from isiw.trials import Status, Trial
 from isiw.types import Reference
 from isiw.visit import Visit
 from isiw.window import Window

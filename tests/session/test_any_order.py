@@ -23,7 +23,8 @@ from isiw.session.loop import Session
 from isiw.session.resume import resume
 from isiw.session.rig import Safeguards
 from isiw.session.sink import SessionUpdate
-from isiw.trials import Measurement, Stimulus
+from isiw.sweeps import Measurement
+from isiw.trials import Stimulus
 from known import known
 from scripted import SPACE, ScriptedDevice, scripted_strategy
 

@@ -19,7 +19,7 @@ from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.choice import Asked, candidate_isis
 from isiw.strategy.course import Course
 from isiw.strategy.strategy import Strategy
-from isiw.trials import Measurement
+from isiw.sweeps import Measurement
 from known import instance, known
 from scripted import SPACE, ScriptedDevice
 

@@ -22,7 +22,8 @@ from isiw.session.interrupts import STILL_ARMED
 from isiw.session.loop import Session
 from isiw.session.resume import resume
 from isiw.session.rig import Safeguards
-from isiw.trials import Channel, Measurement, Stimulus, Sweep
+from isiw.sweeps import Channel, Measurement, Sweep
+from isiw.trials import Stimulus
 from known import known
 from scripted import ScriptedDevice, scripted_strategy, told_to
 

@@ -37,7 +37,7 @@ signal.signal(signal.SIGHUP, signal.SIG_DFL)
 from pathlib import Path
 from isiw.devices.limits import Limits
 from isiw.session.loop import Session
-from isiw.trials import Measurement
+from isiw.sweeps import Measurement
 from scripted import ScriptedDevice, scripted_strategy
 
 folder = Path({folder!r})

@@ -29,7 +29,8 @@ from isiw.signals import SignalLimits
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.recipe import Recipe
 from isiw.strategy.strategy import Strategy
-from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial
+from isiw.sweeps import Channel, Measurement, Sweep
+from isiw.trials import Status, Stimulus, Trial
 from known import instance, known
 from scripted import FakeRealClock, ScriptedDevice, scripted_strategy, told_to
 

@@ -17,7 +17,8 @@ from isiw.session.resume import open_session, resume
 from isiw.session.sink import SessionUpdate
 from isiw.session.threshold import open_threshold, read_threshold
 from isiw.strategy.threshold import IntensityRange, make_threshold_search
-from isiw.trials import Measurement, Stimulus
+from isiw.sweeps import Measurement
+from isiw.trials import Stimulus
 from scripted import ScriptedDevice, scripted_strategy
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows does not let an open file be moved or deleted")

@@ -20,7 +20,8 @@ from isiw.log.reader import read_session
 from isiw.session.loop import Session
 from isiw.session.resume import open_session, resume
 from isiw.session.sink import SessionUpdate
-from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep
+from isiw.sweeps import Channel, Measurement, Sweep
+from isiw.trials import Status, Stimulus
 from isiw.visit import Control, Visit, VisitProtocol
 from scripted import ALONE_MS, FakeRealClock, ScriptedDevice, scripted_strategy, told_to
 

@@ -30,7 +30,8 @@ from isiw.session.sink import SessionUpdate
 from isiw.strategy.catalogue import make_strategy, remade_strategy
 from isiw.strategy.strategy import Strategy
 from isiw.subjects.cohorts import cohort
-from isiw.trials import Measurement, Stimulus
+from isiw.sweeps import Measurement
+from isiw.trials import Stimulus
 from isiw.visit import VisitProtocol
 from known import known
 from log.written import make_header

@@ -21,7 +21,8 @@ from isiw.session.resume import resume
 from isiw.session.rig import Safeguards
 from isiw.session.sink import SessionUpdate
 from isiw.strategy.decisions import StopKind
-from isiw.trials import Measurement, Stimulus
+from isiw.sweeps import Measurement
+from isiw.trials import Stimulus
 from scripted import ScriptedDevice, scripted_strategy
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="POSIX signals")

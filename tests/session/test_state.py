@@ -15,7 +15,8 @@ from isiw.session.loop import Session
 from isiw.session.rig import Safeguards
 from isiw.session.sink import Sink
 from isiw.session.state import SENTENCES, Fault, State, state_of
-from isiw.trials import Measurement, Stimulus
+from isiw.sweeps import Measurement
+from isiw.trials import Stimulus
 from scripted import ScriptedDevice, scripted_strategy
 
 

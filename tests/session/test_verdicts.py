@@ -27,7 +27,8 @@ from isiw.session.resume import open_session, resume
 from isiw.session.rig import Safeguards
 from isiw.session.sink import SessionUpdate
 from isiw.strategy.catalogue import make_strategy
-from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep
+from isiw.sweeps import Channel, Measurement, Sweep
+from isiw.trials import Status, Stimulus
 from scripted import ScriptedDevice, scripted_strategy, told_to
 
 Act: TypeAlias = Callable[[Session], None]

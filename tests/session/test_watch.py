@@ -25,7 +25,8 @@ from isiw.signals import SignalLimits
 from isiw.signals.watch import Watch
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.strategy import Strategy
-from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial, TrialTable
+from isiw.sweeps import Channel, Measurement, Sweep
+from isiw.trials import Status, Stimulus, Trial, TrialTable
 from scripted import ScriptedDevice, scripted_strategy
 from wrong_rigs import NAMED, SPACE, WRONG, rig
 

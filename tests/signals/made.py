@@ -10,7 +10,7 @@ import numpy as np
 from isiw.devices.robot.mechanism import Geometry, SensorNoise, Taps, draw_taps
 from isiw.devices.robot.tapper import preset
 from isiw.devices.robot.waveforms import record_emg, record_robot, sample_times_ms
-from isiw.trials import Channel, Sweep
+from isiw.sweeps import Channel, Sweep
 from isiw.types import FloatArray
 
 RATE_HZ = 5000.0

@@ -15,7 +15,8 @@ from isiw.devices.protocol import CallbackDevice, DeviceInfo
 from isiw.session.loop import Session
 from isiw.signals import judge
 from isiw.strategy.catalogue import make_strategy
-from isiw.trials import Channel, Status, Stimulus, Sweep, Trial
+from isiw.sweeps import Channel, Sweep
+from isiw.trials import Status, Stimulus, Trial
 from known import known
 
 SPACE = DesignSpace(0, 320, reference="impact")

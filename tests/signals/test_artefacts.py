@@ -14,7 +14,8 @@ from isiw.errors import InvalidValueError
 from isiw.findings import Finding, Kind, Severity
 from isiw.signals import SignalLimits, judge
 from isiw.signals.watch import Watch
-from isiw.trials import Channel, Stimulus, Sweep, TrialTable
+from isiw.sweeps import Channel, Sweep
+from isiw.trials import Stimulus, TrialTable
 from isiw.types import FloatArray
 
 SPACE, LIMITS = DesignSpace(0, 320, reference="impact"), SignalLimits()

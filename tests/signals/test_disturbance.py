@@ -12,7 +12,8 @@ from isiw.signals.mep import at_rest, disturbance
 from isiw.signals.places import told_by
 from isiw.signals.rig import Evidence
 from isiw.signals.watch import findings
-from isiw.trials import Channel, Stimulus, Sweep, Trial
+from isiw.sweeps import Channel, Sweep
+from isiw.trials import Stimulus, Trial
 from known import known
 
 SPACE, LIMITS = DesignSpace(0, 300, reference="impact"), SignalLimits()

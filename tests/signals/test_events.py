@@ -9,7 +9,7 @@ from isiw.devices.robot.mechanism import Faults
 from isiw.errors import InvalidValueError
 from isiw.signals import detect_events, load_cell_times, sweep_events
 from isiw.signals.events import TapEvents
-from isiw.trials import Channel, Sweep
+from isiw.sweeps import Channel, Sweep
 from signals.made import Rendered, render, sweep_of
 
 

@@ -11,7 +11,8 @@ from isiw.design import DesignSpace
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.findings import Kind
 from isiw.signals import SignalLimits, is_saturated, judge, judge_measurement
-from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep
+from isiw.sweeps import Channel, Measurement, Sweep
+from isiw.trials import Status, Stimulus
 from isiw.types import ArrayLike, FloatArray
 from signals.made import sweep_of
 

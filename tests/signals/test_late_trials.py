@@ -14,7 +14,8 @@ from isiw.signals.amplitudes import Response, Told, large, silent, small, stoppe
 from isiw.signals.limits import SignalLimits
 from isiw.signals.watch import Watch
 from isiw.strategy.outcomes import Outcome, Outcomes, found_step_mv
-from isiw.trials import Measurement, Status, Trial
+from isiw.sweeps import Measurement
+from isiw.trials import Status, Trial
 
 
 def told(rng: np.random.Generator) -> Told:

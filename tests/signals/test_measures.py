@@ -18,7 +18,8 @@ from isiw.signals import MEP_WINDOWS_MS, SignalLimits, judge
 from isiw.signals.measures import Measures, measures
 from isiw.strategy.catalogue import make_strategy
 from isiw.subjects.changes import TapResponse
-from isiw.trials import Channel, Status, Stimulus, Sweep, Trial
+from isiw.sweeps import Channel, Sweep
+from isiw.trials import Status, Stimulus, Trial
 from tapped import IMPACT, TapRig
 from wrong_rigs import rig
 

@@ -17,7 +17,8 @@ from isiw.signals.places import told_by
 from isiw.signals.rig import Evidence
 from isiw.signals.watch import findings
 from isiw.subjects.cohorts import cohort
-from isiw.trials import Channel, Stimulus, Sweep
+from isiw.sweeps import Channel, Sweep
+from isiw.trials import Stimulus
 from isiw.types import Reference
 from known import instance
 from wrong_rigs import SPACE, tapper

@@ -14,7 +14,8 @@ from isiw.design import DesignSpace
 from isiw.devices.simulated import SimulatedDevice
 from isiw.findings import MISTRIALS, REMEDIES, Finding, Kind, Severity
 from isiw.signals import judge
-from isiw.trials import Channel, Measurement, Status, Stimulus, Sweep, Trial
+from isiw.sweeps import Channel, Measurement, Sweep
+from isiw.trials import Status, Stimulus, Trial
 from known import instance
 from wrong_rigs import KINDS, SPACE, WRONG, WrongRig, doubled, rig
 

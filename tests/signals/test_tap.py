@@ -14,7 +14,8 @@ from isiw.devices.robot.tapper import Tapper, TapperSettings, preset
 from isiw.signals import judge, tap
 from isiw.signals.tap import LONGER_MS, TapResponses
 from isiw.subjects.changes import TapResponse
-from isiw.trials import Channel, Stimulus, Sweep, Trial, TrialTable
+from isiw.sweeps import Channel, Sweep
+from isiw.trials import Stimulus, Trial, TrialTable
 from isiw.types import FloatArray
 from isiw.window import Window
 from known import known

@@ -18,7 +18,8 @@ from isiw.checks import (
     text,
 )
 from isiw.errors import DeviceError, InvalidValueError, NotDelivered
-from isiw.trials import Measurement, Stimulus, Sweep
+from isiw.sweeps import Measurement, Sweep
+from isiw.trials import Stimulus
 from isiw.types import Conditioning, Reference
 
 Answer: TypeAlias = Sweep | Measurement

@@ -19,7 +19,8 @@ from isiw.errors import DeviceError, InvalidValueError
 from isiw.lazy import pd
 from isiw.signals.limits import MEP_WINDOW_MS
 from isiw.subjects.subject import Response
-from isiw.trials import MOST_ISI_SD_MS, Channel, Measurement, Stimulus, Sweep, Trial, TrialTable
+from isiw.sweeps import Channel, Measurement, Sweep
+from isiw.trials import MOST_ISI_SD_MS, Stimulus, Trial, TrialTable
 from isiw.types import BoolArray, Conditioning, FloatArray, Reference
 
 Respond: TypeAlias = Callable[[float | None], Response | Measurement]

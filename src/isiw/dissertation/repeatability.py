@@ -25,7 +25,7 @@ from isiw.log.reader import SessionRecord
 from isiw.signals.events import TapEvents, detect_events, first_rise, sweep_events
 from isiw.signals.impact import VALVE_MS
 from isiw.signals.waveforms import as_waveforms, crossing_before, first_true, rest_level
-from isiw.trials import Sweep
+from isiw.sweeps import Sweep
 from isiw.types import ArrayLike, FloatArray
 
 _LEAST_FREEDOM = 2

@@ -38,7 +38,8 @@ from isiw.signals.watch import Watch
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.decisions import StopKind
 from isiw.strategy.strategy import Strategy
-from isiw.trials import Measurement, Status, Sweep, Trial, TrialTable
+from isiw.sweeps import Measurement, Sweep
+from isiw.trials import Status, Trial, TrialTable
 from isiw.types import ArrayLike, FloatArray
 from isiw.visit import Visit
 

@@ -18,7 +18,7 @@ from pydantic import BaseModel, ConfigDict, create_model
 from isiw import errors
 from isiw.errors import IsiwError
 from isiw.existing.delivered import Delivered
-from isiw.trials import Channel
+from isiw.sweeps import Channel
 
 ANSWER: Final = "answer.json"
 SAMPLES: Final = "samples.f8"

@@ -18,8 +18,9 @@ from isiw.existing.layout import EMG_UNITS, ISI_UNITS_MS
 from isiw.findings import AMPLITUDE_MV, Kind
 from isiw.signals.limits import SignalLimits
 from isiw.signals.plausible import implausible_scale
+from isiw.sweeps import Channel
 from isiw.text.sanitize import counted
-from isiw.trials import Channel, Trial, TrialTable
+from isiw.trials import Trial, TrialTable
 from isiw.types import Conditioning, Reference
 from isiw.visit import Visit
 

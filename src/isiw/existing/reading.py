@@ -29,7 +29,8 @@ from isiw.lazy import pd
 from isiw.log.durable import log_exists
 from isiw.signals.judgement import judge_measurement
 from isiw.signals.limits import SignalLimits
-from isiw.trials import Measurement, Status, Stimulus, Trial
+from isiw.sweeps import Measurement
+from isiw.trials import Status, Stimulus, Trial
 from isiw.types import Reference
 from isiw.visit import Visit
 

@@ -24,7 +24,8 @@ from isiw.findings import Kind
 from isiw.lazy import pd
 from isiw.signals.judgement import judge
 from isiw.signals.limits import SignalLimits
-from isiw.trials import Channel, Status, Stimulus, Sweep, Trial
+from isiw.sweeps import Channel, Sweep
+from isiw.trials import Status, Stimulus, Trial
 from isiw.types import FloatArray
 
 _BEFORE_MS: Final = 150.0

@@ -15,9 +15,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from isiw.log.reader import SessionRecord
+from isiw.sweeps import Channel
 from isiw.text.named_code import library
 from isiw.text.stimuli import TAP, StimulusWords, meanings
-from isiw.trials import Channel, Stimulus, Trial
+from isiw.trials import Stimulus, Trial
 from isiw.types import FloatArray
 
 EMG: Final = "emg"

@@ -24,9 +24,10 @@ from isiw.signals.measures import Measures, measures
 from isiw.signals.tap import TapResponses
 from isiw.strategy.decisions import StopDecision
 from isiw.summary import JUDGED_SINCE
+from isiw.sweeps import Channel, Sweep
 from isiw.text.sanitize import command
 from isiw.text.stimuli import TAP, StimulusWords, meanings
-from isiw.trials import Channel, Stimulus, Sweep, Trial, TrialTable
+from isiw.trials import Stimulus, Trial, TrialTable
 
 HeaderT = TypeVar("HeaderT", Header, ThresholdHeader)
 

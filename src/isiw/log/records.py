@@ -24,9 +24,10 @@ from isiw.log.salvage import Salvage
 from isiw.log.schema import EstimateRecord, Event, Intent, Message, PulseOutcome, Record, Waveform, decode
 from isiw.log.writer import CONFIGURATION
 from isiw.strategy.decisions import StopKind
+from isiw.sweeps import Channel
 from isiw.text.sanitize import counted
 from isiw.text.toml_files import parsed, read_json
-from isiw.trials import Channel, Trial
+from isiw.trials import Trial
 
 
 class Onset(NamedTuple):

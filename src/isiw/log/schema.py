@@ -38,8 +38,9 @@ from isiw.log.headers import ANY_HEADER, AnyHeader, Header, LogRecord, Productio
 from isiw.log.moments import Moment
 from isiw.strategy.decisions import StopDecision, StopKind
 from isiw.strategy.threshold.pulses import ThresholdEstimate
+from isiw.sweeps import Channel
 from isiw.text.toml_files import refuse_doubled
-from isiw.trials import Channel, Stimulus, Trial
+from isiw.trials import Stimulus, Trial
 from isiw.types import Numbers
 
 TrialNumber: TypeAlias = Annotated[int, Field(ge=0, lt=MOST_TRIALS)]

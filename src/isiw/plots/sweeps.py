@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from isiw.plots.style import BLUE, FAINT, INK, RED, tidied
-from isiw.trials import Channel, Trial
+from isiw.sweeps import Channel
+from isiw.trials import Trial
 
 
 def sweeps_figure(

@@ -15,8 +15,9 @@ from isiw.report.tables import trial_row
 from isiw.report.words import answer_and_warnings
 from isiw.signals.limits import EMG_UNITS_MV
 from isiw.summary import tap_unmeasured
+from isiw.sweeps import Channel
 from isiw.text import plain
-from isiw.trials import Channel, Trial
+from isiw.trials import Trial
 from isiw.types import FloatArray
 
 NEAR_MS: Final = (-60.0, 100.0)

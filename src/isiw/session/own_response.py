@@ -11,7 +11,8 @@ from isiw.log.verdicts import correction
 from isiw.session.examination import WindowExamination
 from isiw.signals.tap import TapResponses
 from isiw.strategy.decisions import OF_THE_WINDOW, StopDecision, stimuli_left
-from isiw.trials import Sweep, Trial
+from isiw.sweeps import Sweep
+from isiw.trials import Trial
 from isiw.visit import PAIRS_FIRST
 
 KNOWN: Final = "What the first stimulus alone does to the EMG is known now, and was subtracted."

@@ -29,8 +29,9 @@ from isiw.signals.limits import SignalLimits
 from isiw.signals.tap import TapResponses
 from isiw.strategy.catalogue import remade_strategy, settings_for
 from isiw.strategy.strategy import Strategy
+from isiw.sweeps import Sweep
 from isiw.text import plain
-from isiw.trials import Sweep, Trial, TrialTable
+from isiw.trials import Trial, TrialTable
 
 _COMPARED_AT_EACH_END = 50
 

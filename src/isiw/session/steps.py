@@ -27,8 +27,9 @@ from isiw.signals.tap import TapResponses
 from isiw.signals.watch import Watch
 from isiw.strategy.decisions import StopDecision, StopKind, stimuli_left
 from isiw.strategy.strategy import Strategy
+from isiw.sweeps import Measurement, Sweep
 from isiw.text.sanitize import shown
-from isiw.trials import Measurement, Stimulus, Sweep, Trial
+from isiw.trials import Stimulus, Trial
 from isiw.visit import Control
 
 _LAST: Final = 20

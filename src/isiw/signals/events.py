@@ -11,7 +11,7 @@ from isiw.errors import InvalidValueError
 from isiw.signals.impact import HYSTERESIS_SD, VALVE_MS, impact_times
 from isiw.signals.mep import EARLIEST_ONSET_MS
 from isiw.signals.waveforms import as_waveforms, crossing_before, first_true, is_recording, per_waveform, rest_level
-from isiw.trials import Channel, Sweep
+from isiw.sweeps import Channel, Sweep
 from isiw.types import ArrayLike, FloatArray
 
 MOTION_SD = 3.0

@@ -16,7 +16,8 @@ from isiw.signals.limits import EMG_UNITS_MV, SignalLimits
 from isiw.signals.mep import ONSET_SD, SURE_SD, SURE_SHARE, at_rest, disturbance, mep_onset
 from isiw.signals.tap import TapResponses, hit_of
 from isiw.signals.waveforms import level_and_noise, samples
-from isiw.trials import Channel, Trial
+from isiw.sweeps import Channel
+from isiw.trials import Trial
 from isiw.types import FloatArray
 
 LATEST_END_MS: Final = 80.0

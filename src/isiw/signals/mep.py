@@ -25,7 +25,8 @@ from isiw.signals.waveforms import (
     per_waveform,
     samples,
 )
-from isiw.trials import Channel, Trial
+from isiw.sweeps import Channel
+from isiw.trials import Trial
 from isiw.types import ArrayLike, BoolArray, FloatArray, IntArray
 
 PRESENT_MV = 0.05  # the field's convention [Rossini2015]; 1.7 % of resting sweeps exceed it

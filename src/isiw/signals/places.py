@@ -18,7 +18,8 @@ from isiw.signals.amplitudes import OF_REST, Response, Told
 from isiw.signals.limits import ARTEFACT_MS, EMG_UNITS_MV, SignalLimits
 from isiw.signals.mep import SPAN_S, Disturbance, at_rest, disturbance
 from isiw.signals.rig import Evidence, tap_span_ms
-from isiw.trials import Sweep, Trial
+from isiw.sweeps import Sweep
+from isiw.trials import Trial
 from isiw.types import BoolArray, FloatArray
 
 SOUGHT_MS = (ARTEFACT_MS, 80.0)

@@ -21,7 +21,8 @@ from isiw.signals.limits import ARTEFACT_MS, EMG_UNITS_MV, SignalLimits
 from isiw.signals.mep import MIN_BACKGROUND_MS
 from isiw.signals.plausible import implausible_amplitude
 from isiw.signals.waveforms import PULSE_GUARD_MS, is_recording, samples
-from isiw.trials import Channel, Measurement, Sweep, Trial
+from isiw.sweeps import Channel, Measurement, Sweep
+from isiw.trials import Trial
 
 _USUAL_LIMITS: Final = SignalLimits()
 

@@ -21,7 +21,8 @@ from isiw.signals.limits import EMG_UNITS_MV, HIT_DELAY_MS, MEP_WINDOW_MS, TAP_M
 from isiw.signals.mep import EARLIEST_ONSET_MS, at_rest, disturbance
 from isiw.signals.taps_alone import LEAST_WEIGHT, is_inside
 from isiw.signals.waveforms import PULSE_GUARD_MS, samples
-from isiw.trials import Sweep, Trial, TrialTable
+from isiw.sweeps import Sweep
+from isiw.trials import Trial, TrialTable
 from isiw.types import BoolArray, FloatArray, IntArray
 from isiw.window import Window
 

@@ -16,7 +16,8 @@ from isiw.signals.amplitudes import Doubts, Told, odd_amplitudes, told_of
 from isiw.signals.limits import SignalLimits
 from isiw.signals.places import told_by
 from isiw.signals.rig import Evidence, too_early_by_chance
-from isiw.trials import Measurement, Sweep, Trial, TrialTable
+from isiw.sweeps import Measurement, Sweep
+from isiw.trials import Trial, TrialTable
 from isiw.types import FloatArray
 
 OF_SWEEP: Final = (rig.unusable_emg, rig.wrong_acceleration, rig.no_origin, rig.double_pulse, rig.stray_edge)

@@ -14,7 +14,8 @@ from isiw.devices.protocol import Answer, Device, DeviceInfo, HasMemory, unprote
 from isiw.findings import Kind
 from isiw.signals.limits import EMG_UNITS_MV, SignalLimits
 from isiw.signals.rig import EVOKED_SPAN_MS, steepest_edge, tap_span_ms
-from isiw.trials import RESPONSE_MV, Stimulus, Sweep, Trial
+from isiw.sweeps import Sweep
+from isiw.trials import RESPONSE_MV, Stimulus, Trial
 
 OF_TIMING = frozenset({Kind.TMS_BEFORE_IMPACT, Kind.ISI_OFF})
 """What comes of a hit delay that is not the one that the rig assumes."""

@@ -25,6 +25,7 @@ from isiw.signals import SignalLimits, judge, judge_measurement
 from isiw.signals.amplitudes import Told
 from isiw.signals.rig import Evidence, too_early_by_chance
 from isiw.signals.watch import findings
+from isiw.sweeps import Measurement, Sweep
 from isiw.testing.device_table import (
     OF_TIMING,
     Delivery,
@@ -38,7 +39,7 @@ from isiw.testing.device_table import (
 )
 from isiw.testing.suites import broken, require
 from isiw.text.sanitize import shown
-from isiw.trials import Measurement, Stimulus, Sweep, Trial
+from isiw.trials import Stimulus, Trial
 
 _DISARMED_S: Final = 2.0
 _VERBS: Final = ("describe", "stage", "deliver", "stop", "unstage")

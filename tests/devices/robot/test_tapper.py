@@ -19,8 +19,9 @@ from isiw.findings import Kind
 from isiw.signals import impact_time, judge
 from isiw.subjects.cohorts import cohort
 from isiw.subjects.subject import Response
+from isiw.sweeps import Sweep
 from isiw.testing import check_device
-from isiw.trials import Stimulus, Sweep
+from isiw.trials import Stimulus
 from isiw.types import Reference
 from known import instance, known
 

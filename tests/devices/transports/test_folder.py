@@ -21,8 +21,9 @@ from isiw.config import load_config, session_for
 from isiw.errors import ConfigError, DeviceError, DeviceTimeoutError, InvalidValueError, NotDelivered
 from isiw.findings import Kind
 from isiw.session.sink import SessionResult
+from isiw.sweeps import Measurement, Sweep
 from isiw.testing import check_device
-from isiw.trials import Measurement, Stimulus, Sweep
+from isiw.trials import Stimulus
 from known import instance
 from scripted import scripted_strategy
 

@@ -11,7 +11,7 @@ from isiw.devices.protocol import DeviceInfo
 from isiw.devices.transports.exchange import Reply
 from isiw.devices.transports.line_table import number_of
 from isiw.errors import DeviceError, InvalidValueError
-from isiw.trials import Channel, Sweep
+from isiw.sweeps import Channel, Sweep
 
 
 @pytest.mark.parametrize("written", ["1_0_0", "١٢", "nan", "0x1"])

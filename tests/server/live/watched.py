@@ -17,7 +17,8 @@ from isiw.devices.protocol import DeviceInfo
 from isiw.log.reader import SessionRecord, read_session
 from isiw.server.live.page import LivePage, watch
 from isiw.session.loop import Session
-from isiw.trials import Channel, Stimulus, Sweep
+from isiw.sweeps import Channel, Sweep
+from isiw.trials import Stimulus
 from scripted import FakeRealClock, ScriptedDevice, scripted_strategy
 from server.serving import NOBODY
 

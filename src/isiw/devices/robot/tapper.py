@@ -18,7 +18,8 @@ from isiw.devices.robot.mechanism import EventTime, Faults, Geometry, Taps, draw
 from isiw.devices.robot.waveforms import UNITS, record_emg, record_robot, sample_times_ms
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.signals.impact import DETECTION_LATENCY_MS, VALVE_MS, impact_time
-from isiw.trials import Channel, Stimulus, Sweep
+from isiw.sweeps import Channel, Sweep
+from isiw.trials import Stimulus
 from isiw.types import FloatArray, Reference
 
 Trigger: TypeAlias = Literal["open-loop", "impact"]

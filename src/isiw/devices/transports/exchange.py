@@ -19,9 +19,10 @@ from typing import Any, Final, Protocol, TypeVar, Unpack
 from isiw.checks import Bounds, from_table, number
 from isiw.devices.protocol import DeviceInfo, require_staged
 from isiw.errors import DeviceError, InvalidValueError, NotDelivered
+from isiw.sweeps import Channel, Sweep
 from isiw.text import plain
 from isiw.text.sanitize import read_number
-from isiw.trials import Channel, Stimulus, Sweep
+from isiw.trials import Stimulus
 
 _T = TypeVar("_T")
 

@@ -21,7 +21,8 @@ from isiw.devices.protocol import Answer, DeviceInfo
 from isiw.devices.transports.exchange import LONGEST_REPLY, Exchange, Reply, Request, Verb, described, sweep_of
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, os_errors
 from isiw.files import opened, written_beside
-from isiw.trials import Channel, Measurement, Stimulus, Sweep
+from isiw.sweeps import Channel, Measurement, Sweep
+from isiw.trials import Stimulus
 from isiw.types import FloatArray
 
 REQUEST: Final = "request.txt"

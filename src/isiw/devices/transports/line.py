@@ -27,7 +27,8 @@ from isiw.devices.transports.line_table import (
     require_address,
 )
 from isiw.errors import DeviceError, InvalidValueError, IsiwError, LimitExceededError, NotDelivered, error_text
-from isiw.trials import Measurement, Stimulus
+from isiw.sweeps import Measurement
+from isiw.trials import Stimulus
 
 _SPARE_S = 0.1
 _MOST_TRIES = 10

@@ -18,9 +18,10 @@ from isiw.devices.protocol import DeviceInfo
 from isiw.devices.transports.exchange import LONGEST_REPLY, Exchange, Reply, Request, Verb, described, sweep_of
 from isiw.devices.transports.lsl_samples import LATE_S, LslChannel, SampleStream
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, NotDelivered
+from isiw.sweeps import Channel, Sweep
 from isiw.text.named_code import library
 from isiw.text.toml_files import read_json
-from isiw.trials import Channel, Stimulus, Sweep
+from isiw.trials import Stimulus
 
 _GLANCE_S: Final = 0.02
 _MOST_KEPT: Final = 8

@@ -13,8 +13,9 @@ from isiw.errors import InvalidValueError
 from isiw.session.loop import Session
 from isiw.signals import impact_time
 from isiw.subjects.cohorts import cohort
+from isiw.sweeps import Sweep
 from isiw.testing import check_device
-from isiw.trials import Stimulus, Sweep
+from isiw.trials import Stimulus
 from known import known
 from scripted import scripted_strategy
 

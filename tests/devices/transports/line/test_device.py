@@ -15,8 +15,9 @@ from benchmarks.pulse_peer import PEER_COMMANDS, Lie, PulsePeer
 import isiw
 from devices.transports.line.parts import HASTY, PAIR, TIMEOUT_S, made, staged, unnumbered
 from isiw.errors import ConfigError, DeviceError, InvalidValueError, LogError, NotDelivered
+from isiw.sweeps import Measurement, Sweep
 from isiw.testing import check_device
-from isiw.trials import Measurement, Stimulus, Sweep
+from isiw.trials import Stimulus
 from scripted import SPACE, scripted_strategy
 
 BOTH = pytest.mark.parametrize("commands", [PEER_COMMANDS, unnumbered(PEER_COMMANDS)], ids=["numbered", "unnumbered"])

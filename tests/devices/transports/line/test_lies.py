@@ -14,7 +14,8 @@ from isiw.errors import DeviceError, DeviceTimeoutError, NotDelivered
 from isiw.findings import Kind
 from isiw.session.rig import Safeguards
 from isiw.signals.judgement import judge_measurement
-from isiw.trials import Measurement, Status, Stimulus
+from isiw.sweeps import Measurement
+from isiw.trials import Status, Stimulus
 from scripted import SPACE, scripted_strategy
 
 FATAL = [Lie.SILENT_BEFORE, Lie.SILENT_AFTER, Lie.LATE, Lie.OTHER_NUMBER, Lie.CORRUPTS, Lie.ENDLESS, Lie.REFUSES]

@@ -16,7 +16,8 @@ from devices.transports.line.parts import HASTY, PAIR, TIMEOUT_S, made, over, st
 from isiw.devices.transports.line_exchange import Line
 from isiw.devices.transports.line_table import LineExchange
 from isiw.errors import DeviceError, NotDelivered
-from isiw.trials import Measurement, Stimulus
+from isiw.sweeps import Measurement
+from isiw.trials import Stimulus
 
 NOT_POSITIVE = [
     Lie.SILENT_BEFORE, Lie.SILENT_AFTER, Lie.LATE, Lie.OTHER_NUMBER, Lie.CORRUPTS, Lie.ENDLESS, Lie.REFUSES,
