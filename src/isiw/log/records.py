@@ -21,8 +21,17 @@ from isiw.findings import Kind
 from isiw.log.headers import AnyHeader, Production, first_fault, header_in_parts
 from isiw.log.moments import Moment
 from isiw.log.salvage import Salvage
-from isiw.log.schema import EstimateRecord, Event, Intent, Message, PulseOutcome, Record, Waveform, decode
-from isiw.log.writer import CONFIGURATION
+from isiw.log.schema import (
+    CONFIGURATION,
+    EstimateRecord,
+    Event,
+    Intent,
+    Message,
+    PulseOutcome,
+    Record,
+    Waveform,
+    decode,
+)
 from isiw.strategy.decisions import StopKind
 from isiw.sweeps import Channel
 from isiw.text.sanitize import counted

@@ -43,6 +43,9 @@ from isiw.text.toml_files import refuse_doubled
 from isiw.trials import Stimulus, Trial
 from isiw.types import Numbers
 
+CONFIGURATION = "configuration.toml"
+"""The attachment that holds the header once more, as TOML."""
+
 TrialNumber: TypeAlias = Annotated[int, Field(ge=0, lt=MOST_TRIALS)]
 
 

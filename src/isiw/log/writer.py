@@ -28,6 +28,7 @@ from isiw.log.salvage import Salvage, holds, salvage_file
 from isiw.log.schema import (
     ANNOUNCEMENT,
     CHANNEL_IDS,
+    CONFIGURATION,
     Event,
     Message,
     Record,
@@ -38,9 +39,6 @@ from isiw.log.schema import (
     log_time_ns,
     topic_of,
 )
-
-CONFIGURATION = "configuration.toml"
-"""The attachment that holds the header once more, as TOML."""
 
 _FROM_MEMORY = "Header, trials and events are written from memory; waveforms and estimates may be lost."
 
