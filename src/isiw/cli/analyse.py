@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 from rich.console import Console
@@ -30,118 +33,133 @@ if TYPE_CHECKING:
 
 app = typer.Typer()
 
-Columns = Annotated[
-    list[str] | None,
-    typer.Option("--column", metavar="KEY=NAME", help='What a column holds, such as "isi=Delay"; repeat it.'),
-]
-Where = Annotated[
-    list[str] | None,
-    typer.Option("--where", metavar="COLUMN=VALUE", help='Rows to read, such as "muscle=FCR"; repeat it.'),
-]
-Units = Annotated[list[str] | None, typer.Option("--unit", help="Unit of ISIs (ms, s) or amplitudes (mV, uV, V).")]
-Reference = Annotated[str | None, typer.Option(help="What ISIs count from: impact, or valve.", **NO_DEFAULT)]
-Markers = Annotated[
-    list[str] | None,
-    typer.Option("--marker", metavar="KEY=NAME", help="What an event of a recording marks: pulse, tap or valve."),
-]
-Unmarked = Annotated[
-    str | None,
-    typer.Option(
-        help="What pulses without a marked tap are: TMS alone, or lost (the marker is missing).", **NO_DEFAULT
-    ),
-]
-Channels = Annotated[
-    list[str] | None, typer.Option("--channel", metavar="KEY=NAME", help="Which channel holds the EMG: emg=NAME.")
-]
-Alone = Annotated[str | None, typer.Option(help="What stands for the ISI of TMS alone.", **NO_DEFAULT)]
-Decimal = Annotated[str | None, typer.Option(help="The decimal sign of the file.", **NO_DEFAULT)]
-Sheet = Annotated[str | None, typer.Option(help="The sheet of a workbook.", **NO_DEFAULT)]
-LayoutFile = Annotated[Path | None, typer.Option("--layout", help="How the files are laid out (TOML).", **NO_DEFAULT)]
-Also = Annotated[
-    list[Path] | None, typer.Option(help="A file elsewhere that a recording may refer to; repeat it.", **NO_DEFAULT)
-]
-Larger = Annotated[float, typer.Option(help="By what to multiply the limits of reading a file.")]
+
+class Reading(NamedTuple):
+    """How files are read, as a command line says."""
+
+    layout: Layout
+    limits: dict[str, Any]  # of `existing.batch.Way` and `existing.look`
+
+
+def _reading(  # noqa: PLR0913, PLR0917 - an option each
+    reference: Annotated[str | None, typer.Option(help="What ISIs count from: impact, or valve.", **NO_DEFAULT)] = None,
+    column: Annotated[
+        list[str] | None,
+        typer.Option("--column", metavar="KEY=NAME", help='What a column holds, such as "isi=Delay"; repeat it.'),
+    ] = None,
+    where: Annotated[
+        list[str] | None,
+        typer.Option("--where", metavar="COLUMN=VALUE", help='Rows to read, such as "muscle=FCR"; repeat it.'),
+    ] = None,
+    unit: Annotated[
+        list[str] | None, typer.Option("--unit", help="Unit of ISIs (ms, s) or amplitudes (mV, uV, V).")
+    ] = None,
+    marker: Annotated[
+        list[str] | None,
+        typer.Option("--marker", metavar="KEY=NAME", help="What an event of a recording marks: pulse, tap or valve."),
+    ] = None,
+    channel: Annotated[
+        list[str] | None, typer.Option("--channel", metavar="KEY=NAME", help="Which channel holds the EMG: emg=NAME.")
+    ] = None,
+    unmarked: Annotated[
+        str | None,
+        typer.Option(
+            help="What pulses without a marked tap are: TMS alone, or lost (the marker is missing).", **NO_DEFAULT
+        ),
+    ] = None,
+    alone: Annotated[str | None, typer.Option(help="What stands for the ISI of TMS alone.", **NO_DEFAULT)] = None,
+    decimal: Annotated[str | None, typer.Option(help="The decimal sign of the file.", **NO_DEFAULT)] = None,
+    sheet: Annotated[str | None, typer.Option(help="The sheet of a workbook.", **NO_DEFAULT)] = None,
+    layout: Annotated[
+        Path | None, typer.Option("--layout", help="How the files are laid out (TOML).", **NO_DEFAULT)
+    ] = None,
+    also: Annotated[
+        list[Path] | None, typer.Option(help="A file elsewhere that a recording may refer to; repeat it.", **NO_DEFAULT)
+    ] = None,
+    larger: Annotated[float, typer.Option(help="By what to multiply the limits of reading a file.")] = 1.0,
+) -> Reading:
+    """The options that say how files are read, each stated here alone."""
+    stated = isiw.existing.layout.read_layout(layout) if layout is not None else isiw.existing.Layout()
+    named = {"columns": column, "where": where, "markers": marker, "channels": channel}
+    pairs = {
+        key: isiw.existing.layout.pairs_of(f"--{key.removesuffix('s')}", texts or []) for key, texts in named.items()
+    }
+    said = {"reference": reference, "alone": alone, "decimal": decimal, "sheet": sheet, "unmarked": unmarked}
+    limits = isiw.existing.ReadingLimits().larger(larger)
+    return Reading(
+        stated.saying(**pairs, units=tuple(unit or ()), **said), {"limits": limits, "also": tuple(also or ())}
+    )
+
+
+def reads_files(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options of `_reading` for its parameter `reading`, which is called for them."""
+    own, read = (list(inspect.signature(each, eval_str=True).parameters.values()) for each in (command, _reading))
+    place = next(index for index, each in enumerate(own) if each.name == "reading")
+
+    def called(**given: Any) -> None:
+        options = {each.name: given.pop(each.name) for each in read}
+        command(**given, reading=partial(_reading, **options))
+
+    parameters = [each.replace(kind=each.KEYWORD_ONLY) for each in (*own[:place], *read, *own[place + 1 :])]
+    called.__name__, called.__doc__ = command.__name__, command.__doc__
+    called.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined] # by which Typer makes options
+    called.__annotations__ = {}
+    return called
 
 
 @app.command(rich_help_panel=LOGS)
-def analyse(  # noqa: PLR0913, PLR0917 - an option each
+@reads_files
+def analyse(  # noqa: PLR0913 - an option each
     files: Annotated[list[Path], typer.Argument(help="Tables, recordings or logs; docs/your-data.md.", **NO_DEFAULT)],
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="The log to write (.mcap), or a folder.", **NO_DEFAULT)
     ] = None,
-    reference: Reference = None,
-    column: Columns = None,
-    where: Where = None,
-    unit: Units = None,
-    marker: Markers = None,
-    channel: Channels = None,
-    unmarked: Unmarked = None,
-    alone: Alone = None,
-    decimal: Decimal = None,
-    sheet: Sheet = None,
-    layout: LayoutFile = None,
-    also: Also = None,
-    larger: Larger = 1.0,
+    *,
+    reading: Callable[[], Reading],
     config: Annotated[
         Path | None, typer.Option(help="Space, strategy, seed and visit as for isiw run (TOML).", **NO_DEFAULT)
     ] = None,
     strategy: Annotated[str | None, typer.Option(help="The strategy; see isiw strategies.", **NO_DEFAULT)] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the analysis.", **NO_DEFAULT)] = None,
     only: Annotated[str | None, typer.Option(help="The code of the one person who is wanted.", **NO_DEFAULT)] = None,
-    simulated: Annotated[bool, typer.Option("--simulated", help="The trials are simulated.")] = False,  # noqa: FBT002 - a flag
-    look: Annotated[bool, typer.Option("--look", help="Say what is in the files, and analyse nothing.")] = False,  # noqa: FBT002 - a flag
+    simulated: Annotated[bool, typer.Option("--simulated", help="The trials are simulated.")] = False,
+    look: Annotated[bool, typer.Option("--look", help="Say what is in the files, and analyse nothing.")] = False,
 ) -> None:
     """Estimate the window from trials that were delivered without isiw; with -o, make a log of them.
 
     Called again with the same files and folder, it continues where it was interrupted.
     """
     with errors_reported("Interrupted: what is finished is kept; give the same command to continue."):
-        said = {"reference": reference, "alone": alone, "decimal": decimal, "sheet": sheet, "unmarked": unmarked}
-        read = _layout(
-            layout, {"columns": column, "where": where, "markers": marker, "channels": channel}, unit, **said
-        )
+        layout, limits = reading()
         if look:
-            _look_at(files, read, **_reading(larger, also))
+            _look_at(files, layout, **limits)
             return
         settings = None  # a file is refused before a configuration that nobody gave is loaded
         if (config, strategy, seed) != (None, None, None):
             settings = isiw.config.load_config(config).with_overrides(strategy=strategy, seed=seed)
-        way = isiw.existing.batch.way_of(settings, read, simulated=simulated, **_reading(larger, also))
+        way = isiw.existing.batch.way_of(settings, layout, simulated=simulated, **limits)
         with working(f"Reading {counted(len(files), 'file')}"):
             people = isiw.existing.batch.read_files(files, way, output, only)
         _analyse_all(people, way, files[0])
 
 
 @app.command(rich_help_panel=STUDIES)
-def replay(  # noqa: PLR0913, PLR0917 - an option each
+@reads_files
+def replay(
     file: Annotated[Path, typer.Argument(help="A table, a recording, or a log.", **NO_DEFAULT)],
     strategy: Annotated[list[str] | None, typer.Option(help="A name that isiw strategies lists; repeat it.")] = None,
     seeds: Annotated[int, typer.Option(help="How many times each strategy is run, with other draws.")] = 5,
     trials: Annotated[int, typer.Option(help="How many stimuli each time.")] = 60,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Picture to draw.", **NO_DEFAULT)] = None,
-    reference: Reference = None,
-    column: Columns = None,
-    where: Where = None,
-    unit: Units = None,
-    marker: Markers = None,
-    channel: Channels = None,
-    unmarked: Unmarked = None,
-    alone: Alone = None,
-    decimal: Decimal = None,
-    sheet: Sheet = None,
-    layout: LayoutFile = None,
-    also: Also = None,
-    larger: Larger = 1.0,
+    *,
+    reading: Callable[[], Reading],
     only: Annotated[str | None, typer.Option(help="The code of the one person who is wanted.", **NO_DEFAULT)] = None,
-    overwrite: Overwrite = False,  # noqa: FBT002 - a flag of the command line
+    overwrite: Overwrite = False,
 ) -> None:
     """How many stimuli would it have taken? Strategies choose ISIs, and the trials of a file answer."""
     with errors_reported("Interrupted."):
-        said = {"reference": reference, "alone": alone, "decimal": decimal, "sheet": sheet, "unmarked": unmarked}
-        read = _layout(
-            layout, {"columns": column, "where": where, "markers": marker, "channels": channel}, unit, **said
-        )
-        way = isiw.existing.batch.Way(read, **_reading(larger, also))
+        layout, limits = reading()
+        way = isiw.existing.batch.Way(layout, **limits)
         with working(f"Reading {file.name}"):
             found = isiw.existing.batch.read_files([file], way, only=only)
         if len(found) > 1:
@@ -160,25 +178,11 @@ def replay(  # noqa: PLR0913, PLR0917 - an option each
             show(f"picture: {replayed.plot(output, overwrite=overwrite)}")
 
 
-def _layout(file: Path | None, named: dict[str, list[str] | None], units: list[str] | None, **said: Any) -> Layout:
-    """The layout of a file, with what the command line says otherwise."""
-    layout = isiw.existing.layout.read_layout(file) if file is not None else isiw.existing.Layout()
-    pairs = {
-        key: isiw.existing.layout.pairs_of(f"--{key.removesuffix('s')}", texts or []) for key, texts in named.items()
-    }
-    return layout.saying(**pairs, units=tuple(units or ()), **said)
-
-
-def _reading(larger: float, also: list[Path] | None) -> dict[str, Any]:
-    """What limits the reading of a file, as the command line says it."""
-    return {"limits": isiw.existing.ReadingLimits().larger(larger), "also": tuple(also or ())}
-
-
-def _look_at(files: list[Path], layout: Layout, **reading: Any) -> None:
+def _look_at(files: list[Path], layout: Layout, **limits: Any) -> None:
     """Say what is in files, and draw the first sweeps of each that has any."""
     for file in files:
         with working(f"Looking into {file.name}"):
-            found = isiw.existing.look(file, layout, **reading)
+            found = isiw.existing.look(file, layout, **limits)
         show(f"{found}")
         if found.figure is not None:
             picture = free_beside(file.with_name(f"{file.stem}_look"), ".png")
