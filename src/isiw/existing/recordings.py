@@ -18,7 +18,7 @@ from isiw.existing.formats.columns import require_rate
 from isiw.existing.formats.contents import APART_S, Contents, Track, events_of
 from isiw.existing.frames import named
 from isiw.existing.layout import EMG_UNITS, MARKERS, UNIT_WORDS, Layout, required_unit
-from isiw.existing.markers import marked, names_of, pulses_of
+from isiw.existing.markers import Pulse, marked, names_of, pulses_of
 from isiw.existing.tables import Columns, require_one
 from isiw.findings import Kind
 from isiw.lazy import pd
@@ -61,9 +61,11 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
     contents = replace(contents, events=events, notes=notes)
     layout.required_reference(contents.source)
     if contents.trials is None or contents.pulse_at_s is None:
-        return delivered_of(contents, unit, sweeps_of(contents, signals, layout), layout, subject)
-    sweeps, columns, person = _of_rows(contents, signals["emg"], layout)
-    return replace(delivered_of(contents, unit, sweeps, layout, person or subject), unused=columns.unused)
+        pulses, unused, person = pulses_of(contents.events, origin_key(layout), layout, contents.source), (), ""
+    else:
+        pulses, unused, person = _pulses_of_rows(contents, signals["emg"], layout)
+    sweeps = sweeps_of(contents, signals, pulses, layout)
+    return replace(delivered_of(contents, unit, sweeps, layout, person or subject), unused=unused)
 
 
 def track_of(contents: Contents, key: str, layout: Layout) -> Track:
@@ -87,11 +89,10 @@ def track_of(contents: Contents, key: str, layout: Layout) -> Track:
     return fitting[0]
 
 
-def _of_rows(contents: Contents, emg: Track, layout: Layout) -> tuple[list[Found], Columns, str]:
-    """Sweeps that a row each says the ISI of, the columns of these, and whose they are, if that is said."""
+def _pulses_of_rows(contents: Contents, emg: Track, layout: Layout) -> tuple[list[Pulse], tuple[str, ...], str]:
+    """The pulses of sweeps that a row each says the ISI of, the columns that are not used, and whose they are."""
     told = replace(layout, alone="") if layout.alone is None and contents.empty_is_alone else layout
     columns = Columns.found(named(contents.trials), told, contents.source, needed=("isi",))
-    zero_s = contents.pulse_at_s or 0.0
     if len(emg.stretches) != columns.rows:
         raise InvalidValueError(
             f"{contents.source} does not say the ISI of each sweep",
@@ -100,23 +101,20 @@ def _of_rows(contents: Contents, emg: Track, layout: Layout) -> tuple[list[Found
     rows, keys = columns.chosen(told), (origin_key(layout), "pulse", "alone")
     marks = {key: np.array(marked(contents.events, key, layout)) for key in keys}
     columns.require_said(rows, told.alone)
-    begin = "t_hit_ms" if layout.reference == "impact" else "t_valve_ms"
-    sweeps: list[Found] = []
-    for number, row in enumerate(rows):
+    pulses = list[Pulse]()
+    for row in rows:
         if columns.tap_alone(row):
             raise columns["isi"].refused(row, "is of a tap alone, whose sweep has no pulse", "Leave that sweep out.")
         isi_ms = None if columns.tms_alone(row, told.alone) else columns["isi"].number(row)
-        stretch = emg.stretches[row]
-        at_tap = _is_tap(contents, marks, stretch.start_s, columns["isi"], row, isi_ms)
-        pulse_ms = 1e3 * zero_s + ((isi_ms or 0.0) if at_tap else 0.0)
-        values = emg.read(stretch.first, stretch.first + stretch.samples)
-        begins: dict[str, Any] = {begin: None if isi_ms is None else -isi_ms}
-        meant = Stimulus(number, None if isi_ms is None else max(isi_ms, 0.0))
-        sweep = Sweep({"emg": Channel(values, emg.rate_hz, "mV", -pulse_ms)}, t_tms_ms=0.0, **begins)
+        isi_s, sweep = None if isi_ms is None else isi_ms / 1e3, emg.stretches[row]
+        at_tap = _is_tap(contents, marks, sweep.start_s, columns["isi"], row, isi_ms)
+        at_s = sweep.start_s + (contents.pulse_at_s or 0.0) + ((isi_s or 0.0) if at_tap else 0.0)
+        span_s = sweep.start_s, sweep.start_s + sweep.samples / emg.rate_hz
         lost = layout.unmarked == "lost" and not columns["isi"].text(row)
-        sweeps.append((meant, sweep, {"excluded": columns.lost(row) is not None, "lost": lost}))
-    require_short([one[0].isi_ms for one in sweeps if one[0].isi_ms is not None], layout, contents.source)
-    return sweeps, columns, _only_one(columns, rows, contents.source)
+        said = {"excluded": columns.lost(row) is not None}
+        pulses.append(Pulse(at_s, isi_s, lost=lost, sweep_s=span_s, said=said))
+    require_short([1e3 * pulse.isi_s for pulse in pulses if pulse.isi_s is not None], layout, contents.source)
+    return pulses, columns.unused, _only_one(columns, rows, contents.source)
 
 
 def _is_tap(
@@ -198,9 +196,8 @@ def delivered_of(contents: Contents, unit: str, sweeps: Sequence[Found], layout:
     )
 
 
-def sweeps_of(contents: Contents, signals: Mapping[str, Track], layout: Layout) -> list[Found]:
+def sweeps_of(contents: Contents, signals: Mapping[str, Track], pulses: Sequence[Pulse], layout: Layout) -> list[Found]:
     """A stretch of the recording for each pulse, with what came before it."""
-    pulses = pulses_of(contents.events, origin_key(layout), layout, contents.source)
     if any(after.at_s - before.at_s < _AFTER_MS / 1e3 for before, after in pairwise(pulses)):
         raise InvalidValueError(
             f"two pulses of {contents.source} are less than {_AFTER_MS:g} ms apart",

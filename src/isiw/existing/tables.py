@@ -215,11 +215,7 @@ def units_beside(key: str, name: str, frame: pd.DataFrame) -> dict[str, str]:
 
 
 def unit_said(name: str, known: Mapping[str, float]) -> str | None:
-    """The unit that a column's name says, of those of one quantity.
-
-    Raises:
-        InvalidValueError: it says two, such as one beside it, in the line below it or in its cells.
-    """
+    """The unit that a column's name says, of those of one quantity; raise if it says two, such as one in its cells."""
     inside, bare = re.findall(r"[\[(]([^][()]*)[\])]", name), re.findall(r"[^\W_]+", re.sub(r"[\[(].*", "", name))[1:]
     found, usual = ([unit for word in words if (unit := UNIT_WORDS.get(word.strip().casefold(), "")) in known]
                     for words in ([*inside, *bare[-1:]], bare))  # fmt: skip
