@@ -11,15 +11,24 @@ from typing import Any, Final
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.existing.cells import Column, is_missing
+from isiw.existing.cells import is_missing
 from isiw.existing.delivered import Delivered, anywhere, renumbered
 from isiw.existing.doubts import is_rectified, require_short
 from isiw.existing.formats.columns import require_rate
 from isiw.existing.formats.contents import APART_S, Contents, Track, events_of
 from isiw.existing.frames import named
-from isiw.existing.layout import EMG_UNITS, MARKERS, UNIT_WORDS, Layout, required_unit
+from isiw.existing.layout import (
+    COLUMNS,
+    EMG_UNITS,
+    ISI_UNITS_MS,
+    MARKERS,
+    UNIT_WORDS,
+    Layout,
+    letters,
+    required_unit,
+)
 from isiw.existing.markers import Pulse, marked, names_of, pulses_of
-from isiw.existing.tables import Columns, require_one
+from isiw.existing.tables import Columns, require_one, unit_said
 from isiw.findings import Kind
 from isiw.lazy import pd
 from isiw.signals.judgement import judge
@@ -51,6 +60,7 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
         require_rate(layout.rate_hz, tracks["emg"].rate_hz, contents.source)
     triggers = events_of((key, at_s, 0.0) for key in MARKERS if key in tracks for at_s in tracks[key].onsets_s())
     events = pd.concat([each for each in (contents.events, triggers) if len(each)] or [triggers], ignore_index=True)
+    tracks["emg"] = tracks["emg"].with_unit(unit_said(tracks["emg"].name, EMG_UNITS))
     said, what = tracks["emg"].unit, f"the channel {tracks['emg'].name!r} of {contents.source}"
     known, notes = UNIT_WORDS.get(said.strip().casefold()), contents.notes
     unit = required_unit(layout, EMG_UNITS, known, what, said or None)
@@ -107,7 +117,7 @@ def _pulses_of_rows(contents: Contents, emg: Track, layout: Layout) -> tuple[lis
             raise columns["isi"].refused(row, "is of a tap alone, whose sweep has no pulse", "Leave that sweep out.")
         isi_ms = None if columns.tms_alone(row, told.alone) else columns["isi"].number(row)
         isi_s, sweep = None if isi_ms is None else isi_ms / 1e3, emg.stretches[row]
-        at_tap = _is_tap(contents, marks, sweep.start_s, columns["isi"], row, isi_ms)
+        at_tap = _is_tap(contents, marks, sweep.start_s, row, isi_ms)
         at_s = sweep.start_s + (contents.pulse_at_s or 0.0) + ((isi_s or 0.0) if at_tap else 0.0)
         span_s = sweep.start_s, sweep.start_s + sweep.samples / emg.rate_hz
         lost = layout.unmarked == "lost" and not columns["isi"].text(row)
@@ -118,7 +128,7 @@ def _pulses_of_rows(contents: Contents, emg: Track, layout: Layout) -> tuple[lis
 
 
 def _is_tap(
-    contents: Contents, marks: Mapping[str, FloatArray], start_s: float, isi: Column, row: int, isi_ms: float | None
+    contents: Contents, marks: Mapping[str, FloatArray], start_s: float, row: int, isi_ms: float | None
 ) -> bool:
     """True if a sweep is about the tap, and not about the pulse; raise if its events are not those of its row."""
     (key, taps_s), (_, pulses_s), _ = within = [
@@ -134,11 +144,19 @@ def _is_tap(
             remedy=f"Say which marker is of the pulse and which of the tap: --marker pulse=NAME --marker {key}=NAME.",
         )
     if len(pulses_s) == len(taps_s) == 1:
-        seen_ms = 1e3 * float(pulses_s[0] - taps_s[0])
-        if isi_ms is None or abs(seen_ms - isi_ms) > _APART_MS:
-            what = f"is not the ISI of the events in that sweep, {seen_ms:.1f} ms"
-            raise isi.refused(row, what, "Correct one of them, or leave the metadata or the annotations out.")
+        _require_same(f"row {row + 1} of {contents.source}", isi_ms, float(pulses_s[0] - taps_s[0]))
     return key in at_zero
+
+
+def _require_same(what: str, isi_ms: float | None, seen_s: float) -> None:
+    """Raise if the ISI in a table is not that of the events."""
+    if isi_ms is None or abs(1e3 * seen_s - isi_ms) > _APART_MS:
+        raise InvalidValueError(
+            f"the ISI of {what} is not that of the events in its sweep",
+            got="TMS alone" if isi_ms is None else f"{isi_ms:g} ms",
+            expected=f"{1e3 * seen_s:.1f} ms, by the events",
+            remedy="Correct one of them, or leave one out of the file.",
+        )
 
 
 def _only_one(columns: Columns, rows: Sequence[int], source: str) -> str:
@@ -205,6 +223,8 @@ def sweeps_of(contents: Contents, signals: Mapping[str, Track], pulses: Sequence
         )
     longest_s = max((pulse.isi_s or 0.0 for pulse in pulses), default=0.0)
     events, found = contents.events, list[Found]()
+    stated = {name: unit_said(name, ISI_UNITS_MS) or "ms" for name in map(str, events)
+              if letters(name) in COLUMNS["isi"]}  # fmt: skip
     bad = events[events["name"].astype(str).str.lower().str.startswith("bad")]  # as MNE takes them
     for number, pulse in enumerate(pulses):
         begin_s = pulse.at_s - _BEFORE_MS / 1e3 - longest_s
@@ -212,6 +232,10 @@ def sweeps_of(contents: Contents, signals: Mapping[str, Track], pulses: Sequence
         origin_s = None if pulse.isi_s is None else pulse.at_s - pulse.isi_s
         sweep = _cut(signals, span_s, pulse.at_s, origin_s, origin_key(layout))
         said: dict[str, Any] = {**pulse.said, "lost": pulse.lost}
+        for name, unit in stated.items():
+            if pulse.isi_s is not None and not is_missing(isi := said.get(name)):
+                what = f"the trial at {pulse.at_s:.3f} s of {contents.source}"
+                _require_same(what, float(isi) * ISI_UNITS_MS[unit], pulse.isi_s)
         judged_s = min(pulse.at_s - _BEFORE_MS / 1e3, origin_s or pulse.at_s), pulse.at_s + _AFTER_MS / 1e3
         if ((bad["onset"] <= judged_s[1]) & (bad["onset"] + bad["duration"] >= judged_s[0])).any():
             said["excluded"] = True

@@ -9,7 +9,13 @@ from typing import Final
 
 from isiw.errors import InvalidValueError, did_you_mean
 from isiw.existing.cells import ALONE, TAP_ALONE, Column, plain, says_alone, with_decimals, without_unit_in_cells
-from isiw.existing.doubts import ALL, require_of_kind, require_single_trials
+from isiw.existing.doubts import (
+    ALL,
+    require_no_verdicts,
+    require_of_kind,
+    require_reference,
+    require_single_trials,
+)
 from isiw.existing.layout import COLUMNS, EMG_UNITS, ISI_UNITS_MS, UNIT_WORDS, Layout, letters, required_unit
 from isiw.findings import Kind
 from isiw.lazy import pd
@@ -139,6 +145,8 @@ class Columns:
             for place, name in enumerate(names)
             if name not in {*held.values(), *of_units} and name.strip()
         }
+        require_no_verdicts(beside.values())
+        require_reference(columns["isi"], layout.reference)
         if (condition := columns.get("condition")) is not None:  # which may tell pairs from each other, too
             alone = ALONE | TAP_ALONE
             of_pairs = replace(condition, cells=["" if plain(str(cell)) in alone else cell for cell in condition.cells])
