@@ -17,18 +17,9 @@ from isiw.existing.doubts import is_rectified, require_short
 from isiw.existing.formats.columns import require_rate
 from isiw.existing.formats.contents import APART_S, Contents, Track, events_of
 from isiw.existing.frames import named
-from isiw.existing.layout import (
-    COLUMNS,
-    EMG_UNITS,
-    ISI_UNITS_MS,
-    MARKERS,
-    UNIT_WORDS,
-    Layout,
-    letters,
-    required_unit,
-)
+from isiw.existing.layout import EMG_UNITS, MARKERS, UNIT_WORDS, Layout, required_unit
 from isiw.existing.markers import Pulse, marked, names_of, pulses_of
-from isiw.existing.tables import Columns, require_one, unit_said
+from isiw.existing.tables import Columns, isis_of, require_one, unit_said
 from isiw.findings import Kind
 from isiw.lazy import pd
 from isiw.signals.judgement import judge
@@ -38,9 +29,14 @@ from isiw.types import FloatArray
 
 _BEFORE_MS: Final = 150.0
 _AFTER_MS: Final = 100.0
-_APART_MS: Final = 2.0
 """What is cut out of a continuous recording: from so long before the longest ISI to so long after the pulse."""
+_APART_MS: Final = 2.0
+"""An ISI in a table that differs by more from that of the events is another one."""
 
+_IF_NONE_COUNTS: Final = (
+    "Is the EMG channel the right one, its unit right, and the marker of the pulse? Is the EMG at rest without mains "
+    "hum, at most {:g} µV RMS? See docs/timing.md."
+)
 OF_SWEEPS: Final[Mapping[str, AbstractSet[str]]] = {
     "columns": {"isi", "status", "exclude", "reason", "tap_alone", "subject", "day", "condition"},
     "channels": {"emg", "tap", "valve"},
@@ -193,13 +189,7 @@ def delivered_of(contents: Contents, unit: str, sweeps: Sequence[Found], layout:
         raise InvalidValueError(
             f"no sweep of {contents.source} counts",
             got=", ".join(reasons) or "excluded ones",
-            remedy=" ".join(
-                [
-                    *contents.notes,
-                    "Is the EMG channel the right one, its unit right, and the marker of the pulse? Is the EMG at rest",
-                    f"without mains hum, at most {signals.background_uv:g} µV RMS? See docs/timing.md.",
-                ]
-            ),
+            remedy=" ".join([*contents.notes, _IF_NONE_COUNTS.format(signals.background_uv)]),
         )
     emg = [sweep.channels["emg"].values for _, sweep, _ in sweeps if "emg" in sweep.channels]
     return Delivered(
@@ -223,8 +213,6 @@ def sweeps_of(contents: Contents, signals: Mapping[str, Track], pulses: Sequence
         )
     longest_s = max((pulse.isi_s or 0.0 for pulse in pulses), default=0.0)
     events, found = contents.events, list[Found]()
-    stated = {name: unit_said(name, ISI_UNITS_MS) or "ms" for name in map(str, events)
-              if letters(name) in COLUMNS["isi"]}  # fmt: skip
     bad = events[events["name"].astype(str).str.lower().str.startswith("bad")]  # as MNE takes them
     for number, pulse in enumerate(pulses):
         begin_s = pulse.at_s - _BEFORE_MS / 1e3 - longest_s
@@ -232,10 +220,8 @@ def sweeps_of(contents: Contents, signals: Mapping[str, Track], pulses: Sequence
         origin_s = None if pulse.isi_s is None else pulse.at_s - pulse.isi_s
         sweep = _cut(signals, span_s, pulse.at_s, origin_s, origin_key(layout))
         said: dict[str, Any] = {**pulse.said, "lost": pulse.lost}
-        for name, unit in stated.items():
-            if pulse.isi_s is not None and not is_missing(isi := said.get(name)):
-                what = f"the trial at {pulse.at_s:.3f} s of {contents.source}"
-                _require_same(what, float(isi) * ISI_UNITS_MS[unit], pulse.isi_s)
+        for isi_ms in isis_of(pulse.said) if pulse.isi_s is not None else ():
+            _require_same(f"the trial at {pulse.at_s:.3f} s of {contents.source}", isi_ms, pulse.isi_s)
         judged_s = min(pulse.at_s - _BEFORE_MS / 1e3, origin_s or pulse.at_s), pulse.at_s + _AFTER_MS / 1e3
         if ((bad["onset"] <= judged_s[1]) & (bad["onset"] + bad["duration"] >= judged_s[0])).any():
             said["excluded"] = True
