@@ -13,10 +13,22 @@ import pandas as pd
 import pytest
 import scipy.io
 
-from existing.test_doubts import table
+from existing.test_doubts import eeglab, table
 from existing.test_tables import IMPACT
 from existing.test_waves import EMG_MV, lines, trigger
-from existing.writers import ISIS_MS, KNOWN, NAMES, RATE_HZ, as_edf, epochs, raw, recording, require_as_written
+from existing.writers import (
+    ISIS_MS,
+    KNOWN,
+    NAMES,
+    RATE_HZ,
+    as_edf,
+    as_nwb,
+    epochs,
+    named_events,
+    raw,
+    recording,
+    require_as_written,
+)
 from isiw.errors import IsiwError
 from isiw.existing.layout import Layout
 from isiw.existing.reading import read_people
@@ -66,7 +78,7 @@ def test_a_unit_beside_numbers_is_theirs_in_a_table_and_in_a_structure_of_matlab
 
 def test_epochs_that_contradict_their_events_are_asked_about() -> None:
     for isis_ms in ([30.0, 60, 90, 120, 85, np.nan], [30.0, 60, 90, 120, np.nan, np.nan]):
-        with pytest.raises(IsiwError, match=r"row 5 .* is not the ISI of the events in that sweep, 45\.0 ms"):
+        with pytest.raises(IsiwError, match=r"ISI of row 5 of .*; expected 45\.0 ms, by the events"):
             read_people(epochs(isi_ms=isis_ms), KNOWN)
     found, _ = mne.events_from_annotations(raw(), {NAMES["tap"]: 1})
     held = pd.DataFrame({"isi_ms": ISIS_MS})
@@ -110,3 +122,32 @@ def test_files_of_bids_beside_a_recording_that_contradict_it_are_asked_about(tmp
                 read_people(path, KNOWN)
         else:
             require_as_written(read_people(path, KNOWN.saying(units=("uV",)))[0])
+
+
+def test_times_of_an_eeglab_file_are_compared_with_its_rate(tmp_path: Path) -> None:
+    path = eeglab(tmp_path, 1e3)
+    held = scipy.io.loadmat(path, simplify_cells=True)["EEG"]
+    for rate_hz, asks in ((RATE_HZ, False), (2000.0, True)):
+        scipy.io.savemat(path, {"EEG": {**held, "srate": rate_hz, "times": np.arange(len(EMG_MV)) / 4.0}})
+        if asks:
+            with pytest.raises(IsiwError, match=r"EEG\.times of P01\.set says; got '2000 Hz'; expected 4000 Hz"):
+                read_people(path, KNOWN)
+        else:
+            require_as_written(read_people(path, KNOWN)[0])
+
+
+def test_units_and_isis_that_a_channel_or_a_table_in_a_recording_says_are_compared(tmp_path: Path) -> None:
+    made = raw()
+    made.rename_channels({"FCR": "FCR (mV)"})
+    with pytest.raises(IsiwError, match="got 'V in one place, and mV in another'"):
+        read_people(made, KNOWN.saying(channels={"emg": "FCR (mV)"}))
+    pynwb, layout = pytest.importorskip("pynwb"), Layout("impact", channels={"emg": "EMG FCR"}, unmarked="alone")
+    with pynwb.NWBHDF5IO(as_nwb(tmp_path), "a") as target:
+        file = target.read()
+        file.add_trial_column("isi_ms", "the ISI")
+        pulses_s = [5.0 + at_s for at_s, name in named_events() if name == "TMS"]
+        for at_s, isi_ms in zip(pulses_s, (*ISIS_MS[:4], 85.0, np.nan), strict=True):
+            file.add_trial(start_time=at_s - 0.5, stop_time=at_s + 0.3, isi_ms=isi_ms)
+        target.write(file)
+    with pytest.raises(IsiwError, match=r"the ISI of the trial at .* got '85 ms'; expected 45\.0 ms, by the events"):
+        read_people(tmp_path / "P01.nwb", layout)

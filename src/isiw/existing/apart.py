@@ -47,21 +47,7 @@ def read_apart(
     *,
     look: bool = False,
 ) -> answer.Answer:
-    """The people whose trials a file holds, read by a process of its own.
-
-    Args:
-        path: the file.
-        layout: how it is laid out.
-        subject: the code of a person who has none in it.
-        limits: the most that is read.
-        also: files elsewhere that it may refer to.
-        look: whether only to look into it, and to say what is in it.
-
-    Raises:
-        InvalidValueError: what reading raises, or a limit that was reached.
-        ConfigError: a library is not installed.
-        OSError: a file that cannot be opened.
-    """
+    """The people whose trials a file holds, read by a process of its own; or, to `look` into it, what is said of it."""
     is_table = formats.format_of(path).is_table
     seconds = seconds_for(limits, path, table=is_table)
     request = {

@@ -6,20 +6,20 @@ import math
 import re
 import statistics
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.existing.cells import Column, plain
+from isiw.existing.cells import Column
 from isiw.existing.delivered import LONGEST_ISI_MS
 from isiw.existing.layout import Layout, letters
 from isiw.findings import AMPLITUDE_MV
 from isiw.lazy import pd
 from isiw.text.sanitize import counted
-from isiw.types import FloatArray
+from isiw.types import FloatArray, Reference
 
 if TYPE_CHECKING:
     from isiw.existing.tables import Columns
@@ -33,6 +33,12 @@ _TITLES: Final = re.compile(r"\b(means?|averages?|averaged|avg|mittelwerte?)\b")
 _SPREADS: Final = frozenset({"sd", "std", "stdev", "stddev", "se", "sem", "stderr", "cv", "sds", "stdabw",
                              "standarddeviation", "standarderror", "ci", "iqr", "var"})  # fmt: skip
 _SUMS: Final = frozenset({"sum", "total", "grand mean", "summe", "gesamt"})
+_LEFT_OUT: Final = frozenset({"mistrial", "rejected", "reject", "bad", "invalid", "excluded", "exclude", "discard",
+                              "discarded", "artefact", "artifact", "outlier", "schlecht", "ungültig", "verworfen",
+                              "ausgeschlossen", "artefakt", "ausreißer"})  # fmt: skip
+"""What a remark says of a trial that does not count."""
+_ORIGINS: Final = {"impact": r"\b(valve|ventil|command)", "valve": r"\b(impact|hit|contact|aufprall)"}
+"""What the name of ISIs that count from another event says."""
 _BESIDE: Final = frozenset({"mep", "amplitude", "of", "lower", "upper", "low", "high", "mv", "uv", "v", "95"})
 """Words that may stand beside those of spreads."""
 _NUMBERS: Final = frozenset({"n", "count", "ntrials", "trials", "ntrial", "nobs", "nsweeps", "sweeps", "anzahl", "nmep",
@@ -48,6 +54,7 @@ _OTHERWISE: Final = {
         (_RELATIVE, "are relative to others", "peak-to-peak amplitudes in mV, µV or V"),
         (re.compile(r"\b(base|zero|0|onset)\w* ?(-|to)* ?peak|\bhalf\b|\barea\b|\bauc\b|\brms\b|integra|rectif|latenc"),
          "are of another measure", "amplitudes from peak to peak"),
+        (re.compile(r"\bgain\b|amplified|verstärk"), "are multiplied", "amplitudes at the electrodes"),
     ),
     "isi": (
         (re.compile(r"\b(codes?|index|idx|levels?|bins?|class|category|nr|no|number|stufe)\b"),
@@ -129,6 +136,26 @@ def _are_counts(column: Column) -> bool:
     return 2 * len(texts) <= len(column.cells) and all(text.isdigit() and int(text) > 1 for text in texts)
 
 
+def require_no_verdicts(beside: Iterable[Column]) -> None:
+    """Raise if a column of which nothing is read says that a trial does not count."""
+    for column in beside:
+        texts = {cell for cell in column.cells if isinstance(cell, str)}
+        if odd := next((text for text in texts if text.strip(" !.").casefold() in _LEFT_OUT), None):
+            remedy = "Mark such rows in a column called exclude; if they count, write something else, or nothing."
+            raise column.refused(column.cells.index(odd), "says that the trial does not count", remedy)
+
+
+def require_reference(isi: Column, reference: Reference | None) -> None:
+    """Raise if the name of ISIs says that they count from another event than the one that is stated."""
+    if reference is not None and (found := re.search(_ORIGINS[reference], _words(isi.name))):
+        raise InvalidValueError(
+            f"the column {isi.name!r} of {isi.of} counts from another event than is stated",
+            got=reference,
+            expected=f"what {found[0]!r} says",
+            remedy="Correct --reference, or name the column of the other ISIs: --column isi=NAME.",
+        )
+
+
 def require_short(isis_ms: Sequence[float], layout: Layout, source: str) -> None:
     """Raise if most ISIs are longer than those after which the effect of a tap is sought."""
     usual_ms = statistics.median(isis_ms) if isis_ms else 0.0
@@ -158,8 +185,7 @@ def is_rectified(sweeps: Sequence[FloatArray]) -> list[str]:
 
 
 def require_codes(texts: Sequence[str], rows: Sequence[int], columns: Columns) -> None:
-    """Raise if a code NA may be a person's initials, or stand for no code, or if one code is written in two ways."""
-    spelled = dict[str, str]()
+    """Raise if a code NA may be a person's initials, or stand for no code."""
     others = {text for text in texts if text and text.upper() != "NA"}
     if (
         others
@@ -170,13 +196,6 @@ def require_codes(texts: Sequence[str], rows: Sequence[int], columns: Columns) -
         if first is not None:
             remedy = "If NA is a person's code, write another one, such as N.A.; if the code is missing, fill it in."
             raise columns.of["subject"].refused(rows[first], "may be a code, or stand for none", remedy)
-
-    for text, row in zip(texts, rows, strict=True):
-        if text != (first := spelled.setdefault(plain(text), text)):
-            remedy = "Write one person's code in one way; if they are two people, give them codes that differ in more."
-            raise columns.of["subject"].refused(
-                row, f"differs from {first!r} in capitals, blanks or hyphens alone", remedy
-            )
 
 
 def require_one_unit(key: str, column: Column, rows: Sequence[int]) -> None:
@@ -206,13 +225,23 @@ def require_isis(columns: Columns, rows: Sequence[int], layout: Layout) -> None:
         others = {isi_ms: count for isi_ms, count in times.items() if isi_ms != odd}
         if times[odd] < 3 or len(others) < 2:
             continue
-        frequent = odd <= 0 and times[odd] >= 2 * max(others.values())
+        frequent = odd <= 0 and (times[odd] >= 2 * max(others.values()) or _is_named(columns, rows, odd))
         if frequent or odd in {-1, -9, -99, -999, 99, 999} or odd > max(499.0, 2 * max(others)):
             raise InvalidValueError(
                 f"{times[odd]} rows of {isi.of} have the ISI {odd:g} ms, which may stand for TMS alone",
                 expected="what an ISI is, and what is TMS alone",
                 remedy=f"Say --alone {odd / isi.factor:g} if they are TMS alone; if they are pairs, say --alone never.",
             )
+
+
+def _is_named(columns: Columns, rows: Sequence[int], isi_ms: float) -> bool:
+    """True if a column that is not used has a word for the rows with one ISI that no other row has."""
+    has = {row: columns["isi"].number(row) == isi_ms for row in rows}
+    for column in columns.beside.values():
+        words, others = ({column.text(row) for row in rows if has[row] is of_isi} for of_isi in (True, False))
+        if len(words) == 1 and words.isdisjoint(others) and not next(iter(words)).isdigit():
+            return True
+    return False
 
 
 def require_one_row_each(columns: Columns, rows: Sequence[int], layout: Layout) -> None:

@@ -11,15 +11,15 @@ from typing import Any, Final
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.existing.cells import Column, is_missing
+from isiw.existing.cells import is_missing
 from isiw.existing.delivered import Delivered, anywhere, renumbered
 from isiw.existing.doubts import is_rectified, require_short
 from isiw.existing.formats.columns import require_rate
 from isiw.existing.formats.contents import APART_S, Contents, Track, events_of
 from isiw.existing.frames import named
 from isiw.existing.layout import EMG_UNITS, MARKERS, UNIT_WORDS, Layout, required_unit
-from isiw.existing.markers import marked, names_of, pulses_of
-from isiw.existing.tables import Columns, require_one
+from isiw.existing.markers import Pulse, marked, names_of, pulses_of
+from isiw.existing.tables import Columns, isis_of, require_one, unit_said
 from isiw.findings import Kind
 from isiw.lazy import pd
 from isiw.signals.judgement import judge
@@ -30,9 +30,14 @@ from isiw.types import FloatArray
 
 _BEFORE_MS: Final = 150.0
 _AFTER_MS: Final = 100.0
-_APART_MS: Final = 2.0
 """What is cut out of a continuous recording: from so long before the longest ISI to so long after the pulse."""
+_APART_MS: Final = 2.0
+"""An ISI in a table that differs by more from that of the events is another one."""
 
+_IF_NONE_COUNTS: Final = (
+    "Is the EMG channel the right one, its unit right, and the marker of the pulse? Is the EMG at rest without mains "
+    "hum, at most {:g} µV RMS? See docs/timing.md."
+)
 OF_SWEEPS: Final[Mapping[str, AbstractSet[str]]] = {
     "columns": {"isi", "status", "exclude", "reason", "tap_alone", "subject", "day", "condition"},
     "channels": {"emg", "tap", "valve"},
@@ -52,6 +57,7 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
         require_rate(layout.rate_hz, tracks["emg"].rate_hz, contents.source)
     triggers = events_of((key, at_s, 0.0) for key in MARKERS if key in tracks for at_s in tracks[key].onsets_s())
     events = pd.concat([each for each in (contents.events, triggers) if len(each)] or [triggers], ignore_index=True)
+    tracks["emg"] = tracks["emg"].with_unit(unit_said(tracks["emg"].name, EMG_UNITS))
     said, what = tracks["emg"].unit, f"the channel {tracks['emg'].name!r} of {contents.source}"
     known, notes = UNIT_WORDS.get(said.strip().casefold()), contents.notes
     unit = required_unit(layout, EMG_UNITS, known, what, said or None)
@@ -62,9 +68,11 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
     contents = replace(contents, events=events, notes=notes)
     layout.required_reference(contents.source)
     if contents.trials is None or contents.pulse_at_s is None:
-        return delivered_of(contents, unit, sweeps_of(contents, signals, layout), layout, subject)
-    sweeps, columns, person = _of_rows(contents, signals["emg"], layout)
-    return replace(delivered_of(contents, unit, sweeps, layout, person or subject), unused=columns.unused)
+        pulses, unused, person = pulses_of(contents.events, origin_key(layout), layout, contents.source), (), ""
+    else:
+        pulses, unused, person = _pulses_of_rows(contents, signals["emg"], layout)
+    sweeps = sweeps_of(contents, signals, pulses, layout)
+    return replace(delivered_of(contents, unit, sweeps, layout, person or subject), unused=unused)
 
 
 def track_of(contents: Contents, key: str, layout: Layout) -> Track:
@@ -88,11 +96,10 @@ def track_of(contents: Contents, key: str, layout: Layout) -> Track:
     return fitting[0]
 
 
-def _of_rows(contents: Contents, emg: Track, layout: Layout) -> tuple[list[Found], Columns, str]:
-    """Sweeps that a row each says the ISI of, the columns of these, and whose they are, if that is said."""
+def _pulses_of_rows(contents: Contents, emg: Track, layout: Layout) -> tuple[list[Pulse], tuple[str, ...], str]:
+    """The pulses of sweeps that a row each says the ISI of, the columns that are not used, and whose they are."""
     told = replace(layout, alone="") if layout.alone is None and contents.empty_is_alone else layout
     columns = Columns.found(named(contents.trials), told, contents.source, needed=("isi",))
-    zero_s = contents.pulse_at_s or 0.0
     if len(emg.stretches) != columns.rows:
         raise InvalidValueError(
             f"{contents.source} does not say the ISI of each sweep",
@@ -101,27 +108,24 @@ def _of_rows(contents: Contents, emg: Track, layout: Layout) -> tuple[list[Found
     rows, keys = columns.chosen(told), (origin_key(layout), "pulse", "alone")
     marks = {key: np.array(marked(contents.events, key, layout)) for key in keys}
     columns.require_said(rows, told.alone)
-    begin = "t_hit_ms" if layout.reference == "impact" else "t_valve_ms"
-    sweeps: list[Found] = []
-    for number, row in enumerate(rows):
+    pulses = list[Pulse]()
+    for row in rows:
         if columns.tap_alone(row):
             raise columns["isi"].refused(row, "is of a tap alone, whose sweep has no pulse", "Leave that sweep out.")
         isi_ms = None if columns.tms_alone(row, told.alone) else columns["isi"].number(row)
-        stretch = emg.stretches[row]
-        at_tap = _is_tap(contents, marks, stretch.start_s, columns["isi"], row, isi_ms)
-        pulse_ms = 1e3 * zero_s + ((isi_ms or 0.0) if at_tap else 0.0)
-        values = emg.read(stretch.first, stretch.first + stretch.samples)
-        begins: dict[str, Any] = {begin: None if isi_ms is None else -isi_ms}
-        meant = Stimulus(number, None if isi_ms is None else max(isi_ms, 0.0))
-        sweep = Sweep({"emg": Channel(values, emg.rate_hz, "mV", -pulse_ms)}, t_tms_ms=0.0, **begins)
+        isi_s, sweep = None if isi_ms is None else isi_ms / 1e3, emg.stretches[row]
+        at_tap = _is_tap(contents, marks, sweep.start_s, row, isi_ms)
+        at_s = sweep.start_s + (contents.pulse_at_s or 0.0) + ((isi_s or 0.0) if at_tap else 0.0)
+        span_s = sweep.start_s, sweep.start_s + sweep.samples / emg.rate_hz
         lost = layout.unmarked == "lost" and not columns["isi"].text(row)
-        sweeps.append((meant, sweep, {"excluded": columns.lost(row) is not None, "lost": lost}))
-    require_short([one[0].isi_ms for one in sweeps if one[0].isi_ms is not None], layout, contents.source)
-    return sweeps, columns, _only_one(columns, rows, contents.source)
+        said = {"excluded": columns.lost(row) is not None}
+        pulses.append(Pulse(at_s, isi_s, lost=lost, sweep_s=span_s, said=said))
+    require_short([1e3 * pulse.isi_s for pulse in pulses if pulse.isi_s is not None], layout, contents.source)
+    return pulses, columns.unused, _only_one(columns, rows, contents.source)
 
 
 def _is_tap(
-    contents: Contents, marks: Mapping[str, FloatArray], start_s: float, isi: Column, row: int, isi_ms: float | None
+    contents: Contents, marks: Mapping[str, FloatArray], start_s: float, row: int, isi_ms: float | None
 ) -> bool:
     """True if a sweep is about the tap, and not about the pulse; raise if its events are not those of its row."""
     (key, taps_s), (_, pulses_s), _ = within = [
@@ -137,11 +141,19 @@ def _is_tap(
             remedy=f"Say which marker is of the pulse and which of the tap: --marker pulse=NAME --marker {key}=NAME.",
         )
     if len(pulses_s) == len(taps_s) == 1:
-        seen_ms = 1e3 * float(pulses_s[0] - taps_s[0])
-        if isi_ms is None or abs(seen_ms - isi_ms) > _APART_MS:
-            what = f"is not the ISI of the events in that sweep, {seen_ms:.1f} ms"
-            raise isi.refused(row, what, "Correct one of them, or leave the metadata or the annotations out.")
+        _require_same(f"row {row + 1} of {contents.source}", isi_ms, float(pulses_s[0] - taps_s[0]))
     return key in at_zero
+
+
+def _require_same(what: str, isi_ms: float | None, seen_s: float) -> None:
+    """Raise if the ISI in a table is not that of the events."""
+    if isi_ms is None or abs(1e3 * seen_s - isi_ms) > _APART_MS:
+        raise InvalidValueError(
+            f"the ISI of {what} is not that of the events in its sweep",
+            got="TMS alone" if isi_ms is None else f"{isi_ms:g} ms",
+            expected=f"{1e3 * seen_s:.1f} ms, by the events",
+            remedy="Correct one of them, or leave one out of the file.",
+        )
 
 
 def _only_one(columns: Columns, rows: Sequence[int], source: str) -> str:
@@ -178,13 +190,7 @@ def delivered_of(contents: Contents, unit: str, sweeps: Sequence[Found], layout:
         raise InvalidValueError(
             f"no sweep of {contents.source} counts",
             got=", ".join(reasons) or "excluded ones",
-            remedy=" ".join(
-                [
-                    *contents.notes,
-                    "Is the EMG channel the right one, its unit right, and the marker of the pulse? Is the EMG at rest",
-                    f"without mains hum, at most {signals.background_uv:g} µV RMS? See docs/timing.md.",
-                ]
-            ),
+            remedy=" ".join([*contents.notes, _IF_NONE_COUNTS.format(signals.background_uv)]),
         )
     emg = [sweep.channels["emg"].values for _, sweep, _ in sweeps if "emg" in sweep.channels]
     return Delivered(
@@ -199,9 +205,8 @@ def delivered_of(contents: Contents, unit: str, sweeps: Sequence[Found], layout:
     )
 
 
-def sweeps_of(contents: Contents, signals: Mapping[str, Track], layout: Layout) -> list[Found]:
+def sweeps_of(contents: Contents, signals: Mapping[str, Track], pulses: Sequence[Pulse], layout: Layout) -> list[Found]:
     """A stretch of the recording for each pulse, with what came before it."""
-    pulses = pulses_of(contents.events, origin_key(layout), layout, contents.source)
     if any(after.at_s - before.at_s < _AFTER_MS / 1e3 for before, after in pairwise(pulses)):
         raise InvalidValueError(
             f"two pulses of {contents.source} are less than {_AFTER_MS:g} ms apart",
@@ -216,6 +221,8 @@ def sweeps_of(contents: Contents, signals: Mapping[str, Track], layout: Layout) 
         origin_s = None if pulse.isi_s is None else pulse.at_s - pulse.isi_s
         sweep = _cut(signals, span_s, pulse.at_s, origin_s, origin_key(layout))
         said: dict[str, Any] = {**pulse.said, "lost": pulse.lost}
+        for isi_ms in isis_of(pulse.said) if pulse.isi_s is not None else ():
+            _require_same(f"the trial at {pulse.at_s:.3f} s of {contents.source}", isi_ms, pulse.isi_s)
         judged_s = min(pulse.at_s - _BEFORE_MS / 1e3, origin_s or pulse.at_s), pulse.at_s + _AFTER_MS / 1e3
         if ((bad["onset"] <= judged_s[1]) & (bad["onset"] + bad["duration"] >= judged_s[0])).any():
             said["excluded"] = True

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
 from isiw.errors import InvalidValueError, did_you_mean
+from isiw.existing import doubts
 from isiw.existing.cells import ALONE, TAP_ALONE, Column, plain, says_alone, with_decimals, without_unit_in_cells
-from isiw.existing.doubts import ALL, require_of_kind, require_single_trials
 from isiw.existing.layout import COLUMNS, EMG_UNITS, ISI_UNITS_MS, UNIT_WORDS, Layout, letters, required_unit
 from isiw.findings import Kind
 from isiw.lazy import pd
@@ -46,7 +46,7 @@ class Columns:
         kept = list(range(self.rows))
         for name, wanted in layout.where.items():
             require_one("column", self.empty.of, name, every)
-            if wanted != ALL:
+            if wanted != doubts.ALL:
                 found = dict.fromkeys(every[name].text(row) for row in range(self.rows))
                 if wanted not in found:
                     raise InvalidValueError(
@@ -133,12 +133,14 @@ class Columns:
             else:
                 columns["subject"] = replace(subject, of_codes=True)
         if "mep" in columns:
-            require_single_trials(columns["mep"], columns["isi"], frame, source)
+            doubts.require_single_trials(columns["mep"], columns["isi"], frame, source)
         beside = {
             name: Column(name, frame.iloc[:, place].tolist(), of=source)
             for place, name in enumerate(names)
             if name not in {*held.values(), *of_units} and name.strip()
         }
+        doubts.require_no_verdicts(beside.values())
+        doubts.require_reference(columns["isi"], layout.reference)
         if (condition := columns.get("condition")) is not None:  # which may tell pairs from each other, too
             alone = ALONE | TAP_ALONE
             of_pairs = replace(condition, cells=["" if plain(str(cell)) in alone else cell for cell in condition.cells])
@@ -200,6 +202,14 @@ def _named(key: str, names: list[str], layout: Layout, source: str) -> str | Non
     return several[0] if several else None
 
 
+def isis_of(said: Mapping[str, Any]) -> Iterator[float]:
+    """The ISIs [ms] among what a row says, by the names of its columns."""
+    for name, cell in said.items():
+        if letters(name) in COLUMNS["isi"]:
+            column = Column(name, [cell], factor=ISI_UNITS_MS[unit_said(name, ISI_UNITS_MS) or "ms"])
+            yield from (number for number in [column.number(0)] if number is not None)
+
+
 def units_beside(key: str, name: str, frame: pd.DataFrame) -> dict[str, str]:
     """Units that columns beside another say of it, such as `isi_unit`, by their names."""
     known, found = (EMG_UNITS if key in {"mep", "emg", "background"} else ISI_UNITS_MS), dict[str, str]()
@@ -215,11 +225,7 @@ def units_beside(key: str, name: str, frame: pd.DataFrame) -> dict[str, str]:
 
 
 def unit_said(name: str, known: Mapping[str, float]) -> str | None:
-    """The unit that a column's name says, of those of one quantity.
-
-    Raises:
-        InvalidValueError: it says two, such as one beside it, in the line below it or in its cells.
-    """
+    """The unit that a column's name says, of those of one quantity; raise if it says two, such as one in its cells."""
     inside, bare = re.findall(r"[\[(]([^][()]*)[\])]", name), re.findall(r"[^\W_]+", re.sub(r"[\[(].*", "", name))[1:]
     found, usual = ([unit for word in words if (unit := UNIT_WORDS.get(word.strip().casefold(), "")) in known]
                     for words in ([*inside, *bare[-1:]], bare))  # fmt: skip
@@ -232,7 +238,7 @@ def unit_said(name: str, known: Mapping[str, float]) -> str | None:
 
 def _required_unit(key: str, what: str, column: Column, layout: Layout, known: Mapping[str, float]) -> str:
     """The column's unit, as it is stated or as its name says, which must not say that it is something else."""
-    require_of_kind(key, what, column.name, column.of)
+    doubts.require_of_kind(key, what, column.name, column.of)
     some = ", ".join(filter(None, map(column.text, range(min(5, len(column.cells)))))) or None
     if (other := unit_said(column.name, dict.fromkeys({*UNIT_WORDS.values()} - known.keys(), 1.0))) is not None:
         remedy = "Name the right column: --column KEY=NAME; if it is the right one, correct its name."

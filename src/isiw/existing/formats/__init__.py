@@ -57,11 +57,7 @@ FORMATS: Final = (
 
 
 def format_of(path: Path) -> Format:
-    """The format of a file, by its name.
-
-    Raises:
-        InvalidValueError: none of them.
-    """
+    """The format of a file, by its name."""
     name = path.name.casefold()
     found = next((one for one in FORMATS if name.endswith(one.suffixes)), None)
     if found is None or (path.is_dir() and not name.endswith(".mff")):
@@ -75,12 +71,7 @@ def format_of(path: Path) -> Format:
 
 
 def read(path: Path, layout: Layout) -> Contents:
-    """What a file holds.
-
-    Raises:
-        InvalidValueError: a format that is not known, or a file that cannot be read.
-        ConfigError: a library is not installed.
-    """
+    """What a file holds."""
     found = format_of(path)
     try:
         with warnings.catch_warnings():

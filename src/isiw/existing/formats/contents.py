@@ -110,11 +110,7 @@ class Track:
                 yield stretch, begin, self.read(stretch.first + begin, stretch.first + end)
 
     def onsets_s(self) -> list[float]:
-        """When a trigger leaves the level at which it mostly is [s].
-
-        Raises:
-            InvalidValueError: it is as long at one level as at the other, so that either edge may be a stimulus.
-        """
+        """When a trigger leaves the level at which it mostly is [s]; raise if it is as long at the other one."""
         ends = [(values.min(), values.max()) for _, _, values in self.pieces()]
         middle = (min(low for low, _ in ends) + max(high for _, high in ends)) / 2 if ends else 0.0
         rises, falls, high = list[float](), list[float](), 0

@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from isiw.errors import InvalidValueError
+from isiw.existing.formats.columns import require_rate
 from isiw.existing.formats.contents import Contents, Track, events_of, part_of, parted, text_of, time_of
 from isiw.existing.layout import EMG_UNITS, Layout
 from isiw.files import opened
@@ -29,6 +30,10 @@ def read(path: Path, layout: Layout) -> Contents:
     if not {"data", "srate", "nbchan", "pnts"} <= eeg.keys():
         raise InvalidValueError("the file has no data of EEGLAB", got=", ".join(list(eeg)[:9]))
     rate_hz, samples, trials = float(eeg["srate"]), int(eeg["pnts"]), int(eeg.get("trials") or 1)
+    times_ms = np.ravel(eeg.get("times", ()))
+    if times_ms.size > 1 and times_ms.dtype.kind == "f":
+        found_hz = 1e3 * (times_ms.size - 1) / float(times_ms[-1] - times_ms[0])
+        require_rate(rate_hz, found_hz, f"EEG.times of {path.name}", "Correct EEG.srate or EEG.times, and save again.")
     places = _listed(eeg.get("chanlocs"))
     events = [one for one in _listed(eeg.get("event")) if not _empty(one.get("latency"))]
     pauses = {math.ceil(float(one["latency"]) - 1.0): _number(one.get("duration")) / rate_hz
