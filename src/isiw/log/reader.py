@@ -25,7 +25,7 @@ from isiw.signals.tap import TapResponses
 from isiw.signals.watch import is_silent
 from isiw.strategy.stopping import StopDecision
 from isiw.text.stimuli import TAP, StimulusWords, meanings
-from isiw.trials import Channel, Stimulus, Sweep, Trial, TrialTable
+from isiw.trials import Channel, Sweep, Trial, TrialTable
 
 HeaderT = TypeVar("HeaderT", Header, ThresholdHeader)
 
@@ -207,7 +207,7 @@ class SessionRecord(_StimuliRecord[Header]):
     @property
     def unknown_trials(self) -> tuple[Trial, ...]:
         """The mistrials that `unknown` stimuli are."""
-        return tuple(Trial.unknown(Stimulus(lost.trial, lost.isi_ms, lost.tap_alone)) for lost in self.unknown)
+        return tuple(Trial.unknown(lost.stimulus) for lost in self.unknown)
 
     @property
     def given(self) -> int:

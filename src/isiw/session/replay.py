@@ -74,8 +74,8 @@ def replay(
         if isinstance(entry, Intent):
             # Behind a lost trial the strategy knew more than the log does.
             comparable = entry.isi_ms is not None and entry.trial == len(learned) and entry.trial in compared
-            if comparable and (asked_ms := strategy.ask()) != entry.isi_ms:
-                _require_other_versions(entry, asked_ms, record.header)
+            if comparable and not is_asked_again(strategy, entry):
+                _require_other_versions(entry, strategy.ask(), record.header)
                 differing.append(entry.trial)
         elif isinstance(entry, Trial):
             learn(strategy, entry)
@@ -92,6 +92,12 @@ def replay(
     strategy.in_doubt = record.in_doubt
     table = TrialTable(tuple(sorted((*learned, *unknown), key=lambda trial: trial.index)))
     return Replayed(strategy, table, unknown, tuple(differing), len(table) if differing or not verify else first)
+
+
+def is_asked_again(strategy: Strategy, intent: Intent) -> bool:
+    """Whether a strategy asks what was asked, at the intensity that was asked for, if there are several."""
+    same_isi = strategy.ask() == intent.isi_ms
+    return same_isi and (not strategy.intensities or strategy.intensity_pct_rmt == intent.intensity_pct_rmt)
 
 
 def _compared(record: SessionRecord) -> frozenset[int]:

@@ -194,7 +194,14 @@ class Responder:
         """Number of stimuli that were answered."""
         return self._trials
 
-    def respond(self, isi_ms: float | None, reference: Reference, *, pulse: bool = True) -> Response:
+    def respond(
+        self,
+        isi_ms: float | None,
+        reference: Reference,
+        *,
+        pulse: bool = True,
+        intensity_pct_rmt: float | None = None,
+    ) -> Response:
         """Answer one pair of stimuli, or one of them alone.
 
         Args:
@@ -202,9 +209,11 @@ class Responder:
             reference: the event that the ISI counts from. From the valve command the hit delay's variation stays
                 unseen; from the impact it moves the realised ISI, which is reported.
             pulse: whether the magnetic pulse is given; without it, the amplitude is of what the MEP window would hold.
+            intensity_pct_rmt: its intensity [% RMT]; None for the person's own. Only for a recruitment curve.
 
         Raises:
-            InvalidValueError: an ISI that is not finite, or an unknown reference.
+            InvalidValueError: an ISI that is not finite, an unknown reference, or an intensity for a person without a
+                recruitment curve.
         """
         isi_ms = None if isi_ms is None else number("an ISI [ms]", isi_ms)
         choice("the reference", reference, get_args(Reference))
@@ -216,7 +225,7 @@ class Responder:
         self._dose += max(0.0, facilitation)
         subject, rng = self.subject, self._rng
         floor_mv = subject.response.floor.median_mv * np.exp(subject.response.floor.log_sd * rng.standard_normal())
-        evoked_mv = self._response().sample_evoked_mv(facilitation, noise, rng) if pulse else 0.0
+        evoked_mv = self._response(intensity_pct_rmt).sample_evoked_mv(facilitation, noise, rng) if pulse else 0.0
         mep_mv = self._with_tap_mv(evoked_mv, noise, from_impact_ms) + floor_mv
         if rng.random() < subject.outlier_probability:
             mep_mv = rng.uniform(*OUTLIERS_MV)
@@ -226,9 +235,15 @@ class Responder:
         unseen_ms = 0.0 if subject.jitter_told or isi_ms is None else subject.isi_jitter_ms
         return Response(told_ms, float(mep_mv), unseen_ms)
 
-    def _response(self) -> ResponseCurve:
+    def _response(self, intensity_pct_rmt: float | None) -> ResponseCurve:
         """The response at the intensity of this trial."""
         change, response = self.subject.change, self.subject.response
+        if intensity_pct_rmt is not None:
+            if not isinstance(response, RecruitmentResponse):
+                raise InvalidValueError(
+                    "only an MEP on a recruitment curve depends on the intensity", got=type(response).__name__
+                )
+            response = replace(response, intensity_pct_rmt=intensity_pct_rmt)
         if change is None or not isinstance(response, RecruitmentResponse):
             return response
         added_pct = change.share(self._trials) * change.intensity_pct_rmt
