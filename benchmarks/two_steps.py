@@ -27,6 +27,7 @@ from isiw.metrics import f1
 from isiw.strategy.strategy import Strategy
 from isiw.subjects.responses import RecruitmentResponse
 from isiw.subjects.subject import SimulatedSubject
+from isiw.trials import Trial
 
 SPACE: Final = isiw.DesignSpace(0, 120, reference="impact")
 FIRST_SPACE: Final = isiw.DesignSpace(10, 120, reference="impact")
@@ -67,7 +68,7 @@ def second_step(person: SimulatedSubject, seed: int, strategy: Strategy) -> dict
     rig, found = person.begin(100_000_000 + seed), dict[str, float]()
     for trial in range(MARKS[-1]):
         outcome = rig.respond(None if is_alone(trial) else strategy.ask(), SPACE.reference)
-        strategy.learn(outcome.isi_ms, outcome.mep_mv)
+        strategy.learn(Trial.of(outcome.isi_ms, outcome.mep_mv))
         if trial + 1 in MARKS:
             estimate = strategy.estimate()
             found[f"enhanced {trial + 1}"] = f1(estimate.window, person.window(SPACE), SPACE)

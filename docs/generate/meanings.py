@@ -60,6 +60,7 @@ MEANINGS: Final[Mapping[str, Mapping[str, str]]] = {
         "isi_ms": "commanded ISI [ms]; None for a control trial.",
         "t_s": "time on the session's clock [s].",
         "tap_alone": "whether it is a tap without the magnetic pulse.",
+        "intensity_pct_rmt": "the intensity that the device sets [% RMT]; None where it sets none.",
         "intensity_pct_mso": "in a search for a threshold, the intensity [% of the maximum stimulator output].",
         "place_mm": "in a search for the hot spot, the place of the coil [mm].",
         "boot_id": "the start of the computer that boot_s counts from; empty if the system gives none.",

@@ -49,28 +49,31 @@ class Stimulus(Checked):
             alone unless it is a tap alone.
         tap_alone: whether the tap comes without the magnetic pulse; only for devices whose `DeviceInfo` says that they
             can.
+        intensity_pct_rmt: the intensity to set for this pulse [% RMT], for devices whose `DeviceInfo` says that they
+            set it; None for what is set.
 
     Raises:
-        InvalidValueError: a negative trial number, an ISI that is not finite, or a tap alone with an ISI.
+        InvalidValueError: a negative trial number, an ISI that is not finite, a tap alone with an ISI or an intensity,
+            or an intensity that is not positive.
     """
 
     trial: Natural
     isi_ms: Number | None
     tap_alone: bool = False
+    intensity_pct_rmt: Positive | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.tap_alone and self.isi_ms is not None:
             raise InvalidValueError("a tap alone has no ISI", got=self.isi_ms, expected="None")
+        require_pulse(self.intensity_pct_rmt, tap_alone=self.tap_alone)
 
 
-def require_alone(intensity_pct_rmt: float | None, isi_ms: float | None, *, tap_alone: bool = False) -> None:
-    """Raise if an intensity is stated of anything but TMS alone."""
-    if intensity_pct_rmt is not None and (isi_ms is not None or tap_alone):
+def require_pulse(intensity_pct_rmt: float | None, *, tap_alone: bool) -> None:
+    """Raise if an intensity is stated of a tap alone."""
+    if intensity_pct_rmt is not None and tap_alone:
         raise InvalidValueError(
-            "an intensity of its own belongs to TMS alone",
-            got=f"{intensity_pct_rmt:g} % RMT, " + ("a tap alone" if tap_alone else f"a pair at {isi_ms:g} ms"),
-            remedy="Leave it out: all pairs of a session have one intensity, intensity_pct_rmt of the visit.",
+            "a tap alone has no magnetic pulse, and so no intensity", got=f"{intensity_pct_rmt:g} % RMT"
         )
 
 
@@ -98,12 +101,11 @@ class Trial(Checked):
         mep_sd_mv: SD of the amplitude [mV]: of the mean of several, or from what is left of the tap's own response.
         mep_interval_mv: the interval that the amplitude lies in, if no more is known [mV]; its end may be infinite.
         tap_mv: what is left of the tap's own response in the amplitude, in the mean [mV]; None if it is unknown.
-        intensity_pct_rmt: intensity of TMS alone [% RMT]; None for that of the pairs.
+        intensity_pct_rmt: intensity of the magnetic pulse [% RMT]; None for the usual one of the session's pairs.
 
     Raises:
         InvalidValueError: a mistrial without a reason, an accepted trial with one or without an amplitude, a tap alone
-            with an ISI, an intensity of anything but TMS alone, or a value that is not finite or that no amplifier
-            gives.
+            with an ISI or an intensity, or a value that is not finite or that no amplifier gives.
     """
 
     index: Natural
@@ -136,7 +138,7 @@ class Trial(Checked):
             raise InvalidValueError("a mistrial needs a reason and an accepted trial has none", got=self.reason)
         if self.tap_alone and self.commanded_isi_ms is not None:
             raise InvalidValueError("a tap alone has no ISI", got=self.commanded_isi_ms, expected="None")
-        require_alone(self.intensity_pct_rmt, self.wanted_isi_ms, tap_alone=self.tap_alone)
+        require_pulse(self.intensity_pct_rmt, tap_alone=self.tap_alone)
         measured = self.mep_mv is not None or self.mep_interval_mv is not None
         if self.status is Status.ACCEPTED and not measured and not self.tap_alone:
             raise InvalidValueError("an accepted trial needs its MEP", got=self.index)
@@ -150,6 +152,7 @@ class Trial(Checked):
             stimulus.isi_ms,
             Kind.OUTCOME_UNKNOWN,
             tap_alone=stimulus.tap_alone,
+            intensity_pct_rmt=stimulus.intensity_pct_rmt,
         )
 
     @classmethod

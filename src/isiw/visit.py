@@ -140,6 +140,8 @@ class VisitProtocol(Checked):
         iti_s: shortest and longest interval between two trials [s], drawn evenly for each; None for as soon as the
             limits allow.
         tms_alone: share of trials that are a magnetic pulse without a tap.
+        alone_pct_rmt: intensity of TMS alone, such as 100 for a baseline at the threshold, on devices that set it
+            [% RMT]; None for the usual one of the pairs.
         tap_alone: share of trials that are a tap without a magnetic pulse; the device must be able to.
         taps_first: how many taps alone follow on the first four trials, to learn what they do to the EMG; on devices
             that deliver them and record it. More follow if a window is found that this could explain. 0 for none.
@@ -153,6 +155,7 @@ class VisitProtocol(Checked):
 
     iti_s: Annotated[tuple[float, float], _interval_ends] | None = None
     tms_alone: Annotated[float, partial(share, least=0, below=1)] = 0.0
+    alone_pct_rmt: Positive | None = None
     tap_alone: Annotated[float, partial(share, least=0, below=1)] = 0.0
     taps_first: Natural = 3
     block_trials: Count | None = None
@@ -180,8 +183,15 @@ class VisitProtocol(Checked):
             min_iti_s: the interval of the limits, which holds if the protocol has none [s].
 
         Raises:
-            InvalidValueError: a rest that is no longer than the longest interval, or intervals that the limits replace.
+            InvalidValueError: a rest that is no longer than the longest interval, intervals that the limits replace, or
+                an intensity of TMS alone where there is none.
         """
+        if self.alone_pct_rmt is not None and not self.tms_alone:
+            raise InvalidValueError(
+                "an intensity of TMS alone has no effect in a protocol without TMS alone",
+                got=f"alone_pct_rmt = {self.alone_pct_rmt:g}",
+                remedy="Set a share tms_alone, or leave out alone_pct_rmt.",
+            )
         if self.iti_s is not None and self.iti_s[1] <= min_iti_s and self.iti_s != (min_iti_s, min_iti_s):
             raise InvalidValueError(
                 "the protocol's intervals are no longer than the limits allow at least, so they would have no effect",

@@ -102,10 +102,8 @@ def test_earlier_pulses_teach_what_pulses_of_the_session_do_and_starting_again_k
         assert strategy.spent == 3
 
 
-def test_an_intensity_of_a_pair_or_of_a_tap_alone_is_refused_with_the_way_out() -> None:
+def test_an_intensity_of_a_tap_alone_is_refused() -> None:
     strategy = small()
-    with pytest.raises(InvalidValueError, match=r"belongs to TMS alone.*a pair at 50 ms.*Leave it out"):
-        strategy.tell(50.0, 0.1, intensity_pct_rmt=110.0)
     with pytest.raises(InvalidValueError, match="a tap alone"):
         strategy.tell(50.0, 0.1, pulse=False, intensity_pct_rmt=110.0)
     with pytest.raises(InvalidValueError, match="intensity_pct_rmt"):

@@ -63,6 +63,16 @@ class FollowsPlan(Protocol):
         """
 
 
+def require_capabilities(acquisition: AcquisitionFunction, model: object, posterior: Posterior) -> None:
+    """Raise if a model's posterior lacks what an acquisition function needs."""
+    if missing := [capability.__name__ for capability in acquisition.needs if not isinstance(posterior, capability)]:
+        raise StrategyError(
+            f"{type(acquisition).__name__} cannot work with {type(model).__name__}",
+            got=f"a posterior without {', '.join(missing)}",
+            remedy="Choose another acquisition function, or a model whose posterior has the capability.",
+        )
+
+
 def require_acquisition(given: object) -> None:
     """Raise if something else is given for an acquisition function."""
     if isinstance(given, type):

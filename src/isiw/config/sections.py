@@ -176,6 +176,7 @@ class LimitsConfig(Section):
     max_coil_c: float | None = None
     intensity_pct_mso: float | None = Field(default=None, ge=0.0)
     max_consecutive_mistrials: int = Field(default=3, ge=1)
+    max_intensity_pct_rmt: float | None = Field(default=None, gt=0.0)
 
 
 class InterventionConfig(Section):

@@ -35,6 +35,7 @@ from isiw.session.given import given_pulses
 from isiw.session.loop import Session
 from isiw.strategy.catalogue import known_settings, make_strategy, settings_for
 from isiw.subjects.cohorts import person_of
+from isiw.subjects.responses import RecruitmentResponse
 from isiw.text.named_code import named_code, require_fitting
 from isiw.trials import Trial
 from isiw.visit import Visit, VisitProtocol
@@ -257,10 +258,17 @@ def simulated_device(
     reference = space.reference
     subject = person_of(person.cohort, person.number, seed)
     respond = partial(subject.begin(seed).respond, reference=reference)
+    sets_intensity = isinstance(subject.response, RecruitmentResponse)
     hit_delay_ms = subject.stated_hit_delay_ms if reference == "valve" else None
     if person.kind == "simulated":
         return SimulatedDevice(
-            SimulatedPerson(respond, reference, hit_delay_ms=hit_delay_ms, conditioning=subject.conditioning)
+            SimulatedPerson(
+                respond,
+                reference,
+                hit_delay_ms=hit_delay_ms,
+                conditioning=subject.conditioning,
+                sets_intensity=sets_intensity,
+            )
         )
     if data is None:
         raise ConfigError(

@@ -87,6 +87,7 @@ class LimitedDevice:
         self._limits.require_left(self._delivered)
         if stimulus.isi_ms is not None:
             self._limits.require_isi(stimulus.isi_ms)
+        self._limits.require_intensity(stimulus.intensity_pct_rmt)
         if (wait_s := self.wait_s()) > ROUNDING_S:
             raise LimitExceededError(
                 "the next stimulus comes too early",
@@ -115,7 +116,7 @@ class LimitedDevice:
         """Get ready and arm; the next stimulus comes a whole interval later at the earliest."""
         self._device.stage()
         self._pacing.begin_anew()
-        if self._limits.intensity_pct_mso is None:
+        if self._limits.intensity_pct_mso is None and self._limits.max_intensity_pct_rmt is None:
             self._limits = dataclasses.replace(
                 self._limits, intensity_pct_mso=readiness_of(self._device).intensity_pct_mso
             )

@@ -42,9 +42,11 @@ class Limits(Checked):
             report it. Where None, one that is reported when the device is staged may not change any more.
         max_consecutive_mistrials: a session pauses after so many rejected trials, or of a faulty rig, in a row.
         isis_ms: the only ISIs that are allowed [ms]; by default all of the range, or of its grid.
+        max_intensity_pct_rmt: the highest intensity that a device may be asked to set [% RMT]; None if it may be asked
+            to set none. Where one is stated, a reported intensity may change from pulse to pulse.
 
     Raises:
-        InvalidValueError: ISIs that do not ascend, or an invalid number.
+        InvalidValueError: ISIs that do not ascend, an invalid number, or both an only and a highest intensity.
     """
 
     low_ms: Number
@@ -60,9 +62,17 @@ class Limits(Checked):
     intensity_pct_mso: NonNegative | None = None
     max_consecutive_mistrials: Count = 3
     isis_ms: tuple[float, ...] = ()
+    max_intensity_pct_rmt: Positive | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.intensity_pct_mso is not None and self.max_intensity_pct_rmt is not None:
+            raise InvalidValueError(
+                "the limits have both the only intensity and the highest one",
+                got=f"intensity_pct_mso = {self.intensity_pct_mso:g}, "
+                f"max_intensity_pct_rmt = {self.max_intensity_pct_rmt:g}",
+                remedy="Leave out max_intensity_pct_rmt, or, in a session of several intensities, intensity_pct_mso.",
+            )
         if self.low_ms > self.high_ms:
             raise InvalidValueError("the limits of the ISI must ascend", got=(self.low_ms, self.high_ms))
 
@@ -174,6 +184,18 @@ class Limits(Checked):
                 expected=f"{self.low_ms:g} ms and steps of {self.step_ms:g} ms",
                 remedy="This stimulus was not delivered. Use the same low_ms and step_ms in the design space and in "
                 "the limits.",
+            )
+
+    def require_intensity(self, pct_rmt: float | None) -> None:
+        """Raise LimitExceededError if an intensity to be set [% RMT] is beyond the limits; None sets none."""
+        most = self.max_intensity_pct_rmt
+        if pct_rmt is not None and not (most is not None and pct_rmt <= most):
+            raise LimitExceededError(
+                "the intensity is beyond the limits",
+                got=f"{pct_rmt:g} % RMT",
+                expected="no intensity to be set" if most is None else f"at most {most:g} % RMT",
+                remedy="This stimulus was not delivered. Write max_intensity_pct_rmt under [limits] if your ethics "
+                "approval allows it.",
             )
 
     def require_state(self, state: Readiness) -> None:

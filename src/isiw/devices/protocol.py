@@ -48,6 +48,7 @@ class DeviceInfo(Checked):
         conditioning: what it delivers first: a tap on the tendon, or an electrical pulse to the nerve, as an impact.
         address: what it is connected to, such as "COM3"; no two sessions of a computer drive a device of one address.
         tap_alone: whether it can deliver a tap without the magnetic pulse, which `Stimulus.tap_alone` asks for.
+        sets_intensity: whether it sets the intensity that `Stimulus.intensity_pct_rmt` asks for, before the pulse.
         if_isiw_dies: what disarms it if isiw dies while it is armed: "watchdog", a process beside isiw, such as
             `isiw.Watchdog`, or "heartbeat", a sign of life without which it disarms itself; None if nothing does.
         shortest_iti_s: the shortest time between two stimuli that it gives [s], which binds the limits; None if any.
@@ -72,6 +73,7 @@ class DeviceInfo(Checked):
     if_isiw_dies: Guard | None = None
     shortest_iti_s: NonNegative | None = None
     most_pulses: Count | None = None
+    sets_intensity: Flag = False
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 
@@ -23,8 +23,8 @@ from isiw.sweeps import Channel, Measurement, Sweep
 from isiw.trials import MOST_ISI_SD_MS, Stimulus, Trial, TrialTable
 from isiw.types import BoolArray, Conditioning, FloatArray, Reference
 
-Respond: TypeAlias = Callable[[float | None], Response | Measurement]
-"""Answers a commanded ISI [ms]; None is TMS alone."""
+Respond: TypeAlias = Callable[..., Response | Measurement]
+"""Answers a commanded ISI [ms]; None is TMS alone. One that sets intensities takes `intensity_pct_rmt` as well."""
 
 
 class Simulation(Protocol):
@@ -86,6 +86,7 @@ class SimulatedPerson:
         name: what the log calls the device.
         hit_delay_ms: mean and SD of the hit delay that the device states [ms].
         conditioning: what it delivers first.
+        sets_intensity: whether `respond` takes `intensity_pct_rmt`.
 
     Raises:
         InvalidValueError: an unknown reference or conditioning, a hit delay that is no pair of positive numbers, or a
@@ -99,17 +100,19 @@ class SimulatedPerson:
         name: str = "simulated person",
         hit_delay_ms: tuple[float, float] | None = None,
         conditioning: Conditioning = "tap",
+        *,
+        sets_intensity: bool = False,
     ) -> None:
-        self.info = DeviceInfo(
-            name, reference, simulated=True, hit_delay_ms=hit_delay_ms, tap_alone=True, conditioning=conditioning
-        )
+        said: dict[str, Any] = {"hit_delay_ms": hit_delay_ms, "conditioning": conditioning}
+        self.info = DeviceInfo(name, reference, simulated=True, tap_alone=True, sets_intensity=sets_intensity, **said)
         self._respond = respond
 
     def answer(self, stimulus: Stimulus) -> Measurement:
         """The person's answer to the next pair of stimuli; a tap alone evokes nothing."""
         if stimulus.tap_alone:
             return Measurement(0.0, None)
-        outcome = self._respond(stimulus.isi_ms)
+        own = {} if stimulus.intensity_pct_rmt is None else {"intensity_pct_rmt": stimulus.intensity_pct_rmt}
+        outcome = self._respond(stimulus.isi_ms, **own)
         return Measurement(outcome.mep_mv, outcome.isi_ms, outcome.isi_sd_ms)
 
 

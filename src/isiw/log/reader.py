@@ -27,7 +27,7 @@ from isiw.summary import JUDGED_SINCE
 from isiw.sweeps import Channel, Sweep
 from isiw.text.sanitize import command
 from isiw.text.stimuli import TAP, StimulusWords, meanings
-from isiw.trials import Stimulus, Trial, TrialTable
+from isiw.trials import Trial, TrialTable
 
 HeaderT = TypeVar("HeaderT", Header, ThresholdHeader)
 
@@ -228,7 +228,7 @@ class SessionRecord(_StimuliRecord[Header]):
     @property
     def unknown_trials(self) -> tuple[Trial, ...]:
         """The mistrials that `unknown` stimuli are."""
-        return tuple(Trial.unknown(Stimulus(lost.trial, lost.isi_ms, lost.tap_alone)) for lost in self.unknown)
+        return tuple(Trial.unknown(lost.stimulus) for lost in self.unknown)
 
     @property
     def given(self) -> int:

@@ -60,15 +60,22 @@ class Intent(LogRecord):
     t_s: float = 0.0
     tap_alone: bool = False
     intensity_pct_mso: float | None = None
+    intensity_pct_rmt: float | None = None
     place_mm: tuple[float, float] | None = None
     boot_id: str = ""
     boot_s: FiniteFloat | None = None
+
+    @property
+    def stimulus(self) -> Stimulus:
+        """What was to be delivered."""
+        return Stimulus(self.trial, self.isi_ms, self.tap_alone, self.intensity_pct_rmt)
 
     @classmethod
     def of(cls, stimulus: Stimulus, t_s: float, **more: Any) -> Self:
         """The intent to deliver a stimulus now; `t_s` is the time on the session's clock [s]."""
         now = Moment.now()
         known = {"trial": stimulus.trial, "isi_ms": stimulus.isi_ms, "t_s": t_s, "tap_alone": stimulus.tap_alone}
+        known["intensity_pct_rmt"] = stimulus.intensity_pct_rmt
         return cls(**known | {"boot_id": now.boot_id, "boot_s": now.boot_s} | more)
 
 

@@ -252,6 +252,26 @@ class LearnsCurves(Protocol):
         """The intensity of the pairs' pulse [% RMT], as it is stated, or else as it usually is."""
 
 
+class AtIntensity(NamedTuple):
+    """What a posterior expects of a pulse of another intensity.
+
+    Args:
+        posterior: the same samples of the window, and the outcomes of such a pulse; of what says anything of it.
+        share: the probability that the person is such that anything is known of it.
+    """
+
+    posterior: Any
+    share: float
+
+
+@runtime_checkable
+class ForeseesIntensities(Protocol):
+    """Capability: foresees outcomes at another intensity than the pairs', as pairs of several intensities need."""
+
+    def at_intensity(self, shift_pct_rmt: float) -> AtIntensity:
+        """What it expects of a pulse that is so much stronger than the pairs' [% RMT]."""
+
+
 @runtime_checkable
 class ReportsTrouble(Protocol):
     """Capability: a fit that can fail, and says so."""

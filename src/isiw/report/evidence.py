@@ -162,8 +162,9 @@ def no_comparison(window: Window | None, trials: Sequence[Trial]) -> str | None:
 
 
 def _placed(trials: Sequence[Trial]) -> list[tuple[float, float]]:
-    """ISI [ms] and MEP [mV] of the pairs among some trials."""
-    return [(t.isi_ms, t.mep_mv) for t in trials if t.isi_ms is not None and t.mep_mv is not None]
+    """ISI [ms] and MEP [mV] of the pairs of the usual intensity among some trials."""
+    usual = [trial for trial in trials if trial.intensity_pct_rmt is None]
+    return [(t.isi_ms, t.mep_mv) for t in usual if t.isi_ms is not None and t.mep_mv is not None]
 
 
 def _inside_and_outside(window: Window, trials: Sequence[Trial]) -> tuple[list[float], list[float]]:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final, TypeVar
 
 from isiw.devices.limits import Limits
-from isiw.errors import error_text
+from isiw.errors import ConfigError, error_text
 from isiw.files import made_folder, twin
 from isiw.log.durable import log_exists, log_of, part_of
 from isiw.log.headers import SERVED_KEY
@@ -179,8 +179,15 @@ class Sessions:
         space, doubts = request.space.design(), list[str]()
         stated = {"intensity_pct_rmt": request.visit.intensity_pct_rmt}
         settings = known_settings(request.strategy.name, stated) | request.strategy.settings
+        strategy = make_strategy(request.strategy.name, space=space, seed=request.seed, **settings)
+        if strategy.intensities:
+            raise ConfigError(
+                "pairs of several intensities are not asked over HTTP",
+                got=strategy.intensities.named_pct_rmt,
+                remedy="Leave out intensities_pct_rmt, or run the session with isiw run or in Python.",
+            )
         recorder = open_session(
-            make_strategy(request.strategy.name, space=space, seed=request.seed, **settings),
+            strategy,
             self._path(request.id),
             earlier=request.earlier.trials if request.earlier else (),
             limits=dataclasses.replace(Limits.of_space(space), **request.limits.model_dump()),

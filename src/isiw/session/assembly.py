@@ -28,6 +28,7 @@ from isiw.session.blocks import Blocks
 from isiw.session.console import OperatorConsole
 from isiw.session.earlier import Earlier
 from isiw.session.examination import WindowExamination, examination_of
+from isiw.session.intensities import require_intensities
 from isiw.session.pausing import Pausing
 from isiw.session.rig import Rig, Safeguards, require_matching
 from isiw.session.sink import SessionUpdate, Sink
@@ -93,6 +94,7 @@ def require_untold(strategy: Strategy, trials: int = 0) -> None:
 def require_fitting(strategy: Strategy, header: Header) -> None:
     """Raise if the visit states another intensity than the strategy, or the limits end the strategy's plan early."""
     header.visit.require_intensity(header.strategy.settings.get("intensity_pct_rmt"))
+    require_intensities(strategy, header)
     planned, most, before = strategy.stimuli_planned, header.limits.max_pulses, header.given_before
     if before >= most:
         raise InvalidValueError(

@@ -28,7 +28,7 @@ from isiw.signals.reported import unconfirmed
 from isiw.strategy.decisions import StopDecision
 from isiw.strategy.outcomes import Outcome
 from isiw.strategy.strategy import Strategy
-from isiw.trials import Status, Stimulus, Trial, TrialTable, require_alone
+from isiw.trials import Status, Stimulus, Trial, TrialTable, require_pulse
 
 RecordedT = TypeVar("RecordedT")
 
@@ -123,6 +123,16 @@ class Recorder(Recording[Trial], Judging):
         """The ISI that was asked and has no outcome yet; None if no trial is open."""
         return self._asked if self._asked is not None and self._asked.trial == len(self.trials) else None
 
+    @property
+    def intensity_pct_rmt(self) -> float | None:
+        """The intensity of the pair that was asked [% RMT]; None where all pairs of the session have the usual one."""
+        return self.strategy.intensity_pct_rmt
+
+    def _of_pair(self, pct_rmt: float | None) -> float | None:
+        """The intensity of a pair as it is logged, by default that which was asked for; None for the usual one."""
+        given = self.intensity_pct_rmt if pct_rmt is None else pct_rmt
+        return None if given == self.strategy.usual_pct_rmt else given
+
     def wait_s(self) -> float:
         """Time that `ask` would wait now until limits and protocol allow the next stimulus [s]."""
         if self.asked is not None:
@@ -164,12 +174,13 @@ class Recorder(Recording[Trial], Judging):
                 return None
             isi_ms = self.strategy.ask(deadline_s)
             self._limits.require_isi(isi_ms)
+            self._limits.require_intensity(self.intensity_pct_rmt)
             self._begin(isi_ms, self.strategy.fallback_reason)
             return isi_ms
 
     def _begin(self, isi_ms: float | None, fallback: str | None = None, *, tap_alone: bool = False) -> None:
         """Put on disk what is about to be delivered."""
-        stimulus = Stimulus(len(self.trials), isi_ms, tap_alone)
+        stimulus = Stimulus(len(self.trials), isi_ms, tap_alone, None if isi_ms is None else self.intensity_pct_rmt)
         self._examination.intend(Intent.of(stimulus, self._clock.now_s()), fallback)
         self._sink.log.require_in_place()
         self._asked = stimulus
@@ -202,12 +213,12 @@ class Recorder(Recording[Trial], Judging):
             mep_interval_mv: as for `Strategy.tell` [mV].
             pulse: False is a tap alone, as for `Strategy.tell`, which was given without a request.
             confirm: whether all realised ISIs are right, however far from those asked; it is logged.
-            intensity_pct_rmt: as for `Strategy.tell` [% RMT].
+            intensity_pct_rmt: as for `Strategy.tell` [% RMT]; of a pair by default the one that was asked for.
 
         Raises:
             InvalidValueError: nothing was asked, a value that cannot be, a slip of unit or order, a pulse before the
-                impact, an ISI that is too uncertain, an intensity of anything but TMS alone, or earlier ISIs that are
-                to be confirmed; the outcome is not logged, and the right value can be given. TMS alone counts as given
+                impact, an ISI that is too uncertain, an intensity of a tap alone, or earlier ISIs that are to be
+                confirmed; the outcome is not logged, and the right value can be given. TMS alone counts as given
                 from the first try on.
             OutOfSpaceError: an ISI beyond the space and its tolerance.
             LogError: the log cannot be written, or is no longer at its path; closing saves the outcome with the rest.
@@ -223,7 +234,9 @@ class Recorder(Recording[Trial], Judging):
                 self._begin(None, tap_alone=not pulse)
                 if self._given_before + len(self.trials) >= self._limits.max_pulses:
                     self._examination.event("limit", f"TMS alone was given beyond {self._limits.max_pulses} pulses.")
-            require_alone(intensity_pct_rmt, isi_ms, tap_alone=not pulse)
+            require_pulse(intensity_pct_rmt, tap_alone=not pulse)
+            if isi_ms is not None and pulse:
+                intensity_pct_rmt = self._of_pair(intensity_pct_rmt)
             outcome = Outcome(isi_ms, mep_mv, None, isi_sd_ms, mep_sd_mv, mep_interval_mv, None, intensity_pct_rmt)
             self._tell(outcome, background_rms_uv, pulse=pulse, confirm=flag("confirm", confirm))
 

@@ -79,7 +79,7 @@ def replay(
         if isinstance(entry, Intent):
             # Behind a lost trial the strategy knew more than the log does.
             comparable = entry.isi_ms is not None and entry.trial == len(learned) and entry.trial in compared
-            if comparable and (asked_ms := ask(strategy, learned)) != entry.isi_ms:
+            if comparable and not is_asked_again(asked_ms := ask(strategy, learned), strategy, entry):
                 _require_other_versions(entry, asked_ms, record.header)
                 differing.append(entry.trial)
         elif isinstance(entry, Trial):
@@ -105,6 +105,12 @@ def _asking(header: Header, strategy: Strategy) -> Callable[[Strategy, Sequence[
         return lambda strategy, _: strategy.ask()
     agenda = Agenda(header.intervention, strategy, header.seed)
     return lambda _, trials: agenda.isi_ms(trials)
+
+
+def is_asked_again(asked_ms: float, strategy: Strategy, intent: Intent) -> bool:
+    """Whether what is asked is what was asked, at the intensity that was asked for, if there are several."""
+    same_pct_rmt = not strategy.intensities or strategy.intensity_pct_rmt == intent.intensity_pct_rmt
+    return asked_ms == intent.isi_ms and same_pct_rmt
 
 
 def _compared(record: SessionRecord) -> frozenset[int]:

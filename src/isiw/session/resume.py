@@ -30,13 +30,14 @@ from isiw.session.assembly import (
     require_untold,
 )
 from isiw.session.examination import estimate_record
+from isiw.session.intensities import stimulus_of
 from isiw.session.loop import Session
 from isiw.session.recorder import Recorder
 from isiw.session.replay import require_as_real, require_same_person, taken_up
 from isiw.session.threshold import ThresholdRecorder, resume_threshold
 from isiw.signals.limits import SignalLimits
 from isiw.strategy.strategy import Strategy
-from isiw.trials import Stimulus, Trial
+from isiw.trials import Trial
 from isiw.visit import Visit, VisitProtocol
 
 
@@ -232,7 +233,7 @@ def _session_resumed(
     strategy = strategy.restarted() if strategy else None
     strategy, earlier = taken_up(salvaged, record, strategy, limits, options)
     if isinstance(device, HasMemory):
-        device.resume_after([Stimulus(t.index, t.commanded_isi_ms, t.tap_alone) for t in earlier.trials])
+        device.resume_after([stimulus_of(trial, strategy, header) for trial in earlier.trials])
     kept: tuple[str, ...] = ("subject", "config", "visit", "protocol", "signals", "timeout_s", "ask_deadline_s")
     kept += ("intervention", "first_step")
     said: Any = {name: getattr(header, name) for name in kept}

@@ -243,6 +243,13 @@ def require_matching(info: DeviceInfo, strategy: Strategy, protocol: VisitProtoc
             remedy="Set the protocol's tap_alone to 0. Or let the device's deliver leave out the pulse where "
             "stimulus.tap_alone is True, and describe it with DeviceInfo(..., tap_alone=True).",
         )
+    if (strategy.intensities or protocol.alone_pct_rmt is not None) and not info.sets_intensity:
+        raise DeviceError(
+            "the session has pulses of several intensities, and the device sets none",
+            got=info.name,
+            remedy="Leave out intensities_pct_rmt and alone_pct_rmt. Or let the device's deliver set "
+            "stimulus.intensity_pct_rmt before the pulse, and describe it with DeviceInfo(..., sets_intensity=True).",
+        )
     for name in info.channels:
         waveform_topic(name)
     if "emg" in info.channels:  # an acceleration is not read where the device itself knows the time of the hit

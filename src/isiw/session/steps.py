@@ -17,6 +17,7 @@ from isiw.log.schema import Event, Intent, Waveform
 from isiw.pairing.agenda import Agenda
 from isiw.session.blocks import AHEAD_S, Blocks
 from isiw.session.examination import WindowExamination
+from isiw.session.intensities import noted, set_for
 from isiw.session.own_response import LONGER, OwnResponse
 from isiw.session.pausing import Pausing
 from isiw.session.rig import Rig
@@ -178,7 +179,10 @@ class Steps:
         number = len(self._examination.trials)
         if self._blocks is not None and not self._announced(self._blocks, number):
             return None
-        stimulus = Stimulus(number, self._next_isi_ms(), self._next_control is Control.TAP_ALONE)
+        control, isi_ms = self._next_control, self._next_isi_ms()
+        stimulus = Stimulus(
+            number, isi_ms, control is Control.TAP_ALONE, set_for(control, self._strategy, self._header)
+        )
         for backoff_s in self._backoffs_s:
             try:
                 return self._deliver_in_time(stimulus)
@@ -278,10 +282,12 @@ class Steps:
         doubt: Finding | None = None
         try:
             self._sink.log.require_in_place()
-            trial = Trial.unknown(stimulus)  # from here on it may have been given, whatever fails
+            trial = noted(
+                Trial.unknown(stimulus), stimulus, self._header
+            )  # from here on it may have been given, whatever fails
             self._at = stimulus.trial, True
             answer = self._answer(stimulus)
-            trial = self._judged(stimulus, answer)
+            trial = noted(self._judged(stimulus, answer), stimulus, self._header)
             if isinstance(answer, Sweep):
                 trial = self._own_response.after(trial, answer)
             self._watch = self._watch.after(trial, answer)

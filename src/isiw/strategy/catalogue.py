@@ -12,8 +12,10 @@ from isiw.design import VALVE_SPACE, DesignSpace, require_space
 from isiw.errors import StrategyError, did_you_mean
 from isiw.models.particles.profile import ProfilePrior
 from isiw.models.protocol import profile_of
+from isiw.strategy.intensities import NONE, Intensities, intensities_for
 from isiw.strategy.recipe import Recipe
 from isiw.strategy.settings.common import (
+    Choosing,
     DescribedSetting,
     Settings,
     described,
@@ -206,4 +208,13 @@ def remade_strategy(name: str, space: DesignSpace, seed: int, **settings: Any) -
         initial_ms=initial_ms,
         seed=seed,
         recipe=Recipe(name=name, seed=seed, settings=settings_values(chosen)),
+        intensities=intensities_of(chosen),
     )
+
+
+def intensities_of(settings: Settings) -> Intensities:
+    """The intensities of a strategy's pairs; none where all have the usual one."""
+    asking = settings.asking
+    if not isinstance(asking, Choosing):
+        return NONE
+    return intensities_for(settings.model, asking.intensities_pct_rmt, chosen=asking.chooses_intensity)

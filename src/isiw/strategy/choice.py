@@ -37,7 +37,15 @@ class Choice:
     isi_ms: float
     fallback: str | None = None
     by: ChosenBy = field(default="acquisition", compare=False)
+    intensity_pct_rmt: float | None = None  # that was chosen with it; None for the usual one
     scores: Array | None = field(default=None, compare=False, repr=False)
+
+    def at_least(self, least_ms: float, space: DesignSpace, reason: str) -> Choice:
+        """The first ISI of the grid that is so long [ms], unless this one stands whatever the responses, or is."""
+        longer = space.grid_ms[space.grid_ms >= least_ms]
+        if self.by in {"initial", "plan"} or self.isi_ms >= least_ms or not longer.size:
+            return self
+        return Choice(float(longer[0]), reason, by="fallback", intensity_pct_rmt=self.intensity_pct_rmt)
 
 
 @cache

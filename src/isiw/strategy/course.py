@@ -6,7 +6,7 @@ import threading
 from collections.abc import Iterable
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from isiw.models.protocol import (
 )
 from isiw.strategy.choice import Choice, Cost, best_choices, evenly_spaced
 from isiw.strategy.decisions import Progress, StopDecision, StoppingRule, looks_back
+from isiw.strategy.intensities import NONE, Intensities
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,7 @@ class Method:
     stopping: StoppingRule
     initial_ms: tuple[float, ...] = ()
     cost: Cost | None = None
+    intensities: Intensities = NONE
 
     def begin(self, seed: int, people: int = 1) -> Course:
         """The course before the first trial."""
@@ -170,11 +172,12 @@ class Course:
     @cached_property
     def planned(self) -> tuple[Choice, ...] | None:
         """Each person's next ISI, if that stands already; None if the acquisition function chooses."""
+        in_turn = partial(self.method.intensities.in_turn, pairs=self.paired_trials)
         if self.initial_left:
-            return (Choice(self.initial_left[0], by="initial"),) * self.people
+            return (in_turn(Choice(self.initial_left[0], by="initial")),) * self.people
         if can(acquisition := self.method.acquisition, FollowsPlan):
             isi_ms = acquisition.planned_isi_ms(self.method.space, self.paired_trials)
-            return (Choice(isi_ms, by="plan"),) * self.people
+            return (in_turn(Choice(isi_ms, by="plan")),) * self.people
         if self.plans_ahead and isinstance(self.posterior, ProposesIsi):
             wanted_ms = self.posterior.proposed_isis_ms()[:, 0].tolist()
             return tuple(Choice(self.method.space.snap(isi_ms), by="plan") for isi_ms in wanted_ms)
@@ -203,16 +206,21 @@ class Course:
             return answer.result(min(deadline_s, threading.TIMEOUT_MAX))
         except TimeoutError:
             reason = f"No choice within {deadline_s:g} s: an evenly spaced ISI instead."
-            return (Choice(evenly_spaced(self.method.space, self.told), reason, by="fallback"),) * self.people
+            even = Choice(evenly_spaced(self.method.space, self.told), reason, by="fallback")
+            return (self.method.intensities.in_turn(even, self.paired_trials),) * self.people
 
     def chosen(self, posterior: Posterior) -> tuple[Choice, ...]:
         """The ISI that the acquisition function chooses for each person, whatever is planned."""
         if can(posterior, ExpectsTheUsual):
             posterior = posterior.as_usual
-        method = self.method
-        return best_choices(
-            posterior, method.acquisition, method.space, told=self.told, people=self.people, cost=method.cost
-        )
+        method, how = self.method, {"told": self.told, "people": self.people, "cost": self.method.cost}
+
+        def best(posterior: Posterior) -> tuple[Choice, ...]:
+            return best_choices(posterior, method.acquisition, method.space, **how)  # type: ignore[arg-type]
+
+        if not method.intensities:
+            return best(posterior)
+        return (method.intensities.best(posterior, self.paired_trials, lambda there: best(there)[0]),)
 
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The estimate of the window of one person."""

@@ -13,12 +13,12 @@ import numpy as np
 
 from isiw.change import MOST_NOTED
 from isiw.checks import Amplitude, AmplitudeInterval, Checked, Flag, NonNegative, Positive
-from isiw.errors import InvalidValueError
+from isiw.errors import InvalidValueError, StrategyError
 from isiw.models.protocol import (
     Observation,
 )
 from isiw.signals.taps_alone import TapsAlone, is_inside, meets_response, taps_anywhere, taps_near
-from isiw.trials import Trial, require_alone
+from isiw.trials import Trial
 from isiw.types import Reference
 from isiw.window import Window
 
@@ -57,7 +57,6 @@ class Outcome(Checked):
         told = self.mep_mv, self.mep_interval_mv, self.response
         if sum(value is not None for value in told) != 1:
             raise InvalidValueError("tell needs one of mep_mv, mep_interval_mv and response", got=told)
-        require_alone(self.intensity_pct_rmt, self.isi_ms)
 
     @classmethod
     def of(cls, trial: Trial) -> Outcome:
@@ -104,7 +103,13 @@ class Outcomes:
         return outcomes
 
     def after(self, outcome: Outcome) -> Outcomes:
-        """The same after one more pulse."""
+        """The same after one more pulse; raise where the model has no law of a pair of its intensity."""
+        if outcome.isi_ms is not None and outcome.intensity_pct_rmt is not None and self.pairs_pct_rmt is None:
+            raise StrategyError(
+                "the model has no law of pairs at another intensity",
+                got=f"a pair at {outcome.intensity_pct_rmt:g} % of RMT",
+                remedy="Leave out the intensity if it is the usual one, or choose the default.",
+            )
         return replace(self, pulses=(*self.pulses, outcome))
 
     def after_tap(self, isi_ms: float | None, mep_mv: float) -> Outcomes:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from isiw.acquisition.protocol import AcquisitionFunction, greedy_batch, require_acquisition
+from isiw.acquisition.protocol import AcquisitionFunction, greedy_batch, require_acquisition, require_capabilities
 from isiw.checks import amplitude, deadline, flag, number, whole
 from isiw.design import DesignSpace, require_space
 from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError, warn
@@ -15,11 +15,12 @@ from isiw.signals.plausible import require_plausible, require_plausible_range
 from isiw.strategy.choice import Asked, Choice, Cost, instead_of_lost
 from isiw.strategy.course import Method
 from isiw.strategy.decisions import StopDecision, StoppingRule, stimuli_left
+from isiw.strategy.intensities import NONE, Intensities
 from isiw.strategy.known import Known
 from isiw.strategy.outcomes import Outcome, Outcomes
 from isiw.strategy.recipe import Recipe
 from isiw.strategy.reported import Reported
-from isiw.trials import Trial, require_alone
+from isiw.trials import Trial, require_pulse
 from isiw.types import FloatArray
 
 MOST_OF_A_BATCH = 1000
@@ -38,13 +39,14 @@ class Strategy:
         cost: what each of some ISIs [ms] (shape (t,)) costs, in the unit of the scores, shape (t,).
         seed: seed of all randomness; the same seed and tells give the same asks.
         recipe: how the catalogue made this strategy; None if it was built by hand.
+        intensities: the intensities of the pairs, if they have several.
 
     Raises:
         StrategyError: no acquisition function, or one that needs a capability that the model's posterior lacks.
         InvalidValueError: no design space, an initial ISI that is not a finite number, or an invalid seed.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - its parts
         self,
         space: DesignSpace,
         model: ResponseModel,
@@ -55,20 +57,16 @@ class Strategy:
         cost: Cost | None = None,
         seed: int = 0,
         recipe: Recipe | None = None,
+        intensities: Intensities = NONE,
     ) -> None:
         require_space(space)
         require_acquisition(acquisition)
         seed = whole("the seed", seed, least=0)
         self.space, self.model, self.acquisition, self.stopping = space, model, acquisition, stopping
-        self.initial_ms = tuple(space.snap(isi_ms) for isi_ms in initial_ms)
+        self.intensities, self.initial_ms = intensities, tuple(space.snap(isi_ms) for isi_ms in initial_ms)
         self.recipe, self.cost, self.seed = recipe or Recipe(name="", seed=seed), cost, seed
-        self._course = Method(space, model, acquisition, stopping, self.initial_ms, cost).begin(seed)
-        if missing := [c.__name__ for c in acquisition.needs if not isinstance(self.posterior, c)]:
-            raise StrategyError(
-                f"{type(acquisition).__name__} cannot work with {type(model).__name__}",
-                got=f"a posterior without {', '.join(missing)}",
-                remedy="Choose another acquisition function, or a model whose posterior has the capability.",
-            )
+        self._course = Method(space, model, acquisition, stopping, self.initial_ms, cost, intensities).begin(seed)
+        require_capabilities(acquisition, model, self.posterior)
         self._mistrials = self._controls = self._lost = 0
         self._outcomes = Outcomes(space.reference, self.amplitude_step_mv, pairs_pct_rmt=pairs_pct_rmt_of(model))
         self.earlier: tuple[Trial, ...] = ()  # learnt before the first ask
@@ -88,8 +86,8 @@ class Strategy:
 
     def restarted(self) -> Strategy:
         """The same strategy before its first trial; it has learnt the earlier ones."""
-        how = {"initial_ms": self.initial_ms, "cost": self.cost, "seed": self.seed, "recipe": self.recipe}
-        again = Strategy(self.space, self.model, self.acquisition, self.stopping, **how)  # type: ignore[arg-type]
+        how = {name: getattr(self, name) for name in ("initial_ms", "cost", "seed", "recipe", "intensities")}
+        again = Strategy(self.space, self.model, self.acquisition, self.stopping, **how)
         again.learn_all(self.earlier, same_level=self.same_level)
         again.earlier_given, again.only_counts = self.earlier_given, self.only_counts
         return again
@@ -126,8 +124,7 @@ class Strategy:
         return self._stated("amplitude_step_mv")
 
     def _stated(self, setting: str) -> float | None:
-        told: float | None = self.recipe.settings.get(setting)
-        return getattr(self.model, setting, None) if told is None else told
+        return self.recipe.settings.get(setting, getattr(self.model, setting, None))  # type: ignore[no-any-return]
 
     def ask(self, deadline_s: float | None = None) -> float:
         """The next ISI [ms], on the grid; the same until the next `tell`, or until its trial was lost three times.
@@ -142,8 +139,7 @@ class Strategy:
             InvalidValueError: a deadline that is negative or not a number.
         """
         deadline_s = deadline("deadline_s", deadline_s)
-        choice = self._asked.choice
-        if choice is None:
+        if (choice := self._asked.choice) is None:
             choice = (self._course.choices if deadline_s is None else self._course.choices_within(deadline_s))[0]
             self._asked = replace(self._asked.noting(choice), choice=choice)
         return choice.isi_ms
@@ -152,16 +148,15 @@ class Strategy:
         """The next ISI [ms] as `ask` has it, or the first of the grid that is at least so long.
 
         Args:
-            least_ms: the shortest [ms]; what is asked whatever the responses stays as it is, and so does all in a space
-                that ends before.
+            least_ms: the shortest [ms]; what is asked whatever the responses stays, and so does all in a shorter space.
             reason: why, as its `fallback_reason`.
         """
-        isi_ms, longer = self.ask(), self.space.grid_ms[self.space.grid_ms >= least_ms]
-        fixed = self.choice is None or self.choice.by in {"initial", "plan"} or not self.acquisition.needs
-        if fixed or isi_ms >= least_ms or not longer.size:
+        isi_ms, choice = self.ask(), self.choice
+        if choice is None or not self.acquisition.needs:
             return isi_ms
-        self._asked = replace(self._asked, choice=Choice(float(longer[0]), reason, by="fallback"), fallback=reason)
-        return float(longer[0])
+        later = choice.at_least(least_ms, self.space, reason)
+        self._asked = replace(self._asked, choice=later, fallback=later.fallback or self._asked.fallback)
+        return later.isi_ms
 
     def ask_batch(self, n: int) -> list[float]:
         """The next n ISIs [ms], to be delivered before any outcome, which may come in any order; the first is `ask`'s.
@@ -174,6 +169,8 @@ class Strategy:
             StrategyError: the model cannot imagine trials, or does not plan so far ahead.
         """
         n = whole("the size of a batch", n, least=1, most=MOST_OF_A_BATCH)
+        if self.intensities:
+            raise StrategyError("pairs of several intensities are asked one at a time", got=n, remedy="Call ask().")
         chosen = [self.ask(), *self._course.ahead_ms(n)[1:]][:n]
         batch_ms = greedy_batch(self.posterior, self.acquisition, chosen, n, self._next_of_batch)
         self._asked = replace(self._asked, batch_ms=tuple(batch_ms))
@@ -188,6 +185,16 @@ class Strategy:
     def choice(self) -> Choice | None:
         """The current ISI and what it was chosen by; None if nothing was asked since the last tell."""
         return self._asked.choice
+
+    @property
+    def intensity_pct_rmt(self) -> float | None:
+        """The intensity of the current pair [% RMT]; None where all pairs of the session have the usual one."""
+        return self.intensities.of(self.choice)
+
+    @property
+    def usual_pct_rmt(self) -> float | None:
+        """The usual intensity of the pairs that the model reckons with [% RMT]; None if it has no law of others."""
+        return self._outcomes.pairs_pct_rmt
 
     @property
     def fallback_reason(self) -> str | None:
@@ -228,16 +235,15 @@ class Strategy:
                 `mep_mv` is the amplitude of what the MEP window would hold at `isi_ms`, and what the tap itself adds to
                 amplitudes near this ISI is learnt.
             confirm: whether all realised ISIs are right, however far from those asked.
-            intensity_pct_rmt: intensity of TMS alone [% RMT]; None for that of the pairs. At another one it teaches the
-                default the person's recruitment curve, and other models nothing.
+            intensity_pct_rmt: intensity of the pulse [% RMT]; None for the usual one of the pairs. TMS alone at another
+                one teaches the default the person's recruitment curve, and other models nothing.
 
         Raises:
             InvalidValueError: a value that cannot be, not exactly one of `mep_mv`, `mep_interval_mv` and `response`, an
                 amplitude that no muscle gives, swapped arguments, seconds, a pulse before the impact, an ISI that is
-                too uncertain, a tap alone without ISI or amplitude, an intensity of anything but TMS alone, or
-                earlier ISIs that are to be confirmed.
+                too uncertain, a tap alone without ISI or amplitude or with an intensity, or ISIs to be confirmed.
             OutOfSpaceError: an ISI beyond the space and its tolerance.
-            StrategyError: a kind of outcome that the model cannot learn from.
+            StrategyError: a kind of outcome that the model cannot learn from, such as a pair of another intensity.
 
         Warns:
             ImplausibleDataWarning: an ISI far from all that were asked and not told yet, or amplitudes that look like a
@@ -246,7 +252,7 @@ class Strategy:
         plain_ms = None if isi_ms is None else number("a realised ISI [ms]", isi_ms)
         plain_mv = None if mep_mv is None else number("mep_mv", mep_mv, least=0)
         if not flag("pulse", pulse):
-            require_alone(intensity_pct_rmt, plain_ms, tap_alone=True)
+            require_pulse(intensity_pct_rmt, tap_alone=True)
             self._tell_tap(plain_ms, plain_mv)
             return
         asked_ms = None if plain_ms is None else self._asked.meant_ms(plain_ms, plain_mv, self.space)
@@ -324,29 +330,24 @@ class Strategy:
 
     def _learn(self, outcome: Outcome) -> None:
         """Learn from one trial, wherever its ISI lies."""
-        outcomes = self._outcomes.after(outcome)
-        self._course = (
-            self._course.after(outcomes.observation(outcome))
-            if outcomes.step_mv == self._outcomes.step_mv
-            else self._course.again(self.seed, outcomes.observations)
-        )
+        outcomes, course = self._outcomes.after(outcome), self._course
+        same = outcomes.step_mv == self._outcomes.step_mv
+        learnt = course.after(outcomes.observation(outcome)) if same else None
+        self._course = learnt or course.again(self.seed, outcomes.observations)
         self._outcomes, self._asked = outcomes, self._asked.after(outcome.isi_ms)
         self._lost = 0 if outcome.isi_ms is not None else self._lost
 
     def _tell_tap(self, isi_ms: float | None, mep_mv: float | None) -> None:
         if isi_ms is None or mep_mv is None:
-            raise InvalidValueError(
-                "a tap alone needs the ISI at which the MEP window would lie, and the amplitude of what it holds",
-                got=(isi_ms, mep_mv),
-            )
+            needed = "the ISI at which the MEP window would lie, and the amplitude of what it holds"
+            raise InvalidValueError(f"a tap alone needs {needed}", got=(isi_ms, mep_mv))
         self._learn_tap(self.space.check_realised(isi_ms), amplitude("mep_mv", mep_mv))
 
     def _learn_tap(self, isi_ms: float, mep_mv: float) -> None:
         """Learn from a tap alone, whatever was learnt before it."""
         outcomes = self._outcomes.after_tap(isi_ms, mep_mv)
         if outcomes.pulses:
-            self._course = self._course.again(self.seed, outcomes.observations)
-            self._asked = self._asked.again()
+            self._course, self._asked = self._course.again(self.seed, outcomes.observations), self._asked.again()
         self._outcomes = outcomes
         self._controls += 1
 
@@ -367,6 +368,7 @@ class Strategy:
         self._asked = replace(self._asked, choice=choice)
         other = instead_of_lost(self.space, self._lost, self._course.told + self._mistrials)
         if other is not None and not self._course.plans_ahead:
+            other = self.intensities.in_turn(other, self._course.paired_trials)
             self._asked, self._lost = replace(self._asked, choice=other, fallback=other.fallback), 0
 
     @property

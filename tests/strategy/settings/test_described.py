@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from isiw.strategy.catalogue import list_settings, list_strategies, settings_for
-from isiw.strategy.settings.common import settings_values
+from isiw.strategy.settings.common import as_toml, settings_values
 
 
 @pytest.mark.parametrize("name", list_strategies())
@@ -13,7 +13,7 @@ def test_every_setting_has_a_meaning_and_the_value_that_the_name_stands_for(name
     entries = {entry.key: entry for entry in list_settings(name)}
     assert [key for key, entry in entries.items() if not entry.meaning] == []
     for key, value in settings_values(settings_for(name)).items():
-        assert entries[key].group if isinstance(value, dict) else entries[key].value == value
+        assert entries[key].group if isinstance(value, dict) else as_toml(entries[key].value) == value
 
 
 def test_a_unit_is_taken_from_the_name_and_left_out_of_the_meaning() -> None:

@@ -117,7 +117,7 @@ def against_curve(prior: Prior, latents: Latents, history: History) -> float | N
         None where no pulse was given alone at another intensity, or the prior leaves no choice between noise with a
         curve and noise without.
     """
-    elsewhere = np.flatnonzero(~np.isnan(history.columns[0, :, BY_CURVES]))
+    elsewhere = np.flatnonzero(~np.isnan(history.columns[0, :, BY_CURVES]) & np.isnan(history.isi_ms[0]))
     if not len(elsewhere):
         return None
     change, given = prior.change(latents), elsewhere[-1] + 1

@@ -23,7 +23,7 @@ from isiw.models.particles.posterior import SwarmPosterior
 from isiw.models.particles.predictions import PersonSample, drawn_mep_mv
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.swarm import Moving, Swarm
-from isiw.models.protocol import Observation, PriorPerson
+from isiw.models.protocol import AtIntensity, Observation, PriorPerson
 from isiw.models.shared.tables import NOTED, SIMULATED, seeds, stream
 from isiw.models.windows import EXCLUDED_AT, SampledHypotheses, SampledProfiles, grid_of, profile_grid, sampled_estimate
 from isiw.native.law import Crowd, Law
@@ -99,6 +99,7 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
     """The posterior of b people."""
 
     usual: Law  # the prior that ISIs are chosen with
+    stronger_pct_rmt: float = 0.0  # by how much the next pulse is stronger than the pairs'
 
     @cached_property
     def as_usual(self) -> ParticlePosterior:
@@ -132,7 +133,18 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
     def sample(self) -> PersonSample:
         """The particles that represent all of them where every candidate ISI is scored."""
         _, fields = self.swarm.picked(self.law, self.model.thinned)
-        return PersonSample(fields, self.space, self.trials)
+        return PersonSample(fields, self.space, self.trials, self.stronger_pct_rmt)
+
+    def at_intensity(self, shift_pct_rmt: float) -> AtIntensity:
+        """What recruitment curves expect of a stronger pulse, of which other noise says nothing (decision 45)."""
+        curved, weights = recruits(self.swarm.latents.noise), self.swarm.log_weights
+        share = float(np.exp(weights[curved]).sum() / len(weights))
+        if not share:
+            return AtIntensity(self, 0.0)
+        kept = np.where(curved, weights, -np.inf)
+        kept -= log_sum(kept)[:, np.newaxis]
+        swarm = replace(self.swarm, crowd=self.swarm.crowd._replace(log_weights=kept))
+        return AtIntensity(replace(self, swarm=swarm, stronger_pct_rmt=shift_pct_rmt), share)
 
     def prediction_mv(self, level: float, person: int = 0) -> tuple[FloatArray, FloatArray]:
         """Between which amplitudes the next MEP lies; see `PredictsMeps`."""

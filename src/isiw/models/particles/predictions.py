@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Final
+from typing import Final, Self
 
 import numpy as np
 
 from isiw.design import DesignSpace
-from isiw.models.particles.records import FLOOR_SD, LOG_FLOOR
+from isiw.models.particles.records import FLOOR_SD, LOG_FLOOR, REST, SLOPE
 from isiw.models.shared import history
 from isiw.models.shared.tables import LEVELS, OUTCOMES
 from isiw.models.windows import Runs, grid_of
@@ -41,14 +41,21 @@ class TabledSample:
         """Expected MEP [mV], shape (b, s, t)."""
         return self._mean_mv(engine.facilitations(self.fields, isi_ms))
 
+    @property
+    def at_the_next(self) -> Self:
+        """The same at the intensity of the next pulse."""
+        return self
+
     def outcome_mass(self, isi_ms: Singles) -> Singles:
         """Predictive distribution of the next MEP under each particle, shape (b, s, t, y)."""
-        return engine.rows_between(self.fields, self.outcome_table, engine.facilitations(self.fields, isi_ms))
+        one = self.at_the_next
+        return engine.rows_between(one.fields, one.outcome_table, engine.facilitations(one.fields, isi_ms))
 
     def foreseen(self, isi_ms: Singles) -> Iterator[engine.Foreseen]:
         """The same, a person at a time: tables of many people are not kept at once."""
+        next_one = self.at_the_next
         for person in range(len(self.fields)):
-            one = self if len(self.fields) == 1 else replace(self, fields=self.fields[person : person + 1])
+            one = next_one if len(self.fields) == 1 else replace(next_one, fields=next_one.fields[person : person + 1])
             yield engine.Foreseen(one.fields, one.outcome_table, engine.facilitations(one.fields, isi_ms))
 
     def mep_quantiles_mv(self, isi_ms: Singles, shares: FloatArray) -> FloatArray:
@@ -109,7 +116,21 @@ class TabledSample:
 
 @dataclass(frozen=True, eq=False)
 class PersonSample(TabledSample):
-    """What equally weighted particles say about the next MEP and about the window."""
+    """What equally weighted particles say about the next MEP and about the window.
+
+    The window is that of the pairs' usual intensity, whatever that of the next pulse is.
+    """
+
+    stronger_pct_rmt: float = 0.0  # by how much the next pulse is stronger than the pairs'
+
+    @cached_property
+    def at_the_next(self) -> PersonSample:
+        """The same at the intensity of the next pulse."""
+        if not self.stronger_pct_rmt:
+            return self
+        fields = self.fields.copy()
+        fields[..., REST] += fields[..., SLOPE] * np.float32(self.stronger_pct_rmt)
+        return replace(self, fields=fields, stronger_pct_rmt=0.0)
 
     @cached_property
     def edge_level(self) -> Singles:

@@ -144,8 +144,8 @@ class Swarm:
         return Swarm(crowd, self.evidence + found[:, 0], history, self.bets)
 
     def _as_curves_have_it(self, trial: History, law: Law) -> History:
-        """A trial of TMS alone at another intensity, with the density that recruitment curves predict (decision 45)."""
-        elsewhere = np.isnan(trial.isi_ms) & (trial.columns[..., SHIFT] != 0)
+        """A trial at another intensity, with the density that recruitment curves predict (decision 45)."""
+        elsewhere = trial.columns[..., SHIFT] != 0
         if not elsewhere.any():
             return trial
         curved = recruits(self.latents.noise)

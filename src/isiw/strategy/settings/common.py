@@ -22,6 +22,7 @@ from isiw.checks import (
     MOST_OF_A_KIND,
     Checked,
     Count,
+    Flag,
     Natural,
     Positive,
     Share,
@@ -84,6 +85,8 @@ class Choosing(Checked):
     Args:
         acquisition: what chooses the next ISI, one of `isiw.acquisition.registry.ACQUISITIONS`.
         initial_trials: how many evenly spaced ISIs to ask for first.
+        intensities_pct_rmt: the intensities that pairs may have, if they are to have several [% RMT].
+        chooses_intensity: whether the acquisition function chooses among them; else pairs have them in turn.
 
     Raises:
         InvalidValueError: an unknown acquisition function, or an invalid number.
@@ -91,6 +94,8 @@ class Choosing(Checked):
 
     acquisition: AcquisitionName = "alternating"
     initial_trials: Natural = 0
+    intensities_pct_rmt: tuple[float, ...] = ()
+    chooses_intensity: Flag = False
 
     def function(self, seed: int) -> AcquisitionFunction:
         """The acquisition function."""
