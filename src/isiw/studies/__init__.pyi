@@ -3,6 +3,9 @@ from . import store as store
 from .execution import DaskCluster as DaskCluster
 from .execution import Failure as Failure
 from .execution import Processes as Processes
+from .interventions import Intervened as Intervened
+from .interventions import InterventionPlan as InterventionPlan
+from .interventions import intervene as intervene
 from .plan import Study as Study
 from .plan import StudyStrategy as StudyStrategy
 from .plan import Unit as Unit

@@ -1,0 +1,118 @@
+"""The report of an intervention: one page with TMS alone before and after, the change, and what was delivered."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from isiw.errors import InvalidValueError
+from isiw.pairing import words
+from isiw.pairing.effect import AfterEffect, BlockChange, change_of
+from isiw.pairing.pulses import Delivered, TestPulse
+from isiw.plots.intervention import change_figure, dose_figure
+from isiw.plots.style import inline_svg
+from isiw.report.page import rendered, write_page
+
+HEADINGS: Final = (
+    "block",
+    "from the last pair",
+    "pulses",
+    "change",
+    "90 % interval",
+    "without a drift",
+    "P(more)",
+    "mean MEPs",
+)
+"""The columns of the table."""
+
+
+@dataclass(frozen=True)
+class InterventionContents:
+    """What a page about an intervention is made of.
+
+    Args:
+        pulses: of TMS alone, in the order of delivery.
+        delivered: the pairs; None while the arm is concealed.
+        stimuli: how many stimuli lie between the pulses before and after; None if that is the number of pairs.
+        window: at some times [s from the first pair] where the window starts and ends [ms].
+        subject: whose it is.
+        log: the name of the log.
+        states: what a reader must know before trusting the page.
+        losses: what is lost of the log.
+        facts: names and values of settings.
+    """
+
+    pulses: Sequence[TestPulse]
+    delivered: Sequence[Delivered] | None
+    stimuli: int | None = None
+    window: Sequence[tuple[float, float, float]] = ()
+    subject: str = "an unnamed subject"
+    log: str = ""
+    states: Sequence[str] = ()
+    losses: Sequence[str] = ()
+    facts: Sequence[Any] = ()
+
+    def change(self) -> AfterEffect:
+        """What the pulses say of the change.
+
+        Raises:
+            InvalidValueError: too few pulses.
+        """
+        stimuli = self.stimuli if self.stimuli is not None else len(self.delivered or ())
+        return change_of(self.pulses, pairs=stimuli)
+
+
+def save_intervention(intervention: InterventionContents, path: str | Path, *, overwrite: bool = False) -> Path:
+    """Write the page of an intervention into a file.
+
+    Args:
+        intervention: what it is made of.
+        path: where to, such as `report.html`.
+        overwrite: whether to replace a file that is there; a log never is.
+
+    Raises:
+        ConfigError: jinja2 is not installed.
+        InvalidValueError: a path that is none of a page, or a file not to be replaced.
+    """
+    return write_page(path, lambda: intervention_page(intervention), overwrite=overwrite)
+
+
+def intervention_page(intervention: InterventionContents) -> str:
+    """A page of HTML about an intervention; it needs no network and no JavaScript."""
+    try:
+        effect = intervention.change()
+    except InvalidValueError as error:
+        effect, said = None, [f"{error.what[:1].upper()}{error.what[1:]}."]
+    else:
+        said = words.statement(effect)
+    delivered = intervention.delivered
+    return rendered(
+        "intervention.html",
+        subject=intervention.subject,
+        states=list(intervention.states),
+        losses=list(intervention.losses),
+        statement=said,
+        change="" if effect is None else inline_svg(change_figure(effect, intervention.pulses), "change"),
+        headings=HEADINGS,
+        rows=[] if effect is None else [_row(change) for change in (*effect.blocks, effect.pooled)],
+        dose=words.CONCEALED if delivered is None else words.dose(delivered),
+        pairs=inline_svg(dose_figure(delivered, intervention.window), "pairs") if delivered else "",
+        facts=list(intervention.facts),
+        log=f"Log: {intervention.log}" if intervention.log else "",
+    )
+
+
+def _row(change: BlockChange) -> tuple[str, ...]:
+    factor, steady = change.factor, change.steady
+    return (
+        change.block,
+        f"{change.at_min:.0f} min",
+        str(change.pulses),
+        words.times(factor.median),
+        f"{words.times(factor.low)} to {words.times(factor.high)}",
+        f"{words.times(steady.low)} to {words.times(steady.high)}",
+        f"{change.more:.2f}",
+        "–" if change.ratio is None else words.times(change.ratio),
+    )
