@@ -107,9 +107,9 @@ ABOUT: Final = """\
 Half of the people have a forearm's recruitment curve, half a hand's; TMS alone at 105 to 130 % RMT, a third of them at
 three intensities; 30 pulses before, 150 pairs, 4 × 20 pulses after. The level is steady, drifts as recordings show (SD
 .26, natural log), or strongly (SD .49). *Covers*: how often the 90 % interval of the pooled change has the true factor.
-*Width*: from its middle to an end, as a factor. *Off*: mean error, natural log. *Shows*: how often it holds no factor of
-1; with factor 1 that is the rate of false alarms, and the t-tests' limits are set to the same rate on the same people.
-*More*: paired difference of what is shown, with the lower end of its 90 % interval."""
+*Width*: from its middle to an end, as a factor. *Off*: mean error, natural log. *Shows*: how often it holds no factor
+of 1; with factor 1 that is the rate of false alarms, and the t-tests' limits are set to the same rate on the same
+people. *More*: paired difference of what is shown, with the lower end of its 90 % interval."""
 
 HEADINGS: Final = (
     "level", "true factor", "interval", "covers", "width", "off", "shows",
