@@ -41,6 +41,7 @@ def show_log(
     with errors_reported():
         record = isiw.read_session(log, channels=())
         say_unread(record)
+        record.require_open()
         for fact in isiw.report.tables.first_facts(record):
             show(f"{fact.name + ':':10}{fact.value}")
         show("")

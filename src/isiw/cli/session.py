@@ -26,7 +26,9 @@ from isiw.text.sanitize import command
 
 if TYPE_CHECKING:
     from isiw.devices.protocol import Device
+    from isiw.log.reader import SessionRecord
     from isiw.session.loop import Session
+    from isiw.window import Window
 
 app = typer.Typer()
 
@@ -101,6 +103,42 @@ def run(  # noqa: PLR0913, PLR0917 - an option each
 
 
 @app.command(rich_help_panel=SESSIONS)
+def pair(
+    config: Annotated[
+        Path | None, typer.Argument(help="A configuration with a section [intervention].", **NO_DEFAULT)
+    ] = None,
+    after: Annotated[
+        Path | None, typer.Option(help="The log of the search, of the same visit, that found the window.", **NO_DEFAULT)
+    ] = None,
+    log: Annotated[Path | None, typer.Option(help="The log's file; by default a new one in isiw-sessions.")] = None,
+    day: Day = None,
+    operator: Annotated[str | None, typer.Option(help="Who runs the session, for the log.", **NO_DEFAULT)] = None,
+    live: Live = False,  # noqa: FBT002 - a flag of the command line
+    opens: Annotated[
+        Path | None,
+        typer.Option("--open", metavar="LOG", help="Say which arm a log is of; the log keeps that it was opened."),
+    ] = None,
+) -> None:
+    """Use a window: pulses of TMS alone, pairs at the best ISI, and pulses again, as [intervention] plans it.
+
+    Continue one that was interrupted with isiw resume; one that its operator has ended is over.
+    """
+    with errors_reported():
+        if opens is not None:
+            show(f"The arm is {isiw.session.open_arm(opens).words}. The log keeps that it was opened.")
+            return
+        if config is None:
+            raise isiw.errors.ConfigError(
+                "an intervention needs a configuration that plans it", remedy="isiw pair CONFIG --after WINDOW_LOG"
+            )
+        settings = isiw.config.load_config(config).with_overrides(
+            log=log, earlier=None if after is None else [after], day=day, operator=operator
+        )
+        show("Preparing the intervention …")
+        _run_to_the_end(isiw.config.session.intervention_for(settings), config, live=live)
+
+
+@app.command(rich_help_panel=SESSIONS)
 def resume(
     log: Annotated[Path, typer.Argument(help="A session's log.", **NO_DEFAULT)],
     config: Annotated[
@@ -163,17 +201,22 @@ def _run_to_the_end(session: Session, config: Path | None, *, live: bool, resume
     if truth.known:
         show(isiw.report.words.truth_sentence(record, truth.window))
     show(f"log:     {result.log}")
-    try:
-        picture = isiw.plots.save_session_plot(record, free_beside(result.log, ".png"), truth=truth.window)
-        show(f"picture: {picture}")
-    except OSError as error:
-        later = command("plot", result.log)
-        show(f"The picture cannot be written ({error.strerror}). The log is complete; draw it later with: {later}")
+    if not record.conceals:
+        _draw(record, truth.window)
     if not result.decision.stop:
         raise typer.Exit(NOT_OVER)
     more = isiw.config.resume.after_end(session, config, delivered=len(session.trials) > before)
     if more is not None:
         show(more)
+
+
+def _draw(record: SessionRecord, truth: Window | None) -> None:
+    """Draw a session beside its log, and say where."""
+    try:
+        show(f"picture: {isiw.plots.save_session_plot(record, free_beside(record.path, '.png'), truth=truth)}")
+    except OSError as error:
+        later = command("plot", record.path)
+        show(f"The picture cannot be written ({error.strerror}). The log is complete; draw it later with: {later}")
 
 
 @contextmanager

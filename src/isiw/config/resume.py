@@ -182,7 +182,9 @@ def _unchangeable(config: RunConfig, header: Header) -> Iterator[tuple[str, obje
             for key in config.strategy.settings:
                 now = strategy.recipe.settings.get(key)
                 yield f"strategy.settings.{key}", header.strategy.settings.get(key, now), now
-    if "protocol" in given:
+    if header.intervention is not None and config.intervention is not None:
+        yield from _differing("intervention", header.intervention.plan, config.intervention.plan())
+    elif "protocol" in given:
         yield from _differing("protocol", header.protocol, config.protocol)
     noted = config.visit.noted()
     for name in config.visit.model_fields_set - {"subject"}:
@@ -214,6 +216,8 @@ def after_error(session: Session, config: Path | None, error: BaseException | No
 def after_end(session: Session, config: Path | None, *, delivered: bool) -> str | None:
     """The way to deliver more to the same person after a session is over; None if nobody has asked for that."""
     header = session.header
+    if header.intervention is not None:
+        return None
     if not session.strategy.decision().stop:  # so that it was the limits
         where = f"in {config}" if config is not None else "of a configuration"
         way_on = continued_by(session.log_path, header, config, changed=True)

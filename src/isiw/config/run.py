@@ -22,6 +22,7 @@ from pydantic import Field, model_validator
 from isiw.config.sections import (
     TIMEOUT_S,
     DeviceConfig,
+    InterventionConfig,
     LimitsConfig,
     PlannedVisit,
     RobotConfig,
@@ -76,6 +77,7 @@ class RunConfig(Section):
     limits: LimitsConfig = LimitsConfig()
     protocol: VisitProtocol = VisitProtocol()
     signals: SignalLimits = SignalLimits()
+    intervention: InterventionConfig | None = None
 
     @model_validator(mode="after")
     def _one_person(self) -> Self:

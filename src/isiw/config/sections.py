@@ -20,7 +20,7 @@ from pydantic import (
     model_validator,
 )
 
-from isiw.checks import choice, patience
+from isiw.checks import choice, from_table, patience
 from isiw.design import DesignSpace, missing_reference
 from isiw.devices.limits import USUAL_ITI_S
 from isiw.devices.robot.mechanism import LINE_DELAY_MS, EventTime, Geometry, SensorNoise
@@ -29,6 +29,7 @@ from isiw.devices.robot.vane.rotation import Vane
 from isiw.devices.robot.vane.tapper import WAIT_MS, RotatingTapper
 from isiw.errors import ConfigError
 from isiw.findings import STOP_WIDTH_MS
+from isiw.intervention import Intervention, Plan
 from isiw.strategy.catalogue import list_strategies, settings_for
 from isiw.strategy.threshold.curve import CurvePulses
 from isiw.subjects.cohorts import COHORTS, person_of
@@ -175,6 +176,40 @@ class LimitsConfig(Section):
     max_coil_c: float | None = None
     intensity_pct_mso: float | None = Field(default=None, ge=0.0)
     max_consecutive_mistrials: int = Field(default=3, ge=1)
+
+
+class InterventionConfig(Section):
+    """An intervention, which uses the window that a search has found; other keys are those of `isiw.intervention.Plan`.
+
+    Args:
+        changes_the_person: the statement that the intervention is meant to change the person; without it there is none.
+        seed: draws the arm of each person, by the person's code, for whoever keeps the list of a study; without it
+            nobody can draw it again.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="allow")
+
+    changes_the_person: bool = False
+    seed: int | None = None
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        self.plan()
+        return self
+
+    def plan(self) -> Plan:
+        """The plan."""
+        return from_table(Plan, self.model_extra or {}, "intervention")
+
+    def drawn(self, subject: str) -> Intervention:
+        """The plan with the arm that is drawn for a person; raise where nobody has stated what it is."""
+        if not self.changes_the_person:
+            raise ConfigError(
+                "the configuration does not state that the intervention is meant to change the person",
+                expected="changes_the_person = true under [intervention]",
+                remedy="Write it if your ethics approval is for such an intervention.",
+            )
+        return Intervention.drawn(self.plan(), subject, self.seed)
 
 
 class RobotConfig(BaseModel):

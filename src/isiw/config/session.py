@@ -18,6 +18,7 @@ from isiw.devices.protocol import Device, DeviceInfo, info_of
 from isiw.devices.simulated import RecordedPerson, SimulatedDevice, SimulatedPerson, load_recordings
 from isiw.errors import ConfigError, StrategyError
 from isiw.files import write_output
+from isiw.intervention import Intervention
 from isiw.log.durable import log_exists
 from isiw.log.headers import RUN_KEY
 from isiw.log.kinds import imported_sentence
@@ -32,7 +33,7 @@ from isiw.strategy.catalogue import known_settings, make_strategy, settings_for
 from isiw.subjects.cohorts import person_of
 from isiw.text.named_code import named_code, require_fitting
 from isiw.trials import Trial
-from isiw.visit import Visit
+from isiw.visit import Visit, VisitProtocol
 
 TEMPLATE_FILES = ("rig.py", "session.toml", "test_rig.py")
 """The files that `write_rig_template` writes."""
@@ -126,6 +127,12 @@ def earlier_trials(config: RunConfig, device: DeviceInfo) -> tuple[Trial, ...]:
     for record in records:
         require_whole(record, "as a table: isiw export, then isiw analyse")
         header = record.header
+        if header.intervention is not None:
+            raise ConfigError(
+                "an intervention is meant to change the person, and teaches no window",
+                got=str(record.path),
+                remedy="Give the log of the search for the window.",
+            )
         if (header.space.reference, header.conditioning) != (device.reference, device.conditioning):
             raise ConfigError(
                 "the ISIs of the earlier trials are not those of the session",
@@ -238,8 +245,12 @@ def require_device(config: RunConfig, path: Path) -> None:
         )
 
 
-def session_for(config: RunConfig) -> Session:
+def session_for(config: RunConfig, intervention: Intervention | None = None) -> Session:
     """The session that a configuration describes, ready to run.
+
+    Args:
+        config: the configuration.
+        intervention: an intervention, in which no window is searched for; None for a search.
 
     Raises:
         ConfigError: a device without a design space; no recordings, or no prior, where the configuration says, or
@@ -262,19 +273,46 @@ def session_for(config: RunConfig) -> Session:
     strategy = make_strategy(config.strategy.name, space=space, seed=config.seed, **settings)
     if earlier := earlier_trials(config, info):
         strategy.learn_all(earlier)
-    code = "" if config.own_rig else f"{config.subject.cohort}-{config.seed}-{config.subject.number}"
     return Session(
         device,
         strategy,
         log=log,
         limits=limits_for(config),
-        subject=config.visit.subject or code,
+        subject=config.visit.subject or _code(config),
         signals=config.signals,
         config={} if config.own_rig else {RUN_KEY: _kept(config)},
         timeout_s=config.timeout_s,
         visit=config.visit.noted(),
-        protocol=config.protocol,
+        protocol=config.protocol if intervention is None else VisitProtocol(taps_first=0),
+        intervention=intervention,
     )
+
+
+def intervention_for(config: RunConfig) -> Session:
+    """The intervention that a configuration describes, ready to run; `earlier` has the log in which the window is.
+
+    Raises:
+        ConfigError: no section [intervention], or one that does not state what it is meant to do; no log of a search,
+            or one of another person; and as for `session_for`.
+        InvalidValueError: no window was found.
+    """
+    if config.intervention is None:
+        raise ConfigError(
+            "the configuration has no intervention",
+            expected='[intervention] with changes_the_person = true and the protocol\'s code, protocol_code = "..."',
+            remedy="Write the section if your ethics approval is for such an intervention: docs/pairing.md has one.",
+        )
+    if not _logs(config):
+        raise ConfigError(
+            "an intervention needs the log of the search for the window",
+            remedy="Search for it first, and give its log: isiw pair CONFIG --after WINDOW_LOG",
+        )
+    return session_for(config, config.intervention.drawn(config.visit.subject or _code(config)))
+
+
+def _code(config: RunConfig) -> str:
+    """The code of a simulated person; empty of a real one."""
+    return "" if config.own_rig else f"{config.subject.cohort}-{config.seed}-{config.subject.number}"
 
 
 def _require_used(subject: SubjectConfig) -> None:
@@ -288,7 +326,7 @@ def _require_used(subject: SubjectConfig) -> None:
 
 def _kept(config: RunConfig) -> dict[str, Any]:
     """The part of a configuration that a log keeps: for readers, where a prior came from; no names of code."""
-    kept = config.model_dump(mode="json", exclude_none=True, exclude={"log", "device", "signals"})
+    kept = config.model_dump(mode="json", exclude_none=True, exclude={"log", "device", "signals", "intervention"})
     if config.subject.data is not None:
         kept["subject"]["data"] = str(config.subject.data.resolve())
     if config.robot is not None:

@@ -245,6 +245,7 @@ def study_sweeps(name: str, sweeps: Iterable[Sweep], commanded_isi_ms: Iterable[
 
 def study_session(record: SessionRecord) -> TimingStudy:
     """Run the repeatability study on the taps of a logged session."""
+    record.require_open()
     from_impact = record.header.space.reference == "impact"
     sweeps, commanded = [], []
     for trial in record.table:

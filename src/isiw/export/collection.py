@@ -207,7 +207,9 @@ def read_logs(source: str | Path, channels: Iterable[str] | None = None) -> tupl
     Of other `channels` than these no samples are read; with None all are.
     """
     if not Path(source).is_dir():
-        return [read_session(source, channels=channels)], []
+        record = read_session(source, channels=channels)
+        record.require_open()
+        return [record], []
     records: dict[str, SessionRecord] = {}
     left_out = []
     files = (file for file in Path(source).rglob("*.mcap*") if file.is_file())
@@ -215,6 +217,7 @@ def read_logs(source: str | Path, channels: Iterable[str] | None = None) -> tupl
     for file in sorted(logs):
         try:
             record = read_salvaged(salvage_file(file, topics_of(channels)))
+            record.require_open()
         except LogError as error:
             left_out.append(f"{file.name} is left out: {error.what}.")
             continue

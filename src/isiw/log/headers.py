@@ -35,6 +35,7 @@ from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import InvalidValueError, LogError
+from isiw.intervention import Intervention
 from isiw.signals.limits import SignalLimits
 from isiw.strategy.threshold.pulses import IntensityRange
 from isiw.text.stimuli import STIMULI, StimulusWords
@@ -168,9 +169,11 @@ class Header(_Header):
     one is of trials that were delivered without isiw, and `source` says where they are from: it was no session, and has
     no intents; `given_by` is when all of them had been given, as ISO 8601 in UTC, if their dates say so. `earlier` are
     trials that were learnt before the first ask, and `earlier_given` is how many stimuli these and lost ones were.
+    An "intervention" uses a window that was found before, and searches for none; an older isiw does not know the kind,
+    and so continues none as if it were a search.
     """
 
-    kind: Literal["session", "imported"] = "session"
+    kind: Literal["session", "imported", "intervention"] = "session"
     source: str = ""
     given_by: str = ""
     strategy: StrategyRecipe
@@ -187,6 +190,7 @@ class Header(_Header):
     earlier: tuple[Trial, ...] = ()
     earlier_given: int = 0
     earlier_same_level: bool = False
+    intervention: Intervention | None = None
 
     @field_validator("given_by")
     @classmethod
@@ -258,6 +262,7 @@ ANY_HEADER: Final[TypeAdapter[AnyHeader]] = TypeAdapter(
     Annotated[
         Annotated[Header, Tag("session")]
         | Annotated[Header, Tag("imported")]
+        | Annotated[Header, Tag("intervention")]
         | Annotated[ThresholdHeader, Tag("threshold")]
         | Annotated[ProductionHeader, Tag("production")],
         Discriminator(kind_tag),
@@ -304,13 +309,14 @@ def _name(strategy: Any) -> str:
     return name if isinstance(name, str) else "not known"
 
 
+_KIND_TAGS: Final = ("session", "imported", "intervention", "threshold", "production")
+
+
 def first_fault(error: ValueError) -> str:
     """The first fault of a record, without what pydantic says of where to read more."""
     if isinstance(error, ValidationError):
         first = error.errors(include_url=False, include_input=False)[0]
-        where = first["loc"][
-            first["loc"][:1] in {("session",), ("imported",), ("threshold",), ("production",)} :
-        ]  # without the kind
+        where = first["loc"][first["loc"][:1] in {(kind,) for kind in _KIND_TAGS} :]  # without the kind
         return f"{'.'.join(map(str, where))}: {first['msg']}"
     return str(error)
 

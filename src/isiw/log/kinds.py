@@ -22,6 +22,7 @@ class LogKind(StrEnum):
     SEARCH = "a search for a window"
     THRESHOLD = "a search for a motor threshold"
     PRODUCTION = "an interval production task"
+    INTERVENTION = "an intervention"
     IMPORTED = "trials that were delivered without isiw"
 
     def shown_by(self, path: Path) -> str:
@@ -44,6 +45,7 @@ _OF_TAG: Final = {
     "threshold": LogKind.THRESHOLD,
     "production": LogKind.PRODUCTION,
     "imported": LogKind.IMPORTED,
+    "intervention": LogKind.INTERVENTION,
 }
 
 

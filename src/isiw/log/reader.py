@@ -24,6 +24,7 @@ from isiw.signals.measures import Measures, measures
 from isiw.signals.tap import TapResponses
 from isiw.signals.watch import is_silent
 from isiw.strategy.stopping import StopDecision
+from isiw.text.sanitize import command
 from isiw.text.stimuli import TAP, StimulusWords, meanings
 from isiw.trials import Channel, Stimulus, Sweep, Trial, TrialTable
 
@@ -98,6 +99,8 @@ class SessionRecord(_StimuliRecord[Header]):
 
     def __str__(self) -> str:
         header, last = self.header, self.estimates[-1] if self.estimates else None
+        if self.conceals:
+            return f"An intervention with {header.subject or 'an unnamed subject'}, its arm concealed\nLog: {self.path}"
         kind = "Imported trials" if header.imported else "Session"
         strategy = header.strategy.name or "of a user's own objects"
         lines = [
@@ -111,6 +114,23 @@ class SessionRecord(_StimuliRecord[Header]):
             if self.is_judged_since:
                 lines.append(JUDGED_SINCE)
         return "\n".join([*lines, *self.told_unread, *(f"Lost: {loss}" for loss in self.losses), f"Log: {self.path}"])
+
+    @property
+    def conceals(self) -> bool:
+        """True if it is of an intervention whose arm nobody has opened."""
+        intervention = self.header.intervention
+        opened = any(event.kind == "opening" for event in self.events)
+        return intervention is not None and intervention.conceals and not opened
+
+    def require_open(self) -> None:
+        """Raise if what is made of it would show a concealed arm."""
+        if self.conceals:
+            raise LogError(
+                "the arm of this intervention is concealed, and this would show it",
+                got=str(self.path),
+                remedy="When nobody has to be blind any more, open it; that is logged: "
+                f"{command('pair', '--open', self.path)}",
+            )
 
     @property
     def told_unread(self) -> tuple[str, ...]:

@@ -19,6 +19,7 @@ from isiw.checks import MOST_TRIALS
 from isiw.errors import DamagedLogError, LogError
 from isiw.findings import Kind
 from isiw.log.headers import AnyHeader, Production, first_fault, header_in_parts
+from isiw.log.moments import Moment
 from isiw.log.salvage import Salvage
 from isiw.log.schema import EstimateRecord, Event, Intent, Message, PulseOutcome, Record, Waveform, decode
 from isiw.log.writer import CONFIGURATION
@@ -35,18 +36,29 @@ class Onset(NamedTuple):
     at_ns: int
 
 
+_SLEPT_S: Final = 1.0
+"""What the computer measures besides is to the millisecond, so that it counts only where it says something else [s]."""
+
+
 class Onsets:
-    """The onsets of a log's stimuli; if the session's clock began again or stood still, the log's time counts."""
+    """The onsets of a log's stimuli, by the session's clock.
+
+    If that began again or stood still, the time since the start of the computer counts, which nobody sets; of another
+    start, or where that is not known, the log's time. A computer that slept has gone on all the same.
+    """
 
     def __init__(self) -> None:
         self.by_trial: dict[int, Onset] = {}
         self._last: Onset | None = None
         self._clock_s: float | None = None
+        self._moment: Moment | None = None
 
     def take(self, record: Record, at_ns: int) -> None:
         """Take the next record; of two intents for the same trial the second counts."""
         if isinstance(record, Intent):
-            self._last = Onset(self._onset_s(record.t_s, at_ns), at_ns)
+            moment = Moment(at_ns, record.boot_id, record.boot_s)
+            self._last = Onset(self._onset_s(record.t_s, moment), at_ns)
+            self._moment = moment
             self._clock_s = record.t_s
             self.by_trial[record.trial] = self._last
         elif isinstance(record, Event) and record.kind == "resume":
@@ -55,12 +67,13 @@ class Onsets:
             self.by_trial.clear()  # nothing was given before, so that the next stimulus is the first one
             self._last = None
 
-    def _onset_s(self, clock_s: float, at_ns: int) -> float:
-        if self._last is None:
+    def _onset_s(self, clock_s: float, at: Moment) -> float:
+        if self._last is None or self._moment is None:
             return 0.0
-        if self._clock_s is not None and clock_s > self._clock_s:
-            return self._last.onset_s + clock_s - self._clock_s
-        return self._last.onset_s + max(0.0, (at_ns - self._last.at_ns) / 1e9)
+        passed = [] if self._clock_s is None or clock_s <= self._clock_s else [clock_s - self._clock_s]
+        if (measured_s := at.since_s(self._moment)) is not None and (measured_s > _SLEPT_S or not passed):
+            passed.append(measured_s)
+        return self._last.onset_s + max([0.0, *(passed or [(at.wall_ns - self._moment.wall_ns) / 1e9])])
 
 
 _KindT = TypeVar("_KindT", Kind, StopKind)

@@ -163,6 +163,9 @@ EventKind: TypeAlias = Literal[
     "note",
     "change",
     "client",
+    "block",
+    "stop",
+    "opening",
 ]
 
 
@@ -185,7 +188,8 @@ class Event(LogRecord):
     `key` of an earlier one is not logged. A "change" bears on all MEPs after its trial. `finding` is what a
     doubt or a pause is about, or an exclusion by isiw and the inclusion that confirms its trial; `corrected` is what a
     correction says that the trial's values really were. `client` is the key of the client over HTTP that drives the
-    session from a "client" on; None if it stated none.
+    session from a "client" on; None if it stated none. A "block" of an intervention begins with the next trial,
+    `late_s` after it was due [s]; a "stop" ends it for good, and an "opening" says which arm it had.
     """
 
     kind: EventKind
@@ -195,6 +199,7 @@ class Event(LogRecord):
     key: str | None = None
     corrected: Correction | None = None
     client: str | None = None
+    late_s: FiniteFloat | None = None
 
 
 Record: TypeAlias = (

@@ -3,8 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final, NamedTuple
 
 from isiw.checks import Amplitude, Checked, Number, Positive, Text
+from isiw.intervention import Part, Plan
+from isiw.log.kinds import LogKind, kind_of, of_another_kind
+from isiw.log.reader import SessionRecord
+
+USUAL_PCT_RMT: Final = 110.0
+"""The intensity of a visit that nobody has stated [% RMT]."""
 
 
 @dataclass(frozen=True)
@@ -47,3 +54,55 @@ class Delivered(Checked):
     at_s: Number
     mep_mv: Amplitude | None
     probe: bool
+
+
+class Pairing(NamedTuple):
+    """What an intervention delivered, and its plan.
+
+    `tests` are in the order of delivery, those that count; `pairs` are all pairs of its arm, none where there were taps
+    or pulses alone.
+    """
+
+    tests: tuple[TestPulse, ...]
+    pairs: tuple[Delivered, ...]
+    plan: Plan
+
+
+def pairing_of(record: SessionRecord) -> Pairing:
+    """What the log of an intervention says was delivered; times are right across restarts and a clock that was set.
+
+    Args:
+        record: the log; its arm may still be concealed, so show nobody the pairs of one that is.
+
+    Raises:
+        LogError: the log is of no intervention.
+    """
+    intervention = record.header.intervention
+    if intervention is None:
+        raise of_another_kind(record.path, kind_of(record.header), LogKind.INTERVENTION)
+    plan, onsets = intervention.plan, record.onsets
+    slots = {trial.index: plan.slots[trial.index] for trial in record.table if trial.index < len(plan.slots)}
+    given = [number for number, slot in slots.items() if slot.part is Part.PAIRS and number in onsets]
+    first_s = onsets[given[0]].onset_s if given else 0.0
+    last_s = onsets[given[-1]].onset_s if given else max((onset.onset_s for onset in onsets.values()), default=0.0)
+    usual_pct = _usual_pct(record)
+    tests, pairs = [], []
+    for trial in record.table:
+        slot, onset = slots.get(trial.index), onsets.get(trial.index)
+        if slot is None or onset is None:
+            continue
+        if slot.part is Part.PAIRS:
+            if trial.wanted_isi_ms is not None and not trial.tap_alone:
+                mep_mv = trial.mep_mv if trial.counts else None
+                at_s, probe = onset.onset_s - first_s, plan.is_probe(slot, record.header.seed)
+                pairs.append(Delivered(trial.wanted_isi_ms, at_s, mep_mv, probe))
+        elif trial.told and trial.mep_mv is not None:
+            pct = slot.intensity_pct_rmt or usual_pct
+            tests.append(TestPulse(trial.mep_mv, pct, onset.onset_s - last_s, slot.name))
+    return Pairing(tuple(tests), tuple(pairs), plan)
+
+
+def _usual_pct(record: SessionRecord) -> float:
+    """The intensity of the visit [% RMT], as it is stated or the strategy assumes it."""
+    stated = record.header.visit.intensity_pct_rmt or record.header.strategy.settings.get("intensity_pct_rmt")
+    return float(stated or USUAL_PCT_RMT)

@@ -75,6 +75,7 @@ def session_figure(record: SessionRecord, *, truth: Window | None = None) -> Fig
         record: the session.
         truth: the true window, if the person is simulated.
     """
+    record.require_open()
     figure = Figure(figsize=(7.2, 6.8), layout="constrained")
     profile, edges, chance = figure.subplots(3, 1, height_ratios=(3.2, 1.5, 0.9))
     tidied(profile, edges, chance)

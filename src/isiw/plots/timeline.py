@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
 def timeline_figure(record: SessionRecord) -> Figure:
     """When, within a pair of stimuli, the pulse enhances the MEP."""
+    record.require_open()
     space = record.header.space
     origin = record.header.stimulus.shown(space.reference)
     figure = Figure(figsize=(7.2, 2.2), layout="constrained")

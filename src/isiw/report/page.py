@@ -72,6 +72,7 @@ def report_page(record: SessionRecord, *, truth: Window | None = None) -> str:
         InvalidValueError: no record of a session.
     """
     require_records((record,))
+    record.require_open()
     scripts = [library("plotly.offline", "report").get_plotlyjs(), asset("draw.js"), asset("page.js")]
     contents = {
         "pictures": _pictures(record, truth),

@@ -6,12 +6,13 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from isiw import sentences
 from isiw.change import Misfit
 from isiw.estimate import Estimate
 from isiw.findings import Kind
+from isiw.intervention import Intervention, Part
 from isiw.log.headers import Header
 from isiw.log.kinds import continued_by
 from isiw.log.reader import SessionRecord, require_records
@@ -57,7 +58,28 @@ def final_statement(record: SessionRecord, config: Path | None = None) -> str:
         InvalidValueError: no record of a session.
     """
     require_records((record,))
+    if record.header.intervention is not None:
+        return intervention_statement(record, record.header.intervention, config)
     return in_lines(statement(record, config))
+
+
+def intervention_statement(record: SessionRecord, intervention: Intervention, config: Path | None = None) -> str:
+    """How far an intervention came, and which arm it had if that is not concealed."""
+    slots, last = intervention.plan.slots, record.estimates[-1] if record.estimates else None
+    given = Counter(slots[trial.index].part for trial in record.table if trial.index < len(slots))
+    done = ", ".join(f"{given[part]} {words}" for part, words in _PARTS.items())
+    stop = next((event.text for event in record.events if event.kind == "stop"), None)
+    over = stop or (last.reason if last is not None and last.stop else "")
+    way_on = continued_by(record.path, record.header, config, end_lost=record.end_lost)
+    arm = f"Arm: {intervention.arm.words}."
+    if record.conceals:
+        arm = f"The arm is concealed. Open it when nobody has to be blind: {command('pair', '--open', record.path)}"
+    return "\n".join(
+        [over or f"The intervention is not over. Do: continue it with {way_on}", f"Delivered: {done}.", arm]
+    )
+
+
+_PARTS: Final = {Part.BEFORE: "before", Part.PAIRS: "of the intervention", Part.AFTER: "after"}
 
 
 def in_lines(said: Sequence[Said]) -> str:
@@ -272,6 +294,7 @@ def truth_sentence(record: SessionRecord, truth: Window | None) -> str:
 
 def trial_rows(record: SessionRecord) -> list[tuple[str, ...]]:
     """All trials, as in `TRIAL_HEADINGS`; stimuli whose outcome the log does not have, too."""
+    record.require_open()
     first, trials = record.header.stimulus, sorted([*record.table, *record.unknown_trials], key=lambda each: each.index)
     rows = ((t, "–" if t.isi_ms is None else f"{t.isi_ms:.4g} ms") for t in trials)
     return [(str(t.index), sentences.asked(t, first), sentences.outcome(t), isi) for t, isi in rows]

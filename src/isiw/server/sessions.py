@@ -142,7 +142,9 @@ class Sessions:
 
     def record(self, name: str) -> SessionRecord:
         """The contents of a session's log by now."""
-        return read_session(self._existing(name))
+        record = read_session(self._existing(name))
+        record.require_open()
+        return record
 
     def _of(self, name: str, opened: Callable[[DrivenSession], T], logged: Callable[[SessionRecord], T]) -> T:
         """Something about a session: as it is open now, or else as its log has it."""

@@ -3,6 +3,7 @@ from .console import PROGRESS_HEADINGS as PROGRESS_HEADINGS
 from .console import aligned as aligned
 from .console import progress_row as progress_row
 from .judging import estimate_again as estimate_again
+from .judging import open_arm as open_arm
 from .loop import Session as Session
 from .recorder import Recorder as Recorder
 from .resume import open_session as open_session

@@ -18,12 +18,16 @@ from isiw.devices.clock import Clock
 from isiw.devices.limits import USUAL_ITI_S, Limits
 from isiw.devices.protocol import Device
 from isiw.errors import InvalidValueError, StrategyError
+from isiw.intervention import Intervention
 from isiw.log.durable import log_of
 from isiw.log.headers import Header, StrategyRecipe
 from isiw.log.pulses import Ages
 from isiw.log.schema import Event, Record, now
 from isiw.log.writer import LogWriter
 from isiw.native.library import version as engine_version
+from isiw.pairing.agenda import Agenda
+from isiw.pairing.fitting import require_possible
+from isiw.session.blocks import Blocks
 from isiw.session.console import OperatorConsole
 from isiw.session.examination import WindowExamination, examination_of
 from isiw.session.pausing import Pausing
@@ -57,6 +61,7 @@ class Earlier:
     first_records: Sequence[Record] = ()
     ages: Callable[[], Ages] = Ages
     taps: Callable[[SignalLimits], TapResponses] = lambda signals: TapResponses(signals.mep_window_ms)
+    ago_s: Callable[[int], float | None] = lambda _: None
 
 
 def versions() -> dict[str, str]:
@@ -71,7 +76,12 @@ def require_known(call: str, options: Mapping[str, Any], kind: type) -> None:
         raise TypeError(f"{call}() got an unexpected keyword argument {min(unknown)!r}")
 
 
-_OPTIONAL_PARTS: Final = {"limits": Limits, "visit": Visit, "protocol": VisitProtocol}
+_OPTIONAL_PARTS: Final = {
+    "limits": Limits,
+    "visit": Visit,
+    "protocol": VisitProtocol,
+    "intervention": Intervention,
+}
 
 
 def require_parts(log: object, options: Mapping[str, Any] = MappingProxyType({}), **parts: tuple[object, type]) -> Path:
@@ -107,6 +117,9 @@ def require_fitting(strategy: Strategy, header: Header) -> None:
             got=f"max_pulses = {most}, {before} stimuli given before",
             remedy="Write a larger max_pulses under [limits] if your ethics approval allows it.",
         )
+    if header.intervention is not None:
+        require_possible(header.intervention.plan, header.limits, before, header.seed)
+        return
     if planned is None and any(trial.intensity_pct_rmt is not None for trial in strategy.earlier):
         planned = stimuli_left(strategy.stopping, 0)  # who plans pulses over the curve plans the pairs after them
     if planned is None or (needed := header.protocol.stimuli_for(planned) + before) <= most:
@@ -180,6 +193,8 @@ class _Described(TypedDict, total=False):
 class Options(Changeable, _Described, total=False):
     """Options of a session that begins."""
 
+    intervention: Intervention | None
+
 
 class OwnLoopOptions(_Described, total=False):
     """Options of a session whose loop is the lab's own."""
@@ -212,7 +227,8 @@ def assembled(
     path = require_parts(log, options, device=(device, Device), strategy=(strategy, Strategy))
     safeguards, protocol = options.get("safeguards") or Safeguards(), options.get("protocol") or VisitProtocol()
     limits = (options.get("limits") or Limits.of_space(strategy.space)).stated(USUAL_ITI_S)
-    sink = Sink(options.get("on_trial"))
+    intervention = options.get("intervention")
+    sink = Sink(options.get("on_trial"), hides=intervention.hides if intervention else lambda _: False)
     rig = Rig(device, limits, options.get("clock"), safeguards, sink, away=console.away)
     require_matching(rig.info, strategy, protocol)
     header = header_of(
@@ -226,6 +242,7 @@ def assembled(
         timeout_s=patience("timeout_s", options.get("timeout_s", 30.0)),
         ask_deadline_s=deadline("ask_deadline_s", options.get("ask_deadline_s")),
         config=dict(options.get("config") or {}),
+        **({} if intervention is None else {"kind": "intervention", "intervention": intervention}),
     ).model_copy(update=dict(earlier.kept))
     if safeguards.earlier_logs is not None and not header.subject:
         raise InvalidValueError(
@@ -238,4 +255,11 @@ def assembled(
         paused_for = [event.finding for event in earlier.events if event.kind == "pause" and event.finding is not None]
         watch = watch.resumed(earlier.trials, paused_for)
     steps = Steps(examination, rig, sink, pausing, watch, header, safeguards.backoffs_s, earlier.taps(header.signals))
+    if intervention is not None:
+        strategy.only_counts = True
+
+        def attended() -> bool:
+            return console.attended or safeguards.on_pause is not None or not rig.info.simulated
+
+        steps.keep_to(Blocks(Agenda(intervention, strategy, strategy.seed), rig.clock, attended))
     return Parts(path, header, limits, safeguards, sink, rig, examination, pausing, steps)

@@ -132,6 +132,8 @@ class _Operated(Protocol):
     @property
     def trials(self) -> TrialTable: ...
     @property
+    def followed(self) -> bool: ...
+    @property
     def last_excluded(self) -> int | None: ...
     def pause(self, reason: str) -> None: ...
     def note(self, text: str) -> None: ...
@@ -154,6 +156,7 @@ class OperatorConsole:
         self._left_alone = False
         self._counted: int | None = None
         self.shown: int | None = None
+        self.final = False
 
     @contextmanager
     def reading_keys(self) -> Iterator[None]:
@@ -166,6 +169,11 @@ class OperatorConsole:
                 yield
             finally:
                 self._keys = None
+
+    @property
+    def attended(self) -> bool:
+        """True if somebody may answer a pause: at a terminal, or who looks on."""
+        return self.reads_keys or self._session.followed
 
     @property
     def reads_keys(self) -> bool:
@@ -182,10 +190,8 @@ class OperatorConsole:
 
     def goes_on(self, reason: str) -> bool:
         """Wait for the key that says whether a paused session goes on."""
-        self.screen.say(
-            f"{State.PAUSED}: {reason} The device is disarmed. r continues, q ends the session; it can be resumed "
-            "later."
-        )
+        way_on = "q ends the intervention for good" if self.final else "q ends the session; it can be resumed later"
+        self.screen.say(f"{State.PAUSED}: {reason} The device is disarmed. r continues, {way_on}.")
         if self.shown is not None and self.shown != (last := self._session.trials[-1].index):
             self.shown = last
             self.screen.say(
@@ -299,6 +305,16 @@ class Table:
         except (OSError, UnicodeError) as error:  # a full disk, a reader who has gone, a sign that is lacking
             self._faults.append(f"the table of trials cannot be shown any more: {error_text(error)}")
             self._shown = False
+
+    def said(self, text: str) -> None:
+        """Show a line that is no trial's."""
+        if not self._shown:
+            return
+        if self._console.reads_keys:
+            self._console.screen.say(text)
+        else:
+            sys.stdout.write(f"{folded(plain(text))}\n")
+            sys.stdout.flush()
 
     def waiting(self, left_s: float | None, text: str) -> None:
         """Count down until the next stimulus."""

@@ -310,7 +310,9 @@ def change_found(change: Change | None, told: Sequence[Trial]) -> Finding | None
 
 def learn(strategy: Strategy, trial: Trial) -> None:
     """Tell a strategy one trial, or count it if there is nothing to tell."""
-    if trial.told:
+    if strategy.only_counts:
+        strategy.count_control()
+    elif trial.told:
         strategy.learn(trial.isi_ms, None if trial.mep_interval_mv else trial.mep_mv, **details_of(trial))
     elif trial.counts and trial.isi_ms is not None:  # a tap alone with an amplitude
         strategy.learn_tap(trial.isi_ms, trial.mep_mv)

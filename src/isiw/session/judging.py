@@ -9,7 +9,8 @@ from pathlib import Path
 import isiw
 from isiw.errors import ImplausibleDataWarning, LogError, warn
 from isiw.findings import Finding
-from isiw.log.kinds import require_session
+from isiw.intervention import Arm
+from isiw.log.kinds import LogKind, kind_of, of_another_kind, require_session
 from isiw.log.reader import read_salvaged
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event
@@ -170,6 +171,31 @@ def include(path: str | Path, trial: int) -> None:
         InvalidValueError: no excluded trial has this number.
     """
     _judge(path, lambda trials, _: inclusion(trials, trial))
+
+
+def open_arm(path: str | Path) -> Arm:
+    """Open the concealed arm of an intervention, so that it may be shown: an event says so, and when, in the log.
+
+    Args:
+        path: the log, with or without `.part`.
+
+    Raises:
+        LogError: no such log, one of no intervention, or one that is still being written.
+        DamagedLogError: the log's end is missing.
+    """
+    salvaged = salvage(path)
+    record = read_salvaged(salvaged)
+    intervention = record.header.intervention
+    if intervention is None:
+        raise of_another_kind(record.path, kind_of(record.header), LogKind.INTERVENTION)
+    if record.conceals:
+        record.require_end()
+        record.require_read()
+        last = record.table[-1].index if record.table else None
+        text = f"The arm was opened: {intervention.arm.words}."
+        with LogWriter.continuing(path, salvaged, record.header) as log:
+            log.append(Event(kind="opening", trial=last, text=text))
+    return intervention.arm
 
 
 def _judge(path: str | Path, verdict: Callable[[TrialTable, Sequence[Event]], Event]) -> None:

@@ -75,6 +75,7 @@ class Session(Judging):
         self._sink, self._rig, self._examination, self._steps = parts.sink, parts.rig, parts.examination, parts.steps
         self._asking, self._pausing = self._console.asking, parts.pausing
         self._fault: Fault | None = None
+        self._console.final = self._header.intervention is not None
 
     @property
     def header(self) -> Header:
@@ -171,6 +172,7 @@ class Session(Judging):
                 if self.trials:
                     self._steps.log_belief()
                 self._rig.begin(self._header.given_before + len(self.trials), earlier_s)
+                self._take_up_blocks()
                 decision = self._steps.at_the_end()  # of a session that was resumed; it need not be armed for nothing
                 if decision is None:
                     with self._operated(keys=keys) as decide, self._rig.armed():
@@ -228,6 +230,19 @@ class Session(Judging):
         self._pausing.end(reason)
 
     @property
+    def shown_trials(self) -> TrialTable:
+        """All trials so far that may be shown: those that would show the concealed arm of an intervention may not."""
+        intervention, trials = self._header.intervention, self.trials
+        if intervention is None:
+            return trials
+        return TrialTable(tuple(trial for trial in trials if not intervention.hides(trial.index)))
+
+    @property
+    def followed(self) -> bool:
+        """True if somebody looks on."""
+        return bool(self._sink.followers)
+
+    @property
     def running(self) -> bool:
         """True if its log is open."""
         return self._sink.is_open
@@ -274,11 +289,22 @@ class Session(Judging):
             self._header = self._header.model_copy(update={"limits": self._rig.limited.limits})
             self._sink.append(self._header)
 
+    def _take_up_blocks(self) -> None:
+        """Find out how long ago the last pair of an intervention was, if it goes on behind it."""
+        if self._header.intervention is not None:
+            self._steps.last_pair_came(self._earlier.ago_s(self._header.intervention.plan.last_pair))
+
+    def _log_stop(self, reason: str) -> None:
+        """Log that an intervention is over for good, if a person has ended it, and not for lack of anybody."""
+        if self._header.intervention is not None and self._asking.refused:
+            self._examination.event("stop", f"The intervention was ended: {reason}", durable=True)
+
     def _loop(self, decide: Callable[[str], bool]) -> StopDecision:
         decision = None
         while decision is None or not decision.stop or self._examination.overruled:
             if self._pausing.due:
                 if (reason := self._pausing.until_decided(decide)) is not None:
+                    self._log_stop(reason)
                     return ended(reason) if self._asking.over else paused(reason)
                 self._steps.seen()
                 continue

@@ -117,6 +117,11 @@ class Asking:
         return self._presses.over
 
     @property
+    def refused(self) -> bool:
+        """True if a person has said that the session is not to go on."""
+        return self._presses.over or self._presses.answer is False
+
+    @property
     def number(self) -> int:
         """The number of the pause."""
         return self._presses.number

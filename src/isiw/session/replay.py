@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, Final, NamedTuple
 
@@ -14,12 +14,14 @@ from isiw.devices.protocol import DeviceInfo
 from isiw.errors import ConfigError, DeviceError, InvalidValueError, OtherVersionsWarning, StrategyError, warn
 from isiw.log.headers import SCHEMA_VERSION, Header, StrategyRecipe
 from isiw.log.kinds import OWN_LOOP
+from isiw.log.moments import Moment
 from isiw.log.pulses import Ages, pulse_ages
 from isiw.log.reader import SessionRecord
 from isiw.log.salvage import Salvage
 from isiw.log.schema import Event, Intent
 from isiw.log.verdicts import MANY_CHANGES, VERDICTS, changed_after, under
 from isiw.log.writer import LogWriter
+from isiw.pairing.agenda import Agenda
 from isiw.session.assembly import BELIEF_VERSION, ENGINE_VERSION, Earlier, versions
 from isiw.session.examination import learn, relearned
 from isiw.signals.limits import SignalLimits
@@ -67,6 +69,7 @@ def replay(
     learned: list[Trial] = []
     changes: list[int] = []
     differing: list[int] = []
+    ask = _asking(record.header, strategy)
     first, compared, judged = record.header.asks_from, _compared(record) if verify else frozenset(), False
     for entry in record.history:
         if judged and isinstance(entry, Intent | Trial):
@@ -74,7 +77,7 @@ def replay(
         if isinstance(entry, Intent):
             # Behind a lost trial the strategy knew more than the log does.
             comparable = entry.isi_ms is not None and entry.trial == len(learned) and entry.trial in compared
-            if comparable and (asked_ms := strategy.ask()) != entry.isi_ms:
+            if comparable and (asked_ms := ask(strategy, learned)) != entry.isi_ms:
                 _require_other_versions(entry, asked_ms, record.header)
                 differing.append(entry.trial)
         elif isinstance(entry, Trial):
@@ -92,6 +95,14 @@ def replay(
     strategy.in_doubt = record.in_doubt
     table = TrialTable(tuple(sorted((*learned, *unknown), key=lambda trial: trial.index)))
     return Replayed(strategy, table, unknown, tuple(differing), len(table) if differing or not verify else first)
+
+
+def _asking(header: Header, strategy: Strategy) -> Callable[[Strategy, Sequence[Trial]], float]:
+    """What asks for an ISI after some trials: the strategy, or the agenda of an intervention."""
+    if header.intervention is None:
+        return lambda strategy, _: strategy.ask()
+    agenda = Agenda(header.intervention, strategy, header.seed)
+    return lambda _, trials: agenda.isi_ms(trials)
 
 
 def _compared(record: SessionRecord) -> frozenset[int]:
@@ -125,6 +136,7 @@ def knowing_earlier(strategy: Strategy, header: Header) -> Strategy:
     """A strategy that has learnt what a session's had before its first ask; the same if it has already."""
     if header.earlier and not strategy.earlier:
         strategy.learn_all(header.earlier, same_level=header.earlier_same_level)
+    strategy.only_counts = header.intervention is not None
     return strategy
 
 
@@ -188,6 +200,7 @@ def taken_up(
         (*found.unknown, _resumption(record, found, limits)),
         partial(_ages, salvaged, found.trials),
         partial(_taps, record),
+        partial(_ago_s, record),
     )
 
 
@@ -195,6 +208,19 @@ def _ages(salvaged: Salvage, trials: TrialTable) -> Ages:
     """How long ago the stimuli of a log were given; those of which it does not say when, just now."""
     known = pulse_ages(salvaged)
     return Ages((*known.ages_s, *[0.0] * (len(trials) - len(known.ages_s))), known.doubts)
+
+
+def _ago_s(record: SessionRecord, trial: int) -> float | None:
+    """How long ago a trial was about to be delivered [s]; None where the log does not say when."""
+    onset, intents = record.onsets.get(trial), record.intents
+    if onset is None:
+        return None
+    last = intents[-1]
+    at = record.onsets[last.trial]
+    now, moment = Moment.now(), Moment(at.at_ns, last.boot_id, last.boot_s)
+    since_s = now.since_s(moment)
+    since_s = max(0.0, (now.wall_ns - at.at_ns) / 1e9) if since_s is None else since_s
+    return at.onset_s - onset.onset_s + since_s
 
 
 def _taps(record: SessionRecord, signals: SignalLimits) -> TapResponses:

@@ -12,10 +12,10 @@ from isiw.design import DesignSpace
 from isiw.devices.clock import MonotonicClock
 from isiw.devices.limits import USUAL_ITI_S, Limits
 from isiw.devices.protocol import Device, DeviceInfo, HasMemory, info_of
-from isiw.errors import InvalidValueError
+from isiw.errors import InvalidValueError, LogError
 from isiw.log.durable import log_exists
 from isiw.log.headers import Header
-from isiw.log.kinds import OWN_LOOP, LogKind, of_another_kind, require_session
+from isiw.log.kinds import OWN_LOOP, LogKind, continued_by, of_another_kind, require_session
 from isiw.log.reader import SessionRecord, read_any, read_salvaged
 from isiw.log.salvage import Salvage, salvage
 from isiw.log.writer import LogWriter
@@ -121,6 +121,12 @@ def _own_loop_resumed(
     require_session(record.path, record.header)
     record.require_read()
     logged = record.header
+    if logged.intervention is not None:
+        raise LogError(
+            "the log is of an intervention, which isiw delivers itself",
+            got=str(record.path),
+            remedy=f"Continue it with its device: {continued_by(record.path, logged)}",
+        )
     require_same_person(changes.get("subject", ""), logged)
     details = {name: getattr(logged, name) for name in ("subject", "visit", "protocol", "limits", "config")}
     details |= changes
@@ -217,6 +223,7 @@ def _session_resumed(
         return _own_loop_resumed(salvaged, record, strategy, {}, options)
     record.require_read()
     header = record.header
+    require_unended(record)
     if (limits := options.get("limits")) is None:
         limits = limits_of_log(header)
     else:
@@ -226,10 +233,21 @@ def _session_resumed(
     strategy, earlier = taken_up(salvaged, record, strategy, limits, options)
     if isinstance(device, HasMemory):
         device.resume_after([Stimulus(t.index, t.commanded_isi_ms, t.tap_alone) for t in earlier.trials])
-    kept = ("subject", "config", "visit", "protocol", "signals", "timeout_s", "ask_deadline_s")
+    kept = ("subject", "config", "visit", "protocol", "signals", "timeout_s", "ask_deadline_s", "intervention")
     said: Any = {name: getattr(header, name) for name in kept}
     said |= {name: value for name, value in options.items() if name in Changeable.__annotations__ and value is not None}
     return Session(device, strategy, log=record.path, earlier=earlier, **said | {"limits": limits})
+
+
+def require_unended(record: SessionRecord) -> None:
+    """Raise if somebody has ended an intervention: what is given after that is another one."""
+    stop = next((event for event in record.events if event.kind == "stop"), None)
+    if stop is not None:
+        raise LogError(
+            "the intervention was ended by its operator, and is not continued",
+            got=f"{record.path}: {stop.text}",
+            remedy="If the protocol allows another one, begin it with a log of its own: isiw pair CONFIG --after LOG.",
+        )
 
 
 def limits_of_log(header: Header) -> Limits:

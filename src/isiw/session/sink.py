@@ -12,7 +12,7 @@ from typing import Final, NamedTuple, Protocol
 
 from isiw.errors import InvalidValueError, error_text
 from isiw.estimate import WindowEstimate
-from isiw.log.schema import Record
+from isiw.log.schema import Event, Record
 from isiw.log.writer import LogWriter
 from isiw.strategy.stopping import StopDecision
 from isiw.trials import Trial, TrialTable
@@ -92,13 +92,26 @@ class _Screen(Protocol):
 
     def updated(self, update: SessionUpdate) -> None: ...
     def waiting(self, left_s: float | None, text: str) -> None: ...
+    def said(self, text: str) -> None: ...
+
+
+_NEVER_HIDDEN: Final = frozenset({"limit", "fault", "refused", "pause", "note", "change", "block", "stop"})
+"""Kinds of events that are shown whatever a trial's arm: they are safety's, and the operator's own."""
 
 
 class Sink:
-    """Takes all that happens. A follower whose call fails gets nothing more, and the session goes on."""
+    """Takes all that happens. A follower whose call fails gets nothing more, and the session goes on.
 
-    def __init__(self, on_trial: Callable[[SessionUpdate], None] | None = None, log: LogWriter | None = None) -> None:
-        self.on_trial = on_trial
+    All goes to the log. Of trials that it `hides`, which would show a concealed arm, nobody else gets anything.
+    """
+
+    def __init__(
+        self,
+        on_trial: Callable[[SessionUpdate], None] | None = None,
+        log: LogWriter | None = None,
+        hides: Callable[[int], bool] = lambda _: False,
+    ) -> None:
+        self.on_trial, self._hides = on_trial, hides
         self.followers: list[Follower] = []
         self.writer = log
         self._screen: _Screen | None = None
@@ -134,10 +147,25 @@ class Sink:
     def append(self, record: Record, channel_name: str | None = None) -> None:
         """Log a record; it is durable after the next `sync`."""
         self.log.append(record, channel_name)
-        self._each(lambda follower: follower.logged(record, channel_name))
+        if not self._is_hidden(record):
+            self._each(lambda follower: follower.logged(record, channel_name))
+
+    def _is_hidden(self, record: Record) -> bool:
+        """True of what would show a concealed arm; what a person has to act on is never hidden."""
+        if isinstance(record, Event) and record.kind in _NEVER_HIDDEN:
+            return False
+        number = record.index if isinstance(record, Trial) else getattr(record, "trial", None)
+        return number is not None and self._hides(number)
+
+    def say(self, text: str) -> None:
+        """Say something to the operator at the screen."""
+        if self._screen is not None:
+            self._screen.said(text)
 
     def updated(self, update: SessionUpdate) -> None:
         """A trial is concluded."""
+        if self._hides(update.trial.index):
+            return
         self._each(lambda follower: follower.updated(update))
         if self._screen is not None:
             self._screen.updated(update)

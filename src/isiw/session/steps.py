@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import statistics
 from collections import deque
@@ -13,6 +14,8 @@ from isiw.errors import DeviceError, DeviceTimeoutError, IsiwError, LimitExceede
 from isiw.findings import Finding
 from isiw.log.headers import Header
 from isiw.log.schema import Event, Intent, Waveform
+from isiw.pairing.agenda import Agenda
+from isiw.session.blocks import AHEAD_S, Blocks
 from isiw.session.examination import WindowExamination
 from isiw.session.own_response import LONGER, OwnResponse
 from isiw.session.pausing import Pausing
@@ -71,7 +74,13 @@ class Steps:
         self._watch, self._header, self._backoffs_s = watch, header, backoffs_s
         self._own_response = OwnResponse(examination, header, taps)
         self._at: tuple[int, bool] | None = None  # the trial that is delivered, and whether its pulse may have come
+        self._agenda: Agenda | None = None
+        self._blocks: Blocks | None = None
         self._ends_s, self._freely = deque[float](maxlen=_LAST + 1), rig.interrupts.freely
+
+    def keep_to(self, blocks: Blocks) -> None:
+        """What comes next is what an intervention's agenda says, block by block, and not what the strategy asks."""
+        self._agenda, self._blocks = blocks.agenda, blocks
 
     @property
     def _strategy(self) -> Strategy:
@@ -80,7 +89,7 @@ class Steps:
     def next(self) -> StopDecision | None:
         """Conclude the trial that was delivered, or deliver the next; the decision, where there is one."""
         trial = self._examination.unconcluded
-        known = self._examination.conclude(self._decision, self._next_isi_ms)
+        known = self._examination.conclude(self._decision, self._known_isi_ms)
         if trial is not None and known is not None:
             self._report(trial, known.decision, known.next_isi_ms)
             return known.decision
@@ -91,7 +100,7 @@ class Steps:
 
     def at_the_end(self) -> StopDecision | None:
         """The decision to stop, by the strategy or the limits; None where there is a stimulus to deliver."""
-        if (decision := self._own_response.decided(self._freely(self._strategy.decision))).stop:
+        if (decision := self._decided()).stop:
             return decision
         if self._rig.limited.pulses_left:
             return None
@@ -105,8 +114,13 @@ class Steps:
     def log_belief(self) -> None:
         """Log what is known after the last trial, which a session that ended then may not have corrected others by."""
         self._own_response.correct()
-        if self._examination.conclude(self._decision, self._next_isi_ms) is None:
-            self._examination.log_belief(self._decision, self._next_isi_ms)
+        if self._examination.conclude(self._decision, self._known_isi_ms) is None:
+            self._examination.log_belief(self._decision, self._known_isi_ms)
+
+    def last_pair_came(self, ago_s: float | None) -> None:
+        """The last pair of an intervention that is resumed was delivered so long ago [s]; None if it was not yet."""
+        if self._blocks is not None and ago_s is not None and self._agenda is not None:
+            self._blocks.came(self._agenda.plan.last_pair, ago_s)
 
     def fault_of(self, error: BaseException) -> Fault:
         """What an error that ends the session was, and in which trial."""
@@ -130,7 +144,7 @@ class Steps:
     def _left_s(self, left: int) -> float | None:
         """About how long so many pairs take [s], with the rests and control trials between them."""
         protocol, seed, usual_s = self._header.protocol, self._header.seed, pace_s(self._ends_s)
-        if usual_s is None:
+        if usual_s is None or self._agenda is not None:
             return None
         intervals_s: list[float] = []
         first, pairs = len(self._examination.trials), 0
@@ -145,15 +159,24 @@ class Steps:
         pause = self._watch.pause
         if pause is not None and self._stimuli_left():
             return paused(f"{pause}")
-        return self._own_response.decided(self._strategy.decision())
+        return self._decided()
+
+    def _decided(self) -> StopDecision:
+        if self._agenda is not None:
+            return self._agenda.decision(len(self._examination.trials))
+        return self._own_response.decided(self._freely(self._strategy.decision))
 
     def _stimuli_left(self) -> int:
+        if self._agenda is not None:
+            return min(self._agenda.left(len(self._examination.trials)), self._rig.limited.pulses_left)
         budget = stimuli_left(self._strategy.stopping, self._strategy.spent)
         return self._rig.limited.pulses_left if budget is None else min(budget, self._rig.limited.pulses_left)
 
     def _one_trial(self) -> None:
         """Ask and deliver; what was refused before firing is tried again."""
         number = len(self._examination.trials)
+        if self._blocks is not None and not self._announced(self._blocks, number):
+            return None
         stimulus = Stimulus(number, self._next_isi_ms(), self._next_control is Control.TAP_ALONE)
         for backoff_s in self._backoffs_s:
             try:
@@ -164,8 +187,34 @@ class Steps:
                 self._freely(self._rig.clock.sleep_s, backoff_s)
         return self._deliver_in_time(stimulus)
 
+    def _announced(self, blocks: Blocks, number: int) -> bool:
+        """Tell the operator what comes; False if that pauses the session first, or somebody has another wish."""
+        if blocks.left_s(number) > AHEAD_S:  # nothing is armed as long as nothing comes
+            self._rig.disarm()
+        self._freely(self._wait_until_due, blocks, number, AHEAD_S)
+        if self._disturbed:
+            return False
+        if (said := blocks.announcement(number)) is not None:
+            self._pausing.reason, self._pausing.kind = said, None
+            blocks.said(number)
+            return False
+        if not self._rig.is_armed:
+            self._rig.stage()
+        self._freely(self._wait_until_due, blocks, number, 0.0)
+        return not self._disturbed
+
+    def _wait_until_due(self, blocks: Blocks, number: int, ahead_s: float) -> None:
+        try:
+            while not self._disturbed and (wait_s := blocks.left_s(number, ahead_s)) > 0:
+                self._sink.waiting(wait_s + ahead_s, "Until the next block is due", rests=True)
+                self._rig.clock.sleep_s(min(wait_s, _NAP_S))
+        finally:
+            self._sink.waiting(None)
+
     @property
     def _next_control(self) -> Control | None:
+        if self._agenda is not None:
+            return self._agenda.control(len(self._examination.trials))
         if self._own_response.wants_tap:
             return Control.TAP_ALONE
         return self._header.protocol.control(len(self._examination.trials), self._header.seed)
@@ -174,9 +223,17 @@ class Steps:
         """The ISI that is asked next [ms]; None if a control trial comes next."""
         if self._next_control:
             return None
+        if self._agenda is not None:
+            return float(self._freely(self._agenda.isi_ms, self._examination.trials))
         isi_ms: float = self._freely(self._strategy.ask, self._header.ask_deadline_s)
         least_ms = self._own_response.least_isi_ms
         return isi_ms if least_ms is None or isi_ms >= least_ms else self._strategy.ask_longer(least_ms, LONGER)
+
+    def _known_isi_ms(self) -> float | None:
+        """The same for those who look on; None if it is to stay concealed."""
+        intervention = self._header.intervention
+        hidden = intervention is not None and intervention.hides(len(self._examination.trials))
+        return None if hidden else self._next_isi_ms()
 
     def _deliver_in_time(self, stimulus: Stimulus) -> None:
         self._freely(self._wait)
@@ -188,8 +245,11 @@ class Steps:
     def _wait(self) -> None:
         """Sleep until limits and protocol allow the next stimulus, or an operator has another wish."""
         number = len(self._examination.trials)
-        rests = self._header.protocol.rests_before(number)
-        interval_s = self._header.protocol.interval_s(number, self._header.seed)
+        if self._agenda is not None:
+            rests, interval_s = self._agenda.rests_before(number), self._agenda.interval_s(number)
+        else:
+            rests = self._header.protocol.rests_before(number)
+            interval_s = self._header.protocol.interval_s(number, self._header.seed)
         try:
             while not self._disturbed and (wait_s := self._rig.limited.wait_s(interval_s)) > 0:
                 text = f"Rest after {number} trials" if rests else "Next stimulus"
@@ -212,6 +272,7 @@ class Steps:
             raise
         if not self._examination.intend(Intent.of(stimulus, self._rig.clock.now_s()), fallback):
             return
+        self._begin_block(stimulus.trial)
         trial: Trial | None = None
         doubt: Finding | None = None
         try:
@@ -242,6 +303,15 @@ class Steps:
             self._sink.log.sync()
         self._at = None
 
+    def _begin_block(self, number: int) -> None:
+        """Take the time of the last pair, and log where a block begins."""
+        if self._blocks is None:
+            return
+        self._blocks.came(number)
+        if (begun := self._blocks.begun(number)) is not None:
+            self._sink.append(begun)
+            self._sink.say(begun.text)
+
     def _answer(self, stimulus: Stimulus) -> Answer:
         """The answer to a stimulus; its waveforms are logged, also if it comes too late."""
         try:
@@ -265,11 +335,18 @@ class Steps:
     def _judged(self, stimulus: Stimulus, answer: Answer) -> Trial:
         space, signals = self._header.space, self._header.signals
         if isinstance(answer, Sweep):
-            return judge(answer, stimulus, space, signals)
+            return self._as_planned(judge(answer, stimulus, space, signals))
         if isinstance(answer, Measurement):
-            return judge_measurement(answer, stimulus, space, signals)
+            return self._as_planned(judge_measurement(answer, stimulus, space, signals))
         raise DeviceError(
             f"the device's deliver returned {shown(answer)}",
             expected="an isiw.Sweep or an isiw.Measurement",
             remedy="Let it return what it recorded, or the MEP that it measured: isiw.Measurement(mep_mv, isi_ms).",
         )
+
+    def _as_planned(self, trial: Trial) -> Trial:
+        """A trial with the intensity that the plan has for it, where that is another than the visit's."""
+        slot = None if self._agenda is None else self._agenda.slot(trial.index)
+        if slot is None or slot.intensity_pct_rmt is None:
+            return trial
+        return dataclasses.replace(trial, intensity_pct_rmt=slot.intensity_pct_rmt)

@@ -28,6 +28,7 @@ class StopKind(StrEnum):
     TOO_LITTLE = "too little measured"
     PAUSED = "paused"
     THRESHOLD = "threshold"
+    PLAN = "plan"
     OWN = "a user's own rule"
 
     def stop(self, reason: str) -> StopDecision:

@@ -76,6 +76,7 @@ class Strategy:
         self.earlier: tuple[Trial, ...] = ()  # learnt before the first ask
         self.same_level, self.earlier_given = True, 0  # stimuli, also of trials from which nothing was learnt
         self.in_doubt, self._asked, self._reported = False, Asked(), Reported(space)
+        self.only_counts = False  # in an intervention, which changes what a search would learn of as if it stayed
 
     def __str__(self) -> str:
         name = f"Strategy {self.recipe.name!r}" if self.recipe.name else "Strategy"
@@ -92,7 +93,7 @@ class Strategy:
         how = {"initial_ms": self.initial_ms, "cost": self.cost, "seed": self.seed, "recipe": self.recipe}
         again = Strategy(self.space, self.model, self.acquisition, self.stopping, **how)  # type: ignore[arg-type]
         again.learn_all(self.earlier, same_level=self.same_level)
-        again.earlier_given = self.earlier_given
+        again.earlier_given, again.only_counts = self.earlier_given, self.only_counts
         return again
 
     @property

@@ -106,7 +106,10 @@ class View:
     def shown(self) -> Shown:
         """The contents of the page now, put together once for all: the state at once, the rest not too often."""
         one = self._session
-        state, rest = (one.pause_waiting, one.state, one.armed, one.wait, self.over), (self._news, self.over)
+        state, rest = (
+            (one.pause_waiting, one.state, one.armed, one.wait, self.over),
+            (self._news, len(one.trials), self.over),
+        )
         if rest != self._rest.state and (self.over or time.monotonic() >= self._next_s):
             begun_s = time.thread_time()
             self._rest = Shown(rest, _json(self._contents()))
@@ -150,7 +153,7 @@ class View:
             "facts": self._facts,
             "unprotected": plain(unprotected(record.header.device) or ""),
             "drawn": drawn(record),
-            "delivered": len(record.table),
+            "delivered": len(self._session.trials),
             "most": max(0, record.header.limits.max_pulses - record.header.given_before),
             "left": None if update is None else update.stimuli_left,
             "leftS": None if update is None else update.left_s,
@@ -172,7 +175,7 @@ class View:
         return SessionRecord(
             path=self._session.log_path,
             header=self._session.header,
-            history=(*self._session.trials, *(() if estimate is None else (estimate,))),
+            history=(*self._session.shown_trials, *(() if estimate is None else (estimate,))),
             waveforms={key: waveform.channel() for key, waveform in self._sweep.items()},
             losses=(),
             finished=False,

@@ -1,0 +1,292 @@
+"""The plan of an intervention, which uses a window to change a person: pulses before, pairs, and pulses after.
+
+Every stimulus has its place in the plan by its number, mistrials included, so that a resumed session delivers neither
+one more nor one less. The arm is drawn, and sealed: what is logged of it is a digest (docs/decisions/0050).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import secrets
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property, partial
+from typing import Annotated, Final
+
+import numpy as np
+
+from isiw.checks import Checked, Count, Flag, NonNegative, Positive, Text, ascending, choice, number, share, whole
+from isiw.errors import InvalidValueError
+from isiw.visit import Control, VisitProtocol, interval_s
+
+LEAST_PAIRS, MOST_PAIRS = 50, 300
+"""What a plan may have: fewer pairs change nobody, and more are not foreseen."""
+
+LEAST_INTERVAL_S: Final = 1.0
+"""Pulses that come faster are repetitive TMS above 1 Hz, whose trains have limits of their own [Rossi2009]."""
+
+_SEPARATE: Final = ":"
+
+
+class Arm(StrEnum):
+    """What a person gets between the pulses before and those after."""
+
+    WINDOW = "window"
+    OUTSIDE = "outside"
+    TMS_ALONE = "tms-alone"
+    TAP_ALONE = "tap-alone"
+
+    @property
+    def words(self) -> str:
+        """The arm in words."""
+        return _WORDS[self]
+
+    @property
+    def control(self) -> Control | None:
+        """The control trial that stands in the place of each pair; None where pairs are given."""
+        return {Arm.TMS_ALONE: Control.TMS_ALONE, Arm.TAP_ALONE: Control.TAP_ALONE}.get(self)
+
+
+_WORDS: Final = {
+    Arm.WINDOW: "pairs in the window",
+    Arm.OUTSIDE: "pairs outside the window",
+    Arm.TMS_ALONE: "TMS alone",
+    Arm.TAP_ALONE: "taps alone",
+}
+
+
+class Part(StrEnum):
+    """The parts of an intervention, in their order."""
+
+    BEFORE = "before"
+    PAIRS = "pairs"
+    AFTER = "after"
+
+
+@dataclass(frozen=True)
+class Slot:
+    """The place of one stimulus in a plan.
+
+    Args:
+        number: the number of its trial, from 0.
+        part: the part of the plan.
+        block: the number of its block within the part, from 0.
+        place: its number within the part, from 0.
+        first: whether a block begins with it.
+        last: whether a block ends with it.
+        intensity_pct_rmt: intensity of a pulse of TMS alone [% RMT]; None for that of the visit.
+        due_s: when its block is due, after the last pair [s]; None before that.
+    """
+
+    number: int
+    part: Part
+    block: int
+    place: int
+    first: bool
+    last: bool
+    intensity_pct_rmt: float | None = None
+    due_s: float | None = None
+
+    @property
+    def name(self) -> str:
+        """The name of its block."""
+        return f"after {self.due_s / 60:g} min" if self.due_s is not None else str(self.part)
+
+
+def _arms(what: str, arms: object) -> tuple[Arm, ...]:
+    if not isinstance(arms, tuple | list) or not arms or len(set(arms)) < len(arms):
+        raise InvalidValueError(f"{what} must be different arms", got=arms, expected=f"some of {', '.join(Arm)}")
+    return tuple(Arm(choice(what, str(arm), [known.value for known in Arm])) for arm in arms)
+
+
+def _interval_ends(what: str, ends_s: object) -> tuple[float, float]:
+    if not isinstance(ends_s, tuple | list) or len(ends_s) != 2:
+        raise InvalidValueError(f"{what} must be the shortest and the longest interval [s]", got=ends_s)
+    low_s, high_s = (interval_s(what, end) for end in ends_s)
+    if not LEAST_INTERVAL_S <= low_s <= high_s:
+        raise InvalidValueError(
+            f"{what} must ascend, from {LEAST_INTERVAL_S:g} s",
+            got=(low_s, high_s),
+            remedy="Faster pulses are repetitive TMS above 1 Hz, for which isiw has no limits.",
+        )
+    return low_s, high_s
+
+
+def _range(what: str, ends_ms: object) -> tuple[float, float]:
+    if not isinstance(ends_ms, tuple | list) or len(ends_ms) != 2:
+        raise InvalidValueError(f"{what} must be the shortest and the longest ISI [ms]", got=ends_ms)
+    low_ms, high_ms = (number(what, end) for end in ends_ms)
+    if low_ms > high_ms:
+        raise InvalidValueError(f"{what} must ascend", got=(low_ms, high_ms))
+    return low_ms, high_ms
+
+
+@dataclass(frozen=True)
+class Plan(Checked):
+    """The plan of an intervention.
+
+    Args:
+        protocol_code: the code of the approved protocol that it follows.
+        arms: what may be given; one is drawn for the person.
+        before: how many pulses of TMS alone come before, at each intensity.
+        intensities_pct_rmt: intensities of the pulses before and after [% RMT], ascending; empty for that of the visit.
+            The operator sets each, and the plan waits for that.
+        pairs: how many pairs, 50 to 300.
+        over_window: whether they spread over the window, and do not all have the ISI of the largest enhancement.
+        iti_s: shortest and longest interval between two pairs [s], drawn evenly for each; twice the same is a fixed
+            rate.
+        block_pairs: a rest follows every block of so many pairs.
+        rest_s: how long it lasts [s].
+        after_min: when each block of pulses after the pairs is due [min after the last pair], ascending.
+        after: how many pulses each of these blocks has, at each intensity.
+        test_iti_s: as `iti_s`, of the pulses before and after [s].
+        probes: share of the pairs that are chosen to notice that the window moves or the enhancement fades.
+        follow_ms: by how much the ISI may follow the window from one block of pairs to the next [ms].
+        range_ms: shortest and longest ISI that pairs may have [ms]; None for those of the design space.
+
+    Raises:
+        InvalidValueError: no code, a value out of range, or blocks after the pairs that overlap.
+    """
+
+    protocol_code: Text
+    arms: Annotated[tuple[Arm, ...], _arms] = (Arm.WINDOW,)
+    before: Count = 20
+    intensities_pct_rmt: Annotated[tuple[float, ...], partial(ascending, above=0)] = ()
+    pairs: Annotated[int, partial(whole, least=LEAST_PAIRS, most=MOST_PAIRS)] = 100
+    over_window: Flag = False
+    iti_s: Annotated[tuple[float, float], _interval_ends] = (5.0, 5.0)
+    block_pairs: Count = 25
+    rest_s: Positive = 60.0
+    after_min: Annotated[tuple[float, ...], partial(ascending, least=0)] = (0.0, 15.0, 30.0, 60.0)
+    after: Count = 20
+    test_iti_s: Annotated[tuple[float, float], _interval_ends] = (5.0, 7.0)
+    probes: Annotated[float, partial(share, least=0, most=0.5)] = 0.1
+    follow_ms: NonNegative = 10.0
+    range_ms: Annotated[tuple[float, float], _range] | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.protocol_code.strip():
+            raise InvalidValueError(
+                "an intervention needs the code of the protocol that it follows",
+                got=self.protocol_code,
+                remedy='Write the code of your ethics approval, such as protocol_code = "2026-17".',
+            )
+        if self.rest_s <= self.iti_s[1]:
+            raise InvalidValueError(
+                "the rest between two blocks of pairs is no longer than the interval between two pairs",
+                got=f"rest_s {self.rest_s:g}, longest interval {self.iti_s[1]:g}",
+                expected=f"rest_s above {self.iti_s[1]:g}",
+            )
+
+    @property
+    def tests(self) -> tuple[float | None, ...]:
+        """The intensities of a block before or after [% RMT]; None is that of the visit."""
+        return self.intensities_pct_rmt or (None,)
+
+    @cached_property
+    def slots(self) -> tuple[Slot, ...]:
+        """The places of all stimuli, in order."""
+        parts = [Slot(0, Part.BEFORE, *rest) for rest in self._tests(self.before)]
+        for place in range(self.pairs):
+            block, within = divmod(place, self.block_pairs)
+            last = within == self.block_pairs - 1 or place == self.pairs - 1
+            parts.append(Slot(0, Part.PAIRS, block, place, within == 0, last))
+        for block, minutes in enumerate(self.after_min):
+            parts += [
+                Slot(0, Part.AFTER, block, place, first, last, intensity, 60.0 * minutes)
+                for _, place, first, last, intensity in self._tests(self.after)
+            ]
+        return tuple(
+            Slot(number, s.part, s.block, s.place, s.first, s.last, s.intensity_pct_rmt, s.due_s)
+            for number, s in enumerate(parts)
+        )
+
+    def _tests(self, each: int) -> Iterator[tuple[int, int, bool, bool, float | None]]:
+        """Block, place, whether first and last, and intensity of each pulse of a block."""
+        all_of_them = [intensity for intensity in self.tests for _ in range(each)]
+        for place, intensity in enumerate(all_of_them):
+            yield 0, place, place == 0, place == len(all_of_them) - 1, intensity
+
+    @property
+    def last_pair(self) -> int:
+        """The number of the trial of the last pair, from which the clock counts."""
+        return self.before * len(self.tests) + self.pairs - 1
+
+    def is_probe(self, slot: Slot, seed: int) -> bool:
+        """True if a pair is one that watches the window: one at a random place in each stretch of them."""
+        probes = VisitProtocol(tms_alone=self.probes)
+        return slot.part is Part.PAIRS and probes.control(slot.place, seed) is not None
+
+    def interval_s(self, slot: Slot, seed: int) -> float:
+        """Shortest interval between the stimulus before and this one [s]."""
+        ends_s = self.iti_s if slot.part is Part.PAIRS else self.test_iti_s
+        drawn_s = VisitProtocol(iti_s=ends_s).interval_s(slot.number, seed)
+        return max(drawn_s, self.rest_s) if self.rests_before(slot) else drawn_s
+
+    def rests_before(self, slot: Slot) -> bool:
+        """True if a rest comes before a stimulus: between two blocks of pairs."""
+        return slot.part is Part.PAIRS and slot.first and slot.block > 0
+
+
+@dataclass(frozen=True)
+class Intervention(Checked):
+    """An intervention as its log has it.
+
+    Args:
+        plan: the plan.
+        sealed: the digest of the arm that was drawn, as `sealed` makes it.
+
+    Raises:
+        InvalidValueError: a digest of none of the plan's arms.
+    """
+
+    plan: Plan
+    sealed: Text
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        opened(self.sealed, self.plan.arms)
+
+    @classmethod
+    def drawn(cls, plan: Plan, subject: str, seed: int | None = None) -> Intervention:
+        """An intervention with the arm that a seed draws for a person; without a seed nobody can draw it again."""
+        return cls(plan, sealed(drawn_arm(plan.arms, subject, seed)))
+
+    @property
+    def arm(self) -> Arm:
+        """The arm, for limits, safety and delivery; nothing that an operator sees may be made of it while concealed."""
+        return opened(self.sealed, self.plan.arms)
+
+    @property
+    def conceals(self) -> bool:
+        """True if there was more than one arm to draw, so that nobody is to know which it is."""
+        return len(self.plan.arms) > 1
+
+    def hides(self, trial: int) -> bool:
+        """True of a trial that would show the arm: one between the pulses before and those after."""
+        return self.conceals and self.plan.last_pair - self.plan.pairs < trial <= self.plan.last_pair
+
+
+def drawn_arm(arms: Sequence[Arm], subject: str, seed: int | None = None) -> Arm:
+    """The arm that a seed draws for a person."""
+    if seed is None:
+        return secrets.choice(tuple(arms))
+    digest = hashlib.sha256(f"{seed}{_SEPARATE}{subject}".encode()).digest()
+    return tuple(arms)[int(np.random.default_rng(list(digest)).integers(len(arms)))]
+
+
+def sealed(arm: Arm, salt: str | None = None) -> str:
+    """A digest of an arm, with a salt, so that the same arm looks different in each log."""
+    salt = secrets.token_hex(16) if salt is None else salt
+    return f"{salt}{_SEPARATE}{hashlib.sha256(f'{salt}{_SEPARATE}{arm}'.encode()).hexdigest()}"
+
+
+def opened(digest: str, arms: Sequence[Arm]) -> Arm:
+    """The arm that a digest is of: the one of these that has it."""
+    salt = digest.partition(_SEPARATE)[0]
+    for arm in arms:
+        if sealed(arm, salt) == digest:
+            return arm
+    raise InvalidValueError("the sealed arm is none of the plan's", got=digest, expected=f"one of {', '.join(arms)}")

@@ -1,0 +1,81 @@
+"""Whether a plan can be kept within the limits: told before anything is delivered, and never at the cost of a limit."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from isiw.devices.limits import Limits
+from isiw.errors import InvalidValueError
+from isiw.intervention import Part, Plan, Slot
+
+_ROUNDING_S: Final = 1e-6
+
+
+def require_possible(plan: Plan, limits: Limits, given_before: int, seed: int) -> None:
+    """Raise if limits do not allow a plan: its number of stimuli, its ISIs, or one of its times.
+
+    Args:
+        plan: the plan.
+        limits: the limits of the session.
+        given_before: stimuli of the visit that were given before.
+        seed: the session's, which draws the intervals.
+
+    Raises:
+        InvalidValueError: more stimuli than the limits allow, a range of ISIs beyond theirs, an interval or a rest that
+            they make longer, or a block that would not be over when the next is due.
+    """
+    tests, blocks = plan.before * len(plan.tests), len(plan.after_min)
+    after = plan.after * len(plan.tests)
+    needed = given_before + len(plan.slots)
+    if needed > limits.max_pulses:
+        before = f"{given_before} given before + " if given_before else ""
+        raise InvalidValueError(
+            "the plan of the intervention does not fit into the limits",
+            got=f"max_pulses = {limits.max_pulses}",
+            expected=f"at least {before}{tests} before the pairs + {plan.pairs} pairs + {blocks} × {after} after "
+            f"= {needed}",
+            remedy=f"Write max_pulses = {needed} under [limits] if your ethics approval allows it, or a smaller plan "
+            "under [intervention].",
+        )
+    if plan.range_ms is not None and not limits.low_ms <= plan.range_ms[0] <= plan.range_ms[1] <= limits.high_ms:
+        raise InvalidValueError(
+            "the ISIs that the plan may follow the window to are beyond the limits",
+            got=plan.range_ms,
+            expected=f"within {limits.low_ms:g} to {limits.high_ms:g} ms",
+        )
+    _require_times(plan, limits, seed)
+
+
+def _require_times(plan: Plan, limits: Limits, seed: int) -> None:
+    """Raise if one stimulus of the plan cannot come at its time, even if nobody loses any."""
+    times_s: list[float] = []
+    last_pair_s = 0.0
+    for slot in plan.slots:
+        planned_s = (times_s[-1] if times_s else 0.0) + plan.interval_s(slot, seed)
+        if slot.due_s is not None and slot.first:
+            _require_over(slot, planned_s - last_pair_s, plan)
+            planned_s = max(planned_s, last_pair_s + slot.due_s)
+        allowed_s = limits.earliest_s(times_s, 0.0)
+        if times_s and allowed_s > planned_s + _ROUNDING_S:
+            raise InvalidValueError(
+                "the limits do not allow the times of the plan",
+                got=f"stimulus {slot.number} ({slot.name}) {planned_s - times_s[-1]:g} s after the one before",
+                expected=f"{allowed_s - times_s[-1]:g} s after it, as the limits' intervals, rests and periods say",
+                remedy="Give the plan longer intervals, more rests (block_pairs, rest_s), or fewer stimuli; loosen the "
+                "limits only if your ethics approval allows it.",
+            )
+        times_s.append(max(planned_s, allowed_s))
+        if slot.number == plan.last_pair:
+            last_pair_s = times_s[-1]
+
+
+def _require_over(slot: Slot, since_s: float, plan: Plan) -> None:
+    """Raise if the block before a later one is not over when that one is due."""
+    if slot.part is Part.AFTER and slot.block > 0 and slot.due_s is not None and since_s > slot.due_s:
+        raise InvalidValueError(
+            f"the block before is not over when the block {slot.name} is due",
+            got=f"{since_s / 60:.1f} min after the last pair",
+            expected=f"at most {slot.due_s / 60:g} min",
+            remedy=f"Give each block fewer pulses than {plan.after}, or shorter intervals (test_iti_s), or let the "
+            "blocks be further apart (after_min).",
+        )

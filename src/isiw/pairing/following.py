@@ -1,0 +1,219 @@
+"""A window that is followed while it is used: it may move, and the enhancement may fade, from pair to pair.
+
+What the search for the window taught are profiles, sampled from its posterior; the window's law itself knows none that
+moves. So each profile is shifted, and its enhancement scaled, by what changes at random from pair to pair: a hidden
+Markov model on a grid of shifts, shares of the enhancement and levels, whose filter is exact.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+
+from isiw.checks import Checked, Count, Positive
+from isiw.design import DesignSpace
+from isiw.errors import StrategyError
+from isiw.models.protocol import Posterior, SamplesProfiles, SamplesWindows
+from isiw.trials import Trial
+from isiw.types import FloatArray
+
+_STEP_MS: Final = 3.0
+_MOST_SHIFT_MS: Final = 60.0
+SHIFTS_MS: Final = np.arange(-_MOST_SHIFT_MS, _MOST_SHIFT_MS + _STEP_MS / 2, _STEP_MS)
+"""By how much the window may have moved [ms]."""
+
+SHARES: Final = np.array([1.0, 0.75, 0.5, 0.25, 0.0])
+"""What may be left of the enhancement."""
+
+LOG_LEVELS: Final = np.linspace(-1.2, 1.2, 9)
+"""By what all that is evoked may have been multiplied, natural log."""
+
+_LEAST_MV: Final = 0.02
+"""Smaller amplitudes are alike: they are the floor of the EMG [mV]."""
+
+_FREEDOM: Final = 5.0
+"""Degrees of freedom of the amplitudes' law, a t law of logarithms: one odd MEP moves no window."""
+
+_LOG_SDS: Final = (0.3, 1.2)
+"""Between these lies the SD of an MEP about its expectation, natural log."""
+
+
+@dataclass(frozen=True)
+class Movement(Checked):
+    """What changes from pair to pair, and how finely that is followed.
+
+    Args:
+        shift_sd_ms: SD of the window's move from one pair to the next [ms].
+        fading: probability that the enhancement moves to a neighbouring share.
+        levelling: probability that the level moves to a neighbouring one.
+        profiles: how many sampled profiles stand for what was known before.
+
+    Raises:
+        InvalidValueError: a value that is not positive.
+    """
+
+    shift_sd_ms: Positive = 1.2
+    fading: Positive = 0.02
+    levelling: Positive = 0.02
+    profiles: Count = 32
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """What is known of a window after some pairs; `weights` are (s, shifts, shares, levels) and sum to 1.
+
+    Args:
+        movement: what changes from pair to pair.
+        isi_ms: ISIs at which the rest is known [ms], ascending, shape (t,).
+        baseline_mv: sampled expected MEPs of TMS alone [mV], shape (s,).
+        profiles_mv: expected MEPs of each profile at each shift [mV], shape (s, shifts, t).
+        inside: whether each ISI is in the window of each profile at each shift, in 0–1, same shape.
+        log_sd: SD of an MEP about its expectation, natural log.
+        weights: the posterior.
+    """
+
+    movement: Movement
+    isi_ms: FloatArray
+    baseline_mv: FloatArray
+    profiles_mv: FloatArray
+    inside: FloatArray
+    log_sd: float
+    weights: FloatArray
+
+    @classmethod
+    def begin(
+        cls, posterior: Posterior, space: DesignSpace, earlier: Sequence[Trial], movement: Movement | None = None
+    ) -> Followed:
+        """What is known before the first pair.
+
+        Args:
+            posterior: the posterior of the search for the window.
+            space: its ISIs.
+            earlier: its trials, which say how much MEPs vary.
+            movement: what changes from pair to pair.
+
+        Raises:
+            StrategyError: a posterior that samples neither profiles nor windows.
+        """
+        if not (isinstance(posterior, SamplesProfiles) and isinstance(posterior, SamplesWindows)):
+            raise StrategyError(
+                "the window of this strategy cannot be used",
+                got=type(posterior).__name__,
+                expected="a posterior that samples profiles and windows, such as that of default",
+            )
+        movement, grid = movement or Movement(), space.grid_ms
+        isi_ms = grid[np.unique(np.linspace(0, len(grid) - 1, min(len(grid), 121)).round().astype(int))]
+        profiles, masks = posterior.profiles_mv(isi_ms)[0], posterior.window_masks(isi_ms)[0]
+        picked = np.linspace(0, len(profiles) - 1, min(movement.profiles, len(profiles))).round().astype(int)
+        baseline = np.asarray(posterior.baselines_mv()[0], dtype=float)[picked]
+        shifted = [_shifted(values[picked], isi_ms) for values in (profiles, masks)]
+        flat = np.zeros((len(picked), len(SHIFTS_MS), len(SHARES), len(LOG_LEVELS)))
+        flat[:, len(SHIFTS_MS) // 2, 0, :] = np.exp(-0.5 * (LOG_LEVELS / 0.4) ** 2)
+        middle = np.median(profiles, axis=0), float(np.median(baseline))
+        return cls(movement, isi_ms, baseline, *shifted, _log_sd(earlier, isi_ms, *middle), flat / flat.sum())
+
+    def after(self, trial: Trial) -> Followed:
+        """What is known after one more trial that counts: a pair, behind which the window may move, or TMS alone."""
+        if not trial.told or trial.mep_mv is None:
+            return self
+        if trial.isi_ms is None:
+            expected = np.broadcast_to(self.baseline_mv[:, None, None], self.weights.shape[:3])
+        else:
+            expected = self._enhanced(self._at(self.profiles_mv, trial.isi_ms))
+        log_mv = np.log(np.maximum(expected[..., None] * np.exp(LOG_LEVELS), _LEAST_MV))
+        off = (math.log(max(trial.mep_mv, _LEAST_MV)) - log_mv) / self.log_sd
+        likely = (1.0 + off**2 / _FREEDOM) ** (-(_FREEDOM + 1.0) / 2.0)
+        weights = self.weights * likely
+        known = replace(self, weights=weights / weights.sum())
+        return known if trial.isi_ms is None else known.moved()
+
+    def moved(self) -> Followed:
+        """What is known of the window at the next pair."""
+        steps = (self.movement.shift_sd_ms / _STEP_MS) ** 2, self.movement.fading, self.movement.levelling
+        weights = self.weights
+        for axis, share in enumerate(steps, start=1):
+            weights = _spread(weights, share, axis)
+        return replace(self, weights=weights)
+
+    def _at(self, values: FloatArray, isi_ms: float) -> FloatArray:
+        """Values at an ISI between those at which they are known, (s, shifts)."""
+        place = float(np.interp(isi_ms, self.isi_ms, np.arange(len(self.isi_ms))))
+        low = min(int(place), len(self.isi_ms) - 2)
+        return values[..., low] * (1.0 - (place - low)) + values[..., low + 1] * (place - low)
+
+    def _enhanced(self, profile_mv: FloatArray) -> FloatArray:
+        """Expected MEPs at one ISI with each share of the enhancement, (s, shifts, shares)."""
+        base = self.baseline_mv[:, None, None]
+        return base + SHARES * (profile_mv[..., None] - base)
+
+    @cached_property
+    def _placed(self) -> FloatArray:
+        """Weights of profiles, shifts and shares, (s, shifts, shares)."""
+        placed: FloatArray = self.weights.sum(-1)
+        return placed
+
+    @cached_property
+    def enhancement_mv(self) -> FloatArray:
+        """The expected enhancement at each ISI [mV], shape (t,)."""
+        left = self._placed @ SHARES
+        mean: FloatArray = np.einsum("sd,sdt->t", left, self.profiles_mv - self.baseline_mv[:, None, None])
+        return mean
+
+    @cached_property
+    def p_inside(self) -> FloatArray:
+        """The probability that each ISI is in the window, shape (t,)."""
+        inside: FloatArray = np.einsum("sd,sdt->t", self._placed.sum(-1), self.inside)
+        return inside
+
+    def news(self, allowed: FloatArray) -> float:
+        """The ISI, of some [ms], at which the next MEP says most of where the window is, and what is left of it."""
+        columns = np.searchsorted(self.isi_ms, allowed)
+        expected = self.baseline_mv[:, None, None, None] + SHARES[:, None] * (
+            self.profiles_mv[:, :, None, columns] - self.baseline_mv[:, None, None, None]
+        )
+        log_mv = np.log(np.maximum(expected, _LEAST_MV))
+        mean = np.einsum("sdf,sdft->t", self._placed, log_mv)
+        spread = np.einsum("sdf,sdft->t", self._placed, log_mv**2) - mean**2
+        return float(allowed[int(np.argmax(spread))])
+
+    def interval(self, values: FloatArray, axis: int, level: float = 0.9) -> tuple[float, float, float]:
+        """Median of the shift (axis 1) or of another change, and the ends of its central interval."""
+        weights = self.weights.sum(tuple(other for other in range(4) if other != axis))
+        order = np.argsort(values)
+        summed = np.cumsum(weights[order])
+        picks = [int(np.searchsorted(summed, share)) for share in (0.5, (1 - level) / 2, (1 + level) / 2)]
+        median, low, high = (float(values[order][min(pick, len(values) - 1)]) for pick in picks)
+        return median, low, high
+
+
+def _shifted(values: FloatArray, isi_ms: FloatArray) -> FloatArray:
+    """Values (s, t) as each shift moves them, (s, shifts, t)."""
+    rows = [[np.interp(isi_ms - shift, isi_ms, row) for shift in SHIFTS_MS] for row in np.asarray(values, dtype=float)]
+    return np.asarray(rows)
+
+
+def _spread(weights: FloatArray, share: float, axis: int) -> FloatArray:
+    """Weights after a step to a neighbour, half of the share to each side; nothing leaves at the ends."""
+    share = min(share, 1.0)
+    shape = np.moveaxis(weights, axis, 0)
+    up, down = np.concatenate((shape[:1], shape[:-1])), np.concatenate((shape[1:], shape[-1:]))
+    return np.moveaxis((1.0 - share) * shape + share / 2.0 * (up + down), 0, axis)
+
+
+def _log_sd(trials: Sequence[Trial], isi_ms: FloatArray, profile_mv: FloatArray, baseline_mv: float) -> float:
+    """SD of MEPs about what is expected of them, natural log."""
+    low, high = _LOG_SDS
+    pulses = [trial for trial in trials if trial.told and trial.mep_mv is not None and trial.intensity_pct_rmt is None]
+    if len(pulses) < 4:
+        return (low + high) / 2
+    expected = [
+        baseline_mv if trial.isi_ms is None else float(np.interp(trial.isi_ms, isi_ms, profile_mv)) for trial in pulses
+    ]
+    mep_mv = np.array([trial.mep_mv for trial in pulses], dtype=float)
+    off = np.log(np.maximum(mep_mv, _LEAST_MV)) - np.log(np.maximum(expected, _LEAST_MV))
+    return float(np.clip(1.48 * np.median(np.abs(off - np.median(off))), low, high))
