@@ -1,3 +1,4 @@
+from . import words as words
 from .effect import AfterEffect as AfterEffect
 from .effect import BlockChange as BlockChange
 from .effect import Interval as Interval

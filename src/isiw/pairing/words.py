@@ -43,10 +43,13 @@ def answer(effect: AfterEffect) -> str:
 def drift(effect: AfterEffect) -> str:
     """What the interval allows for, and what it would be without that."""
     steady = effect.pooled.steady
-    said = f"This allows for a drift of the level by itself. Without one: {times(steady.low)} to {times(steady.high)}"
-    if effect.is_shown == (not steady.holds_none):
-        return f"{said}."
-    return f"{said}, which {'would hold' if steady.holds_none else 'would not hold'} a factor of 1."
+    ends = f"{times(steady.low)} to {times(steady.high)}"
+    if effect.is_shown or steady.holds_none:
+        return f"The interval allows for a drift of the level by itself. Without one it is {ends}."
+    return (
+        f"It would be a change only if the level did not drift by itself: the interval is then {ends}. "
+        "The pulses do not say which."
+    )
 
 
 def ratio(change: BlockChange) -> str:

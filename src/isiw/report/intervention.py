@@ -5,15 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from isiw.errors import InvalidValueError
+from isiw.intervention import Part, Plan
+from isiw.log.reader import SessionRecord
 from isiw.pairing import words
 from isiw.pairing.effect import AfterEffect, BlockChange, change_of
-from isiw.pairing.pulses import Delivered, TestPulse
+from isiw.pairing.pulses import Delivered, TestPulse, pairing_of
 from isiw.plots.intervention import change_figure, dose_figure
 from isiw.plots.style import inline_svg
-from isiw.report.page import rendered, write_page
+from isiw.report.html import rendered, write_page
+from isiw.report.tables import Fact, first_facts
+
+_OF_A_SEARCH: Final = frozenset({"strategy"})
+"""Facts that mean nothing to an intervention."""
 
 HEADINGS: Final = (
     "block",
@@ -52,7 +58,7 @@ class InterventionContents:
     log: str = ""
     states: Sequence[str] = ()
     losses: Sequence[str] = ()
-    facts: Sequence[Any] = ()
+    facts: Sequence[Fact] = ()
 
     def change(self) -> AfterEffect:
         """What the pulses say of the change.
@@ -62,6 +68,56 @@ class InterventionContents:
         """
         stimuli = self.stimuli if self.stimuli is not None else len(self.delivered or ())
         return change_of(self.pulses, pairs=stimuli)
+
+
+def contents_of(record: SessionRecord, states: Sequence[str] = ()) -> InterventionContents:
+    """What the log of an intervention says; of one whose arm is concealed nothing that would show it.
+
+    Args:
+        record: the log.
+        states: what a reader must know of it.
+
+    Raises:
+        LogError: the log is of no intervention.
+    """
+    pairing, intervention = pairing_of(record), record.header.intervention
+    arm = "concealed" if record.conceals or intervention is None else intervention.arm.words
+    plan, tests = pairing.plan, pairing.tests
+    between = sum(slot.part is Part.PAIRS for slot in plan.slots[: len(record.table)])
+    facts = [fact for fact in first_facts(record) if fact.name not in _OF_A_SEARCH]
+    more = Fact(
+        "plan", f"{plan.before} before, {plan.pairs} pairs, {plan.after} in each block after, at each intensity"
+    )
+    return InterventionContents(
+        tests,
+        None if record.conceals else pairing.pairs,
+        between,
+        () if record.conceals else _window_course(record, plan),
+        record.header.subject or "an unnamed subject",
+        record.path.name,
+        [*states, *_unfinished(record, plan)],
+        (*record.told_unread, *record.losses),
+        [*facts, Fact("arm", arm), Fact("protocol", plan.protocol_code), more],
+    )
+
+
+def _unfinished(record: SessionRecord, plan: Plan) -> list[str]:
+    """That a part of the plan is missing."""
+    planned, given = len(plan.slots), record.given
+    return [f"{given} of {planned} stimuli of the plan were given."] if given < planned else []
+
+
+def _window_course(record: SessionRecord, plan: Plan) -> list[tuple[float, float, float]]:
+    """When the window was known to lie where, while it was used."""
+    slots, onsets = plan.slots, record.onsets
+    used = [trial.index for trial in record.table if trial.index in onsets and slots[trial.index].part is Part.PAIRS]
+    windows = {estimate.trial: estimate.window for estimate in record.estimates if estimate.window is not None}
+    first_s = onsets[used[0]].onset_s if used else 0.0
+    return [
+        (onsets[number].onset_s - first_s, windows[number].start_ms, windows[number].end_ms)
+        for number in used
+        if number in windows
+    ]
 
 
 def save_intervention(intervention: InterventionContents, path: str | Path, *, overwrite: bool = False) -> Path:
