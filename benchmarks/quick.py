@@ -23,6 +23,7 @@ __all__ = ["FOLDER", "QUICK", "expanded", "understood"]
 FOLDER: Final = Path("benchmarks/results/quick")
 
 QUICK: Final[Mapping[str, str]] = {
+    "after_effects": "--people 20 --out OUT",
     "another_day": "--people 4 --earlier-trials 8 --trials 8 --out OUT",
     "another_version compare": "--out OUT",
     "another_version run": "--cohorts gaussian --people 2 --out OUT",

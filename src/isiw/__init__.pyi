@@ -7,6 +7,7 @@ from . import export as export
 from . import log as log
 from . import metrics as metrics
 from . import models as models
+from . import pairing as pairing
 from . import plots as plots
 from . import priors as priors
 from . import report as report

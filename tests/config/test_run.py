@@ -455,3 +455,11 @@ def test_a_visit_with_pulses_over_the_curve_needs_the_log_of_all_of_them(
     assert session_for(after).header.given_before == 4
     with pytest.raises(ConfigError, match="at_pct_mso"):
         load_config(config_file(f"{VISIT}curve = {{ each = 2 }}"))
+
+
+def test_a_simulated_person_may_have_an_after_effect(config_file: WriteFile) -> None:
+    subject = load_config(config_file('[subject]\ncohort = "hand"\nafter_effect = "growth"\n')).subject
+    assert subject.person(3).plasticity is not None
+    assert person_of("hand", 0, 3).plasticity is None
+    with pytest.raises(ConfigError, match="after-effect"):
+        load_config(config_file('[subject]\nafter_effect = "groth"\n'))

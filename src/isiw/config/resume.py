@@ -22,7 +22,6 @@ from isiw.log.reader import SessionRecord, read_session
 from isiw.session.loop import Session
 from isiw.session.resume import limits_of_log
 from isiw.strategy.catalogue import make_strategy
-from isiw.subjects.cohorts import person_of
 from isiw.text.sanitize import command
 from isiw.text.toml_files import checked
 from isiw.window import Window
@@ -70,7 +69,7 @@ def truth_of(record: SessionRecord) -> Truth:
         if run.device is not None:
             person, _ = person_under(run.device, run.subject, run.seed)
         else:
-            person = person_of(run.subject.cohort, run.subject.number, run.seed)
+            person = run.subject.person(run.seed)
     except (ConfigError, InvalidValueError) as error:
         return Truth(lacking=f"The true window of the simulated person is not known: {error}")
     return Truth(known=True, window=person.window(record.header.space))

@@ -32,6 +32,7 @@ from isiw.findings import STOP_WIDTH_MS
 from isiw.intervention import Intervention, Plan
 from isiw.strategy.catalogue import list_strategies, settings_for
 from isiw.strategy.threshold.curve import CurvePulses
+from isiw.subjects.after_effects import AFTER_EFFECTS, after_effect_of
 from isiw.subjects.cohorts import COHORTS, person_of
 from isiw.subjects.subject import SimulatedSubject
 from isiw.text.toml_files import checked
@@ -88,6 +89,11 @@ class SimulatedConfig(BaseModel):
     kind: Literal["simulated", "recorded"] = "simulated"
     cohort: Annotated[str, AfterValidator(lambda name: choice("the cohort", name, COHORTS))] = "recruitment"
     number: int = Field(default=0, ge=0, lt=10_000)
+    after_effect: Annotated[str, AfterValidator(lambda name: choice("the after-effect", name, AFTER_EFFECTS))] = "none"
+
+    def person(self, seed: int) -> SimulatedSubject:
+        """The simulated person."""
+        return after_effect_of(person_of(self.cohort, self.number, seed), self.after_effect, seed, self.number)
 
 
 class SubjectConfig(SimulatedConfig):
@@ -97,6 +103,8 @@ class SubjectConfig(SimulatedConfig):
         kind: `"simulated"`, or `"recorded"` for simulated MEPs in recorded EMG.
         cohort: one of `isiw.subjects.COHORTS`.
         number: which person of the cohort, from 0.
+        after_effect: what pairs leave behind, one of `isiw.subjects.AFTER_EFFECTS`; the person's time stands still
+            between stimuli, so that none of it is lost.
         data: the folder with the recorded EMG.
     """
 
@@ -358,7 +366,7 @@ def robot_for(robot: RobotConfig, seed: int, simulated: SimulatedConfig, space: 
 
 def person_under(robot: RobotConfig, simulated: SimulatedConfig, seed: int) -> tuple[SimulatedSubject, Geometry]:
     """The person and the wrist under the robot, which has the person's hit delay; that varies by the robot alone."""
-    person = person_of(simulated.cohort, simulated.number, seed)
+    person = simulated.person(seed)
     if simulated.kind != "simulated" or person.conditioning != "tap":
         raise ConfigError(
             "the tapping robot records its own EMG, of people who are tapped",

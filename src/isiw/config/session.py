@@ -34,7 +34,6 @@ from isiw.priors.days import DayToDay, require_each_once, require_whole
 from isiw.session.given import given_pulses
 from isiw.session.loop import Session
 from isiw.strategy.catalogue import known_settings, make_strategy, settings_for
-from isiw.subjects.cohorts import person_of
 from isiw.subjects.responses import RecruitmentResponse
 from isiw.text.named_code import named_code, require_fitting
 from isiw.trials import Trial
@@ -256,7 +255,7 @@ def simulated_device(
     if robot is not None:
         return SimulatedDevice(robot_for(robot, seed, person, space))
     reference = space.reference
-    subject = person_of(person.cohort, person.number, seed)
+    subject = person.person(seed)
     respond = partial(subject.begin(seed).respond, reference=reference)
     sets_intensity = isinstance(subject.response, RecruitmentResponse)
     hit_delay_ms = subject.stated_hit_delay_ms if reference == "valve" else None

@@ -55,7 +55,7 @@ class LevelPrior(Checked):
     largest_mv: PositiveLaw = Scale(0.6, 1.2)
     change_log_sd: Positive = 1.0
     block_log_sd: Positive = 0.2
-    drifts: tuple[tuple[float, float], ...] = ((0.03, 0.6), (0.15, 0.16), (0.3, 0.16), (0.6, 0.08))
+    drifts: tuple[tuple[float, float], ...] = ((0.03, 0.25), (0.15, 0.25), (0.3, 0.25), (0.6, 0.25))
     persistence: Annotated[float, partial(number, least=0, below=1)] = 0.97
 
     @property

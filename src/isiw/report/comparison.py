@@ -14,7 +14,7 @@ from isiw.plots.comparison import comparison_figure
 from isiw.plots.style import inline_svg, session_name
 from isiw.priors.days import DayToDay
 from isiw.priors.differing import Difference
-from isiw.report.page import rendered, write_page
+from isiw.report.html import rendered, write_page
 from isiw.report.tables import first_facts
 from isiw.report.words import counts_sentence, finding_sentences
 from isiw.text import one_line

@@ -5,21 +5,18 @@ What comes from a log is text in it. `isiw.plots` draws the pictures; plotly wha
 
 from __future__ import annotations
 
-import base64
-import hashlib
-from collections.abc import Callable, Mapping, Sequence
-from importlib import resources
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
-from isiw.errors import InvalidValueError
-from isiw.files import check_output, write_output
 from isiw.log.reader import SessionRecord, require_records
 from isiw.plots.session import session_figure
 from isiw.plots.style import inline_svg
 from isiw.plots.timeline import course_figure, sweeps_figure, timeline_figure
 from isiw.report.answers import answers, method_answers
 from isiw.report.drawn import drawn
+from isiw.report.html import asset, rendered, write_page
+from isiw.report.intervention import contents_of, intervention_page
 from isiw.report.tables import (
     counted_rows,
     event_rows,
@@ -31,12 +28,8 @@ from isiw.report.tables import (
 )
 from isiw.report.words import fit_sentence, statement
 from isiw.summary import JUDGED_SINCE
-from isiw.text import plain
 from isiw.text.named_code import library
 from isiw.window import Window
-
-_ASSETS: Final = resources.files("isiw.report") / "assets"
-_SUFFIXES: Final = {".html", ".htm"}
 
 _SAID_ABOVE: Final = {"end lost", "judged since"}
 """Sentences of the statement that the state of the log says already."""
@@ -61,7 +54,7 @@ def save_report(
 
 
 def report_page(record: SessionRecord, *, truth: Window | None = None) -> str:
-    """The report of a session as a page of HTML.
+    """The report of a session as a page of HTML; of an intervention, the change from before to after.
 
     Args:
         record: the session.
@@ -72,7 +65,8 @@ def report_page(record: SessionRecord, *, truth: Window | None = None) -> str:
         InvalidValueError: no record of a session.
     """
     require_records((record,))
-    record.require_open()
+    if record.header.intervention is not None:
+        return intervention_page(contents_of(record, _states(record)))
     scripts = [library("plotly.offline", "report").get_plotlyjs(), asset("draw.js"), asset("page.js")]
     contents = {
         "pictures": _pictures(record, truth),
@@ -118,38 +112,3 @@ def _pictures(record: SessionRecord, truth: Window | None) -> Mapping[str, str]:
         "course": course_figure(record),
     }
     return {name: inline_svg(figure, name) for name, figure in figures.items() if figure is not None}
-
-
-def write_page(path: str | Path, page: Callable[[], str], *, overwrite: bool = False) -> Path:
-    """Write a page into a file, which is checked before the page is made."""
-    if Path(path).suffix.lower() not in _SUFFIXES:
-        raise InvalidValueError("a page is for a browser", got=str(path), expected="a path that ends in .html")
-    check_output(path, overwrite=overwrite)
-    return write_output(path, page().encode(), overwrite=overwrite)
-
-
-def rendered(template: str, scripts: Sequence[str] = (), **contents: Any) -> str:
-    """A page; its policy lets no script run but these, and nothing be fetched."""
-    jinja2 = library("jinja2", "report")
-    environment = jinja2.Environment(
-        loader=jinja2.FunctionLoader(asset),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        finalize=lambda value: plain(value) if type(value) is str else value,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    digests = (base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts)
-    hashes = [f"'sha256-{digest}'" for digest in digests]  # what the page's policy knows a script by
-    page: str = environment.get_template(template).render(
-        contents,
-        style=asset("page.css"),
-        scripts=scripts,
-        hashes=" ".join(hashes) or "'none'",
-    )
-    return page
-
-
-def asset(name: str) -> str:
-    """A file of `assets`."""
-    return (_ASSETS / name).read_text(encoding="utf-8")

@@ -4,6 +4,9 @@ from . import threshold as threshold
 from .execution import DaskCluster as DaskCluster
 from .execution import Failure as Failure
 from .execution import Processes as Processes
+from .interventions import Intervened as Intervened
+from .interventions import InterventionPlan as InterventionPlan
+from .interventions import intervene as intervene
 from .plan import Study as Study
 from .plan import StudyStrategy as StudyStrategy
 from .plan import Unit as Unit

@@ -28,7 +28,7 @@ from isiw.errors import InvalidValueError
 from isiw.subjects.changes import Change, Plasticity, TapResponse, amplitude_of_both_mv
 from isiw.subjects.responses import OpposedProfile, Profile, RecruitmentResponse, ResponseCurve, TrialNoise
 from isiw.types import Conditioning, FloatArray, Reference
-from isiw.window import LEAST_DEPRESSED_MV, Window, window_from_excess
+from isiw.window import EDGE_LEVEL, LEAST_DEPRESSED_MV, Window, window_from_excess
 
 _Numbers: TypeAlias = Annotated[tuple[float, ...], lambda what, given: tuple(number(what, each) for each in given)]
 
@@ -193,6 +193,15 @@ class Responder:
     def after_effect(self) -> float:
         """The change of the log gain by the pairs so far, natural log."""
         return self._after_effect
+
+    def is_inside(self, isi_ms: float, reference: Reference) -> bool:
+        """Whether an ISI is inside the window now: whether its facilitation is that of an edge at least.
+
+        Args:
+            isi_ms: the ISI [ms].
+            reference: the event that it counts from.
+        """
+        return bool(self.subject.facilitation(np.asarray(isi_ms), reference, self._trials + 1) >= EDGE_LEVEL)
 
     def wait(self, minutes: float) -> None:
         """Let time go by without a stimulus, in which an after-effect may be lost [min]."""

@@ -1,0 +1,11 @@
+from . import words as words
+from .effect import AfterEffect as AfterEffect
+from .effect import BlockChange as BlockChange
+from .effect import Interval as Interval
+from .effect import change_of as change_of
+from .level import LevelPrior as LevelPrior
+from .power import measuring_log_sd as measuring_log_sd
+from .power import people_needed as people_needed
+from .power import pulses_needed as pulses_needed
+from .pulses import Delivered as Delivered
+from .pulses import TestPulse as TestPulse
