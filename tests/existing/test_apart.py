@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 import scipy.io
 
+from existing import writers
 from existing.writers import KNOWN, RECORDINGS, as_brainvision, as_eeglab, require_as_written
 from isiw.errors import InvalidValueError
 from isiw.existing import Layout, ReadingLimits, read_people
@@ -46,6 +47,16 @@ def test_what_is_wrong_with_a_file_is_said_as_if_it_were_read_here(tmp_path: Pat
 def test_recordings_are_read_apart_as_they_are_here(kind: str, tmp_path: Path) -> None:
     (person,) = read_people(RECORDINGS[kind](tmp_path), KNOWN)
     require_as_written(person)
+
+
+@pytest.mark.slow
+def test_what_libraries_ask_of_the_system_is_no_file_elsewhere(tmp_path: Path) -> None:
+    path = writers.as_edf(tmp_path).rename(tmp_path / "sub-01_emg.edf")
+    rows = pd.DataFrame(sorted(writers.recording()[1]), columns=["onset", "trial_type"]).assign(duration=0.0)
+    rows.to_csv(tmp_path / "sub-01_events.tsv", sep="\t", index=False)
+    require_as_written(read_people(path, KNOWN)[0])
+    path = writers.as_matlab_73(tmp_path / "P01.mat", isi_ms=[10.0, 20.0, 40.0], mep_mv=[0.1, 0.5, 0.2])
+    assert len(read_people(path, IMPACT)[0].trials) == 3
 
 
 @pytest.mark.slow

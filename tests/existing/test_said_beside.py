@@ -13,22 +13,11 @@ import pandas as pd
 import pytest
 import scipy.io
 
+from existing import writers
 from existing.test_doubts import eeglab, table
 from existing.test_tables import IMPACT
 from existing.test_waves import EMG_MV, lines, trigger
-from existing.writers import (
-    ISIS_MS,
-    KNOWN,
-    NAMES,
-    RATE_HZ,
-    as_edf,
-    as_nwb,
-    epochs,
-    named_events,
-    raw,
-    recording,
-    require_as_written,
-)
+from existing.writers import ISIS_MS, KNOWN, NAMES, RATE_HZ, as_edf, epochs, raw, recording, require_as_written
 from isiw.errors import IsiwError
 from isiw.existing.layout import Layout
 from isiw.existing.reading import read_people
@@ -115,25 +104,22 @@ def test_files_of_bids_beside_a_recording_that_contradict_it_are_asked_about(tmp
     require_as_written(read_people(path, KNOWN.saying(units=("uV",)))[0])
     events = pd.DataFrame([(at_s, round(at_s * RATE_HZ), name) for at_s, name in sorted(recording()[1])])
     events = events.set_axis(["onset", "sample", "trial_type"], axis=1).assign(duration=0.0)
-    for factor, asks in ((1.0, ""), (1e3, "the onsets of events beside sub-01_emg.edf are not those of their samples")):
-        events.assign(onset=factor * events["onset"]).to_csv(tmp_path / "sub-01_events.tsv", sep="\t", index=False)
-        if asks:
-            with pytest.raises(IsiwError, match=asks):
-                read_people(path, KNOWN)
-        else:
-            require_as_written(read_people(path, KNOWN.saying(units=("uV",)))[0])
+    events.to_csv(tmp_path / "sub-01_events.tsv", sep="\t", index=False)
+    require_as_written(read_people(path, KNOWN.saying(units=("uV",)))[0])
+    events.assign(onset=1e3 * events["onset"]).to_csv(tmp_path / "sub-01_events.tsv", sep="\t", index=False)
+    with pytest.raises(IsiwError, match=r"onsets of events beside sub-01_emg\.edf are not those of their samples"):
+        read_people(path, KNOWN)
 
 
 def test_times_of_an_eeglab_file_are_compared_with_its_rate(tmp_path: Path) -> None:
     path = eeglab(tmp_path, 1e3)
     held = scipy.io.loadmat(path, simplify_cells=True)["EEG"]
-    for rate_hz, asks in ((RATE_HZ, False), (2000.0, True)):
-        scipy.io.savemat(path, {"EEG": {**held, "srate": rate_hz, "times": np.arange(len(EMG_MV)) / 4.0}})
-        if asks:
-            with pytest.raises(IsiwError, match=r"EEG\.times of P01\.set says; got '2000 Hz'; expected 4000 Hz"):
-                read_people(path, KNOWN)
-        else:
-            require_as_written(read_people(path, KNOWN)[0])
+    times_ms = np.arange(len(EMG_MV)) / 4.0
+    scipy.io.savemat(path, {"EEG": {**held, "times": times_ms}})
+    require_as_written(read_people(path, KNOWN)[0])
+    scipy.io.savemat(path, {"EEG": {**held, "srate": 2000.0, "times": times_ms}})
+    with pytest.raises(IsiwError, match=r"EEG\.times of P01\.set says; got '2000 Hz'; expected 4000 Hz"):
+        read_people(path, KNOWN)
 
 
 def test_units_and_isis_that_a_channel_or_a_table_in_a_recording_says_are_compared(tmp_path: Path) -> None:
@@ -142,10 +128,10 @@ def test_units_and_isis_that_a_channel_or_a_table_in_a_recording_says_are_compar
     with pytest.raises(IsiwError, match="got 'V in one place, and mV in another'"):
         read_people(made, KNOWN.saying(channels={"emg": "FCR (mV)"}))
     pynwb, layout = pytest.importorskip("pynwb"), Layout("impact", channels={"emg": "EMG FCR"}, unmarked="alone")
-    with pynwb.NWBHDF5IO(as_nwb(tmp_path), "a") as target:
+    with pynwb.NWBHDF5IO(writers.as_nwb(tmp_path), "a") as target:
         file = target.read()
         file.add_trial_column("isi_ms", "the ISI")
-        pulses_s = [5.0 + at_s for at_s, name in named_events() if name == "TMS"]
+        pulses_s = [5.0 + at_s for at_s, name in writers.named_events() if name == "TMS"]
         for at_s, isi_ms in zip(pulses_s, (*ISIS_MS[:4], 85.0, np.nan), strict=True):
             file.add_trial(start_time=at_s - 0.5, stop_time=at_s + 0.3, isi_ms=isi_ms)
         target.write(file)

@@ -20,6 +20,10 @@ _HDF5_AT: Final = (0, 512)
 """Where a file of HDF5 begins: MATLAB's have a text of their own before it."""
 
 
+_NOTHING: Final = Path(os.devnull)
+"""Which libraries open as they ask the system what it is, and which holds nothing."""
+
+
 class Gate:
     """An audit hook that sees each file as it is opened for reading, whatever library does it.
 
@@ -49,7 +53,7 @@ class Gate:
         if stat.S_ISDIR(mode):
             return
         real = _real(path)
-        if any(real.is_relative_to(folder) for folder in self._code):
+        if real == _NOTHING or any(real.is_relative_to(folder) for folder in self._code):
             return
         if not self._may_be_read(real):
             self.refused = self._elsewhere(path)

@@ -23,6 +23,9 @@ PIECE: Final = 2**20
 APART_S: Final = 100.0
 """Sweeps without a time of their own, and what a pause of unknown length separates, are so far apart."""
 
+_ROWS: Final = 2**20
+"""So many rows are read of a file beside a recording; without a number pandas opens files of the system."""
+
 _SAME: Final = 1.5
 """An event of a channel of codes is one that is noted, too, if both have one name, and so many samples between them."""
 
@@ -222,5 +225,6 @@ class Contents:
 def _beside(path: Path, what: str) -> pd.DataFrame:
     """A table that BIDS has beside a recording; an empty one if there is none."""
     beside = path.with_name(f"{path.stem.rpartition('_')[0]}_{what}.tsv")
-    is_there = beside.is_file() and "_" in path.stem
-    return pd.read_csv(beside, sep="\t", na_values=["n/a"]) if is_there else pd.DataFrame()
+    if not (beside.is_file() and "_" in path.stem):
+        return pd.DataFrame()
+    return pd.read_csv(beside, sep="\t", na_values=["n/a"], nrows=_ROWS)
