@@ -1,0 +1,74 @@
+"""Plans of interventions, and how their arm is drawn and sealed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from isiw.errors import InvalidValueError
+from isiw.intervention import Arm, Intervention, Part, drawn_arm, opened, sealed
+from pairing.paired import planned
+
+
+def test_every_stimulus_has_its_place_by_its_number() -> None:
+    plan = planned(intensities_pct_rmt=(100.0, 120.0))
+    parts = [slot.part for slot in plan.slots]
+    assert parts == [Part.BEFORE] * 6 + [Part.PAIRS] * 50 + [Part.AFTER] * 12
+    assert [slot.number for slot in plan.slots] == list(range(68))
+    assert [slot.number for slot in plan.slots if slot.first] == [0, 6, 26, 46, 56, 62]
+    assert plan.slots[plan.last_pair].last
+    assert plan.slots[plan.last_pair].part is Part.PAIRS
+    assert [slot.intensity_pct_rmt for slot in plan.slots[:6]] == [100.0] * 3 + [120.0] * 3
+    assert [slot.name for slot in plan.slots[-4:]] == ["after 2 min"] * 4
+
+
+def test_one_pair_in_each_stretch_is_a_probe() -> None:
+    plan = planned(pairs=100)
+    places = [slot.place for slot in plan.slots if plan.is_probe(slot, 7)]
+    assert [place // 10 for place in places] == list(range(10))
+    assert len({place % 10 for place in places}) > 1
+    assert not any(planned(probes=0.0).is_probe(slot, 7) for slot in plan.slots)
+
+
+def test_a_seed_draws_the_same_arm_for_a_person_and_all_arms_for_many() -> None:
+    arms = tuple(Arm)
+    drawn = [drawn_arm(arms, f"P{number}", 3) for number in range(400)]
+    assert drawn == [drawn_arm(arms, f"P{number}", 3) for number in range(400)]
+    assert all(70 < drawn.count(arm) < 130 for arm in arms)
+    assert {Intervention.drawn(planned(arms=arms), "P1").arm for _ in range(60)} == set(arms)
+
+
+def test_a_sealed_arm_looks_different_each_time_and_is_none_of_the_words() -> None:
+    digests = {sealed(Arm.WINDOW) for _ in range(10)}
+    assert len(digests) == 10
+    assert all(opened(digest, tuple(Arm)) is Arm.WINDOW for digest in digests)
+    assert not any(arm in digest for digest in digests for arm in Arm)
+
+
+def test_a_digest_of_no_arm_of_the_plan_is_refused() -> None:
+    with pytest.raises(InvalidValueError, match="none of the plan's"):
+        Intervention(planned(arms=(Arm.WINDOW, Arm.OUTSIDE)), sealed(Arm.TAP_ALONE))
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"pairs": 49}, "pairs"),
+        ({"pairs": 301}, "pairs"),
+        ({"iti_s": (0.5, 5.0)}, "repetitive TMS above 1 Hz"),
+        ({"rest_s": 5.0}, "no longer than the interval"),
+        ({"arms": ("window", "window")}, "different arms"),
+        ({"arms": ("nothing",)}, "unknown"),
+        ({"after_min": (15.0, 0.0)}, "ascend"),
+        ({"range_ms": (90.0, 20.0)}, "ascend"),
+        ({"protocol_code": " "}, "protocol"),
+    ],
+)
+def test_a_plan_that_makes_no_sense_is_refused(changes: dict[str, Any], says: str) -> None:
+    code = changes.pop("protocol_code", None)
+    with pytest.raises(InvalidValueError, match=says):
+        if code is None:
+            planned(**changes)
+        else:
+            type(planned())(code)
