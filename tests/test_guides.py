@@ -29,7 +29,7 @@ def test_the_python_examples_run_one_page_after_the_other(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    for page in ("device.md", "log.md", "strategies.md"):
+    for page in ("device.md", "log.md", "strategies.md", "after_effects.md"):
         names: dict[str, Any] = {"__name__": "guide"}
         for block in blocks(page, "python"):
             exec(compile(block, page, "exec"), names)  # noqa: S102 - the point of the test

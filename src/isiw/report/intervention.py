@@ -82,29 +82,27 @@ def contents_of(record: SessionRecord, states: Sequence[str] = ()) -> Interventi
     """
     pairing, intervention = pairing_of(record), record.header.intervention
     arm = "concealed" if record.conceals or intervention is None else intervention.arm.words
-    plan, tests = pairing.plan, pairing.tests
-    between = sum(slot.part is Part.PAIRS for slot in plan.slots[: len(record.table)])
+    plan, unfinished = pairing.plan, record.given < len(pairing.plan.slots)
+    concealed = [words.NOT_YET] if record.conceals and unfinished else []
     facts = [fact for fact in first_facts(record) if fact.name not in _OF_A_SEARCH]
     more = Fact(
         "plan", f"{plan.before} before, {plan.pairs} pairs, {plan.after} in each block after, at each intensity"
     )
     return InterventionContents(
-        tests,
+        () if concealed else pairing.tests,
         None if record.conceals else pairing.pairs,
-        between,
+        plan.pairs,  # all of them, where there are pulses after them
         () if record.conceals else _window_course(record, plan),
         record.header.subject or "an unnamed subject",
         record.path.name,
-        [*states, *_unfinished(record, plan)],
+        [
+            *states,
+            *concealed,
+            *([f"{record.given} of {len(plan.slots)} stimuli of the plan were given."] if unfinished else []),
+        ],
         (*record.told_unread, *record.losses),
         [*facts, Fact("arm", arm), Fact("protocol", plan.protocol_code), more],
     )
-
-
-def _unfinished(record: SessionRecord, plan: Plan) -> list[str]:
-    """That a part of the plan is missing."""
-    planned, given = len(plan.slots), record.given
-    return [f"{given} of {planned} stimuli of the plan were given."] if given < planned else []
 
 
 def _window_course(record: SessionRecord, plan: Plan) -> list[tuple[float, float, float]]:

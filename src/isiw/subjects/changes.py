@@ -64,7 +64,12 @@ class Plasticity(Checked):
         return limit + (log_gain - limit) * math.exp(-strength / self.pairs)
 
     def left(self, log_gain: float, minutes: float) -> float:
-        """What is left of a change of the log gain after some time without pairs [min]."""
+        """What is left of a change of the log gain after some time without pairs.
+
+        Args:
+            log_gain: the change before, natural log.
+            minutes: the time [min].
+        """
         return log_gain if self.half_life_min is None else log_gain * 2.0 ** (-minutes / self.half_life_min)
 
 
