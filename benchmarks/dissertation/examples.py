@@ -38,7 +38,7 @@ _ONLINE_SAYS: Final = "NR online, on waveforms, with seven initial ISIs, converg
 NOTE: Final = (
     f"Simulated people of the cohort `{COHORT}`, live; ISIs in 5 ms steps from the valve command, seven initial ones. "
     "The text shows one person of its own in each figure, so a number is held against the middle half of ours, and "
-    "against the range of 90 %."
+    "against the range of 90 %. That person may be unlike most of ours, which explains nothing."
 )
 
 
@@ -108,9 +108,7 @@ def verdict_on_one(theirs: int, ours: IntArray) -> str:
     """
     low, first, third, high = np.quantile(ours, [0.05, 0.25, 0.75, 0.95])
     if low <= theirs <= high:
-        return verdict(
-            holds=bool(first <= theirs <= third), otherwise="under reading one person, who is unlike most of ours"
-        )
+        return verdict(holds=bool(first <= theirs <= third), otherwise="not, because it is outside our middle half")
     return (
         "not, because the text leaves open what chooses the next ISI (and GPR's kernel), and ours takes "
         f"{'longer' if low > theirs else 'less'} in 95 % of the sessions or more"

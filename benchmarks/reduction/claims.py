@@ -20,6 +20,9 @@ UNIT: Final = 0.1
 SHARE: Final = 0.3
 """and numbers of trials of which it is not known within 30 %."""
 
+WIDE: Final = 0.2
+"""Nothing is said to come out as printed if twice our own error could hold such a share of the text's number."""
+
 SHOWN: Final = 3
 """Readings that a verdict names."""
 
@@ -27,12 +30,21 @@ _Context = TypeVar("_Context")
 
 
 class Found(NamedTuple):
-    """What one context shows of a claim: whether it holds, our words, how far off, and the difference in words."""
+    """What one context shows of a claim: whether it holds, our words, how far off, and the difference in words.
+
+    `weak` is why it says nothing that it holds: its own error, or the power of a test; empty if it does.
+    """
 
     holds: bool
     ours: str
     off: float = math.nan
     difference: str = "–"
+    weak: str = ""
+
+    @property
+    def says(self) -> bool:
+        """Whether it holds, and could have failed."""
+        return self.holds and not self.weak
 
 
 @dataclass(frozen=True)
@@ -68,9 +80,9 @@ def told(statement: Statement[_Context], contexts: Mapping[str, _Context]) -> Cl
 
 
 def _verdict(statement: Statement[_Context], found: Mapping[str, Found]) -> str:
-    names = [name for name, one in found.items() if one.holds]
-    if next(iter(found)) in names:
-        return "reproduced"
+    base, names = next(iter(found.values())), [name for name, one in found.items() if one.says]
+    if base.holds:
+        return f"cannot fail here: {base.weak}" if base.weak else "reproduced"
     if names:
         more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
         return f"under reading {'; '.join(names[:SHOWN])}{more}"
@@ -93,7 +105,7 @@ def share(ours: float, theirs: float) -> Found:
     return Found(abs(off) <= SHARE + 1e-9, f"{ours:.1f}", off, f"{ours - theirs:+.1f} ({100 * off:+.0f} %)")
 
 
-def between(ours: float, theirs: float, error: float, digits: int = 1) -> Found:
+def between(ours: float, theirs: float, error: float, digits: int = 1, own: float = 0.0) -> Found:
     """Whether a number is the text's within two standard errors of the difference.
 
     Args:
@@ -101,10 +113,15 @@ def between(ours: float, theirs: float, error: float, digits: int = 1) -> Found:
         theirs: the text's.
         error: the standard error of their difference.
         digits: of our words.
+        own: the standard error of ours alone.
     """
-    off = (ours - theirs) / error
-    difference = f"{ours - theirs:+.{digits}f}, {off:+.1f} standard errors"
-    return Found(abs(off) <= ERRORS, f"{ours:.{digits}f}", off, difference)
+    off, most = (ours - theirs) / error, ERRORS * error
+    apart = f"{ours - theirs - most:+.{digits}f} to {ours - theirs + most:+.{digits}f}"
+    difference = f"{ours - theirs:+.{digits}f} ({apart}), {off:+.1f} standard errors"
+    weak = ""
+    if ERRORS * own > WIDE * abs(theirs):
+        weak = f"its own error of {ERRORS * own:.{digits}f} could hold a fifth of the text's number"
+    return Found(abs(off) <= ERRORS, f"{ours:.{digits}f}", off, difference, weak)
 
 
 def number(ours: float, theirs: float, within: float = UNIT) -> Found:
@@ -113,6 +130,6 @@ def number(ours: float, theirs: float, within: float = UNIT) -> Found:
     return Found(abs(off) <= within + 1e-9, f"{ours:.2f}", off, f"{off:+.2f}")
 
 
-def about(holds: object, ours: str) -> Found:
-    """Whether something holds, with our numbers in words."""
-    return Found(bool(holds), ours)
+def about(holds: object, ours: str, weak: str = "") -> Found:
+    """Whether something holds, with our numbers in words, and why that may say nothing."""
+    return Found(bool(holds), ours, weak=weak)

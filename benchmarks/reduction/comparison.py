@@ -35,7 +35,7 @@ def sessions(size: Size, seed: int) -> list[Session]:
     """Every method with the same people, with and without accelerometer."""
     people = {
         PEOPLE: (size.kim, size.kim_default),
-        "kim11": (size.kim, size.people_default),
+        "kim11": (size.people, size.people_default),
         "recruitment": (size.people, size.people_default),
     }
     return [

@@ -14,7 +14,7 @@ from benchmarks.reduction import dissertation as text
 from benchmarks.reduction.claims import ERRORS, Found, Statement, about, between, number, share, told
 from benchmarks.reduction.comparison import METHODS, WORDS, by_person, error_of_mean
 from benchmarks.reduction.look import NAMES
-from benchmarks.reduction.significance import paired_tests
+from benchmarks.reduction.significance import no_power, paired_tests
 
 Table = pd.DataFrame
 """A comparison, as from `comparison.summary`."""
@@ -59,7 +59,9 @@ def numbers() -> Iterator[Statement[Table]]:
             "Fig. 4.24, Fig. 4.14" if (method, word) == ("pf", "without") else "Fig. 4.24",
             f"{name} needs {n} trials.",
             str(n),
-            lambda t, m=method, w=word, n=n: between(cell(t, "trials", m, w), n, _error(t, m, w)),
+            lambda t, m=method, w=word, n=n: between(
+                cell(t, "trials", m, w), n, _error(t, m, w), own=cell(t, "SE", m, w)
+            ),
         )
         yield Statement(
             "Fig. 4.25",
@@ -91,8 +93,8 @@ def _error(table: Table, method: str, word: str) -> float:
 def _converged(table: Table, method: str, word: str, theirs: float) -> Found:
     """Shares of runs, each with the error of a share that is never quite 0 or 1."""
     ours, runs = cell(table, "converged %", method, word) / 100, cell(table, "sessions", method, word)
-    error = math.hypot(_share_error(ours, runs), _share_error(theirs, text.RUNS[word]))
-    return between(ours, theirs, error, 2)
+    own = _share_error(ours, runs)
+    return between(ours, theirs, math.hypot(own, _share_error(theirs, text.RUNS[word])), 2, own)
 
 
 def _share_error(share: float, runs: float) -> float:
@@ -105,7 +107,7 @@ def _ratio(table: Table, first: str, second: str) -> Found:
     ours, theirs = cell(table, "trials", first) / cell(table, "trials", second), _texts_ratio(first, second)
     of_ours = [cell(table, "SE", m) / cell(table, "trials", m) for m in (first, second)]
     of_theirs = [their_error(m) / text.TRIALS["without"][m] for m in (first, second)]
-    return between(ours, theirs, theirs * math.hypot(*of_ours, *of_theirs), 2)
+    return between(ours, theirs, theirs * math.hypot(*of_ours, *of_theirs), 2, theirs * math.hypot(*of_ours))
 
 
 def _texts_ratio(first: str, second: str) -> float:
@@ -188,7 +190,7 @@ def sweep_claims(rows: pd.DataFrame) -> list[Claim]:
             "Fig. 4.24, 4.18",
             "The conventional sweep needs 272 trials.",
             "272",
-            lambda n: between(n[0], 272, math.hypot(n[1], theirs)),
+            lambda n: between(n[0], 272, math.hypot(n[1], theirs), own=n[1]),
         ),
         Statement(
             "Fig. 4.24",
@@ -203,8 +205,12 @@ def sweep_claims(rows: pd.DataFrame) -> list[Claim]:
 def star_claims(rows: pd.DataFrame) -> list[Claim]:
     """The marks of Fig. 4.23–4.25 whose pairs the text names, by paired tests of the base cohort's eleven people."""
     bare = rows[~rows["accelerometer"] & rows["method"].isin((*text.METHODS, "incremental"))]
-    correlation = _p_values(by_person(bare, "correlation, measured")[list(text.METHODS)])
-    claims = [_pair_claim(pair, correlation) for pair in itertools.combinations(text.METHODS, 2)]
+    values = by_person(bare, "correlation, measured")[list(text.METHODS)]
+    correlation = _p_values(values)
+    claims = [
+        _pair_claim(pair, correlation, no_power(values[pair[0]] - values[pair[1]]))
+        for pair in itertools.combinations(text.METHODS, 2)
+    ]
     trials = by_person(bare, "trials")
     for method in ("nr", "svmr", "gpr"):
         p = _p_values(trials)[frozenset((method, "incremental"))]
@@ -224,7 +230,7 @@ def _p_values(values: pd.DataFrame) -> dict[frozenset[str], tuple[float, float]]
     return {frozenset((t.first, t.second)): (float(t.difference), float(t.p)) for t in tests.itertuples()}
 
 
-def _pair_claim(pair: tuple[str, str], tests: Mapping[frozenset[str], tuple[float, float]]) -> Claim:
+def _pair_claim(pair: tuple[str, str], tests: Mapping[frozenset[str], tuple[float, float]], weak: str) -> Claim:
     better = next((p for p in text.SIGNIFICANT_CORRELATIONS if set(p) == set(pair)), None)
     difference, p = tests[frozenset(pair)]
     first, second = better or pair
@@ -232,7 +238,7 @@ def _pair_claim(pair: tuple[str, str], tests: Mapping[frozenset[str], tuple[floa
     ours = f"{sign * difference:+.2f}, p = {p:.2g}"
     if better is None:
         what = f"{NAMES[first]} and {NAMES[second]} do not differ significantly in correlation."
-        look = about(p >= SIGNIFICANT, ours)
+        look = about(p >= SIGNIFICANT, ours, weak)
     else:
         what = f"{NAMES[first]} correlates significantly better than {NAMES[second]}."
         look = about(p < SIGNIFICANT and sign * difference > 0, ours)

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 import isiw
 from benchmarks.reduction import dissertation as text
+from benchmarks.reduction.conventional import TWELVE
 from benchmarks.reduction.document import Section, Table
 from benchmarks.reduction.look import COLOURS, NAMES, panels
 from benchmarks.reduction.sessions import correlation
@@ -28,11 +29,11 @@ PEOPLE: Final = (4, 7)
 SETTINGS: Final[dict[str, dict[str, Any]]] = {"nr": {"initial": 7}, "default": {}, "incremental": {}}
 """The text's regression had seven initial observations."""
 
-PROSE = """\
+PROSE = f"""\
 The simulated tapping robot in open loop, with waveforms, ISIs from 0 to 320 ms from the impact; two people of
 `kim11-measured`, each strategy in a session, which learns what the tap itself does to the EMG. NR begins with seven
 ISIs, as online in the text. Conventional: the sweep from the impact, on waveforms as well, until the window was passed.
-Means over sessions; the figure has the first."""
+Means over sessions; the figure has the first. {TWELVE}"""
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,10 @@ class Size:
     """How many sessions each part has; sessions of the eleven of `kim11` and `kim11-measured` are noise seeds.
 
     Args:
-        kim: sessions of either eleven in the main comparison.
-        kim_default: how many of those of `kim11-measured` the default plays too, which takes longer than all others.
-        people: people of `recruitment` in the main comparison.
-        people_default: how many of them, and of `kim11`, the default plays too.
+        kim: sessions of the eleven of `kim11-measured` in the main comparison.
+        kim_default: how many of those the default plays too, which takes longer than all others.
+        people: sessions of `kim11`, and people of `recruitment`, in the main comparison.
+        people_default: how many of them the default plays too.
         sweep: sessions for each number of initial observations or particles.
         readings: sessions for each reading.
         online: sessions on waveforms with each of two people.
@@ -34,7 +34,7 @@ class Size:
 
 
 FULL: Final = Size(
-    kim=11,
+    kim=88,
     kim_default=0,
     people=11,
     people_default=0,

@@ -22,7 +22,7 @@ from benchmarks.reduction import (
 )
 from benchmarks.reduction import dissertation as text
 from benchmarks.reduction.claims import ERRORS, SHARE, UNIT
-from benchmarks.reduction.conventional import shows_a_window
+from benchmarks.reduction.conventional import TWELVE, shows_a_window
 from benchmarks.reduction.document import Section, Table
 from benchmarks.reduction.method_claims import in_words, method_claims, row, star_claims, sweep_claims
 from benchmarks.reduction.part_claims import (
@@ -35,16 +35,19 @@ from benchmarks.reduction.part_claims import (
     sweep_facts,
 )
 from benchmarks.reduction.readings import PEOPLE
+from benchmarks.reduction.significance import POWER, WORTH
 
 PROSE = f"""\
 Each claim of chapters 4 and 5 about the methods, ours on `{PEOPLE}` beside it. One rule: a number counts within
-{ERRORS:g} standard errors of the difference where the text's is known (trials: the SDs of Fig. 4.14–4.18; convergence:
-its runs), else within {UNIT:g} (F1, correlation) or {100 * SHARE:.0f} % (one person's trials); an order where it is the
-same throughout; a direction where it is {ERRORS:g} standard errors large. Whatever comes out so is "reproduced" only if
-it fails for a wrong model that was run on the same people (`fails_for`); else it "cannot fail here". Where the base
-fails, the verdict names readings, or other people, for whom the claim holds: with so many, some do by chance. Which
-method a bar of Fig. 4.24 and 4.25 belongs to was inferred from a
-copy in which the figures' text is out of order: likely, not certain. Base and readings are below."""
+{ERRORS:g} standard errors of the difference, whose interval stands beside it, where the text's is known (trials: the
+SDs of Fig. 4.14–4.18; convergence: its runs), else within {UNIT:g} (F1, correlation) or {100 * SHARE:.0f} % (one
+person's trials); an order where it is the same throughout; a direction where it is {ERRORS:g} standard errors large. A
+number whose own interval could hold a fifth of the text's holds and says nothing; so does "not significant" by a test
+that finds a difference of {WORTH:g} with a power below {POWER:g}. Whatever comes out so is "reproduced" only if it
+fails for a wrong model that was run on the same people (`fails_for`); else it "cannot fail here". Where the base fails,
+the verdict names readings, or other people, for whom the claim holds: with so many, some do by chance. Which method a
+bar of Fig. 4.24 and 4.25 belongs to was inferred from a copy in which the figures' text is out of order: likely, not
+certain. Base and readings are below."""
 
 PUT_IN = {"A full sweep takes 130 minutes": "by construction: the text's own sum of its own times"}
 
@@ -153,6 +156,8 @@ def opening(claims: Sequence[Claim], main: pd.DataFrame) -> str:
     counts = by_kind(claims)
     f1, trials, converged = (row(table, column) for column in ("F1: measured", "trials", "converged %"))
     ranked = sorted(f1, key=lambda method: -f1[method])
+    sweep = main[(main["cohort"] == PEOPLE) & (main["method"] == "incremental") & ~main["accelerometer"]]
+    swept = float(sweep["trials"].mean())
     place = ("first", "second", "third", "last")[ranked.index("pf")]
     theirs = {name: {m: values["without"][m] for m in text.METHODS} for name, values in _THEIRS.items()}
     shares = {method: 100 * value for method, value in theirs["converged"].items()}
@@ -164,11 +169,19 @@ def opening(claims: Sequence[Claim], main: pd.DataFrame) -> str:
         shows_a_window(main),
         f"Without accelerometer, F1: {in_words(f1)} (text: {in_words(theirs['F1'])});",
         f"the text has PF last, and here it is {place}.",
-        f"Trials: {in_words(trials, 0)} (text: {in_words(theirs['trials'], 0)}).",
+        f"Trials: {in_words(trials, 0)} (text: {in_words(theirs['trials'], 0)});",
+        f"that is {_shares(trials, 272.0)} of the text's 272,",
+        f"and {_shares(trials, swept)} of our own sweep's {swept:.0f}.",
+        TWELVE,
         f"Runs that converge: {in_words(converged, 0)} % (text: {in_words(shares, 0)} %).",
         "Which method a bar of Fig. 4.24 (trials) and 4.25 (F1) belongs to was inferred: likely, not certain.",
     )
     return " ".join(sentences)
+
+
+def _shares(trials: Mapping[str, float], sweep: float) -> str:
+    fewest_first = sorted(trials.items(), key=lambda pair: pair[1])
+    return ", ".join(f"{100 * n / sweep:.0f} % ({m.upper()})" for m, n in fewest_first)
 
 
 _THEIRS = {"F1": text.F1, "trials": text.TRIALS, "converged": text.CONVERGED}

@@ -50,7 +50,8 @@ def sessions(size: Size, seed: int) -> list[Session]:
         for person in people
         for session in _wrong(Session(method, PEOPLE, person, seed, accelerometer=accelerometer))
     ]
-    others = (*initial.sessions(size, seed), *particles.sessions(size, seed)) if size.sweep > FEWEST else ()
+    once = replace(size, sweep=min(size.sweep, PEOPLE_OF_KIM))
+    others = (*initial.sessions(once, seed), *particles.sessions(once, seed)) if size.sweep > FEWEST else ()
     return [*side_by_side, *(replace(one, wrong=UNRELATED) for one in others if one.cohort == PEOPLE)]
 
 

@@ -85,6 +85,8 @@ MEANINGS: Final[Mapping[str, Mapping[str, str]]] = {
         "beforehand": "probability of a window before the first trial.",
         "tap_may_explain": "whether the tap's own response may be what is larger within the window.",
         "tap_is_likely": "whether the tap alone was measured there and evokes as much.",
+        "enhancement_mv": "size of the enhancement at the best ISI [mV]: median, and ends of its 90 % interval.",
+        "enhancement_ratio": "how many times as large as of TMS alone it is: median, and ends of its 90 % interval.",
         "misfit": "what amplitudes say against the law of responses, as `isiw.change.Misfit`.",
         "trial": "the trial after which this was known.",
         "predicted_low_mv": "lower end of the band of nine of ten next MEPs at the ISIs of the profile [mV].",

@@ -16,7 +16,7 @@ from isiw.errors import InvalidValueError
 from isiw.findings import lacking
 from isiw.lazy import WorkedOut
 from isiw.types import ArrayLike, FloatArray, IntArray, Number, Numbers
-from isiw.window import Interval, Window
+from isiw.window import Enhancement, Interval, Magnitude, Window
 
 _NOTHING: Final[Mapping[str, float]] = {}
 
@@ -58,13 +58,6 @@ class BestISI(NamedTuple):
     high_ms: float
 
 
-class Enhancement(NamedTuple):
-    """By how much the tap enlarges the expected MEP [mV], and the shift of the recruitment curve's input [% RMT]."""
-
-    mep_mv: float
-    shift_pct_rmt: float | None = None
-
-
 @dataclass(frozen=True, eq=False)
 class WindowEstimate(Checked):
     """The estimate of one person's window. What a non-Bayesian method does not have is None.
@@ -87,6 +80,7 @@ class WindowEstimate(Checked):
         hypothesis_names: what the hypotheses are called.
         expected_f1: posterior mean of the F1 of the reported decision.
         best_isi: the ISI of the largest expected MEP, given that there is a window: median and 90 % interval [ms].
+        magnitude: the size of the enhancement at the best ISI, given that there is a window.
         largest_excluded: an enhancement [mV] that, with 90 % probability, is larger than the largest at any ISI of the
             space; its shift [% RMT] is that of the window's peak, wherever it lies.
         unusual: how probable it is that parts of this person are of another law than the usual one, by their names.
@@ -123,6 +117,7 @@ class WindowEstimate(Checked):
     hypothesis_names: tuple[str, ...] = field(default=(), repr=False)
     expected_f1: Share | None = None
     best_isi: WorkedOut[BestISI | None] = field(default=WorkedOut("best_isi", None))
+    magnitude: WorkedOut[Magnitude | None] = field(default=WorkedOut("magnitude", None))
     largest_excluded: WorkedOut[Enhancement | None] = field(default=WorkedOut("largest_excluded", None))
     unusual: WorkedOut[Mapping[str, float]] = field(default=WorkedOut("unusual", _NOTHING), repr=False)
     pairs: int | None = None
@@ -319,6 +314,7 @@ class Estimate(Reported):
     what probably changed during the session, whatever the ISI. `beforehand` is the probability of a window before the
     first trial. `tap_may_explain` says whether the tap's own response may be what is larger within the window, and
     `tap_is_likely` that the tap alone was measured there and evokes as much; `misfit` what speaks against the law.
+    `enhancement_mv` and `enhancement_ratio` are medians and intervals of the `Magnitude`.
     """
 
     start_beyond: float | None = None
@@ -334,6 +330,8 @@ class Estimate(Reported):
     tap_may_explain: bool = False
     tap_is_likely: bool = False
     misfit: Misfit | None = None
+    enhancement_mv: tuple[float, ...] = ()
+    enhancement_ratio: tuple[float, ...] = ()
 
     @classmethod
     def of(cls, estimate: WindowEstimate, **more: Any) -> Self:
@@ -343,13 +341,15 @@ class Estimate(Reported):
             for name, edge in zip(("start", "end"), estimate.edges, strict=True)
             for part, value in zip(("ms", "low_ms", "high_ms", "beyond"), edge, strict=True)
         }
-        excluded = estimate.largest_excluded
+        excluded, (size_mv, ratio) = estimate.largest_excluded, estimate.magnitude or ((), ())
         figures: dict[str, Any] = {name: getattr(estimate, name) for name in _SAME} | {
             "segments_ms": () if estimate.window is None else estimate.window.edges_ms,
             "split": estimate.split_probability,
             "hypotheses": estimate.hypotheses or {},
             "unusual": dict(estimate.unusual),
             "best_isi_ms": tuple(estimate.best_isi or ()),
+            "enhancement_mv": tuple(round(size, PROFILE_DECIMALS) for size in size_mv),
+            "enhancement_ratio": tuple(round(size, PROFILE_DECIMALS) for size in ratio),
             "excluded_mv": None if excluded is None else excluded.mep_mv,
             "excluded_pct_rmt": None if excluded is None else excluded.shift_pct_rmt,
             "depressed_ms": () if estimate.depressed is None else estimate.depressed.edges_ms,

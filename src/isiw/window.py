@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -135,6 +135,25 @@ class Window:
 
     def __str__(self) -> str:
         return " and ".join(f"{a:g}–{b:g} ms" for a, b in self.segments)
+
+
+class Enhancement(NamedTuple):
+    """By how much the tap enlarges the expected MEP [mV], and the shift of the recruitment curve's input [% RMT]."""
+
+    mep_mv: float
+    shift_pct_rmt: float | None = None
+
+
+class Magnitude(NamedTuple):
+    """The size of the enhancement at the best ISI, given that there is a window: medians and 90 % intervals.
+
+    Args:
+        mep_mv: by how much the expected MEP is larger than without a tap [mV].
+        ratio: how many times as large as that of TMS alone it is, the EMG floor in both.
+    """
+
+    mep_mv: tuple[float, float, float]
+    ratio: tuple[float, float, float]
 
 
 def least_excess_mv(peak_mv: ArrayLike, baseline_mv: ArrayLike, share: float = EDGE_LEVEL) -> FloatArray:

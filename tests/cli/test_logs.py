@@ -235,3 +235,21 @@ def test_compare_of_a_damaged_log_says_what_was_lost_and_exits_3(isiw: Command, 
     result = isiw("compare", sweeps, "t.mcap")
     assert result.exit_code == 3
     assert "t.mcap: " in result.output
+
+
+def test_the_profile_is_correlated_with_measured_means(isiw: Command, log: Path, tmp_path: Path) -> None:
+    measured = write_log(tmp_path / "sweep.mcap", trials=40, space=read_session(log).header.space)
+    result = isiw("correlate", log, measured)
+    assert result.exit_code == 0, result.output
+    assert "correlates with the mean MEPs of P1 (sweep.mcap) by" in " ".join(result.output.split())
+
+
+def test_responses_are_counted_by_a_threshold_of_ones_own(isiw: Command, tmp_path: Path) -> None:
+    log = write_log(tmp_path / "sweep.mcap", trials=40)
+    low, high = (isiw("counts", log, "--threshold-mv", mv).output for mv in ("0.001", "29"))
+    assert "above 1 µV" in low
+    assert "Effective: " in low
+    assert "No ISI is effective: more than 40% of the trials above 2.9e+04 µV." in " ".join(high.split())
+    refused = isiw("counts", log, "--share", "1.5")
+    assert refused.exit_code == 1
+    assert "share of responses" in " ".join(refused.output.split())

@@ -111,3 +111,27 @@ def test_a_profile_has_no_gaps_that_a_narrow_peak_fits_into_however_wide_the_ran
     ):
         assert np.diff(profile_grid(space)).max() <= 4.0
     assert len(profile_grid(DesignSpace(0, 400, 10, reference="impact"))) == 41
+
+
+def test_the_magnitude_is_that_of_the_largest_expected_mep_given_a_window() -> None:
+    space = DesignSpace(0, 100, 10, reference="impact")
+    grid = profile_grid(space)
+    peaks_mv = np.array([0.2, 0.3, 0.4, 0.1])
+    mep_mv = np.full((4, len(grid)), 0.1)
+    mep_mv[:, 5] = peaks_mv  # the last one has no window
+    masks = np.zeros((4, len(space.grid_ms)))
+    masks[:3, 5] = 1
+    profiles = SampledProfiles(mep_mv, np.full(4, 0.1))
+    estimate = sampled_estimate(Runs.of_masks(masks), lambda: profiles, space)
+    assert estimate.magnitude is not None
+    (size, low, high), (ratio, *_) = estimate.magnitude
+    assert size == pytest.approx(0.2)
+    assert ratio == pytest.approx(3.0)
+    assert 0.1 <= low < size < high <= 0.3
+
+
+def test_without_a_window_there_is_no_magnitude() -> None:
+    space = DesignSpace(0, 100, 10, reference="impact")
+    flat = SampledProfiles(np.full((3, len(profile_grid(space))), 0.1), np.full(3, 0.1))
+    nothing = Runs.of_masks(np.zeros((3, len(space.grid_ms))))
+    assert sampled_estimate(nothing, lambda: flat, space).magnitude is None

@@ -28,7 +28,7 @@ def test_three_methods_and_the_form_of_the_profile_are_told_side_by_side() -> No
     assert "of 12 trials with TMS alone" in means.answer
     assert counts.answer.startswith("Window ")
     assert "95 % of the trials with TMS alone" in counts.answer
-    assert "fail a test of normality" in form.answer
+    assert "means inside the window pass a test of normality" in form.answer
     told = [trial for trial in analysed().record.table.told if trial.isi_ms is not None]
     fits = profile_fits([trial.isi_ms or 0.0 for trial in told], [trial.mep_mv or 0.0 for trial in told])
     assert f"AICc prefers: {best_fit(fits).name}." in form.answer
@@ -58,3 +58,17 @@ def test_the_page_of_imported_trials_has_them() -> None:
     page = isiw.report.report_page(analysed(trials=1).record)
     assert 'id="methods"' in page
     assert "Response counts" in page
+
+
+@pytest.mark.slow
+def test_a_statement_says_how_large_the_enhancement_is_in_mv_and_beside_tms_alone() -> None:
+    record = analysed().record
+    last = record.estimates[-1]
+    size, low, high = last.enhancement_mv
+    assert low <= size <= high
+    assert 0.3 < size < 0.9  # 0.6 mV more than 0.1 mV
+    assert 4.0 < last.enhancement_ratio[0] < 10.0
+    assert "above TMS alone" in isiw.report.final_statement(record)
+    facts = isiw.export.tables.session_facts(record)
+    assert facts["enhancement_mv"] == size
+    assert facts["enhancement_ratio_low"] == last.enhancement_ratio[1]

@@ -193,3 +193,36 @@ def compare(
             show(f"picture: {isiw.plots.save_figure(figure, output, overwrite=overwrite)}")
         losses = [f"{record.path.name}: {loss}" for record in records for loss in record.losses]
         exit_if_damaged(losses)
+
+
+@app.command(rich_help_panel=LOGS)
+def correlate(
+    log: Log,
+    measured: Annotated[
+        Path, typer.Argument(help="A log with the measured MEPs, such as that of a sweep over all ISIs.", **NO_DEFAULT)
+    ],
+) -> None:
+    """Correlate the estimated profile of a log with the mean MEPs by ISI of another one (Fig. 4.23)."""
+    with errors_reported():
+        records = [isiw.read_session(path, channels=()) for path in (log, measured)]
+        for record in records:
+            say_unread(record)
+        show(isiw.report.comparison.correlation_sentence(*records), style="bold")
+        exit_if_damaged([f"{record.path.name}: {loss}" for record in records for loss in record.losses])
+
+
+@app.command(rich_help_panel=LOGS)
+def counts(
+    log: Log,
+    threshold_mv: Annotated[
+        float | None,
+        typer.Option(help="What an MEP has to exceed to be a response [mV]; by default by the log's TMS alone."),
+    ] = None,
+    share: Annotated[float, typer.Option(help="The share of responses that an effective ISI exceeds.")] = 0.4,
+) -> None:
+    """Count the responses at each ISI, and name the effective ISIs: the dissertation's earlier definition (3.3.4)."""
+    with errors_reported():
+        record = isiw.read_session(log, channels=())
+        say_unread(record)
+        show(isiw.report.comparison.counts_table(record, threshold_mv, share))
+        exit_if_damaged(record.losses)

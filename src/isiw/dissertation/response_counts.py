@@ -20,7 +20,7 @@ from isiw.findings import AMPLITUDE_MV
 from isiw.lazy import pd
 from isiw.signals.plausible import require_amplitude
 from isiw.trials import RESPONSE_MV, Trial
-from isiw.types import ArrayLike, FloatArray
+from isiw.types import ArrayLike, FloatArray, IntArray
 from isiw.window import Window
 
 Segments: TypeAlias = Literal["all", "peak"]
@@ -68,13 +68,30 @@ def by_isi(trials: Iterable[Trial]) -> TrialsByIsi:
     return TrialsByIsi(commanded_ms, np.array([trial.mep_mv for trial in pairs], dtype=np.float64), alone_mv)
 
 
-def count_trials(trials: TrialsByIsi) -> CountStudy:
-    """The response counts of a session, by its own trials of TMS alone if it has any, else by the usual 50 µV."""
+def measured_profile(trials: TrialsByIsi) -> tuple[FloatArray, FloatArray, IntArray]:
+    """The ISIs, ascending [ms], the mean MEP at each [mV], and the number of trials there, shape (t,) each."""
+    at_ms, which, counts = np.unique(trials.isi_ms, return_inverse=True, return_counts=True)
+    return at_ms, np.bincount(which, trials.mep_mv, minlength=len(at_ms)) / counts, counts
+
+
+def count_trials(trials: TrialsByIsi, threshold_mv: float | None = None, share: float = EFFECTIVE_SHARE) -> CountStudy:
+    """The response counts of a session.
+
+    Args:
+        trials: its trials, as `by_isi` has them.
+        threshold_mv: what an MEP has to exceed to be a response [mV]; by default by its own trials of TMS alone, or
+            else the usual 50 µV.
+        share: the share of responses that an effective ISI exceeds.
+
+    Raises:
+        InvalidValueError: values that are no MEPs, or a threshold or a share that cannot be.
+    """
     known = len(trials.alone_mv) > 0
-    threshold_mv = max(response_threshold_mv(trials.alone_mv), 1e-6) if known else RESPONSE_MV
+    if threshold_mv is None:
+        threshold_mv = max(response_threshold_mv(trials.alone_mv), 1e-6) if known else RESPONSE_MV
     counts = response_counts(trials.isi_ms, trials.mep_mv, threshold_mv)
-    share = float((trials.alone_mv > threshold_mv).mean()) if known else float("nan")
-    return CountStudy(counts, effective_window(counts, segments="peak"), threshold_mv, share)
+    alone_share = float((trials.alone_mv > threshold_mv).mean()) if known else float("nan")
+    return CountStudy(counts, effective_window(counts, share, segments="peak"), threshold_mv, alone_share)
 
 
 def response_counts(isi_ms: ArrayLike, mep_mv: ArrayLike, threshold_mv: float) -> pd.DataFrame:

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from isiw.dissertation.response_counts import by_isi, count_trials
 from isiw.errors import InvalidValueError
+from isiw.estimate import Estimate
 from isiw.export.collection import Part, log_losses, stimulus_of
 from isiw.files import write_output
 from isiw.lazy import pd
@@ -52,6 +53,13 @@ _SESSION_COLUMNS: Final[Columns] = {
     "start_high_ms": ("ms", "upper end of the 90 % interval of its start"),
     "end_low_ms": ("ms", "lower end of the 90 % interval of its end"),
     "end_high_ms": ("ms", "upper end of the 90 % interval of its end"),
+    "best_isi_ms": ("ms", "the ISI of the largest expected MEP, given a window: posterior median"),
+    "enhancement_mv": ("mV", "by how much the expected MEP there is larger than of TMS alone: posterior median"),
+    "enhancement_low_mv": ("mV", "lower end of its 90 % interval"),
+    "enhancement_high_mv": ("mV", "upper end of its 90 % interval"),
+    "enhancement_ratio": ("", "how many times as large as of TMS alone it is: posterior median"),
+    "enhancement_ratio_low": ("", "lower end of its 90 % interval"),
+    "enhancement_ratio_high": ("", "upper end of its 90 % interval"),
     "counts_threshold_mv": ("mV", "what an MEP has to exceed to be a response, for the response counts"),
     "counts_window": ("", "the window by response counts [Kim2020, 3.3.4]; empty if no ISI is effective"),
     "stopped": ("", "whether the strategy had stopped"),
@@ -161,7 +169,18 @@ def _what_came_of_it(record: SessionRecord) -> dict[str, Any]:
     found = {"p_window": last.probability, "window": ""}
     if (window := last.window) is not None:
         found |= {"window": str(window), "start_ms": window.start_ms, "end_ms": window.end_ms}
-    return counts | found | {name: getattr(last, name) for name in edges} | _by_counts(record) | ended
+    edges_ms = {name: getattr(last, name) for name in edges}
+    return counts | found | edges_ms | _magnitude(last) | _by_counts(record) | ended
+
+
+def _magnitude(last: Estimate) -> dict[str, float]:
+    """The best ISI and the size of the enhancement there, if a window was reported and its model says so."""
+    if last.window is None or not (last.best_isi_ms and last.enhancement_mv):
+        return {}
+    sizes = ("enhancement_mv", "enhancement_low_mv", "enhancement_high_mv")
+    ratios = ("enhancement_ratio", "enhancement_ratio_low", "enhancement_ratio_high")
+    named = zip((*sizes, *ratios), (*last.enhancement_mv, *last.enhancement_ratio), strict=True)
+    return {"best_isi_ms": last.best_isi_ms[0], **dict(named)}
 
 
 def _by_counts(record: SessionRecord) -> dict[str, Any]:

@@ -10,10 +10,10 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from isiw.design import DesignSpace
-from isiw.estimate import BestISI, Enhancement, WindowEstimate
+from isiw.estimate import BestISI, WindowEstimate
 from isiw.lazy import Later
-from isiw.types import Array, FloatArray, IntArray, Singles
-from isiw.window import Window, least_excess_mv
+from isiw.types import Array, BoolArray, FloatArray, IntArray, Singles
+from isiw.window import Enhancement, Magnitude, Window, least_excess_mv
 
 PROFILE_POINTS = 101
 """ISIs at which the expected MEP and its band are reported, at least."""
@@ -142,6 +142,11 @@ class SampledProfiles(NamedTuple):
         excess_mv: Array = np.maximum(self.mep_mv.max(-1) - self.baseline_mv, 0.0)
         return excess_mv
 
+    @property
+    def enhanced(self) -> BoolArray:
+        """Which samples have a window, shape (s,)."""
+        return np.isfinite(least_excess_mv(self.excess_mv, self.baseline_mv))
+
 
 class SampledHypotheses(NamedTuple):
     """The hypotheses that sampled windows belong to: an index of the names for each sample, shape (s,)."""
@@ -178,6 +183,7 @@ def sampled_estimate(
         hypothesis_names=() if hypotheses is None else hypotheses.names,
         expected_f1=f1 * (1.0 - probability if reported is None else probability),
         best_isi=Later(lambda: _best_isi(profiles(), space)),
+        magnitude=Later(lambda: _magnitude(profiles())),
         largest_excluded=Later(
             lambda: Enhancement(float(np.quantile(profiles().excess_mv, EXCLUDED_AT)), shift_pct_rmt())
         ),
@@ -196,8 +202,18 @@ def _band_mv(profiles: SampledProfiles) -> FloatArray:
     return band_mv
 
 
+def _magnitude(profiles: SampledProfiles) -> Magnitude | None:
+    enhanced, base_mv = profiles.enhanced, profiles.baseline_mv
+    if not enhanced.any():
+        return None
+    excess_mv = profiles.excess_mv[enhanced]
+    sizes = (excess_mv, 1.0 + excess_mv / base_mv[enhanced])
+    medians = (np.quantile(each, _BAND)[[1, 0, 2]].astype(float).tolist() for each in sizes)
+    return Magnitude(*map(tuple, medians))
+
+
 def _best_isi(profiles: SampledProfiles, space: DesignSpace) -> BestISI | None:
-    enhanced = np.isfinite(least_excess_mv(profiles.excess_mv, profiles.baseline_mv))
+    enhanced = profiles.enhanced
     if not enhanced.any():
         return None
     low, median, high = np.quantile(profile_grid(space)[profiles.mep_mv[enhanced].argmax(-1)], _BAND).tolist()

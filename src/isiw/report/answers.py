@@ -14,7 +14,7 @@ import numpy as np
 from isiw import sentences
 from isiw.dissertation.profiles import best_fit, normality, profile_fits
 from isiw.dissertation.regression import curve_masks
-from isiw.dissertation.response_counts import TrialsByIsi, by_isi, count_trials
+from isiw.dissertation.response_counts import TrialsByIsi, by_isi, count_trials, measured_profile
 from isiw.errors import InvalidValueError
 from isiw.findings import Kind
 from isiw.log.reader import SessionRecord
@@ -187,24 +187,18 @@ def method_answers(record: SessionRecord) -> list[MethodAnswer]:
     )
     if not len(trials.isi_ms):
         return [estimate]
-    return [estimate, _by_means(trials), _by_counts(trials), _by_form(trials)]
-
-
-def _means(trials: TrialsByIsi) -> tuple[FloatArray, FloatArray, int]:
-    """The ISIs [ms], the mean MEP at each [mV], and the fewest trials at one."""
-    at_ms, which, counts = np.unique(trials.isi_ms, return_inverse=True, return_counts=True)
-    return at_ms, np.bincount(which, trials.mep_mv) / counts, int(counts.min())
+    return [estimate, _by_means(trials), _by_counts(trials), _by_form(trials, last.window)]
 
 
 def _by_means(trials: TrialsByIsi) -> MethodAnswer:
     """ISIs about the largest mean whose mean has .135 of its excess over TMS alone."""
-    at_ms, mean_mv, fewest = _means(trials)
+    at_ms, mean_mv, counts = measured_profile(trials)
     known = len(trials.alone_mv) > 0
     baseline_mv = float(trials.alone_mv.mean() if known else np.median(mean_mv))
     inside = curve_masks((mean_mv - baseline_mv)[None], baseline_mv)[0]
     window = Window.from_mask(at_ms, inside)
     of = f"of {counted(len(trials.alone_mv), 'trial')} with TMS alone" if known else "guessed: the median of all means"
-    said = f"Baseline {1e3 * baseline_mv:.3g} µV ({of}); means of {counted(fewest, 'trial')} at least."
+    said = f"Baseline {1e3 * baseline_mv:.3g} µV ({of}); means of {counted(int(counts.min()), 'trial')} at least."
     return MethodAnswer(
         "Mean MEPs [Kim2020, 4.3; baseline as in 4.2]",
         f"{_in_words(window)} {said}",
@@ -232,13 +226,11 @@ def _by_counts(trials: TrialsByIsi) -> MethodAnswer:
     )
 
 
-def _by_form(trials: TrialsByIsi) -> MethodAnswer:
-    """The form of the mean MEPs by ISI: the number of Gaussians, and a test of normality."""
-    at_ms, mean_mv, _ = _means(trials)
-    said = []
+def _by_form(trials: TrialsByIsi, window: Window | None) -> MethodAnswer:
+    """The form of the mean MEPs by ISI: the number of Gaussians, and a test of normality of those in the window."""
+    at_ms, mean_mv, _ = measured_profile(trials)
+    said = [_of_normality(mean_mv[window.mask(at_ms)]) if window is not None else "No window, no test of normality."]
     try:
-        normal = normality(mean_mv)
-        said.append(f"The means {'pass' if normal.normal else 'fail'} a test of normality (p = {normal.p_value:.2g}).")
         fits = profile_fits(trials.isi_ms, trials.mep_mv)
         said.append(f"Of up to five Gaussians and a spline, AICc prefers: {best_fit(fits).name}.")
     except InvalidValueError as error:
@@ -249,6 +241,17 @@ def _by_form(trials: TrialsByIsi) -> MethodAnswer:
         "Means at five ISIs and more; a few hundred trials to distinguish two Gaussians from one.",
         f"Where the window is. {counted(len(at_ms), 'ISI')} were used.",
     )
+
+
+def _of_normality(enhanced_mv: FloatArray) -> str:
+    """The test of Table 4.1, on the mean MEPs inside the window, as the text has it: they are the enhanced ones."""
+    try:
+        normal = normality(enhanced_mv)
+    except InvalidValueError as error:
+        return f"No test of normality inside the window: {error.what}."
+    passed = "pass" if normal.normal else "fail"
+    means = counted(len(enhanced_mv), "mean")
+    return f"The {means} inside the window {passed} a test of normality (p = {normal.p_value:.2g})."
 
 
 def _in_words(window: Window | None) -> str:

@@ -7,9 +7,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from isiw import sentences, summary
+from isiw.dissertation.response_counts import by_isi, count_trials, measured_profile
+from isiw.errors import InvalidValueError
 from isiw.estimate import Edge, Estimate
 from isiw.log.kinds import imported_sentence
 from isiw.log.reader import SessionRecord
+from isiw.metrics import profile_correlation
 from isiw.plots.comparison import comparison_figure
 from isiw.plots.style import inline_svg, session_name
 from isiw.priors.days import DayToDay
@@ -69,6 +72,43 @@ def comparison_sentence(difference: Difference) -> str:
         f"{difference.obstacle.removesuffix('.')}." if difference.obstacle else "",
     ]
     return " ".join(sentence for sentence in said if sentence)
+
+
+def correlation_sentence(record: SessionRecord, measured: SessionRecord) -> str:
+    """How the estimated profile of a session correlates with the mean MEPs by ISI of another.
+
+    Raises:
+        InvalidValueError: an estimate without a profile, no pairs that count, ISIs from different events, or too few
+            in common.
+    """
+    found, trials = record.found, by_isi(measured.table)
+    if found is None or not found.profile_mv:
+        raise InvalidValueError("the log has no estimated profile", got=str(record.path))
+    events = record.header.space.reference, measured.header.space.reference
+    if events[0] != events[1]:
+        raise InvalidValueError("the logs count ISIs from different events", got=" and ".join(events))
+    at_ms, mean_mv, counts = measured_profile(trials)
+    r, isis = profile_correlation(found.grid_ms, found.profile_mv, at_ms, mean_mv)
+    fewest = f"means of {counts.min()} to {counts.max()} trials"
+    return (
+        f"The profile of {_whose(record)} correlates with the mean MEPs of {_whose(measured)} by {r:.2f}, "
+        f"at {isis} ISIs ({fewest} each)."
+    )
+
+
+def counts_table(record: SessionRecord, threshold_mv: float | None, share: float) -> str:
+    """The response counts of a session, a line an ISI, and the effective window.
+
+    Raises:
+        InvalidValueError: as for `count_trials`.
+    """
+    study = count_trials(by_isi(record.table), threshold_mv, share)
+    rows = study.counts.itertuples()
+    lines = [f"{row.Index:5g} ms  {row.trials:6d}  {row.responses:9d}  {row.share:5.2f}" for row in rows]
+    effective = "No ISI is effective" if study.window is None else f"Effective: {study.window}"
+    alone = "" if math.isnan(study.alone_share) else f" {study.alone_share:.0%} of the trials of TMS alone exceed it."
+    said = f"{effective}: more than {share:.0%} of the trials above {1e3 * study.threshold_mv:.3g} µV.{alone}"
+    return "\n".join([f"{'ISI':>8}  trials  responses  share", *lines, said])
 
 
 def _whose(record: SessionRecord) -> str:

@@ -170,7 +170,7 @@ def findings(record: SessionRecord) -> list[Said]:
             Said("at rest", Role.WARNING, nothing_stood_out(told, sought_ms) or ""),
             *(Said("doubt", Role.WARNING, f"Doubt since trial {event.trial}: {event.text}") for event in doubts),
             Said("edges", Role.DETAIL, sentences.edges(estimate, space)),
-            Said("best ISI", Role.DETAIL, sentences.best_isi(estimate)),
+            Said("best ISI", Role.DETAIL, _best_isi(estimate)),
             Said("excluded", Role.DETAIL, sentences.excluded(estimate)),
             Said("expected F1", Role.DETAIL, sentences.expected_f1(estimate)),
             Said("depression", Role.DETAIL, _depression(record)),
@@ -194,6 +194,16 @@ def answer_and_warnings(estimate: Estimate, header: Header, told: Sequence[Trial
     }
     answer = Said("answer", Role.ANSWER, sentences.finding(estimate, first, header.space))
     return [answer, *(Said(name, Role.WARNING, text) for name, text in against.items() if text)]
+
+
+def _best_isi(estimate: Estimate) -> str:
+    """The ISI of the largest MEP, and how large it is there, in mV and beside TMS alone."""
+    said = sentences.best_isi(estimate)
+    if not said or not estimate.enhancement_mv:
+        return said
+    (size, low, high), (ratio, least, most) = estimate.enhancement_mv, estimate.enhancement_ratio
+    larger = f"{size:.2g} mV ({low:.2g}–{high:.2g}) above TMS alone, {ratio:.2g} times it ({least:.2g}–{most:.2g})"
+    return f"{said.removesuffix('.')}, {larger}."
 
 
 def _misfit(found: Misfit | None) -> str:

@@ -13,6 +13,7 @@ from benchmarks.reduction.look import NAMES
 from benchmarks.reduction.method_claims import method_claims, star_claims
 from benchmarks.reduction.part_claims import initial_claims
 from benchmarks.reduction.readings import PEOPLE
+from benchmarks.reduction.significance import no_power
 
 from benchmarks.reduction import dissertation as text
 
@@ -74,7 +75,24 @@ def test_a_reason_that_is_known_is_given() -> None:
 
 def test_a_number_with_errors_on_both_sides_holds_within_two_of_the_difference() -> None:
     assert [between(n, 16.0, 1.5).holds for n in (12.9, 13.1, 18.9, 19.1)] == [False, True, True, False]
-    assert between(17.0, 16.0, 2.0).difference == "+1.0, +0.5 standard errors"
+    assert between(17.0, 16.0, 2.0).difference == "+1.0 (-3.0 to +5.0), +0.5 standard errors"
+
+
+def test_a_number_whose_own_error_could_hold_a_fifth_of_the_texts_says_nothing() -> None:
+    said = Statement[float](
+        "Fig. 4.24", "PF needs 190 trials.", "190", lambda own: between(150.0, 190.0, 40.0, own=own)
+    )
+    assert told(said, {"base": 10.0}).verdict == "reproduced"
+    assert told(said, {"base": 35.0}).verdict.startswith("cannot fail here: its own error of 70.0 could hold a fifth")
+    far = Statement[float]("Fig. 4.24", "PF", "190", lambda own: between(150.0 if own else 400.0, 190.0, 40.0, own=own))
+    assert told(far, {"base": 0.0, "few": 35.0}).verdict.startswith("not, because")
+
+
+def test_not_significant_by_a_test_without_power_says_nothing() -> None:
+    rng = np.random.default_rng(1)
+    noisy, still = (pd.Series(rng.normal(0.0, sd, 11)) for sd in (0.3, 0.02))
+    assert "with a power of 0." in no_power(noisy)
+    assert no_power(still) == ""
 
 
 def test_a_direction_that_is_smaller_than_its_errors_is_no_improvement() -> None:
