@@ -70,6 +70,7 @@ def test_other_segments_are_an_error() -> None:
         effective_window(response_counts([0], [1], 0.5), segments=cast("Any", "last"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "width_ms"), [("electrical", 20.0), ("mechanical", 50.0)])
 def test_the_two_kinds_of_stimulation_have_the_widths_of_the_dissertation(kind: str, width_ms: float) -> None:
     study = study_counts(STIMULATION[kind], np.arange(0.0, 140.0), trials=300, seed=1)

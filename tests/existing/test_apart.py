@@ -35,6 +35,7 @@ def test_a_table_is_read_by_another_process_and_known_by_its_content(tmp_path: P
     assert list(person.files) == ["P01.csv"]
 
 
+@pytest.mark.slow
 def test_what_is_wrong_with_a_file_is_said_as_if_it_were_read_here(tmp_path: Path) -> None:
     (tmp_path / "P01.csv").write_text("isi_ms,other\n10,1\n")
     with pytest.raises(InvalidValueError, match=r"no column of P01\.csv is known to hold the amplitudes"):

@@ -65,6 +65,7 @@ def test_the_official_validator_finds_no_error(data_set: Path) -> None:
     assert errors_of(data_set) == []
 
 
+@pytest.mark.slow
 def test_logs_of_all_earlier_versions_make_one_valid_data_set(tmp_path: Path) -> None:
     export_logs(OLD_LOGS, tmp_path / "out", "bids")
     assert errors_of(tmp_path / "out") == []

@@ -128,6 +128,7 @@ def test_an_intensity_of_a_pair_is_refused_before_anything_is_logged(tmp_path: P
     assert [trial.intensity_pct_rmt for trial in isiw.read_session(tmp_path / "a.mcap").table] == [None, 110.0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [1.0, 5.0])
 def test_the_window_is_taken_over_whatever_the_level_was(factor: float) -> None:
     subject, found = isiw.subjects.cohort("recruitment", 1, 3)[0], []
