@@ -153,6 +153,7 @@ def test_a_file_is_replayed_for_one_person(isiw: Command, people: Path) -> None:
     assert "--only CODE" in isiw(*words).output
 
 
+@pytest.mark.usefixtures("read_here")
 def test_who_cannot_be_analysed_keeps_nobody_else_from_it(isiw: Command, people: Path) -> None:
     rows = pd.read_csv(people)
     same = rows[rows["subject"] == "A"].assign(subject="0", isi_ms=30.0)

@@ -235,6 +235,7 @@ def test_a_trial_with_a_dead_sensor_does_not_end_the_study(tmp_path: Path, name:
     assert "4 taps" in timing_report(study)
 
 
+@pytest.mark.slow
 def test_the_report_says_all_of_it() -> None:
     study = study_preset("cushion", taps=10, seed=4)
     report = timing_report(study)

@@ -27,6 +27,7 @@ def earlier(n: int = 60, factor: float = 1.0) -> tuple[Trial, ...]:
     return isiw.analyse(isis_ms, meps_mv, space=SPACE, particles=50).record.table.trials
 
 
+@pytest.mark.slow
 def test_a_session_knows_earlier_trials_and_no_budget_counts_them(tmp_path: Path) -> None:
     trials = earlier()
     limits = isiw.Limits.of_space(SPACE, min_iti_s=0, max_pulses=len(trials) + 5)

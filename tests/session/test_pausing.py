@@ -117,7 +117,7 @@ def test_nothing_arms_after_pause_or_stop_without_a_press_of_its_own(monkeypatch
 
     @hypothesis.seed(71)
     @hypothesis.settings(
-        max_examples=200, deadline=None, database=None, suppress_health_check=list(hypothesis.HealthCheck)
+        max_examples=60, deadline=None, database=None, suppress_health_check=list(hypothesis.HealthCheck)
     )
     @hypothesis.given(SEQUENCES)
     def goes(presses: list[Press]) -> None:

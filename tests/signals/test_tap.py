@@ -220,8 +220,7 @@ def test_a_trial_that_an_operator_excluded_is_not_corrected() -> None:
     assert not rig.taps.corrected(excluded)[1]
 
 
-@pytest.mark.parametrize("name", ["subject1", "subject2"])
-@pytest.mark.parametrize("isi_ms", [0.0, 5.0, 10.0])
+@pytest.mark.parametrize(("isi_ms", "name"), [(0.0, "subject1"), (5.0, "subject2"), (10.0, "subject1")])
 def test_the_artefact_of_the_robots_tap_is_known(isi_ms: float, name: str) -> None:
     class Evoked:
         mep_mv = 0.0

@@ -148,6 +148,7 @@ def test_people_do_not_see_each_other() -> None:
     assert two.estimate(1).probability == alone.estimate().probability
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("likelihood", LIKELIHOODS)
 def test_a_clear_responder_is_found_and_a_non_responder_is_not_given_a_window(likelihood: Likelihood) -> None:
     model = ParametricModel(likelihood=likelihood)
