@@ -85,13 +85,6 @@ def test_it_keeps_what_every_device_promises(trigger: Trigger, *, accelerometer:
     check_device(lambda: made("valve"), DesignSpace(200, 500, reference="valve"))
 
 
-def test_it_delivers_nothing_unless_staged() -> None:
-    device = tapper()
-    device.stop()
-    with pytest.raises(DeviceError, match="not staged"):
-        deliver(device, 50.0)
-
-
 def test_its_sweep_has_the_channels_and_units_that_it_describes() -> None:
     for geometry, accelerometer in itertools.product(("bench", "subject1"), (True, False)):
         device = tapper(geometry, accelerometer=accelerometer, reference="valve")
