@@ -9,7 +9,7 @@ _PARTICLES: Final = {"particles": 100}
 _PROCESS: Final = {"samples": 64}
 _SEARCHED: Final = {
     "samples": 64,
-    "effort": {"scouts": 96, "starts": 4, "steps": 8, "draws": 150, "fits": 3, "enough": 100},
+    "effort": {"scouts": 16, "starts": 1, "steps": 2, "draws": 50, "fits": 1, "enough": 10},
 }
 QUICK: Final[Mapping[str, dict[str, Any]]] = {
     **dict.fromkeys(("default", "particles-window", "particles-mi", "even", "random", "supra-threshold"), _PARTICLES),

@@ -55,6 +55,7 @@ def one_peak(n: int) -> GaussianProcessPosterior:
     return after(isis_ms.tolist(), (0.01 + 0.1 * np.exp(-0.5 * ((isis_ms - 250) / 40) ** 2)).tolist())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("people", [1, 2])
 def test_it_conforms(people: int) -> None:
     check_acquisition(BotorchAcquisition(reduced_variance), after([100.0, 250.0], [0.01, 0.1], people), VALVE_SPACE)

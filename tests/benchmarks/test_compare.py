@@ -140,6 +140,7 @@ def plan_in(folder: Path) -> Plan:
     return Plan(folder, people=3, trials=5, seed=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cohort", ["gaussian", RECORDED])
 def test_what_was_interrupted_continues_with_the_same_rows(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cohort: str

@@ -85,6 +85,7 @@ def test_evidence_does_not_depend_on_the_draws_and_is_that_of_the_prior() -> Non
     assert found == pytest.approx(2 * [float(np.log(np.exp(plain).mean()))], abs=0.15)
 
 
+@pytest.mark.slow
 def test_draws_of_one_prior_say_the_evidence_of_another() -> None:
     bank = bank_of_a_curve(1, 4)
     narrow, wide = (Mixture(m.shares, m.means, factor * m.sds) for factor, m in ((1.0, HAND), (1.3, HAND)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import subprocess
+import runpy
 import sys
 from pathlib import Path
 
@@ -17,10 +17,15 @@ SCRIPTS = {
 
 
 def run(name: str, arguments: list[str]) -> None:
-    """Run a benchmark as from the command line."""
-    command = [sys.executable, "-m", f"benchmarks.{name}", *arguments]
-    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)  # noqa: S603 - a script of this repository
-    assert ended.returncode == 0, ended.stderr
+    """Run a benchmark as from the command line, in this process."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(ROOT)
+        patch.setattr(sys, "argv", [f"benchmarks/{name}.py", *arguments])
+        patch.setattr(sys, "path", list(sys.path))
+        patch.delitem(sys.modules, f"benchmarks.{name}", raising=False)
+        with pytest.raises(SystemExit) as ended:
+            runpy.run_module(f"benchmarks.{name}", run_name="__main__")
+    assert ended.value.code == 0
 
 
 @pytest.mark.slow

@@ -143,6 +143,7 @@ def test_a_session_is_run_with_earlier_trials(isiw: Command, people: Path) -> No
     assert "not those of the session" in refused.output
 
 
+@pytest.mark.slow
 def test_a_file_is_replayed_for_one_person(isiw: Command, people: Path) -> None:
     words = ("replay", people, "--reference", "impact", "--strategy", "random", "--seeds", "1", "--trials", "6")
     result = isiw(*words, "--only", "A", "-o", "a.png")
@@ -152,6 +153,7 @@ def test_a_file_is_replayed_for_one_person(isiw: Command, people: Path) -> None:
     assert "--only CODE" in isiw(*words).output
 
 
+@pytest.mark.usefixtures("read_here")
 def test_who_cannot_be_analysed_keeps_nobody_else_from_it(isiw: Command, people: Path) -> None:
     rows = pd.read_csv(people)
     same = rows[rows["subject"] == "A"].assign(subject="0", isi_ms=30.0)

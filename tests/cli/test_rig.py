@@ -281,6 +281,7 @@ def test_what_would_be_ignored_or_is_in_the_wrong_unit_is_refused(
     assert words in result.output
 
 
+@pytest.mark.slow
 def test_a_log_that_was_made_before_slips_were_refused_is_read_and_goes_on(
     isiw: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

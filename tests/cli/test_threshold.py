@@ -123,6 +123,7 @@ def test_only_five_of_ten_counts_responses(tmp_path: Path) -> None:
     assert "enough" in result.output
 
 
+@pytest.mark.slow
 def test_the_hot_spot_of_a_simulated_person_is_found_and_shown(tmp_path: Path) -> None:
     result = run(tmp_path / "t.mcap", "--method", "hot-spot", "--high", 75, "--cohort", "hand", "--seed", 6)
     assert result.exit_code == 0, result.output

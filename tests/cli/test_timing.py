@@ -26,6 +26,7 @@ def test_timing_of_a_preset_is_printed_and_drawn(tmp_path: Path) -> None:
     assert (tmp_path / "timing.png").exists()
 
 
+@pytest.mark.slow
 def test_timing_of_the_vane_actuator_is_printed_and_drawn(tmp_path: Path) -> None:
     result = run("vane", "--taps", 12, "--output", tmp_path / "vane.png")
     assert result.exit_code == 0, result.output

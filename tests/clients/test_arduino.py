@@ -81,6 +81,7 @@ def device(board: Board) -> Iterator[Any]:
     device.unstage()
 
 
+@pytest.mark.slow
 def test_the_example_of_the_page_conforms_on_the_sketch(board: Board) -> None:
     check_device(lambda: device_of_the_page(board.address, 0.0), SPACE, timeout_s=2.0, iti_s=0.0, say=lambda _: None)
     assert [pin for pin, _ in board.rises] == ["valve", "trigger"] + ["trigger"] + ["valve", "trigger"] * 2 + ["valve"]

@@ -159,6 +159,7 @@ def test_a_session_starts_from_the_same_persons_earlier_ones_alone(template: Pat
         session_for(config.with_overrides(after=[own, others]))
 
 
+@pytest.mark.usefixtures("few_sweeps")
 def test_a_session_does_not_start_from_one_of_another_muscle_or_intensity(template: Path, tmp_path: Path) -> None:
     other, far = (
         write_log(tmp_path / f"{name}.mcap", subject="P01", trials=3, space=IMPACT_SPACE, visit=visit)
@@ -174,6 +175,7 @@ def test_a_session_does_not_start_from_one_of_another_muscle_or_intensity(templa
         session_for(config.model_copy(update={"visit": noted}).with_overrides(prior=lab))
 
 
+@pytest.mark.usefixtures("few_sweeps")
 def test_what_simulated_sessions_taught_is_not_used_on_a_person(template: Path, tmp_path: Path) -> None:
     simulated = write_log(tmp_path / "sim.mcap", subject="P01", trials=3, space=IMPACT_SPACE, simulated=True)
     lab = priors.write_lab_prior(priors.learn([simulated]), tmp_path / "lab.toml")

@@ -10,7 +10,7 @@ import pytest
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
-from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
+from isiw.design import VALVE_SPACE
 from isiw.dissertation.regression import FittedCurve, GaussianProcessRegression, RegressionModel
 from isiw.errors import InvalidValueError
 from isiw.models.shared.history import FloorTreatment
@@ -51,6 +51,7 @@ def test_sampled_curves_scatter_about_the_mean_as_the_process_does() -> None:
     assert curve.samples_mv.std(axis=0) == pytest.approx(curve.sd_mv, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_floor_above_the_edges_level_hides_them_unless_it_is_subtracted() -> None:
     trials = trials_of(lambda isi_ms: 0.02 + bell_mv(isi_ms))
     raw, subtracted = (
@@ -72,11 +73,11 @@ def test_a_search_that_gives_up_says_so_and_its_best_parameters_stand_in() -> No
     assert "did not converge in 1 iterations" in known(fit(max_fit_iterations=1).trouble)
 
 
-@pytest.mark.parametrize("space", [VALVE_SPACE, IMPACT_SPACE], ids=["valve", "impact"])
-def test_the_model_conforms(space: DesignSpace) -> None:
+@pytest.mark.slow
+def test_the_model_conforms() -> None:
     check_model(
         lambda: RegressionModel(GaussianProcessRegression(samples=16, max_fit_iterations=10)),
-        space,
+        VALVE_SPACE,
         order_tolerance_ms=1.0,
     )
 

@@ -83,6 +83,7 @@ def test_standard_errors_are_those_of_the_delta_method() -> None:
     assert curve.dof == 27
 
 
+@pytest.mark.slow
 def test_the_prediction_interval_holds_the_next_mep_as_often_as_it_says() -> None:
     rng = np.random.default_rng(7)
     isi_ms = np.linspace(0.0, 500.0, 40)
@@ -133,8 +134,8 @@ def test_a_search_that_gives_up_says_so_and_its_best_curve_stands_in() -> None:
     assert posterior.estimate().window is not None
 
 
-@pytest.mark.parametrize("space", [VALVE_SPACE, IMPACT_SPACE], ids=["valve", "impact"])
-@pytest.mark.parametrize("peaks", [1, 2])
+@pytest.mark.slow
+@pytest.mark.parametrize(("space", "peaks"), [(VALVE_SPACE, 1), (IMPACT_SPACE, 2)], ids=["one peak", "two peaks"])
 def test_the_model_conforms(space: DesignSpace, peaks: int) -> None:
     check_model(lambda: RegressionModel(NonlinearRegression(peaks=peaks, samples=16)), space, order_tolerance_ms=1.0)
 

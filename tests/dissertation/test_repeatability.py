@@ -85,6 +85,7 @@ def test_the_timing_fault_preset_has_negative_isis_at_10_ms_only(seed: int) -> N
     assert (table.drop(10.0)["mistrials"] == 0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("person", "hit_ms"), [(7, 683), (8, 682), (9, 673), (10, 677), (11, 688)])
 def test_the_later_people_are_hit_when_the_figure_says_and_vary_by_less_than_2_ms(person: int, hit_ms: float) -> None:
     hit = study_preset(f"subject{person}", taps=60, isi_ms=(), seed=1).event_table.loc["hit"]
@@ -92,6 +93,7 @@ def test_the_later_people_are_hit_when_the_figure_says_and_vary_by_less_than_2_m
     assert hit["sd_ms"] < 2.0
 
 
+@pytest.mark.slow
 def test_jitter_of_the_pulse_adds_to_the_isi_error() -> None:
     study = study_preset("cushion", isi_ms=(50.0, 90.0), taps=150, seed=3, pulse_jitter_ms=6.0)
     assert study.pulse_table["sd_ms"].to_numpy() == pytest.approx([6.0, 6.0], rel=0.2)
@@ -234,6 +236,7 @@ def test_a_trial_with_a_dead_sensor_does_not_end_the_study(tmp_path: Path, name:
     assert "4 taps" in timing_report(study)
 
 
+@pytest.mark.slow
 def test_the_report_says_all_of_it() -> None:
     study = study_preset("cushion", taps=10, seed=4)
     report = timing_report(study)
@@ -275,6 +278,7 @@ def test_an_invalid_seed_is_refused() -> None:
         study_preset("subject1", taps=1, seed=-1)
 
 
+@pytest.mark.slow
 def test_rotations_begin_within_a_few_milliseconds_of_each_other_and_end_within_a_second() -> None:
     study = study_vane(rotations=40, seed=3)
     table = study.event_table

@@ -70,6 +70,7 @@ def test_other_segments_are_an_error() -> None:
         effective_window(response_counts([0], [1], 0.5), segments=cast("Any", "last"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "width_ms"), [("electrical", 20.0), ("mechanical", 50.0)])
 def test_the_two_kinds_of_stimulation_have_the_widths_of_the_dissertation(kind: str, width_ms: float) -> None:
     study = study_counts(STIMULATION[kind], np.arange(0.0, 140.0), trials=300, seed=1)
@@ -78,7 +79,7 @@ def test_the_two_kinds_of_stimulation_have_the_widths_of_the_dissertation(kind: 
 
 def test_the_window_depends_on_the_threshold() -> None:
     widths = [
-        study_counts(STIMULATION["mechanical"], np.arange(0.0, 140.0, 5.0), trials=200, threshold_mv=threshold, seed=1)
+        study_counts(STIMULATION["mechanical"], np.arange(0.0, 140.0, 5.0), trials=100, threshold_mv=threshold, seed=1)
         for threshold in (0.02, 0.03, 0.05)
     ]
     low, middle, high = (known(study.window).width_ms for study in widths)

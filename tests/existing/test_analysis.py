@@ -43,6 +43,7 @@ def test_trials_that_exist_say_what_a_strategy_that_was_told_them_says() -> None
     assert analysis.estimate.pairs == len(isis_ms)
 
 
+@pytest.mark.slow
 def test_a_session_that_is_exported_and_analysed_again_says_the_same_to_the_last_digit(tmp_path: Path) -> None:
     space = isiw.DesignSpace(0, 300, reference="valve")
     person = isiw.subjects.cohort("recruitment", 2, 4)[1]

@@ -89,9 +89,8 @@ def test_structures_of_matlab_with_the_same_names_are_asked_about(tmp_path: Path
 def test_a_sampling_rate_is_compared_with_the_times_in_the_file(tmp_path: Path) -> None:
     taps, pulses = trigger("tap"), trigger("pulse")
     text = lines(EMG_MV, taps, pulses)
-    for rate_hz in (2000, 5000):
-        with pytest.raises(InvalidValueError, match=r"the column 'time' of P01\.txt says.* 4000 Hz"):
-            read(tmp_path, text, f"rate_hz = {rate_hz}\n{COLUMNS}[channels]\n{TRIGGERS}")
+    with pytest.raises(InvalidValueError, match=r"the column 'time' of P01\.txt says.* 4000 Hz"):
+        read(tmp_path, text, f"rate_hz = 5000\n{COLUMNS}[channels]\n{TRIGGERS}")
     assert len(read(tmp_path, text, f"rate_hz = 4000\n{COLUMNS}[channels]\n{TRIGGERS}").trials) == 6
     with pytest.raises(InvalidValueError, match="several columns"):
         read(tmp_path, text, f"rate_hz = 4000\n{COLUMNS.replace('time', 'EMG')}[channels]\n{TRIGGERS}")

@@ -39,6 +39,7 @@ def test_strategies_are_answered_by_recorded_trials_and_compared_with_all_of_the
     assert "could not be answered" not in said
 
 
+@pytest.mark.slow
 def test_each_trial_answers_once_and_what_no_trial_is_left_for_is_said() -> None:
     replayed = replay(swept(1), ["incremental"], space=SPACE, seeds=1, trials=41)
     (run,) = replayed.runs

@@ -66,11 +66,13 @@ def test_the_official_validator_finds_no_error(data_set: Path) -> None:
     assert errors_of(data_set) == []
 
 
+@pytest.mark.slow
 def test_logs_of_all_earlier_versions_make_one_valid_data_set(tmp_path: Path) -> None:
     export_logs(OLD_LOGS, tmp_path / "out", "bids")
     assert errors_of(tmp_path / "out") == []
 
 
+@pytest.mark.slow
 def test_a_pseudonymised_data_set_is_valid_and_has_no_logs(log: Path, tmp_path: Path) -> None:
     export_logs(log, tmp_path / "out", "bids", pseudonymise=True)
     assert errors_of(tmp_path / "out") == []
@@ -136,6 +138,7 @@ def write_pulsed(path: Path) -> Path:
     return write_sweeps(path, {trial: sweep(trial) for trial in (0, 2, 3)}, *alone(4), device=STIMULATOR)
 
 
+@pytest.mark.slow
 def test_a_data_set_of_electrical_pulses_speaks_of_no_tap(tmp_path: Path) -> None:
     export_logs(write_pulsed(tmp_path / "s.mcap"), tmp_path / "out", "bids")
     texts = [
@@ -176,6 +179,7 @@ def test_a_data_set_of_taps_says_so_and_needs_no_column_for_it(data_set: Path) -
     assert "at which a tap on the tendon enhances" in (data_set / "README").read_text("utf-8")
 
 
+@pytest.mark.slow
 def test_in_a_data_set_with_both_each_session_says_which_stimulus_came_first(log: Path, tmp_path: Path) -> None:
     write_pulsed(log.parent / "electrical.mcap").rename(log.parent / "second.mcap")
     exported = export_logs(log.parent, tmp_path / "out", "bids")
@@ -215,6 +219,7 @@ def test_what_is_known_of_the_recording_is_said_and_what_is_not_known_is_not_mad
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_sweeps_of_another_length_are_another_run(tmp_path: Path) -> None:
     sweeps = {0: sweep(0), 1: sweep(1), 2: sweep(2, samples=300), 3: {"emg": sweep(3)["emg"]}}
     export_logs(write_sweeps(tmp_path / "s.mcap", sweeps), tmp_path / "out", "bids")
@@ -257,6 +262,7 @@ def test_a_channel_that_never_changes_and_one_with_a_long_name_are_written(tmp_p
     assert signal.data[:SAMPLES] == pytest.approx(np.full(SAMPLES, 5.0), abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_damaged_log_makes_a_valid_data_set_that_says_what_it_lacks(log: Path, tmp_path: Path) -> None:
     whole = log.read_bytes()
     log.write_bytes(whole[: len(whole) // 2])

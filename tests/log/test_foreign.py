@@ -66,6 +66,7 @@ def unpacked_sizes(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return sizes
 
 
+@pytest.mark.slow
 def test_a_block_that_unpacks_to_more_than_a_log_may_hold_is_left_out_unpacked(
     foreign: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

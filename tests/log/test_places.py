@@ -179,6 +179,7 @@ def test_a_disk_that_knows_no_locks_is_refused_and_nothing_is_left_on_it(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["finished_log", "broken_log"])
 def test_of_two_that_go_on_at_once_one_does_and_the_other_is_told_why(
     kind: Any, request: pytest.FixtureRequest
@@ -200,7 +201,7 @@ def test_of_two_that_go_on_at_once_one_does_and_the_other_is_told_why(
         else:
             won.append(name)
 
-    for _ in range(100):
+    for _ in range(40):
         runners = [threading.Thread(target=resume, args=(name,)) for name in ("one", "other")]
         for runner in runners:
             runner.start()

@@ -41,7 +41,7 @@ def test_no_flipped_bit_changes_what_is_read_unnoticed(kind: str, request: pytes
     log = request.getfixturevalue(kind)
     whole, original = log.read_bytes(), content(read_session(log))
     noticed = 0
-    for position in sample(8 * len(whole), 300):
+    for position in sample(8 * len(whole), 100):
         flipped = bytearray(whole)
         flipped[position // 8] ^= 1 << (position % 8)
         log.write_bytes(flipped)
@@ -53,12 +53,13 @@ def test_no_flipped_bit_changes_what_is_read_unnoticed(kind: str, request: pytes
         assert record.losses or content(record) == original
         noticed += bool(record.losses)
     # A finished log has a checksum over every byte; an unfinished one over every record, not over what lies between.
-    assert noticed == 300 if kind == "finished_log" else noticed > 150
+    assert noticed == 100 if kind == "finished_log" else noticed > 50
 
 
+@pytest.mark.slow
 def test_a_flipped_bit_costs_no_more_than_its_own_block(finished_log: Path) -> None:
     whole, all_trials = finished_log.read_bytes(), set(range(8))
-    for position in sample(8 * len(whole), 200):
+    for position in sample(8 * len(whole), 100):
         flipped = bytearray(whole)
         flipped[position // 8] ^= 1 << (position % 8)
         finished_log.write_bytes(flipped)

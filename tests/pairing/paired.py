@@ -19,7 +19,8 @@ from isiw.models.protocol import Observation
 from isiw.session.loop import Session
 from isiw.strategy.stopping import Budget
 from isiw.strategy.strategy import Strategy
-from isiw.trials import Measurement, Stimulus
+from isiw.sweeps import Measurement
+from isiw.trials import Stimulus
 from isiw.types import Array
 from isiw.window import Window
 from scripted import ScriptedDevice, WantedIsi

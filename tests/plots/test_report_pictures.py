@@ -136,6 +136,7 @@ def test_a_picture_in_a_page_has_the_pages_colours_and_names_of_its_own(record: 
     assert one == inline_svg(course_figure(record), "one")
 
 
+@pytest.mark.slow
 def test_a_code_that_reads_like_markup_is_text_in_the_picture(record: SessionRecord) -> None:
     for code in ("font: 1px a", "<b>P07</b>"):
         named = replace(record, header=record.header.model_copy(update={"subject": code}))

@@ -42,7 +42,7 @@ def line(axes: Axes, label: str) -> tuple[list[float], list[float]]:
     return np.asarray(found.get_xdata()).tolist(), np.asarray(found.get_ydata()).tolist()
 
 
-@pytest.mark.parametrize("suffix", [".png", ".pdf", ".svg"])
+@pytest.mark.parametrize("suffix", [".png", *(pytest.param(one, marks=pytest.mark.slow) for one in (".pdf", ".svg"))])
 def test_a_session_is_drawn_into_a_file(record: SessionRecord, tmp_path: Path, suffix: str) -> None:
     path = save_session_plot(record, tmp_path / "new" / f"s{suffix}")
     assert path.stat().st_size > 5000

@@ -52,6 +52,7 @@ def test_fewer_people_leave_a_wider_law() -> None:
     assert spreads[0] > 2.0
 
 
+@pytest.mark.slow
 def test_one_odd_person_does_not_bend_the_law() -> None:
     without, with_one = law_of(people_at(6.0, 12)), law_of([*people_at(6.0, 12), -18.0])
     assert with_one.mean[0] == pytest.approx(without.mean[0], abs=0.5)

@@ -12,7 +12,7 @@ from isiw.pairing.words import NOT_YET
 from isiw.report.intervention import InterventionContents, intervention_page
 from isiw.report.page import report_page
 from isiw.report.words import final_statement
-from isiw.session.judging import open_arm
+from isiw.session.afterwards import open_arm
 from isiw.session.sink import SessionUpdate
 from pairing.paired import intervention, session
 from pairing.tested import visit

@@ -41,6 +41,7 @@ def test_without_tms_alone_the_baseline_is_guessed_and_the_threshold_is_nobodys_
     assert "Threshold of a response 50 µV (a usual value" in counts.answer
 
 
+@pytest.mark.slow
 def test_isis_that_hardly_repeat_are_put_into_steps() -> None:
     rng = np.random.default_rng(2)
     isis_ms = rng.uniform(0, 150, 60)
@@ -54,6 +55,7 @@ def test_of_few_trials_it_is_said_what_cannot_be_said(isis_ms: list[float]) -> N
     assert "No more can be said" in method_answers(record)[-1].answer
 
 
+@pytest.mark.slow
 def test_the_page_of_imported_trials_has_them() -> None:
     page = isiw.report.report_page(analysed(trials=1).record)
     assert 'id="methods"' in page

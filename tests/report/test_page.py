@@ -96,6 +96,7 @@ def test_the_numbers_that_are_drawn_are_those_of_the_log(page: Page, record: Ses
     assert shown["beliefs"][str(last.trial)]["profile"] == pytest.approx([1e3 * mv for mv in last.profile_mv], abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.needs_pictures
 def test_all_pictures_are_there_and_readable_without_javascript(page: Page, record: SessionRecord) -> None:
     whole = report_page(record)
@@ -106,6 +107,7 @@ def test_all_pictures_are_there_and_readable_without_javascript(page: Page, reco
     assert ("section", "hidden", "") in page.attributes
 
 
+@pytest.mark.slow
 @pytest.mark.needs_pictures
 def test_a_page_about_electrical_pulses_speaks_of_no_tap(page: Page, record: SessionRecord) -> None:
     of_a_tap = re.compile(r"\b(taps?|tapped|hammer|hit|impact|valve)\b")

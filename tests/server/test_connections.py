@@ -162,6 +162,7 @@ def test_a_page_with_too_many_viewers_still_pauses_and_stops(tmp_path: Path) -> 
         watched.until(lambda: not watched.session.running)
 
 
+@pytest.mark.slow
 def test_calls_that_wait_keep_neither_pause_nor_stop_waiting(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     written = threading.Event()
     with Watched(tmp_path / "s.mcap") as watched, ExitStack() as stack:

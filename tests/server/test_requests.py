@@ -88,18 +88,15 @@ def test_a_malformed_body_is_refused_in_words_and_begins_nothing(
         ({"strategy": {"name": "defualt"}}, "strategy.name", "default"),
         ({"strategy": {"name": "even", "settings": {"particels": 9}}}, "strategy.settings", "particles"),
         ({"space": {"low_ms": 0, "high_ms": 320}}, "space", "needs its reference, the event that its ISIs count from"),
-        ({"space": {"reference": "valve", "low_ms": 100, "high_ms": 50}}, "space", "low_ms < high_ms"),
         ({"space": {"low": 100}}, "space.low", "is unknown; got 100; expected one of high_ms"),
-        ({"limits": {"max_pulses": 0}}, "limits.max_pulses", "greater than"),
         ({"protocol": {"iti_s": [9.0, 5.0]}}, "protocol", "ascend"),
         ({"visit": {"day": 0}}, "visit.day", "greater than"),
         ({"seed": True}, "seed", "expected a whole number"),
         ({"limits": {"period_s": 60.0}}, None, "limits.period_s does nothing without limits.max_period_pulses"),
         ({"visit": 5}, "visit", "expected a table"),
-        ({"space": {"refrence": "impact"}}, "space.refrence", "Did you mean reference?"),
         ({"space": {"reference": "impct"}}, "space.reference", "Did you mean impact?"),
         ({"limits": {"min_iti_s": 5000.0}}, None, "Is it in ms?"),
-        ({"visit": {"intensity_pct_rmt": 1.2}}, None, "Is it in parts of 1?"),
+        ({"limits": {"min_iti_s": 5.0, "max_block_pulses": 3, "rest_s": 2.0}}, None, "so it would have no effect"),
         (
             {"visit": {"intensity_pct_rmt": 110}, "strategy": {"settings": {"intensity_pct_rmt": 80}}},
             None,
@@ -115,15 +112,6 @@ def test_a_plan_that_cannot_be_is_refused_by_the_name_of_its_field(
     assert (response.status_code, error["field"]) == (422, field)
     assert words in error["message"]
     assert not (folder / "b.mcap.part").exists()
-
-
-def test_a_rest_that_limits_nothing_is_refused_and_begins_nothing(client: httpx.Client, folder: Path) -> None:
-    plan = {**PLAN, "id": "c", "limits": {"min_iti_s": 5.0, "max_block_pulses": 3, "rest_s": 2.0}}
-    assert (
-        "so it would have no effect"
-        in refused(client.post("/sessions", json=plan), 422, "InvalidValueError")["message"]
-    )
-    assert not (folder / "c.mcap.part").exists()
 
 
 def test_a_misspelt_field_is_told_before_the_one_that_is_missing_because_of_it(client: httpx.Client) -> None:

@@ -503,6 +503,7 @@ def test_only_so_many_sessions_are_open_at_once(client: httpx.Client, monkeypatc
     created(client, "B")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "begins"), [("png", b"\x89PNG"), ("svg", b"<?xml")])
 def test_a_session_is_drawn(client: httpx.Client, session: str, kind: str, begins: bytes) -> None:
     told(client, session, 3)

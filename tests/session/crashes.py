@@ -43,8 +43,8 @@ class Disk:
     shadow: Path
     outside: Callable[[], bytes]
     steps: int = 0
-    left: dict[tuple[Ending, Left, bytes], int] = field(default_factory=dict)
-    """What the endings leave, and at which operation for the first time."""
+    left: dict[tuple[Left, bytes], None] = field(default_factory=dict)
+    """What an ending leaves in the folder and outside it, in the order of the operations."""
     _sizes: dict[int, int] = field(default_factory=dict)
     _names: dict[str, int] = field(default_factory=dict)
 
@@ -74,7 +74,7 @@ class Disk:
 
     def _note(self) -> None:
         for ending in Ending:
-            self.left.setdefault((ending, self._after(ending), self.outside()), self.steps)
+            self.left[self._after(ending), self.outside()] = None
         self.steps += 1
 
     def _fsync(self, usual: Callable[[int], None], handle: int) -> None:

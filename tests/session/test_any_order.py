@@ -9,6 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeAlias
 
+import pytest
 from benchmarks.faulty_device import Fired, check_ledger
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
@@ -182,7 +183,7 @@ class SessionsInAnyOrder(RuleBasedStateMachine):
             resume(self.log, ScriptedDevice(), scripted_strategy(TRIALS))  # raises where it asks differently
 
 
-TestSessionsInAnyOrder = SessionsInAnyOrder.TestCase
+TestSessionsInAnyOrder = pytest.mark.slow(SessionsInAnyOrder.TestCase)
 TestSessionsInAnyOrder.settings = settings(
     max_examples=10, stateful_step_count=6, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True
 )

@@ -159,7 +159,7 @@ def test_whenever_it_dies_nothing_is_lost_or_replaced_and_it_goes_on(scenario: s
     with pytest.MonkeyPatch.context() as patch:
         disk.install(patch)
         act(bench)
-    for _, left, ledger in disk.left:
+    for left, ledger in disk.left:
         shutil.rmtree(bench.folder)
         bench.folder.mkdir()
         for name, content in left:

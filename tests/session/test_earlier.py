@@ -27,6 +27,7 @@ def earlier(n: int = 60, factor: float = 1.0) -> tuple[Trial, ...]:
     return isiw.analyse(isis_ms, meps_mv, space=SPACE, particles=50).record.table.trials
 
 
+@pytest.mark.slow
 def test_a_session_knows_earlier_trials_and_no_budget_counts_them(tmp_path: Path) -> None:
     trials = earlier()
     limits = isiw.Limits.of_space(SPACE, min_iti_s=0, max_pulses=len(trials) + 5)
@@ -128,6 +129,7 @@ def test_an_intensity_of_a_pair_is_refused_before_anything_is_logged(tmp_path: P
     assert [trial.intensity_pct_rmt for trial in isiw.read_session(tmp_path / "a.mcap").table] == [None, 110.0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [1.0, 5.0])
 def test_the_window_is_taken_over_whatever_the_level_was(factor: float) -> None:
     subject, found = isiw.subjects.cohort("recruitment", 1, 3)[0], []

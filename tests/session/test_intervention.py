@@ -23,7 +23,7 @@ from isiw.plots.session import session_figure
 from isiw.plots.timeline import timeline_figure
 from isiw.report.words import final_statement, trial_rows
 from isiw.server.live.view import View
-from isiw.session.judging import open_arm
+from isiw.session.afterwards import open_arm
 from isiw.session.loop import Session
 from isiw.session.resume import open_session, resume
 from isiw.session.rig import Safeguards
@@ -38,9 +38,7 @@ PAIRS = [slot.number for slot in PLAN.slots if slot.part is Part.PAIRS]
 
 def kinds(given: list[Stimulus]) -> Counter[str]:
     named = {True: "tap alone", False: "pair"}
-    return Counter(
-        "TMS alone" if one.isi_ms is None and not one.tap_alone else named[one.tap_alone] for one in given
-    )
+    return Counter("TMS alone" if one.isi_ms is None and not one.tap_alone else named[one.tap_alone] for one in given)
 
 
 @pytest.mark.parametrize("arm", EVERY_ARM)

@@ -61,6 +61,7 @@ def test_the_stimuli_that_pairs_take_hold_the_controls_between_them(share: float
         assert sum(protocol.control(trial, seed) is None for trial in range(given)) >= 60
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(PLANNING))
 def test_a_plan_runs_to_its_end_within_the_limits_that_are_proposed(tmp_path: Path, name: str) -> None:
     settings = {"particles": 10, "max_trials": 120} if name == "pf" else {"trials_per_isi": 4, "max_trials": 320}

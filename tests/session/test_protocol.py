@@ -98,7 +98,7 @@ def test_what_is_learnt_is_in_the_order_of_delivery(log: Path) -> None:
     assert ALONE_MS in expected
 
 
-@pytest.mark.parametrize("last", [3, 11, 12, 17])
+@pytest.mark.parametrize("last", [3, pytest.param(11, marks=pytest.mark.slow), 12])
 def test_a_killed_and_resumed_session_has_the_intervals_and_controls_of_an_undisturbed_one(
     log: Path, tmp_path: Path, last: int
 ) -> None:
@@ -163,6 +163,7 @@ def test_a_lost_control_costs_neither_budget_nor_a_retry(log: Path) -> None:
     assert result.decision.reason == "The budget of 10 stimuli is used up."
 
 
+@pytest.mark.slow
 def test_an_isi_that_was_lost_is_asked_three_times_whatever_controls_come_between(log: Path) -> None:
     rig = device()
 

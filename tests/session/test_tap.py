@@ -146,11 +146,11 @@ def test_a_person_whose_tap_evokes_no_response_and_who_has_no_window_gets_no_sur
 def test_people_without_a_window_get_no_sure_one_from_a_reflex(
     tmp_path: Path, size_mv: float, protocol: VisitProtocol
 ) -> None:
-    sure = 0
-    for seed in range(10):
+    sure = []
+    for seed in range(5):
         session = of_a_reflex(size_mv, seed, tmp_path, protocol)
-        sure += known(session.strategy.estimate().probability) >= 0.9
-    assert sure <= 1
+        sure.append(known(session.strategy.estimate().probability) >= 0.9)
+    assert not any(sure)  # of five: where every second is, 97 % of such tests fail
 
 
 @pytest.mark.slow

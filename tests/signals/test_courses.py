@@ -101,7 +101,12 @@ def size_shown(wave: FloatArray, unit: FloatArray, shown: BoolArray) -> float:
 
 @pytest.mark.parametrize(
     ("seed", "response"),
-    [(0, reflex(0.3)), (1, TapResponse(50.0, 50.0, 0.3, 0.5)), (2, reflex(0.1, start_ms=60.0)), (3, None)],
+    [
+        (0, reflex(0.3)),
+        pytest.param(1, TapResponse(50.0, 50.0, 0.3, 0.5), marks=pytest.mark.slow),
+        pytest.param(2, reflex(0.1, start_ms=60.0), marks=pytest.mark.slow),
+        (3, None),
+    ],
 )
 def test_sums_over_all_sweeps_come_to_what_a_look_at_each_sweep_does(seed: int, response: TapResponse | None) -> None:
     rng, rig = np.random.default_rng(seed), TapRig(response, seed=seed)

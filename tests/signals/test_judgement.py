@@ -373,7 +373,7 @@ def test_what_moves_the_hammer_after_the_pulse_is_no_tap() -> None:
 
 def test_a_coarse_amplifiers_quiet_trials_are_not_taken_for_blanked_ones() -> None:
     rng = np.random.default_rng(0)
-    for _ in range(300):
+    for _ in range(40):
         emg = np.round(rng.normal(0.0, 0.0015, 5000) / 0.005) * 0.005
         quiet = with_channel(sweep_of(t_valve_ms=None, t_hit_ms=680.0), "emg", emg)
         assert judge(quiet, PAIR, IMPACT).reason is not Kind.MISSING_CHANNEL

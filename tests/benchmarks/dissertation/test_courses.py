@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from benchmarks.dissertation.courses import GENERATION, INITIAL, SPACE, live, online
 
 from isiw.subjects import cohort
@@ -23,11 +24,13 @@ def test_a_filter_has_one_spread_for_each_generation_and_its_last_particles() ->
     assert course.spread[-1][1] <= 25.0 < course.spread[0][1]
 
 
+@pytest.mark.slow
 def test_two_gaussians_have_two_amplitudes() -> None:
     high, low = live("nr2", PEOPLE, 0, seed=5).amplitudes_mv
     assert high >= low >= 0
 
 
+@pytest.mark.slow
 def test_online_the_isis_count_from_the_impact_and_come_from_waveforms() -> None:
     course = online(PEOPLE, 4, seed=5)
     isi_ms, mep_mv = np.array(course.told).T

@@ -86,13 +86,6 @@ def test_it_keeps_what_every_device_promises(trigger: Trigger, *, accelerometer:
     check_device(lambda: made("valve"), DesignSpace(200, 500, reference="valve"))
 
 
-def test_it_delivers_nothing_unless_staged() -> None:
-    device = tapper()
-    device.stop()
-    with pytest.raises(DeviceError, match="not staged"):
-        deliver(device, 50.0)
-
-
 def test_its_sweep_has_the_channels_and_units_that_it_describes() -> None:
     for geometry, accelerometer in itertools.product(("bench", "subject1"), (True, False)):
         device = tapper(geometry, accelerometer=accelerometer, reference="valve")
@@ -117,7 +110,7 @@ def test_the_person_answers_the_isi_that_truly_came_about(reference: Reference, 
 
 def test_open_loop_the_isi_varies_with_the_hit_and_triggered_it_does_not() -> None:
     def errors(trigger: Trigger) -> list[float]:
-        sweeps = deliver(tapper("subject1", trigger=trigger), 60.0, n=60)
+        sweeps = deliver(tapper("subject1", trigger=trigger), 60.0, n=40)
         return [realised_ms(sweep) - 60.0 for sweep in sweeps]
 
     assert np.std(errors("open-loop")[5:]) == pytest.approx(4.0, rel=0.3)
@@ -128,7 +121,7 @@ def test_open_loop_the_isi_varies_with_the_hit_and_triggered_it_does_not() -> No
 def test_jitter_moves_the_pulse_and_its_recorded_time_and_no_tap(trigger: Trigger) -> None:
     def pulses_and_hits(jitter_ms: float) -> tuple[np.ndarray, np.ndarray]:
         device = tapper("subject4", trigger=trigger, pulse_jitter_ms=jitter_ms)
-        sweeps = deliver(device, 60.0, n=80)
+        sweeps = deliver(device, 60.0, n=40)
         pulses = np.array([known(sweep.t_tms_ms) for sweep in sweeps])
         return pulses, pulses - [realised_ms(sweep) for sweep in sweeps]
 
@@ -139,10 +132,10 @@ def test_jitter_moves_the_pulse_and_its_recorded_time_and_no_tap(trigger: Trigge
 
 def test_the_command_is_corrected_by_the_measured_hits() -> None:
     robot = Tapper(Listener(), "subject2", TapperSettings(expected_hit_ms=190.0))
-    for trial in range(30):
+    for trial in range(20):
         robot.answer(Stimulus(trial, 60.0))
     assert robot.hit_delay_ms == pytest.approx(172.0, abs=1.0)
-    later = [robot.answer(Stimulus(trial, 60.0)) for trial in range(30, 90)]
+    later = [robot.answer(Stimulus(trial, 60.0)) for trial in range(20, 60)]
     error = [known(judge(sweep, Stimulus(0, 60.0), IMPACT).isi_ms) - 60.0 for sweep in later]
     assert np.mean(error) == pytest.approx(0.0, abs=0.8)
 
@@ -178,7 +171,7 @@ def test_the_stated_uncertainty_is_what_varies_from_trial_to_trial() -> None:
     off_ms = list[float]()
     for name in ("subject1", "subject2", "subject3", "subject4"):
         person = Listener()
-        deliver(tapper(name, accelerometer=False, reference="valve", respond=person), 240.0, n=50)
+        deliver(tapper(name, accelerometer=False, reference="valve", respond=person), 240.0, n=20)
         heard_ms = np.array(person.heard_ms, dtype=float)
         off_ms.extend(heard_ms - heard_ms.mean())
     assert np.mean(np.abs(off_ms) <= 2 * 2.5) >= 0.9
@@ -209,17 +202,16 @@ def test_tms_alone_taps_nobody(reference: Reference) -> None:
 @pytest.mark.parametrize("mep_mv", [0.0, 0.02, 0.1, 1.0])
 def test_the_judged_amplitude_is_the_one_that_the_person_gave(mep_mv: float) -> None:
     device = tapper("subject2", respond=Listener(mep_mv))
-    judged = [judge(sweep, Stimulus(0, 80.0), IMPACT) for sweep in deliver(device, 80.0, n=40)]
+    judged = [judge(sweep, Stimulus(0, 80.0), IMPACT) for sweep in deliver(device, 80.0, n=15)]
     measured = [each.mep_mv for each in judged if each.mep_mv is not None]
-    assert len(measured) >= 35
+    assert len(measured) >= 13
     if mep_mv == 0:  # 1 µV RMS of EMG at rest has 3 to 9 µV of its own
         assert 0.003 < min(measured) < max(measured) < 0.009
     else:
         np.testing.assert_allclose(measured, mep_mv, rtol=0.01)
 
 
-@pytest.mark.parametrize("trigger", ["open-loop", "impact"])
-@pytest.mark.parametrize("reference", ["impact", "valve"])
+@pytest.mark.parametrize(("reference", "trigger"), [("impact", "open-loop"), ("valve", "impact")])
 def test_the_emg_floor_of_a_person_counts_once(reference: Reference, trigger: Trigger) -> None:
     person, answers = cohort("nonresponder", 2, 0)[1].begin(1), list[Response]()
 
@@ -229,9 +221,9 @@ def test_the_emg_floor_of_a_person_counts_once(reference: Reference, trigger: Tr
 
     device = tapper(reference=reference, trigger=trigger, respond=respond)
     isi_ms, space = (100.0, IMPACT) if reference == "impact" else (280.0, VALVE)
-    judged = [judge(sweep, Stimulus(0, isi_ms), space) for sweep in deliver(device, isi_ms, n=60)]
+    judged = [judge(sweep, Stimulus(0, isi_ms), space) for sweep in deliver(device, isi_ms, n=40)]
     told, given = np.array([(j.mep_mv, a.mep_mv) for j, a in zip(judged, answers, strict=True) if j.mep_mv]).T
-    assert len(told) >= 55
+    assert len(told) >= 36
     np.testing.assert_allclose(np.log(told / given).mean(), 0.0, atol=0.01)
 
 

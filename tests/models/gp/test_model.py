@@ -69,6 +69,7 @@ def estimate(model: GaussianProcess, trials: Trials) -> WindowEstimate:
     return after(model, trials).estimate()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "changed",
     [
@@ -115,12 +116,14 @@ def test_it_finds_the_window_of_clear_people() -> None:
         assert known(found.window).end_ms > truth.end_ms - 0.4 * truth.width_ms
 
 
+@pytest.mark.slow
 def test_a_flat_profile_is_mostly_said_to_have_no_window() -> None:
     probabilities = np.array([estimate(FEW, flat(40, seed)).probability for seed in range(40)])
     assert (probabilities >= 0.5).mean() <= 0.15
     assert (probabilities >= 0.9).mean() <= 0.025
 
 
+@pytest.mark.slow
 def test_a_flat_profile_becomes_ever_more_certain_to_be_flat() -> None:
     few, many = (np.mean([estimate(FEW, flat(n, seed)).probability for seed in range(20)]) for n in (8, 60))
     assert many < 0.5 * few

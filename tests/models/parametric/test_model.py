@@ -82,7 +82,7 @@ def test_model_and_posterior_keep_their_protocols() -> None:
 
 @pytest.mark.slow
 def test_the_parametric_model_conforms_whatever_the_order_of_the_trials() -> None:
-    model = ParametricModel(samples=64, effort=Effort(scouts=96, starts=4, steps=8, draws=150, fits=3, enough=100))
+    model = ParametricModel(samples=64, effort=Effort(scouts=16, starts=1, steps=2, draws=50, fits=1, enough=10))
     check_model(lambda: replace(model), IMPACT_SPACE, order_tolerance_ms=0.0)
 
 
@@ -128,6 +128,7 @@ def test_the_posterior_agrees_with_plain_importance_sampling_from_the_prior(like
     assert (got.std(0) / sd - 1).abs().max() < 0.25
 
 
+@pytest.mark.slow
 def test_trials_told_at_once_and_one_by_one_give_the_same_posterior() -> None:
     model = ParametricModel(likelihood="gamma")
     observations = evenly("gaussian", 2, 6)
@@ -147,6 +148,7 @@ def test_people_do_not_see_each_other() -> None:
     assert two.estimate(1).probability == alone.estimate().probability
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("likelihood", LIKELIHOODS)
 def test_a_clear_responder_is_found_and_a_non_responder_is_not_given_a_window(likelihood: Likelihood) -> None:
     model = ParametricModel(likelihood=likelihood)
@@ -280,6 +282,7 @@ def test_effort_that_cannot_be_made_is_refused(wrong: dict[str, Any]) -> None:
         Effort(**wrong)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("likelihood", LIKELIHOODS)
 def test_people_of_its_own_have_windows_as_often_as_believed_and_the_same_meps_again(likelihood: Likelihood) -> None:
     model = ParametricModel(likelihood=likelihood)

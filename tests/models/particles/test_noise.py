@@ -132,6 +132,7 @@ def test_the_expected_mep_is_the_simulated_persons(modelled: Singles, true: Resp
     np.testing.assert_allclose(means[0, 0], expected, rtol=0.03 + corner, atol=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("modelled", "true"), PAIRS)
 def test_the_predicted_distribution_is_that_of_simulated_trials(modelled: Singles, true: ResponseCurve) -> None:
     # Kolmogorov distance to 20,000 trials. The outliers that the model allows for account for 0.03 of it; sampling
@@ -177,6 +178,7 @@ def test_seen_and_not_seen_are_all_that_can_happen(modelled: Singles) -> None:
     assert (np.diff(seen) > 0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("modelled", "curve"), PAIRS)
 def test_draws_have_the_distribution_that_the_likelihood_is_of(modelled: Singles, curve: ResponseCurve) -> None:
     del curve

@@ -19,21 +19,25 @@ def deep() -> Performance:
     return performance([*vanes, *loaded], periods=6, step_ms=0.5)
 
 
+@pytest.mark.slow
 def test_the_recommended_heights_reach_the_full_range_and_larger_and_smaller_ones_do_not(deep: Performance) -> None:
     full = deep.range_share[: len(HEIGHTS_MM)] >= 0.999
     assert list(np.array(HEIGHTS_MM)[full]) == [10, 12.5, 15, 17.5]
 
 
+@pytest.mark.slow
 def test_the_recommended_heights_break_away_within_80_to_100_ms(deep: Performance) -> None:
     recommended = deep.delay_ms[1:5]
     assert recommended.min() > 80
     assert recommended.max() < 100
 
 
+@pytest.mark.slow
 def test_the_delay_falls_with_height(deep: Performance) -> None:
     assert (np.diff(deep.delay_ms[: len(HEIGHTS_MM)]) < 0).all()
 
 
+@pytest.mark.slow
 def test_the_payload_hardly_matters(deep: Performance) -> None:
     assert deep.delay_ms[-1] == pytest.approx(deep.delay_ms[-2], rel=0.02)
     assert deep.range_share[-2:] == pytest.approx(1.0)

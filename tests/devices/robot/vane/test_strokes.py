@@ -23,6 +23,7 @@ def test_without_variation_all_strokes_are_one_and_without_noise_they_are_record
     assert waves["vane_pressure"].max() == pytest.approx(300, rel=0.05)  # 4 bar on one side, 1 bar on the other
 
 
+@pytest.mark.slow
 def test_more_friction_starts_later(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(f"{MODULE}.FRICTION_CV", 0.3)
     monkeypatch.setattr(f"{MODULE}.RESERVOIR_CV", 0)

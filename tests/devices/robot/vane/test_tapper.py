@@ -43,6 +43,7 @@ def begins_ms(sweep: Sweep) -> float:
     return float(moved[0]) * 1000 / angle.rate_hz
 
 
+@pytest.mark.slow
 def test_it_keeps_what_every_device_promises() -> None:
     def made() -> SimulatedDevice:
         subject = cohort("recruitment", 1, 0)[0].begin(1)
