@@ -1,9 +1,20 @@
 from __future__ import annotations
 
+from contextlib import suppress
+from pathlib import Path
+
 import pytest
 
+from isiw.intervention import Arm
+from isiw.log.reader import read_session
 from isiw.pairing import Delivered
+from isiw.pairing.words import NOT_YET
 from isiw.report.intervention import InterventionContents, intervention_page
+from isiw.report.page import report_page
+from isiw.report.words import final_statement
+from isiw.session.judging import open_arm
+from isiw.session.sink import SessionUpdate
+from pairing.paired import intervention, session
 from pairing.tested import visit
 from report.sessions import HOSTILE, Page
 
@@ -49,3 +60,46 @@ def test_pulses_of_several_intensities_are_told_apart() -> None:
     words = Page(intervention_page(InterventionContents(pulses, ()))).words
     assert "mean of a block at 110 % RMT" in words
     assert "No pair of stimuli was delivered." in words
+
+
+def test_the_page_of_an_interventions_log_is_that_of_the_change_and_conceals_its_arm(tmp_path: Path) -> None:
+    concealed = intervention(Arm.WINDOW, before=6, after=5)
+    session(tmp_path / "s.mcap", concealed).run()
+    page = Page(report_page(read_session(tmp_path / "s.mcap"))).words
+    assert "TMS alone evokes" in page
+    assert "after 2 min" in page
+    assert "The arm is concealed" in page
+    assert Arm.WINDOW.words not in page
+    assert "probe" not in page
+    open_arm(tmp_path / "s.mcap")
+    opened = Page(report_page(read_session(tmp_path / "s.mcap"))).words
+    assert Arm.WINDOW.words in opened
+    assert "45 pairs at" in opened
+    assert "5 probes of the window" in opened
+
+
+def test_an_intervention_that_is_not_over_says_so(tmp_path: Path) -> None:
+    def stopping(update: SessionUpdate) -> None:
+        if update.trial.index == 6:
+            raise KeyboardInterrupt
+
+    with suppress(KeyboardInterrupt):
+        session(tmp_path / "s.mcap", intervention(arms=(Arm.WINDOW,), before=6), on_trial=stopping).run()
+    page = Page(report_page(read_session(tmp_path / "s.mcap"))).words
+    assert "7 of 62 stimuli of the plan were given." in page
+    assert "Too few pulses" in page
+
+
+def test_a_concealed_change_waits_for_the_end_of_the_plan(tmp_path: Path) -> None:
+    def stopping(update: SessionUpdate) -> None:
+        if update.trial.index == 61:
+            raise KeyboardInterrupt
+
+    with suppress(KeyboardInterrupt):
+        session(tmp_path / "s.mcap", intervention(before=6, after=4), on_trial=stopping).run()
+    record = read_session(tmp_path / "s.mcap")
+    for said in (Page(report_page(record)).words, final_statement(record)):
+        assert NOT_YET in said
+        assert "90 % interval ×" not in said
+    session(tmp_path / "t.mcap", intervention(before=6, after=4)).run()
+    assert "90 % interval ×" in final_statement(read_session(tmp_path / "t.mcap"))

@@ -21,7 +21,6 @@ from isiw.log.schema import EstimateRecord, Intent, Waveform
 from isiw.pairing.pulses import pairing_of
 from isiw.plots.session import session_figure
 from isiw.plots.timeline import timeline_figure
-from isiw.report.page import report_page
 from isiw.report.words import final_statement, trial_rows
 from isiw.server.live.view import View
 from isiw.session.judging import open_arm
@@ -322,7 +321,6 @@ def _without_times(text: str) -> str:
 SHOWING: dict[str, Callable[[Path], object]] = {
     "picture": lambda log: session_figure(read_session(log)),
     "timeline": lambda log: timeline_figure(read_session(log)),
-    "report": lambda log: report_page(read_session(log)),
     "table": lambda log: trial_rows(read_session(log)),
     "export": lambda log: read_logs(log),
 }

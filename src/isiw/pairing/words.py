@@ -16,6 +16,8 @@ SOUGHT: Final = 1.5
 
 CONCEALED: Final = "The arm is concealed. What was delivered is shown once it is opened."
 
+NOT_YET: Final = "The arm is concealed, so the change is shown once the plan is complete, or the arm is opened."
+
 NO_CAUSE: Final = (
     "What one person shows after an intervention need not come from it. Compare people, or visits, with a control arm."
 )

@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 
 from isiw import sentences
 from isiw.change import Misfit
+from isiw.errors import InvalidValueError
 from isiw.estimate import Estimate
 from isiw.findings import Kind
 from isiw.intervention import Intervention, Part
@@ -17,6 +18,9 @@ from isiw.log.headers import Header
 from isiw.log.kinds import continued_by
 from isiw.log.reader import SessionRecord, require_records
 from isiw.metrics import f1
+from isiw.pairing import words
+from isiw.pairing.effect import change_of
+from isiw.pairing.pulses import pairing_of
 from isiw.report.evidence import changed_with_time, contradiction, no_comparison, nothing_measured, nothing_stood_out
 from isiw.session.examination import change_found
 from isiw.strategy.catalogue import known_settings, list_strategies, measured_of
@@ -67,16 +71,27 @@ def intervention_statement(record: SessionRecord, intervention: Intervention, co
     """How far an intervention came, and which arm it had if that is not concealed."""
     slots, last = intervention.plan.slots, record.estimates[-1] if record.estimates else None
     given = Counter(slots[trial.index].part for trial in record.table if trial.index < len(slots))
-    done = ", ".join(f"{given[part]} {words}" for part, words in _PARTS.items())
+    done = ", ".join(f"{given[part]} {name}" for part, name in _PARTS.items())
     stop = next((event.text for event in record.events if event.kind == "stop"), None)
     over = stop or (last.reason if last is not None and last.stop else "")
     way_on = continued_by(record.path, record.header, config, end_lost=record.end_lost)
     arm = f"Arm: {intervention.arm.words}."
     if record.conceals:
         arm = f"The arm is concealed. Open it when nobody has to be blind: {command('pair', '--open', record.path)}"
-    return "\n".join(
-        [over or f"The intervention is not over. Do: continue it with {way_on}", f"Delivered: {done}.", arm]
-    )
+    way_on = over or f"The intervention is not over. Do: continue it with {way_on}"
+    return "\n".join([way_on, f"Delivered: {done}.", *_change(record), arm])
+
+
+def _change(record: SessionRecord) -> list[str]:
+    """What pulses of TMS alone say of a change, if there are enough of them."""
+    pairing = pairing_of(record)
+    if record.conceals and record.given < len(pairing.plan.slots):
+        return [words.NOT_YET]
+    try:
+        effect = change_of(pairing.tests, pairs=pairing.plan.pairs)
+    except InvalidValueError:
+        return []
+    return [words.answer(effect), words.drift(effect), words.NO_CAUSE]
 
 
 _PARTS: Final = {Part.BEFORE: "before", Part.PAIRS: "of the intervention", Part.AFTER: "after"}
