@@ -56,6 +56,7 @@ QUICK: Final[Mapping[str, str]] = {
     "long_sessions": "--most 100",
     "lsl_throughput": "--seconds 5",
     "measured_windows": "--sweeps 2",
+    "pairing_watch": "--people 1 --trials 8 --out OUT",
     "people": "--cohorts gaussian,recruitment --people 3 --trials 10 --out OUT",
     "plausibility": "--people 2 --trials 20 --rigs 5 --out OUT",
     "raw_sweeps plain": "--people 1",

@@ -74,7 +74,7 @@ def knowing() -> Strategy:
 def planned(**changes: Any) -> Plan:
     """A short plan."""
     usual: dict[str, Any] = {"pairs": 50, "before": 3, "after": 3, "after_min": (0.0, 2.0), "block_pairs": 20}
-    return Plan("2026-17", **usual | changes)
+    return Plan(**{"protocol_code": "2026-17"} | usual | changes)
 
 
 def intervention(arm: Arm = Arm.WINDOW, arms: tuple[Arm, ...] = EVERY_ARM, **changes: Any) -> Intervention:

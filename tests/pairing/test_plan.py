@@ -66,9 +66,5 @@ def test_a_digest_of_no_arm_of_the_plan_is_refused() -> None:
     ],
 )
 def test_a_plan_that_makes_no_sense_is_refused(changes: dict[str, Any], says: str) -> None:
-    code = changes.pop("protocol_code", None)
     with pytest.raises(InvalidValueError, match=says):
-        if code is None:
-            planned(**changes)
-        else:
-            type(planned())(code)
+        planned(**changes)

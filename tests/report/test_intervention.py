@@ -32,7 +32,7 @@ def test_a_page_shows_the_change_each_block_the_dose_and_the_window() -> None:
         "after 60 min",
         "all blocks",
         "45 pairs at 88–90 ms and 5 probes",
-        "window as known then",
+        "window",
     ):
         assert said in page.words
     assert "taken" in page.words  # the subject's code is text

@@ -1,0 +1,105 @@
+"""Whether pairs stay in a window that moves, if it is watched: the same people with watching and without.
+
+    python -m benchmarks.pairing_watch --people 40 --seed 140000 --out benchmarks/results/pairing_watch
+
+Each person's window is searched for with the default, and then used for 100 pairs: once it stays, and once it moves
+by 25 ms within them, earlier or later by turns. "Watching" is the plan's default, a tenth of the pairs as probes and an
+ISI that may move by 10 ms a block; without it the ISI stays where the search left it. Shares are of all pairs, probes
+among them, whose realised ISI lies in the true window at that time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import pandas as pd
+import typer
+
+import isiw
+from benchmarks.provenance import facts_of
+from benchmarks.quick import understood
+from benchmarks.tables import write_table
+from isiw.intervention import Arm, Intervention, Plan, sealed
+from isiw.pairing.agenda import Agenda
+from isiw.strategy.strategy import Strategy
+from isiw.subjects import SimulatedSubject, cohort
+from isiw.subjects.changes import Change
+from isiw.trials import Status, Trial
+
+SPACE = isiw.VALVE_SPACE
+MOVES_MS = 25.0
+PLAN = Plan("benchmark", before=1, after=1, pairs=100)
+PLANS = {"watching": PLAN, "without": replace(PLAN, probes=0.0, follow_ms=0.0)}
+
+
+def searched(subject: SimulatedSubject, seed: int, trials: int) -> Strategy | None:
+    """A strategy that knows what a search for the window taught; None if it found none."""
+    person, search = subject.begin(seed), isiw.make_strategy("default", SPACE, seed=seed, max_trials=trials)
+    table = []
+    for index in range(trials):
+        response = person.respond(search.ask(), SPACE.reference)
+        table.append(Trial(index, Status.ACCEPTED, None, isi_ms=response.isi_ms, mep_mv=response.mep_mv))
+        search.learn(response.isi_ms, response.mep_mv)
+    knowing = search.restarted()
+    knowing.learn_all(table)
+    return None if knowing.estimate().window is None else knowing
+
+
+def paired(strategy: Strategy, subject: SimulatedSubject, plan: Plan, seed: int) -> tuple[float, float]:
+    """The share of the pairs in the true window, and of those that were no probes."""
+    agenda = Agenda(Intervention(plan, sealed(Arm.WINDOW)), strategy, seed)
+    person, trials, inside = subject.begin(seed + 1_000_000), [], []
+    for slot in plan.slots[: plan.last_pair + 1]:
+        alone = agenda.control(slot.number) is not None
+        isi_ms = None if alone else agenda.isi_ms(trials)
+        response = person.respond(isi_ms, SPACE.reference)
+        trials.append(Trial(slot.number, Status.ACCEPTED, isi_ms, isi_ms=response.isi_ms, mep_mv=response.mep_mv))
+        if response.isi_ms is not None:
+            window = subject.window(SPACE, slot.place + 1)
+            is_in = window is not None and bool(window.mask([response.isi_ms])[0])
+            inside.append((is_in, plan.is_probe(slot, seed)))
+    usual = [is_in for is_in, probe in inside if not probe]
+    return sum(is_in for is_in, _ in inside) / len(inside), sum(usual) / len(usual)
+
+
+def rows(name: str, people: int, seed: int, trials: int) -> Iterator[dict[str, object]]:
+    """A row for each person, course of the window, and way."""
+    for number, subject in enumerate(cohort(name, people, seed)):
+        if subject.window(SPACE) is None or (strategy := searched(subject, seed + number, trials)) is None:
+            continue
+        shift_ms = MOVES_MS * (-1) ** number
+        moving = replace(subject, change=Change(first=2, last=101, shift_ms=shift_ms))
+        for course, one in {"stays": subject, "moves": moving}.items():
+            for way, plan in PLANS.items():
+                share, usual = paired(strategy, one, plan, seed + number)
+                yield {"cohort": name, "person": number, "window": course, "way": way, "share": share, "usual": usual}
+
+
+def summary(table: pd.DataFrame) -> pd.DataFrame:
+    """Means over people, and what watching brings in pairs."""
+    wide = table.pivot_table(index=["cohort", "window", "person"], columns="way", values="share")
+    wide["more"] = wide["watching"] - wide["without"]
+    grouped = wide.groupby(level=["cohort", "window"])
+    mean = grouped.mean()
+    mean["se"], mean["people"] = grouped["more"].sem(), grouped.size()
+    return mean.reset_index()
+
+
+def main(
+    out: Annotated[Path, typer.Option(help="Path of the result, without suffix.")],
+    people: Annotated[int, typer.Option(help="People of each cohort.")] = 40,
+    seed: Annotated[int, typer.Option(help="Seed of the people.")] = 140_000,
+    trials: Annotated[int, typer.Option(help="Trials of the search.")] = 40,
+    cohorts: Annotated[list[str], typer.Option("--cohort", help="A cohort; repeat it.")] = ["narrow", "recruitment"],  # noqa: B006 - typer's
+) -> None:
+    """Pair the people of some cohorts."""
+    table = pd.DataFrame([row for name in cohorts for row in rows(name, people, seed, trials)])
+    write_table(summary(table), facts_of("pairing_watch", "numpy", seed=seed, people=people, trials=trials), out)
+
+
+if __name__ == "__main__":
+    understood("pairing_watch")
+    typer.run(main)
