@@ -88,3 +88,15 @@ def test_too_few_pulses_are_refused_with_what_to_do() -> None:
         change_of(pulses[:30])
     with pytest.raises(InvalidValueError):
         TestPulse(math.nan, 120.0, 0.0, "before")
+
+
+@pytest.mark.slow
+def test_intervals_cover_no_change_with_a_drift_and_without_one() -> None:
+    recorded = Drift(0.97, 0.26 * math.sqrt(1 - 0.97**2), ())
+    people = range(40)
+    wide = [change_of(visit(number, 1.0, recorded).pulses, pairs=50).pooled for number in people]
+    narrow = [change_of(visit(number).pulses, pairs=50).pooled for number in people]
+    # Of 40 intervals that cover with a probability of .9, 30 or fewer do with one of .01 (benchmarks/after_effects.py).
+    assert sum(change.factor.holds_none for change in wide) > 30
+    assert sum(change.steady.holds_none for change in narrow) > 30
+    assert sum(change.steady.holds_none for change in wide) < sum(change.factor.holds_none for change in wide)

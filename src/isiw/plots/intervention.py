@@ -102,7 +102,7 @@ def _draw_changes(axes: Axes, effect: AfterEffect) -> None:
 
 
 def dose_figure(delivered: Sequence[Delivered], window: Sequence[tuple[float, float, float]] = ()) -> Figure:
-    """The pairs of an intervention: at which ISIs, and when; and what was known of the window meanwhile.
+    """The pairs of an intervention: at which ISIs, and when; and where the window was.
 
     Args:
         delivered: in the order of delivery.
@@ -121,7 +121,7 @@ def dose_figure(delivered: Sequence[Delivered], window: Sequence[tuple[float, fl
     if window:
         times_s, start, end = np.array(window).T
         right.fill_between(
-            times_s / 60.0, start, end, step="post", color=BLUE, alpha=0.15, lw=0, label="window as known then"
+            times_s / 60.0, start, end, step="post", color=BLUE, alpha=0.15, lw=0, label="window"
         )
     groups = ((~probe, BLUE, "o", "pair"), (probe, ORANGE, "^", "probe of the window"))
     width = max(1.0, float(np.ptp(isi_ms)) / 30.0)

@@ -39,7 +39,7 @@ class InterventionContents:
     """What a page about an intervention is made of.
 
     Args:
-        pulses: of TMS alone, in the order of delivery.
+        pulses: of TMS alone, in the order of delivery; None while they are to be seen by nobody.
         delivered: the pairs; None while the arm is concealed.
         stimuli: how many stimuli lie between the pulses before and after; None if that is the number of pairs.
         window: at some times [s from the first pair] where the window starts and ends [ms].
@@ -50,7 +50,7 @@ class InterventionContents:
         facts: names and values of settings.
     """
 
-    pulses: Sequence[TestPulse]
+    pulses: Sequence[TestPulse] | None
     delivered: Sequence[Delivered] | None
     stimuli: int | None = None
     window: Sequence[tuple[float, float, float]] = ()
@@ -67,7 +67,7 @@ class InterventionContents:
             InvalidValueError: too few pulses.
         """
         stimuli = self.stimuli if self.stimuli is not None else len(self.delivered or ())
-        return change_of(self.pulses, pairs=stimuli)
+        return change_of(self.pulses or (), pairs=stimuli)
 
 
 def contents_of(record: SessionRecord, states: Sequence[str] = ()) -> InterventionContents:
@@ -83,23 +83,20 @@ def contents_of(record: SessionRecord, states: Sequence[str] = ()) -> Interventi
     pairing, intervention = pairing_of(record), record.header.intervention
     arm = "concealed" if record.conceals or intervention is None else intervention.arm.words
     plan, unfinished = pairing.plan, record.given < len(pairing.plan.slots)
-    concealed = [words.NOT_YET] if record.conceals and unfinished else []
+    waits = record.conceals and unfinished
+    given = [f"{record.given} of {len(plan.slots)} stimuli of the plan were given."] if unfinished else []
     facts = [fact for fact in first_facts(record) if fact.name not in _OF_A_SEARCH]
     more = Fact(
         "plan", f"{plan.before} before, {plan.pairs} pairs, {plan.after} in each block after, at each intensity"
     )
     return InterventionContents(
-        () if concealed else pairing.tests,
+        None if waits else pairing.tests,
         None if record.conceals else pairing.pairs,
         plan.pairs,  # all of them, where there are pulses after them
         () if record.conceals else _window_course(record, plan),
         record.header.subject or "an unnamed subject",
         record.path.name,
-        [
-            *states,
-            *concealed,
-            *([f"{record.given} of {len(plan.slots)} stimuli of the plan were given."] if unfinished else []),
-        ],
+        [*states, *given],
         (*record.told_unread, *record.losses),
         [*facts, Fact("arm", arm), Fact("protocol", plan.protocol_code), more],
     )
@@ -138,7 +135,8 @@ def intervention_page(intervention: InterventionContents) -> str:
     try:
         effect = intervention.change()
     except InvalidValueError as error:
-        effect, said = None, [f"{error.what[:1].upper()}{error.what[1:]}."]
+        few = f"{error.what[:1].upper()}{error.what[1:]}."
+        effect, said = None, [words.NOT_YET if intervention.pulses is None else few]
     else:
         said = words.statement(effect)
     delivered = intervention.delivered
@@ -148,7 +146,7 @@ def intervention_page(intervention: InterventionContents) -> str:
         states=list(intervention.states),
         losses=list(intervention.losses),
         statement=said,
-        change="" if effect is None else inline_svg(change_figure(effect, intervention.pulses), "change"),
+        change="" if effect is None else inline_svg(change_figure(effect, intervention.pulses or ()), "change"),
         headings=HEADINGS,
         rows=[] if effect is None else [_row(change) for change in (*effect.blocks, effect.pooled)],
         dose=words.CONCEALED if delivered is None else words.dose(delivered),
