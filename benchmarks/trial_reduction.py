@@ -2,9 +2,11 @@
 
     python -m benchmarks.trial_reduction --quick
     python -m benchmarks.trial_reduction
+    python -m benchmarks.trial_reduction --rows
 
 writes a report (Markdown), its tables with versions, command and seed (JSON) and figures (PNG). Run it from the
-project's root. Reported people come from seed 10,000 on; seeds below 1,000 are for work.
+project's root. `--rows` plays only the main comparison, with 88 sessions a row, and judges the claims about it again.
+Reported people come from seed 10,000 on; seeds below 1,000 are for work.
 """
 
 from __future__ import annotations
@@ -34,6 +36,7 @@ from benchmarks.reduction import (
     particles,
     pf_readings,
     reading_table,
+    rows,
     verdicts,
     wrong,
 )
@@ -55,29 +58,29 @@ def measured(size: Size, seed: int, workers: Workers) -> Measured:
     """Run everything."""
     plans = {part: part.sessions(size, seed) for part in PARTS}
     outcomes = run_sessions((session for plan in plans.values() for session in plan), workers)
-    rows = {part.__name__: frame(plan, outcomes) for part, plan in plans.items()}
+    found = {part.__name__: frame(plan, outcomes) for part, plan in plans.items()}
     waveforms = in_parallel(online.examine, online.plan(size.online, seed, size.default), workers, "online")
-    return rows, waveforms
+    return found, waveforms
 
 
 def report(found: Measured, facts: dict[str, Any], out: Path) -> None:
     """Tell it."""
     named, waveforms = found
-    rows = {part: named[part.__name__] for part in PARTS}
-    claims = verdicts.all_claims(rows, waveforms)
+    of_part = {part: named[part.__name__] for part in PARTS}
+    claims = verdicts.all_claims(of_part, waveforms)
     sections = [
         verdicts.section(claims),
-        comparison.section(rows[comparison]),
-        reading_table.section(rows[reading_table]),
-        pf_readings.section(rows[pf_readings]),
-        conventional.section_sweeps(rows[comparison]),
-        conventional.section_burden(rows[comparison]),
-        initial.section(rows[initial]),
-        particles.section(rows[particles]),
-        gaussians.section(rows[gaussians], rows[comparison]),
+        comparison.section(of_part[comparison]),
+        reading_table.section(of_part[reading_table]),
+        pf_readings.section(of_part[pf_readings]),
+        conventional.section_sweeps(of_part[comparison]),
+        conventional.section_burden(of_part[comparison]),
+        initial.section(of_part[initial]),
+        particles.section(of_part[particles]),
+        gaussians.section(of_part[gaussians], of_part[comparison]),
         online.section(waveforms),
     ]
-    opening = verdicts.opening(claims, rows[comparison])
+    opening = verdicts.opening(claims, of_part[comparison])
     write(sections, facts, out, TITLE, opening, claims_as_json(claims))
 
 
@@ -100,9 +103,17 @@ def main(
     few: Annotated[bool, typer.Option(help="Hardly any people.")] = False,
     go_on: Annotated[bool, typer.Option(help="Go on with a run that was interrupted, with the same code.")] = False,
     again: Annotated[bool, typer.Option(help="Tell once more what the last run measured.")] = False,
+    rows_alone: Annotated[
+        bool, typer.Option("--rows", help="Only the main comparison, 88 sessions a row, and the claims about it.")
+    ] = False,
 ) -> None:
     """Reproduce the dissertation's reduction of trials."""
     kept = out.with_suffix(".parts")
+    if rows_alone:
+        workers = Workers(processes, kept.with_suffix(".done.parts"))
+        made = {"command": f"`{command_of('trial_reduction')}`", "versions": made_with(*VERSIONS), "seed": seed}
+        print(rows.rewritten(rows.measured(FULL, seed, workers), made, out))
+        return
     if not again:
         run(FEW if few else FULL, seed, processes, kept, go_on=go_on)
     if not kept.exists():

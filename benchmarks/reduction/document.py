@@ -12,7 +12,7 @@ from typing import Any, Final
 import pandas as pd
 from matplotlib.figure import Figure
 
-__all__ = ["DPI", "Section", "Table", "write"]
+__all__ = ["DPI", "Section", "Table", "markdown", "write"]
 
 DPI: Final = 110
 
@@ -66,7 +66,7 @@ def write(
     header = [f"- {key}: {value}" for key, value in facts.items()]
     lines = [f"# {title}", "", fill(opening, 120), "", *header, ""]
     for section in sections:
-        lines += _markdown(section, out)
+        lines += markdown(section, out)
     out.with_suffix(".md").write_text("\n".join(lines).rstrip() + "\n")
     record = {
         "facts": dict(facts),
@@ -77,7 +77,8 @@ def write(
     out.with_suffix(".json").write_text(json.dumps(record, indent=1, ensure_ascii=False) + "\n")
 
 
-def _markdown(section: Section, out: Path) -> list[str]:
+def markdown(section: Section, out: Path) -> list[str]:
+    """A section as lines of Markdown; its figure is written beside `out`."""
     lines = [f"## {section.title}", "", section.prose, ""]
     if section.figure is not None:
         name, picture = section.figure

@@ -280,4 +280,5 @@ def outcome(trial: Trial) -> str:
     if trial.reason is not None:
         return f"mistrial: {trial.reason}"
     text = "–" if trial.mep_mv is None else f"{1e3 * trial.mep_mv:.0f} µV"
+    text += "" if trial.intensity_pct_rmt is None else f" at {trial.intensity_pct_rmt:g} %"
     return f"{text} (excluded)" if trial.excluded else text

@@ -16,6 +16,8 @@ from isiw.dissertation.repeatability import (
     RotationEvents,
     TimingStudy,
     error_probabilities,
+    hit_delay_ms,
+    study_emg,
     study_preset,
     study_session,
     study_sweeps,
@@ -179,6 +181,21 @@ def test_each_sweep_of_a_study_has_its_isi() -> None:
     sweeps = [instance(Sweep, device.deliver(Stimulus(trial, 50.0), 1.0)) for trial in range(3)]
     with pytest.raises(InvalidValueError, match="got 2; expected 3"):
         study_sweeps("three taps", sweeps, [50.0, 50.0])
+
+
+@pytest.mark.parametrize("name", ["subject1", "subject2", "subject3", "subject4"])
+def test_without_an_accelerometer_the_hit_is_found_in_the_emg_to_within_what_people_differ_by(name: str) -> None:
+    robot = Tapper(lambda _: NoResponse(), name, TapperSettings(trigger="impact"))
+    sweeps = [robot.answer(Stimulus(trial, 60.0)) for trial in range(20)]
+    usual = study_sweeps("with", sweeps, [60.0] * 20)
+    blind = [replace(sweep, channels={"emg": sweep.channels["emg"]}) for sweep in sweeps]
+    study = study_emg("without", blind, [60.0] * 20)
+    off_ms = instance(TapEvents, study.events).hit_ms - instance(TapEvents, usual.events).hit_ms
+    assert abs(off_ms.mean()) < 1.5 * study.hit_sd_ms
+    assert off_ms.std() < 2.0
+    said = timing_report(study)
+    assert "No acceleration: hits are 20.5 ms before the tap shows in the EMG" in said
+    assert known(hit_delay_ms(study))[1] > known(hit_delay_ms(usual))[1]
 
 
 def on_the_pulses_clock(sweep: Sweep) -> Sweep:

@@ -50,6 +50,8 @@ def test_pairs_have_the_named_intensities_in_turn_and_the_log_says_which(tmp_pat
     assert [trial.intensity_pct_rmt for trial in result.trials] == [None, 100.0, 110.0] * 2
     record = isiw.read_session(tmp_path / "mixed.mcap")
     assert [intent.intensity_pct_rmt for intent in record.intents] == [90.0, 100.0, 110.0] * 2
+    rows = isiw.report.words.trial_rows(record)
+    assert [("at 110 %" in outcome) for _, _, outcome, _ in rows] == [False, False, True] * 2
 
 
 def test_the_acquisition_function_chooses_only_among_the_named_ones(tmp_path: Path) -> None:

@@ -22,7 +22,14 @@ from isiw.devices.robot.waveforms import record_emg, record_robot, sample_times_
 from isiw.errors import InvalidValueError
 from isiw.lazy import pd, scipy
 from isiw.log.reader import SessionRecord
-from isiw.signals.events import TapEvents, detect_events, first_rise, sweep_events
+from isiw.signals.events import (
+    EMG_DELAY_MS,
+    TapEvents,
+    detect_events,
+    first_rise,
+    impact_times_in_emg,
+    sweep_events,
+)
 from isiw.signals.impact import VALVE_MS
 from isiw.signals.waveforms import as_waveforms, crossing_before, first_true, rest_level
 from isiw.sweeps import Sweep
@@ -91,12 +98,14 @@ class TimingStudy:
         events: those of all taps, or of all rotations [ms from the trial's start, 500 ms before its valve command].
         commanded_ms: commanded ISIs from the impact [ms], NaN for a tap without a pulse, shape (n,).
         realised_ms: realised ISIs [ms], NaN where no impact was found, shape (n,).
+        hit_sd_ms: SD of an error that all hits share, if they were found in the EMG alone [ms]; else 0.
     """
 
     name: str
     events: TapEvents | RotationEvents
     commanded_ms: FloatArray
     realised_ms: FloatArray
+    hit_sd_ms: float = 0.0
 
     @property
     def kind(self) -> str:
@@ -169,7 +178,8 @@ def hit_delay_ms(study: TimingStudy) -> tuple[float, float] | None:
     if not hits_ms.size:
         return None
     error_ms = hits_ms.std(ddof=1) / np.sqrt(hits_ms.size) if hits_ms.size > 1 else 0.0
-    return float(hits_ms.mean()), float(np.hypot(math.sqrt(2.0) * HIT_DELAY_SD_MS, error_ms))
+    shared_ms = math.hypot(error_ms, study.hit_sd_ms)
+    return float(hits_ms.mean()), float(np.hypot(math.sqrt(2.0) * HIT_DELAY_SD_MS, shared_ms))
 
 
 def error_probabilities(commanded_ms: FloatArray, realised_ms: FloatArray, sd_ms: float) -> pd.DataFrame:
@@ -243,16 +253,36 @@ def study_sweeps(name: str, sweeps: Iterable[Sweep], commanded_isi_ms: Iterable[
     return TimingStudy(name, _joined(parts), commanded, np.array(realised))
 
 
+def study_emg(name: str, sweeps: Iterable[Sweep], commanded_isi_ms: Iterable[float | None]) -> TimingStudy:
+    """Run the repeatability study on sweeps without an acceleration: by what the tap does to the EMG (3.3.3)."""
+    parts, realised = [], []
+    for sweep in sweeps:
+        emg, valve_ms, pulse_ms = sweep.channels["emg"], sweep.t_valve_ms or 0.0, sweep.t_tms_ms
+        pulses = None if pulse_ms is None else [pulse_ms - emg.t0_ms]
+        (hit_ms,) = impact_times_in_emg(emg.values, emg.rate_hz, valve_ms=valve_ms - emg.t0_ms, t_tms_ms=pulses)
+        hit_ms += emg.t0_ms
+        realised.append(np.nan if pulse_ms is None else pulse_ms - hit_ms)
+        unknown, shift_ms = np.full(1, np.nan), VALVE_MS - valve_ms
+        seen_ms = np.array([hit_ms + EMG_DELAY_MS[0] + shift_ms])
+        parts.append(TapEvents(unknown, unknown, np.array([hit_ms + shift_ms]), unknown, seen_ms))
+    commanded = np.array([np.nan if isi is None else isi for isi in commanded_isi_ms])
+    return TimingStudy(name, _joined(parts), commanded, np.array(realised), EMG_DELAY_MS[1])
+
+
 def study_session(record: SessionRecord) -> TimingStudy:
-    """Run the repeatability study on the taps of a logged session."""
+    """Run the repeatability study on the taps of a logged session; without an acceleration, by the EMG."""
     record.require_open()
     from_impact = record.header.space.reference == "impact"
     sweeps, commanded = [], []
+    known = {name for trial in record.table for name in record.sweep(trial.index)}
+    channel = "emg" if "acceleration" not in known else "acceleration"
     for trial in record.table:
         channels = record.sweep(trial.index)
-        if "acceleration" in channels and trial.t_valve_ms is not None:
+        if channel in channels and trial.t_valve_ms is not None:
             sweeps.append(Sweep(channels, t_valve_ms=trial.t_valve_ms, t_tms_ms=trial.t_tms_ms))
             commanded.append(trial.commanded_isi_ms if from_impact else None)
+    if channel == "emg" and sweeps:
+        return study_emg(str(record.path), sweeps, commanded)
     return study_sweeps(str(record.path), sweeps, commanded)
 
 
@@ -281,6 +311,9 @@ def timing_report(study: TimingStudy) -> str:
         unknown = "No ISI has three accepted trials, nor have two ISIs two, so the SD of the error is not known."
         known = unknown if np.isnan(study.pooled_sd_ms) else pooled
         lines += ["", f"{known} Mistrials: {study.mistrials}."]
+    if study.hit_sd_ms:
+        how = f"hits are {EMG_DELAY_MS[0]:g} ms before the tap shows in the EMG"
+        lines += ["", f"No acceleration: {how}, and all may be off by {study.hit_sd_ms:g} ms (SD over people)."]
     hit_delay = hit_delay_ms(study)
     if hit_delay is not None:
         mean_ms, sd_ms = hit_delay

@@ -326,7 +326,10 @@ _COLUMNS: Final[Mapping[str, tuple[str, str]]] = {
     "t_tms_ms": ("ms", "the magnetic pulse, on the sweep's clock"),
     "excluded": ("", "whether an operator excluded it afterwards"),
     "tap_alone": ("", "whether it was {0.one} without the magnetic pulse"),
-    "intensity_pct_rmt": ("%", "intensity of TMS alone, of the resting motor threshold; empty for that of the pairs"),
+    "intensity_pct_rmt": (
+        "%",
+        "intensity of the pulse, of the resting motor threshold; empty for the usual one of the pairs",
+    ),
     "overruled": ("", "why it had been a mistrial before an operator accepted it"),
     "p_window": ("", "probability that there is a window, after this trial"),
     "window_start_ms": ("ms", "start of the window that was reported after this trial; empty if none was"),

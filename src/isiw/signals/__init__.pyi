@@ -1,5 +1,6 @@
 from .events import TapEvents as TapEvents
 from .events import detect_events as detect_events
+from .events import impact_times_in_emg as impact_times_in_emg
 from .events import load_cell_times as load_cell_times
 from .events import sweep_events as sweep_events
 from .impact import Impact as Impact

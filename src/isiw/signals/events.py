@@ -17,6 +17,12 @@ from isiw.types import ArrayLike, FloatArray
 MOTION_SD = 3.0
 ARTEFACT_SEARCH_MS = (12.0, 30.0)  # four people: 18 to 23 ms after the impact, SD below 2 (Table 3.2)
 ARTEFACT_SPAN_MS = (-1.0, 2.0)
+EMG_DELAY_MS = (20.5, 2.4)
+"""From the hit to the EMG's deviation [ms]: mean and SD over the four people of Table 3.2 (18, 23, 19 and 22 ms)."""
+
+AFTER_VALVE_MS = (40.0, 450.0)
+"""In which the tap shows in the EMG, of a rig of any hit delay from 20 to 430 ms."""
+
 LATEST_MEP_MS = 50.0  # after the pulse, in hand muscles
 
 
@@ -163,7 +169,37 @@ def _descent_and_away(
     return descent * 1000 / rate_hz, away * 1000 / rate_hz
 
 
-def _in_emg(waves: FloatArray, rate_hz: float, hit_ms: FloatArray, valve_ms: float, pulse_ms: FloatArray) -> FloatArray:
+def impact_times_in_emg(
+    emg: ArrayLike, rate_hz: float, *, valve_ms: float = VALVE_MS, t_tms_ms: ArrayLike | None = None
+) -> FloatArray:
+    """When the hammer hit, by what the tap does to the EMG [ms from the first sample], NaN if never, shape (n,).
+
+    For rigs without an accelerometer: the EMG deviates some 20 ms after the hit [Kim2020, 3.3.3]. It is the mean of
+    `EMG_DELAY_MS` earlier; its SD is how far a person's hits may all be off. What begins 10 to 50 ms after the magnetic
+    pulse may be the MEP, and is left out.
+
+    Args:
+        emg: shape (n, w).
+        rate_hz: sampling rate [Hz].
+        valve_ms: the valve command [ms from the first sample].
+        t_tms_ms: the magnetic pulses [ms from the first sample], shape (n,), NaN for none; None if there are none.
+
+    Raises:
+        InvalidValueError: a waveform that is not a recording, or less than 20 ms of rest.
+    """
+    waves = as_waveforms(emg, rate_hz, "emg")
+    earliest_ms, pulse_ms = np.full(len(waves), valve_ms), per_waveform(t_tms_ms, waves)
+    return _in_emg(waves, rate_hz, earliest_ms, valve_ms, pulse_ms, AFTER_VALVE_MS) - EMG_DELAY_MS[0]
+
+
+def _in_emg(
+    waves: FloatArray,
+    rate_hz: float,
+    hit_ms: FloatArray,
+    valve_ms: float,
+    pulse_ms: FloatArray,
+    span_ms: tuple[float, float] = ARTEFACT_SEARCH_MS,
+) -> FloatArray:
     """When the tap shows in the EMG [ms], NaN if never; what begins 10 to 50 ms after the pulse may be the MEP."""
     level, noise = rest_level(waves, round(valve_ms * rate_hz / 1000), rate_hz)
     deviation = np.abs(waves - level)
@@ -171,7 +207,7 @@ def _in_emg(waves: FloatArray, rate_hz: float, hit_ms: FloatArray, valve_ms: flo
     since_pulse = times - pulse_ms[:, None]
     deviation[(since_pulse >= ARTEFACT_SPAN_MS[0]) & (since_pulse <= ARTEFACT_SPAN_MS[1])] = 0.0
     since_hit = times - hit_ms[:, None]
-    sought = (since_hit >= ARTEFACT_SEARCH_MS[0]) & (since_hit <= ARTEFACT_SEARCH_MS[1])
+    sought = (since_hit >= span_ms[0]) & (since_hit <= span_ms[1])
     sought &= ~((since_pulse >= EARLIEST_ONSET_MS) & (since_pulse <= LATEST_MEP_MS))
     shown = first_true(sought & (deviation > HYSTERESIS_SD * noise))
     onset: FloatArray = crossing_before(deviation, MOTION_SD * noise, shown) * 1000 / rate_hz
