@@ -105,6 +105,7 @@ def test_the_sentences_have_the_figures() -> None:
     assert "not above it are `nr`" in third
 
 
+@pytest.mark.slow
 def test_other_figures_are_another_sentence() -> None:
     worse = FOUND | {"default": FOUND[EVEN], EVEN: FOUND["default"], "nr": (0.0, 0.9, 0.9, 0.9)}
     first, second, third = said(worse)

@@ -30,6 +30,7 @@ def test_told_start_and_width_it_reports_the_true_window_wherever_the_range_ends
     assert min(scores) > 0.97
 
 
+@pytest.mark.slow
 def test_without_a_window_it_says_so() -> None:
     nonresponder = cohort("nonresponder", 2, seed=1)[1]  # of recruitment noise
     assert nonresponder.window(VALVE_SPACE) is None

@@ -181,6 +181,7 @@ def test_a_replay_takes_every_option_that_a_file_may_need(isiw: Command, people:
     assert "No trial is TMS alone: no ISI is '-5', as --alone says." in other.output
 
 
+@pytest.mark.slow
 @pytest.mark.needs_pictures
 def test_a_look_into_a_file_writes_no_log(isiw: Command, tmp_path: Path) -> None:
     path = as_edf(tmp_path)

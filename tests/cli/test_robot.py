@@ -83,6 +83,7 @@ def test_the_closed_loop_on_raw_sweeps_runs_and_goes_on_after_a_kill(isiw: Comma
     assert "acceleration" in Path("killed.html").read_text("utf-8")
 
 
+@pytest.mark.slow
 def test_the_vane_turns_the_wrist_in_the_sweeps_of_a_session(isiw: Command, tmp_path: Path) -> None:
     settings = 'geometry = "subject3"\nwait_ms = 80.0\nvane = { rotor = { height_mm = 20, depth_mm = 150 } }'
     ran = isiw("run", configured(tmp_path, "rotating-tapper", settings, trials=2), "--log", "vane.mcap")

@@ -110,6 +110,7 @@ def test_replay_of_a_row_finds_its_unit_and_what_differs_is_exit_code_1(folder: 
     assert "even.gaussian.00001 is not what it was: f1 differ" in result.output
 
 
+@pytest.mark.slow
 @pytest.mark.needs_pictures
 def test_summary_prints_the_table_and_writes_it_with_a_figure(folder: Path) -> None:
     result = study("summary", folder)

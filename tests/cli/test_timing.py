@@ -17,6 +17,7 @@ def run(*arguments: object) -> Result:
     return CliRunner().invoke(app, ["timing", *map(str, arguments)])
 
 
+@pytest.mark.slow
 def test_timing_of_a_preset_is_printed_and_drawn(tmp_path: Path) -> None:
     result = run("subject1", "--taps", 12, "--output", tmp_path / "timing.png")
     assert result.exit_code == 0
@@ -35,6 +36,7 @@ def test_timing_of_the_vane_actuator_is_printed_and_drawn(tmp_path: Path) -> Non
     assert (tmp_path / "vane.png").exists()
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_study() -> None:
     assert run("cushion", "--taps", 5, "--seed", 3).stdout == run("cushion", "--taps", 5, "--seed", 3).stdout
     assert run("cushion", "--taps", 5, "--seed", 3).stdout != run("cushion", "--taps", 5, "--seed", 4).stdout

@@ -279,6 +279,7 @@ def test_limits_of_another_kind_are_refused(tmp_path: Path, limits: dict[str, An
         load_config(file)
 
 
+@pytest.mark.slow
 def test_every_limit_of_a_configuration_is_the_sessions(tmp_path: Path) -> None:
     wanted = {"min_iti_s": 6, "max_pulses": 30, "max_block_pulses": 12, "rest_s": 90.0, "max_period_pulses": 40}
     file = tmp_path / "session.toml"

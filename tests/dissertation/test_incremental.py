@@ -148,6 +148,7 @@ def test_tms_alone_does_not_move_the_sweep_on() -> None:
     assert strategy.ask_batch(13) == [0.0] * 12 + [5.0]
 
 
+@pytest.mark.slow
 def test_the_sweep_ends_when_it_has_left_the_window_behind() -> None:
     strategy = make_strategy("incremental", seed=0)
     rng = np.random.default_rng(1)

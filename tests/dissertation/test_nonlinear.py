@@ -45,6 +45,7 @@ def test_a_floor_above_the_edges_level_hides_them_unless_it_is_subtracted() -> N
     assert windows["raw"].width_ms > 120.0
 
 
+@pytest.mark.slow
 def test_two_gaussians_are_recovered_with_both_segments() -> None:
     def profile(isi_ms: FloatArray) -> FloatArray:
         return np.asarray(bell_mv(isi_ms, mean_ms=210.0, sd_ms=15.0) + bell_mv(isi_ms, 0.06, mean_ms=320.0, sd_ms=20.0))

@@ -33,6 +33,7 @@ def made(request: pytest.FixtureRequest) -> tuple[str, FloatArray, tuple[Profile
     return name, PROFILES[name], profile_fits(ISIS_MS, PROFILES[name] + noise_mv, most=4)
 
 
+@pytest.mark.slow
 def test_the_curve_that_made_a_profile_is_chosen(made: tuple[str, FloatArray, tuple[ProfileFit, ...]]) -> None:
     name, profile_mv, fits = made
     chosen = best_fit(fits)
@@ -74,6 +75,7 @@ def test_criteria_are_those_of_normal_residuals() -> None:
     assert fit.aicc + constant == pytest.approx(2 * p - 2 * log_likelihood + 2 * p * (p + 1) / (n - p - 1))
 
 
+@pytest.mark.slow
 def test_a_curve_with_as_many_parameters_as_isis_is_never_chosen() -> None:
     fits = profile_fits(ISIS_MS[:8], PROFILES["1 Gaussian"][:8], most=3)
     assert [math.isinf(fit.aicc) for fit in fits[:-1]] == [False, True, True]

@@ -77,6 +77,7 @@ def test_the_two_kinds_of_stimulation_have_the_widths_of_the_dissertation(kind: 
     assert (study.counts["share"] > 0.4).sum() == pytest.approx(width_ms, abs=4)
 
 
+@pytest.mark.slow
 def test_the_window_depends_on_the_threshold() -> None:
     widths = [
         study_counts(STIMULATION["mechanical"], np.arange(0.0, 140.0, 5.0), trials=100, threshold_mv=threshold, seed=1)

@@ -393,6 +393,7 @@ def test_rectified_emg_is_noticed_at_any_level_and_upside_down(change: Callable[
     assert "as if it was rectified" in read_people(made, KNOWN)[0].notes[0]
 
 
+@pytest.mark.slow
 def test_a_pause_in_a_column_of_times_is_a_gap(tmp_path: Path) -> None:
     rows = lines(EMG_MV, trigger("tap"), trigger("pulse")).splitlines(keepends=True)
     (tmp_path / "P01.txt").write_text("".join([*rows[:12040], *rows[12120:]]))  # 20 ms after the second tap

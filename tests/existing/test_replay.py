@@ -56,6 +56,7 @@ def test_what_was_found_is_compared_with_a_window_that_is_known() -> None:
     assert replayed.f1_by_trial("default", None)[0, -1] == 0.0
 
 
+@pytest.mark.slow
 def test_a_replay_is_drawn(tmp_path: Path) -> None:
     replayed = replay(swept(1), ["random"], space=SPACE, seeds=2, trials=5, **FEW)
     assert replayed.plot(tmp_path / "replay.png").stat().st_size > 1000

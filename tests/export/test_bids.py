@@ -317,6 +317,7 @@ def test_two_people_whose_codes_become_one_label_are_refused(tmp_path: Path) -> 
     assert export_logs(tmp_path / "logs", tmp_path / "tables").sessions == 2
 
 
+@pytest.mark.slow
 def test_a_session_without_sweeps_needs_no_edfio(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "edfio", None)
     export_logs(write_sweeps(tmp_path / "s.mcap", {0: {}, 1: {}}), tmp_path / "out", "bids")

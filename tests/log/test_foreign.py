@@ -137,6 +137,7 @@ def test_numbers_that_no_session_has_are_left_out_and_said(foreign: Any, topic: 
     assert len(found.unknown) <= 1  # where the index counts a stimulus that no record tells of
 
 
+@pytest.mark.slow
 def test_as_many_gaps_as_a_log_may_have_are_counted_in_time(foreign: Any) -> None:
     record, _ = read_in_time(foreign(("/intent", json.dumps({"trial": MOST_TRIALS - 1, "isi_ms": 5.0}).encode())))
     assert len(record.unknown) == MOST_TRIALS

@@ -125,6 +125,7 @@ def test_the_best_isi_is_on_the_time_line(record: SessionRecord) -> None:
     assert line_of(figure.axes[0], "best ISI, 90 % interval") == ([60.0], [0.2])
 
 
+@pytest.mark.slow
 def test_a_picture_in_a_page_has_the_pages_colours_and_names_of_its_own(record: SessionRecord) -> None:
     one, other = (inline_svg(course_figure(record), name) for name in ("one", "other"))
     assert one.startswith("<svg")

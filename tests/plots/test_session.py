@@ -167,6 +167,7 @@ def test_where_nothing_counts_the_panels_say_so(record: SessionRecord) -> None:
     assert said == [["no trial counts"], *[["no estimate that rests on trials"]] * 2]
 
 
+@pytest.mark.slow
 def test_a_session_without_trials_is_drawn(record: SessionRecord, tmp_path: Path) -> None:
     empty = type(record)(record.path, record.header, (), (), False)
     assert save_session_plot(empty, tmp_path / "empty.png").stat().st_size > 1000

@@ -17,6 +17,7 @@ def test_the_errors_are_drawn_only_where_isis_were_commanded() -> None:
     assert [label.get_text() for label in figure.axes[1].get_xticklabels()] == ["10", "50"]
 
 
+@pytest.mark.slow
 def test_the_picture_is_saved(tmp_path: Path) -> None:
     path = save_figure(timing_figure(study_preset("subject1", taps=5, isi_ms=())), tmp_path / "new" / "timing.png")
     assert path.stat().st_size > 10_000

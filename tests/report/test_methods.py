@@ -35,6 +35,7 @@ def test_three_methods_and_the_form_of_the_profile_are_told_side_by_side() -> No
     assert all(each.needs and each.cannot for each in (belief, means, counts, form))
 
 
+@pytest.mark.slow
 def test_without_tms_alone_the_baseline_is_guessed_and_the_threshold_is_nobodys_own() -> None:
     _, means, counts, _ = method_answers(analysed(alone=0, trials=2).record)
     assert "guessed: the median of all means" in means.answer

@@ -130,6 +130,7 @@ def test_a_log_that_is_whole_and_closed_is_shown_without_a_warning(page: Page) -
     assert not [value for _, name, value in page.attributes if name == "class" and value == "warning"]
 
 
+@pytest.mark.slow
 def test_a_damaged_log_says_at_the_top_what_is_lost(tmp_path: Path) -> None:
     tapped(tmp_path / "s.mcap", subject="P07")
     whole = bytearray((tmp_path / "s.mcap").read_bytes())

@@ -180,6 +180,7 @@ def test_where_nobody_is_simulated_nobody_answers(recorder: ThresholdRecorder) -
         run_simulated(recorder, print)
 
 
+@pytest.mark.slow
 def test_a_hot_spot_is_sought_by_hand_with_every_place_on_disk_before_it_is_read(tmp_path: Path) -> None:
     person = threshold_cohort("hand", 1, 6)[0].begin(1)
     at = float(round(1.2 * person.person.rmt_pct_mso))

@@ -102,6 +102,7 @@ def test_a_log_of_a_robots_sweeps_is_measured_too(tmp_path: Path) -> None:
     assert set(record.measures) == {trial.index for trial in record.table.told}
 
 
+@pytest.mark.slow
 def test_measures_are_without_the_taps_own_response_as_the_amplitude_is(tmp_path: Path) -> None:
     rig, strategy = (
         TapRig(TapResponse(30.0, 100.0, 0.3, 0.0)),

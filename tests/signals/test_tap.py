@@ -246,7 +246,7 @@ def test_the_artefact_of_the_robots_tap_is_known(isi_ms: float, name: str) -> No
     hit_ms=st.floats(-250.0, 60.0),
     t0_ms=st.floats(-1e4, 1e4),
 )
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_whatever_rate_length_and_offset_a_sweep_has_it_shows_something_or_nothing(
     rate_hz: float, before_ms: float, after_ms: float, hit_ms: float, t0_ms: float
 ) -> None:

@@ -51,6 +51,7 @@ def test_double_precision_as_the_default_changes_no_answer(name: str) -> None:
     np.testing.assert_equal(answers(name, DOUBLE, DOUBLE), usual)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list_strategies())
 def test_a_default_that_changes_in_the_middle_of_a_session_changes_no_answer(name: str) -> None:
     usual = usual_answers(name, SINGLE, SINGLE)

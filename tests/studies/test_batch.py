@@ -22,7 +22,11 @@ from isiw.types import Array, Reference
 from quick import QUICK
 from studies.tiny import FEW, timeless
 
-EVERY = ("default", "even", "random", "gp-straddle", "nr", "svmr", "gpr", "pf", "incremental")
+FITTED = ("gp-straddle", "nr", "svmr", "gpr")
+EVERY = [
+    *("default", "even", "random", "pf", "incremental"),
+    *(pytest.param(name, marks=pytest.mark.slow) for name in FITTED),
+]
 SETTINGS = {**QUICK, "default": FEW, "even": FEW, "random": FEW, "pf": {"particles": 4}}
 
 
@@ -51,6 +55,7 @@ def test_a_batch_of_one_is_that_session(strategy: str) -> None:
     pd.testing.assert_frame_equal(timeless(simulate_batch(batch)), timeless(one_at_a_time(batch)))
 
 
+@pytest.mark.slow
 def test_people_side_by_side_take_less_than_a_megabyte_each() -> None:
     batch = [SimulatedSession("default", "recruitment", person, 5, 3, (3,)) for person in range(12)]
     simulate_batch(batch[:1])  # what is kept for all people

@@ -86,6 +86,7 @@ def test_rows_of_several_folders_are_put_together(
     assert "pf" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_every_column_of_a_row_is_explained(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     names: dict[str, Any] = {"__name__": "docs"}

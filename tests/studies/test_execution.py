@@ -80,6 +80,7 @@ def test_a_worker_leaves_ctrl_c_to_the_process_that_it_works_for() -> None:
     assert first in rest
 
 
+@pytest.mark.slow
 def test_stopping_early_leaves_the_rest_undone() -> None:
     results = Processes(2).results(double, range(100))
     next(results)

@@ -128,6 +128,7 @@ def test_more_comparisons_have_wider_intervals() -> None:
     assert same["high"] - same["low"] > 1.2 * (one["high"] - one["low"])
 
 
+@pytest.mark.slow
 def test_intervals_hold_for_the_share_of_studies_that_they_say() -> None:
     rng, held = np.random.default_rng(5), 0
     for _ in range(60):

@@ -58,6 +58,7 @@ def test_sampled_meps_of_a_gain_have_their_expected_mean(probability: float | No
     assert_mean(values, float(response.expected_evoked_mv(facilitation)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cv", [0.4, 0.9])
 def test_the_noise_of_a_gain_has_its_cv_whatever_the_facilitation(cv: float) -> None:
     response = GainResponse(FLOOR, gain_mv=0.06, cv=cv)
@@ -114,6 +115,7 @@ def test_drift_multiplies_the_response_and_not_the_floor() -> None:
         assert loud == pytest.approx(2 * quiet)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("delta_pct_rmt", "share_above_20_uv", "mean_mv", "cv"),
     [(0, 0.20, 0.02, 1.1), (10, 0.80, 0.07, 0.85), (20, 0.95, 0.15, 0.45)],

@@ -30,7 +30,7 @@ from quick import quick
 
 FEW: dict[str, Any] = {"particles": 100}
 NAMES = sorted(list_strategies())
-FITTED = ("parametric-", "gp-", "supra-", "particles-")
+FITTED = ("parametric-", "gp", "supra-", "particles-", "nr", "svmr")
 """Strategies that take seconds begin so; the particle model itself is checked with the default."""
 SLOW_FITS = [pytest.param(name, marks=pytest.mark.slow) if name.startswith(FITTED) else name for name in NAMES]
 SCORING = sorted(name for name, make in ACQUISITIONS.items() if ProposesIsi not in make(0).needs)

@@ -25,7 +25,7 @@ Run: TypeAlias = tuple[list[Fired], SessionRecord]
 LIMITS = Limits(0, 200, 5.0, 10)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", [*range(4), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(4, 12))])
 def test_a_session_with_a_device_that_fails_in_every_way_loses_nothing_and_gives_nothing_twice(
     tmp_path: Path, seed: int
 ) -> None:

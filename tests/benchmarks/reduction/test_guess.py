@@ -34,6 +34,7 @@ def test_unrelated_meps_are_those_of_other_isis() -> None:
     assert np.ptp(drawn) > 200.0
 
 
+@pytest.mark.slow
 def test_what_is_not_learnt_from_the_person_correlates_with_nothing() -> None:
     r = [run(replace(BARE, wrong=UNRELATED, person=person))["correlation, measured"] for person in range(4)]
     assert np.mean(r) < 0.5

@@ -108,6 +108,7 @@ def test_the_person_answers_the_isi_that_truly_came_about(reference: Reference, 
     assert person.heard_ms == pytest.approx([realised_ms(sweep) for sweep in sweeps], abs=0.2)
 
 
+@pytest.mark.slow
 def test_open_loop_the_isi_varies_with_the_hit_and_triggered_it_does_not() -> None:
     def errors(trigger: Trigger) -> list[float]:
         sweeps = deliver(tapper("subject1", trigger=trigger), 60.0, n=40)
@@ -117,6 +118,7 @@ def test_open_loop_the_isi_varies_with_the_hit_and_triggered_it_does_not() -> No
     assert np.max(np.abs(errors("impact"))) <= 0.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("trigger", ["open-loop", "impact"])
 def test_jitter_moves_the_pulse_and_its_recorded_time_and_no_tap(trigger: Trigger) -> None:
     def pulses_and_hits(jitter_ms: float) -> tuple[np.ndarray, np.ndarray]:

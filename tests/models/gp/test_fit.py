@@ -66,6 +66,7 @@ def test_trials_of_tms_alone_are_the_constant_and_noise() -> None:
     assert (got.log_joint - got.log_prior)[0].item() == pytest.approx(expected.item(), abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("transform", ["log", "sqrt", "none"])
 def test_the_evidence_is_a_density_of_log_amplitudes(transform: Transform) -> None:
     # Summed over all amplitudes that the next trial may have, the predictive density is 1.

@@ -88,6 +88,7 @@ def test_it_conforms(changed: dict[str, Any]) -> None:
     check_model(lambda: replace(FEW, samples=16, **changed), VALVE_SPACE)
 
 
+@pytest.mark.slow
 def test_it_conforms_from_the_impact_and_in_a_narrow_space() -> None:
     for space in (IMPACT_SPACE, DesignSpace(20, 60, reference="impact")):
         check_model(lambda: replace(FEW, samples=16), space)

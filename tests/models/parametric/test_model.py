@@ -138,6 +138,7 @@ def test_trials_told_at_once_and_one_by_one_give_the_same_posterior() -> None:
     assert torch.equal(step_by_step.latents, after(model, observations).latents)
 
 
+@pytest.mark.slow
 def test_people_do_not_see_each_other() -> None:
     model = ParametricModel(likelihood="gamma", samples=100)
     two = model.begin(VALVE_SPACE, 1, people=2)
@@ -178,6 +179,7 @@ def test_tms_alone_teaches_the_floor_and_nothing_about_the_window() -> None:
     assert abs(known(posterior.estimate().probability) - WindowPrior().p_window) < 0.05
 
 
+@pytest.mark.slow
 def test_responses_seen_or_not_are_learnt_from() -> None:
     isis_ms = (190.0, 230.0, 270.0, 310.0, 350.0, 390.0, 430.0) * 3
     seen = [observation(isi_ms, response=float(240 <= isi_ms <= 360)) for isi_ms in isis_ms]
@@ -192,6 +194,7 @@ def test_an_amplitude_of_zero_says_that_it_is_below_the_detection_limit() -> Non
     assert np.median(posterior.baselines_mv()) < 0.006
 
 
+@pytest.mark.slow
 def test_an_uncertain_isi_leaves_the_edges_less_certain() -> None:
     exact = evenly("gaussian", 1, 24)
     blurred = [replace(each, isi_sd_ms=np.array([15.0], dtype=np.float32)) for each in exact]

@@ -9,6 +9,7 @@ from isiw.devices.robot.vane.tapper import UNITS, draw_strokes, record_strokes
 MODULE = "isiw.devices.robot.vane.tapper"
 
 
+@pytest.mark.slow
 def test_without_variation_all_strokes_are_one_and_without_noise_they_are_recorded_as_they_are(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
