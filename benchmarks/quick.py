@@ -34,8 +34,8 @@ QUICK: Final[Mapping[str, str]] = {
     "before_and_now stops": "--out OUT",
     "bounds": "--sessions 20",
     "calibration": "--replications 4 --trials 5 --people 1 --out OUT",
-    "compare": "--people 2 --slow-people 1 --trials 20 --cohorts recruitment,gaussian "
-    "--parts named,regressions,particles,botorch --out OUT",
+    "compare": "--people 2 --slow-people 1 --trials 20 --rows 3 --cohorts recruitment "
+    "--parts named,regressions,particles,gp,botorch,supra,parametric --out OUT",
     "deaths": "--kills 9 --out OUT",
     "dissertation": "--few --out OUT",
     "fair_opponent": "--people 3 --trials 12 --out OUT",
