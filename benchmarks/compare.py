@@ -6,8 +6,8 @@
 writes tables and three sentences (Markdown), all figures and README's table (JSON), and a picture (SVG). Rows
 are kept in a folder beside them as sessions finish: the same command continues where it was interrupted. `--first 50`
 ends each row after its first fifty people, `--parts`, `--rows` and `--cohorts` run some rows only; the tables are made
-of all that is in the folder, and say how many people each row has. Recorded people need the folder that ISIW_SHARED_DATA
-names. People of seeds below 1,000 are for work.
+of all that is in the folder, and say how many people each row has. Recorded people need the folder that
+ISIW_SHARED_DATA names. People of seeds below 1,000 are for work.
 """
 
 from __future__ import annotations
