@@ -5,9 +5,9 @@
 
 writes tables and three sentences (Markdown), all figures and README's table (JSON), and a picture (SVG). Rows
 are kept in a folder beside them as sessions finish: the same command continues where it was interrupted. `--first 50`
-ends each row after its first fifty people, `--parts` and `--cohorts` run some rows only; the tables are made of all
-that is in the folder, and say how many people each row has. Recorded people need the folder that ISIW_SHARED_DATA
-names. People of seeds below 1,000 are for work.
+ends each row after its first fifty people, `--parts`, `--rows` and `--cohorts` run some rows only; the tables are made
+of all that is in the folder, and say how many people each row has. Recorded people need the folder that
+ISIW_SHARED_DATA names. People of seeds below 1,000 are for work.
 """
 
 from __future__ import annotations
@@ -98,6 +98,9 @@ def main(  # noqa: PLR0913, PLR0917 - an option each
     trials: Annotated[int, typer.Option(help="Pairs a session.")] = 60,
     seed: Annotated[int, typer.Option(help="Seed of the people.")] = SEED,
     first: Annotated[int, typer.Option(help="End each row after so many people; 0 for all.")] = 0,
+    rows_a_part: Annotated[
+        int, typer.Option("--rows", help="Rows of each part but the first, the named strategies; 0 for all.")
+    ] = 0,
     only: Annotated[str, typer.Option("--parts", help="Parts to run, comma-separated; all if empty.")] = "",
     cohorts: Annotated[str, typer.Option(help="Cohorts to run, comma-separated; none to write tables only.")] = (
         ",".join(COHORTS)
@@ -110,7 +113,7 @@ def main(  # noqa: PLR0913, PLR0917 - an option each
     """Compare strategies on the same people."""
     executor = DaskCluster(dask) if dask else Processes(workers)
     plan = Plan(out.with_suffix(".rows"), people, trials, seed, first, executor)
-    every, wanted = parts(slow_people, reference_people), [name for name in cohorts.split(",") if name]
+    every, wanted = parts(slow_people, reference_people, rows_a_part), [name for name in cohorts.split(",") if name]
     with Progress() as progress:
         for part in chosen(every, [name for name in only.split(",") if name]):
             for cohort in wanted:
