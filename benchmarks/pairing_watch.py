@@ -42,7 +42,7 @@ def searched(subject: SimulatedSubject, seed: int, trials: int) -> Strategy | No
     for index in range(trials):
         response = person.respond(search.ask(), SPACE.reference)
         table.append(Trial(index, Status.ACCEPTED, None, isi_ms=response.isi_ms, mep_mv=response.mep_mv))
-        search.learn(response.isi_ms, response.mep_mv)
+        search.learn(Trial.of(response.isi_ms, response.mep_mv))
     knowing = search.restarted()
     knowing.learn_all(table)
     return None if knowing.estimate().window is None else knowing
