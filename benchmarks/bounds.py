@@ -139,5 +139,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    understood("bounds")
+    understood("bounds", prints=True)
     main()

@@ -179,5 +179,5 @@ def listed(command: str, only: Sequence[str] | None) -> bool:
 
 
 if __name__ == "__main__":
-    understood("first_words")
+    understood("first_words", prints=True)
     main()

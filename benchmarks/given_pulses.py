@@ -154,5 +154,5 @@ def main(
 
 
 if __name__ == "__main__":
-    understood("given_pulses")
+    understood("given_pulses", prints=True)
     typer.run(main)

@@ -100,5 +100,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    understood("house")
+    understood("house", prints=True)
     main()

@@ -80,5 +80,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    understood("impact_stream")
+    understood("impact_stream", prints=True)
     main()

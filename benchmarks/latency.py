@@ -135,5 +135,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    understood("latency")
+    understood("latency", prints=True)
     main()

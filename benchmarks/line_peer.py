@@ -137,5 +137,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    understood("line_peer")
+    understood("line_peer", prints=True)
     main()

@@ -221,5 +221,5 @@ def _say_how(load: float) -> None:
 
 
 if __name__ == "__main__":
-    understood("live")
+    understood("live", prints=True)
     main()

@@ -142,5 +142,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    understood("log_damage")
+    understood("log_damage", prints=True)
     main()

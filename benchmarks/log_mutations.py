@@ -264,5 +264,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    understood("log_mutations")
+    understood("log_mutations", prints=True)
     main()

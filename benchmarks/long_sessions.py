@@ -133,5 +133,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    understood("long_sessions")
+    understood("long_sessions", prints=True)
     main()

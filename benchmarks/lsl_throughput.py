@@ -129,5 +129,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    understood("lsl_throughput")
+    understood("lsl_throughput", prints=True)
     main()

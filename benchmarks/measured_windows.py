@@ -119,5 +119,5 @@ def main(
 
 
 if __name__ == "__main__":
-    understood("measured_windows")
+    understood("measured_windows", prints=True)
     typer.run(main)

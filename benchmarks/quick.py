@@ -5,16 +5,17 @@
 
 Every benchmark understands it by the same rule. `--quick` stands for the options of `QUICK`; one that the command gives
 itself stays as given. What a quick run writes goes into a folder of its own, `FOLDER`, unless `--out` says otherwise,
-so that no committed result is lost.
+so that no committed result is lost. Of a benchmark that writes nothing but what it prints, `--out FILE` keeps that.
 """
 
 from __future__ import annotations
 
+import io
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Final
+from typing import Final, TextIO
 
 from threadpoolctl import threadpool_limits
 
@@ -33,8 +34,8 @@ QUICK: Final[Mapping[str, str]] = {
     "before_and_now stops": "--out OUT",
     "bounds": "--sessions 20",
     "calibration": "--replications 4 --trials 5 --people 1 --out OUT",
-    "compare": "--people 2 --slow-people 1 --trials 20 --cohorts recruitment,gaussian "
-    "--parts named,regressions,particles,botorch --out OUT",
+    "compare": "--people 2 --slow-people 1 --trials 20 --rows 3 --cohorts recruitment "
+    "--parts named,regressions,particles,gp,botorch,supra,parametric --out OUT",
     "deaths": "--kills 9 --out OUT",
     "dissertation": "--few --out OUT",
     "fair_opponent": "--people 3 --trials 12 --out OUT",
@@ -90,18 +91,63 @@ QUICK: Final[Mapping[str, str]] = {
 """What `--quick` stands for, by benchmark and command; OUT is the benchmark's name in `FOLDER`."""
 
 
-def understood(benchmark: str) -> None:
-    """Put what `--quick` stands for in the place of it, before the command line is read.
+def understood(benchmark: str, *, prints: bool = False) -> None:
+    """Put what `--quick` stands for in the place of it, before the command line is read; and keep what is printed.
 
     Args:
         benchmark: its module in this folder.
+        prints: it has no option `--out` of its own, since all that it finds is what it prints.
     """
     given = sys.argv[1:]
     if "--help" in given:
         print(f"--quick stands for: {_meant(benchmark, given)}\n")
+        if prints:
+            print("--out FILE keeps what is printed in a file, too.\n")
     if "--quick" in given:
         threadpool_limits(1)  # small matrices gain nothing from several threads, which cost processor time
         sys.argv[1:] = expanded(benchmark, given)
+    if prints:
+        sys.argv[1:], out = without_out(sys.argv[1:])
+        if out is not None:
+            _keep_printed(out)
+
+
+def without_out(given: Sequence[str]) -> tuple[list[str], Path | None]:
+    """A command line without `--out FILE`, and the file.
+
+    Args:
+        given: the command line.
+
+    Raises:
+        SystemExit: `--out` without a file.
+    """
+    words = [part for word in given for part in (word.split("=", 1) if word.startswith("--out=") else [word])]
+    if "--out" not in words:
+        return words, None
+    place = words.index("--out")
+    if place + 1 == len(words):
+        raise SystemExit("--out needs a file.")
+    return words[:place] + words[place + 2 :], Path(words[place + 1])
+
+
+class _Both(io.TextIOBase):
+    """What is written to it goes to two places."""
+
+    def __init__(self, shown: TextIO, kept: TextIO) -> None:
+        self._shown, self._kept = shown, kept
+
+    def write(self, text: str) -> int:
+        self._kept.write(text)
+        return self._shown.write(text)
+
+    def flush(self) -> None:
+        self._kept.flush()
+        self._shown.flush()
+
+
+def _keep_printed(out: Path) -> None:
+    out.parent.mkdir(parents=True, exist_ok=True)
+    sys.stdout = _Both(sys.stdout, out.open("w", encoding="utf-8", buffering=1))
 
 
 def expanded(benchmark: str, given: Sequence[str]) -> list[str]:

@@ -254,5 +254,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    understood("read_files")
+    understood("read_files", prints=True)
     main()

@@ -59,7 +59,7 @@ def examined(person: isiw.subjects.SimulatedSubject, seed: int) -> list[float]:
 
 def main() -> None:
     """Print the table."""
-    understood("replayed")
+    understood("replayed", prints=True)
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--people", type=int, default=200)
     parser.add_argument("--first", type=int, default=20_000)

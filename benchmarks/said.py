@@ -214,5 +214,5 @@ def main(
 
 
 if __name__ == "__main__":
-    understood("said")
+    understood("said", prints=True)
     typer.run(main)

@@ -83,5 +83,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    understood("same_asks")
+    understood("same_asks", prints=True)
     main()

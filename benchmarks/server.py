@@ -215,5 +215,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    understood("server")
+    understood("server", prints=True)
     main()

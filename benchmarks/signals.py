@@ -79,5 +79,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    understood("signals")
+    understood("signals", prints=True)
     main()

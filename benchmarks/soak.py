@@ -210,5 +210,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    understood("soak")
+    understood("soak", prints=True)
     main()

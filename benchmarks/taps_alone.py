@@ -95,5 +95,5 @@ def main(
 
 
 if __name__ == "__main__":
-    understood("taps_alone")
+    understood("taps_alone", prints=True)
     typer.run(main)

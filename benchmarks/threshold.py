@@ -210,5 +210,5 @@ believes.
 
 
 if __name__ == "__main__":
-    understood("threshold")
+    understood("threshold", prints=True)
     typer.run(main)

@@ -109,5 +109,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    understood("throughput")
+    understood("throughput", prints=True)
     main()

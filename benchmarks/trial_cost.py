@@ -56,5 +56,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    understood("trial_cost")
+    understood("trial_cost", prints=True)
     main()

@@ -135,5 +135,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    understood("trial_way")
+    understood("trial_way", prints=True)
     main()

@@ -210,5 +210,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    understood("waveform_loop")
+    understood("waveform_loop", prints=True)
     main()

@@ -118,5 +118,5 @@ def main(
 
 
 if __name__ == "__main__":
-    understood("zero_trials")
+    understood("zero_trials", prints=True)
     typer.run(main)

@@ -10,13 +10,17 @@ import sys
 from pathlib import Path
 
 import pytest
-from benchmarks.quick import FOLDER, QUICK, expanded
+from benchmarks.quick import FOLDER, QUICK, expanded, without_out
 
 ROOT = Path(__file__).parents[2]
 BENCHMARKS = {
     match[1]: path
     for path in sorted((ROOT / "benchmarks").rglob("*.py"))
-    if (match := re.search(r'^    understood\("(.+)"\)$', path.read_text(encoding="utf-8"), re.MULTILINE))
+    if (
+        match := re.search(
+            r'^    understood\("(.+?)"(?:, prints=True)?\)$', path.read_text(encoding="utf-8"), re.MULTILINE
+        )
+    )
 }
 MODULES = sorted(path for path in (ROOT / "benchmarks").rglob("*.py") if not path.name.startswith("__"))
 MOST_S = 120.0
@@ -66,6 +70,31 @@ def test_a_command_of_several_has_its_own_sizes() -> None:
 
 def test_without_quick_a_command_line_stays_as_it_is() -> None:
     assert expanded("people", ["--people", "2"]) == ["--people", "2"]
+
+
+@pytest.mark.parametrize("name", sorted(BENCHMARKS))
+def test_every_benchmark_takes_out(name: str) -> None:
+    source = BENCHMARKS[name].read_text(encoding="utf-8")
+    own = re.search(r'"--out"|\bout: (Annotated|Path)', source, re.MULTILINE)
+    assert (own is None) == ("prints=True" in source)
+
+
+def test_a_benchmark_that_only_prints_says_so_and_keeps_what_it_prints_in_out() -> None:
+    script = (
+        "import sys; sys.path.insert(0, {!r}); from benchmarks.quick import understood\n"
+        "understood('zero_trials', prints=True)\nprint(sys.argv[1:])"
+    )
+    run = [sys.executable, "-c", script.format(str(ROOT))]
+    for words in (["--people", "3", "--out", "new/found.md"], ["--out=new/found.md", "--people", "3"]):
+        ended = subprocess.run([*run, *words], capture_output=True, text=True, check=True)  # noqa: S603 - as above
+        assert ended.stdout == Path("new/found.md").read_text(encoding="utf-8") == "['--people', '3']\n"
+    helped = subprocess.run([*run, "--help"], capture_output=True, text=True, check=True)  # noqa: S603 - as above
+    assert "--out FILE" in helped.stdout
+
+
+def test_out_without_a_file_is_refused() -> None:
+    with pytest.raises(SystemExit, match="needs a file"):
+        without_out(["--people", "3", "--out"])
 
 
 @pytest.mark.long
