@@ -5,9 +5,9 @@
 
 writes tables and three sentences (Markdown), all figures and README's table (JSON), and a picture (SVG). Rows
 are kept in a folder beside them as sessions finish: the same command continues where it was interrupted. `--first 50`
-ends each row after its first fifty people, `--parts` and `--cohorts` run some rows only; the tables are made of all
-that is in the folder, and say how many people each row has. Recorded people need the folder that ISIW_SHARED_DATA
-names. People of seeds below 1,000 are for work.
+ends each row after its first fifty people, `--parts`, `--rows` and `--cohorts` run some rows only; the tables are made
+of all that is in the folder, and say how many people each row has. Recorded people need the folder that
+ISIW_SHARED_DATA names. People of seeds below 1,000 are for work.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from rich.progress import Progress
 from benchmarks.comparison.guess import with_guess
 from benchmarks.comparison.measures import table_of
 from benchmarks.comparison.picture import picture
-from benchmarks.comparison.rows import Part, chosen, parts
+from benchmarks.comparison.rows import EVEN, Part, chosen, parts
 from benchmarks.comparison.running import COHORTS, Plan, processor_ms, rows_of, run_part, timed
-from benchmarks.comparison.words import PEOPLE, compared_rows, readable, readme_table, savings, sentences
+from benchmarks.comparison.words import DEFAULT, PEOPLE, compared_rows, readable, readme_table, savings, sentences
 from benchmarks.provenance import facts_of
 from benchmarks.quick import understood
 from benchmarks.tables import write_tables
@@ -48,7 +48,7 @@ the same eleven)."""
 def write(
     rows: pd.DataFrame, processor: dict[str, float], facts: dict[str, object], out: Path, drawn: Path | None = None
 ) -> None:
-    """Tables, sentences and picture.
+    """Tables; with even ISIs and the default among the rows, sentences and picture, too.
 
     Args:
         rows: of all that was run, and of the fixed window.
@@ -58,18 +58,27 @@ def write(
         drawn: the picture's path; without it beside the results.
     """
     table = table_of(rows, processor)
+    if not {DEFAULT, EVEN} <= set(table["strategy"]):
+        write_tables({"All rows": table}, facts, out)
+        out.with_suffix(".md").write_text(_text(table, facts), encoding="utf-8")
+        return
     said = sentences(table, rows)
     shown = {cohort: compared_rows(rows, cohort) for cohort in PEOPLE if cohort in set(table["cohort"])}
     tables = {cohort: table_of(own, processor) for cohort, own in shown.items()}
     readme = f"{savings(table, tables)}\n\n{readme_table(tables)}"
     write_tables({"All rows": table}, facts, out, said=said, readme=readme)
-    blocks = [f"## `{name}`\n\n{readable(own).to_markdown(index=False)}" for name, own in table.groupby("cohort")]
-    made = "\n".join(f"- {key}: `{value}`" for key, value in facts.items())
-    follows = "\n".join(f"- {sentence}" for sentence in said)
-    text = "\n\n".join(["# Strategies compared", made, "## What follows", follows, COLUMNS, *blocks])
-    out.with_suffix(".md").write_text(f"{text}\n", encoding="utf-8")
+    text = _text(table, facts, said)
+    out.with_suffix(".md").write_text(text, encoding="utf-8")
     save_figure(picture(shown, tables), drawn or out.with_suffix(".svg"), overwrite=True)
     print(text, readme, sep="\n\n")
+
+
+def _text(table: pd.DataFrame, facts: dict[str, object], said: Sequence[str] = ()) -> str:
+    """The tables as they are read, under what made them and what follows from them."""
+    blocks = [f"## `{name}`\n\n{readable(own).to_markdown(index=False)}" for name, own in table.groupby("cohort")]
+    made = "\n".join(f"- {key}: `{value}`" for key, value in facts.items())
+    follows = ["## What follows", "\n".join(f"- {sentence}" for sentence in said)] if said else []
+    return "\n\n".join(["# Strategies compared", made, *follows, COLUMNS, *blocks]) + "\n"
 
 
 def unfinished(plan: Plan, every: Sequence[Part], rows: pd.DataFrame) -> dict[str, str]:
@@ -98,6 +107,9 @@ def main(  # noqa: PLR0913, PLR0917 - an option each
     trials: Annotated[int, typer.Option(help="Pairs a session.")] = 60,
     seed: Annotated[int, typer.Option(help="Seed of the people.")] = SEED,
     first: Annotated[int, typer.Option(help="End each row after so many people; 0 for all.")] = 0,
+    rows_a_part: Annotated[
+        int, typer.Option("--rows", help="Rows of each part but the first, the named strategies; 0 for all.")
+    ] = 0,
     only: Annotated[str, typer.Option("--parts", help="Parts to run, comma-separated; all if empty.")] = "",
     cohorts: Annotated[str, typer.Option(help="Cohorts to run, comma-separated; none to write tables only.")] = (
         ",".join(COHORTS)
@@ -110,7 +122,7 @@ def main(  # noqa: PLR0913, PLR0917 - an option each
     """Compare strategies on the same people."""
     executor = DaskCluster(dask) if dask else Processes(workers)
     plan = Plan(out.with_suffix(".rows"), people, trials, seed, first, executor)
-    every, wanted = parts(slow_people, reference_people), [name for name in cohorts.split(",") if name]
+    every, wanted = parts(slow_people, reference_people, rows_a_part), [name for name in cohorts.split(",") if name]
     with Progress() as progress:
         for part in chosen(every, [name for name in only.split(",") if name]):
             for cohort in wanted:

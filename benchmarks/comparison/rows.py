@@ -6,7 +6,7 @@ A part is a study. Within a part all rows have the same people; between parts th
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import isiw
@@ -45,16 +45,17 @@ class Part:
     cohorts: tuple[str, ...] = ()
 
 
-def parts(slow_people: int, reference_people: int) -> tuple[Part, ...]:
+def parts(slow_people: int, reference_people: int, rows: int = 0) -> tuple[Part, ...]:
     """All parts, the quick and most important ones first.
 
     Args:
         slow_people: people of each cohort for rows that take .1 s a trial or more.
         reference_people: of `recruitment` for the reference by NUTS, which takes half a minute a trial.
+        rows: of each part but the first at most, for a quick look; 0 for all.
     """
     botorch = tuple(StudyStrategy(BOTORCH, {"function": name}, f"gp+botorch-{name}") for name in BOTORCH_FUNCTIONS)
     nuts = StudyStrategy("parametric-mi", {"method": "nuts"}, NUTS)
-    return (
+    every = (
         Part("named", _named("default", EVEN, "random", "particles-window", "particles-mi", "nr", "pf", "incremental")),
         Part("regressions", _named("gpr", "svmr", "nr2")),
         Part("particles", matrix("particles")),
@@ -64,6 +65,7 @@ def parts(slow_people: int, reference_people: int) -> tuple[Part, ...]:
         Part("parametric", (*_named("parametric-mi", "parametric-window"), *matrix("parametric")), slow_people, 10),
         Part("nuts", (nuts,), reference_people, 1, ("recruitment",)),
     )
+    return (every[0], *(replace(part, strategies=part.strategies[: rows or None]) for part in every[1:]))
 
 
 def _named(*names: str) -> tuple[StudyStrategy, ...]:

@@ -14,9 +14,10 @@ import pandas as pd
 import pytest
 from benchmarks.comparison import running
 from benchmarks.comparison.measures import lasting, ratio, table_of
-from benchmarks.comparison.rows import EVEN, GUESS, Part, matrix
+from benchmarks.comparison.rows import EVEN, GUESS, Part, chosen, matrix, parts
 from benchmarks.comparison.running import RECORDED, Plan, recorded_units, rows_of, run_part
 from benchmarks.comparison.words import choosing, compared_rows, readme_table, saving, sentences, trusting
+from benchmarks.quick import expanded
 
 import isiw
 from isiw.strategy.catalogue import measured_of
@@ -191,6 +192,22 @@ def test_the_matrix_repeats_no_named_strategy() -> None:
     labels = [strategy.label for strategy in matrix("particles")]
     assert "particles+straddle" in labels
     assert not {"particles+alternating", "particles+mutual-information", "particles+even"} & set(labels)
+
+
+@pytest.mark.slow
+def test_a_quick_look_has_rows_of_every_family() -> None:
+    words = expanded("compare", ["--quick"])
+    named = words[words.index("--parts") + 1].split(",")
+    rows = int(words[words.index("--rows") + 1])
+    run = chosen(parts(1, 1, rows), named)
+    models = {
+        type(isiw.make_strategy(row.name).model) for part in run for row in part.strategies if ":" not in row.name
+    }
+    assert models == {type(isiw.make_strategy(name).model) for name in isiw.list_strategies()}
+    assert all(len(part.strategies) <= rows for part in run if part.name != "named")
+    assert {row.label for part in run for row in part.strategies if ":" in row.name} == {
+        f"gp+botorch-{name}" for name in ("ei", "nipv", "jes")
+    }
 
 
 def test_a_comparison_with_one_person_says_that_it_cannot() -> None:
