@@ -29,14 +29,16 @@ def test_the_python_examples_run_one_page_after_the_other(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    for page in ("device.md", "log.md", "strategies.md"):
+    for page in ("device.md", "log.md", "strategies.md", "own-model.md"):
         names: dict[str, Any] = {"__name__": "guide"}
         for block in blocks(page, "python"):
-            exec(compile(block, page, "exec"), names)  # noqa: S102 - the point of the test
+            exec(compile(block, page, "exec", dont_inherit=True), names)  # noqa: S102 - the point of the test
     printed = capsys.readouterr().out
     assert "The budget of 4 stimuli is used up." in printed
     assert "nothing is missing" in printed
     assert "60 pairs are left." in printed
+    assert "conforms\n" in printed
+    assert "is reported" in printed
 
 
 @pytest.mark.parametrize("page", ["device.md", "log.md"])

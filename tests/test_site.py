@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from docs.generate import api, commands, configuration, docstrings, topics
 from docs.generate.meanings import MEANINGS
+from docs.generate.places import DOCS
 from pydantic import BaseModel
 from typer.main import get_command
 
@@ -110,3 +111,10 @@ def test_every_field_of_a_log_has_a_meaning() -> None:
 def test_a_protocol_that_is_called_shows_how() -> None:
     entry = REFERENCE["api/isiw.acquisition.rst"].partition("isiw.acquisition.AcquisitionFunction\n")[2]
     assert "   :special-members: __call__" in entry.partition("\n\n")[0].splitlines()
+
+
+def test_every_tutorial_can_be_downloaded_as_a_notebook() -> None:
+    pages = [page for page in (DOCS / "tutorials").glob("*.md") if page.stem != "index"]
+    assert pages
+    for page in pages:
+        assert re.search(rf"\{{nb-download\}}`[^`]+ <{page.stem}\.ipynb>`", page.read_text("utf-8")), page
