@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from typing import Any
 
 import pytest
 
+import isiw
+from isiw.acquisition.fixed import EvenSpacing
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import ConfigError, InvalidValueError, StrategyError
@@ -86,6 +89,22 @@ def test_a_named_strategy_is_rebuilt_from_its_recipe(name: str) -> None:
     assert again.model == strategy.model
     assert again.acquisition == strategy.acquisition
     assert again.stopping == strategy.stopping
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_strategy_follows_its_own_plan_or_says_how_to_give_it_an_acquisition_function(name: str) -> None:
+    space = VALVE_SPACE
+    try:
+        planned = make_strategy(name, space, acquisition="own", **quick(name))
+    except StrategyError as refused:
+        found = re.search(r"isiw\.Strategy\(.*\)(?=\.)", str(refused))
+        usual = make_strategy(name, space, **quick(name))
+        names = {"isiw": isiw, "space": space, "usual": usual, "YOURS": EvenSpacing()}
+        yours = eval(known(found)[0], names)  # noqa: S307 - what the message says
+        assert space.low_ms <= yours.ask() <= space.high_ms
+    else:
+        assert planned.recipe == make_strategy(name, space, **quick(name)).recipe
+        assert planned.ask() == make_strategy(name, space, **quick(name)).ask()
 
 
 def test_settings_reach_the_parts_they_are_meant_for() -> None:

@@ -14,6 +14,9 @@ from isiw.acquisition.twostep import TwoStep
 from isiw.acquisition.variance import EdgeVariance, IntegratedVariance, ProfileVariance
 from isiw.checks import choice
 
+OWN: Final = "own"
+"""Of a method with a plan of its own: what it wants itself."""
+
 ACQUISITIONS: Final[Mapping[str, Callable[[int], AcquisitionFunction]]] = {
     "alternating": lambda _seed: Alternating(),
     "window-gain": lambda _seed: WindowGain(),
@@ -33,7 +36,7 @@ ACQUISITIONS: Final[Mapping[str, Callable[[int], AcquisitionFunction]]] = {
     "sobol": SobolIsi,
     "random": RandomIsi,
     "sweep": lambda _seed: IncrementalSweep(),
-    "own": lambda _seed: OwnProposal(),
+    OWN: lambda _seed: OwnProposal(),
 }
 """Acquisition functions by name; each is made with a strategy's seed."""
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
+from isiw.acquisition.registry import ACQUISITIONS, OWN
 from isiw.checks import whole
 from isiw.design import VALVE_SPACE, DesignSpace, require_space
 from isiw.errors import StrategyError, did_you_mean
@@ -160,7 +161,23 @@ def settings_for(name: str, **settings: Any) -> Settings:
         )
     entry = _CATALOGUE[name]
     usual: Settings = pkgutil.resolve_name(entry.family)
+    if settings.get("acquisition") == OWN:
+        _require_own_plan(usual, name)
+        settings = {key: value for key, value in settings.items() if key != "acquisition"}
     return settings_from(usual, {**entry.meant, **settings}, name)
+
+
+def _require_own_plan(usual: Settings, name: str) -> None:
+    """Raise if a method has no plan of its own, which "own" asks for; those that have one follow nothing else."""
+    if "acquisition" in settings_keys(usual):
+        raise StrategyError(
+            f"the method of {name!r} has no plan of its own that its ISIs could follow",
+            got=f'acquisition="{OWN}"',
+            expected=", ".join(sorted(ACQUISITIONS.keys() - {OWN})),
+            remedy="An acquisition function of your own is an object: with "
+            f'usual = isiw.make_strategy("{name}", space), give it to '
+            "isiw.Strategy(space, usual.model, YOURS, usual.stopping, initial_ms=usual.initial_ms).",
+        )
 
 
 def known_settings(name: str, known: Mapping[str, Any]) -> dict[str, Any]:
