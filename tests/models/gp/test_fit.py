@@ -13,10 +13,10 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel
 
 from isiw.models.gp.fit import Fit, fit
+from isiw.models.gp.places import Hyperparameters
 from isiw.models.gp.prior import (
     FixedProcess,
     HyperparameterPrior,
-    Hyperparameters,
     ProcessSettings,
     Standardisation,
     Transform,

@@ -8,7 +8,8 @@ import torch
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Matern
 
-from isiw.models.gp.prior import Hyperparameters, KernelName, correlations, regression
+from isiw.models.gp.places import Hyperparameters
+from isiw.models.gp.prior import KernelName, correlations, regression
 
 RNG = np.random.default_rng(3)
 ISIS_MS = RNG.uniform(0, 500, 40)

@@ -18,15 +18,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.lazy import botorch, scipy, torch
-from isiw.models.gp.prior import (
-    Hyperparameters,
-    ProcessSettings,
-    Standardisation,
-    Tensor,
-    correlations,
-    regression,
-)
+from isiw.models.gp.places import Hyperparameters, Places, Tensor
+from isiw.models.gp.prior import ProcessSettings, Standardisation, correlations, regression
 from isiw.models.shared.history import PersonTrials
 from isiw.types import FloatArray
 
@@ -126,6 +121,7 @@ class Trials(NamedTuple):
     isi_ms: Tensor
     values: Tensor
     alone: Tensor
+    isi_sd_ms: Tensor  # (n,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,17 +135,21 @@ class Fit:
     log_prior: Tensor  # added to each one's log marginal likelihood, (q,)
     noise: NoiseProfile = field(default_factory=equal_noise)
     trouble: str | None = None
+    places: Places | None = None  # of the processes; None if they may leave their constants everywhere
 
     @cached_property
     def trials(self) -> Trials:
         """The trials on the scale of the process."""
         told, scaled = self.told, self.scale.standardised
-        return Trials(torch.as_tensor(told.isi_ms), scaled(told.mep_mv), scaled(told.baseline_mv))
+        isi_ms = torch.as_tensor(told.isi_ms)
+        sd_ms = torch.zeros_like(isi_ms) if told.isi_sd_ms is None else torch.as_tensor(told.isi_sd_ms)
+        return Trials(isi_ms, scaled(told.mep_mv), scaled(told.baseline_mv), sd_ms)
 
     @cached_property
     def log_joint(self) -> Tensor:
         """Log prior and log marginal likelihood of each process, shape (q,)."""
-        return self.log_prior + self.log_marginal(self.processes, self.noise.log_variance(self.trials.isi_ms))
+        log_variance = self.noise.log_variance(self.trials.isi_ms)
+        return self.log_prior + self.log_marginal(self.processes, log_variance, self.places)
 
     @property
     def log_evidence(self) -> float:
@@ -168,34 +168,57 @@ class Fit:
         """The most believable process that has an amplitude."""
         return int(torch.where(self.processes.amplitude > 0, self.log_joint, -torch.inf).argmax())
 
-    def log_marginal(self, processes: Hyperparameters, log_variance: Tensor) -> Tensor:
+    def log_marginal(self, processes: Hyperparameters, log_variance: Tensor, places: Places | None = None) -> Tensor:
         """Log marginal likelihood of the standardised trials, shape (q,); -inf where their covariance is singular."""
-        values = torch.cat((self.trials.values, self.trials.alone))
-        factor, failed = torch.linalg.cholesky_ex(self._covariance(processes, log_variance))
+        values = self._about_the_mean(places)
+        factor, failed = torch.linalg.cholesky_ex(self._covariance(processes, log_variance, places))
         pivots = factor.diagonal(dim1=-2, dim2=-1)
         sound = (failed == 0) & (pivots > LEAST_PIVOT).all(-1)
         white = torch.linalg.solve_triangular(factor, values.unsqueeze(-1), upper=False).squeeze(-1)
         log_density = -0.5 * white.square().sum(-1) - pivots.log().sum(-1)
-        constant = 0.5 * len(values) * math.log(2 * math.pi)
+        constant = 0.5 * values.shape[-1] * math.log(2 * math.pi)
         return torch.where(sound, log_density - constant, -torch.inf)
 
-    def _covariance(self, processes: Hyperparameters, log_variance: Tensor) -> Tensor:
+    def _about_the_mean(self, places: Places | None) -> Tensor:
+        """All values less the mean of each process, those of TMS alone behind the others, (n + m,) or (q, n + m)."""
+        trials = self.trials
+        if places is None:
+            return torch.cat((trials.values, trials.alone))
+        about = trials.values - places.rise.unsqueeze(-1) * places.share(trials.isi_ms)
+        return torch.cat((about, trials.alone.expand(len(about), -1)), dim=-1)
+
+    def _covariance(self, processes: Hyperparameters, log_variance: Tensor, places: Places | None = None) -> Tensor:
         """Of all values, those of TMS alone behind the others, shape (q, n + m, n + m)."""
         trials = self.trials
         lengths, which = torch.unique(processes.length_ms, return_inverse=True)
         correlation = correlations(self.settings.kernel, lengths, trials.isi_ms)
-        padded = torch.nn.functional.pad(correlation[which], (0, len(trials.alone)) * 2)
-        shared = LEVEL_SD**2 + processes.amplitude.square()[:, None, None] * padded
+        profile = processes.amplitude.square()[:, None, None] * correlation[which]
         # Where a tap changes nothing, it does not change the noise either.
         changed = log_variance * (processes.amplitude > 0).unsqueeze(-1)
-        log_relative = torch.nn.functional.pad(changed, (0, len(trials.alone)))
-        return shared + torch.diag_embed(processes.noise.square().unsqueeze(-1) * log_relative.exp())
+        if places is not None:
+            share = places.share(trials.isi_ms)
+            rise = places.rise_sd.square()[:, None, None]
+            profile = (profile + rise) * share.unsqueeze(-1) * share.unsqueeze(-2)
+        alone = len(trials.alone)
+        padded = torch.nn.functional.pad(profile, (0, alone) * 2)
+        relative = torch.nn.functional.pad(self._relative_variance(processes, places, changed), (0, alone), value=1.0)
+        return LEVEL_SD**2 + padded + torch.diag_embed(processes.noise.square().unsqueeze(-1) * relative)
+
+    def _relative_variance(self, processes: Hyperparameters, places: Places | None, log_variance: Tensor) -> Tensor:
+        """Noise variance of the trials with a tap, relative to that of TMS alone, (..., n)."""
+        if places is None:
+            return log_variance.exp()
+        isi_ms, sd_ms = self.trials.isi_ms, self.trials.isi_sd_ms
+        # What an ISI is off by moves a trial along the flank [McHutchon2011].
+        blur = (places.slope(isi_ms) * sd_ms / processes.noise.unsqueeze(-1)).square()
+        return torch.exp(log_variance + 2.0 * places.log_growth(isi_ms)) + blur
 
     def surprise(self, log_variance: Tensor) -> Tensor:
         """Leave-one-out residuals of the trials with a tap under the best process [SD], shape (n,)."""
-        best = self.processes.picked(torch.tensor([self.best]))
-        values = torch.cat((self.trials.values, self.trials.alone))
-        return leave_one_out(self._covariance(best, log_variance)[0], values)[: len(log_variance)]
+        pick = torch.tensor([self.best])
+        best, places = self.processes.picked(pick), None if self.places is None else self.places.picked(pick)
+        values = self._about_the_mean(places).flatten()
+        return leave_one_out(self._covariance(best, log_variance, places)[0], values)[: len(log_variance)]
 
     def level(self, noise: Tensor) -> tuple[Tensor, Tensor]:
         """Mean and variance of the constant given the trials of TMS alone, of the shape of their noise SD."""
@@ -210,23 +233,36 @@ class Fit:
     def regression(self, picks: Tensor) -> botorch.models.SingleTaskGP:
         """Some of the processes as BoTorch models, from ISIs [ms] to standardised MEPs."""
         chosen, trials = self.processes.picked(picks), self.trials
-        relative_variance = self.noise.log_variance(trials.isi_ms).exp()
-        level = self.level(chosen.noise)
-        return regression(self.settings.kernel, chosen, level, trials.isi_ms, trials.values, relative_variance)
+        places = None if self.places is None else self.places.picked(picks)
+        relative = self._relative_variance(chosen, places, self.noise.log_variance(trials.isi_ms))
+        level, data = self.level(chosen.noise), (trials.isi_ms, trials.values, relative)
+        return regression(self.settings.kernel, chosen, level, *data, places)
 
 
-def fit(settings: ProcessSettings, scale: Standardisation, told: PersonTrials) -> Fit:
-    """Weigh processes by one person's trials; of hyperparameters that are not learnt, that one process."""
+def fit(settings: ProcessSettings, scale: Standardisation, told: PersonTrials, space: DesignSpace = VALVE_SPACE) -> Fit:
+    """Weigh processes by one person's trials; of hyperparameters that are not learnt, that one process.
+
+    The space is where windows are sought, if profiles are windows'.
+    """
+    if settings.profile == "window":
+        processes, places, log_prior = settings.windows.processes(space)
+        return _with_noise(_sound(Fit(settings, scale, told, processes, log_prior, places=places)))
     if (fixed := settings.fixed) is not None:
         columns = torch.tensor([[fixed.length_ms] * 2, [fixed.amplitude, 0.0], [fixed.noise] * 2], dtype=torch.float64)
         return _sound(Fit(settings, scale, told, Hyperparameters(*columns), settings.prior.log_hypotheses))
     found = _sound(Fit(settings, scale, told, *settings.prior.grid()))
     if found.trouble:
         return found
-    if settings.noise == "by-isi" and len(told.isi_ms):
-        profile = noise_profile(found.trials.isi_ms, found.surprise)
-        found = _with_same_totals(found, replace(found, noise=profile))
+    found = _with_noise(found)
     return found if settings.hyperparameters == "marginalised" else _most_likely(found)
+
+
+def _with_noise(found: Fit) -> Fit:
+    """The fit with a noise profile, if noise depends on the ISI."""
+    if found.settings.noise != "by-isi" or found.trouble or not len(found.told.isi_ms):
+        return found
+    profile = noise_profile(found.trials.isi_ms, found.surprise)
+    return _with_same_totals(found, replace(found, noise=profile))
 
 
 def _sound(found: Fit) -> Fit:
@@ -239,6 +275,7 @@ def _sound(found: Fit) -> Fit:
         processes=medians._replace(amplitude=medians.amplitude * torch.tensor([1.0, 0.0], dtype=torch.float64)),
         log_prior=found.settings.prior.log_hypotheses,
         noise=equal_noise(),
+        places=None,
         trouble="The covariance of the trials is singular under all hyperparameters. "
         "The medians of their priors, with the same noise at all ISIs, stand in for them.",
     )

@@ -14,10 +14,19 @@ import numpy as np
 
 from isiw.checks import Checked, Positive, whole
 from isiw.design import DesignSpace
+from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
 from isiw.lazy import botorch, torch
 from isiw.models.gp.fit import Fit, fit
-from isiw.models.gp.prior import ProcessSettings, Standardisation, Tensor, Transform, expected_mep_mv, scale_of
+from isiw.models.gp.places import Tensor
+from isiw.models.gp.prior import (
+    LOG_SCALE_MV,
+    ProcessSettings,
+    Standardisation,
+    Transform,
+    expected_mep_mv,
+    scale_of,
+)
 from isiw.models.protocol import Observation
 from isiw.models.shared.history import AmplitudeHistory, FloorKind, FloorTreatment, OfAmplitudes, PersonTrials
 from isiw.models.shared.tables import systematic
@@ -25,7 +34,7 @@ from isiw.models.windows import Runs, SampledProfiles, grid_of, profile_grid, sa
 from isiw.types import Array, Singles
 from isiw.window import least_excess_mv
 
-PATH_STEP_MS = 4.0
+PATH_STEP_MS = 5.0
 """Paths are drawn at ISIs this far apart at most, and are straight in between; length scales are 10 ms and more."""
 
 
@@ -73,12 +82,17 @@ def draw_paths(found: Fit, isi_ms: Tensor, size: int, rng: np.random.Generator) 
     drawn[~present] = _constants(found, chosen.noise[~present], z[~present, -1]).unsqueeze(-1)
     level, alone = drawn[:, :-1], drawn[:, -1]
     changed = found.noise.log_variance(isi_ms) * present.unsqueeze(-1)
+    if found.places is not None:
+        places = found.places.picked(picks)
+        changed = changed + 2.0 * places.log_growth(isi_ms)
     noise_sd = chosen.noise.unsqueeze(-1) * torch.exp(0.5 * changed)
     unit, centre = found.scale.unit, found.scale.centre
+    # Outside a window all is as with TMS alone, whether that was told or not.
+    known = found.places is not None or len(found.trials.alone) > 0
     return Paths(
         level=centre + unit * level,
         noise_sd=unit * noise_sd,
-        alone=centre + unit * alone if len(found.trials.alone) else torch.full_like(alone, torch.nan),
+        alone=centre + unit * alone if known else torch.full_like(alone, torch.nan),
         alone_sd=unit * chosen.noise,
         present=present,
     )
@@ -91,12 +105,13 @@ def _profiles(found: Fit, picks: Tensor, isi_ms: Tensor, z: Tensor) -> Tensor:
     which, member = torch.unique(picks, return_inverse=True)
     # Far from all trials a process is its constant, and a deviation that they tell nothing of.
     far_ms = isi_ms[-1:] + FAR_LENGTHS * found.processes.length_ms[which].amax()
+    deviates = 1.0 if found.places is None else 0.0
     with torch.no_grad():
         posterior: Any = found.regression(which).posterior(torch.cat((isi_ms, far_ms)).unsqueeze(-1))
         mean, covariance = posterior.mean.squeeze(-1), posterior.distribution.covariance_matrix
     surplus = torch.full_like(mean[0], PATH_JITTER)
-    # The deviation is taken away again.
-    surplus[-1] -= 1.0
+    # The deviation is taken away again, where there is one outside windows.
+    surplus[-1] -= deviates
     variance = found.processes.amplitude[which].square()
     factor = torch.linalg.cholesky(covariance + torch.diag_embed(torch.outer(variance, surplus)))
     drawn: Tensor = mean[member] + (factor[member] @ z.unsqueeze(-1)).squeeze(-1)
@@ -185,8 +200,8 @@ class ProfileSample:
 class GaussianProcess(Checked):
     """A Gaussian process on the transformed MEP.
 
-    It learns from amplitudes only, ignores the SD of an ISI, and takes an amplitude below the detection limit for that
-    limit.
+    It learns from amplitudes only, and takes an amplitude below the detection limit for that limit. Profiles that may
+    be anywhere ignore the SD of an ISI.
 
     Args:
         process: kernel, noise and hyperparameters.
@@ -195,6 +210,9 @@ class GaussianProcess(Checked):
             it is the median of what lies low on each path.
         samples: how many paths represent the posterior.
         detection_limit_mv: an amplitude of 0 lies below this [mV].
+
+    Raises:
+        InvalidValueError: an invalid setting, or a window's profile of something else than the log MEP.
     """
 
     process: ProcessSettings = field(default_factory=ProcessSettings, metadata={"spread": True})
@@ -202,6 +220,16 @@ class GaussianProcess(Checked):
     floor: FloorTreatment = field(default_factory=FloorTreatment, metadata={"spread": True})
     samples: Annotated[int, partial(whole, least=2)] = 256
     detection_limit_mv: Positive = 0.005
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.process.profile == "window" and self.transform != "log":
+            raise InvalidValueError(
+                "a window's profile is one of the log MEP",
+                got=self.transform,
+                expected="log",
+                remedy='Set profile to "anywhere" for other transforms.',
+            )
 
     def begin(self, space: DesignSpace, seed: int, people: int = 1) -> GaussianProcessPosterior:
         """The posterior before the first trial."""
@@ -211,15 +239,17 @@ class GaussianProcess(Checked):
         """The posterior after one more trial."""
         return replace(posterior, told=posterior.told.appended(observation), held=None)
 
-    def fit(self, told: PersonTrials) -> Fit:
-        """Fit one person's trials."""
+    def fit(self, told: PersonTrials, space: DesignSpace) -> Fit:
+        """Fit one person's trials; the space is where windows are sought."""
         told, fixed = self.seen(told), self.process.fixed
-        if fixed is not None:
+        if self.process.profile == "window":
+            scale = Standardisation("log", self.detection_limit_mv, math.log(LOG_SCALE_MV), 1.0)
+        elif fixed is not None:
             scale = Standardisation(self.transform, self.detection_limit_mv, fixed.centre, fixed.unit)
         else:
             meps_mv = np.concatenate((told.mep_mv, told.baseline_mv))
             scale = scale_of(meps_mv, self.transform, self.detection_limit_mv)
-        return fit(self.process, scale, told)
+        return fit(self.process, scale, told, space)
 
     def seen(self, told: PersonTrials) -> PersonTrials:
         """Trials as they are fitted: small MEPs are 0 if the floor is `"zeroed"`."""
@@ -254,7 +284,7 @@ class GaussianProcessPosterior(OfAmplitudes):
         told = [self.told.person(person) for person in range(self.people)]
         if self.held is not None:
             return tuple(f.conditioned(self.model.seen(t)) for f, t in zip(self.held, told, strict=True))
-        return tuple(map(self.model.fit, told))
+        return tuple(self.model.fit(trials, self.space) for trials in told)
 
     @cached_property
     def _sample(self) -> ProfileSample:

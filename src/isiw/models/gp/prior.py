@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import math
+import pkgutil
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Annotated, Literal, NamedTuple, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 
 from isiw.checks import Checked, Count, Number, Positive, number
 from isiw.errors import InvalidValueError
 from isiw.lazy import botorch, gpytorch, torch
+from isiw.models.gp.places import Hyperparameters, Places, Tensor, WindowsPrior
 from isiw.models.shared.scales import PositiveScale, Scale
 from isiw.types import FloatArray
-
-Tensor: TypeAlias = "torch.Tensor"
 
 GRID_SD = 2.25
 GRID_POINTS = (7, 5, 7)
@@ -23,18 +23,6 @@ GRID_POINTS = (7, 5, 7)
 
 LEAST_NOISE = 0.01
 """Noise SDs are at least this share of the unit, so that covariances have a stable Cholesky factor."""
-
-
-class Hyperparameters(NamedTuple):
-    """Of q processes, amplitudes and noise in standardised units, shape (q,)."""
-
-    length_ms: Tensor
-    amplitude: Tensor  # SD of the profile; 0 if a tap changes nothing
-    noise: Tensor  # SD of a trial about it, if the relative noise variance is 1
-
-    def picked(self, picks: Tensor) -> Hyperparameters:
-        """Some of them."""
-        return Hyperparameters(*(field[picks] for field in self))
 
 
 @dataclass(frozen=True)
@@ -124,6 +112,7 @@ class FixedProcess(Checked):
 
 KernelName: TypeAlias = Literal["rbf", "matern"]
 NoiseKind: TypeAlias = Literal["equal", "by-isi"]
+ProfileKind: TypeAlias = Literal["window", "anywhere"]
 
 
 @dataclass(frozen=True)
@@ -134,12 +123,16 @@ class ProcessSettings(Checked):
         kernel: `"rbf"`, the squared exponential, or `"matern"` with smoothness 5/2.
         noise: `"equal"` at all ISIs, or `"by-isi"`. Whether there is a profile at all is judged under equal noise.
         hyperparameters: `"marginalised"` over a grid, or `"map"`, the most likely ones.
-        prior: prior of the hyperparameters.
+        prior: prior of the hyperparameters of profiles that may be anywhere.
         fixed: hyperparameters and scale that are not learnt, for equal noise.
         max_evaluations: evaluations after which the search for the most likely hyperparameters gives up.
+        profile: `"window"`: it leaves its constant within one window, which lies where windows can, in the log MEP; or
+            `"anywhere"`, in either direction.
+        windows: prior of profiles that are a window's.
 
     Raises:
-        InvalidValueError: an unknown choice, or fixed hyperparameters with noise that depends on the ISI.
+        InvalidValueError: an unknown choice, fixed hyperparameters with noise that depends on the ISI, or a window's
+            profile whose hyperparameters are not averaged over.
     """
 
     kernel: KernelName = "matern"
@@ -148,17 +141,30 @@ class ProcessSettings(Checked):
     prior: HyperparameterPrior = field(default_factory=HyperparameterPrior)
     fixed: FixedProcess | None = None
     max_evaluations: Count = 150
+    profile: ProfileKind = "anywhere"
+    windows: WindowsPrior = field(default_factory=WindowsPrior)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.fixed is not None and self.noise != "equal":
             raise InvalidValueError("fixed hyperparameters are of equal noise", got=self.noise, expected="equal")
+        if self.profile == "window" and (self.fixed is not None or self.hyperparameters != "marginalised"):
+            raise InvalidValueError(
+                "the hyperparameters of a window's profile are averaged over",
+                got="fixed" if self.fixed is not None else self.hyperparameters,
+                expected="marginalised",
+                remedy='Set profile to "anywhere", or leave the hyperparameters as they are.',
+            )
 
 
 def correlations(kernel: KernelName, length_ms: Tensor, isi_ms: Tensor) -> Tensor:
-    """Correlation of a profile's values at some ISIs."""
-    matrices: Tensor = _kernel(kernel, length_ms)(isi_ms.unsqueeze(-1)).to_dense().detach()
-    return matrices
+    """Correlation of a profile's values at some ISIs, (q, n, n) [Rasmussen2006, equations 4.9 and 4.17]."""
+    # As GPyTorch's kernels have it, several times as quickly.
+    steps = (isi_ms.unsqueeze(-1) - isi_ms).abs() / length_ms[:, None, None]
+    if kernel == "rbf":
+        return torch.exp(-0.5 * steps.square())
+    steps = math.sqrt(5.0) * steps
+    return (1.0 + steps + steps.square() / 3.0) * torch.exp(-steps)
 
 
 def regression(
@@ -168,20 +174,21 @@ def regression(
     isi_ms: Tensor,
     values: Tensor,
     relative_variance: Tensor,
+    places: Places | None = None,
 ) -> botorch.models.SingleTaskGP:
     """Processes about constants of a mean and a variance, given trials, as a BoTorch model of their batch shape."""
-    mean, level_variance = level
     inputs = isi_ms.unsqueeze(-1).expand(*process.length_ms.shape, -1, 1)
     noise_variance = process.noise.square()
     variance = noise_variance[..., None, None] * relative_variance.unsqueeze(-1)
+    mean_module, covar_module = _modules(kernel, process, level, places)
     return botorch.models.SingleTaskGP(
         inputs,
         values.unsqueeze(-1).expand_as(inputs),
         variance if len(values) else None,
         # Without a trial, BoTorch cannot take the next one's noise from theirs.
         likelihood=None if len(values) else _likelihood(noise_variance),
-        mean_module=gpytorch.means.ConstantMean(batch_shape=mean.shape).double().initialize(constant=mean),
-        covar_module=_covariance(kernel, process, level_variance),
+        mean_module=mean_module,
+        covar_module=covar_module,
         outcome_transform=None,
     )
 
@@ -192,11 +199,21 @@ def _kernel(name: KernelName, length_ms: Tensor) -> gpytorch.kernels.Kernel:
     return kind(batch_shape=length_ms.shape).double().initialize(lengthscale=length_ms[..., None, None])
 
 
-def _covariance(kernel: KernelName, process: Hyperparameters, level_variance: Tensor) -> gpytorch.kernels.Kernel:
+def _modules(
+    kernel: KernelName, process: Hyperparameters, level: tuple[Tensor, Tensor], places: Places | None
+) -> tuple[Any, Any]:
+    """Mean and covariance of processes before the trials, as modules of GPyTorch's."""
+    mean, level_variance = level
     shape = process.amplitude.shape
     profile = gpytorch.kernels.ScaleKernel(_kernel(kernel, process.length_ms), batch_shape=shape).double()
-    constant = gpytorch.kernels.ConstantKernel(batch_shape=shape).double()
-    return profile.initialize(outputscale=process.amplitude.square()) + constant.initialize(constant=level_variance)
+    profile = profile.initialize(outputscale=process.amplitude.square())
+    constant = gpytorch.kernels.ConstantKernel(batch_shape=shape).double().initialize(constant=level_variance)
+    flat = gpytorch.means.ConstantMean(batch_shape=mean.shape).double().initialize(constant=mean)
+    if places is None:
+        return flat, profile + constant
+    # Their classes are GPyTorch's, which is imported only when it is used.
+    risen, within = (pkgutil.resolve_name(f"isiw.models.gp.modules:{name}") for name in ("RisenMean", "WithinWindow"))
+    return risen(flat, places), within(profile, places) + constant
 
 
 def _likelihood(noise_variance: Tensor) -> gpytorch.likelihoods.GaussianLikelihood:
@@ -207,6 +224,10 @@ def _likelihood(noise_variance: Tensor) -> gpytorch.likelihoods.GaussianLikeliho
 
 
 Transform: TypeAlias = Literal["log", "sqrt", "none"]
+
+LOG_SCALE_MV = 0.012
+"""The floor of an amplitude is this give or take a factor of e, where windows' profiles are on a scale of their own
+[mV]."""
 
 USUAL_MEP_MV = 0.02
 """About so large amplitudes are taken to be before the first trial [mV]."""

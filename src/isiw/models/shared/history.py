@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
@@ -124,24 +124,29 @@ def without_known(observation: Observation) -> Observation:
 
 @dataclass(frozen=True, eq=False)
 class PersonTrials:
-    """The trials of one person: ISIs [ms] and MEPs [mV], shape (n,), and MEPs of TMS alone [mV], shape (m,)."""
+    """The trials of one person: ISIs [ms] and MEPs [mV], shape (n,), and MEPs of TMS alone [mV], shape (m,).
+
+    The SDs of the ISIs [ms], shape (n,), are None where all were measured.
+    """
 
     isi_ms: FloatArray
     mep_mv: FloatArray
     baseline_mv: FloatArray
+    isi_sd_ms: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class AmplitudeHistory:
-    """Trials of b people, in order: ISIs [ms], NaN for TMS alone, and MEPs [mV], shape (b, n)."""
+    """Trials of b people, in order: ISIs [ms], NaN for TMS alone, MEPs [mV], and SDs of the ISIs [ms], shape (b, n)."""
 
     isi_ms: FloatArray
     mep_mv: FloatArray
+    isi_sd_ms: FloatArray
 
     @classmethod
     def nothing(cls, people: int) -> AmplitudeHistory:
         """No trials."""
-        return cls(np.empty((people, 0)), np.empty((people, 0)))
+        return cls(*(np.empty((people, 0)) for _ in fields(cls)))
 
     @property
     def trials(self) -> int:
@@ -159,20 +164,24 @@ class AmplitudeHistory:
         if observation.mep_high_mv is not None:
             high = np.nan_to_num(observation.mep_high_mv, nan=0.0, posinf=0.0)
             amplitude = np.where(high > amplitude, (amplitude + high) / 2, amplitude)
-        isi_ms, mep_mv = (x.astype(float)[:, None] for x in (observation.isi_ms, amplitude))
-        if np.isnan(mep_mv).any():
+        if np.isnan(amplitude).any():
             raise StrategyError(
                 "the model learns from amplitudes only",
                 got="a response without its amplitude",
                 remedy="Tell mep_mv, or choose a model with a likelihood for responses, as the default has.",
             )
-        return replace(self, isi_ms=np.hstack((self.isi_ms, isi_ms)), mep_mv=np.hstack((self.mep_mv, mep_mv)))
+        columns = zip(
+            (self.isi_ms, self.mep_mv, self.isi_sd_ms),
+            (observation.isi_ms, amplitude, observation.isi_sd_ms),
+            strict=True,
+        )
+        return AmplitudeHistory(*(np.hstack((so_far, new.astype(float)[:, None])) for so_far, new in columns))
 
     def person(self, person: int) -> PersonTrials:
         """The trials of one person."""
         isi_ms, mep_mv = self.isi_ms[person], self.mep_mv[person]
         alone = np.isnan(isi_ms)
-        return PersonTrials(isi_ms[~alone], mep_mv[~alone], mep_mv[alone])
+        return PersonTrials(isi_ms[~alone], mep_mv[~alone], mep_mv[alone], self.isi_sd_ms[person][~alone])
 
 
 class OfAmplitudes:

@@ -39,6 +39,7 @@ KNOWN: Final = {
     "hit_delay_ms": (
         ("model", "prior", "profile", "start", "hit_delay_ms"),
         ("model", "prior", "start", "hit_delay_ms"),
+        ("model", "process", "windows", "start", "hit_delay_ms"),
     ),
     "muscle": (("model", "prior", "muscle"),),
     "intensity_pct_rmt": (("model", "prior", "intensity_pct_rmt"),),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from isiw.models.gp import GaussianProcess
+from isiw.models.gp import GaussianProcess, ProcessSettings
 from isiw.models.parametric import ParametricModel
 from isiw.models.particles import ParticleModel
 from isiw.models.particles.supra import SupraModel
@@ -15,4 +15,6 @@ PARTICLES: Final = Settings(ParticleModel(), Choosing(), Stopping())
 # The rules of the default look at the window alone, and would leave a depression unknown.
 SUPRA: Final = Settings(SupraModel(), Choosing(), Budget(60))
 PARAMETRIC: Final = Settings(ParametricModel(), Choosing(), Stopping())
-GAUSSIAN_PROCESS: Final = Settings(GaussianProcess(), Choosing("straddle", initial_trials=5), Stopping())
+GAUSSIAN_PROCESS: Final = Settings(
+    GaussianProcess(ProcessSettings(profile="window")), Choosing("straddle", initial_trials=5), Stopping()
+)
