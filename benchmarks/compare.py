@@ -24,9 +24,9 @@ from rich.progress import Progress
 from benchmarks.comparison.guess import with_guess
 from benchmarks.comparison.measures import table_of
 from benchmarks.comparison.picture import picture
-from benchmarks.comparison.rows import Part, chosen, parts
+from benchmarks.comparison.rows import EVEN, Part, chosen, parts
 from benchmarks.comparison.running import COHORTS, Plan, processor_ms, rows_of, run_part, timed
-from benchmarks.comparison.words import PEOPLE, compared_rows, readable, readme_table, savings, sentences
+from benchmarks.comparison.words import DEFAULT, PEOPLE, compared_rows, readable, readme_table, savings, sentences
 from benchmarks.provenance import facts_of
 from benchmarks.quick import understood
 from benchmarks.tables import write_tables
@@ -48,7 +48,7 @@ the same eleven)."""
 def write(
     rows: pd.DataFrame, processor: dict[str, float], facts: dict[str, object], out: Path, drawn: Path | None = None
 ) -> None:
-    """Tables, sentences and picture.
+    """Tables; with even ISIs and the default among the rows, sentences and picture, too.
 
     Args:
         rows: of all that was run, and of the fixed window.
@@ -58,18 +58,27 @@ def write(
         drawn: the picture's path; without it beside the results.
     """
     table = table_of(rows, processor)
+    if not {DEFAULT, EVEN} <= set(table["strategy"]):
+        write_tables({"All rows": table}, facts, out)
+        out.with_suffix(".md").write_text(_text(table, facts), encoding="utf-8")
+        return
     said = sentences(table, rows)
     shown = {cohort: compared_rows(rows, cohort) for cohort in PEOPLE if cohort in set(table["cohort"])}
     tables = {cohort: table_of(own, processor) for cohort, own in shown.items()}
     readme = f"{savings(table, tables)}\n\n{readme_table(tables)}"
     write_tables({"All rows": table}, facts, out, said=said, readme=readme)
-    blocks = [f"## `{name}`\n\n{readable(own).to_markdown(index=False)}" for name, own in table.groupby("cohort")]
-    made = "\n".join(f"- {key}: `{value}`" for key, value in facts.items())
-    follows = "\n".join(f"- {sentence}" for sentence in said)
-    text = "\n\n".join(["# Strategies compared", made, "## What follows", follows, COLUMNS, *blocks])
-    out.with_suffix(".md").write_text(f"{text}\n", encoding="utf-8")
+    text = _text(table, facts, said)
+    out.with_suffix(".md").write_text(text, encoding="utf-8")
     save_figure(picture(shown, tables), drawn or out.with_suffix(".svg"), overwrite=True)
     print(text, readme, sep="\n\n")
+
+
+def _text(table: pd.DataFrame, facts: dict[str, object], said: Sequence[str] = ()) -> str:
+    """The tables as they are read, under what made them and what follows from them."""
+    blocks = [f"## `{name}`\n\n{readable(own).to_markdown(index=False)}" for name, own in table.groupby("cohort")]
+    made = "\n".join(f"- {key}: `{value}`" for key, value in facts.items())
+    follows = ["## What follows", "\n".join(f"- {sentence}" for sentence in said)] if said else []
+    return "\n\n".join(["# Strategies compared", made, *follows, COLUMNS, *blocks]) + "\n"
 
 
 def unfinished(plan: Plan, every: Sequence[Part], rows: pd.DataFrame) -> dict[str, str]:

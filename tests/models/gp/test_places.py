@@ -22,7 +22,7 @@ from isiw.models.shared.start import StartPrior
 from isiw.testing import check_model
 from known import known
 
-PRIOR = WindowsPrior(start=StartPrior(hit_delay_ms=(180.0, 6.0)), ensemble=64)
+PRIOR = WindowsPrior(start=StartPrior(hit_delay_ms=(180.0, 6.0), p_anywhere=0.0), ensemble=64)
 SETTINGS = ProcessSettings("rbf", profile="window", windows=PRIOR)
 SCALE = Standardisation("log", 0.005, math.log(0.012), 1.0)
 MODEL = GaussianProcess(replace(SETTINGS, kernel="matern"), samples=64)
@@ -52,7 +52,7 @@ def joint(found: Fit, which: int, isi_ms: np.ndarray) -> tuple[np.ndarray, np.nd
     correlation = np.exp(-0.5 * ((at_ms[:, None] - at_ms) / length_ms) ** 2)
     covariance = LEVEL_SD**2 + np.outer(share, share) * (rise_sd**2 + deviation**2 * correlation)
     slope = -rise * share[:n] * (told.isi_ms - middle) / sd**2
-    own = (noise * np.exp(growth * share[: n + m])) ** 2
+    own = (noise * np.exp(growth * np.sqrt(share[: n + m]))) ** 2
     own[:n] += (slope * known(told.isi_sd_ms)) ** 2
     covariance[range(n + m), range(n + m)] += own
     return rise * share, covariance
@@ -60,7 +60,8 @@ def joint(found: Fit, which: int, isi_ms: np.ndarray) -> tuple[np.ndarray, np.nd
 
 def test_windows_cannot_lie_before_the_hit() -> None:
     # MEPs long before the hit, at 180 ms, are large by chance.
-    told = [(30.0, 0.012), (60.0, 0.15), (70.0, 0.2), (80.0, 0.12), (240.0, 0.02), (260.0, 0.03), (300.0, 0.01)] * 3
+    told = [(30.0, 0.012), (60.0, 0.1), (65.0, 0.05), (70.0, 0.03), (80.0, 0.12), (100.0, 0.012), (110.0, 0.01)]
+    told += [(200.0, 0.012), (240.0, 0.02), (280.0, 0.011), (340.0, 0.009), (420.0, 0.01)]
     for name in ("gp-straddle", "gp-variance", "gp-ei"):
         strategy = isiw.make_strategy(
             name, VALVE_SPACE, 1, hit_delay_ms=(180.0, 6.0), samples=64, windows={"ensemble": 64}
@@ -68,7 +69,7 @@ def test_windows_cannot_lie_before_the_hit() -> None:
         for isi_ms, mep_mv in told:
             strategy.tell(isi_ms, mep_mv)
         found = strategy.estimate().window
-        assert found is None or found.start_ms > 130.0
+        assert found is None or found.start_ms > 140.0
 
 
 def test_the_marginal_likelihood_is_that_of_the_joint_gaussian() -> None:
@@ -122,7 +123,7 @@ def test_windows_of_the_ensemble_have_the_law_of_the_prior() -> None:
     for share in (0.1, 0.5, 0.9):
         assert np.quantile(start_ms, share) == pytest.approx(np.interp(share, knots.below, knots.start_ms), abs=1.0)
     assert float((4.0 * places.sd_ms[rising]).median()) == pytest.approx(100.0, rel=0.01)
-    assert float(processes.noise[rising].log().std()) == pytest.approx(0.35, rel=0.03)
+    assert float(processes.noise[rising].log().std()) == pytest.approx(prior.noise.sd, rel=0.03)
     assert float(log_prior[rising].logsumexp(0).exp()) == pytest.approx(prior.p_window)
     assert float(log_prior.logsumexp(0).exp()) == pytest.approx(1.0)
 

@@ -211,7 +211,7 @@ class Fit:
         isi_ms, sd_ms = self.trials.isi_ms, self.trials.isi_sd_ms
         # What an ISI is off by moves a trial along the flank [McHutchon2011].
         blur = (places.slope(isi_ms) * sd_ms / processes.noise.unsqueeze(-1)).square()
-        return torch.exp(log_variance + 2.0 * places.growth.unsqueeze(-1) * places.share(isi_ms)) + blur
+        return torch.exp(log_variance + 2.0 * places.log_growth(isi_ms)) + blur
 
     def surprise(self, log_variance: Tensor) -> Tensor:
         """Leave-one-out residuals of the trials with a tap under the best process [SD], shape (n,)."""

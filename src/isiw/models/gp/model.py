@@ -84,7 +84,7 @@ def draw_paths(found: Fit, isi_ms: Tensor, size: int, rng: np.random.Generator) 
     changed = found.noise.log_variance(isi_ms) * present.unsqueeze(-1)
     if found.places is not None:
         places = found.places.picked(picks)
-        changed = changed + 2.0 * places.growth.unsqueeze(-1) * places.share(isi_ms)
+        changed = changed + 2.0 * places.log_growth(isi_ms)
     noise_sd = chosen.noise.unsqueeze(-1) * torch.exp(0.5 * changed)
     unit, centre = found.scale.unit, found.scale.centre
     # Outside a window all is as with TMS alone, whether that was told or not.

@@ -71,6 +71,13 @@ class Places(NamedTuple):
         steps = (isi_ms - self.middle_ms.unsqueeze(-1)) / self.sd_ms.unsqueeze(-1)
         return torch.exp(-0.5 * steps.square())
 
+    def log_growth(self, isi_ms: Tensor) -> Tensor:
+        """Log ratio of the noise SD at each ISI [ms] (t,) and outside, (q, t).
+
+        It grows with the square root of the share: on a flank most stimuli evoke nothing and some evoke much.
+        """
+        return self.growth.unsqueeze(-1) * self.share(isi_ms).sqrt()
+
     def slope(self, isi_ms: Tensor) -> Tensor:
         """By how much the mean changes with each ISI [1/ms], (q, t)."""
         steps = (isi_ms - self.middle_ms.unsqueeze(-1)) / self.sd_ms.unsqueeze(-1)
@@ -83,25 +90,27 @@ class WindowsPrior(Checked):
 
     Args:
         p_window: probability that the tap changes anything.
-        start: where windows start; it knows the hit delay.
+        start: where windows start; it knows the hit delay. Noise is Gaussian, so that no chance is left to windows
+            anywhere: one large MEP before the hit would be enough for them.
         width_ms: how wide they are, each a median and a log SD, as for what follows.
         rise: mean and SD of the largest rise of the log MEP [natural log].
         deviation: SD of the smooth deviation from a Gaussian rise [natural log].
         length_share: over which share of the width it varies.
         noise: SD of the log MEP outside the window.
-        growth: ratio of its SD in the middle of the window and outside.
+        growth: ratio of its SD in the middle of the window and outside; near the motor threshold a stimulus in the
+            window evokes much, or nothing.
         ensemble: how many processes with a window stand for the prior.
     """
 
     p_window: Annotated[float, partial(number, above=0, most=1)] = 0.75
-    start: StartPrior = field(default_factory=StartPrior)
+    start: StartPrior = field(default_factory=lambda: StartPrior(p_anywhere=0.0))
     width_ms: PositiveLaw = Scale(100.0, 0.45)
-    rise: PositiveLaw = Scale(1.6, 0.8)
+    rise: PositiveLaw = Scale(1.3, 0.6)
     deviation: Positive = 0.35
     length_share: Positive = 0.25
-    noise: PositiveLaw = Scale(0.45, 0.35)
-    growth: PositiveLaw = Scale(1.6, 0.25)
-    ensemble: Annotated[int, partial(whole, least=16, most=8192)] = 512
+    noise: PositiveLaw = Scale(0.55, 0.2)
+    growth: PositiveLaw = Scale(1.7, 0.25)
+    ensemble: Annotated[int, partial(whole, least=16, most=8192)] = 256
 
     def processes(self, space: DesignSpace) -> tuple[Hyperparameters, Places, Tensor]:
         """The ensemble in a space: those with a window, then those without; and the log prior of each."""
