@@ -29,7 +29,6 @@ from isiw.subjects import SimulatedSubject, cohort
 from isiw.subjects.changes import Change
 from isiw.trials import Status, Trial
 
-SPACE = isiw.VALVE_SPACE
 MOVES_MS = 25.0
 PLAN = Plan("benchmark", before=1, after=1, pairs=100)
 COHORTS = "narrow-unstated", "narrow", "recruitment"
@@ -39,12 +38,19 @@ STATED = {"narrow-unstated": {"conditioning": "electrical"}}
 PLANS = {"watching": PLAN, "without": replace(PLAN, probes=0.0, follow_ms=0.0)}
 
 
-def searched(subject: SimulatedSubject, seed: int, trials: int, **stated: str) -> Strategy | None:
+def space_of(name: str) -> isiw.DesignSpace:
+    """The design space of a cohort: after an electrical pulse ISIs count from it."""
+    return isiw.IMPACT_SPACE if name in STATED else isiw.VALVE_SPACE
+
+
+def searched(name: str, subject: SimulatedSubject, seed: int, trials: int) -> Strategy | None:
     """A strategy that knows what a search for the window taught; None if it found none."""
-    person, search = subject.begin(seed), isiw.make_strategy("default", SPACE, seed=seed, max_trials=trials, **stated)
+    space = space_of(name)
+    search = isiw.make_strategy("default", space, seed=seed, max_trials=trials, **STATED.get(name, {}))
+    person = subject.begin(seed)
     table = []
     for index in range(trials):
-        response = person.respond(search.ask(), SPACE.reference)
+        response = person.respond(search.ask(), space.reference)
         table.append(Trial(index, Status.ACCEPTED, None, isi_ms=response.isi_ms, mep_mv=response.mep_mv))
         search.learn(response.isi_ms, response.mep_mv)
     knowing = search.restarted()
@@ -59,10 +65,10 @@ def paired(strategy: Strategy, subject: SimulatedSubject, plan: Plan, seed: int)
     for slot in plan.slots[: plan.last_pair + 1]:
         alone = agenda.control(slot.number) is not None
         isi_ms = None if alone else agenda.isi_ms(trials)
-        response = person.respond(isi_ms, SPACE.reference)
+        response = person.respond(isi_ms, strategy.space.reference)
         trials.append(Trial(slot.number, Status.ACCEPTED, isi_ms, isi_ms=response.isi_ms, mep_mv=response.mep_mv))
         if response.isi_ms is not None:
-            window = subject.window(SPACE, slot.place + 1)
+            window = subject.window(strategy.space, slot.place + 1)
             is_in = window is not None and bool(window.mask([response.isi_ms])[0])
             inside.append((is_in, plan.is_probe(slot, seed)))
     usual = [is_in for is_in, probe in inside if not probe]
@@ -73,8 +79,8 @@ def rows(name: str, people: int, seed: int, trials: int) -> Iterator[dict[str, o
     """A row for each person, course of the window, and way."""
     for number, subject in enumerate(cohort(name, people, seed)):
         if (
-            subject.window(SPACE) is None
-            or (strategy := searched(subject, seed + number, trials, **STATED.get(name, {}))) is None
+            subject.window(space_of(name)) is None
+            or (strategy := searched(name, subject, seed + number, trials)) is None
         ):
             continue
         shift_ms = MOVES_MS * (-1) ** number
