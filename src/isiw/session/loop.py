@@ -51,6 +51,8 @@ class Session(Judging):
         visit: what is noted about the visit, for the log.
         protocol: intervals, control trials, blocks and rests.
         first_step: the profile below the motor threshold that a search above it goes on from, for the log.
+        intervention: an intervention, which uses the window that the strategy knows from trials before; its plan says
+            what is delivered, and the strategy learns nothing more.
 
     Raises:
         DeviceError: the device counts its ISIs from another event than the space, or states another detection limit
