@@ -120,9 +120,7 @@ def dose_figure(delivered: Sequence[Delivered], window: Sequence[tuple[float, fl
     probe = np.array([pair.probe for pair in delivered])
     if window:
         times_s, start, end = np.array(window).T
-        right.fill_between(
-            times_s / 60.0, start, end, step="post", color=BLUE, alpha=0.15, lw=0, label="window"
-        )
+        right.fill_between(times_s / 60.0, start, end, step="post", color=BLUE, alpha=0.15, lw=0, label="window")
     groups = ((~probe, BLUE, "o", "pair"), (probe, ORANGE, "^", "probe of the window"))
     width = max(1.0, float(np.ptp(isi_ms)) / 30.0)
     edges = np.arange(isi_ms.min() - width / 2, isi_ms.max() + width, width)
