@@ -1,6 +1,6 @@
 """Whether pairs stay in a window that moves, if it is watched: the same people with watching and without.
 
-    python -m benchmarks.pairing_watch --people 40 --seed 140000 --out benchmarks/results/pairing_watch
+    python -m benchmarks.pairing_watch --people 20 --seed 140000 --out benchmarks/results/pairing_watch
 
 Each person's window is searched for with the default, and then used for 100 pairs: once it stays, and once it moves
 by 25 ms within them, earlier or later by turns. "Watching" is the plan's default, a tenth of the pairs as probes and an
@@ -29,18 +29,28 @@ from isiw.subjects import SimulatedSubject, cohort
 from isiw.subjects.changes import Change
 from isiw.trials import Status, Trial
 
-SPACE = isiw.VALVE_SPACE
 MOVES_MS = 25.0
 PLAN = Plan("benchmark", before=1, after=1, pairs=100)
+COHORTS = "narrow-unstated", "narrow", "recruitment"
+STATED = {"narrow-unstated": {"conditioning": "electrical"}}
+"""What is stated of the stimulus, as it is known where windows are so narrow."""
+
 PLANS = {"watching": PLAN, "without": replace(PLAN, probes=0.0, follow_ms=0.0)}
 
 
-def searched(subject: SimulatedSubject, seed: int, trials: int) -> Strategy | None:
+def space_of(name: str) -> isiw.DesignSpace:
+    """The design space of a cohort: after an electrical pulse ISIs count from it."""
+    return isiw.IMPACT_SPACE if name in STATED else isiw.VALVE_SPACE
+
+
+def searched(name: str, subject: SimulatedSubject, seed: int, trials: int) -> Strategy | None:
     """A strategy that knows what a search for the window taught; None if it found none."""
-    person, search = subject.begin(seed), isiw.make_strategy("default", SPACE, seed=seed, max_trials=trials)
+    space = space_of(name)
+    search = isiw.make_strategy("default", space, seed=seed, max_trials=trials, **STATED.get(name, {}))
+    person = subject.begin(seed)
     table = []
     for index in range(trials):
-        response = person.respond(search.ask(), SPACE.reference)
+        response = person.respond(search.ask(), space.reference)
         table.append(Trial(index, Status.ACCEPTED, None, isi_ms=response.isi_ms, mep_mv=response.mep_mv))
         search.learn(response.isi_ms, response.mep_mv)
     knowing = search.restarted()
@@ -55,10 +65,10 @@ def paired(strategy: Strategy, subject: SimulatedSubject, plan: Plan, seed: int)
     for slot in plan.slots[: plan.last_pair + 1]:
         alone = agenda.control(slot.number) is not None
         isi_ms = None if alone else agenda.isi_ms(trials)
-        response = person.respond(isi_ms, SPACE.reference)
+        response = person.respond(isi_ms, strategy.space.reference)
         trials.append(Trial(slot.number, Status.ACCEPTED, isi_ms, isi_ms=response.isi_ms, mep_mv=response.mep_mv))
         if response.isi_ms is not None:
-            window = subject.window(SPACE, slot.place + 1)
+            window = subject.window(strategy.space, slot.place + 1)
             is_in = window is not None and bool(window.mask([response.isi_ms])[0])
             inside.append((is_in, plan.is_probe(slot, seed)))
     usual = [is_in for is_in, probe in inside if not probe]
@@ -68,7 +78,10 @@ def paired(strategy: Strategy, subject: SimulatedSubject, plan: Plan, seed: int)
 def rows(name: str, people: int, seed: int, trials: int) -> Iterator[dict[str, object]]:
     """A row for each person, course of the window, and way."""
     for number, subject in enumerate(cohort(name, people, seed)):
-        if subject.window(SPACE) is None or (strategy := searched(subject, seed + number, trials)) is None:
+        if (
+            subject.window(space_of(name)) is None
+            or (strategy := searched(name, subject, seed + number, trials)) is None
+        ):
             continue
         shift_ms = MOVES_MS * (-1) ** number
         moving = replace(subject, change=Change(first=2, last=101, shift_ms=shift_ms))
@@ -90,13 +103,13 @@ def summary(table: pd.DataFrame) -> pd.DataFrame:
 
 def main(
     out: Annotated[Path, typer.Option(help="Path of the result, without suffix.")],
-    people: Annotated[int, typer.Option(help="People of each cohort.")] = 40,
+    people: Annotated[int, typer.Option(help="People of each cohort.")] = 20,
     seed: Annotated[int, typer.Option(help="Seed of the people.")] = 140_000,
     trials: Annotated[int, typer.Option(help="Trials of the search.")] = 40,
-    cohorts: Annotated[list[str], typer.Option("--cohort", help="A cohort; repeat it.")] = ["narrow", "recruitment"],  # noqa: B006 - typer's
+    cohorts: Annotated[list[str] | None, typer.Option("--cohort", help="A cohort; repeat it.")] = None,
 ) -> None:
     """Pair the people of some cohorts."""
-    table = pd.DataFrame([row for name in cohorts for row in rows(name, people, seed, trials)])
+    table = pd.DataFrame([row for name in cohorts or COHORTS for row in rows(name, people, seed, trials)])
     write_table(summary(table), facts_of("pairing_watch", "numpy", seed=seed, people=people, trials=trials), out)
 
 

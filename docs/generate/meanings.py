@@ -36,8 +36,8 @@ _EDGE: Final = {
 MEANINGS: Final[Mapping[str, Mapping[str, str]]] = {
     "/header": _OF_A_DEVICE
     | {
-        "kind": '"session", "intervention" if a window was used and none searched for, or "imported" for trials that were '
-        "delivered without isiw.",
+        "kind": '"session", "intervention" if a window was used and none searched for, or "imported" for trials that '
+        "were delivered without isiw.",
         "source": "of an imported log, where the trials are from.",
         "given_by": "of an imported log, by when all trials had been given, as their dates say; empty if unknown.",
         "strategy": "name, seed and settings of the strategy; no name if it was built from a user's own objects.",
@@ -102,8 +102,8 @@ MEANINGS: Final[Mapping[str, Mapping[str, str]]] = {
         "refused a stimulus; fault: an error; resume: the session continues; fallback: another ISI than the strategy's "
         "choice; fit: the model's fit failed; refused: it was not delivered; late: an answer past its deadline; "
         "pause: paused, or continued; doubt: somebody should look at the data; note: a remark; change: something "
-        "changed that bears on all later MEPs; client: another client drives the session; block, stop, opening: a block "
-        "of an intervention begins, its operator has ended it, or its arm was opened.",
+        "changed that bears on all later MEPs; client: another client drives the session; block, stop, opening: a "
+        "block of an intervention begins, its operator has ended it, or its arm was opened.",
         "finding": "of a doubt or a pause, what was found; of an exclusion or inclusion, that ISIs were in doubt.",
         "trial": "the trial that was judged, refused or late; else the last one before the event.",
         "text": "what happened, in sentences.",

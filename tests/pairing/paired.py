@@ -19,7 +19,7 @@ from isiw.models.protocol import Observation
 from isiw.session.loop import Session
 from isiw.strategy.stopping import Budget
 from isiw.strategy.strategy import Strategy
-from isiw.trials import Measurement, Stimulus
+from isiw.trials import Measurement, Status, Stimulus, Trial
 from isiw.types import Array
 from isiw.window import Window
 from scripted import ScriptedDevice, WantedIsi
@@ -66,9 +66,12 @@ class KnownModel:
         return posterior
 
 
-def knowing() -> Strategy:
-    """A strategy that knows the window."""
-    return Strategy(SPACE, KnownModel(), WantedIsi(), Budget(10), seed=4)  # type: ignore[arg-type]
+def knowing(earlier: int = 0) -> Strategy:
+    """A strategy that knows the window, and from so many trials how much MEPs vary."""
+    strategy = Strategy(SPACE, KnownModel(), WantedIsi(), Budget(10), seed=4)  # type: ignore[arg-type]
+    trials = [Trial(k, Status.ACCEPTED, None, isi_ms=BEST_MS, mep_mv=BASE_MV + 1.0) for k in range(earlier)]
+    strategy.learn_all(trials)
+    return strategy
 
 
 def planned(**changes: Any) -> Plan:
@@ -104,5 +107,6 @@ def device(best_ms: Callable[[int], float] = lambda _: BEST_MS, *, simulated: bo
 
 def session(log: Path, given: Intervention | None = None, on: ScriptedDevice | None = None, **options: Any) -> Session:
     """A session of an intervention."""
+    strategy = options.pop("strategy", None) or knowing()
     options = {"limits": LIMITS, "subject": "P07"} | options
-    return Session(on or device(), knowing(), log=log, intervention=given or intervention(), **options)
+    return Session(on or device(), strategy, log=log, intervention=given or intervention(), **options)

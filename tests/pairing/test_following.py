@@ -1,0 +1,78 @@
+"""A window that is followed while it is used."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from isiw.errors import StrategyError
+from isiw.findings import Kind
+from isiw.pairing.following import SHARES, SHIFTS_MS, Followed
+from isiw.trials import Status, Trial
+from pairing.paired import BASE_MV, BEST_MS, SPACE, KnownWindow, knowing
+from scripted import RememberingPosterior
+
+VARIED = np.exp(0.25 * np.random.default_rng(8).standard_normal(60))
+
+
+def trial(number: int, isi_ms: float | None, mep_mv: float) -> Trial:
+    return Trial(number, Status.ACCEPTED, isi_ms, isi_ms=isi_ms, mep_mv=mep_mv)
+
+
+def begun() -> Followed:
+    return Followed.begin(KnownWindow(SPACE), SPACE, knowing(earlier=6).earlier)
+
+
+def after(best_ms: float, share: float = 1.0, pairs: int = 60) -> Followed:
+    """What is known after pairs around the usual best ISI, of a window that is elsewhere or enhances less."""
+    followed = begun()
+    for number in range(pairs):
+        isi_ms = BEST_MS + (-25.0, 0.0, 25.0)[number % 3]
+        mep_mv = BASE_MV + share * float(np.exp(-0.5 * ((isi_ms - best_ms) / 20.0) ** 2))
+        followed = followed.after(trial(number, isi_ms, mep_mv * VARIED[number]))
+    return followed
+
+
+@pytest.mark.parametrize("best_ms", [80.0, 100.0, 125.0])
+def test_a_window_that_has_moved_is_found_where_it_is(best_ms: float) -> None:
+    median, low, high = after(best_ms).interval(SHIFTS_MS, 1)
+    assert low <= best_ms - BEST_MS <= high
+    assert abs(median - (best_ms - BEST_MS)) < 8.0
+    best = after(best_ms)
+    assert abs(best.isi_ms[int(np.argmax(best.enhancement_mv))] - best_ms) < 10.0
+
+
+def test_an_enhancement_that_is_gone_is_noticed() -> None:
+    left, _, high = after(100.0, share=0.0).interval(SHARES, 2)
+    assert left <= 0.25
+    assert high < 1.0
+    assert after(100.0).interval(SHARES, 2)[0] >= 0.75
+
+
+def test_tms_alone_says_nothing_of_the_place_but_of_the_level() -> None:
+    followed = begun()
+    for number in range(10):
+        followed = followed.after(trial(number, None, 2.0 * BASE_MV))
+    assert followed.p_inside == pytest.approx(begun().p_inside)
+    assert followed.weights[..., 5:].sum() > 0.8
+
+
+def test_a_probe_is_where_the_next_mep_says_most_and_among_those_that_are_allowed() -> None:
+    unsure = begun()
+    for _ in range(40):
+        unsure = unsure.moved()
+    everywhere = unsure.news(unsure.isi_ms)
+    assert 8.0 < abs(everywhere - BEST_MS) < 60.0  # at a flank
+    allowed = unsure.isi_ms[(unsure.isi_ms >= 95) & (unsure.isi_ms <= 105)]
+    assert 95.0 <= unsure.news(allowed) <= 105.0
+
+
+def test_a_lost_trial_teaches_nothing() -> None:
+    followed = begun()
+    lost = Trial(0, Status.MISTRIAL, 100.0, Kind.OUTCOME_UNKNOWN)
+    assert followed.after(lost) is followed
+
+
+def test_a_posterior_without_profiles_is_refused() -> None:
+    with pytest.raises(StrategyError, match="cannot be used"):
+        Followed.begin(RememberingPosterior(SPACE, 0), SPACE, ())
