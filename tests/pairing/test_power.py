@@ -27,6 +27,7 @@ def test_more_pulses_show_less_of_a_change_and_none_do_where_the_level_drifts() 
     assert large is not None
     assert small > large
     assert pulses_needed(replace(effect, drift_log_sd=0.5), 1.3) is None
+    assert pulses_needed(replace(effect, drift_log_sd=0.5), 1.3, steady=True) is not None
     wanted, measured = np.log(1.3), np.sqrt(2 * (0.6**2 / small + 0.05**2))
     assert scipy.stats.norm.cdf(wanted / measured - 1.645) == pytest.approx(0.8, abs=0.01)
 

@@ -19,7 +19,7 @@ BETWEEN_PEOPLE: Final = 0.35
 _MOST_PEOPLE: Final = 10_000
 
 
-def pulses_needed(effect: AfterEffect, factor: float, *, power: float = POWER) -> int | None:
+def pulses_needed(effect: AfterEffect, factor: float, *, power: float = POWER, steady: bool = False) -> int | None:
     """How many pulses before and in all blocks after, of each, show a change in this person.
 
     The 90 % interval then holds no factor of 1 with this probability. From n pulses before and n after, the change has
@@ -29,15 +29,16 @@ def pulses_needed(effect: AfterEffect, factor: float, *, power: float = POWER) -
         effect: what was measured in the person.
         factor: the change that is to be seen, such as 1.5.
         power: the probability.
+        steady: whether the level is taken not to drift.
 
     Returns:
-        The number, or None where the level drifts so much that no number is enough.
+        The number, or None where the level may drift so much that no number is enough.
 
     Raises:
         InvalidValueError: a factor of 1 or not above 0, or no probability.
     """
     wanted = _log_of(factor) / (_quantile(0.95) + _quantile(share("the power", power, above=0.0, below=1.0)))
-    left = 0.5 * wanted**2 - effect.drift_log_sd**2
+    left = 0.5 * wanted**2 - (0.0 if steady else effect.drift_log_sd**2)
     return None if left <= 0 else math.ceil(effect.pulse_log_sd**2 / left)
 
 

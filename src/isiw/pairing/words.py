@@ -68,11 +68,13 @@ def needed(effect: AfterEffect, factor: float = SOUGHT) -> str:
     people = people_needed(factor, math.hypot(BETWEEN_PEOPLE, measuring_log_sd(effect)))
     pulses = pulses_needed(effect, factor)
     share = f"with a probability of {POWER:g}"
-    one = (
-        f"No number of pulses shows {times(factor)} in this person {share}: the level drifts too much."
-        if pulses is None
-        else f"To show {times(factor)} in this person {share} takes {pulses} pulses before and {pulses} after."
-    )
+    one = f"To show {times(factor)} in this person {share} takes {pulses} pulses before and {pulses} after."
+    if pulses is None:
+        few = pulses_needed(effect, factor, steady=True)
+        one = (
+            f"No number of pulses shows {times(factor)} in this person {share}, since the level may drift as much; "
+            f"if it did not, {few} before and {few} after would."
+        )
     return (
         f"{one} A study of such people takes {people}, "
         f"if their changes differ by a log SD of {BETWEEN_PEOPLE:g} (an assumption)."
