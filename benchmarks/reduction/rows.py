@@ -85,10 +85,10 @@ def judged_again(before: Iterable[Claim], rows: pd.DataFrame) -> list[Claim]:
     """
     now = [*method_claims({PEOPLE: comparison.summary(rows)}), *sweep_claims(rows), *star_claims(rows)]
     known = {(claim.where, claim.what): claim for claim in now}
-    return [_again(claim, known.get((claim.where, claim.what), claim)) for claim in before]
+    return [again(claim, known.get((claim.where, claim.what), claim)) for claim in before]
 
 
-def _again(before: Claim, now: Claim) -> Claim:
+def again(before: Claim, now: Claim) -> Claim:
     """A claim with its new numbers; wrong models and readings were run only for the verdict before."""
     if now is before:
         return before
