@@ -1,4 +1,4 @@
-"""The main comparison alone, with 88 sessions a row: its table, and the claims about it judged again.
+"""The main comparison alone, with many sessions a row: its table, and the claims about it judged again.
 
 What else the report holds, and which wrong models a claim fails for, is as the last whole run has it.
 """
@@ -42,7 +42,7 @@ __all__ = ["judged_again", "measured", "rewritten"]
 REST: Final = "The text's own ground truth"
 """How the rest of the opening begins, behind the counts."""
 
-TITLE: Final = "The reduction of trials, 88 sessions a row"
+TITLE: Final = "The reduction of trials, with many sessions a row"
 
 
 def measured(size: Size, seed: int, workers: Workers) -> pd.DataFrame:
@@ -114,9 +114,10 @@ def rewritten(rows: pd.DataFrame, facts: Mapping[str, Any], results: Path) -> st
     record, before = json.loads(path.read_text(encoding="utf-8")), read_claims(path)
     claims = judged_again(before, rows)
     said, was = verdicts.section(claims), fill(record["opening"], 120)
+    people = rows["person"].nunique()
     counts, whole = by_kind(claims), record.get("whole", record["opening"])
     opening = (
-        f"With 88 sessions a row of `{PEOPLE}` (8 for each of 11 people) in the comparison, {counts[REPRODUCED]} of "
+        f"With {people} sessions a row of `{PEOPLE}` ({people / 11:g} for each of 11 people), {counts[REPRODUCED]} of "
         f"the text's {len(claims)} claims come out as printed and fail for a wrong model that was run; {counts[UNDER]} "
         f"come out under another reading or on other people, {counts[NOT]} do not, and {counts[KINDS[-1]]} "
         f"hold but could not fail. {TWELVE} The [table](trial_reduction_rows.md) has intervals of each difference. All "

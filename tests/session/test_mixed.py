@@ -14,6 +14,7 @@ from isiw.devices.limits import Limits
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, StrategyError
 from isiw.session.sink import SessionUpdate
 from isiw.subjects.cohorts import person_of
+from isiw.subjects.subject import Response
 from isiw.trials import Stimulus
 from isiw.visit import Visit, VisitProtocol
 
@@ -31,8 +32,8 @@ def device(*, sets_intensity: bool = True) -> isiw.SimulatedDevice:
     """A simulated person whose MEPs depend on the intensity."""
     responder = person_of("recruitment", 0, 1).begin(1)
 
-    def respond(isi_ms: float | None, **more: float) -> isiw.subjects.Response:
-        return responder.respond(isi_ms, "impact", **more)
+    def respond(isi_ms: float | None, intensity_pct_rmt: float | None = None) -> Response:
+        return responder.respond(isi_ms, "impact", intensity_pct_rmt=intensity_pct_rmt)
 
     return isiw.SimulatedDevice(isiw.SimulatedPerson(respond, "impact", sets_intensity=sets_intensity))
 
