@@ -69,7 +69,9 @@ def beside_text(rows: pd.DataFrame) -> pd.DataFrame:
                 "text": f"{line['text']:g}",
                 "difference": f"{apart:+.1f} ({apart - ERRORS * error:+.1f} to {apart + ERRORS * error:+.1f})",
                 "% of the text's 272": f"{100 * line['trials'] / text.TRIALS['without']['incremental']:.1f}",
-                "F1: measured": f"{line['F1: measured']:.2f} ± {line['F1 SE']:.2f}",
+                "F1: measured": "–"
+                if math.isnan(line["F1 SE"])
+                else f"{line['F1: measured']:.2f} ± {line['F1 SE']:.2f}",
                 "text: F1": f"{line['text: F1']:.2f}",
             }
         )
@@ -120,7 +122,7 @@ def rewritten(rows: pd.DataFrame, facts: Mapping[str, Any], results: Path) -> st
         f"With {people} sessions a row of `{PEOPLE}` ({people / 11:g} for each of 11 people), {counts[REPRODUCED]} of "
         f"the text's {len(claims)} claims come out as printed and fail for a wrong model that was run; {counts[UNDER]} "
         f"come out under another reading or on other people, {counts[NOT]} do not, and {counts[KINDS[-1]]} "
-        f"hold but could not fail. {TWELVE} The [table](trial_reduction_rows.md) has intervals of each difference. All "
+        f"hold but could not fail. {TWELVE} `trial_reduction_rows.md` has intervals of each difference. All "
         f"else is of the last whole run, with 11 sessions a row. {whole[whole.index(REST) :]}"
     )
     record |= {"whole": whole, "opening": opening, "claims": claims_as_json(claims)}
