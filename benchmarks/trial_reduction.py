@@ -2,10 +2,10 @@
 
     python -m benchmarks.trial_reduction --quick
     python -m benchmarks.trial_reduction
-    python -m benchmarks.trial_reduction --rows
+    python -m benchmarks.trial_reduction --rows 88
 
 writes a report (Markdown), its tables with versions, command and seed (JSON) and figures (PNG). Run it from the
-project's root. `--rows` plays only the main comparison, with 88 sessions a row, and judges the claims about it again.
+project's root. `--rows` plays only the main comparison, with so many sessions a row, and judges its claims again.
 Reported people come from seed 10,000 on; seeds below 1,000 are for work.
 """
 
@@ -14,6 +14,7 @@ from __future__ import annotations
 import os
 import shutil
 import time
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Annotated, Any
@@ -103,16 +104,16 @@ def main(
     few: Annotated[bool, typer.Option(help="Hardly any people.")] = False,
     go_on: Annotated[bool, typer.Option(help="Go on with a run that was interrupted, with the same code.")] = False,
     again: Annotated[bool, typer.Option(help="Tell once more what the last run measured.")] = False,
-    rows_alone: Annotated[
-        bool, typer.Option("--rows", help="Only the main comparison, 88 sessions a row, and the claims about it.")
-    ] = False,
+    rows_of: Annotated[
+        int, typer.Option("--rows", help="Only the main comparison, so many sessions a row, and the claims about it.")
+    ] = 0,
 ) -> None:
     """Reproduce the dissertation's reduction of trials."""
     kept = out.with_suffix(".parts")
-    if rows_alone:
+    if rows_of:
         workers = Workers(processes, kept.with_suffix(".done.parts"))
         made = {"command": f"`{command_of('trial_reduction')}`", "versions": made_with(*VERSIONS), "seed": seed}
-        print(rows.rewritten(rows.measured(FULL, seed, workers), made, out))
+        print(rows.rewritten(rows.measured(replace(FULL, kim=rows_of), seed, workers), made, out))
         return
     if not again:
         run(FEW if few else FULL, seed, processes, kept, go_on=go_on)

@@ -1,4 +1,4 @@
-"""The main comparison alone, with 88 sessions a row: its table, and the claims about it judged again.
+"""The main comparison alone, with many sessions a row: its table, and the claims about it judged again.
 
 What else the report holds, and which wrong models a claim fails for, is as the last whole run has it.
 """
@@ -42,7 +42,7 @@ __all__ = ["judged_again", "measured", "rewritten"]
 REST: Final = "The text's own ground truth"
 """How the rest of the opening begins, behind the counts."""
 
-TITLE: Final = "The reduction of trials, 88 sessions a row"
+TITLE: Final = "The reduction of trials, with many sessions a row"
 
 
 def measured(size: Size, seed: int, workers: Workers) -> pd.DataFrame:
@@ -69,7 +69,9 @@ def beside_text(rows: pd.DataFrame) -> pd.DataFrame:
                 "text": f"{line['text']:g}",
                 "difference": f"{apart:+.1f} ({apart - ERRORS * error:+.1f} to {apart + ERRORS * error:+.1f})",
                 "% of the text's 272": f"{100 * line['trials'] / text.TRIALS['without']['incremental']:.1f}",
-                "F1: measured": f"{line['F1: measured']:.2f} ± {line['F1 SE']:.2f}",
+                "F1: measured": "–"
+                if math.isnan(line["F1 SE"])
+                else f"{line['F1: measured']:.2f} ± {line['F1 SE']:.2f}",
                 "text: F1": f"{line['text: F1']:.2f}",
             }
         )
@@ -85,10 +87,10 @@ def judged_again(before: Iterable[Claim], rows: pd.DataFrame) -> list[Claim]:
     """
     now = [*method_claims({PEOPLE: comparison.summary(rows)}), *sweep_claims(rows), *star_claims(rows)]
     known = {(claim.where, claim.what): claim for claim in now}
-    return [_again(claim, known.get((claim.where, claim.what), claim)) for claim in before]
+    return [again(claim, known.get((claim.where, claim.what), claim)) for claim in before]
 
 
-def _again(before: Claim, now: Claim) -> Claim:
+def again(before: Claim, now: Claim) -> Claim:
     """A claim with its new numbers; wrong models and readings were run only for the verdict before."""
     if now is before:
         return before
@@ -114,12 +116,13 @@ def rewritten(rows: pd.DataFrame, facts: Mapping[str, Any], results: Path) -> st
     record, before = json.loads(path.read_text(encoding="utf-8")), read_claims(path)
     claims = judged_again(before, rows)
     said, was = verdicts.section(claims), fill(record["opening"], 120)
+    people = rows["person"].nunique()
     counts, whole = by_kind(claims), record.get("whole", record["opening"])
     opening = (
-        f"With 88 sessions a row of `{PEOPLE}` (8 for each of 11 people) in the comparison, {counts[REPRODUCED]} of "
+        f"With {people} sessions a row of `{PEOPLE}` ({people / 11:g} for each of 11 people), {counts[REPRODUCED]} of "
         f"the text's {len(claims)} claims come out as printed and fail for a wrong model that was run; {counts[UNDER]} "
         f"come out under another reading or on other people, {counts[NOT]} do not, and {counts[KINDS[-1]]} "
-        f"hold but could not fail. {TWELVE} The [table](trial_reduction_rows.md) has intervals of each difference. All "
+        f"hold but could not fail. {TWELVE} `trial_reduction_rows.md` has intervals of each difference. All "
         f"else is of the last whole run, with 11 sessions a row. {whole[whole.index(REST) :]}"
     )
     record |= {"whole": whole, "opening": opening, "claims": claims_as_json(claims)}

@@ -14,7 +14,12 @@ from isiw.devices.limits import Limits
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, StrategyError
 from isiw.session.sink import SessionUpdate
 from isiw.subjects.cohorts import person_of
+<<<<<<< HEAD
 from isiw.trials import Stimulus, Trial
+=======
+from isiw.subjects.subject import Response
+from isiw.trials import Stimulus
+>>>>>>> twostep
 from isiw.visit import Visit, VisitProtocol
 
 SPACE = isiw.DesignSpace(0, 300, reference="impact")
@@ -31,8 +36,8 @@ def device(*, sets_intensity: bool = True) -> isiw.SimulatedDevice:
     """A simulated person whose MEPs depend on the intensity."""
     responder = person_of("recruitment", 0, 1).begin(1)
 
-    def respond(isi_ms: float | None, **more: float) -> isiw.subjects.Response:
-        return responder.respond(isi_ms, "impact", **more)
+    def respond(isi_ms: float | None, intensity_pct_rmt: float | None = None) -> Response:
+        return responder.respond(isi_ms, "impact", intensity_pct_rmt=intensity_pct_rmt)
 
     return isiw.SimulatedDevice(isiw.SimulatedPerson(respond, "impact", sets_intensity=sets_intensity))
 

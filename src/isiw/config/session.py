@@ -85,20 +85,21 @@ def settings_with_prior(config: RunConfig, device: DeviceInfo) -> dict[str, Any]
             "strategy.settings.prior and a prior from earlier sessions exclude each other",
             remedy="Give only one of them.",
         )
-    if looks_above(config.strategy.name) and earlier:
-        lab = None if config.prior is None else read_lab_prior(config.prior).joined()
-        _require_people(config, earlier, device, any_intensity=True)
-        return settings | {"prior": above(*earlier, prior=lab, law=_law(config, earlier))}
-    if not learns_from_earlier(config.strategy.name):
+    second_step = looks_above(config.strategy.name) and bool(earlier)
+    if not second_step and not learns_from_earlier(config.strategy.name):
         raise StrategyError(
             f"the strategy {config.strategy.name} learns nothing from earlier sessions",
             remedy="Leave out the prior and the earlier sessions, or choose another strategy, such as default.",
         )
     lab = None if config.prior is None else read_lab_prior(config.prior)
-    _require_people(config, earlier, device, [str(config.prior)] if lab is not None and lab.simulated else [])
+    nobodys = [str(config.prior)] if lab is not None and lab.simulated else []
+    _require_people(config, earlier, device, nobodys, any_intensity=second_step)
     if lab is not None:
         _require_like(config, Visit(muscle=lab.noted_muscle), config.prior)
-    return settings | {"prior": after(*earlier, prior=None if lab is None else lab.joined())}
+    before = None if lab is None else lab.joined()
+    if second_step:
+        return settings | {"prior": above(*earlier, prior=before, law=_law(config, earlier))}
+    return settings | {"prior": after(*earlier, prior=before)}
 
 
 def learns_from_earlier(name: str) -> bool:

@@ -288,7 +288,14 @@ class Responder:
         tap_mv = tap.sample_mv(self._rng) * float(np.exp(noise.log_gain))
         return amplitude_of_both_mv(evoked_mv, tap, tap_mv, from_impact_ms)
 
-    def respond_instead(self, isi_ms: float | None, reference: Reference, *, pulse: bool = True) -> Response:
+    def respond_instead(
+        self,
+        isi_ms: float | None,
+        reference: Reference,
+        *,
+        pulse: bool = True,
+        intensity_pct_rmt: float | None = None,
+    ) -> Response:
         """Answer one pair of stimuli that is given because another was lost; see `respond`.
 
         Its noise is drawn apart, so that what was lost does not move the noise of all later trials. What it does to the
@@ -298,10 +305,11 @@ class Responder:
             isi_ms: the commanded ISI on the reference [ms]; None for TMS alone.
             reference: the event that the ISI counts from.
             pulse: whether the magnetic pulse is given.
+            intensity_pct_rmt: its intensity [% RMT].
         """
         usual, self._rng = self._rng, np.random.default_rng([self._seed, 1, self._trials])
         try:
-            return self.respond(isi_ms, reference, pulse=pulse)
+            return self.respond(isi_ms, reference, pulse=pulse, intensity_pct_rmt=intensity_pct_rmt)
         finally:
             self._rng = usual
 
