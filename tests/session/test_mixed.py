@@ -14,12 +14,8 @@ from isiw.devices.limits import Limits
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, StrategyError
 from isiw.session.sink import SessionUpdate
 from isiw.subjects.cohorts import person_of
-<<<<<<< HEAD
-from isiw.trials import Stimulus, Trial
-=======
 from isiw.subjects.subject import Response
-from isiw.trials import Stimulus
->>>>>>> twostep
+from isiw.trials import Stimulus, Trial
 from isiw.visit import Visit, VisitProtocol
 
 SPACE = isiw.DesignSpace(0, 300, reference="impact")
