@@ -116,6 +116,7 @@ ASKED: dict[str, tuple[pd.DataFrame, dict[str, Any], str]] = {
     "remarks that leave out": (table(Bemerkung=np.where(np.arange(36) == 5, "Verworfen!", "")), {},
                                "'Bemerkung' .* says that the trial does not count"),
     "a word for ISIs of 0": (table(stim=np.where(ISIS > 20, "cond", "uncond")).replace(20.0, 0.0), {}, "--alone 0 if"),
+    "numbers of rows": (table().assign(isi_ms=np.arange(1.0, 37.0)), {}, "in the column 'isi_ms' are the numbers of"),
     "two columns of ISIs": (table(realised_isi_ms=ISIS + 40), {}, "isi_ms or realised_isi_ms"),
     "a unit beside that is another": (table(isi_unit=of(["s"])), {}, "'isi_ms .s.' says two units"),
     "a unit beside that changes": (renamed(isi_ms="ISI").assign(isi_unit=of(["s", "ms"])), {}, "says two units"),

@@ -42,6 +42,8 @@ def crossed_out(sheet: Any) -> None:
         (lambda sheet: [setattr(sheet.row_dimensions[row], "hidden", True) for row in (5, 9)],
          "2 rows of the sheet 'Data' are hidden; got 'row 5, 9'.*called exclude"),
         (crossed_out, "1 row of the sheet 'Data' is crossed out; got 'row 7'"),
+        (lambda sheet: setattr(sheet["A8"], "comment", openpyxl.comments.Comment("Artefakt!", "EK")),
+         "1 row of the sheet 'Data' is left out by a note; got 'row 8'"),
         (lambda sheet: sheet.__setitem__("B4", "=1/2"), "1 row .* without the result of a formula; got 'row 4'"),
     ],
 )  # fmt: skip
@@ -69,6 +71,8 @@ def test_epochs_that_contradict_their_events_are_asked_about() -> None:
     for isis_ms in ([30.0, 60, 90, 120, 85, np.nan], [30.0, 60, 90, 120, np.nan, np.nan]):
         with pytest.raises(IsiwError, match=r"ISI of row 5 of .*; expected 45\.0 ms, by the events"):
             read_people(epochs(isi_ms=isis_ms), KNOWN)
+    with pytest.raises(IsiwError, match=r"ISI of row 6 of .* got '20 ms'; expected no tap, by the events"):
+        read_people(epochs(isi_ms=[*ISIS_MS, 20.0]), KNOWN)
     found, _ = mne.events_from_annotations(raw(), {NAMES["tap"]: 1})
     held = pd.DataFrame({"isi_ms": ISIS_MS})
     about = mne.Epochs(raw(), found, {"stim": 1}, -0.3, 0.3, baseline=None, preload=True, metadata=held)
@@ -103,7 +107,7 @@ def test_files_of_bids_beside_a_recording_that_contradict_it_are_asked_about(tmp
         read_people(path, KNOWN)
     require_as_written(read_people(path, KNOWN.saying(units=("uV",)))[0])
     events = pd.DataFrame([(at_s, round(at_s * RATE_HZ), name) for at_s, name in sorted(recording()[1])])
-    events = events.set_axis(["onset", "sample", "trial_type"], axis=1).assign(duration=0.0)
+    events = events.set_axis(["onset", "sample", "value"], axis=1).assign(duration=0.0, trial_type="n/a")
     events.to_csv(tmp_path / "sub-01_events.tsv", sep="\t", index=False)
     require_as_written(read_people(path, KNOWN.saying(units=("uV",)))[0])
     events.assign(onset=1e3 * events["onset"]).to_csv(tmp_path / "sub-01_events.tsv", sep="\t", index=False)

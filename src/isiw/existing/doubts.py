@@ -33,7 +33,7 @@ _TITLES: Final = re.compile(r"\b(means?|averages?|averaged|avg|mittelwerte?)\b")
 _SPREADS: Final = frozenset({"sd", "std", "stdev", "stddev", "se", "sem", "stderr", "cv", "sds", "stdabw",
                              "standarddeviation", "standarderror", "ci", "iqr", "var"})  # fmt: skip
 _SUMS: Final = frozenset({"sum", "total", "grand mean", "summe", "gesamt"})
-_LEFT_OUT: Final = frozenset({"mistrial", "rejected", "reject", "bad", "invalid", "excluded", "exclude", "discard",
+LEFT_OUT: Final = frozenset({"mistrial", "rejected", "reject", "bad", "invalid", "excluded", "exclude", "discard",
                               "discarded", "artefact", "artifact", "outlier", "schlecht", "ungültig", "verworfen",
                               "ausgeschlossen", "artefakt", "ausreißer"})  # fmt: skip
 """What a remark says of a trial that does not count."""
@@ -140,7 +140,7 @@ def require_no_verdicts(beside: Iterable[Column]) -> None:
     """Raise if a column of which nothing is read says that a trial does not count."""
     for column in beside:
         texts = {cell for cell in column.cells if isinstance(cell, str)}
-        if odd := next((text for text in texts if text.strip(" !.").casefold() in _LEFT_OUT), None):
+        if odd := next((text for text in texts if text.strip(" !.").casefold() in LEFT_OUT), None):
             remedy = "Mark such rows in a column called exclude; if they count, write something else, or nothing."
             raise column.refused(column.cells.index(odd), "says that the trial does not count", remedy)
 
@@ -220,6 +220,17 @@ def require_isis(columns: Columns, rows: Sequence[int], layout: Layout) -> None:
     isis_ms = [isi.number(row) for row in rows if not columns.tms_alone(row, layout.alone)]
     if layout.alone is not None or len(isis_ms) < len(rows):
         return
+    if (
+        "order" not in columns.of
+        and len(isis_ms) >= _FEWEST
+        and isis_ms in (list(range(len(isis_ms))), list(range(1, len(isis_ms) + 1)))
+    ):
+        remedy = (
+            "Name the column of the ISIs: --column isi=NAME; if these are, number the rows in a column called trial."
+        )
+        raise InvalidValueError(
+            f"the ISIs of {isi.of} in the column {isi.name!r} are the numbers of rows", remedy=remedy
+        )
     times = Counter(isi_ms for isi_ms in isis_ms if isi_ms is not None)
     for odd in {min(times, default=0.0), max(times, default=0.0)}:
         others = {isi_ms: count for isi_ms, count in times.items() if isi_ms != odd}

@@ -16,6 +16,7 @@ import numpy as np
 
 from isiw.errors import InvalidValueError
 from isiw.existing.cells import is_missing
+from isiw.existing.doubts import LEFT_OUT
 from isiw.existing.layout import COLUMNS, UNIT_WORDS, Layout, letters
 from isiw.existing.tables import require_one
 from isiw.files import opened
@@ -39,6 +40,8 @@ _SHOWN_OTHERWISE: Final = (
     (r'<row (?=[^>/]*hidden="(?:1|true)")[^>/]*?r="(\d+)"[^>/]*>', "hidden", _COUNT),
     (r'<c r="[A-Z]+(\d+)"[^>]*><f[^>]*(?:/>|>[^<]*</f>)(?:<v ?/>|<v></v>)?</c>', "without the result of a formula",
      "Open the workbook in Excel or LibreOffice, and save it."),
+    (rf'(?is)<comment ref="[A-Z]+(\d+)"(?:(?!</comment>).)*?<t[^>]*>\s*(?:{"|".join(LEFT_OUT)})[\s!.]*</t>',
+     "left out by a note", _COUNT),
 )  # fmt: skip
 """In a sheet's XML, rows that Excel shows otherwise than as their cells say, and what to do."""
 
@@ -233,6 +236,8 @@ def _require_whole(book: Any, sheet: str, head: int) -> None:
     """Raise if Excel shows rows below the head of a sheet otherwise than its cells are read."""
     with book[sheet]._get_source() as file:  # noqa: SLF001 - openpyxl does not read it in another way, row by row
         content = file.read()
+    notes = (book._archive.read(name) for name in book._archive.namelist() if "comment" in name)  # noqa: SLF001 - the same
+    content = b"".join([content, *notes])
     fonts = {n for n, font in enumerate(book._fonts) if font.strike}  # noqa: SLF001 - the same
     styles = [str(n) for n, style in enumerate(book._cell_styles) if style.fontId in fonts]  # noqa: SLF001 - the same
     crossed = rf'<c r="[A-Z]+(\d+)" s="(?:{"|".join(styles)})"[^>/]*>' if styles else "(?!)"

@@ -210,8 +210,9 @@ def _person(
     columns.require_said(rows, layout.alone)
     doubts.require_one_kind(columns, rows, layout, columns["isi"].of)
     doubts.require_isis(columns, rows, layout)
+    pairs = [row for row in rows if not columns.tms_alone(row, layout.alone)]
     for key in ("isi", "mep"):
-        doubts.require_one_unit(key, columns[key], [row for row in rows if not columns.tms_alone(row, layout.alone)])
+        doubts.require_one_unit(key, columns[key], pairs)
     space, signals = anywhere(reference), SignalLimits()
     trials = [_trial(columns, row, number, layout, space, signals) for number, row in enumerate(rows)]
     trials, paired_pct_rmt = _with_intensities(trials, columns, rows)

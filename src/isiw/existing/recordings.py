@@ -142,16 +142,18 @@ def _is_tap(
         )
     if len(pulses_s) == len(taps_s) == 1:
         _require_same(f"row {row + 1} of {contents.source}", isi_ms, float(pulses_s[0] - taps_s[0]))
+    elif len(marks[key]) and not len(taps_s) and isi_ms is not None and 0 < isi_ms <= 1e3 * zero_s:
+        _require_same(f"row {row + 1} of {contents.source}", isi_ms, None)
     return key in at_zero
 
 
-def _require_same(what: str, isi_ms: float | None, seen_s: float) -> None:
-    """Raise if the ISI in a table is not that of the events."""
-    if isi_ms is None or abs(1e3 * seen_s - isi_ms) > _APART_MS:
+def _require_same(what: str, isi_ms: float | None, seen_s: float | None) -> None:
+    """Raise if the ISI in a table is not that of the events; None is TMS alone, or a pulse without a tap."""
+    if isi_ms is None or seen_s is None or abs(1e3 * seen_s - isi_ms) > _APART_MS:
         raise InvalidValueError(
             f"the ISI of {what} is not that of the events in its sweep",
             got="TMS alone" if isi_ms is None else f"{isi_ms:g} ms",
-            expected=f"{1e3 * seen_s:.1f} ms, by the events",
+            expected="no tap, by the events" if seen_s is None else f"{1e3 * seen_s:.1f} ms, by the events",
             remedy="Correct one of them, or leave one out of the file.",
         )
 

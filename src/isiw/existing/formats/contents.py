@@ -218,8 +218,11 @@ class Contents:
                     expected=f"seconds, at {tracks[0].rate_hz:g} Hz",
                     remedy="Correct the onsets, or the samples, in the file of events.",
                 )
-        name = "trial_type" if "trial_type" in events else "value"
-        return replace(self, tracks=tracks, events=events.rename(columns={name: "name"}))
+        named = [
+            events[column] for column in ("trial_type", "value") if column in events and events[column].notna().any()
+        ]
+        names = [text_of(each) for each in named[0]] if named else ""
+        return replace(self, tracks=tracks, events=events.assign(name=names))
 
 
 def _beside(path: Path, what: str) -> pd.DataFrame:
