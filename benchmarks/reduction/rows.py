@@ -42,6 +42,9 @@ __all__ = ["judged_again", "measured", "rewritten"]
 REST: Final = "The text's own ground truth"
 """How the rest of the opening begins, behind the counts."""
 
+UNTRIED: Final = "no reading was tried"
+"""Here; the verdict before names those that were."""
+
 TITLE: Final = "The reduction of trials, with many sessions a row"
 
 
@@ -101,6 +104,9 @@ def again(before: Claim, now: Claim) -> Claim:
         return replace(now, verdict=before.verdict if before.verdict.startswith("cannot fail") else untested)
     if now.verdict.startswith(NOT) and before.verdict.startswith(UNDER):
         return replace(now, verdict=before.verdict)
+    if UNTRIED in now.verdict:
+        was = before.verdict if before.verdict.startswith(NOT) else "not, because it comes out otherwise"
+        return replace(now, verdict=was)
     return replace(now, fails_for=NONE)
 
 

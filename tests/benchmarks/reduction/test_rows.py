@@ -18,6 +18,13 @@ BEFORE = Claim("Fig. 4.24", "PF with accelerometer needs 190 trials.", "190", "1
         ("cannot fail here: it holds as well", "reproduced", "cannot fail here: it holds as well", NONE),
         ("not, because", "reproduced", "cannot fail here: no wrong model was run for it with so many sessions", NONE),
         ("reproduced", "not, because it is less", "not, because it is less", NONE),
+        (
+            "not, because none of 6 readings",
+            "not, because … no reading was tried for it",
+            "not, because none of 6 readings",
+            NONE,
+        ),
+        ("reproduced", "not, because … no reading was tried for it", "not, because it comes out otherwise", NONE),
         ("under reading base", "not, because it is less", "under reading base", NONE),
         ("reproduced", "cannot fail here: its own error", "cannot fail here: its own error", NONE),
     ],
