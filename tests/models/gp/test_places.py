@@ -17,6 +17,7 @@ from isiw.models.gp.fit import LEVEL_SD, Fit, fit
 from isiw.models.gp.model import GaussianProcess, draw_paths
 from isiw.models.gp.places import WindowsPrior
 from isiw.models.gp.prior import FixedProcess, ProcessSettings, Standardisation
+from isiw.models.protocol import Observation
 from isiw.models.shared.history import PersonTrials
 from isiw.models.shared.start import StartPrior
 from isiw.testing import check_model
@@ -63,12 +64,11 @@ def test_windows_cannot_lie_before_the_hit() -> None:
     told = [(30.0, 0.012), (60.0, 0.1), (65.0, 0.05), (70.0, 0.03), (80.0, 0.12), (100.0, 0.012), (110.0, 0.01)]
     told += [(200.0, 0.012), (240.0, 0.02), (280.0, 0.011), (340.0, 0.009), (420.0, 0.01)]
     for name in ("gp-straddle", "gp-variance", "gp-ei"):
-        strategy = isiw.make_strategy(
-            name, VALVE_SPACE, 1, hit_delay_ms=(180.0, 6.0), samples=64, windows={"ensemble": 64}
-        )
+        model = isiw.make_strategy(name, VALVE_SPACE, hit_delay_ms=(180.0, 6.0)).model
+        posterior = model.begin(VALVE_SPACE, 1)
         for isi_ms, mep_mv in told:
-            strategy.tell(isi_ms, mep_mv)
-        found = strategy.estimate().window
+            posterior = model.update(posterior, Observation.of([isi_ms], [mep_mv]))
+        found = posterior.estimate().window
         assert found is None or found.start_ms > 140.0
 
 

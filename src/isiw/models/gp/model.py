@@ -240,7 +240,12 @@ class GaussianProcess(Checked):
         return replace(posterior, told=posterior.told.appended(observation), held=None)
 
     def fit(self, told: PersonTrials, space: DesignSpace) -> Fit:
-        """Fit one person's trials; the space is where windows are sought."""
+        """Fit one person's trials.
+
+        Args:
+            told: the trials.
+            space: where windows are sought.
+        """
         told, fixed = self.seen(told), self.process.fixed
         if self.process.profile == "window":
             scale = Standardisation("log", self.detection_limit_mv, math.log(LOG_SCALE_MV), 1.0)
