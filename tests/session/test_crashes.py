@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -87,7 +88,7 @@ def damaged(bench: Bench) -> None:
     bench.log.write_bytes(whole)
 
 
-SCENARIOS = {
+SCENARIOS: dict[str, tuple[Callable[[Bench], Any], Callable[[Bench], Any]]] = {
     "run": (lambda _: None, Bench.run),
     "resume a closed log": (one_trial, Bench.resume),
     "resume a killed one": (killed, Bench.resume),
