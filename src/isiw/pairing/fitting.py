@@ -47,7 +47,7 @@ def require_possible(plan: Plan, limits: Limits, given_before: int, seed: int) -
     _require_times(plan, limits, seed)
 
 
-def require_intensities(plan: Plan, limits: Limits, device: DeviceInfo) -> None:
+def require_settable(plan: Plan, limits: Limits, device: DeviceInfo) -> None:
     """Raise if the intensities of a plan cannot be set: by nobody at a simulated device, or by a limit's word.
 
     Args:
