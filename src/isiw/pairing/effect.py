@@ -151,7 +151,9 @@ def _as_read(pulses: Sequence[TestPulse], limit_mv: float) -> Pulses:
 
 def _stretches(blocks: Sequence[Sequence[TestPulse]], pairs: int) -> Stretches:
     """Stretches of at most ten pulses, and where each is among all stimuli."""
-    of_pulse, block_of, at = [], [], []
+    of_pulse: list[int] = []
+    block_of: list[int] = []
+    at: list[tuple[float, float]] = []
     given = 0
     for number_of, block in enumerate(blocks):
         for part in np.array_split(np.arange(len(block)), -(-len(block) // STRETCH)):

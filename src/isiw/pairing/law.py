@@ -120,7 +120,11 @@ def curvatures(pulses: Pulses, latents: FloatArray) -> FloatArray:
     """Second derivatives of each pulse's log density by its latents, (n, 7, 7)."""
     n, number = latents.shape
     moved = latents[None] + np.concatenate((np.diag(_STEPS), -np.diag(_STEPS)))[:, None, :]
-    again = Pulses(*(np.tile(column, 2 * number) for column in pulses))
+    times = 2 * number
+    again = Pulses(
+        np.tile(pulses.log_mep, times), np.tile(pulses.censored, times), np.tile(pulses.intensity_pct, times)
+    )
     gradient = scores(again, moved.reshape(-1, number)).gradient.reshape(2, number, n, number)
     found = np.moveaxis((gradient[0] - gradient[1]) / (2.0 * _STEPS[:, None, None]), 0, 1)
-    return 0.5 * (found + np.swapaxes(found, 1, 2))
+    both: FloatArray = 0.5 * (found + np.swapaxes(found, 1, 2))
+    return both

@@ -132,13 +132,13 @@ def save_intervention(intervention: InterventionContents, path: str | Path, *, o
 
 def intervention_page(intervention: InterventionContents) -> str:
     """A page of HTML about an intervention; it needs no network and no JavaScript."""
+    effect: AfterEffect | None = None
     try:
         effect = intervention.change()
+        said = words.statement(effect)
     except InvalidValueError as error:
         few = f"{error.what[:1].upper()}{error.what[1:]}."
-        effect, said = None, [words.NOT_YET if intervention.pulses is None else few]
-    else:
-        said = words.statement(effect)
+        said = [words.NOT_YET if intervention.pulses is None else few]
     delivered = intervention.delivered
     return rendered(
         "intervention.html",
