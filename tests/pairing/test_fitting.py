@@ -9,9 +9,10 @@ from typing import Any
 import pytest
 
 from isiw.devices.limits import Limits
+from isiw.devices.protocol import DeviceInfo
 from isiw.errors import InvalidValueError
 from isiw.intervention import Plan
-from isiw.pairing.fitting import require_possible
+from isiw.pairing.fitting import require_intensities, require_possible
 from pairing.paired import LIMITS, intervention, planned, session
 
 
@@ -44,6 +45,18 @@ def test_a_plan_whose_times_or_isis_the_limits_do_not_allow_is_refused(
 ) -> None:
     with pytest.raises(InvalidValueError, match=says):
         require_possible(planned(**plan), dataclasses.replace(LIMITS, **limits), 0, 0)
+
+
+def test_intensities_that_nobody_can_set_are_refused(tmp_path: Path) -> None:
+    several = planned(intensities_pct_rmt=(100.0, 120.0))
+    with pytest.raises(InvalidValueError, match="the device is simulated"):
+        require_intensities(several, LIMITS, DeviceInfo("a robot", "valve", simulated=True))
+    with pytest.raises(InvalidValueError, match="allows one alone"):
+        require_intensities(several, dataclasses.replace(LIMITS, intensity_pct_mso=50.0), DeviceInfo("rig", "valve"))
+    require_intensities(several, LIMITS, DeviceInfo("rig", "valve"))
+    refused = session(tmp_path / "s.mcap", intervention(intensities_pct_rmt=(100.0, 120.0)))
+    with pytest.raises(InvalidValueError, match="cannot be set"):
+        refused.run()
 
 
 def test_a_plan_that_rests_as_the_limits_ask_is_allowed() -> None:

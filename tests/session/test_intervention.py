@@ -380,3 +380,20 @@ def test_a_strategy_that_found_no_window_has_none_to_use(log: Path) -> None:
 def test_other_things_than_interventions_are_refused(log: Path) -> None:
     with pytest.raises(InvalidValueError, match="intervention"):
         Session(device(), knowing(), log=log, intervention="window")  # type: ignore[arg-type]
+
+
+@pytest.mark.slow
+def test_the_plan_waits_until_each_intensity_is_set_and_the_pulses_have_it_in_the_log(log: Path) -> None:
+    asked: list[str] = []
+
+    def hearing(reason: str) -> bool:
+        asked.append(reason)
+        return True
+
+    several = intervention(intensities_pct_rmt=(100.0, 120.0), before=2, after=1)
+    rig, guards = device(simulated=False), Safeguards(on_pause=hearing)
+    session(log, several, rig, clock=FakeRealClock(), safeguards=guards).run()
+    said = [reason.rsplit("Set the intensity of the stimulator to ", 1)[-1] for reason in asked]
+    assert said == ["100 % RMT.", "120 % RMT.", "that of the pairs.", *["100 % RMT.", "120 % RMT."] * 2]
+    pulses = pairing_of(read_session(log)).tests
+    assert [pulse.intensity_pct_rmt for pulse in pulses] == [100.0, 100.0, 120.0, 120.0, 100.0, 120.0, 100.0, 120.0]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from isiw.devices.limits import Limits
+from isiw.devices.protocol import DeviceInfo
 from isiw.errors import InvalidValueError
 from isiw.intervention import Part, Plan, Slot
 
@@ -44,6 +45,27 @@ def require_possible(plan: Plan, limits: Limits, given_before: int, seed: int) -
             expected=f"within {limits.low_ms:g} to {limits.high_ms:g} ms",
         )
     _require_times(plan, limits, seed)
+
+
+def require_intensities(plan: Plan, limits: Limits, device: DeviceInfo) -> None:
+    """Raise if the intensities of a plan cannot be set: by nobody at a simulated device, or by a limit's word.
+
+    Args:
+        plan: the plan.
+        limits: the limits of the session.
+        device: the description of its device.
+
+    Raises:
+        InvalidValueError: several intensities at a simulated device, or where the limits have one.
+    """
+    if plan.intensities_pct_rmt and (device.simulated or limits.intensity_pct_mso is not None):
+        raise InvalidValueError(
+            "the intensities of the plan cannot be set",
+            got=f"intensities_pct_rmt = {plan.intensities_pct_rmt}",
+            expected="none of its own: "
+            + ("the device is simulated" if device.simulated else "intensity_pct_mso under [limits] allows one alone"),
+            remedy="Leave out intensities_pct_rmt, so that all pulses have the intensity of the visit.",
+        )
 
 
 def _require_times(plan: Plan, limits: Limits, seed: int) -> None:

@@ -26,7 +26,7 @@ from isiw.log.schema import Event, Record, now
 from isiw.log.writer import LogWriter
 from isiw.native.library import version as engine_version
 from isiw.pairing.agenda import Agenda
-from isiw.pairing.fitting import require_possible
+from isiw.pairing.fitting import require_intensities, require_possible
 from isiw.session.blocks import Blocks
 from isiw.session.console import OperatorConsole
 from isiw.session.examination import WindowExamination, examination_of
@@ -118,6 +118,7 @@ def require_fitting(strategy: Strategy, header: Header) -> None:
             remedy="Write a larger max_pulses under [limits] if your ethics approval allows it.",
         )
     if header.intervention is not None:
+        require_intensities(header.intervention.plan, header.limits, header.device)
         require_possible(header.intervention.plan, header.limits, before, header.seed)
         return
     if planned is None and any(trial.intensity_pct_rmt is not None for trial in strategy.earlier):
