@@ -9,7 +9,7 @@ import sysconfig
 import zoneinfo
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, BinaryIO, Final, cast
 
 from isiw.errors import ConfigError, InvalidValueError
 from isiw.files import opened
@@ -96,7 +96,7 @@ class Gate:
 def hash_of(path: Path) -> str:
     """The SHA-256 of a file."""
     with opened(path) as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+        return hashlib.file_digest(cast("BinaryIO", file), "sha256").hexdigest()
 
 
 def require_no_links(path: Path) -> None:
