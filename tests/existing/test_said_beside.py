@@ -39,8 +39,8 @@ def crossed_out(sheet: Any) -> None:
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        (lambda sheet: [setattr(sheet.row_dimensions[row], "hidden", True) for row in (5, 9)],
-         "2 rows of the sheet 'Data' are hidden; got 'row 5, 9'.*called exclude"),
+        (lambda sheet: sheet.row_dimensions.group(5, 6, hidden=True),
+         "2 rows of the sheet 'Data' are hidden; got 'row 5, 6'.*called exclude"),
         (crossed_out, "1 row of the sheet 'Data' is crossed out; got 'row 7'"),
         (lambda sheet: setattr(sheet["A8"], "comment", openpyxl.comments.Comment("Artefakt!", "EK")),
          "1 row of the sheet 'Data' is left out by a note; got 'row 8'"),
@@ -117,11 +117,11 @@ def test_files_of_bids_beside_a_recording_that_contradict_it_are_asked_about(tmp
 
 def test_times_of_an_eeglab_file_are_compared_with_its_rate(tmp_path: Path) -> None:
     path = eeglab(tmp_path, 1e3)
-    held = scipy.io.loadmat(path, simplify_cells=True)["EEG"]
-    times_ms = np.arange(len(EMG_MV)) / 4.0
-    scipy.io.savemat(path, {"EEG": {**held, "times": times_ms}})
+    held = {**scipy.io.loadmat(path, simplify_cells=True)["EEG"], "times": np.arange(len(EMG_MV)) / 4.0}
+    held["data"].astype("<f4").tofile(tmp_path / "P01.fdt")
+    scipy.io.savemat(path, {"EEG": {**held, "data": "P01.fdt"}})
     require_as_written(read_people(path, KNOWN)[0])
-    scipy.io.savemat(path, {"EEG": {**held, "srate": 2000.0, "times": times_ms}})
+    scipy.io.savemat(path, {"EEG": {**held, "srate": 2000.0}})
     with pytest.raises(IsiwError, match=r"EEG\.times of P01\.set says; got '2000 Hz'; expected 4000 Hz"):
         read_people(path, KNOWN)
 

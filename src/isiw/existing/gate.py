@@ -8,8 +8,9 @@ import stat
 import sysconfig
 import zoneinfo
 from collections.abc import Iterable
+from io import BufferedReader
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from isiw.errors import ConfigError, InvalidValueError
 from isiw.files import opened
@@ -96,7 +97,7 @@ class Gate:
 def hash_of(path: Path) -> str:
     """The SHA-256 of a file."""
     with opened(path) as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+        return hashlib.file_digest(cast("BufferedReader", file), "sha256").hexdigest()
 
 
 def require_no_links(path: Path) -> None:

@@ -67,8 +67,9 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
     signals["emg"] = signals["emg"].scaled(EMG_UNITS[unit])  # in mV
     contents = replace(contents, events=events, notes=notes)
     layout.required_reference(contents.source)
+    unused, person = tuple[str, ...](), ""
     if contents.trials is None or contents.pulse_at_s is None:
-        pulses, unused, person = pulses_of(contents.events, origin_key(layout), layout, contents.source), (), ""
+        pulses = pulses_of(contents.events, origin_key(layout), layout, contents.source)
     else:
         pulses, unused, person = _pulses_of_rows(contents, signals["emg"], layout)
     sweeps = sweeps_of(contents, signals, pulses, layout)

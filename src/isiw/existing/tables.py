@@ -122,9 +122,11 @@ class Columns:
         for key, name in held.items():
             if name is not None:
                 said, cells = without_unit_in_cells(name, frame.iloc[:, names.index(name)].tolist())
-                beside = units_beside(key, name, frame)
-                columns[key] = Column("".join([said, *(f" ({unit})" for unit in beside.values())]), cells, of=source)
-                of_units |= beside.keys()
+                said_beside = units_beside(key, name, frame)
+                columns[key] = Column(
+                    "".join([said, *(f" ({unit})" for unit in said_beside.values())]), cells, of=source
+                )
+                of_units |= said_beside.keys()
         columns, units = _scaled(columns, layout)
         if (subject := columns.pop("subject", None)) is not None:
             is_id = "subject" not in layout.columns and letters(subject.name) == "id"

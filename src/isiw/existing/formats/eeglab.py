@@ -63,7 +63,7 @@ def read(path: Path, layout: Layout) -> Contents:
 
 def _beside(path: Path, name: str, count: int, channel: int, first: int, last: int) -> FloatArray:
     """Numbers of a channel, of so many, in the file beside this one."""
-    beside = path.withtext_of(Path(name.replace("\\", "/")).name)  # a folder of another computer is not meant
+    beside = path.with_name(Path(name.replace("\\", "/")).name)  # a folder of another computer is not meant
     with opened(beside if beside.exists() else path.parent / name) as file:
         file.seek(4 * count * first)
         whole = np.frombuffer(file.read(4 * count * (last - first)), "<f4")
