@@ -119,9 +119,10 @@ def _against(own: pd.DataFrame, even: pd.DataFrame) -> Iterator[tuple[str, Any]]
     both = [table.pivot_table(index="person", columns="trial", values="f1") for table in (own, even)]
     people = both[0].index.intersection(both[1].index)
     marks = list(both[0].columns)
-    if len(people) == 0:
+    nobody = len(people) == 0
+    if nobody:
         both, people = [both[0], both[0] * math.nan], both[0].index
     curves = [f1.loc[people, marks].to_numpy() for f1 in both]
     for criterion in CRITERIA:
         for name, value in ratio(*curves, marks, criterion).items():
-            yield f"{name}_{criterion}", value
+            yield f"{name}_{criterion}", "unknown" if nobody and name == "bound" else value

@@ -94,6 +94,12 @@ def said(means: Mapping[str, tuple[float, ...]]) -> list[str]:
     return sentences(table_of(rows, {}), rows)
 
 
+def test_without_even_isis_no_ratio_to_them_is_given() -> None:
+    rows = rows_with({"nr": (0.5, 0.7, 0.8, 0.9)})
+    (line,) = table_of(rows, {}).to_dict("records")
+    assert {line[f"bound_{criterion}"] for criterion in (0.7, 0.8, 0.9)} == {"unknown"}
+
+
 def test_the_sentences_have_the_figures() -> None:
     first, second, third = said(FOUND)
     assert "on 20 simulated people of `recruitment`" in first.lower()

@@ -311,14 +311,15 @@ def _expects_a_tap(record: SessionRecord) -> str:
 
 
 def _measured(record: SessionRecord) -> str:
-    """How seldom the strategy keeps what it claims, as it was measured; empty if it does keep it."""
+    """What the strategy keeps of what it claims, of one that few people were tried with; empty for the others."""
     name = record.header.strategy.name
     if (found := measured_of(name)) is None or not record.rests_on_data:
         return ""
     return (
-        f"{name} claims more than it keeps: in {found.sessions} simulated sessions of its family with noise as near "
-        f"the motor threshold, its 90 % intervals held {100 * found.coverage:.0f} % of the true edges after 20 "
-        f"stimuli, and its F1 was {found.excess_f1:.2f} below the expected one."
+        f"{name} was tried on few people: in {found.sessions} simulated sessions of its family with noise as near the "
+        f"motor threshold, its 90 % intervals held {100 * found.coverage:.0f} % of the true edges after 20 stimuli, "
+        f"and it expected an F1 that was {abs(found.excess_f1):.2f} {'above' if found.excess_f1 > 0 else 'below'} the "
+        "actual one."
     )
 
 
