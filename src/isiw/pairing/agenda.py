@@ -64,7 +64,8 @@ class Agenda:
         self._restart()
 
     def _restart(self) -> None:
-        self._followed, self._learnt = self._begun, ()  # type: tuple[Followed, tuple[Trial, ...]]
+        self._followed = self._begun
+        self._learnt: tuple[Trial, ...] = ()
         self._centre_ms = _centre(self._wanted(self._followed))
 
     def slot(self, number: int) -> Slot | None:
