@@ -78,7 +78,8 @@ def test_the_marginal_likelihood_is_that_of_the_joint_gaussian() -> None:
     values = np.log(np.maximum(np.concatenate((told.mep_mv, told.baseline_mv)), 0.005)) - SCALE.centre
     for which in (0, 17):
         mean, covariance = joint(found, which, np.empty(0))
-        law = torch.distributions.MultivariateNormal(*map(torch.as_tensor, (mean[:-1], covariance[:-1, :-1])))
+        centre, spread = torch.as_tensor(mean[:-1]), torch.as_tensor(covariance[:-1, :-1])
+        law = torch.distributions.MultivariateNormal(centre, spread)
         log_marginal = (found.log_joint - found.log_prior)[which].item()
         assert log_marginal == pytest.approx(law.log_prob(torch.as_tensor(values)).item(), abs=1e-6)
 

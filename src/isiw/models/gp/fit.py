@@ -236,7 +236,7 @@ class Fit:
         places = None if self.places is None else self.places.picked(picks)
         relative = self._relative_variance(chosen, places, self.noise.log_variance(trials.isi_ms))
         level, data = self.level(chosen.noise), (trials.isi_ms, trials.values, relative)
-        return regression(self.settings.kernel, chosen, level, *data, places)
+        return regression(self.settings.kernel, chosen, level, *data, places=places)
 
 
 def fit(settings: ProcessSettings, scale: Standardisation, told: PersonTrials, space: DesignSpace = VALVE_SPACE) -> Fit:

@@ -15,7 +15,7 @@ def _share(places: Places, inputs: Tensor) -> Tensor:
     return (-0.5 * steps.square()).exp()
 
 
-class RisenMean(gpytorch.means.Mean):
+class RisenMean(gpytorch.means.Mean):  # type: ignore[misc] # GPyTorch states no types
     """A constant, and the rise of a window."""
 
     def __init__(self, constant: gpytorch.means.Mean, places: Places) -> None:
@@ -28,7 +28,7 @@ class RisenMean(gpytorch.means.Mean):
         return mean
 
 
-class WithinWindow(gpytorch.kernels.Kernel):
+class WithinWindow(gpytorch.kernels.Kernel):  # type: ignore[misc] # GPyTorch states no types
     """A kernel and a common rise, both times the share of an ISI."""
 
     def __init__(self, base: gpytorch.kernels.Kernel, places: Places) -> None:

@@ -119,7 +119,7 @@ class WindowsPrior(Checked):
 
 @lru_cache(maxsize=64)
 def _processes(prior: WindowsPrior, space: DesignSpace) -> tuple[Hyperparameters, Places, Tensor]:
-    sequence = torch.quasirandom.SobolEngine(4, scramble=True, seed=DRAWN)
+    sequence = torch.quasirandom.SobolEngine(4, scramble=True, seed=DRAWN)  # type: ignore[no-untyped-call]
     drawn = sequence.draw(prior.ensemble, dtype=torch.float64).clamp(LEAST_QUANTILE, 1 - LEAST_QUANTILE)
     knots = prior.start.knots(space)
     start_ms = torch.as_tensor(np.interp(drawn[:, 0].numpy(), knots.below, knots.start_ms))

@@ -174,6 +174,7 @@ def regression(
     isi_ms: Tensor,
     values: Tensor,
     relative_variance: Tensor,
+    *,
     places: Places | None = None,
 ) -> botorch.models.SingleTaskGP:
     """Processes about constants of a mean and a variance, given trials, as a BoTorch model of their batch shape."""
