@@ -48,6 +48,7 @@ def test_two_steps_are_those_of_an_enumeration(seed: int) -> None:
     np.testing.assert_allclose(got, enumerated(p), atol=2e-5)
 
 
+@pytest.mark.slow
 @given(seeds)
 def test_a_second_trial_never_costs(seed: int) -> None:
     p = some_posterior(seed, outcomes=6)

@@ -79,6 +79,7 @@ def test_what_reads_logs_reads_imported_ones_and_says_what_they_are(isiw: Comman
         assert "delivered without isiw" in result.output
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("read_here")
 def test_a_session_after_an_imported_log_knows_it_and_says_what_it_is(isiw: Command, people: Path) -> None:
     made = ("--reference", "impact", "--config", "few.toml", "--simulated", "--only", "A", "-o", "A.mcap")

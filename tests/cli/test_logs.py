@@ -145,6 +145,7 @@ def test_an_excluded_trial_is_included_again(isiw: Command, log: Path) -> None:
     assert all(trial.told for trial in read_session(log).table)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="POSIX pipes")
 def test_a_reader_who_has_enough_of_the_output_is_no_fault(tmp_path: Path) -> None:
     Session(ScriptedDevice(), scripted_strategy(6), log=tmp_path / "s.mcap").run()

@@ -100,6 +100,7 @@ def test_a_session_goes_on_within_the_limits_that_the_configuration_says_now(isi
     assert (record.header.signals.background_uv, record.header.timeout_s) == (25.0, 7.0)
 
 
+@pytest.mark.slow
 def test_a_session_that_its_limits_have_ended_says_which_file_to_change(isiw: Command, begun: Path) -> None:
     for output in (isiw("resume", "s.mcap", begun).output, isiw("run", begun, "--log", "new.mcap").output):
         assert f"a higher max_pulses under [limits] in {begun}, then resume with: isiw resume" in output
@@ -120,6 +121,7 @@ def test_a_session_that_was_over_says_so_when_it_is_resumed_and_how_the_person_g
     assert isiw(*command.split()[1:], "--log", "another.mcap").exit_code == 0
 
 
+@pytest.mark.slow
 def test_a_session_that_was_over_and_learns_nothing_goes_on_without_what_it_found(isiw: Command, begun: Path) -> None:
     changed(begun, "max_trials = 6", "max_trials = 2")
     isiw("run", begun, "--strategy", "gp-ei", "--log", "over.mcap")

@@ -165,6 +165,7 @@ class NoResponse:
     mep_mv = 0.0
 
 
+@pytest.mark.slow
 def test_recorded_sweeps_are_studied_like_a_preset() -> None:
     device = SimulatedDevice(Tapper(lambda _: NoResponse(), "subject4", TapperSettings(trigger="impact")))
     device.stage()
@@ -217,6 +218,7 @@ def test_a_sweep_clock_that_begins_elsewhere_changes_nothing() -> None:
     assert usual.event_table.loc["hit", "mean_ms"] == pytest.approx(682, abs=2.0)
 
 
+@pytest.mark.slow
 def test_a_logged_session_is_studied_like_a_preset(tmp_path: Path) -> None:
     space = DesignSpace(0, 200, reference="impact")
     device = SimulatedDevice(Tapper(lambda _: NoResponse(), "subject4"))
@@ -231,6 +233,7 @@ def test_a_logged_session_is_studied_like_a_preset(tmp_path: Path) -> None:
     assert study.event_table.loc["memg", "n"] == sum(apart)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", [0.0, np.nan])
 @pytest.mark.parametrize("name", ["acceleration", "emg"])
 def test_a_trial_with_a_dead_sensor_does_not_end_the_study(tmp_path: Path, name: str, fault: float) -> None:

@@ -39,6 +39,7 @@ def test_each_member_of_the_committee_has_its_own_bootstrap() -> None:
     assert curve.sd_mv == pytest.approx(curve.samples_mv.std(axis=0))
 
 
+@pytest.mark.slow
 def test_the_window_is_near_the_true_one() -> None:
     window = told(RegressionModel(SupportVectorRegression()), trials_of(bell_mv)).estimate().window
     assert window.start_ms == pytest.approx(213.0, abs=15.0)

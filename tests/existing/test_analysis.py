@@ -122,6 +122,7 @@ def test_trials_beyond_the_space_teach_too() -> None:
     assert analysis.estimate.pairs == 20
 
 
+@pytest.mark.slow
 def test_of_long_series_every_trial_is_logged_and_some_of_the_beliefs() -> None:
     isis_ms, meps_mv = told(130)
     record = isiw.analyse(isis_ms, meps_mv, space=SPACE, particles=50).record

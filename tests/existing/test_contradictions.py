@@ -86,6 +86,7 @@ def test_structures_of_matlab_with_the_same_names_are_asked_about(tmp_path: Path
     assert trials_of(read_people(path, IMPACT)) == list(zip(isis_ms, meps_mv, strict=True))
 
 
+@pytest.mark.slow
 def test_a_sampling_rate_is_compared_with_the_times_in_the_file(tmp_path: Path) -> None:
     taps, pulses = trigger("tap"), trigger("pulse")
     text = lines(EMG_MV, taps, pulses)
@@ -142,6 +143,7 @@ def silent(**said: Any) -> Any:
     return epochs(**said).set_annotations(None)
 
 
+@pytest.mark.slow
 def test_the_metadata_of_epochs_are_read_as_the_columns_of_a_table() -> None:
     (person,) = read_people(epochs(exclude=[0, 1, 0, 0, 0, 0], note="x"), KNOWN)
     assert [trial.told for trial in person.trials] == [True, False, True, True, True, True]

@@ -349,6 +349,7 @@ def test_a_second_tap_or_pulse_is_asked_about(marks: str, later_s: float, says: 
         read_people(twice, KNOWN)
 
 
+@pytest.mark.slow
 def test_codes_of_triggers_that_overlap_are_told_apart_in_fif_and_in_bdf(tmp_path: Path) -> None:
     codes = pulsed(200)  # for 50 ms, and ISIs are from 30 ms on
     made = with_stim(codes)

@@ -113,6 +113,7 @@ def test_samples_of_xdf_are_those_of_pyxdf_whichever_of_them_have_a_time(suffix:
     assert (track.stretches[0].samples, len(values)) == (100, 100)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gap_s", [0.02, 0.3, 0.9])
 def test_a_gap_in_a_stream_is_not_smeared_over_it(gap_s: float, tmp_path: Path) -> None:
     require_as_written(read(as_xdf(tmp_path, gap_s=gap_s, jitter_s=0.001)))
@@ -135,6 +136,7 @@ def test_samples_that_come_late_for_good_come_after_a_gap_and_jitter_is_none() -
         clocked(np.zeros(10), 1000.0, "a stream")
 
 
+@pytest.mark.slow
 def test_what_pyxdf_says_of_clocks_is_said(tmp_path: Path) -> None:
     assert any("scatter" in note for note in read(as_xdf(tmp_path, jitter_s=0.004)).notes)
     assert read(as_xdf(tmp_path)).notes == ()

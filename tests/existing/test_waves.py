@@ -73,6 +73,7 @@ def test_columns_of_samples_with_triggers_are_a_recording(tmp_path: Path) -> Non
     require_as_written(read(tmp_path, head + samples.replace(".", ","), layout))
 
 
+@pytest.mark.slow
 def test_comments_beside_samples_are_events(tmp_path: Path) -> None:
     comments = np.full(len(EMG_MV), "", dtype=object)
     for at_s, name in EVENTS:
@@ -82,6 +83,7 @@ def test_comments_beside_samples_are_events(tmp_path: Path) -> None:
     require_as_written(read(tmp_path, content, f'{layout}[channels]\nemg = "EMG"\nevents = "comment"\n'))
 
 
+@pytest.mark.slow
 def test_blocks_are_sweeps(tmp_path: Path) -> None:
     tap, pulse, content = trigger("tap"), trigger("pulse"), ""
     for at_s in (at_s for at_s, name in EVENTS if name == NAMES["pulse"]):

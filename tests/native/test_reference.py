@@ -166,6 +166,7 @@ def test_the_usual_is_as_probable_as_by_the_reference_where_isis_are_chosen(prof
     np.testing.assert_allclose(found[0], expected - scipy.special.logsumexp(expected), atol=1e-3, rtol=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["default", "places"])
 def test_densities_of_the_priors_blocks_are_those_of_the_reference(name: str) -> None:
     case = CASES[name]

@@ -12,7 +12,7 @@ from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import InvalidValueError
 from isiw.intervention import Plan
-from isiw.pairing.fitting import require_settable, require_possible
+from isiw.pairing.fitting import require_possible, require_settable
 from pairing.paired import LIMITS, intervention, planned, session
 
 

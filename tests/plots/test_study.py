@@ -64,6 +64,7 @@ def test_a_strategy_has_its_colour_whatever_it_is_compared_with() -> None:
     assert len({colours[name] for name in strategies}) == 4
 
 
+@pytest.mark.slow
 def test_of_more_than_three_strategies_each_has_a_panel_with_its_band_before_the_means_of_the_others() -> None:
     figure = study_figure(table("wide", "narrow", strategies=("default", "nr", "gpr", "mine")))
     shown = [axes for axes in figure.axes if axes.get_visible()]

@@ -10,6 +10,7 @@ from isiw.plots.style import save_figure
 from isiw.plots.timeline import timing_figure
 
 
+@pytest.mark.slow
 def test_the_errors_are_drawn_only_where_isis_were_commanded() -> None:
     assert len(timing_figure(study_preset("bench", taps=5, isi_ms=())).axes) == 1
     figure = timing_figure(study_preset("timing-fault", taps=10, isi_ms=(10.0, 50.0)))

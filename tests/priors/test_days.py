@@ -124,6 +124,7 @@ def test_a_window_that_stayed_probably_did_not_move_and_one_elsewhere_did(first:
     assert priors.moved(first, gone) > 0.9
 
 
+@pytest.mark.slow
 def test_whether_a_window_moved_is_judged_with_the_hit_delay_of_the_second_day(first: Any, folder: Path) -> None:
     path = write_log(folder / "stated.mcap", person(EARLY_MS + 60.0), trials=18, seed=3, hit_delay_ms=(180.0, 6.0))
     later = recalled(read_session(path), priors.after(first))

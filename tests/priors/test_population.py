@@ -65,6 +65,7 @@ def test_nobody_teaches_a_law_of_what_their_particles_do_not_use() -> None:
     assert population_of(people_at(6.0, 10), used=False).laws["x"].members == 0
 
 
+@pytest.mark.slow
 def test_kinds_that_come_often_are_expected_more() -> None:
     kinds = np.tile(np.array([2, 2, 2, 1]), (8, 75))
     shares = population_of(people_at(6.0, 8), kinds=kinds).shares["kind"]
@@ -73,6 +74,7 @@ def test_kinds_that_come_often_are_expected_more() -> None:
     assert 0.05 < shares[0] < 0.25
 
 
+@pytest.mark.slow
 def test_kinds_that_mean_nothing_to_a_particle_teach_nothing() -> None:
     shares = population_of(people_at(6.0, 8), kinds=np.full((8, 300), -1)).shares["kind"]
     assert shares == pytest.approx(KINDS, abs=0.03)

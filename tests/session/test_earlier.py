@@ -153,6 +153,7 @@ def test_at_the_same_level_they_are_learnt_as_if_they_were_the_sessions_own() ->
     assert known.spent == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["gp-straddle", "nr", "pf", "incremental"])
 def test_strategies_that_cannot_widen_what_they_believe_learn_them_as_they_are(name: str) -> None:
     strategy = isiw.make_strategy(name, SPACE, seed=1)

@@ -185,6 +185,7 @@ def person(kind: str) -> Device:
     return isiw.SimulatedDevice(isiw.SimulatedPerson(lambda isi_ms: answer.respond(isi_ms, "impact"), "impact"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["tapper", "person"])
 def test_simulated_rigs_tap_alone(log: Path, kind: str) -> None:
     space = DesignSpace(20, 200, reference="impact")

@@ -67,6 +67,7 @@ def test_a_window_that_begins_a_part_of_a_sample_before_the_sweep_is_no_error() 
     assert judged(Sweep({"emg": emg_of(600.0, -15.1, 100.0)}, t_tms_ms=0.0), None).status is Status.MISTRIAL
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate_hz", [1024.0, 3003.003, 4370.0])
 def test_a_session_with_just_enough_rest_at_some_isi_runs_to_its_end(rate_hz: float, tmp_path: Path) -> None:
     def fired(stimulus: Stimulus, _: float) -> Sweep:

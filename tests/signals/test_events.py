@@ -23,6 +23,7 @@ def test_events_come_in_order_of_occurrence() -> None:
     assert (np.diff(np.array(list(events.columns().values())), axis=0) > 0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["subject1", "subject4"])
 def test_events_are_found_where_the_plant_put_them(name: str) -> None:
     tapped = render(name, n=200, seed=3)

@@ -68,6 +68,7 @@ def test_a_contracted_muscle_is_a_mistrial_unless_it_is_stated() -> None:
     assert judge(tense, Stimulus(0, 100.0), SPACE, CONTRACTED).reason is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("file", "dataset", "muscles", "share"),
     [("ID10_1_ECR", "ID10_1", "forearm", 0.8), ("ID01_FDI", "ID01", "hand", 0.6)],

@@ -171,6 +171,7 @@ def misplaced_of(simulation: Simulation, space: DesignSpace, trials: int, limits
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("accelerometer", [True, False])
 @pytest.mark.parametrize("name", ["gaussian", "recruitment"])
 def test_no_sweep_of_the_simulated_robot_has_a_response_elsewhere(name: str, *, accelerometer: bool) -> None:

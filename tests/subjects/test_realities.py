@@ -124,6 +124,7 @@ def test_above_the_threshold_tms_alone_already_gives_meps() -> None:
     assert above > 3 * usual
 
 
+@pytest.mark.slow
 def test_a_study_judges_a_fading_window_by_that_of_now() -> None:
     people = cohort("fading", 40, 3)
     person = next(n for n in range(0, 40, 2) if known(known(people[n].change).half_life) < 20)

@@ -76,6 +76,7 @@ def test_stops_inside_count_both_ends() -> None:
     assert stops_inside(None) == 0
 
 
+@pytest.mark.slow
 def test_the_same_seed_records_the_same_sweep() -> None:
     assert np.array_equal(record(CLEAR, 5).trials_mv, record(CLEAR, 5).trials_mv)
     assert not np.array_equal(record(CLEAR, 5).trials_mv, record(CLEAR, 6).trials_mv)

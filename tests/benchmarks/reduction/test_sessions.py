@@ -88,6 +88,7 @@ def test_profiles_that_are_missing_or_flat_do_not_break_the_correlation() -> Non
     assert correlation(2 * rising + 1, rising) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_a_session_can_be_run_again_and_tells_when_it_stopped() -> None:
     session = replace(BARE, horizon=12)
     first = run(session)
@@ -118,6 +119,7 @@ def test_the_conventional_sweep_is_judged_by_the_true_window() -> None:
     assert 0.5 < outcome["f1, of .135"] <= 1.0
 
 
+@pytest.mark.slow
 def test_a_live_pulse_before_the_impact_is_counted_and_not_told(monkeypatch: pytest.MonkeyPatch) -> None:
     told_ms: list[float] = []
     usual = Strategy.tell

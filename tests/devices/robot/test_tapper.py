@@ -132,6 +132,7 @@ def test_jitter_moves_the_pulse_and_its_recorded_time_and_no_tap(trigger: Trigge
     assert np.abs(same_hits - hits).max() < 1.0
 
 
+@pytest.mark.slow
 def test_the_command_is_corrected_by_the_measured_hits() -> None:
     robot = Tapper(Listener(), "subject2", TapperSettings(expected_hit_ms=190.0))
     for trial in range(20):
@@ -213,6 +214,7 @@ def test_the_judged_amplitude_is_the_one_that_the_person_gave(mep_mv: float) -> 
         np.testing.assert_allclose(measured, mep_mv, rtol=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("reference", "trigger"), [("impact", "open-loop"), ("valve", "impact")])
 def test_the_emg_floor_of_a_person_counts_once(reference: Reference, trigger: Trigger) -> None:
     person, answers = cohort("nonresponder", 2, 0)[1].begin(1), list[Response]()

@@ -64,6 +64,7 @@ def staged(faults: Mapping[str, str]) -> Iterator[isiw.LslDevice]:
         yield made
 
 
+@pytest.mark.slow
 def test_it_conforms_also_with_an_accelerometer_on_a_stream_of_its_own() -> None:
     with rig({}, 1000.0) as name:
         emg = {"stream": f"{name}-emg", "unit": "mV", "rate_hz": RATE_HZ}

@@ -86,6 +86,7 @@ def test_a_profile_is_believed_and_a_flat_one_is_not() -> None:
     assert odds[1] < 0
 
 
+@pytest.mark.slow
 def test_the_most_likely_process_is_more_likely_than_all_of_the_grid() -> None:
     told = trials()
     grid, most_likely = fitted(told), fitted(told, hyperparameters="map")

@@ -108,6 +108,7 @@ def test_it_has_the_capabilities_that_it_says() -> None:
         assert isinstance(posterior, capability)
 
 
+@pytest.mark.slow
 def test_it_finds_the_window_of_clear_people() -> None:
     for person in (0, 1, 2, 4, 5):
         found = estimate(GaussianProcess(), evenly("gaussian", 40, person))

@@ -217,6 +217,7 @@ def test_a_fantasy_moves_the_samples_as_an_update_would() -> None:
     assert gaps.max() < 0.5 * moved.max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("likelihood", LIKELIHOODS)
 def test_the_predicted_outcomes_have_the_expectation_of_the_profile(likelihood: Likelihood) -> None:
     # Without outliers. Outcomes lie a quarter of a nat apart and leave out the rarest MEPs, which makes 1.1 % at most.
@@ -230,6 +231,7 @@ def test_the_predicted_outcomes_have_the_expectation_of_the_profile(likelihood: 
     np.testing.assert_allclose(expected_mv, posterior.profiles_mv(GRID)[0].mean(0), rtol=0.02)
 
 
+@pytest.mark.slow
 def test_the_unit_of_the_amplitude_is_learnt() -> None:
     usual = evenly("gaussian", 2, 20)
     scaled = [replace(each, mep_mv=10.0 * each.mep_mv) for each in usual]

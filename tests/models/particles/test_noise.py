@@ -200,6 +200,7 @@ def test_startle_and_drift_belong_to_the_trial_and_not_to_its_isi() -> None:
         np.testing.assert_allclose(*found, atol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("modelled", "true"), PAIRS)
 def test_a_gain_is_the_gain_of_the_simulated_persons_trials(modelled: Singles, true: ResponseCurve) -> None:
     rng, log_gain_of_trial = np.random.default_rng(6), 0.5

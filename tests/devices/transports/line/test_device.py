@@ -23,6 +23,7 @@ from scripted import SPACE, scripted_strategy
 BOTH = pytest.mark.parametrize("commands", [PEER_COMMANDS, unnumbered(PEER_COMMANDS)], ids=["numbered", "unnumbered"])
 
 
+@pytest.mark.slow
 @BOTH
 def test_it_conforms_over_tcp_and_over_a_serial_port(
     address: str, peer: PulsePeer, commands: Mapping[str, Any]
