@@ -69,7 +69,7 @@ class KnownModel:
 
 def knowing(earlier: int = 0) -> Strategy:
     """A strategy that knows the window, and from so many trials how much MEPs vary."""
-    strategy = Strategy(SPACE, KnownModel(), WantedIsi(), Budget(10), seed=4)  # type: ignore[arg-type]
+    strategy = Strategy(SPACE, KnownModel(), WantedIsi(), Budget(10), seed=4)
     trials = [Trial(k, Status.ACCEPTED, None, isi_ms=BEST_MS, mep_mv=BASE_MV + 1.0) for k in range(earlier)]
     strategy.learn_all(trials)
     return strategy
@@ -109,5 +109,5 @@ def device(best_ms: Callable[[int], float] = lambda _: BEST_MS, *, simulated: bo
 def session(log: Path, given: Intervention | None = None, on: ScriptedDevice | None = None, **options: Any) -> Session:
     """A session of an intervention."""
     strategy = options.pop("strategy", None) or knowing()
-    options = {"limits": LIMITS, "subject": "P07"} | options
+    options = dict[str, Any]({"limits": LIMITS, "subject": "P07"}) | options
     return Session(on or device(), strategy, log=log, intervention=given or intervention(), **options)

@@ -111,11 +111,11 @@ class Followed:
         profiles, masks = posterior.profiles_mv(isi_ms)[0], posterior.window_masks(isi_ms)[0]
         picked = np.linspace(0, len(profiles) - 1, min(movement.profiles, len(profiles))).round().astype(int)
         baseline = np.asarray(posterior.baselines_mv()[0], dtype=float)[picked]
-        shifted = [_shifted(values[picked], isi_ms) for values in (profiles, masks)]
+        shifted, inside = _shifted(profiles[picked], isi_ms), _shifted(masks[picked], isi_ms)
         flat = np.zeros((len(picked), len(SHIFTS_MS), len(SHARES), len(LOG_LEVELS)))
         flat[:, len(SHIFTS_MS) // 2, 0, :] = np.exp(-0.5 * (LOG_LEVELS / 0.4) ** 2)
         middle = np.median(profiles, axis=0), float(np.median(baseline))
-        return cls(movement, isi_ms, baseline, *shifted, _log_sd(earlier, isi_ms, *middle), flat / flat.sum())
+        return cls(movement, isi_ms, baseline, shifted, inside, _log_sd(earlier, isi_ms, *middle), flat / flat.sum())
 
     def after(self, trial: Trial) -> Followed:
         """What is known after one more trial that counts: a pair, behind which the window may move, or TMS alone."""

@@ -248,7 +248,8 @@ def assembled(
         strategy.only_counts = True
 
         def attended() -> bool:
-            return console.attended or safeguards.on_pause is not None or not rig.info.simulated
+            somebody = console.reads_keys or bool(sink.followers)
+            return somebody or safeguards.on_pause is not None or not rig.info.simulated
 
         steps.keep_to(Blocks(Agenda(intervention, strategy, strategy.seed), rig.clock, attended))
     return Parts(path, header, limits, safeguards, sink, rig, examination, pausing, steps)

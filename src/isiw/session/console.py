@@ -132,8 +132,6 @@ class _Operated(Protocol):
     @property
     def trials(self) -> TrialTable: ...
     @property
-    def followed(self) -> bool: ...
-    @property
     def last_excluded(self) -> int | None: ...
     def pause(self, reason: str) -> None: ...
     def note(self, text: str) -> None: ...
@@ -169,11 +167,6 @@ class OperatorConsole:
                 yield
             finally:
                 self._keys = None
-
-    @property
-    def attended(self) -> bool:
-        """True if somebody may answer a pause: at a terminal, or who looks on."""
-        return self.reads_keys or self._session.followed
 
     @property
     def reads_keys(self) -> bool:

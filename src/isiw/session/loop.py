@@ -242,11 +242,6 @@ class Session(Judging):
         return TrialTable(tuple(trial for trial in trials if not intervention.hides(trial.index)))
 
     @property
-    def followed(self) -> bool:
-        """True if somebody looks on."""
-        return bool(self._sink.followers)
-
-    @property
     def running(self) -> bool:
         """True if its log is open."""
         return self._sink.is_open
