@@ -37,6 +37,7 @@ QUICK: Final[Mapping[str, str]] = {
     "calibration": "--replications 4 --trials 5 --people 1 --out OUT",
     "compare": "--people 2 --slow-people 1 --trials 20 --rows 3 --cohorts recruitment "
     "--parts named,regressions,particles,gp,botorch,supra,parametric --out OUT",
+    "core_size": "--out OUT",
     "deaths": "--kills 9 --out OUT",
     "dissertation": "--few --out OUT",
     "fair_opponent": "--people 3 --trials 12 --out OUT",

@@ -116,7 +116,9 @@ class RecordedSweep:
         isi_ms = np.concatenate((np.full(len(alone_mv), np.nan), self.isi_ms[first:last].repeat(TRIALS_PER_ISI)))
         mep_mv = np.concatenate((alone_mv, self.trials_mv[first:last].ravel()))
         model = SweepModel(rule=rule)
-        return SweepPosterior(model, space, AmplitudeHistory(isi_ms[None], mep_mv[None])).estimate()
+        return SweepPosterior(
+            model, space, AmplitudeHistory(isi_ms[None], mep_mv[None], np.zeros((1, len(isi_ms))))
+        ).estimate()
 
 
 @dataclass(frozen=True)

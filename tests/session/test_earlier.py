@@ -121,7 +121,7 @@ def test_a_session_with_pulses_over_the_curve_resumes_with_the_same_asks(
 def test_an_intensity_of_a_pair_is_refused_before_anything_is_logged(tmp_path: Path) -> None:
     session = isiw.open_session(isiw.make_strategy("nr", space=SPACE), tmp_path / "a.mcap")
     isi_ms = session.ask()
-    with pytest.raises(isiw.errors.InvalidValueError, match="belongs to TMS alone"):
+    with pytest.raises(isiw.errors.StrategyError, match="no law of pairs at another intensity"):
         session.tell(isi_ms, 0.1, intensity_pct_rmt=110.0)
     session.tell(isi_ms, 0.1)
     session.tell(None, 0.1, intensity_pct_rmt=110.0)

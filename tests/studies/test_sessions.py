@@ -236,8 +236,8 @@ def test_where_trials_are_lost_a_study_asks_what_a_session_asks(monkeypatch: pyt
     session = Late("even", "gaussian", 2, 5, 40, (40,), IMPACT_SPACE, settings, stopping="ends")
     delivered, usual = list[tuple[float, Response]](), Responder.respond
 
-    def respond(responder: Responder, isi_ms: float | None, reference: Reference, *, pulse: bool = True) -> Response:
-        response = usual(responder, isi_ms, reference, pulse=pulse)
+    def respond(responder: Responder, isi_ms: float | None, reference: Reference, **how: Any) -> Response:
+        response = usual(responder, isi_ms, reference, **how)
         delivered.append((known(isi_ms), response))
         return response
 

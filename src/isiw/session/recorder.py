@@ -238,6 +238,7 @@ class Recorder(Recording[Trial], Judging):
             if isi_ms is not None and pulse:
                 intensity_pct_rmt = self._of_pair(intensity_pct_rmt)
             outcome = Outcome(isi_ms, mep_mv, None, isi_sd_ms, mep_sd_mv, mep_interval_mv, None, intensity_pct_rmt)
+            self.strategy.require_law(outcome)
             self._tell(outcome, background_rms_uv, pulse=pulse, confirm=flag("confirm", confirm))
 
     def _tell(self, outcome: Outcome, background_rms_uv: float | None, *, pulse: bool, confirm: bool) -> None:

@@ -103,14 +103,18 @@ class Outcomes:
         return outcomes
 
     def after(self, outcome: Outcome) -> Outcomes:
-        """The same after one more pulse; raise where the model has no law of a pair of its intensity."""
+        """The same after one more pulse."""
+        self.require_law(outcome)
+        return replace(self, pulses=(*self.pulses, outcome))
+
+    def require_law(self, outcome: Outcome) -> None:
+        """Raise where the model has no law of a pair of such an intensity."""
         if outcome.isi_ms is not None and outcome.intensity_pct_rmt is not None and self.pairs_pct_rmt is None:
             raise StrategyError(
                 "the model has no law of pairs at another intensity",
                 got=f"a pair at {outcome.intensity_pct_rmt:g} % of RMT",
                 remedy="Leave out the intensity if it is the usual one, or choose the default.",
             )
-        return replace(self, pulses=(*self.pulses, outcome))
 
     def after_tap(self, isi_ms: float | None, mep_mv: float) -> Outcomes:
         """The same after one more tap alone."""

@@ -301,6 +301,10 @@ class Strategy:
         else:
             self.count_mistrial()
 
+    def require_law(self, outcome: Outcome) -> None:
+        """Raise StrategyError where the model has no law of a pair of such an intensity."""
+        self._outcomes.require_law(outcome)
+
     def learn_all(self, trials: Iterable[Trial], *, same_level: bool = False) -> None:
         """Learn trials that were delivered before the first ask, at whatever ISIs; no plan and no budget counts them.
 
