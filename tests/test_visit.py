@@ -24,6 +24,7 @@ def test_each_kind_of_control_has_its_share(seed: int) -> None:
     assert (kinds.count(Control.TMS_ALONE), kinds.count(Control.TAP_ALONE)) == (60, 30)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("tms", "tap"), [(0.3, 0.0), (0.0, 0.07), (0.5, 0.4), (1 / 3, 1 / 3), (0.001, 0.0)])
 def test_any_shares_are_kept(tms: float, tap: float) -> None:
     kinds = list(controls(VisitProtocol(tms_alone=tms, tap_alone=tap), 1, 6000).values())

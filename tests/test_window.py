@@ -94,6 +94,7 @@ def test_a_deep_valley_splits_the_window_and_a_shallow_one_does_not() -> None:
     assert (segments(15), segments(30)) == (2, 1)
 
 
+@pytest.mark.slow
 @given(excesses, st.floats(1.0, 1e3))
 def test_the_window_does_not_depend_on_the_unit_once_it_is_above_the_least_excess(
     excess: np.ndarray, factor: float
@@ -108,6 +109,7 @@ def test_the_window_does_not_depend_on_the_unit_once_it_is_above_the_least_exces
         np.testing.assert_array_equal(scaled.mask(GRID_MS)[~on_level], window.mask(GRID_MS)[~on_level])
 
 
+@pytest.mark.slow
 @given(excesses)
 def test_the_window_holds_the_isi_of_the_largest_excess(excess: np.ndarray) -> None:
     window = window_from_excess(GRID_MS, excess, 0.0)

@@ -47,6 +47,7 @@ def lab(isiw: Command, logs: Any, folder: Path) -> Any:
     return folder / "lab.toml"
 
 
+@pytest.mark.slow
 def test_a_lab_prior_is_shown_beside_the_built_in_one_and_drawn(isiw: Command, lab: Any, folder: Path) -> None:
     result = isiw("prior", "show", lab, "-o", "lab.png")
     assert result.exit_code == 0, result.output

@@ -53,6 +53,7 @@ def path(lab: Any, tmp_path: Path) -> Any:
     return priors.write_lab_prior(lab, tmp_path / "lab.toml")
 
 
+@pytest.mark.slow
 def test_a_lab_prior_names_its_sessions_by_their_content(lab: Any, logs: Any) -> None:
     assert [session.sha256 for session in lab.sessions] == [hashlib.sha256(p.read_bytes()).hexdigest() for p in logs]
     assert [(session.subject, session.trials) for session in lab.sessions] == [(f"P{k}", TRIALS) for k in range(3)]

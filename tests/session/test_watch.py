@@ -38,6 +38,7 @@ def strategy_for_rigs(max_trials: int = 20) -> Strategy:
     return make_strategy("default", SPACE, max_trials=max_trials, particles=200)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wrong", WRONG)
 def test_each_wrong_rig_is_named_within_four_trials_and_ends_in_no_finding(wrong: str, log: Path) -> None:
     rows: list[tuple[str, ...]] = []
@@ -248,6 +249,7 @@ def short_before_the_pulse(stimulus: Stimulus) -> Sweep:
     return replace(sweep, channels={"emg": emg})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("answer", "trials", "found"),
     [

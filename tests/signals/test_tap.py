@@ -24,6 +24,7 @@ from tapped import IMPACT, TapRig, reflex
 LONG_MS = (310.0, 280.0, 250.0, 220.0, 300.0, 260.0)
 
 
+@pytest.mark.slow
 def test_without_a_response_to_the_tap_an_mep_keeps_its_amplitude_at_every_isi() -> None:
     rig = TapRig()
     rig.trials(LONG_MS)
@@ -34,6 +35,7 @@ def test_without_a_response_to_the_tap_an_mep_keeps_its_amplitude_at_every_isi()
         assert {trial.tap_mv for trial in told} == {0.0}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size_mv", [0.1, 0.3])
 @pytest.mark.parametrize("isi_ms", [0.0, 10.0, 20.0, 30.0, 45.0])
 def test_a_response_to_the_tap_is_not_told_as_an_mep(size_mv: float, isi_ms: float) -> None:
@@ -239,6 +241,7 @@ def test_the_artefact_of_the_robots_tap_is_known(isi_ms: float, name: str) -> No
     assert abs(np.mean([known(trial.mep_mv) - known(trial.tap_mv) for trial in pairs])) < 0.03
 
 
+@pytest.mark.slow
 @given(
     rate_hz=st.floats(500.0, 50_000.0),
     before_ms=st.floats(0.0, 400.0),

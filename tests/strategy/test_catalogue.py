@@ -276,6 +276,7 @@ def test_a_tap_that_hits_after_the_last_isi_is_refused() -> None:
     assert make_strategy(space=IMPACT_SPACE, hit_delay_ms=(5000.0, 6.0), **FEW).estimate().window is not None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_every_strategy_works_on_a_list_of_isis(name: str) -> None:
     listed = DesignSpace.of([10, 15, 20, 30, 50], reference="impact")

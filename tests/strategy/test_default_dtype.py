@@ -45,6 +45,7 @@ def answers(name: str, *defaults: torch.dtype) -> list[Any]:
 usual_answers = cache(answers)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list_strategies())
 def test_double_precision_as_the_default_changes_no_answer(name: str) -> None:
     usual = usual_answers(name, SINGLE, SINGLE)

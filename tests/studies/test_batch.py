@@ -67,6 +67,7 @@ def test_people_side_by_side_take_less_than_a_megabyte_each() -> None:
         tracemalloc.stop()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("strategy", EVERY)
 def test_rounded_amplitudes_are_learnt_as_intervals_as_in_a_session(strategy: str) -> None:
     batch = sessions(strategy, 1, first=1, trials=12, cohort="coarse")  # whose step shows after some trials

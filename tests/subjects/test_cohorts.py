@@ -205,6 +205,7 @@ def test_nobody_is_a_cohort_too() -> None:
     assert cohort("gaussian", 0, 0) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", USUAL_START)
 def test_windows_start_as_stated(name: str) -> None:
     assert_uniform([profile_of(s).start_ms for s in people(name)], 5, 110)
@@ -230,6 +231,7 @@ def test_another_rig_hits_at_any_time_and_states_it() -> None:
     assert all(s.stated_hit_delay_ms == (s.hit_delay_ms, 6.0) for s in drawn)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", COHORTS)
 def test_what_rigs_state_of_their_hit_delay_is_true(name: str) -> None:
     off = [(s.hit_delay_ms - s.stated_hit_delay_ms[0]) / s.stated_hit_delay_ms[1] for s in people(name)]
@@ -472,6 +474,7 @@ def test_a_nonresponder_has_no_window(space: DesignSpace) -> None:
     assert {s.window(space) for s in people("nonresponder")} == {None}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("space", SPACES, ids=["valve", "impact"])
 @pytest.mark.parametrize("name", COHORTS)
 def test_all_others_have_one_or_nearly_all(name: str, space: DesignSpace) -> None:
@@ -542,6 +545,7 @@ def test_what_differs_from_trial_to_trial_leaves_the_truth_alone() -> None:
 # How they answer
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["gaussian", "low-response", "recruitment", "nonresponder"])
 @pytest.mark.parametrize("share", [None, 0.0, 0.5])
 def test_answers_have_the_expected_mep_as_their_mean(name: str, share: float | None) -> None:

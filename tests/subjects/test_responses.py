@@ -44,12 +44,14 @@ def test_the_mean_of_the_emg_floor_is_that_of_its_log_normal() -> None:
     assert_mean(FLOOR.median_mv * np.exp(FLOOR.log_sd * z), FLOOR.mean_mv)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("facilitation", [0.0, 0.3, 1.0])
 def test_sampled_meps_of_the_recruitment_curve_have_their_expected_mean(facilitation: float) -> None:
     values = sampled_evoked_mv(FCR, facilitation, seed=2)
     assert_mean(values, float(FCR.expected_evoked_mv(facilitation)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("probability", [None, 0.55])
 @pytest.mark.parametrize("facilitation", [0.25, 1.0])
 def test_sampled_meps_of_a_gain_have_their_expected_mean(probability: float | None, facilitation: float) -> None:

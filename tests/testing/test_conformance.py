@@ -57,6 +57,7 @@ def test_every_acquisition_function_conforms_on_particles(name: str, people: int
     check_acquisition(ACQUISITIONS[name](3), particles_after(usual_trials(VALVE_SPACE)[:6], people), VALVE_SPACE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCORING)
 def test_every_acquisition_function_scores_what_breaks_things(name: str) -> None:
     for trials in trials_that_break_things(VALVE_SPACE).values():

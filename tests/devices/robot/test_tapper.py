@@ -74,6 +74,7 @@ def test_it_is_a_device_with_a_memory() -> None:
     assert device.describe().simulated
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("trigger", "accelerometer"), [("open-loop", True), ("open-loop", False), ("impact", True)])
 def test_it_keeps_what_every_device_promises(trigger: Trigger, *, accelerometer: bool) -> None:
     def made(reference: Reference) -> SimulatedDevice:

@@ -39,6 +39,7 @@ def on_grid(unknowns: Unknowns, likelihood: Likelihood, grid: torch.Tensor = GRI
     return log_likelihood(each, LEVELS.unsqueeze(-1), points(grid), likelihood).exp()
 
 
+@pytest.mark.slow
 def test_the_edges_of_a_window_have_the_share_that_defines_them() -> None:
     unknowns = people("gamma")
     for edge_ms in (unknowns.start_ms, unknowns.start_ms + unknowns.width_ms):
