@@ -68,8 +68,12 @@ def test_an_intervention_needs_its_statement_and_ends_concealed_until_it_is_open
     assert not list(tmp_path.glob("p*.png"))
     arm = read_session("p.mcap").header.intervention
     assert arm is not None
-    for command in ("show", "plot", "report"):
+    for command in ("show", "plot"):
         assert "concealed" in isiw(command, "p.mcap").output
+    assert isiw("report", "p.mcap").exit_code == 0
+    page = (tmp_path / "p.html").read_text(encoding="utf-8")
+    assert "concealed" in page
+    assert arm.arm.words not in page
     assert arm.arm.words in isiw("pair", "--open", "p.mcap").output
     assert "opening" in isiw("show", "p.mcap").output
     taught = isiw("run", config, "--after", "p.mcap")
