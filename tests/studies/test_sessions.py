@@ -268,3 +268,11 @@ def test_a_space_that_no_realised_isi_keeps_is_refused() -> None:
     session = replace(small(), space=replace(IMPACT_SPACE, tolerance_ms=0.0))
     with pytest.raises(StudyError, match="wider tolerance_ms"):
         play(session, Perfect(session))
+
+
+def test_several_intensities_which_no_person_of_a_study_is_given_are_refused() -> None:
+    settings = (("intensities_pct_rmt", (90.0, 110.0)), ("intensity_pct_rmt", 90.0), ("particles", 40))
+    session = SimulatedSession("default", "recruitment", 0, 5, 3, (3,), settings=settings)
+    for run in (simulate, lambda one: simulate_batch([one])):
+        with pytest.raises(StudyError, match="usual intensity"):
+            run(session)

@@ -136,7 +136,14 @@ class SimulatedSession(Checked):
         seed, settings = self.seed + self.person, dict(self.settings)
         if self.own is not None:
             return self.own.player(self.space, seed, settings)
-        return make_strategy(self.strategy, self.space, seed, **settings)
+        strategy = make_strategy(self.strategy, self.space, seed, **settings)
+        if strategy.intensities:
+            raise StudyError(
+                "a study gives all pairs the person's usual intensity",
+                got=f"intensities_pct_rmt = {strategy.intensities.named_pct_rmt}",
+                remedy="Leave intensities_pct_rmt out, or run sessions of several intensities with isiw.Session.",
+            )
+        return strategy
 
 
 def simulate(session: SimulatedSession) -> pd.DataFrame:
