@@ -26,6 +26,14 @@ from isiw.native.arrays import (
 from isiw.native.library import call
 from isiw.types import Array, BoolArray, FloatArray, IntArray, Singles
 
+_MOST_OF_BLOCK: Final = 32
+_MOST_BLOCKS: Final = 64
+"""How many latents a block may have, and how many blocks a prior: `prior.h` has the same."""
+
+_OF_A_CHANGE: Final = slice(MEANINGS - 5, MEANINGS - 3)
+_OF_A_DEPRESSION: Final = slice(MEANINGS - 3, MEANINGS - 1)
+"""Meanings of latents that moves write or compare: when and by how much, and the start and the log width."""
+
 _LAST_KINDS: Final = np.array([3, 4, 1, 1, 4])
 """The last of each."""
 
@@ -151,8 +159,11 @@ class Law:
         within = within and (np.abs(components) <= width).all() and ((at >= 0) & (at <= self.latents)).all()
         # A start and width of a place are the first two latents; a change, where there is one, is two blocks.
         within = within and (first[components < 0] == 0).all() and (size[components < 0] == 2).all()
+        within = within and size.max() <= _MOST_OF_BLOCK and self.blocks <= _MOST_BLOCKS
         if self._arrays["renewed"][:, -1].any():
-            within = within and 0 <= changed < self.blocks - 1
+            within = within and 0 <= changed < self.blocks - 1 and (at[_OF_A_CHANGE] < self.latents).all()
+        if self._struct.apart:
+            within = within and (at[_OF_A_DEPRESSION] < self.latents).all()
         if not within or knots < 2 or width % LANES or (_LAST_KINDS @ self._arrays["state_of"]) >= self._struct.states:
             raise ValueError("the tables of a prior point beyond themselves")
 

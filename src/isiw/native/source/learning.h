@@ -156,35 +156,38 @@ static int learn(const Tables *tables, int64_t people, int64_t particles, int64_
 static int usual_weights(const Tables *tables, const Tables *usual, int64_t people, int64_t particles,
                          const float *values, const int64_t *kinds, const float *densities, const double *log_weights,
                          double *found) {
-    for (int64_t person = 0; person < people; person++) {
-        for (int64_t i = person * particles; i < (person + 1) * particles; i++) {
-            const float *z = values + i * tables->latents;
-            const int64_t *of = kinds + i * KINDS;
-            float own = log_usual(tables, z, of, densities + i * tables->blocks);
-            found[i] = log_weights[i] + log_usual(usual, z, of, NULL) - own;
+    for (int64_t first = 0, count = people * particles; first < count; first += LANES) {
+        int64_t numbers[LANES], left = count - first;
+        const float *known[LANES];
+        for (int64_t lane = 0; lane < LANES; lane++) {
+            numbers[lane] = first + lane;
+            known[lane] = densities + (first + (lane < left ? lane : left - 1)) * tables->blocks;
         }
-        normalise(found + person * particles, particles);
+        Lanes lanes = lanes_of(values, tables->latents, kinds, numbers, left);
+        Reals own = log_usual(tables, &lanes, known), others = log_usual(usual, &lanes, NULL);
+        for (int64_t lane = 0; lane < LANES && lane < left; lane++)
+            found[first + lane] = log_weights[first + lane] + others[lane] - own[lane];
     }
+    for (int64_t person = 0; person < people; person++) normalise(found + person * particles, particles);
     return 0;
 }
 
 static int represent(const Tables *tables, int64_t people, int64_t particles, int64_t size, int64_t trials,
                      const float *values, const int64_t *kinds, const double *log_weights, int64_t *picks,
                      float *fields) {
-    int64_t latents = tables->latents;
-    float *z = calloc((size_t)latents + 1, sizeof *z);
-    if (!z) return -1;
+    float *room = malloc((size_t)particles * FIELDS * sizeof *room);
+    if (!room) return -1;
     for (int64_t person = 0; person < people; person++) {
         int64_t *own = picks + person * size, first = person * particles;
         systematic(log_weights + first, particles, size, own);
+        meanings_of(tables, values + first * tables->latents, tables->latents, kinds + first * KINDS, own, size, room);
         for (int64_t i = 0; i < size; i++) {
-            memcpy(z, values + (first + own[i]) * latents, (size_t)latents * sizeof *z);
             float *meant = fields + (person * size + i) * FIELDS;
-            meaning_of(tables, z, kinds + (first + own[i]) * KINDS, meant);
+            memcpy(meant, room + own[i] * FIELDS, FIELDS * sizeof *meant);
             settle(meant, (float)trials);
         }
     }
-    free(z);
+    free(room);
     return 0;
 }
 

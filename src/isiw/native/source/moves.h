@@ -26,7 +26,31 @@ typedef struct {
     const float *steps; /* of the mean log MEP at each trial, see steps_of, (count + 1,) */
     int64_t count;      /* of trials */
     float *redrawn;     /* room for latents that are drawn again, (latents,) */
+    uint64_t *touched;  /* blocks that a part moves, by state, (states, part_count), then those of each jump, as bits */
 } Chain;
+
+/* The blocks of which any latent is flagged, as bits. */
+static uint64_t blocks_of(const Tables *tables, const uint8_t *flagged) {
+    uint64_t found = 0;
+    for (int64_t block = 0; block < tables->blocks; block++)
+        for (int64_t latent = tables->first[block]; latent < tables->first[block] + tables->size[block]; latent++)
+            if (flagged[latent]) found |= (uint64_t)1 << block;
+    return found;
+}
+
+static void touched_of(const Tables *tables, uint64_t *touched) {
+    int64_t parts = tables->states * tables->part_count, padded = in_lanes(tables->latents);
+    for (int64_t i = 0; i < parts; i++) touched[i] = blocks_of(tables, tables->shifted + i * padded);
+    for (int64_t i = 0; i < tables->jump_count; i++)
+        touched[parts + i] = blocks_of(tables, tables->redrawn + i * tables->latents);
+}
+
+/* The number of the lowest bit, which is taken away. */
+INLINE int64_t next_of(uint64_t *bits) {
+    int64_t number = __builtin_ctzll(*bits);
+    *bits &= *bits - 1;
+    return number;
+}
 
 /* By how much the mean log MEP is larger from each trial on than before it; 0 for all and none, (count + 1,). */
 static void steps_of(const float *columns, int64_t count, float *steps) {
@@ -52,10 +76,12 @@ static double step_at(const Chain *chain, double after) {
 
 /* Log density of when something changes, and of by how much. */
 INLINE float log_when(const Chain *chain, const float *z) {
-    return log_block(chain->tables, chain->tables->changed, z);
+    Reals when = all(z[chain->tables->first[chain->tables->changed]]);
+    return log_block(chain->tables, chain->tables->changed, &when)[0];
 }
 INLINE float log_size(const Chain *chain, const float *z) {
-    return log_block(chain->tables, chain->tables->changed + 1, z);
+    Reals size = all(z[chain->tables->first[chain->tables->changed + 1]]);
+    return log_block(chain->tables, chain->tables->changed + 1, &size)[0];
 }
 
 INLINE const float *change_edges(const Tables *tables) { return tables->kinds + OF_CHANGE * tables->kind_values; }
@@ -121,11 +147,8 @@ static int64_t jump(const Chain *chain, uint64_t *dice, float *z, int64_t *kinds
     const Tables *tables = chain->tables;
     int64_t number = which(uniform(dice), tables->jumps, tables->jump_count - 1);
     const uint8_t *redrawn = tables->redrawn + number * tables->latents, *renewed = tables->renewed + number * KINDS;
-    for (int64_t block = 0; block < tables->blocks; block++) {
-        int64_t first = tables->first[block], behind = first + tables->size[block];
-        int wanted = 0;
-        for (int64_t latent = first; latent < behind; latent++) wanted |= redrawn[latent];
-        if (!wanted) continue;
+    for (uint64_t wanted = chain->touched[tables->states * tables->part_count + number]; wanted;) {
+        int64_t block = next_of(&wanted), first = tables->first[block], behind = first + tables->size[block];
         draw_block(tables, block, dice, chain->redrawn);
         for (int64_t latent = first; latent < behind; latent++)
             if (redrawn[latent]) z[latent] = chain->redrawn[latent];
@@ -141,15 +164,13 @@ static int64_t jump(const Chain *chain, uint64_t *dice, float *z, int64_t *kinds
     return number;
 }
 
-/* Add a scaled difference of two of the others (ter Braak, Stat. Comput. 16, 2006); log of the ratio of prior
-densities. Log densities of blocks are kept: UNKNOWN in found where a block does not move. */
-static double shift(const Chain *chain, uint64_t *dice, const float *theirs, int64_t others, const uint8_t *moves,
-                    const float *old, float *z, float *densities, float *found) {
+/* Add a scaled difference of two of the others (ter Braak, Stat. Comput. 16, 2006). */
+static void shift(const Chain *chain, uint64_t *dice, const float *theirs, int64_t others, const uint8_t *moves,
+                  float *z) {
     const Tables *tables = chain->tables;
     int64_t latents = tables->latents;
     const float *one = theirs + latents * one_of(dice, others), *other = theirs + latents * one_of(dice, others);
     float scale = uniform(dice) < WHOLE_DIFFERENCE ? 1.0f : 0.15f + 0.7f * uniform(dice);
-    double ratio = 0.0;
     uint64_t bits = random_bits(dice);
     for (int64_t at = 0; at < latents; at += LANES) { /* all latents, as those that move are at no place of their own */
         int64_t left = latents - at;
@@ -157,17 +178,6 @@ static double shift(const Chain *chain, uint64_t *dice, const float *theirs, int
         apart += BLUR * loaded(tables->spreads + at, left) * blurs(bits, at);
         stored(pick(flags(moves + at), loaded(z + at, left) + apart, loaded(z + at, left)), z + at, left);
     }
-    for (int64_t block = 0; block < tables->blocks; block++) {
-        int touched = 0;
-        for (int64_t latent = tables->first[block]; latent < tables->first[block] + tables->size[block]; latent++)
-            touched |= moves[latent];
-        found[block] = UNKNOWN;
-        if (!touched) continue;
-        if (densities[block] == UNKNOWN) densities[block] = log_block(tables, block, old);
-        found[block] = log_block(tables, block, z);
-        ratio += (double)found[block] - densities[block];
-    }
-    return ratio;
 }
 
 /* Whether enhancement and depression overlap. */
@@ -179,45 +189,68 @@ static int overlap(const Tables *tables, const float *z) {
 
 /* Where the particles of a half may move to. */
 typedef struct {
-    float *z;        /* (half, latents + 1): the last is 0, for latents that a model does not have */
-    float *found;    /* log densities of blocks, (half, blocks) */
-    float *fields;   /* what it means, (half, FIELDS) */
-    float *after;    /* its log likelihood, (half,) */
-    double *ratio;   /* of prior densities and proposals, natural log */
-    int64_t *kinds;  /* (half, KINDS) */
-    uint64_t *dice;  /* streams of draws */
-    uint8_t *jumped; /* whether it is a jump */
-    uint8_t *wanted; /* whether its likelihood must be worked out */
+    float *z;         /* (half, latents) */
+    float *found;     /* log densities of blocks that a difference moves, (half, blocks) */
+    float *fields;    /* what it means, (half, FIELDS) */
+    float *after;     /* its log likelihood, (half,) */
+    double *ratio;    /* of prior densities and proposals, natural log */
+    int64_t *kinds;   /* (half, KINDS) */
+    int64_t *numbers; /* room for numbers of some of them, (half,) */
+    uint64_t *dice;   /* streams of draws */
+    uint64_t *moved;  /* blocks that a difference moves, as bits */
+    uint8_t *jumped;  /* whether it is a jump */
+    uint8_t *wanted;  /* whether its likelihood must be worked out */
 } Proposals;
 
+/* Propose a particle in place of one: of another likelihood where it is wanted, of another prior where blocks moved. */
 static void propose(const Chain *chain, const Proposals *to, int64_t i, const float *old, const int64_t *kinds,
-                    float *densities, const float *theirs, int64_t others, float log_likelihood) {
+                    const float *theirs, int64_t others) {
     const Tables *tables = chain->tables;
-    float *z = to->z + i * (tables->latents + 1), *found = to->found + i * tables->blocks;
+    float *z = to->z + i * tables->latents;
     int64_t *chosen = to->kinds + i * KINDS, state = 0;
     uint64_t *dice = to->dice + i;
     memcpy(z, old, (size_t)tables->latents * sizeof *z);
-    z[tables->latents] = 0.0f;
     for (int kind = 0; kind < KINDS; kind++) chosen[kind] = kinds[kind], state += tables->state_of[kind] * kinds[kind];
-    int same = 1;
     to->jumped[i] = uniform(dice) < JUMPS;
-    to->ratio[i] = 0.0;
+    to->ratio[i] = 0.0, to->moved[i] = 0;
     if (to->jumped[i]) {
         int64_t number = jump(chain, dice, z, chosen, to->ratio + i);
-        same = tables->of_profile[number] && !kinds[OF_PRESENT] && !chosen[OF_PRESENT];
-    } else {
-        int64_t part = which(uniform(dice), tables->parts, tables->part_count - 1);
-        const uint8_t *moves = tables->shifted + (state * tables->part_count + part) * in_lanes(tables->latents);
-        for (int64_t latent = 0; latent < tables->latents; latent++) same &= !moves[latent];
-        if (same)
-            for (int64_t block = 0; block < tables->blocks; block++) found[block] = UNKNOWN;
-        else
-            to->ratio[i] = shift(chain, dice, theirs, others, moves, old, z, densities, found);
+        to->wanted[i] = !(tables->of_profile[number] && !kinds[OF_PRESENT] && !chosen[OF_PRESENT]);
+        return;
     }
-    if (tables->apart && overlap(tables, z)) to->ratio[i] = -INFINITY;
-    to->after[i] = log_likelihood;
-    to->wanted[i] = to->ratio[i] > -INFINITY && !same;
-    if (to->wanted[i]) meaning_of(tables, z, chosen, to->fields + i * FIELDS);
+    int64_t part = state * tables->part_count + which(uniform(dice), tables->parts, tables->part_count - 1);
+    to->moved[i] = chain->touched[part], to->wanted[i] = to->moved[i] != 0;
+    if (to->moved[i]) shift(chain, dice, theirs, others, tables->shifted + part * in_lanes(tables->latents), z);
+}
+
+/* Log densities of a block of numbered particles, each at its number, (p, blocks). */
+static void densities_of(const Tables *tables, int64_t block, const float *values, const int64_t *kinds,
+                         const int64_t *numbers, int64_t count, float *found) {
+    for (int64_t first = 0; first < count; first += LANES) {
+        Lanes lanes = lanes_of(values, tables->latents, kinds, numbers + first, count - first);
+        Reals of = log_block_of(tables, block, &lanes);
+        for (int lane = 0; lane < LANES && first + lane < count; lane++)
+            found[numbers[first + lane] * tables->blocks + block] = of[lane];
+    }
+}
+
+/* Work out the ratio of prior densities of what differences moved. Densities of the particles themselves are kept. */
+static void weigh_shifts(const Tables *tables, const Proposals *to, int64_t size, const float *old,
+                         const int64_t *kinds, float *densities) {
+    int64_t *numbers = to->numbers;
+    for (int64_t block = 0; block < tables->blocks; block++) {
+        int64_t count = 0, unknown = 0;
+        for (int64_t i = 0; i < size; i++)
+            if (to->moved[i] >> block & 1 && densities[i * tables->blocks + block] == UNKNOWN) numbers[unknown++] = i;
+        densities_of(tables, block, old, kinds, numbers, unknown, densities);
+        for (int64_t i = 0; i < size; i++)
+            if (to->moved[i] >> block & 1) numbers[count++] = i;
+        densities_of(tables, block, to->z, to->kinds, numbers, count, to->found);
+        for (int64_t n = 0; n < count; n++) {
+            int64_t at = numbers[n] * tables->blocks + block;
+            to->ratio[numbers[n]] += (double)to->found[at] - densities[at];
+        }
+    }
 }
 
 /* The particles of a person, in place. */
@@ -234,15 +267,13 @@ static void accept(const Tables *tables, const Proposals *to, int64_t i, State *
     if (!(log_1(most_1(uniform(to->dice + i), 1e-30f)) < ratio)) return;
     state->counts[sort + 1] += 1.0f;
     *log_likelihood = to->after[i];
-    memcpy(state->values + particle * tables->latents, to->z + i * (tables->latents + 1),
+    memcpy(state->values + particle * tables->latents, to->z + i * tables->latents,
            (size_t)tables->latents * sizeof(float));
     memcpy(state->kinds + particle * KINDS, to->kinds + i * KINDS, KINDS * sizeof(int64_t));
-    for (int64_t block = 0; block < tables->blocks; block++) {
-        float found = to->found[i * tables->blocks + block];
-        if (to->jumped[i])
-            densities[block] = UNKNOWN;
-        else if (found != UNKNOWN)
-            densities[block] = found;
+    for (int64_t block = 0; to->jumped[i] && block < tables->blocks; block++) densities[block] = UNKNOWN;
+    for (uint64_t moved = to->moved[i]; moved;) {
+        int64_t block = next_of(&moved);
+        densities[block] = to->found[i * tables->blocks + block];
     }
 }
 
@@ -250,14 +281,21 @@ static void accept(const Tables *tables, const Proposals *to, int64_t i, State *
 static void move_half(const Chain *chain, const Proposals *to, const Trial *trials, int shares, State *state,
                       uint64_t sweep, int64_t first, int64_t behind, int64_t theirs, int64_t others) {
     const Tables *tables = chain->tables;
-    int64_t latents = tables->latents, size = behind - first;
+    int64_t latents = tables->latents, size = behind - first, wanted = 0;
+    const float *old = state->values + first * latents;
+    const int64_t *kinds = state->kinds + first * KINDS;
     for (int64_t i = 0; i < size; i++) {
-        int64_t particle = first + i;
-        to->dice[i] = stream_of(sweep, particle);
-        propose(chain, to, i, state->values + particle * latents, state->kinds + particle * KINDS,
-                state->densities + particle * tables->blocks, state->values + theirs * latents, others,
-                state->log_likelihood[particle]);
+        to->dice[i] = stream_of(sweep, first + i);
+        propose(chain, to, i, old + i * latents, kinds + i * KINDS, state->values + theirs * latents, others);
     }
+    weigh_shifts(tables, to, size, old, kinds, state->densities + first * tables->blocks);
+    for (int64_t i = 0; i < size; i++) {
+        if (tables->apart && overlap(tables, to->z + i * latents)) to->ratio[i] = -INFINITY;
+        to->after[i] = state->log_likelihood[first + i];
+        to->wanted[i] &= to->ratio[i] > -INFINITY;
+        if (to->wanted[i]) to->numbers[wanted++] = i;
+    }
+    meanings_of(tables, to->z, latents, to->kinds, to->numbers, wanted, to->fields);
     person_likelihood(to->fields, size, to->wanted, trials, chain->count, shares, to->after);
     for (int64_t i = 0; i < size; i++) accept(tables, to, i, state, first + i);
 }
@@ -269,21 +307,25 @@ static int sweeps(const Tables *tables, int64_t people, int64_t particles, int64
     size_t each = (size_t)most;
     Trial *trials = malloc((size_t)(count + 1) * sizeof *trials);
     float *steps = malloc((size_t)(count + 1) * sizeof *steps);
-    Proposals to = {.z = malloc(each * (size_t)(latents + 1) * sizeof(float)),
+    Proposals to = {.z = malloc(each * (size_t)latents * sizeof(float)),
                     .found = malloc(each * (size_t)blocks * sizeof(float)),
                     .fields = malloc(each * FIELDS * sizeof(float)),
                     .after = malloc(each * sizeof(float)),
                     .ratio = malloc(each * sizeof(double)),
                     .kinds = malloc(each * KINDS * sizeof(int64_t)),
+                    .numbers = malloc(each * sizeof(int64_t)),
                     .dice = malloc(each * sizeof(uint64_t)),
+                    .moved = malloc(each * sizeof(uint64_t)),
                     .jumped = malloc(each),
                     .wanted = malloc(each)};
     float *redrawn = malloc((size_t)latents * sizeof *redrawn);
-    int there = trials && steps && to.z && to.found && to.fields && to.after && to.ratio && to.kinds && to.dice &&
-                to.jumped && to.wanted && redrawn;
+    uint64_t *touched = malloc((size_t)(tables->states * tables->part_count + tables->jump_count) * sizeof *touched);
+    int there = trials && steps && to.z && to.found && to.fields && to.after && to.ratio && to.kinds && to.numbers &&
+                to.dice && to.moved && to.jumped && to.wanted && redrawn && touched;
+    if (there) touched_of(tables, touched);
     for (int64_t person = 0; there && person < people; person++) {
         int shares = trials_of(columns + person * count * COLUMNS, count, trials);
-        Chain chain = {tables, steps, count, redrawn};
+        Chain chain = {tables, steps, count, redrawn, touched};
         steps_of(columns + person * count * COLUMNS, count, steps);
         int64_t at = person * particles;
         State state = {values + at * latents, log_likelihood + at, densities + at * blocks, counts + 4 * person,
@@ -294,9 +336,9 @@ static int sweeps(const Tables *tables, int64_t people, int64_t particles, int64
             move_half(&chain, &to, trials, shares, &state, stream, half, particles, 0, half);
         }
     }
-    free(trials), free(steps), free(to.z), free(to.found), free(to.fields), free(to.after), free(to.ratio),
-        free(to.kinds);
-    free(to.dice), free(to.jumped), free(to.wanted), free(redrawn);
+    free(trials), free(steps), free(redrawn), free(touched), free(to.z), free(to.found), free(to.fields);
+    free(to.after), free(to.ratio), free(to.kinds), free(to.numbers), free(to.dice), free(to.moved), free(to.jumped);
+    free(to.wanted);
     return there ? 0 : -1;
 }
 

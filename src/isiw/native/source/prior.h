@@ -37,56 +37,103 @@ enum {
 };
 enum { LOG_CEILING, LOG_SLOPE, LOG_INPUT_SD, LOG_SIGMA_Y, LOG_BOOST, REST_PCT }; /* of a curve */
 
+enum { MOST_OF_BLOCK = 32, MOST_BLOCKS = 64 }; /* how many latents a block has, and how many blocks there are */
 #define NEVER (-1e30f)      /* log density of what cannot be */
 #define UNKNOWN 1e30f       /* in place of a log density that was not worked out yet */
 #define MOST_ONSET 0.9f     /* a threshold further up a curve would leave nothing of it */
 #define INTENSITY_PCT 9.0f  /* by how much the intensity changes at a size of 1 [% RMT] */
 #define FADING_HALVES 0.04f /* by how many halves the enhancement changes from trial to trial at a size of 1 */
 
-/* What latents mean. Those that a model does not have are read as 0, from behind the last: z has room for one more. */
-static void meaning_of(const Tables *tables, const float *z, const int64_t *kinds, float *fields) {
-    const int64_t *at = tables->at;
-    int64_t noise = kinds[OF_NOISE], change = kinds[OF_CHANGE];
-    fields[NOISE] = (float)noise, fields[SHAPE] = (float)kinds[OF_SHAPE], fields[PRESENT] = (float)kinds[OF_PRESENT];
-    fields[START] = z[at[START_MS]], fields[WIDTH] = exp_1(z[at[LOG_WIDTH_MS]]);
-    fields[FORM] = kinds[OF_SHAPE] ? erff(z[at[FORM_SCORE]] * 0.70710678f) : 0.0f;
-    fields[LOG_FLOOR] = z[at[LOG_FLOOR_MV]], fields[FLOOR_SD] = exp_1(z[at[LOG_FLOOR_SD]]);
-    fields[DRIFT] = z[at[DRIFT_SIZE]], fields[STARTLED] = z[at[STARTUP]];
-    fields[MOST] = 1.0f, fields[LEAST] = 0.0f;
-    fields[ONSET] = fields[BOOST] = fields[REST] = fields[SLOPE] = 0.0f;
-    if (noise == RECRUITMENT || noise == RECTIFIED) {
-        const int64_t *of = at + (noise == RECTIFIED ? RECTIFIED_LATENTS : CURVE_LATENTS);
-        float slope = exp_1(z[of[LOG_SLOPE]]);
-        fields[LOG_RATIO] = z[of[LOG_CEILING]], fields[SPREAD] = exp_1(z[of[LOG_INPUT_SD]]);
-        fields[OUTPUT_SD] = exp_1(z[of[LOG_SIGMA_Y]]), fields[SLOPE] = slope;
-        fields[BOOST] = slope * exp_1(z[of[LOG_BOOST]]), fields[REST] = slope * z[of[REST_PCT]];
-        if (noise == RECTIFIED) { /* the rest counts from the threshold */
-            float onset = least_1(exp_1(z[at[LOG_ONSET]]), MOST_ONSET);
-            fields[ONSET] = onset, fields[REST] += log_1(onset) - log_1(1.0f - onset);
+/* Latents of particles side by side: where those of each lane begin, and its kinds. */
+typedef struct {
+    const float *z[LANES];
+    const int64_t *kinds[LANES];
+} Lanes;
+
+/* Some of numbered particles, (p, stride) and (p, KINDS); lanes that are left over repeat the last. */
+INLINE Lanes lanes_of(const float *values, int64_t stride, const int64_t *kinds, const int64_t *numbers, int64_t left) {
+    Lanes made;
+    for (int64_t lane = 0; lane < LANES; lane++) {
+        int64_t number = numbers[lane < left ? lane : left - 1];
+        made.z[lane] = values + number * stride, made.kinds[lane] = kinds + number * KINDS;
+    }
+    return made;
+}
+
+/* A latent by its meaning, 0 where the model has none. */
+INLINE float latent_of(const Tables *tables, const float *z, int64_t meaning) {
+    int64_t at = tables->at[meaning];
+    return at < tables->latents ? z[at] : 0.0f;
+}
+
+/* What latents mean. */
+static Particles meaning_of(const Tables *tables, const Lanes *lanes) {
+    Particles made;
+    Reals *of = made.of, onset, size;
+    Wholes curved, rectified, change;
+    memset(&made, 0, sizeof made);
+    for (int lane = 0; lane < LANES; lane++) {
+        const float *z = lanes->z[lane];
+        const int64_t *kinds = lanes->kinds[lane];
+        int64_t noise = kinds[OF_NOISE];
+        of[NOISE][lane] = (float)noise, of[SHAPE][lane] = (float)kinds[OF_SHAPE];
+        of[PRESENT][lane] = (float)kinds[OF_PRESENT], change[lane] = (int32_t)kinds[OF_CHANGE];
+        rectified[lane] = -(noise == RECTIFIED), curved[lane] = -(noise == RECRUITMENT || noise == RECTIFIED);
+#define LATENT(meaning) latent_of(tables, z, meaning)
+        of[START][lane] = LATENT(START_MS), of[WIDTH][lane] = LATENT(LOG_WIDTH_MS);
+        of[FORM][lane] = kinds[OF_SHAPE] ? erff(LATENT(FORM_SCORE) * 0.70710678f) : 0.0f;
+        of[LOG_FLOOR][lane] = LATENT(LOG_FLOOR_MV), of[FLOOR_SD][lane] = LATENT(LOG_FLOOR_SD);
+        of[DRIFT][lane] = LATENT(DRIFT_SIZE), of[STARTLED][lane] = LATENT(STARTUP);
+        of[CHANGED][lane] = LATENT(LOG_CHANGED_AFTER), size[lane] = LATENT(CHANGE_SIZE);
+        of[LOW_WIDTH][lane] = 0.0f, of[DEPTH][lane] = -INFINITY; /* no depression */
+        if (kinds[OF_DEPRESSED]) {
+            of[LOW_START][lane] = LATENT(LOW_START_MS), of[LOW_WIDTH][lane] = LATENT(LOW_LOG_WIDTH_MS);
+            of[DEPTH][lane] = LATENT(LOW_LOG_SHIFT) - LATENT(CURVE_LATENTS + LOG_BOOST);
         }
-    } else {
-        int switches = noise == ALL_OR_NONE;
-        fields[LOG_RATIO] = z[at[switches ? LOG_SIZE : LOG_GAIN]];
-        fields[SPREAD] = exp_1(z[at[switches ? LOG_SIZE_CV : LOG_CV]]), fields[OUTPUT_SD] = 1.0f;
-        fields[MOST] = 1.0f / (1.0f + exp_1(-z[at[switches ? SWITCHED_ON : RELIABILITY]]));
-        fields[LEAST] = 1.0f / (1.0f + exp_1(-z[at[SWITCHED_OFF]]));
+        int64_t curve = noise == RECTIFIED ? RECTIFIED_LATENTS : CURVE_LATENTS, large = noise == ALL_OR_NONE;
+        if (curved[lane]) {
+            of[LOG_RATIO][lane] = LATENT(curve + LOG_CEILING), of[SPREAD][lane] = LATENT(curve + LOG_INPUT_SD);
+            of[OUTPUT_SD][lane] = LATENT(curve + LOG_SIGMA_Y), of[SLOPE][lane] = LATENT(curve + LOG_SLOPE);
+            of[BOOST][lane] = LATENT(curve + LOG_BOOST), of[REST][lane] = LATENT(curve + REST_PCT);
+            onset[lane] = LATENT(LOG_ONSET);
+        } else {
+            of[LOG_RATIO][lane] = LATENT(large ? LOG_SIZE : LOG_GAIN);
+            of[SPREAD][lane] = LATENT(large ? LOG_SIZE_CV : LOG_CV);
+            of[MOST][lane] = LATENT(large ? SWITCHED_ON : RELIABILITY), of[LEAST][lane] = LATENT(SWITCHED_OFF);
+            onset[lane] = 0.0f;
+        }
+#undef LATENT
     }
-    fields[LOW_START] = 0.0f, fields[LOW_WIDTH] = 1.0f, fields[DEPTH] = 0.0f;
-    if (kinds[OF_DEPRESSED]) {
-        fields[LOW_START] = z[at[LOW_START_MS]], fields[LOW_WIDTH] = exp_1(z[at[LOW_LOG_WIDTH_MS]]);
-        fields[DEPTH] = exp_1(z[at[LOW_LOG_SHIFT]] - z[at[CURVE_LATENTS + LOG_BOOST]]);
+    Reals none = all(0.0f);
+    of[WIDTH] = exp_v(of[WIDTH]), of[FLOOR_SD] = exp_v(of[FLOOR_SD]), of[SPREAD] = exp_v(of[SPREAD]);
+    of[CHANGED] = exp_v(of[CHANGED]), of[LOW_WIDTH] = exp_v(of[LOW_WIDTH]), of[OUTPUT_SD] = exp_v(of[OUTPUT_SD]);
+    of[DEPTH] = pick(of[DEPTH] == -INFINITY, none, exp_v(of[DEPTH]));
+    of[SLOPE] = pick(curved, exp_v(of[SLOPE]), none);
+    of[BOOST] = pick(curved, of[SLOPE] * exp_v(of[BOOST]), none), of[REST] *= of[SLOPE];
+    onset = pick(rectified, least_v(exp_v(onset), all(MOST_ONSET)), none);
+    of[ONSET] = onset; /* from the threshold on the rest counts */
+    of[REST] += pick(rectified, log_v(onset) - log_v(1.0f - onset), none);
+    of[MOST] = pick(curved, all(1.0f), 1.0f / (1.0f + exp_v(-of[MOST])));
+    of[LEAST] = pick(curved, none, 1.0f / (1.0f + exp_v(-of[LEAST])));
+    of[FADING] = pick(change == ENHANCEMENT_CHANGE, FADING_HALVES * size, none);
+    of[STEP_SCALE] = pick(change == SCALE_CHANGE, size, none);
+    /* without a recruitment curve an intensity is a level */
+    Wholes driven = (change == INTENSITY_CHANGE) & (of[SLOPE] > 0.0f);
+    of[STEP_DRIVE] = pick(driven, of[SLOPE] * INTENSITY_PCT * size, none);
+    of[STEP] = pick((change == LEVEL_CHANGE) | ((change == INTENSITY_CHANGE) & ~driven), size, none);
+    return made;
+}
+
+/* What numbered particles mean, each at its number, (p, FIELDS). */
+static void meanings_of(const Tables *tables, const float *values, int64_t stride, const int64_t *kinds,
+                        const int64_t *numbers, int64_t count, float *fields) {
+    for (int64_t first = 0; first < count; first += LANES) {
+        Lanes lanes = lanes_of(values, stride, kinds, numbers + first, count - first);
+        Particles made = meaning_of(tables, &lanes);
+        for (int lane = 0; lane < LANES && first + lane < count; lane++)
+            for (int field = 0; field < FIELDS; field++)
+                fields[numbers[first + lane] * FIELDS + field] = made.of[field][lane];
     }
-    float size = z[at[CHANGE_SIZE]];
-    fields[CHANGED] = exp_1(z[at[LOG_CHANGED_AFTER]]);
-    fields[STEP] = fields[STEP_DRIVE] = fields[FADING] = fields[STEP_SCALE] = 0.0f;
-    if (change == ENHANCEMENT_CHANGE)
-        fields[FADING] = FADING_HALVES * size;
-    else if (change == SCALE_CHANGE)
-        fields[STEP_SCALE] = size;
-    else if (change == INTENSITY_CHANGE && fields[SLOPE] > 0.0f)
-        fields[STEP_DRIVE] = fields[SLOPE] * INTENSITY_PCT * size;
-    else if (change != NO_CHANGE) /* without a recruitment curve an intensity is a level */
-        fields[STEP] = size;
 }
 
 /* Density of a start, 0 where none can be; straight between the knots. */
@@ -115,68 +162,71 @@ static float start_at(const Tables *tables, float quantile) {
     return tables->start_ms[low] + share * (tables->start_ms[high] - tables->start_ms[low]);
 }
 
-/* Log density of the latents of a place: of start and log width. */
-INLINE float log_place(const Tables *tables, int64_t place, const float *z) {
+/* Log densities of the latents of a place: of start and log width. */
+INLINE Reals log_place(const Tables *tables, int64_t place, const Reals *z) {
     const float *law = tables->places + 5 * place;
-    float a = (z[0] - law[1]) / law[2], b = (z[1] - law[3]) / law[4];
+    Reals a = (z[0] - law[1]) / law[2], b = (z[1] - law[3]) / law[4];
     return law[0] - 0.5f * (a * a + b * b);
 }
 
-/* Log densities of the latents first to behind under some components of a block's mixture, which are lanes. */
-INLINE Reals log_components(const Tables *tables, int64_t block, int64_t k, int64_t first, int64_t behind,
-                            const float *z) {
+/* Log densities of latents under a component of a block's mixture. */
+INLINE Reals log_component(const Tables *tables, int64_t block, int64_t k, int64_t first, int64_t count,
+                           const Reals *z) {
     Reals squares = all(0.0f);
-    for (int64_t latent = first; latent < behind; latent++) {
-        Reals distance = z[latent] - loaded(tables->means + latent * tables->width + k, LANES);
-        distance *= loaded(tables->per_sds + latent * tables->width + k, LANES);
+    for (int64_t i = 0; i < count; i++) {
+        int64_t at = (first + i) * tables->width + k;
+        Reals distance = (z[i] - tables->means[at]) * tables->per_sds[at];
         squares += distance * distance;
     }
-    return loaded(tables->log_shares + block * tables->width + k, LANES) - 0.5f * squares;
+    return tables->log_shares[block * tables->width + k] - 0.5f * squares;
 }
 
 /* Log of a sum of exponentials, of which the largest is not known beforehand. */
 typedef struct {
-    float most, sum;
+    Reals most, sum;
 } LogSum;
 
-static void add_log(LogSum *to, float part) {
-    float most = most_1(to->most, part);
-    to->sum = to->sum * exp_1(to->most - most) + exp_1(part - most), to->most = most;
+INLINE void add_log(LogSum *to, Reals part) {
+    Reals most = most_v(to->most, part);
+    to->sum = to->sum * exp_v(to->most - most) + exp_v(part - most), to->most = most;
 }
 
-/* Log density of the latents of a block but for a constant; -inf where there can be none. */
-static float log_block(const Tables *tables, int64_t block, const float *z) {
-    int64_t first = tables->first[block], behind = first + tables->size[block], components = tables->components[block];
-    int64_t count = components < 0 ? -components : components, width = tables->width;
-    int64_t places = components < 0 ? tables->place_count : 0;
-    float anywhere = 0.0f, usual = tables->log_shares[block * width], sum = 0.0f;
+/* Log densities of the latents of a block (size,) but for a constant; -inf where there can be none. */
+static Reals log_block(const Tables *tables, int64_t block, const Reals *z) {
+    int64_t first = tables->first[block], size = tables->size[block], components = tables->components[block];
+    int64_t count = components < 0 ? -components : components, places = components < 0 ? tables->place_count : 0;
+    Reals anywhere = all(0.0f), sum = all(0.0f);
+    const Reals *mixed = z;
     if (components <= 0) { /* a start, and with places its width */
-        float density = start_density(tables, z[first]);
-        anywhere = density == 0.0f ? NEVER : log_1(density);
-        if (components == 0) return density == 0.0f ? -INFINITY : anywhere;
-        first++, behind = first + 1;
+        for (int lane = 0; lane < LANES; lane++) anywhere[lane] = start_density(tables, z[0][lane]);
+        Wholes never = anywhere == 0.0f;
+        anywhere = pick(never, all(components ? NEVER : -INFINITY), log_v(anywhere));
+        if (components == 0) return anywhere;
+        first++, size = 1, mixed++;
     }
-    if (count == 1) { /* of one component no lanes are needed */
-        float squares = 0.0f;
-        for (int64_t latent = first; latent < behind; latent++) {
-            float distance = (z[latent] - tables->means[latent * width]) * tables->per_sds[latent * width];
-            squares += distance * distance;
-        }
-        if (!places) return usual - 0.5f * squares + anywhere;
-    }
-    if (count <= LANES) { /* as shares of the largest share of the first, unless all are next to nothing */
-        Reals shares = exp_v(log_components(tables, block, 0, first, behind, z) - usual + anywhere);
-        for (int64_t k = 0; k < count; k++) sum += shares[k];
-        for (int64_t place = 0; place < places; place++) sum += exp_1(log_place(tables, place, z) - usual);
-        if (sum > 1e-30f) return usual + log_1(sum);
-    }
-    LogSum slow = {NEVER, 0.0f};
-    for (int64_t k = 0; k < count; k += LANES) {
-        Reals parts = log_components(tables, block, k, first, behind, z) + anywhere;
-        for (int64_t lane = 0; lane < LANES && k + lane < count; lane++) add_log(&slow, parts[lane]);
-    }
-    for (int64_t place = 0; place < places; place++) add_log(&slow, log_place(tables, place, z));
-    return slow.most > NEVER * 0.5f ? slow.most + log_1(slow.sum) : -INFINITY;
+    if (count == 1 && !places) return log_component(tables, block, 0, first, size, mixed) + anywhere;
+    float usual = tables->log_shares[block * tables->width];
+    /* as shares of the largest share of the first, unless all are next to nothing */
+    for (int64_t k = 0; k < count; k++)
+        sum += exp_v(log_component(tables, block, k, first, size, mixed) - usual + anywhere);
+    for (int64_t place = 0; place < places; place++) sum += exp_v(log_place(tables, place, z) - usual);
+    Wholes slow = sum <= 1e-30f;
+    Reals found = usual + log_v(sum);
+    if (!any(slow)) return found;
+    LogSum slowly = {all(NEVER), all(0.0f)};
+    for (int64_t k = 0; k < count; k++)
+        add_log(&slowly, log_component(tables, block, k, first, size, mixed) + anywhere);
+    for (int64_t place = 0; place < places; place++) add_log(&slowly, log_place(tables, place, z));
+    Wholes once = slowly.most > NEVER * 0.5f;
+    return pick(slow, pick(once, slowly.most + log_v(slowly.sum), all(-INFINITY)), found);
+}
+
+/* The same of the particles of lanes. */
+static Reals log_block_of(const Tables *tables, int64_t block, const Lanes *lanes) {
+    Reals z[MOST_OF_BLOCK];
+    for (int64_t i = 0; i < tables->size[block]; i++)
+        for (int lane = 0; lane < LANES; lane++) z[i][lane] = lanes->z[lane][tables->first[block] + i];
+    return log_block(tables, block, z);
 }
 
 /* Draw the latents of a block from the prior. */
@@ -204,40 +254,51 @@ static void draw_block(const Tables *tables, int64_t block, uint64_t *dice, floa
 
 static int meanings(const Tables *tables, int64_t people, int64_t particles, const float *values, const int64_t *kinds,
                     int64_t trials, float *fields) {
-    int64_t latents = tables->latents;
-    float *z = calloc((size_t)latents + 1, sizeof *z);
-    if (!z) return -1;
-    for (int64_t i = 0; i < people * particles; i++) {
-        memcpy(z, values + i * latents, (size_t)latents * sizeof *z);
-        meaning_of(tables, z, kinds + i * KINDS, fields + i * FIELDS);
-        if (trials >= 0) settle(fields + i * FIELDS, (float)trials);
+    for (int64_t first = 0, count = people * particles; first < count; first += LANES) {
+        int64_t numbers[LANES], left = count - first < LANES ? count - first : LANES;
+        for (int64_t lane = 0; lane < LANES; lane++) numbers[lane] = first + lane;
+        meanings_of(tables, values, tables->latents, kinds, numbers, left, fields);
+        for (int64_t i = first; trials >= 0 && i < first + left; i++) settle(fields + i * FIELDS, (float)trials);
     }
-    free(z);
     return 0;
 }
 
-/* Whether a block is one that ISIs are chosen with another law of, and means anything to a particle. */
-static int is_weighed(const Tables *tables, int64_t block, const int64_t *kinds) {
-    int64_t first = tables->first[block], noise = kinds[OF_NOISE], change = kinds[OF_CHANGE];
-    int stepped = change != NO_CHANGE && change != ENHANCEMENT_CHANGE;
-    int curve = (noise == RECRUITMENT && first == tables->at[CURVE_LATENTS]) ||
-                (noise == RECTIFIED && first == tables->at[RECTIFIED_LATENTS]);
-    return (first < 2 && kinds[OF_PRESENT]) || curve || first == tables->at[DRIFT_SIZE] ||
-           (stepped && block == tables->changed);
+/* The particles to which a block means anything that ISIs are chosen with another law of. */
+static Wholes weighed_by(const Tables *tables, int64_t block, const Lanes *lanes) {
+    int64_t first = tables->first[block];
+    int of_curve = first == tables->at[CURVE_LATENTS], of_rectified = first == tables->at[RECTIFIED_LATENTS];
+    Wholes found = (Wholes){0} - (first == tables->at[DRIFT_SIZE]);
+    if (first >= 2 && !of_curve && !of_rectified && block != tables->changed) return found;
+    for (int lane = 0; lane < LANES; lane++) {
+        const int64_t *kinds = lanes->kinds[lane];
+        int64_t noise = kinds[OF_NOISE], change = kinds[OF_CHANGE];
+        int present = first < 2 && kinds[OF_PRESENT];
+        int curve = (of_curve && noise == RECRUITMENT) || (of_rectified && noise == RECTIFIED);
+        int stepped = block == tables->changed && change != NO_CHANGE && change != ENHANCEMENT_CHANGE;
+        found[lane] |= -(present || curve || stepped);
+    }
+    return found;
 }
 
-/* The log prior density of what ISIs are chosen with another law of, but for a constant; densities of blocks may be
-known. */
-static float log_usual(const Tables *tables, const float *z, const int64_t *kinds, const float *densities) {
+/* The log prior densities of what ISIs are chosen with another law of, but for a constant; densities of blocks (blocks,)
+may be known. */
+static Reals log_usual(const Tables *tables, const Lanes *lanes, const float *const *densities) {
     const float *edges = tables->kinds + OF_CHANGE * tables->kind_values;
-    int64_t change = kinds[OF_CHANGE];
-    float share =
-        (change < tables->kind_values ? least_1(edges[change], 1.0f) : 1.0f) - (change ? edges[change - 1] : 0.0f);
-    float sum = log_1(most_1(share, 1e-30f));
+    Reals sum;
+    for (int lane = 0; lane < LANES; lane++) {
+        int64_t change = lanes->kinds[lane][OF_CHANGE];
+        float until = change < tables->kind_values ? least_1(edges[change], 1.0f) : 1.0f;
+        sum[lane] = most_1(until - (change ? edges[change - 1] : 0.0f), 1e-30f);
+    }
+    sum = log_v(sum);
     for (int64_t block = 0; block < tables->blocks; block++) {
-        if (!is_weighed(tables, block, kinds)) continue;
-        float known = densities ? densities[block] : UNKNOWN;
-        sum += known == UNKNOWN ? log_block(tables, block, z) : known;
+        Wholes weighed = weighed_by(tables, block, lanes);
+        if (!any(weighed)) continue;
+        Reals found = all(UNKNOWN);
+        for (int lane = 0; densities && lane < LANES; lane++) found[lane] = densities[lane][block];
+        Wholes unknown = weighed & (found == UNKNOWN);
+        if (any(unknown)) found = pick(unknown, log_block_of(tables, block, lanes), found);
+        sum += pick(weighed, found, all(0.0f));
     }
     return sum;
 }

@@ -1,0 +1,50 @@
+"""Tables that would lead the engine beyond its arrays are refused before it reads them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from isiw.models.particles import jumps
+from isiw.native.law import Law, Tables
+from native.drawn import CASES
+
+
+@pytest.fixture
+def tables(monkeypatch: pytest.MonkeyPatch) -> Tables:
+    """Those of the default's prior."""
+    monkeypatch.setattr(jumps, "Law", lambda tables: tables)
+    made: Any = getattr(jumps.law_of, "__wrapped__", jumps.law_of)(CASES["default"].prior, CASES["default"].space)
+    return made
+
+
+def _blocks(tables: Tables, first: list[int], size: list[int]) -> Tables:
+    """The same with other blocks, each of one component."""
+    shares = np.zeros((len(first), tables.log_shares.shape[1]), dtype=np.float32)
+    each = dict.fromkeys(("log_shares", "below"), shares)
+    return tables._replace(first=np.array(first), size=np.array(size), components=np.ones(len(first), int), **each)
+
+
+def test_tables_of_a_prior_are_taken(tables: Tables) -> None:
+    assert Law(tables).latents == len(tables.spreads)
+
+
+def test_blocks_that_the_engine_has_no_room_for_are_refused(tables: Tables) -> None:
+    latents = len(tables.spreads)
+    one = tables._replace(renewed=np.zeros_like(tables.renewed), changed=0)
+    assert Law(_blocks(one, [0] * 64, [1] * 64)).blocks == 64
+    for first, size in (([0] * 65, [1] * 65), ([0], [latents + 1]), ([latents], [1])):
+        with pytest.raises(ValueError, match="beyond themselves"):
+            Law(_blocks(one, first, size))
+
+
+@pytest.mark.parametrize(("meaning", "changed"), [(27, {}), (28, {}), (29, {"apart": True}), (30, {"apart": True})])
+def test_latents_that_moves_write_or_compare_are_there(tables: Tables, meaning: int, changed: dict[str, Any]) -> None:
+    at = tables.at.copy()
+    at[29:31] = 0  # as if the prior had a depression
+    assert Law(tables._replace(at=at, **changed))
+    at[meaning] = len(tables.spreads)
+    with pytest.raises(ValueError, match="beyond themselves"):
+        Law(tables._replace(at=at, **changed))
