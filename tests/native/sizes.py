@@ -23,7 +23,7 @@ from isiw.models.particles.supra.predictions import SupraSample
 from isiw.models.particles.supra.prior import SupraPrior
 from isiw.models.shared.history import Circumstances, History, neutral
 from isiw.models.shared.scales import Scale
-from isiw.models.windows import grid_of
+from isiw.models.windows import Runs, best_window, grid_of
 from isiw.native.engine import entropy_reductions, log_likelihoods, variance_reductions
 from isiw.native.law import Crowd
 from native.drawn import Case, seeds
@@ -78,6 +78,9 @@ def predicted(case: Case, latents: Latents) -> None:
             entropy_reductions(each)
             variance_reductions(each, masks[person])
     sample.expected_mep_mv(isi_ms)
+    windows = Runs.of_masks(masks[0])
+    if len(windows.found):
+        best_window(windows, isi_ms)
 
 
 def with_components(number: int) -> Prior:

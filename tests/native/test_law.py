@@ -1,4 +1,4 @@
-"""Tables that would lead the engine beyond its arrays are refused before it reads them."""
+"""What would lead the engine beyond its arrays is refused before it reads them."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from isiw.models.particles import jumps
+from isiw.native.engine import expected_f1
 from isiw.native.law import Law, Tables
 from native.drawn import CASES
 
@@ -48,3 +49,10 @@ def test_latents_that_moves_write_or_compare_are_there(tables: Tables, meaning: 
     at[meaning] = len(tables.spreads)
     with pytest.raises(ValueError, match="beyond themselves"):
         Law(tables._replace(at=at, **changed))
+
+
+@pytest.mark.parametrize(("first", "behind"), [([-1], [2]), ([2], [1]), ([0], [4]), ([], [])])
+def test_windows_beyond_the_isis_are_refused(first: list[int], behind: list[int]) -> None:
+    inside, runs = np.ones((1, 3), dtype=bool), (np.array(each, dtype=np.int64) for each in (first, first, behind))
+    with pytest.raises(ValueError, match="runs of the ISIs"):
+        expected_f1(inside, *runs)

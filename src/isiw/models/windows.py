@@ -12,6 +12,7 @@ import numpy as np
 from isiw.design import DesignSpace
 from isiw.estimate import BestISI, WindowEstimate
 from isiw.lazy import Later
+from isiw.native.engine import expected_f1
 from isiw.types import Array, BoolArray, FloatArray, IntArray, Singles
 from isiw.window import Enhancement, Magnitude, Window, least_excess_mv
 
@@ -96,17 +97,10 @@ _LEVELS: Final = np.linspace(0.1, 0.9, 17)
 def best_window(windows: Runs, grid_ms: FloatArray) -> tuple[Window | None, float]:
     """The window of largest expected F1 among the level sets of the posterior's membership, and that F1."""
     membership = windows.membership
-    somewhere = np.flatnonzero(membership >= _LEVELS[0] * membership.max())
-    low, high = somewhere[0], somewhere[-1] + 1  # outside there is no candidate
-    candidates = membership[low:high, None] >= _LEVELS * membership.max()
-    # Candidates are last, so that what a run adds is looked up at once.
-    below = np.zeros((len(candidates) + 1, len(_LEVELS)), dtype=np.float32)
-    np.cumsum(candidates, axis=0, out=below[1:])
-    first, behind = (below.take(ends - low, axis=0, mode="clip") for ends in (windows.first, windows.behind))
-    overlap = windows.summed(behind - first)
-    expected_f1 = 2.0 * (overlap / (below[-1] + windows.sizes[:, None])).mean(0)
-    best = int(expected_f1.argmax())
-    return Window.from_mask(grid_ms[low:high], candidates[:, best]), float(expected_f1[best])
+    candidates = membership >= _LEVELS[:, np.newaxis] * membership.max()
+    f1 = expected_f1(candidates, windows.sample, windows.first, windows.behind)
+    best = int(f1.argmax())
+    return Window.from_mask(grid_ms, candidates[best]), float(f1[best])
 
 
 def edge_samples(windows: Runs, space: DesignSpace) -> FloatArray:

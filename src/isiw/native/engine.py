@@ -7,9 +7,9 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from isiw.native.arrays import COLUMNS, FIELDS, SINGLE, address
+from isiw.native.arrays import COLUMNS, DOUBLE, FIELDS, FLAG, SINGLE, WHOLE, address
 from isiw.native.library import call
-from isiw.types import Singles
+from isiw.types import BoolArray, FloatArray, IntArray, Singles
 
 
 def log_likelihoods(fields: Singles, columns: Singles) -> Singles:
@@ -103,6 +103,24 @@ def window_runs(fields: Singles, levels: Singles, isi_ms: Singles) -> NDArray[np
     at = address(runs, runs.dtype, *runs.shape)
     call("window_runs", _samples(fields), len(isi_ms), _fields(fields), *arrays, at)
     return runs
+
+
+def expected_f1(sets: BoolArray, sample: IntArray, first: IntArray, behind: IntArray) -> FloatArray:
+    """Expected F1 of sets of ISIs (c, t) with sampled windows, (c,).
+
+    Args:
+        sets: which ISIs each set has.
+        sample: the sample that each run of ISIs next to each other is of, ascending, (r,).
+        first: index of its first ISI, (r,).
+        behind: index behind its last, (r,).
+    """
+    runs, found = len(sample), np.empty(len(sets), dtype=DOUBLE)
+    if not runs or first.min() < 0 or (first > behind).any() or behind.max() > sets.shape[1]:
+        raise ValueError("windows are runs of the ISIs")
+    side_by_side = [np.ascontiguousarray(array) for array in (sample, first, behind)]
+    arrays = address(sets, FLAG, *sets.shape), *(address(array, WHOLE, runs) for array in side_by_side)
+    call("expected_f1", *sets.shape, runs, *arrays, address(found, DOUBLE, len(sets)))
+    return found
 
 
 class Foreseen(NamedTuple):

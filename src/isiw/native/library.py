@@ -42,6 +42,7 @@ _SIGNATURES: Final = {
     "facilitations": "nnaaa",
     "edge_levels": "nnnsaaaa",
     "window_runs": "nnaaaa",
+    "expected_f1": "nnnaaaaa",
     "entropy_reductions": "nnnnaaaa",
     "variance_reductions": "nnnnnaaaaa",
     "elementary": "snaaa",

@@ -40,9 +40,9 @@ NARROWEST: Final = 1e-3
 
 
 def _laws(below: FloatArray) -> FloatArray:
-    """Distributions that are bet on, in amplitudes larger, smaller, less and more alike than expected, (4, ...)."""
-    spread = 2.0 / np.pi * np.arcsin(np.sqrt(below))
-    return np.stack((below**2, 1.0 - (1.0 - below) ** 2, spread, below**2 * (3.0 - 2.0 * below)))
+    """Distributions that are bet on, in amplitudes larger, smaller, less and more alike than expected, (..., 4)."""
+    square, spread = below * below, 2.0 / math.pi * np.arcsin(np.sqrt(below))
+    return np.stack((square, 2.0 * below - square, spread, square * (3.0 - 2.0 * below)), axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,12 +68,12 @@ class Bets:
             below: predictive probabilities of less than its lower end, and than its upper one, (b, 2).
         """
         half = np.maximum(0.5 * (below[:, 1] - below[:, 0]), 0.5 * NARROWEST)
-        middle = np.clip(below.mean(-1), half, 1.0 - half)
-        low, high = middle - half, middle + half
-        paid = (_laws(high) - _laws(low)) / (high - low)  # (4, b)
-        kept = 1.0 + STAKED[:, np.newaxis, np.newaxis] * (paid - 1.0)
-        log_won = self.log_won + np.log(np.maximum(kept, NARROWEST)).reshape(self.log_won.shape[1], -1).T
-        return Bets(log_won, np.maximum(self.most, log_sum(log_won) - np.log(log_won.shape[1])))
+        middle = np.minimum(np.maximum(0.5 * (below[:, 0] + below[:, 1]), half), 1.0 - half)
+        low, high = _laws(np.stack((middle - half, middle + half)))
+        paid = (high - low) / (2.0 * half[:, np.newaxis])  # (b, 4)
+        kept = 1.0 + STAKED[:, np.newaxis] * (paid[:, np.newaxis] - 1.0)
+        log_won = self.log_won + np.log(np.maximum(kept, NARROWEST)).reshape(self.log_won.shape)
+        return Bets(log_won, np.maximum(self.most, log_sum(log_won) - math.log(log_won.shape[1])))
 
 
 def probability_below(trial: History, crowd: Crowd, law: Law) -> FloatArray:

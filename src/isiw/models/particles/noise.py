@@ -5,8 +5,6 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import Final
 
-import numpy as np
-
 from isiw.types import BoolArray, IntArray
 
 PERSISTENCE: Final = 0.97
@@ -25,4 +23,4 @@ class NoiseKind(IntEnum):
 
 def recruits(kind: IntArray) -> BoolArray:
     """Which particles have a recruitment curve, with a threshold or without, same shape."""
-    return np.isin(kind, (NoiseKind.RECRUITMENT, NoiseKind.RECTIFIED))
+    return (kind == NoiseKind.RECRUITMENT) | (kind == NoiseKind.RECTIFIED)

@@ -142,7 +142,8 @@ class PersonSample(TabledSample):
         """Sampled windows as 0 or 1, shape (b, s, t)."""
         runs, at = self._pairs(isi_ms), np.arange(len(isi_ms))
         firsts, behinds = runs[..., ::2, np.newaxis], runs[..., 1::2, np.newaxis]
-        return np.asarray(((firsts <= at) & (at < behinds)).any(-2), dtype=np.float32)
+        inside = (firsts <= at) & (at < behinds)
+        return (inside[..., 0, :] | inside[..., 1, :]).astype(np.float32)
 
     def runs(self, isi_ms: Singles, person: int = 0) -> Runs:
         """Sampled windows of one person, as runs of some ascending ISIs [ms] (t,)."""

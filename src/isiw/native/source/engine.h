@@ -85,6 +85,9 @@ typedef struct {
     /* Windows as two runs of indices of ISIs: first, behind the last, (b, s, 4). */
     int (*window_runs)(int64_t samples, int64_t isis, const float *fields, const float *levels, const float *isi_ms,
                        int32_t *runs);
+    /* Expected F1 of sets of ISIs (c, t) with windows as runs, the number of the sample, first and behind, (c,). */
+    int (*expected_f1)(int64_t sets, int64_t isis, int64_t runs, const uint8_t *inside, const int64_t *sample,
+                       const int64_t *first, const int64_t *behind, double *found);
     /* Entropy of the mean of distributions less their mean entropy, (t,). They are a table (s, t, y), or with rows lie
     between those of one (s, rows, y) at facilitations (s, t). */
     int (*entropy_reductions)(int64_t samples, int64_t rows, int64_t isis, int64_t outcomes, const float *fields,

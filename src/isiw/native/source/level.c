@@ -45,6 +45,7 @@ const Engine *NAMED(ISIW_LEVEL)(void) {
         .facilitations = facilitations,
         .edge_levels = edge_levels,
         .window_runs = window_runs,
+        .expected_f1 = expected_f1,
         .entropy_reductions = entropy_reductions,
         .variance_reductions = variance_reductions,
         .elementary = elementary,

@@ -104,4 +104,26 @@ static int window_runs(int64_t samples, int64_t isis, const float *fields, const
     return 0;
 }
 
+/* Expected F1 of sets of ISIs (c, t) with sampled windows, which are runs of ISIs (r,), sample by sample. */
+static int expected_f1(int64_t sets, int64_t isis, int64_t runs, const uint8_t *inside, const int64_t *sample,
+                       const int64_t *first, const int64_t *behind, double *found) {
+    int64_t *before = malloc((size_t)(isis + 1) * sizeof *before);
+    if (!before) return -1;
+    for (int64_t set = 0; set < sets; set++) {
+        before[0] = 0;
+        for (int64_t t = 0; t < isis; t++) before[t + 1] = before[t] + inside[set * isis + t];
+        int64_t windows = 0;
+        double sum = 0.0;
+        for (int64_t run = 0; run < runs; windows++) {
+            int64_t of = sample[run], size = 0, overlap = 0;
+            for (; run < runs && sample[run] == of; run++)
+                size += behind[run] - first[run], overlap += before[behind[run]] - before[first[run]];
+            sum += (double)overlap / (double)(before[isis] + size);
+        }
+        found[set] = 2.0 * (sum / (double)windows);
+    }
+    free(before);
+    return 0;
+}
+
 #endif
