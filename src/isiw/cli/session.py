@@ -106,7 +106,7 @@ def run(  # noqa: PLR0913, PLR0917 - an option each
 @app.command(rich_help_panel=SESSIONS)
 def pair(
     config: Annotated[
-        Path | None, typer.Argument(help="A configuration with a section [intervention].", **NO_DEFAULT)
+        Path | None, typer.Argument(help="A configuration with the section of an intervention.", **NO_DEFAULT)
     ] = None,
     after: Annotated[
         Path | None, typer.Option(help="The log of the search, of the same visit, that found the window.", **NO_DEFAULT)
@@ -120,7 +120,7 @@ def pair(
         typer.Option("--open", metavar="LOG", help="Say which arm a log is of; the log keeps that it was opened."),
     ] = None,
 ) -> None:
-    """Use a window: pulses of TMS alone, pairs at the best ISI, and pulses again, as [intervention] plans it.
+    """Use a window: pulses of TMS alone, pairs at the best ISI, and pulses again, as its configuration plans it.
 
     Continue one that was interrupted with isiw resume; one that its operator has ended is over.
     """

@@ -135,7 +135,9 @@ def threshold(  # noqa: PLR0913, PLR0917 - an option each
     max_pulses: Annotated[int, typer.Option(help="Largest number of pulses, including lost ones.")] = 100,
     min_iti_s: Annotated[float, typer.Option(help="Shortest time between two pulses, in seconds.")] = 5.0,
     subject: Annotated[str, typer.Option(help="The person's code, for the log.", **NO_DEFAULT)] = "",
-    muscle: Annotated[str, typer.Option(help="Whose MEPs they are, as [visit] of a session says.", **NO_DEFAULT)] = "",
+    muscle: Annotated[
+        str, typer.Option(help="Whose MEPs they are, as a session's configuration says under visit.", **NO_DEFAULT)
+    ] = "",
     cohort: Annotated[str, typer.Option(help="The cohort that a simulated person comes from.")] = "recruitment",
     seed: Annotated[int, typer.Option(help="Seed of the simulated person, and of the order of a curve.")] = 0,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the log, as it was begun.")] = False,  # noqa: FBT002 - a flag

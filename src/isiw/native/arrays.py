@@ -20,7 +20,7 @@ MEANINGS: Final = 32
 """Latents that mean anything: those of the default in their order, then three of a depression."""
 
 LANES: Final = 16
-"""Components of mixtures are padded to whole vectors of any processor."""
+"""Latents that do not move are padded to whole vectors of any processor."""
 
 UNKNOWN: Final = np.float32(1e30)
 """In place of the log density of a block that was not worked out yet."""

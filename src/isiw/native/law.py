@@ -164,7 +164,7 @@ class Law:
             within = within and 0 <= changed < self.blocks - 1 and (at[_OF_A_CHANGE] < self.latents).all()
         if self._struct.apart:
             within = within and (at[_OF_A_DEPRESSION] < self.latents).all()
-        if not within or knots < 2 or width % LANES or (_LAST_KINDS @ self._arrays["state_of"]) >= self._struct.states:
+        if not within or knots < 2 or (_LAST_KINDS @ self._arrays["state_of"]) >= self._struct.states:
             raise ValueError("the tables of a prior point beyond themselves")
 
     @cached_property

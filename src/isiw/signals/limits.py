@@ -1,4 +1,4 @@
-"""What a sweep must satisfy to be accepted, and whether its amplitude, ISI and times can be true, of any muscle."""
+"""What a sweep must satisfy to be accepted, of any muscle; see `isiw.signals.plausible` for what cannot be true."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ import numpy as np
 from isiw.design import DesignSpace
 from isiw.models.particles.mixture import Mixture
 from isiw.models.shared.start import StartPrior
-from isiw.native.arrays import LANES, MEANINGS
+from isiw.native.arrays import MEANINGS
 from isiw.native.law import Tables
 from isiw.types import FloatArray, Singles
 
@@ -38,8 +38,7 @@ def prior_tables(
     moves: dict[str, Any],
 ) -> Tables:
     """The tables of a prior."""
-    latents, most = len(spreads), max(len(mixture.shares) for mixture in mixtures)
-    width = -(-most // LANES) * LANES
+    latents, width = len(spreads), max(len(mixture.shares) for mixture in mixtures)
     sizes = [mixture.means.shape[-1] for mixture in mixtures]
     first = [*range(starts), *(starts + np.cumsum([0, *sizes[:-1]]))]
     size, components = [1] * starts + sizes, [0] * starts + [len(mixture.shares) for mixture in mixtures]

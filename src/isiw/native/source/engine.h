@@ -16,7 +16,7 @@ typedef struct {
     const int64_t *first;      /* latent of each block, (blocks,) */
     const int64_t *size;       /* how many latents it has, (blocks,) */
     const int64_t *components; /* of its mixture, (blocks,); 0 for a start, negative for start and width with places */
-    const float *log_shares;   /* of the components, less the logs of their SDs, (blocks, width): whole lanes */
+    const float *log_shares;   /* of the components, less the logs of their SDs, (blocks, width) */
     const float *below;        /* sums of the shares of earlier components, from the second on, likewise */
     const float *means;        /* of the latents in each component, (latents, width) */
     const float *sds;          /* likewise */
