@@ -1,8 +1,12 @@
+from pathlib import Path
+
 import pytest
 
+import isiw
 from isiw import summary
 from isiw.change import Change
 from isiw.findings import Kind
+from isiw.session.afterwards import estimate_again
 from isiw.session.examination import change_found
 from isiw.trials import Status, Trial
 
@@ -50,3 +54,19 @@ def test_a_change_that_is_not_sure_is_not_said() -> None:
 def test_an_estimate_says_what_changed() -> None:
     change = Change("enhancement", 0.95, 2.1, 1.6, 3.0)
     assert summary.at_a_trial(change, None).startswith("The enhancement has grown")
+
+
+def test_an_estimate_made_again_knows_the_change_that_was_noted(tmp_path: Path) -> None:
+    log = tmp_path / "changed.mcap"
+    strategy = isiw.make_strategy("default", isiw.DesignSpace(0, 300, 5, reference="impact"), seed=1, particles=100)
+    person = isiw.subjects.cohort("recruitment", 1, seed=3)[0].begin(1)
+    with isiw.open_session(strategy, log, on_doubt=lambda _: None) as own:
+        for number in range(12):
+            isi_ms = own.ask()
+            own.tell(isi_ms, person.respond(isi_ms, "impact").mep_mv * (4.0 if number > 5 else 1.0))
+            if number == 5:
+                own.note_change("another electrode")
+        known = own.estimate()
+    estimate_again(log)
+    again = isiw.read_session(log).estimates[-1]
+    assert (again.probability, again.start_ms, again.end_ms) == (known.probability, known.start_ms, known.end_ms)

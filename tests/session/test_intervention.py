@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import sys
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -19,12 +20,14 @@ from isiw.intervention import Arm, Part
 from isiw.log import moments, writer
 from isiw.log.reader import read_session
 from isiw.log.schema import EstimateRecord, Intent, Waveform
+from isiw.pairing.agenda import Agenda
 from isiw.pairing.pulses import pairing_of
 from isiw.plots.session import session_figure
 from isiw.plots.timeline import timeline_figure
 from isiw.report.words import final_statement, trial_rows
 from isiw.server.live.view import View
 from isiw.session.afterwards import open_arm
+from isiw.session.blocks import Blocks
 from isiw.session.loop import Session
 from isiw.session.resume import open_session, resume
 from isiw.session.rig import Safeguards
@@ -395,5 +398,27 @@ def test_the_plan_waits_until_each_intensity_is_set_and_the_pulses_have_it_in_th
     session(log, several, rig, clock=FakeRealClock(), safeguards=guards).run()
     said = [reason.rsplit("Set the intensity of the stimulator to ", 1)[-1] for reason in asked]
     assert said == ["100 % RMT.", "120 % RMT.", "that of the pairs.", *["100 % RMT.", "120 % RMT."] * 2]
-    pulses = pairing_of(read_session(log)).tests
-    assert [pulse.intensity_pct_rmt for pulse in pulses] == [100.0, 100.0, 120.0, 120.0, 100.0, 120.0, 100.0, 120.0]
+    record, named = read_session(log), [100.0, 100.0, 120.0, 120.0, 100.0, 120.0, 100.0, 120.0]
+    assert [pulse.intensity_pct_rmt for pulse in pairing_of(record).tests] == named
+    assert [trial.intensity_pct_rmt for trial in record.table if trial.commanded_isi_ms is None] == named
+
+
+def test_who_continues_amid_pulses_of_one_intensity_hears_which() -> None:
+    agenda = Agenda(intervention(intensities_pct_rmt=(100.0, 120.0), before=3), knowing(), 0)
+    blocks = Blocks(agenda, VirtualClock(), lambda: True)
+    assert blocks.announcement(4) == "Set the intensity of the stimulator to 120 % RMT."
+    blocks.came(4)
+    assert blocks.announcement(5) is None
+
+
+def test_a_screen_that_is_gone_ends_no_intervention(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shown = sys.stdout.write
+
+    def gone(text: str) -> int:
+        if "Block 2" in text:
+            raise BrokenPipeError(32, "Broken pipe")
+        return shown(text)
+
+    monkeypatch.setattr(sys.stdout, "write", gone)
+    session(log, intervention(Arm.WINDOW)).run(progress=True)
+    assert len(read_session(log).table) == len(PLAN.slots)

@@ -175,3 +175,24 @@ def test_a_configuration_names_intensities_and_the_highest(tmp_path: Path) -> No
     record = isiw.read_session(tmp_path / "run.mcap")
     assert record.header.limits.max_intensity_pct_rmt == 110.0
     assert record.header.strategy.settings["intensities_pct_rmt"] == [90.0, 110.0]
+
+
+def test_a_device_that_sets_intensities_is_told_the_usual_one_where_all_pulses_have_it(tmp_path: Path) -> None:
+    usual = isiw.make_strategy("default", SPACE, seed=3, **QUICK)
+    session(tmp_path / "usual.mcap", usual).run()
+    record = isiw.read_session(tmp_path / "usual.mcap")
+    assert {intent.intensity_pct_rmt for intent in record.intents} == {90.0}
+    assert {trial.intensity_pct_rmt for trial in record.table} == {None}
+    session(tmp_path / "unlimited.mcap", usual.restarted(), most=None).run()
+    assert {intent.intensity_pct_rmt for intent in isiw.read_session(tmp_path / "unlimited.mcap").intents} == {None}
+
+
+@pytest.mark.parametrize("stimulus", [Stimulus(0, None, tap_alone=True), Stimulus(0, 80.0, intensity_pct_rmt=100.0)])
+def test_no_device_gets_what_it_does_not_say_that_it_gives(stimulus: Stimulus) -> None:
+    limits = replace(Limits.of_space(SPACE, min_iti_s=0.0), max_intensity_pct_rmt=110.0)
+    rig = device(sets_intensity=False)
+    rig.stage()
+    guarded = LimitedDevice(rig, limits, VirtualClock())
+    guarded._info = replace(rig.describe(), tap_alone=False)  # noqa: SLF001 - the simulated one gives both
+    with pytest.raises(LimitExceededError, match="does not say that it gives"):
+        guarded.check(stimulus)

@@ -5,16 +5,17 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 from isiw.config.run import RunConfig
 from isiw.errors import ConfigError
 from isiw.log.reader import SessionRecord, ThresholdRecord, read_any
 from isiw.log.salvage import salvage
+from isiw.log.verdicts import changed_after
 from isiw.session.threshold import search_of
 from isiw.strategy.threshold.curve import CurvePulses
 from isiw.text.sanitize import command, counted
-from isiw.trials import Status, Trial
+from isiw.trials import Status, Stimulus, Trial
 from isiw.visit import different_muscles, require_percent
 
 _COLUMNS: Final = ("intensity_pct_rmt", "mep_mv")
@@ -130,3 +131,24 @@ def _without_muscle(config: RunConfig, searches: Sequence[ThresholdRecord]) -> s
 
 def _read(config: RunConfig) -> list[SessionRecord | ThresholdRecord]:
     return [read_any(salvage(path)) for path in config.after]
+
+
+class Before(NamedTuple):
+    """What was given in a visit before a session: trials, and the places of those after which something changed."""
+
+    trials: tuple[Trial, ...]
+    changed_after: frozenset[int]
+
+
+def before_of(record: SessionRecord, already: Sequence[Trial]) -> Before:
+    """What a session's strategy had learnt at its end, and what else was given, but for what is known already."""
+    header, own = record.header, sorted((*record.table, *record.unknown_trials), key=lambda trial: trial.index)
+    known = bool(header.earlier) and all(trial in already for trial in header.earlier)
+    earlier = () if known else header.earlier
+    lost = [] if known else [Trial.unknown(Stimulus(0, None))] * (header.given_before - len(header.earlier))
+    noted, first = changed_after(record.events), len(lost) + len(earlier)
+    changed = {len(lost) + place for place in header.earlier_changed} if earlier else set()
+    if earlier and not header.earlier_same_level:
+        changed.add(first - 1)
+    changed |= {first + place for place, trial in enumerate(own) if trial.index in noted}
+    return Before((*lost, *earlier, *own), frozenset(changed))

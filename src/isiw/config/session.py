@@ -12,7 +12,15 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, Final
 
-from isiw.config.given import is_table, pulses_of_table, searches_after, searches_sentence, sessions_after
+from isiw.config.given import (
+    Before,
+    before_of,
+    is_table,
+    pulses_of_table,
+    searches_after,
+    searches_sentence,
+    sessions_after,
+)
 from isiw.config.run import RunConfig, limits_for
 from isiw.config.sections import RobotConfig, SimulatedConfig, SubjectConfig, robot_for
 from isiw.design import DesignSpace
@@ -36,7 +44,6 @@ from isiw.session.loop import Session
 from isiw.strategy.catalogue import known_settings, make_strategy, settings_for
 from isiw.subjects.responses import RecruitmentResponse
 from isiw.text.named_code import named_code, require_fitting
-from isiw.trials import Trial
 from isiw.visit import Visit, VisitProtocol
 
 SAME_VISIT_H: Final = 12.0
@@ -158,7 +165,7 @@ def _require_people(
             _require_like(config, replace(visit, intensity_pct_rmt=None) if any_intensity else visit, record.path)
 
 
-def earlier_trials(config: RunConfig, device: DeviceInfo) -> tuple[Trial, ...]:
+def earlier_trials(config: RunConfig, device: DeviceInfo) -> Before:
     """The earlier trials of the visit, which count for the limits, and which a strategy learns before its first ask."""
     records, searches = [read_session(path) for path in _logs(config)], searches_after(config)
     _require_people(config, [*records, *searches], device)
@@ -179,9 +186,14 @@ def earlier_trials(config: RunConfig, device: DeviceInfo) -> tuple[Trial, ...]:
                 expected=f"{device.conditioning} and {device.reference}",
                 remedy="Leave this file out.",
             )
-    learnt = [trial for record in records for trial in (*record.table, *record.unknown_trials)]
-    tables = [pulse for path in config.earlier if is_table(path) for pulse in pulses_of_table(path)]
-    return (*given_pulses(searches), *tables, *learnt)
+    trials = [*given_pulses(searches)]
+    trials += [pulse for path in config.earlier if is_table(path) for pulse in pulses_of_table(path)]
+    changed: set[int] = set()
+    for record in records:
+        before = before_of(record, trials)
+        changed |= {len(trials) + place for place in before.changed_after}
+        trials += before.trials
+    return Before(tuple(trials), frozenset(changed))
 
 
 def _logs(config: RunConfig) -> list[Path]:
@@ -317,8 +329,9 @@ def session_for(config: RunConfig, intervention: Intervention | None = None) -> 
     }
     settings = known_settings(config.strategy.name, known) | settings_with_prior(config, info)
     strategy = make_strategy(config.strategy.name, space=space, seed=config.seed, **settings)
-    if earlier := earlier_trials(config, info):
-        strategy.learn_all(earlier)
+    before = earlier_trials(config, info)
+    if before.trials:
+        strategy.learn_all(before.trials, changed_after=before.changed_after)
     return Session(
         device,
         strategy,

@@ -88,6 +88,7 @@ class LimitedDevice:
         if stimulus.isi_ms is not None:
             self._limits.require_isi(stimulus.isi_ms)
         self._limits.require_intensity(stimulus.intensity_pct_rmt)
+        self._require_given(stimulus)
         if (wait_s := self.wait_s()) > ROUNDING_S:
             raise LimitExceededError(
                 "the next stimulus comes too early",
@@ -107,6 +108,20 @@ class LimitedDevice:
                 "the dead man's switch is not held",
                 remedy="This stimulus was not delivered. Resume the session when the switch is held.",
             )
+
+    def _require_given(self, stimulus: Stimulus) -> None:
+        """Raise if the device would have to ignore a part of a stimulus: it would then give another one."""
+        for what, wanted, there in (
+            ("a tap alone", stimulus.tap_alone, self._info.tap_alone),
+            ("an intensity of a pulse's own", stimulus.intensity_pct_rmt is not None, self._info.sets_intensity),
+        ):
+            if wanted and not there:
+                raise LimitExceededError(
+                    f"the device does not say that it gives {what}",
+                    got=self._info.name,
+                    remedy="This stimulus was not delivered. Describe the device with "
+                    "DeviceInfo(..., tap_alone=True, sets_intensity=True) as far as it does.",
+                )
 
     def describe(self) -> DeviceInfo:
         """The description of the guarded device."""

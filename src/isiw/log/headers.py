@@ -186,7 +186,8 @@ class Header(_Header):
     the same settings come to another estimate, or compute it otherwise; 1 is what older logs mean. An "imported"
     one is of trials that were delivered without isiw, and `source` says where they are from: it was no session, and has
     no intents; `given_by` is when all of them had been given, as ISO 8601 in UTC, if their dates say so. `earlier` are
-    trials that were learnt before the first ask, and `earlier_given` is how many stimuli these and lost ones were.
+    trials that were learnt before the first ask, `earlier_changed` are the places of those after which something
+    changed, and `earlier_given` is how many stimuli these and lost ones were.
     An "intervention" uses a window that was found before, and searches for none; an older isiw does not know the kind,
     and so continues none as if it were a search.
     `first_step` is the profile below the motor threshold that a search above it goes on from.
@@ -207,6 +208,7 @@ class Header(_Header):
     belief_version: int = 1
     engine_version: int = 1
     earlier: tuple[Trial, ...] = ()
+    earlier_changed: tuple[int, ...] = ()
     earlier_given: int = 0
     earlier_same_level: bool = False
     intervention: Intervention | None = None

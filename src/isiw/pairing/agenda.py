@@ -53,13 +53,14 @@ class Agenda:
                 got=self.plan.range_ms,
                 expected=f"{self._space}",
             )
-        self._outside_ms = self._begun.isi_ms[self._begun.p_inside <= OUTSIDE]
+        outside = self._begun.isi_ms[self._begun.p_inside <= OUTSIDE]
+        self._outside_ms = outside[np.isin(outside, allowed)]  # the range holds for every pair
         if Arm.OUTSIDE in self.plan.arms and not self._outside_ms.size:
             raise InvalidValueError(
                 "no ISI of the design space is outside the window, so there are no control pairs",
                 got=f"{self._window}",
                 expected=f"an ISI with a probability of at most {OUTSIDE:g} to be in it",
-                remedy=f'Use a wider [space], or leave "{Arm.OUTSIDE}" out of the arms.',
+                remedy=f'Use a wider [space] or range_ms, or leave "{Arm.OUTSIDE}" out of the arms.',
             )
         self._restart()
 

@@ -7,7 +7,7 @@ from typing import Final
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import InvalidValueError
-from isiw.intervention import Part, Plan, Slot
+from isiw.intervention import Arm, Part, Plan, Slot
 
 _ROUNDING_S: Final = 1e-6
 
@@ -47,17 +47,40 @@ def require_possible(plan: Plan, limits: Limits, given_before: int, seed: int) -
     _require_times(plan, limits, seed)
 
 
-def require_settable(plan: Plan, limits: Limits, device: DeviceInfo) -> None:
-    """Raise if the intensities of a plan cannot be set: by nobody at a simulated device, or by a limit's word.
+def require_settable(plan: Plan, limits: Limits, device: DeviceInfo, *, searched_several: bool = False) -> None:
+    """Raise if a device cannot give what a plan has: an arm, or intensities, which limits may exclude, too.
 
     Args:
         plan: the plan.
         limits: the limits of the session.
         device: the description of its device.
+        searched_several: whether the device was told an intensity for each pulse of the search.
 
     Raises:
-        InvalidValueError: several intensities at a simulated device, or where the limits have one.
+        InvalidValueError: an arm of taps alone, whichever is drawn, at a device that gives none; several intensities at
+            a device that is simulated or sets them itself, where the limits have one, or beyond the highest one.
     """
+    if Arm.TAP_ALONE in plan.arms and not device.tap_alone:
+        raise InvalidValueError(
+            "the plan has an arm of taps alone, and the device does not deliver these",
+            got=device.name,
+            remedy=f'Leave "{Arm.TAP_ALONE}" out of the arms. Or let the device\'s deliver leave out the pulse where '
+            "stimulus.tap_alone is True, and describe it with DeviceInfo(..., tap_alone=True).",
+        )
+    most = limits.max_intensity_pct_rmt
+    if plan.intensities_pct_rmt and most is not None and max(plan.intensities_pct_rmt) > most:
+        raise InvalidValueError(
+            "an intensity of the plan is beyond the limits",
+            got=f"intensities_pct_rmt = {plan.intensities_pct_rmt}",
+            expected=f"at most {most:g} % RMT, as max_intensity_pct_rmt says",
+            remedy="Leave it out; raise the limit only if your ethics approval allows it.",
+        )
+    if plan.intensities_pct_rmt and searched_several:
+        raise InvalidValueError(
+            "the intensities of the plan are set by hand, and this session's device sets that of each pulse",
+            got=f"intensities_pct_rmt = {plan.intensities_pct_rmt}",
+            remedy="Leave out intensities_pct_rmt of the plan, or those of the strategy.",
+        )
     if plan.intensities_pct_rmt and (device.simulated or limits.intensity_pct_mso is not None):
         raise InvalidValueError(
             "the intensities of the plan cannot be set",

@@ -12,7 +12,7 @@ from isiw.log.kinds import LogKind, kind_of, of_another_kind, require_session
 from isiw.log.reader import read_salvaged
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event
-from isiw.log.verdicts import exclusion, inclusion
+from isiw.log.verdicts import changed_after, exclusion, inclusion
 from isiw.log.writer import LogWriter
 from isiw.session.examination import estimate_record
 from isiw.session.replay import strategy_of
@@ -43,8 +43,11 @@ def estimate_again(
         raise LogError("there is no trial to estimate from", got=str(record.path))
     made = strategy_of(record.header) if strategy is None else strategy.restarted()
     trials = sorted([*record.table, *record.unknown_trials], key=lambda trial: trial.index)
+    changes = changed_after(record.events)
     for number, trial in enumerate(trials, start=1):
         made.learn(trial)
+        if trial.index in changes:
+            made.note_change()
         replayed(number)
     made.in_doubt = record.in_doubt
     last = record.table[-1].index

@@ -28,7 +28,7 @@ from isiw.session.blocks import Blocks
 from isiw.session.console import OperatorConsole
 from isiw.session.earlier import Earlier
 from isiw.session.examination import WindowExamination, examination_of
-from isiw.session.intensities import require_intensities
+from isiw.session.intensities import has_several, require_intensities
 from isiw.session.pausing import Pausing
 from isiw.session.rig import Rig, Safeguards, require_matching
 from isiw.session.sink import SessionUpdate, Sink
@@ -103,7 +103,8 @@ def require_fitting(strategy: Strategy, header: Header) -> None:
             remedy="Write a larger max_pulses under [limits] if your ethics approval allows it.",
         )
     if header.intervention is not None:
-        require_settable(header.intervention.plan, header.limits, header.device)
+        plan, several = header.intervention.plan, has_several(strategy, header)
+        require_settable(plan, header.limits, header.device, searched_several=several)
         require_possible(header.intervention.plan, header.limits, before, header.seed)
         return
     if planned is None and any(trial.intensity_pct_rmt is not None for trial in strategy.earlier):
@@ -133,6 +134,7 @@ def header_of(strategy: Strategy, **details: Any) -> Header:
         belief_version=BELIEF_VERSION,
         engine_version=ENGINE_VERSION,
         earlier=strategy.earlier,
+        earlier_changed=strategy.earlier_changed,
         earlier_given=strategy.earlier_given,
         earlier_same_level=bool(strategy.earlier) and strategy.same_level,
         **details,

@@ -28,10 +28,12 @@ class Blocks:
     def __init__(self, agenda: Agenda, clock: Clock, attended: Callable[[], bool]) -> None:
         self.agenda, self._clock, self._attended = agenda, clock, attended
         self._last: tuple[float, Moment, float] | None = None
+        self._set_here = False  # whether the stimulator stands as the trial before needed it
         self._announced: set[int] = set()
 
     def came(self, trial: int, ago_s: float = 0.0) -> None:
         """A stimulus was about to be delivered, so long ago [s]; from the last pair on the time counts."""
+        self._set_here |= not ago_s
         if trial == self.agenda.plan.last_pair:
             self._last = self._clock.now_s(), Moment.now(), ago_s
 
@@ -74,7 +76,8 @@ class Blocks:
     def _set(self, slot: Slot) -> str:
         before = self.agenda.slot(slot.number - 1) if slot.number else None
         was = None if before is None else before.intensity_pct_rmt
-        if slot.intensity_pct_rmt == was:
+        unknown = bool(slot.number and self.agenda.plan.intensities_pct_rmt) and not self._set_here
+        if slot.intensity_pct_rmt == was and not unknown:
             return ""
         at = "that of the pairs" if slot.intensity_pct_rmt is None else f"{slot.intensity_pct_rmt:g} % RMT"
         return f"Set the intensity of the stimulator to {at}."

@@ -289,12 +289,18 @@ class Table:
         if not self._shown:
             return
         row = progress_row(update, self._header.stimulus)
-        try:
+        with self._shows():
             if self._console.reads_keys and is_terminal(sys.stdout):
                 self._console.screen.say(fitted(row)[: columns()], standing(update, self._header.space))
             else:
                 show_progress(row)
             self._console.shown = update.trial.index
+
+    @contextmanager
+    def _shows(self) -> Iterator[None]:
+        """What is shown; where it cannot be, nothing is shown from then on, and the session goes on."""
+        try:
+            yield
         except (OSError, UnicodeError) as error:  # a full disk, a reader who has gone, a sign that is lacking
             self._faults.append(f"the table of trials cannot be shown any more: {error_text(error)}")
             self._shown = False
@@ -303,11 +309,12 @@ class Table:
         """Show a line that is no trial's."""
         if not self._shown:
             return
-        if self._console.reads_keys:
-            self._console.screen.say(text)
-        else:
-            sys.stdout.write(f"{folded(plain(text))}\n")
-            sys.stdout.flush()
+        with self._shows():
+            if self._console.reads_keys:
+                self._console.screen.say(text)
+            else:
+                sys.stdout.write(f"{folded(plain(text))}\n")
+                sys.stdout.flush()
 
     def waiting(self, left_s: float | None, text: str) -> None:
         """Count down until the next stimulus."""

@@ -43,24 +43,40 @@ def require_intensities(strategy: Strategy, header: Header) -> None:
 
 def set_for(control: Control | None, strategy: Strategy, header: Header) -> float | None:
     """The intensity that the device has to set for the next pulse [% RMT]; None for that which is set."""
-    if control is Control.TAP_ALONE or not has_several(strategy, header):
-        return None
     usual = header.visit.intensity_pct_rmt
+    if control is Control.TAP_ALONE:
+        return None
+    if not has_several(strategy, header):
+        return usual if _sets_usual(header) else None
     if control is None:
         return strategy.intensity_pct_rmt or usual
     return header.protocol.alone_pct_rmt or usual
 
 
+def _sets_usual(header: Header) -> bool:
+    """Whether a device is told the intensity of each pulse although all have one: it may stand at another's.
+
+    Intensities that a plan has of its own are set by hand.
+    """
+    usual, most = header.visit.intensity_pct_rmt, header.limits.max_intensity_pct_rmt
+    by_hand = header.intervention is not None and bool(header.intervention.plan.intensities_pct_rmt)
+    sets = header.device.sets_intensity and not by_hand
+    return sets and usual is not None and most is not None and usual <= most
+
+
 def noted(trial: Trial, stimulus: Stimulus, header: Header) -> Trial:
-    """A trial with the intensity of its pulse; none is noted where it is the usual one."""
+    """A trial with the intensity that its pulse was to be set to; none is noted where it is the usual one."""
     pct_rmt = stimulus.intensity_pct_rmt
-    own = None if pct_rmt is None or pct_rmt == header.visit.intensity_pct_rmt else pct_rmt
+    if pct_rmt is None:
+        return trial
+    own = None if pct_rmt == header.visit.intensity_pct_rmt else pct_rmt
     return trial if trial.intensity_pct_rmt == own else replace(trial, intensity_pct_rmt=own)
 
 
 def stimulus_of(trial: Trial, strategy: Strategy, header: Header) -> Stimulus:
     """The stimulus that a trial came of."""
     pct_rmt = trial.intensity_pct_rmt
-    if pct_rmt is None and has_several(strategy, header) and not trial.tap_alone:
+    told = has_several(strategy, header) or _sets_usual(header)
+    if pct_rmt is None and told and not trial.tap_alone:
         pct_rmt = header.visit.intensity_pct_rmt
     return Stimulus(trial.index, trial.commanded_isi_ms, trial.tap_alone, pct_rmt)

@@ -143,7 +143,8 @@ def strategy_of(header: Header) -> Strategy:
 def knowing_earlier(strategy: Strategy, header: Header) -> Strategy:
     """A strategy that has learnt what a session's had before its first ask; the same if it has already."""
     if header.earlier and not strategy.earlier:
-        strategy.learn_all(header.earlier, same_level=header.earlier_same_level)
+        same, changed = header.earlier_same_level, header.earlier_changed
+        strategy.learn_all(header.earlier, same_level=same, changed_after=changed)
     strategy.only_counts = header.intervention is not None
     return strategy
 

@@ -284,9 +284,8 @@ class Steps:
         doubt: Finding | None = None
         try:
             self._sink.log.require_in_place()
-            trial = noted(
-                Trial.unknown(stimulus), stimulus, self._header
-            )  # from here on it may have been given, whatever fails
+            # From here on it may have been given, whatever fails.
+            trial = self._as_planned(noted(Trial.unknown(stimulus), stimulus, self._header))
             self._at = stimulus.trial, True
             answer = self._answer(stimulus)
             trial = noted(self._judged(stimulus, answer), stimulus, self._header)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 
 from isiw.acquisition.protocol import AcquisitionFunction, greedy_batch, require_acquisition, require_capabilities
@@ -70,6 +70,7 @@ class Strategy:
         self._mistrials = self._controls = self._lost = 0
         self._outcomes = Outcomes(space.reference, self.amplitude_step_mv, pairs_pct_rmt=pairs_pct_rmt_of(model))
         self.earlier: tuple[Trial, ...] = ()  # learnt before the first ask
+        self.earlier_changed: tuple[int, ...] = ()  # places of those after which something changed
         self.same_level, self.earlier_given = True, 0  # stimuli, also of trials from which nothing was learnt
         self.in_doubt, self._asked, self._reported = False, Asked(), Reported(space)
         self.only_counts = False  # in an intervention, which changes what a search would learn of as if it stayed
@@ -88,7 +89,7 @@ class Strategy:
         """The same strategy before its first trial; it has learnt the earlier ones."""
         how = {name: getattr(self, name) for name in ("initial_ms", "cost", "seed", "recipe", "intensities")}
         again = Strategy(self.space, self.model, self.acquisition, self.stopping, **how)
-        again.learn_all(self.earlier, same_level=self.same_level)
+        again.learn_all(self.earlier, same_level=self.same_level, changed_after=self.earlier_changed)
         again.earlier_given, again.only_counts = self.earlier_given, self.only_counts
         return again
 
@@ -305,13 +306,16 @@ class Strategy:
         """Raise StrategyError where the model has no law of a pair of such an intensity."""
         self._outcomes.require_law(outcome)
 
-    def learn_all(self, trials: Iterable[Trial], *, same_level: bool = False) -> None:
+    def learn_all(
+        self, trials: Iterable[Trial], *, same_level: bool = False, changed_after: Collection[int] = ()
+    ) -> None:
         """Learn trials that were delivered before the first ask, at whatever ISIs; no plan and no budget counts them.
 
         Args:
             trials: the trials, in order; mistrials and taps alone teach nothing. For `max_pulses` of limits all count.
             same_level: whether electrodes, coil and intensity stay as they were. Otherwise the level of the MEPs from
                 here on may be another one, as far as the model can say so; the window stays.
+            changed_after: places of trials, from 0, after which something changed that may bear on all MEPs.
 
         Raises:
             InvalidValueError: an amplitude that no amplifier gives.
@@ -322,15 +326,18 @@ class Strategy:
             raise StrategyError(
                 "earlier trials are learnt once, before the first ask", remedy="Let a new strategy learn all of them."
             )
-        trials = tuple(trials)
-        learnt = tuple(trial for trial in trials if trial.told)
-        for trial in learnt:
-            self._learn(Outcome.of(trial))
-        self._course = self._course.begun_here()
-        if learnt and not same_level:
+        before = len(self.earlier)
+        for place, trial in enumerate(trials):
+            if trial.told:
+                self._learn(Outcome.of(trial))
+                self.earlier = (*self.earlier, trial)
+            if place in changed_after and len(self.earlier) > before:
+                self.note_change()
+                self.earlier_changed = (*self.earlier_changed, len(self.earlier) - 1)
+            self.earlier_given += 1
+        self._course, self.same_level = self._course.begun_here(), same_level
+        if len(self.earlier) > before and not same_level:
             self.note_change()
-        self.earlier, self.same_level = (*self.earlier, *learnt), same_level
-        self.earlier_given += len(trials)
 
     def _learn(self, outcome: Outcome) -> None:
         """Learn from one trial, wherever its ISI lies."""

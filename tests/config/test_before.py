@@ -1,0 +1,93 @@
+"""What was given in a visit before a session: all of it counts, and is learnt as the search had learnt it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import isiw
+from isiw.config.run import RunConfig, load_config
+from isiw.config.session import device_for, earlier_trials, intervention_for, session_for
+from isiw.devices.protocol import info_of
+from isiw.errors import InvalidValueError
+from isiw.session.sink import SessionUpdate
+
+CONFIG = """
+seed = 7
+[visit]
+subject = "P7"
+intensity_pct_rmt = 90.0
+[space]
+reference = "impact"
+low_ms = 0
+high_ms = 300
+[strategy.settings]
+particles = 100
+max_trials = 5
+[limits]
+max_pulses = 90
+[intervention]
+changes_the_person = true
+protocol_code = "2026-17"
+before = 5
+pairs = 50
+after = 5
+after_min = [0]
+"""
+
+
+@pytest.fixture
+def config(tmp_path: Path) -> RunConfig:
+    """Of a visit in which thirty pulses over the curve came first, and then a search."""
+    rng = np.random.default_rng(1)
+    rows = [f"{pct},{0.02 * 1.12 ** (pct - 85) * rng.lognormal(0, 0.4):.4f}" for pct in (90, 100, 110) * 10]
+    (tmp_path / "curve.csv").write_text("\n".join(["intensity_pct_rmt,mep_mv", *rows]))
+    (tmp_path / "visit.toml").write_text(CONFIG)
+    config = load_config(tmp_path / "visit.toml")
+    searched = config.with_overrides(log=tmp_path / "search.mcap", earlier=[tmp_path / "curve.csv"])
+    session_for(searched).run(progress=False)
+    return config
+
+
+def test_pulses_before_the_search_count_for_what_follows_it(config: RunConfig, tmp_path: Path) -> None:
+    search = tmp_path / "search.mcap"
+    after = config.with_overrides(log=tmp_path / "pair.mcap", earlier=[search])
+    given, own = earlier_trials(after, info_of(device_for(after))).trials, len(isiw.read_session(search).table)
+    assert len(given) == 30 + own
+    with pytest.raises(InvalidValueError, match=f"{30 + own} given before"):
+        intervention_for(after).require_effect()
+
+
+def test_pulses_that_are_named_again_count_once(config: RunConfig, tmp_path: Path) -> None:
+    both = config.with_overrides(earlier=[tmp_path / "curve.csv", tmp_path / "search.mcap"])
+    alone = config.with_overrides(earlier=[tmp_path / "search.mcap"])
+    lengths = [len(earlier_trials(each, info_of(device_for(each))).trials) for each in (both, alone)]
+    assert lengths[0] == lengths[1]
+
+
+def test_a_change_that_was_noted_in_the_search_is_known_afterwards_and_on_resuming(tmp_path: Path) -> None:
+    (tmp_path / "visit.toml").write_text(CONFIG)
+    config = load_config(tmp_path / "visit.toml").with_overrides(log=tmp_path / "search.mcap")
+    described = session_for(config)
+
+    def noting(update: SessionUpdate) -> None:
+        if update.trial.index == 3:
+            searching.note_change("the coil moved")
+
+    searching = isiw.Session(
+        device_for(config),
+        described.strategy,
+        log=config.log,
+        limits=described.header.limits,
+        visit=config.visit.noted(),
+        on_trial=noting,
+        subject="P7",
+    )
+    searching.run(progress=False)
+    after = config.with_overrides(log=tmp_path / "next.mcap", earlier=[tmp_path / "search.mcap"])
+    assert earlier_trials(after, info_of(device_for(after))).changed_after == {3}
+    strategy = session_for(after).strategy
+    assert strategy.earlier_changed == (3,)
+    assert strategy.restarted().estimate().probability == strategy.estimate().probability
