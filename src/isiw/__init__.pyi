@@ -25,6 +25,7 @@ from .devices.clock import MonotonicClock as MonotonicClock
 from .devices.clock import VirtualClock as VirtualClock
 from .devices.deadlines import Deadlines as Deadlines
 from .devices.limits import Limits as Limits
+from .devices.limits import PulseLimits as PulseLimits
 from .devices.protocol import CallbackDevice as CallbackDevice
 from .devices.protocol import Device as Device
 from .devices.protocol import DeviceInfo as DeviceInfo

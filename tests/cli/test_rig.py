@@ -6,6 +6,7 @@ import shutil
 import sys
 from collections.abc import Iterator
 from contextlib import chdir
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -294,7 +295,7 @@ def test_a_log_that_was_made_before_slips_were_refused_is_read_and_goes_on(
     (tmp_path / "c.toml").write_text(short, encoding="utf-8")
     config = load_config(tmp_path / "c.toml")
     slips = {"subject": config.subject.model_copy(update={"data": tmp_path}),
-             "visit": config.visit.model_copy(update={"intensity_pct_rmt": 1.2})}  # fmt: skip
+             "visit": replace(config.visit, intensity_pct_rmt=1.2)}  # fmt: skip
     session_for(config.model_copy(update={**slips, "log": tmp_path / "old.mcap"})).run()
     monkeypatch.undo()
     monkeypatch.chdir(tmp_path)

@@ -326,7 +326,7 @@ def test_the_space_that_nobody_named_is_said(config_file: WriteFile, text: str, 
 def test_a_space_can_be_a_list_of_isis_and_not_a_range_as_well(tmp_path: Path) -> None:
     path = tmp_path / "list.toml"
     path.write_text('[space]\nisis_ms = [10, 20, 50]\nreference = "impact"\n')
-    assert load_config(path).space.design() == DesignSpace.of([10, 20, 50], reference="impact")
+    assert load_config(path).space == DesignSpace.of([10, 20, 50], reference="impact")
     path.write_text('[space]\nisis_ms = [10, 20, 50]\nhigh_ms = 60.0\nreference = "impact"\n')
     with pytest.raises(ConfigError, match="exclude each other"):
         load_config(path)

@@ -362,7 +362,9 @@ def test_without_a_writable_log_nothing_is_delivered(log: Path, monkeypatch: pyt
 @pytest.mark.parametrize("delay_s", [0.005, 0.05, 0.12, 0.2])
 def test_ctrl_c_at_any_time_leaves_an_intact_log(log: Path, monkeypatch: pytest.MonkeyPatch, delay_s: float) -> None:
     device = ScriptedDevice()
-    session = Session(device, scripted_strategy(100_000), log=log, limits=Limits(0, 200, 0.0, 100_000))
+    session = Session(
+        device, scripted_strategy(100_000), log=log, limits=Limits(0, 200, min_iti_s=0.0, max_pulses=100_000)
+    )
     stage = device.stage
 
     def interrupt() -> None:
@@ -434,7 +436,7 @@ def test_numbers_of_numpy_are_numbers(space: DesignSpace, log: Path) -> None:
     seed, low_ms, pulses = cast("tuple[int, int, int]", (np.int64(3), np.int64(0), np.int64(2)))
     high_ms, iti_s = cast("tuple[float, float]", (np.float32(space.high_ms), np.float32(5)))
     strategy = make_strategy("even", space, seed, max_trials=np.int64(2), particles=np.int64(64))
-    limits = Limits(low_ms, high_ms, iti_s, pulses)
+    limits = Limits(low_ms, high_ms, min_iti_s=iti_s, max_pulses=pulses)
     result = Session(ScriptedDevice(), strategy, log=log, limits=limits).run()
     assert len(result.trials) == 2
     assert read_session(log).header.strategy.settings["particles"] == 64

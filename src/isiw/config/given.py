@@ -55,7 +55,7 @@ def _require_curve(config: RunConfig, searches: Sequence[ThresholdRecord]) -> No
     """Raise if the visit's pulses over the curve were not all given."""
     if config.visit.curve is None:
         return
-    plan = config.visit.curve.pulses(config.seed)
+    plan = CurvePulses(config.visit.curve.at_pct_mso, config.visit.curve.each, config.seed)
     for search in map(search_of, searches):
         if isinstance(search.method, CurvePulses) and not plan.left(search.pulses):
             return

@@ -234,7 +234,7 @@ def fresh_log_path(config: RunConfig) -> Path:
 def assumed_space(config: RunConfig) -> str | None:
     """That a new session has the design space that is assumed; None if somebody has named one."""
     is_stated = config.space_named or config.own_rig
-    return None if is_stated else f"No [space] is given, so ISIs are {config.space.design()}."
+    return None if is_stated else f"No [space] is given, so ISIs are {config.space}."
 
 
 def device_for(config: RunConfig) -> Device:
@@ -246,7 +246,7 @@ def device_for(config: RunConfig) -> Device:
     """
     if config.device is not None and config.device.factory is not None:
         return device_from_factory(config.device.factory, config.device.settings, config.device.folder)
-    return simulated_device(config.seed, config.subject, config.space.design(), config.subject.data, config.robot)
+    return simulated_device(config.seed, config.subject, config.space, config.subject.data, config.robot)
 
 
 def simulated_device(

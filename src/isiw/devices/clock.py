@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Protocol, runtime_checkable
 
-from isiw.devices.limits import Limits
+from isiw.devices.limits import PulseLimits
 from isiw.errors import LimitExceededError, NotDelivered
 
 ROUNDING_S = 1e-6
@@ -61,7 +61,7 @@ class VirtualClock:
 class Pacing:
     """The times of a session's stimuli, and the waits before each; the first waits too, as nobody knows what came."""
 
-    def __init__(self, limits: Limits, clock: Clock, earlier_s: Sequence[float] = ()) -> None:
+    def __init__(self, limits: PulseLimits, clock: Clock, earlier_s: Sequence[float] = ()) -> None:
         self._limits, self._clock = limits, clock
         self._since_s = clock.now_s()
         self._times_s = [self._since_s - age_s for age_s in sorted(earlier_s, reverse=True)]

@@ -72,7 +72,7 @@ def way_of(config: RunConfig | None, layout: Layout, *, simulated: bool = False,
         )
     return Way(
         layout,
-        config.space.design() if config.space_named else None,
+        config.space if config.space_named else None,
         config.strategy.name,
         config.seed,
         config.strategy.settings,

@@ -11,7 +11,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
 
 from isiw.checks import MOST_TRIALS
-from isiw.config.sections import LimitsConfig, SpaceConfig, StrategyConfig, VisitConfig, require_together, require_units
+from isiw.config.sections import PersonsVisit, Space, StrategyConfig, require_together, require_units
+from isiw.design import VALVE_SPACE
+from isiw.devices.limits import PulseLimits
 from isiw.errors import InvalidValueError, IsiwError
 from isiw.log.schema import TrialNumber
 from isiw.server.answers import Refusal
@@ -78,13 +80,13 @@ class CreateRequest(_Request):
 
     id: str = Field(pattern=NAME, description="Letters, digits, - and _; the log is ID.mcap.")
     seed: int = Field(default=0, ge=0, lt=2**63, description="Seed of the strategy.")
-    visit: VisitConfig = VisitConfig()
-    space: SpaceConfig = Field(
-        default=SpaceConfig(reference="valve"),
+    visit: PersonsVisit = PersonsVisit()
+    space: Space = Field(
+        default=VALVE_SPACE,
         description="Without it, ISIs count from the valve command, from 0 to 500 ms.",
     )
     strategy: StrategyConfig = StrategyConfig()
-    limits: LimitsConfig = LimitsConfig()
+    limits: PulseLimits = PulseLimits()
     protocol: VisitProtocol = VisitProtocol()
     earlier: GivenPulses | None = Field(
         default=None, description="TMS alone that was given before; limits.max_pulses counts it."
