@@ -12,6 +12,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
+from dataclasses import fields
 from functools import cache, partial
 from numbers import Integral, Real
 from types import UnionType
@@ -168,6 +169,11 @@ def from_table(kind: type[_T], table: _T | Mapping[str, Any], what: str) -> _T:
     return kind(*given.args, **given.kwargs)
 
 
+def fields_of(kind: type, value: object) -> dict[str, Any]:
+    """The fields of a dataclass, as a value has them that may be of more."""
+    return {each.name: getattr(value, each.name) for each in fields(kind)}
+
+
 def choice(what: str, value: Any, known: Iterable[Any]) -> Any:
     """One of some known values."""
     values = tuple(known)
@@ -259,7 +265,7 @@ def _checking(schema: Any, plain: partial[object]) -> Any:
     kind = schema["type"]
     if kind in {"default", "nullable"}:
         return schema | {"schema": _checking(schema["schema"], plain)}
-    if kind in {"float", "int"}:
+    if kind in {"bool", "float", "int"}:
         words = {_JSON_BOUNDS[name]: bound for name, bound in plain.keywords.items() if name in _JSON_BOUNDS}
         schema = schema | {"strict": True, "metadata": {"pydantic_js_updates": words}}
     return core_schema.no_info_after_validator_function(plain, schema)

@@ -121,7 +121,8 @@ def interval_s(what: str, value: object) -> float:
     return plain_s
 
 
-def _interval_ends(what: str, iti_s: object) -> tuple[float, float]:
+def interval_ends(what: str, iti_s: object) -> tuple[float, float]:
+    """The shortest and the longest interval between two stimuli [s]."""
     if not isinstance(iti_s, tuple | list) or len(iti_s) != 2:
         raise InvalidValueError(f"{what} must be the shortest and the longest interval [s]", got=iti_s)
     low_s, high_s = (interval_s(what, value) for value in iti_s)
@@ -153,7 +154,7 @@ class VisitProtocol(Checked):
             leave no pairs, or a number that is not positive.
     """
 
-    iti_s: Annotated[tuple[float, float], _interval_ends] | None = None
+    iti_s: Annotated[tuple[float, float], interval_ends] | None = None
     tms_alone: Annotated[float, partial(share, least=0, below=1)] = 0.0
     alone_pct_rmt: Positive | None = None
     tap_alone: Annotated[float, partial(share, least=0, below=1)] = 0.0

@@ -21,7 +21,7 @@ from pydantic import Field, model_validator
 from isiw.config.sections import (
     TIMEOUT_S,
     DeviceConfig,
-    InterventionConfig,
+    PlannedIntervention,
     PlannedVisit,
     RobotConfig,
     Section,
@@ -76,7 +76,7 @@ class RunConfig(Section):
     limits: PulseLimits = PulseLimits()
     protocol: VisitProtocol = VisitProtocol()
     signals: SignalLimits = SignalLimits()
-    intervention: InterventionConfig | None = None
+    intervention: PlannedIntervention | None = None
 
     @model_validator(mode="after")
     def _one_person(self) -> Self:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, Self, TypeAlias
@@ -20,7 +20,7 @@ from pydantic import (
     model_validator,
 )
 
-from isiw.checks import Text, choice, from_table, patience
+from isiw.checks import Flag, Text, choice, fields_of, patience, whole
 from isiw.design import DesignSpace, range_of
 from isiw.devices.robot.mechanism import LINE_DELAY_MS, EventTime, Geometry, SensorNoise
 from isiw.devices.robot.tapper import Tapper, TapperSettings, preset
@@ -151,8 +151,9 @@ class StrategyConfig(Section):
         return settings
 
 
-class InterventionConfig(Section):
-    """An intervention, which uses the window that a search has found; other keys are those of `isiw.intervention.Plan`.
+@dataclass(frozen=True)
+class PlannedIntervention(Plan):
+    """An intervention, which uses the window that a search has found.
 
     Args:
         changes_the_person: the statement that the intervention is meant to change the person; without it there is none.
@@ -160,19 +161,12 @@ class InterventionConfig(Section):
             nobody can draw it again.
     """
 
-    model_config = ConfigDict(frozen=True, extra="allow")
-
-    changes_the_person: bool = False
-    seed: int | None = None
-
-    @model_validator(mode="after")
-    def _possible(self) -> Self:
-        self.plan()
-        return self
+    changes_the_person: Flag = False
+    seed: Annotated[int, whole] | None = None
 
     def plan(self) -> Plan:
-        """The plan."""
-        return from_table(Plan, self.model_extra or {}, "intervention")
+        """The plan alone, as a log has it."""
+        return Plan(**fields_of(Plan, self))
 
     def drawn(self, subject: str) -> Intervention:
         """The plan with the arm that is drawn for a person; raise where nobody has stated what it is."""
@@ -250,7 +244,7 @@ class PersonsVisit(Visit):
 
     def noted(self) -> Visit:
         """The notes alone, as a log has them."""
-        return Visit(**{each.name: getattr(self, each.name) for each in fields(Visit)})
+        return Visit(**fields_of(Visit, self))
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Self
 
-from isiw.checks import Checked, Count, NonNegative, Number, Positive
+from isiw.checks import Checked, Count, NonNegative, Number, Positive, fields_of
 from isiw.design import DesignSpace, require_space
 from isiw.devices.protocol import Readiness
 from isiw.errors import InvalidValueError, LimitExceededError
@@ -115,8 +115,7 @@ class PulseLimits(Checked):
     def within(self, space: DesignSpace) -> Limits:
         """The same, with exactly the ISIs of a design space."""
         require_space(space)
-        own = {each.name: getattr(self, each.name) for each in fields(PulseLimits)}
-        step_ms = None if space.isis_ms else space.step_ms
+        own, step_ms = fields_of(PulseLimits, self), None if space.isis_ms else space.step_ms
         return Limits(space.low_ms, space.high_ms, step_ms=step_ms, isis_ms=space.isis_ms, **own)
 
     def require_left(self, delivered: int) -> None:
