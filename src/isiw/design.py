@@ -24,7 +24,7 @@ MOST_ISIS = 10_001
 MOST_MS: Final = 60_000.0
 """Of an ISI, before or after its reference: two stimuli a minute from each other are no pair."""
 
-_MOST_TOLD: Final = 12
+_MOST_LISTED: Final = 12
 """ISIs of a list that are written one by one."""
 
 _UNSAID: Final = cast("Reference", "")
@@ -130,14 +130,14 @@ class DesignSpace(Checked):
         return {name: getattr(self, name) for name in ("low_ms", "high_ms", "step_ms", "tolerance_ms")}
 
     def __str__(self) -> str:
-        return self.told(TAP)
+        return self.in_words(TAP)
 
-    def told(self, first: StimulusWords) -> str:
+    def in_words(self, first: StimulusWords) -> str:
         """The ISIs in words, with those for the conditioning stimulus."""
         counted = first.origin(self.reference)
         if self.isis_ms:
             *before, last = (f"{isi_ms:g}" for isi_ms in self.isis_ms)
-            shown = [*before[:_MOST_TOLD], "…"] if len(before) > _MOST_TOLD else before
+            shown = [*before[:_MOST_LISTED], "…"] if len(before) > _MOST_LISTED else before
             return f"{', '.join(shown)} and {last} ms after the {counted}"
         return f"{self.low_ms:g}–{self.high_ms:g} ms after the {counted}, every {self.step_ms:g} ms"
 

@@ -116,7 +116,7 @@ def exit_if_damaged(losses: Sequence[str]) -> None:
 
 def say_unread(record: SessionRecord) -> None:
     """Print which parts of a log's header this version cannot read."""
-    for sentence in record.told_unread:
+    for sentence in record.unread_said:
         show(sentence, style="yellow", stderr=True)
 
 

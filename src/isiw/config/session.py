@@ -189,7 +189,7 @@ def _logs(config: RunConfig) -> list[Path]:
     return [path for path in config.earlier if not is_table(path)]
 
 
-def told_imported(config: RunConfig) -> str:
+def imported_said(config: RunConfig) -> str:
     """That some of the earlier sessions were none, in words; empty if all were."""
     records = [*sessions_after(config), *(read_session(path) for path in _logs(config))]
     imported = imported_sentence([record.path.name for record in records if record.header.imported])

@@ -78,7 +78,7 @@ class Pacing:
             times_s.append(max(now_s, last_s + interval_s, self._limits.earliest_s(times_s, self._since_s)))
         return times_s[-1] - now_s if intervals_s else 0.0
 
-    def begin_anew(self) -> None:
+    def begin_again(self) -> None:
         """From now on there may be stimuli; the next one comes a whole interval later at the earliest."""
         self._since_s = self._clock.now_s()
 

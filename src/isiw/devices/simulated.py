@@ -182,8 +182,8 @@ class RecordedTrials:
             )
         trial = min(fitting, key=lambda candidate: abs((candidate.wanted_isi_ms or 0.0) - (asked_ms or 0.0)))
         self._left.remove(trial)
-        told = {field.name: getattr(trial, field.name) for field in dataclasses.fields(Measurement)}
-        return Measurement(**told | {"mep_mv": trial.mep_mv or 0.0})
+        values = {field.name: getattr(trial, field.name) for field in dataclasses.fields(Measurement)}
+        return Measurement(**values | {"mep_mv": trial.mep_mv or 0.0})
 
 
 PATTERN = "uef_*_ECR_epochs_uV_3kHz.csv.gz"

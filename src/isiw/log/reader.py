@@ -106,7 +106,7 @@ class SessionRecord(_StimuliRecord[Header]):
         strategy = header.strategy.name or "of a user's own objects"
         lines = [
             f"{kind} of {header.subject or 'an unnamed subject'}, {header.created}",
-            f"Strategy: {strategy}, seed {header.strategy.seed}, {header.space.told(header.stimulus)}",
+            f"Strategy: {strategy}, seed {header.strategy.seed}, {header.space.in_words(header.stimulus)}",
             f"Trials: {self.table.counted(header.stimulus)}"
             + (f", {len(self.unknown)} of unknown outcome" if self.unknown else ""),
         ]
@@ -114,7 +114,7 @@ class SessionRecord(_StimuliRecord[Header]):
             lines += [self.too_little or str(last), f"{'Ended' if last.stop else 'Not over'}: {last.reason}"]
             if self.is_judged_since:
                 lines.append(JUDGED_SINCE)
-        return "\n".join([*lines, *self.told_unread, *(f"Lost: {loss}" for loss in self.losses), f"Log: {self.path}"])
+        return "\n".join([*lines, *self.unread_said, *(f"Lost: {loss}" for loss in self.losses), f"Log: {self.path}"])
 
     @property
     def conceals(self) -> bool:
@@ -134,7 +134,7 @@ class SessionRecord(_StimuliRecord[Header]):
             )
 
     @property
-    def told_unread(self) -> tuple[str, ...]:
+    def unread_said(self) -> tuple[str, ...]:
         """A sentence for each part of the header that this version cannot read."""
         said = "The log's {} cannot be read by this version of isiw: {}"
         return tuple(said.format(part, why) for part, why in self.unread.items())
@@ -147,7 +147,7 @@ class SessionRecord(_StimuliRecord[Header]):
 
     @property
     def trials(self) -> pd.DataFrame:
-        """All trials as a DataFrame, a row a trial, indexed by their number: onset, outcome, and the belief after it.
+        """All trials as a DataFrame, a row a trial, indexed by their number: onset, outcome, and the estimate after it.
 
         The columns are those of `isiw.log.reader.TRIAL_COLUMNS`.
         """
@@ -277,7 +277,7 @@ def read_any(salvaged: Salvage, wanted: LogKind = LogKind.SEARCH) -> SessionReco
     read: dict[str, Any] = {
         "path": salvaged.path,
         "history": tuple(records.history),
-        "losses": records.told_losses,
+        "losses": records.losses_said,
         "finished": salvaged.finished,
         "end_lost": salvaged.end_lost,
         "delivered": records.delivered,
@@ -356,7 +356,7 @@ TRIAL_COLUMNS: Final[Mapping[str, tuple[str, str]]] = trial_columns(TAP)
 _TEXTS: Final = ("status", "reason", "overruled")
 _FLAGS: Final = ("excluded", "tap_alone")
 _NUMBERS: Final = tuple(name for name in TRIAL_COLUMNS if name not in {*_TEXTS, *_FLAGS, "intent_utc"})
-_BELIEF: Final = tuple(TRIAL_COLUMNS)[tuple(TRIAL_COLUMNS).index("p_window") :]
+_ESTIMATE: Final = tuple(TRIAL_COLUMNS)[tuple(TRIAL_COLUMNS).index("p_window") :]
 
 
 def trial_frame(
@@ -366,13 +366,13 @@ def trial_frame(
     measured: Mapping[int, Measures],
 ) -> pd.DataFrame:
     """All trials as a DataFrame, a row a trial, columns as in `TRIAL_COLUMNS`, indexed by `index`."""
-    beliefs = {estimate.trial: estimate for estimate in estimates}
+    estimates_by_trial = {estimate.trial: estimate for estimate in estimates}
     times = {trial: {"onset_s": onset.onset_s, "intent_utc": onset.at_ns} for trial, onset in onsets.items()}
     rows = [
         times.get(trial.index, {})
         | _outcome(trial)
         | measured.get(trial.index, Measures())._asdict()
-        | _belief(beliefs.get(trial.index))
+        | _estimated(estimates_by_trial.get(trial.index))
         for trial in table
     ]
     index = pd.Index([trial.index for trial in table], name="index", dtype=int)
@@ -386,7 +386,7 @@ def _outcome(trial: Trial) -> dict[str, Any]:
     return values | {name: None if values[name] is None else str(values[name]) for name in _TEXTS}
 
 
-def _belief(estimate: EstimateRecord | None) -> dict[str, Any]:
+def _estimated(estimate: EstimateRecord | None) -> dict[str, Any]:
     if estimate is None:
         return {}
     window = estimate.window
@@ -395,4 +395,4 @@ def _belief(estimate: EstimateRecord | None) -> dict[str, Any]:
         "window_start_ms": None if window is None else window.start_ms,
         "window_end_ms": None if window is None else window.end_ms,
     }
-    return special | {name: getattr(estimate, name) for name in _BELIEF if name not in special}
+    return special | {name: getattr(estimate, name) for name in _ESTIMATE if name not in special}

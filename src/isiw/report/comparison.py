@@ -156,5 +156,5 @@ def comparison_page(records: Sequence[SessionRecord], differences: Sequence[Diff
             }
             for record in records
         ],
-        losses=[f"{record.path.name}: {loss}" for record in records for loss in (*record.told_unread, *record.losses)],
+        losses=[f"{record.path.name}: {loss}" for record in records for loss in (*record.unread_said, *record.losses)],
     )

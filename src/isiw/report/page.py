@@ -72,7 +72,7 @@ def report_page(record: SessionRecord, *, truth: Window | None = None) -> str:
         "pictures": _pictures(record, truth),
         "subject": record.header.subject or "an unnamed subject",
         "states": _states(record),
-        "losses": (*record.told_unread, *record.losses),
+        "losses": (*record.unread_said, *record.losses),
         "statement": [said for said in statement(record) if said.name not in _SAID_ABOVE],
         "fit": fit_sentence(record),
         "answers": answers(record),

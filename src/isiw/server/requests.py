@@ -134,7 +134,7 @@ class AskRequest(_Request):
     )
 
 
-_TOLD_BY: Any = Field(
+_CLIENT: Any = Field(
     default=None, pattern=KEY, description="The client's key, if any; another's than that which asked is refused."
 )
 
@@ -159,7 +159,7 @@ class TellRequest(_Request):
     intensity_pct_rmt: float | None = Field(
         default=None, description="Intensity of TMS alone [% RMT]; null for that of the pairs."
     )
-    client: str | None = _TOLD_BY
+    client: str | None = _CLIENT
 
 
 class MistrialRequest(_Request):
@@ -169,7 +169,7 @@ class MistrialRequest(_Request):
     reason: Text = Field(
         default="rejected", description="A reason that isiw knows, such as no impact; any other becomes a note."
     )
-    client: str | None = _TOLD_BY
+    client: str | None = _CLIENT
 
 
 _KEY: Final = r"^[A-Za-z0-9_-]{1,64}$"

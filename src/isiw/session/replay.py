@@ -22,7 +22,7 @@ from isiw.log.schema import Event, Intent
 from isiw.log.verdicts import MANY_CHANGES, VERDICTS, changed_after, under
 from isiw.log.writer import LogWriter
 from isiw.pairing.agenda import Agenda
-from isiw.session.assembly import BELIEF_VERSION, ENGINE_VERSION, versions
+from isiw.session.assembly import ENGINE_VERSION, ESTIMATE_VERSION, versions
 from isiw.session.earlier import Earlier
 from isiw.session.examination import relearned
 from isiw.signals.limits import SignalLimits
@@ -168,7 +168,7 @@ def _known_settings(recipe: StrategyRecipe) -> dict[str, Any]:
 
 def _require_other_versions(intent: Intent, asked_ms: float, header: Header) -> None:
     """Raise if the strategy has no reason to ask something else than it did."""
-    now = SCHEMA_VERSION, BELIEF_VERSION, ENGINE_VERSION
+    now = SCHEMA_VERSION, ESTIMATE_VERSION, ENGINE_VERSION
     same = (header.schema_version, header.belief_version, header.engine_version) == now
     if same and versions() == {**header.versions, "isiw": header.isiw_version}:
         raise StrategyError(

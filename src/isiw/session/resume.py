@@ -26,8 +26,8 @@ from isiw.session.assembly import (
     header_of,
     require_fitting,
     require_known,
+    require_new,
     require_parts,
-    require_untold,
 )
 from isiw.session.examination import estimate_record
 from isiw.session.intensities import stimulus_of
@@ -78,7 +78,7 @@ def open_session(
     """
     require_known("open_session", options, OwnLoopOptions)
     path = require_parts(log, options, strategy=(strategy, Strategy))
-    require_untold(strategy)
+    require_new(strategy)
     if trials := tuple(earlier):
         strategy.learn_all(trials)
     stated = _stated(strategy.space, options)

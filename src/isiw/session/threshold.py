@@ -18,7 +18,7 @@ from isiw.log.kinds import LogKind, of_another_kind
 from isiw.log.pulses import pulse_ages
 from isiw.log.reader import SessionRecord, ThresholdRecord, read_any
 from isiw.log.salvage import salvage
-from isiw.log.schema import Event, Intent, PulseOutcome, ThresholdBelief
+from isiw.log.schema import Event, Intent, PulseOutcome, ThresholdEstimateRecord
 from isiw.log.writer import LogWriter
 from isiw.session.assembly import begun, require_parts
 from isiw.session.examination import Examination
@@ -215,8 +215,8 @@ class _ThresholdLearner:
     def decision(self) -> StopDecision:
         return self.search.decision()
 
-    def belief(self, trial: int, decision: StopDecision, _: float | None) -> ThresholdBelief:
-        return ThresholdBelief(trial=trial, estimate=self.search.estimate(), decision=decision)
+    def record(self, trial: int, decision: StopDecision, _: float | None) -> ThresholdEstimateRecord:
+        return ThresholdEstimateRecord(trial=trial, estimate=self.search.estimate(), decision=decision)
 
 
 class ThresholdRecorder(Recording[PulseOutcome]):

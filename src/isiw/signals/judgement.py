@@ -67,8 +67,8 @@ def _judge_emg(emg: Channel, timed: Trial, limits: SignalLimits) -> Trial:
     if is_blanked(emg_mv, emg.rate_hz, pulse, span_ms):
         return _mistrial(timed, Kind.MISSING_CHANNEL)
     if mep_mv == 0 or implausible_amplitude(mep_mv) is not None:  # in a sweep even EMG at rest has more than 0
-        told_mv = mep_mv if mep_mv <= MOST_MEP_MV else None  # as where a sample is missing and the converter says so
-        measured = _mistrial(replace(timed, mep_mv=told_mv), Kind.IMPLAUSIBLE)
+        kept_mv = mep_mv if mep_mv <= MOST_MEP_MV else None  # as where a sample is missing and the converter says so
+        measured = _mistrial(replace(timed, mep_mv=kept_mv), Kind.IMPLAUSIBLE)
     else:
         measured = replace(timed, status=Status.ACCEPTED, reason=None, mep_mv=mep_mv)
     return _mistrial(measured, Kind.BACKGROUND_ACTIVITY) if _is_tense(measured, limits) else measured
