@@ -86,7 +86,7 @@ def test_a_session_goes_on_within_the_limits_that_the_configuration_says_now(isi
     assert "no temperature" in hot.output
     assert f"The limits are under [limits] in {begun}" in hot.output
     assert hot.stdout.endswith(f"The log is kept; resume with: isiw resume s.mcap {begun}\n")
-    assert len(read_session("s.mcap").trials) == 3
+    assert len(read_session("s.mcap").table) == 3
     changed(begun, "\nmax_coil_c = 40.0", "")
     changed(begun, "background_uv = 10.0", "background_uv = 25.0")
     changed(begun, 'factory = "rig:make"', 'timeout_s = 7.0\nfactory = "rig:make"')

@@ -15,10 +15,10 @@ import pytest
 from isiw.errors import InvalidValueError
 from isiw.existing import Delivered, Layout, ReadingLimits, read_people, reading
 from isiw.existing.answer import Answer, read_answer, write_answer, write_error
-from isiw.existing.columns import Columns, unit_said
 from isiw.existing.gate import Gate, require_no_links
 from isiw.existing.layout import letters
 from isiw.existing.limits import LARGEST_FACTOR, require_file, seconds_for
+from isiw.existing.quantities import Columns, unit_said
 from isiw.sweeps import Channel
 from isiw.text.sanitize import read_number
 from isiw.text.toml_files import DoubledKeyError, once_each

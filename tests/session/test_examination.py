@@ -11,10 +11,10 @@ import pytest
 
 import isiw
 from isiw.errors import LogError
+from isiw.log.new_verdicts import exclusion
 from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Intent
-from isiw.log.verdicts import exclusion
 from isiw.log.writer import LogWriter
 from isiw.models.particles.prior import Prior
 from isiw.session import Recorder, ThresholdRecorder, examination, open_threshold

@@ -19,7 +19,7 @@ from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, LogError, StrategyError
 from isiw.findings import Kind
-from isiw.log.durable import log_exists
+from isiw.log.places import log_exists
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import EstimateRecord, Intent
 from isiw.models.particles import ParticleModel

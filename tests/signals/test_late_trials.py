@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from isiw.design import DesignSpace
+from isiw.findings import is_silent
 from isiw.signals import amplitudes, places
 from isiw.signals.amplitudes import Counted, Response, large, silent, small, stopped
 from isiw.signals.limits import SignalLimits
@@ -30,7 +31,7 @@ def kinds_plainly(series: tuple[Counted, ...]) -> set[str]:
     """What is found in some amplitudes by going through all of them."""
     found, meps_mv = set[str](), [one.mep_mv for one in series]
     seen = [mep_mv for mep_mv in meps_mv if mep_mv > 0]
-    if len(meps_mv) >= amplitudes.SILENT_FROM_THE_START and amplitudes.is_silent(meps_mv):
+    if len(meps_mv) >= amplitudes.SILENT_FROM_THE_START and is_silent(meps_mv):
         found.add("silent")
     if amplitudes.stopped_after([one.isi_ms for one in series], [one.stands_out for one in series]) is not None:
         found.add("stopped")

@@ -18,8 +18,7 @@ import typer
 from rich.console import Console
 
 import isiw
-from isiw.text import plain
-from isiw.text.sanitize import counted
+from isiw.text.sanitize import counted, plain
 
 if TYPE_CHECKING:
     from isiw.log.reader import SessionRecord

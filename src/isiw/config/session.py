@@ -21,9 +21,9 @@ from isiw.devices.simulated import RecordedPerson, SimulatedDevice, SimulatedPer
 from isiw.errors import ConfigError, StrategyError
 from isiw.files import write_output
 from isiw.intervention import Intervention
-from isiw.log.durable import log_exists
 from isiw.log.headers import RUN_KEY, FirstStep
 from isiw.log.kinds import imported_sentence
+from isiw.log.places import log_exists
 from isiw.log.reader import SessionRecord, ThresholdRecord, read_session
 from isiw.log.schema import now
 from isiw.models.particles.prior import Prior

@@ -17,7 +17,7 @@ from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, readine
 from isiw.devices.robot.waveforms import scale_of_mep
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.lazy import pd
-from isiw.signals.limits import MEP_WINDOW_MS
+from isiw.signals.spans import MEP_WINDOW_MS
 from isiw.subjects.subject import Response
 from isiw.sweeps import Channel, Measurement, Sweep
 from isiw.trials import MOST_ISI_SD_MS, Stimulus, Trial, TrialTable

@@ -20,7 +20,7 @@ from isiw.existing.layout import Layout
 from isiw.existing.limits import ReadingLimits
 from isiw.existing.reading import read_people
 from isiw.files import folded, is_reserved
-from isiw.log.durable import log_exists
+from isiw.log.places import log_exists
 from isiw.visit import Visit
 
 if TYPE_CHECKING:  # a file is read, and perhaps refused, before what analyses it is loaded

@@ -17,13 +17,13 @@ from isiw.errors import IsiwError
 from isiw.existing import formats
 from isiw.existing.answer import Answer
 from isiw.existing.apart import read_apart
-from isiw.existing.columns import Columns
 from isiw.existing.delivered import Delivered
 from isiw.existing.formats.contents import Contents, Track
 from isiw.existing.frames import named
 from isiw.existing.layout import Layout
 from isiw.existing.limits import ReadingLimits
 from isiw.existing.markers import marked, names_of, times_of
+from isiw.existing.quantities import Columns
 from isiw.existing.reading import people_of_contents
 from isiw.text.sanitize import command, counted
 from isiw.types import FloatArray, Reference

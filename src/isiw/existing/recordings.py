@@ -12,7 +12,6 @@ import numpy as np
 
 from isiw.errors import InvalidValueError
 from isiw.existing.cells import is_missing
-from isiw.existing.columns import Columns, isis_of, require_one, unit_said
 from isiw.existing.delivered import Delivered, anywhere, renumbered
 from isiw.existing.doubts import is_rectified, require_short
 from isiw.existing.formats.columns import require_rate
@@ -20,6 +19,7 @@ from isiw.existing.formats.contents import APART_S, Contents, Track, events_of
 from isiw.existing.frames import named
 from isiw.existing.layout import EMG_UNITS, MARKERS, UNIT_WORDS, Layout, required_unit
 from isiw.existing.markers import Pulse, marked, names_of, pulses_of
+from isiw.existing.quantities import Columns, isis_of, require_one, unit_said
 from isiw.findings import Kind
 from isiw.lazy import pd
 from isiw.signals.judgement import judge

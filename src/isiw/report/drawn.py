@@ -16,7 +16,7 @@ from isiw.report.words import answer_and_warnings
 from isiw.signals.limits import EMG_UNITS_MV
 from isiw.summary import tap_unmeasured
 from isiw.sweeps import Channel
-from isiw.text import plain
+from isiw.text.sanitize import plain
 from isiw.trials import Trial
 from isiw.types import FloatArray
 

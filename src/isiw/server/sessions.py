@@ -12,8 +12,8 @@ from typing import Final, TypeVar
 from isiw.devices.limits import USUAL_ITI_S
 from isiw.errors import ConfigError, error_text
 from isiw.files import made_folder, twin
-from isiw.log.durable import log_exists, log_of, part_of
 from isiw.log.headers import SERVED_KEY
+from isiw.log.places import log_exists, log_of, part_of
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import Event
 from isiw.server.answers import EstimateAnswer, Refusal, SessionAnswer, SessionEntry, TrialRow

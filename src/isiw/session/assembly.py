@@ -18,8 +18,8 @@ from isiw.devices.limits import USUAL_ITI_S, Limits
 from isiw.devices.protocol import Device
 from isiw.errors import InvalidValueError, StrategyError
 from isiw.intervention import Intervention
-from isiw.log.durable import log_of
 from isiw.log.headers import FirstStep, Header, StrategyRecipe
+from isiw.log.places import log_of
 from isiw.log.schema import now
 from isiw.native.library import version as engine_version
 from isiw.pairing.agenda import Agenda

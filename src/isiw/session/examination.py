@@ -17,8 +17,9 @@ from isiw import checks, summary
 from isiw.change import Change
 from isiw.errors import LimitExceededError, StrategyError, error_text
 from isiw.findings import Finding, Kind, Severity
+from isiw.log.new_verdicts import is_logged, or_remark
 from isiw.log.schema import EstimateRecord, Event, EventKind, Intent, Record
-from isiw.log.verdicts import changed_after, doubted_by, excluded_by, is_logged, or_remark, under_all
+from isiw.log.verdicts import changed_after, doubted_by, excluded_by, under_all
 from isiw.session.sink import Sink
 from isiw.strategy.choice import candidate_isis
 from isiw.strategy.decisions import StopDecision

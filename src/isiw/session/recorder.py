@@ -15,8 +15,8 @@ from isiw.estimate import WindowEstimate
 from isiw.findings import IN_DOUBT, REMEDIES, Finding, Kind, Severity
 from isiw.log.headers import Header
 from isiw.log.moments import Ages
+from isiw.log.new_verdicts import isi_confirmed, isi_doubted, newly_doubted
 from isiw.log.schema import Event, Intent
-from isiw.log.verdicts import isi_confirmed, isi_doubted, newly_doubted
 from isiw.log.writer import LogWriter
 from isiw.session.earlier import Earlier
 from isiw.session.examination import Examination, examination_of

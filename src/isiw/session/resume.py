@@ -13,9 +13,9 @@ from isiw.devices.clock import MonotonicClock
 from isiw.devices.limits import USUAL_ITI_S, Limits
 from isiw.devices.protocol import Device, DeviceInfo, HasMemory, info_of
 from isiw.errors import InvalidValueError, LogError
-from isiw.log.durable import log_exists
 from isiw.log.headers import Header
 from isiw.log.kinds import OWN_LOOP, LogKind, continued_by, of_another_kind, require_session
+from isiw.log.places import log_exists
 from isiw.log.reader import SessionRecord, read_any, read_salvaged
 from isiw.log.salvage import Salvage, salvage
 from isiw.log.writer import LogWriter

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, Final, Self
 
-from isiw.text import plain
+from isiw.text.sanitize import plain
 
 if sys.platform == "win32":
     import msvcrt

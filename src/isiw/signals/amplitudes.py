@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from isiw.findings import ENOUGH_PAIRS, Finding, Kind, Severity
+from isiw.findings import Finding, Kind, Severity, zeros_are_usual
 from isiw.lazy import scipy
 from isiw.trials import RESPONSE_MV, Trial
 
@@ -74,9 +74,6 @@ STOPPED_BY_CHANCE = 1e-4
 ALIKE = ((6, 0.015), (8, 0.05))
 """So many in a row with a CV below this: from pulse to pulse MEPs have a CV of .3 and more; what a stimulator itself
 puts into the EMG has less. So may mains hum, which is smaller than a response where the muscle counts as at rest."""
-
-MANY_BELOW_MV = 0.02
-"""Of a detection limit from here on, amplitudes of 0 are usual: most pulses below the threshold evoke less."""
 
 
 def _doubt(kind: Kind, text: str, remedy: str) -> Finding:
@@ -144,12 +141,6 @@ def large(told: Sequence[Counted]) -> Finding | None:
     return _doubt(Kind.JUMP, text, "Has their unit changed, from mV to µV or from V to mV?")
 
 
-def is_silent(meps_mv: Sequence[float], detection_limit_mv: float | None = None) -> bool:
-    """Whether enough amplitudes were told, and each is 0, where the detection limit is too low for that."""
-    enough = len(meps_mv) >= ENOUGH_PAIRS and not _zeros_are_usual(detection_limit_mv)
-    return enough and not any(meps_mv)
-
-
 def stopped_after(isis_ms: Sequence[float | None], answered: Sequence[bool]) -> int | None:
     """After how many pulses there was no answer any more, at ISIs between answered ones; None if that may be chance."""
     first = max((index + 1 for index, yes in enumerate(answered) if yes), default=0)
@@ -174,11 +165,6 @@ def _last_seen_mv(told: Sequence[Counted]) -> list[float]:
     return list(seen)[::-1]
 
 
-def _zeros_are_usual(detection_limit_mv: float | None) -> bool:
-    """Whether amplitudes of 0 say little, since much is below the detection limit."""
-    return detection_limit_mv is not None and detection_limit_mv >= MANY_BELOW_MV
-
-
 def odd_amplitudes(told: Sequence[Counted], detection_limit_mv: float | None = None) -> Iterator[Finding]:
     """What is odd about the amplitudes so far, in the order of the checks.
 
@@ -186,7 +172,7 @@ def odd_amplitudes(told: Sequence[Counted], detection_limit_mv: float | None = N
         told: the trials that count so far.
         detection_limit_mv: below which an amplitude is 0 [mV]; None if it is unknown.
     """
-    of_zeros = () if _zeros_are_usual(detection_limit_mv) else (silent, stopped)
+    of_zeros = () if zeros_are_usual(detection_limit_mv) else (silent, stopped)
     yield from filter(None, (find(told) for find in (equal, *of_zeros, small, large)))
 
 

@@ -16,9 +16,10 @@ from isiw.errors import DeviceError, InvalidValueError
 from isiw.findings import MISTRIALS, Kind
 from isiw.signals.agreement import pulse_with_tap_alone, require_agreement, tap_with_tms_alone
 from isiw.signals.impact import impact_time
-from isiw.signals.limits import ACCELERATION_UNITS, EMG_UNITS_MV, TAP_MS, SignalLimits
+from isiw.signals.limits import ACCELERATION_UNITS, EMG_UNITS_MV, SignalLimits
 from isiw.signals.mep import TAP_SPAN_MS, at_rest, disturbance, known_background_rms, mep_amplitudes
 from isiw.signals.plausible import before_impact, implausible_amplitude
+from isiw.signals.spans import TAP_MS
 from isiw.signals.waveforms import is_blanked, is_recording, is_saturated
 from isiw.sweeps import Channel, Measurement, Sweep
 from isiw.trials import Status, Stimulus, Trial

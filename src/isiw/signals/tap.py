@@ -17,8 +17,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from isiw.signals.courses import GRID_MS, STEP_MS, Courses, Span, Sums, size_at_rest_mv, within
-from isiw.signals.limits import EMG_UNITS_MV, HIT_DELAY_MS, MEP_WINDOW_MS, TAP_MS
+from isiw.signals.limits import EMG_UNITS_MV
 from isiw.signals.mep import EARLIEST_ONSET_MS, at_rest, disturbance
+from isiw.signals.spans import HIT_DELAY_MS, MEP_WINDOW_MS, TAP_MS
 from isiw.signals.taps_alone import LEAST_WEIGHT, is_inside
 from isiw.signals.waveforms import PULSE_GUARD_MS, samples
 from isiw.sweeps import Sweep

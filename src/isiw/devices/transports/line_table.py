@@ -317,12 +317,12 @@ class LineCommands(Checked):
         groups = self.fire.groups | self._result_groups
         _require_one(_ISI, groups, "the answer to fire or result must say the realised ISI", r"(?P<isi_ms>[\d.]+)")
         try:
-            groups = re.compile(self.refusal).groupindex
+            said = re.compile(self.refusal).groupindex
         except (re.error, TypeError) as error:
             raise InvalidValueError(f"the pattern of a refusal is invalid: {error}", got=self.refusal) from error
-        if not groups.keys() <= {"sequence", "reason"}:
+        if not said.keys() <= {"sequence", "reason"}:
             raise InvalidValueError(
-                "a refusal says something unknown", got=sorted(groups), expected="the groups sequence and reason"
+                "a refusal says something unknown", got=sorted(said), expected="the groups sequence and reason"
             )
 
     @property

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from isiw.existing.columns import unit_said
 from isiw.existing.doubts import doubtful_words
 from isiw.existing.formats.contents import Contents
 from isiw.existing.layout import EMG_UNITS, ISI_UNITS_MS, Layout
+from isiw.existing.quantities import unit_said
 from isiw.text.named_code import library
 
 _READERS = {".sav": "read_sav", ".zsav": "read_sav", ".por": "read_por", ".dta": "read_dta"}
