@@ -43,7 +43,7 @@ from benchmarks.simulated_board import (
     pairs_of,
     sealed,
 )
-from isiw.log.durable import log_exists
+from isiw.log.places import log_exists
 from isiw.trials import Status
 
 __all__ = ["NoisySession", "killed_while_delivering", "session_with_noise"]

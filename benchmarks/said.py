@@ -36,7 +36,7 @@ from isiw.log.schema import EstimateRecord, Event
 from isiw.report.evidence import ENOUGH_ON_EACH_SIDE, changed_with_time
 from isiw.report.words import Role, Said, in_lines, statement
 from isiw.session.loop import Session
-from isiw.signals.amplitudes import Doubts, told_of
+from isiw.signals.amplitudes import Doubts, counted_of
 from isiw.signals.rig import Evidence
 from isiw.signals.watch import findings
 from isiw.subjects.cohorts import person_of
@@ -80,7 +80,9 @@ def session(cohort: str, seed: int) -> dict[str, Any]:
         trial = Trial(len(trials), Status.ACCEPTED, asked_ms, isi_ms=outcome.isi_ms, mep_mv=outcome.mep_mv)
         trials = trials.appended(trial)
         strategy.learn(trial)
-        doubts = doubts.after(findings(Evidence(told=told_of(trials), detection_limit_mv=strategy.detection_limit_mv)))
+        doubts = doubts.after(
+            findings(Evidence(told=counted_of(trials), detection_limit_mv=strategy.detection_limit_mv))
+        )
         raised += [] if doubts.new is None else [(trial.index, f"{doubts.new}")]
     last = EstimateRecord.after(len(trials) - 1, strategy.estimate(), strategy.decision(), None)
     return {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from isiw.findings import Finding
-from isiw.signals.amplitudes import Told
+from isiw.signals.amplitudes import Counted
 from isiw.signals.rig import Evidence
 from isiw.signals.watch import findings
 from isiw.sweeps import Measurement, Sweep
@@ -22,5 +22,5 @@ def doubt_of(
 ) -> Finding | None:
     """The first finding in the amplitudes of several trials."""
     isis_ms = isis_ms or [None] * len(meps_mv)
-    told = [Told(mep_mv, isi_ms) for mep_mv, isi_ms in zip(meps_mv, isis_ms, strict=True)]
+    told = [Counted(mep_mv, isi_ms) for mep_mv, isi_ms in zip(meps_mv, isis_ms, strict=True)]
     return next(findings(Evidence(told=told, detection_limit_mv=detection_limit_mv)), None)

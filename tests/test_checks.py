@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from typing import Annotated, Any, Literal
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import TypeAdapter
 
 from isiw.checks import (
     Checked,
@@ -26,7 +28,8 @@ from isiw.checks import (
     number,
     whole,
 )
-from isiw.errors import InvalidValueError
+from isiw.errors import ConfigError, InvalidValueError
+from isiw.text.toml_files import checked
 
 
 class Boastful(float):
@@ -172,3 +175,40 @@ def test_a_flag_is_true_or_false(on: Any) -> None:
 def test_a_word_or_a_number_is_no_flag(on: Any) -> None:
     with pytest.raises(InvalidValueError, match="on must"):
         Switched(on)
+
+
+@dataclass(frozen=True)
+class Read(Checked):
+    """What files and requests are read as."""
+
+    share: Annotated[float, partial(number, least=0, below=1)] = 0.5
+    most: Count | None = None
+    on: Flag = False
+    ends_ms: Annotated[tuple[float, ...], ascending] = (1.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"share": 1.0}, {"share": math.nan}, {"share": -0.1}, {"most": 0}, {"ends_ms": [2.0, 1.0]}],
+)
+def test_a_table_is_read_by_the_fields_own_checks_and_the_error_has_their_words_and_the_key(
+    wrong: dict[str, Any],
+) -> None:
+    with pytest.raises(InvalidValueError) as made:
+        Read(**wrong)
+    with pytest.raises(ConfigError) as read:
+        checked(Read, wrong, "a.toml")
+    assert f"a.toml: the value of {min(wrong)} cannot be used: {made.value.what}" in str(read.value)
+
+
+@pytest.mark.parametrize("wrong", [{"share": "0.5"}, {"share": True}, {"most": 2.5}, {"most": "2"}, {"on": "true"}])
+def test_no_number_and_no_flag_is_made_of_something_else(wrong: dict[str, Any]) -> None:
+    with pytest.raises(ConfigError, match=f"the value of {min(wrong)} cannot be used"):
+        checked(Read, wrong, "a.toml")
+
+
+def test_a_table_may_leave_out_state_none_and_have_lists_and_its_schema_has_the_bounds() -> None:
+    assert checked(Read, {"most": None, "ends_ms": [1, 3], "share": 0}, "a.toml") == Read(0.0, None, False, (1.0, 3.0))
+    schema = TypeAdapter(Read).json_schema()["properties"]
+    assert (schema["share"]["minimum"], schema["share"]["exclusiveMaximum"]) == (0, 1)
+    assert schema["most"]["anyOf"][0] == {"minimum": 1, "type": "integer"}

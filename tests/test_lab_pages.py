@@ -47,7 +47,7 @@ def test_the_example_of_the_folder_runs(tmp_path: Path, monkeypatch: pytest.Monk
             assert rig.poll() is None, "the rig has ended"
             time.sleep(0.01)
         config = load_config("session.toml")
-        check_device(partial(device_for, config), config.space.design())
+        check_device(partial(device_for, config), config.space)
         result = session_for(config).run()
     assert len(result.trials.told) == 6
 
@@ -58,7 +58,7 @@ def test_the_example_of_lsl_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     monkeypatch.chdir(tmp_path)
     with example("lsl.md", tmp_path):
         config = load_config("session.toml")
-        check_device(partial(device_for, config), config.space.design())
+        check_device(partial(device_for, config), config.space)
         result = session_for(config).run()
     assert len(result.trials.told) == 6
     assert all(trial.mep_mv is not None and 0.25 < trial.mep_mv < 0.35 for trial in result.trials.told)

@@ -11,13 +11,7 @@ from pydantic import TypeAdapter
 
 import isiw
 from isiw.config.run import RunConfig
-from isiw.config.sections import LimitsConfig, PlannedVisit, SpaceConfig
 from isiw.studies import Study, StudyStrategy
-
-_EXPLAINED: dict[Any, Any] = {LimitsConfig: isiw.Limits, SpaceConfig: isiw.DesignSpace, PlannedVisit: isiw.Visit}
-"""Sections that are explained where the value that they make is."""
-
-_SUBJECT = "the person's code, never a name."
 
 
 def pages() -> Iterator[tuple[str, str]]:
@@ -51,7 +45,7 @@ def _section(annotation: Any) -> Any:
 
 
 def _fields(section: Any) -> dict[str, tuple[str, str]]:
-    meanings = {"subject": _SUBJECT} | arguments(_EXPLAINED.get(section, section)) | arguments(section)
+    meanings = {name: said for owner in reversed(section.__mro__) for name, said in arguments(owner).items()}
     if dataclasses.is_dataclass(section):
         return {one.name: (_shown(one.default), meanings.get(one.name, "")) for one in dataclasses.fields(section)}
     return {

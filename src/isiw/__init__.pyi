@@ -25,6 +25,7 @@ from .devices.clock import MonotonicClock as MonotonicClock
 from .devices.clock import VirtualClock as VirtualClock
 from .devices.deadlines import Deadlines as Deadlines
 from .devices.limits import Limits as Limits
+from .devices.limits import PulseLimits as PulseLimits
 from .devices.protocol import CallbackDevice as CallbackDevice
 from .devices.protocol import Device as Device
 from .devices.protocol import DeviceInfo as DeviceInfo
@@ -50,7 +51,7 @@ from .dissertation import response_counts as response_counts
 from .estimate import WindowEstimate as WindowEstimate
 from .existing.analysis import Analysis as Analysis
 from .existing.analysis import analyse as analyse
-from .log.reader import read_session as read_session
+from .log.frames import read_session as read_session
 from .server.live.page import watch as watch
 from .session.afterwards import exclude as exclude
 from .session.afterwards import include as include

@@ -2,6 +2,7 @@
 
 Each returns the value as Python's own type, so that the value that was checked is the one that is kept. A frozen
 dataclass that is `Checked` declares its checks: `most: Count`, `cells: Annotated[int, partial(whole, least=2)]`.
+pydantic reads it from files and requests by the same checks, so that an error names the key.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
+from dataclasses import fields
 from functools import cache, partial
 from numbers import Integral, Real
 from types import UnionType
@@ -26,12 +28,15 @@ from typing import (
     TypeVar,
     Union,
     Unpack,
+    cast,
     get_args,
     get_origin,
     get_type_hints,
 )
 
 import numpy as np
+from pydantic import GetCoreSchemaHandler
+from pydantic_core import CoreSchema, core_schema
 
 from isiw.errors import InvalidValueError, did_you_mean
 from isiw.findings import AMPLITUDE_MV, DELAY_MS, INTERVAL_S, SHARE
@@ -164,6 +169,11 @@ def from_table(kind: type[_T], table: _T | Mapping[str, Any], what: str) -> _T:
     return kind(*given.args, **given.kwargs)
 
 
+def fields_of(kind: type, value: object) -> dict[str, Any]:
+    """The fields of a dataclass, as a value has them that may be of more."""
+    return {each.name: getattr(value, each.name) for each in fields(kind)}
+
+
 def choice(what: str, value: Any, known: Iterable[Any]) -> Any:
     """One of some known values."""
     values = tuple(known)
@@ -239,6 +249,27 @@ class Checked:
             if not (optional and value is None):
                 object.__setattr__(self, name, plain(what, value))
 
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: type, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """What pydantic makes of the dataclass, with the declared checks at its fields, and bounds in JSON schemas."""
+        schema: Any = handler(source)
+        plain_of = {name: partial(plain, what) for name, what, _, plain in _declared(cls)}  # type: ignore[arg-type]
+        for field in schema["schema"]["fields"]:
+            if (plain := plain_of.get(field["name"])) is not None:
+                field["schema"] = _checking(field["schema"], plain)
+        return cast("CoreSchema", schema)
+
+
+def _checking(schema: Any, plain: partial[object]) -> Any:
+    """What pydantic makes of a field, with its check; no number is made of a text."""
+    kind = schema["type"]
+    if kind in {"default", "nullable"}:
+        return schema | {"schema": _checking(schema["schema"], plain)}
+    if kind in {"bool", "float", "int"}:
+        words = {_JSON_BOUNDS[name]: bound for name, bound in plain.keywords.items() if name in _JSON_BOUNDS}
+        schema = schema | {"strict": True, "metadata": {"pydantic_js_updates": words}}
+    return core_schema.no_info_after_validator_function(plain, schema)
+
 
 @cache
 def _declared(owner: type) -> tuple[tuple[str, str, bool, Callable[[str, object], object]], ...]:
@@ -263,6 +294,7 @@ def _within(plain: float, bounds: Bounds) -> bool:
     )
 
 
+_JSON_BOUNDS = {"above": "exclusiveMinimum", "least": "minimum", "below": "exclusiveMaximum", "most": "maximum"}
 _WORDS = {"above": "above", "least": "of at least", "below": "below", "most": "of at most"}
 
 

@@ -7,9 +7,11 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, cast
+from typing import Any, Final, cast
 
 import numpy as np
+from pydantic import GetJsonSchemaHandler
+from pydantic_core import CoreSchema
 
 from isiw.checks import Checked, NonNegative, Number, Positive, number
 from isiw.errors import InvalidValueError, OutOfSpaceError
@@ -22,7 +24,7 @@ MOST_ISIS = 10_001
 MOST_MS: Final = 60_000.0
 """Of an ISI, before or after its reference: two stimuli a minute from each other are no pair."""
 
-_MOST_TOLD: Final = 12
+_MOST_LISTED: Final = 12
 """ISIs of a list that are written one by one."""
 
 _UNSAID: Final = cast("Reference", "")
@@ -34,8 +36,8 @@ class DesignSpace(Checked):
     """The ISIs that may be asked: a grid from `low_ms` to `high_ms`, both included, or a list; see `of`.
 
     Args:
-        low_ms: first ISI [ms].
-        high_ms: last ISI [ms].
+        low_ms: first ISI [ms], by default 0.
+        high_ms: last ISI [ms], by default 500.
         step_ms: distance between two ISIs [ms], by default 1; the range must hold a whole number of steps.
         reference: the event that an ISI is counted from, the `"impact"` of the hammer or the `"valve"` command; it has
             no default, as the same number is another ISI in the other one.
@@ -48,8 +50,8 @@ class DesignSpace(Checked):
             many ISIs, an unknown reference, or none.
     """
 
-    low_ms: Number
-    high_ms: Number
+    low_ms: Number = 0.0
+    high_ms: Number = 500.0
     step_ms: Positive = 1.0
     reference: Reference = _UNSAID
     tolerance_ms: NonNegative = 10.0
@@ -68,10 +70,7 @@ class DesignSpace(Checked):
             InvalidValueError: fewer than two ISIs, one that is not finite or beyond a minute, too many of them, or no
                 reference.
         """
-        listed = tuple(sorted({number("an ISI of the design space [ms]", isi_ms) for isi_ms in isis_ms}))
-        if len(listed) < 2:
-            raise InvalidValueError("a list of ISIs needs at least two", got=listed)
-        return cls(listed[0], listed[-1], _widest_ms(listed), reference, tolerance_ms, listed)
+        return cls(reference=reference, tolerance_ms=tolerance_ms, **range_of(isis_ms))
 
     def __post_init__(self) -> None:
         if not self.reference:
@@ -119,19 +118,26 @@ class DesignSpace(Checked):
                 remedy="Choose high_ms = low_ms + k * step_ms with a whole k.",
             )
 
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Its JSON schema, in which the reference has no default."""
+        described = handler.resolve_ref_schema(handler(schema))
+        described["properties"]["reference"].pop("default")
+        return described | {"required": ["reference"]}
+
     @property
     def _extents_ms(self) -> dict[str, float]:
         return {name: getattr(self, name) for name in ("low_ms", "high_ms", "step_ms", "tolerance_ms")}
 
     def __str__(self) -> str:
-        return self.told(TAP)
+        return self.in_words(TAP)
 
-    def told(self, first: StimulusWords) -> str:
+    def in_words(self, first: StimulusWords) -> str:
         """The ISIs in words, with those for the conditioning stimulus."""
         counted = first.origin(self.reference)
         if self.isis_ms:
             *before, last = (f"{isi_ms:g}" for isi_ms in self.isis_ms)
-            shown = [*before[:_MOST_TOLD], "…"] if len(before) > _MOST_TOLD else before
+            shown = [*before[:_MOST_LISTED], "…"] if len(before) > _MOST_LISTED else before
             return f"{', '.join(shown)} and {last} ms after the {counted}"
         return f"{self.low_ms:g}–{self.high_ms:g} ms after the {counted}, every {self.step_ms:g} ms"
 
@@ -193,6 +199,14 @@ class DesignSpace(Checked):
                 remedy=f"ISIs count from the {self.reference}; check the reference, or log the trial as a mistrial.",
             )
         return realised_ms
+
+
+def range_of(isis_ms: Iterable[float]) -> dict[str, Any]:
+    """The fields of a design space that a list of ISIs [ms] stands for."""
+    listed = tuple(sorted({number("an ISI of the design space [ms]", isi_ms) for isi_ms in isis_ms}))
+    if len(listed) < 2:
+        raise InvalidValueError("a list of ISIs needs at least two", got=listed)
+    return {"low_ms": listed[0], "high_ms": listed[-1], "step_ms": _widest_ms(listed), "isis_ms": listed}
 
 
 def _widest_ms(listed_ms: tuple[float, ...]) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from types import MappingProxyType
@@ -157,6 +157,20 @@ def lacking(pairs: int | None, *, silent: bool, in_doubt: bool = False) -> Findi
     return None if pairs is None or pairs >= ENOUGH_PAIRS else TOO_FEW
 
 
+MANY_BELOW_MV: Final = 0.02
+"""Of a detection limit from here on, amplitudes of 0 are usual: most pulses below the threshold evoke less."""
+
+
+def zeros_are_usual(detection_limit_mv: float | None) -> bool:
+    """Whether amplitudes of 0 say little, since much is below the detection limit."""
+    return detection_limit_mv is not None and detection_limit_mv >= MANY_BELOW_MV
+
+
+def is_silent(meps_mv: Sequence[float], detection_limit_mv: float | None = None) -> bool:
+    """Whether enough amplitudes count, and each is 0, where the detection limit is too low for that."""
+    return len(meps_mv) >= ENOUGH_PAIRS and not zeros_are_usual(detection_limit_mv) and not any(meps_mv)
+
+
 @dataclass(frozen=True)
 class UnitScale:
     """A quantity's possible values, its usual one, and the unit and factor that smaller and larger ones were in."""
@@ -208,6 +222,14 @@ INTERVAL_S: Final = UnitScale(most=1000.0, too_large=("ms", 1000))
 SHARE: Final = UnitScale(most=1.0, too_large=("%", 100))
 INTENSITY_PCT: Final = UnitScale(3.0, too_small=("parts of 1", 100))
 """Nobody stimulates with so low an intensity; 1.2 is meant as 120 %."""
+
+
+def require_percent(what: str, intensity_pct: float | None) -> None:
+    """Raise if an intensity [%] is probably in another unit; None is none."""
+    if intensity_pct is not None:
+        scale = INTENSITY_PCT
+        scale.require(f"{what} is probably in another unit", intensity_pct, f"at least {scale.least:g} %")
+
 
 STOP_WIDTH_MS: Final = UnitScale(1.0, too_small=("s", 1000))
 """No interval of an edge is as narrow as the least; a width of 0.005 and less is meant to stop nothing."""

@@ -18,7 +18,7 @@ import numpy as np
 
 from isiw.checks import Checked, Count, Flag, NonNegative, Positive, Text, ascending, choice, number, share, whole
 from isiw.errors import InvalidValueError
-from isiw.visit import Control, VisitProtocol, interval_s
+from isiw.visit import Control, VisitProtocol, interval_ends
 
 LEAST_PAIRS, MOST_PAIRS = 50, 300
 """What a plan may have: fewer pairs change nobody, and more are not foreseen."""
@@ -101,12 +101,10 @@ def _arms(what: str, arms: object) -> tuple[Arm, ...]:
 
 
 def _interval_ends(what: str, ends_s: object) -> tuple[float, float]:
-    if not isinstance(ends_s, tuple | list) or len(ends_s) != 2:
-        raise InvalidValueError(f"{what} must be the shortest and the longest interval [s]", got=ends_s)
-    low_s, high_s = (interval_s(what, end) for end in ends_s)
-    if not LEAST_INTERVAL_S <= low_s <= high_s:
+    low_s, high_s = interval_ends(what, ends_s)
+    if low_s < LEAST_INTERVAL_S:
         raise InvalidValueError(
-            f"{what} must ascend, from {LEAST_INTERVAL_S:g} s",
+            f"{what} must be at least {LEAST_INTERVAL_S:g} s",
             got=(low_s, high_s),
             remedy="Faster pulses are repetitive TMS above 1 Hz, for which isiw has no limits.",
         )

@@ -22,7 +22,7 @@ from isiw.checks import (
     share,
 )
 from isiw.errors import InvalidValueError
-from isiw.findings import INTENSITY_PCT, INTERVAL_S
+from isiw.findings import INTERVAL_S, require_percent
 
 _ITI_DRAWS, _CONTROL_DRAWS = 1, 2
 """What is drawn, so that the two never share their draws."""
@@ -96,13 +96,6 @@ class Visit(Checked):
         return None
 
 
-def require_percent(what: str, intensity_pct: float | None) -> None:
-    """Raise if an intensity [%] is probably in another unit; None is none."""
-    if intensity_pct is not None:
-        scale = INTENSITY_PCT
-        scale.require(f"{what} is probably in another unit", intensity_pct, f"at least {scale.least:g} %")
-
-
 def different_muscles(noted: Iterable[str]) -> list[str]:
     """The muscles that visits note, if these are more than one; else none. Capitals make no difference."""
     muscles = {muscle.strip().casefold(): muscle.strip() for muscle in noted if muscle.strip()}
@@ -121,7 +114,8 @@ def interval_s(what: str, value: object) -> float:
     return plain_s
 
 
-def _interval_ends(what: str, iti_s: object) -> tuple[float, float]:
+def interval_ends(what: str, iti_s: object) -> tuple[float, float]:
+    """The shortest and the longest interval between two stimuli [s]."""
     if not isinstance(iti_s, tuple | list) or len(iti_s) != 2:
         raise InvalidValueError(f"{what} must be the shortest and the longest interval [s]", got=iti_s)
     low_s, high_s = (interval_s(what, value) for value in iti_s)
@@ -153,7 +147,7 @@ class VisitProtocol(Checked):
             leave no pairs, or a number that is not positive.
     """
 
-    iti_s: Annotated[tuple[float, float], _interval_ends] | None = None
+    iti_s: Annotated[tuple[float, float], interval_ends] | None = None
     tms_alone: Annotated[float, partial(share, least=0, below=1)] = 0.0
     alone_pct_rmt: Positive | None = None
     tap_alone: Annotated[float, partial(share, least=0, below=1)] = 0.0

@@ -3,6 +3,7 @@ from __future__ import annotations
 import importlib.util
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -166,7 +167,7 @@ def test_a_session_does_not_start_from_one_of_another_muscle_or_intensity(templa
         for name, visit in (("other", Visit(muscle="FDI")), ("far", Visit(muscle="FCR", intensity_pct_rmt=90.0)))
     )
     config = load_config(with_real_device(template)).with_overrides(log=tmp_path / "s.mcap")
-    noted = config.visit.model_copy(update={"muscle": "FCR", "intensity_pct_rmt": 120.0})
+    noted = replace(config.visit, muscle="FCR", intensity_pct_rmt=120.0)
     for earlier, what in ((other, "different muscles, FCR and FDI"), (far, "different intensities, 120 and 90 %")):
         with pytest.raises(ConfigError, match=what):
             session_for(config.model_copy(update={"visit": noted}).with_overrides(after=[earlier]))

@@ -9,7 +9,7 @@ import tomli_w
 
 from isiw.config import RunConfig, device_for, load_config, session_for
 from isiw.config.resume import Truth, run_of_log, truth_of
-from isiw.config.session import assumed_space, fresh_log_path, told_imported
+from isiw.config.session import assumed_space, fresh_log_path, imported_said
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import ConfigError, DeviceError, InvalidValueError, StrategyError
@@ -54,28 +54,20 @@ def test_a_file_changes_what_it_names(config_file: WriteFile) -> None:
         ("[subject]\ncohrt = 'x'", ["subject.cohrt", "'x'", "Did you mean cohort?", "cohort, data, kind, number"]),
         ("seed = 'many'", ["value of seed", "'many'", "a whole number"]),
         ("[strategy.settings]\nmax_trails = 9", ["strategy.settings", "max_trails", "Did you mean max_trials?"]),
-        ("[strategy.settings]\nmax_trials = 'all'", ["strategy.settings", "max_trials", "'all'", "whole number"]),
         ("seed = -1", ["value of seed", "-1"]),
         ("log = 3", ["value of log", "3", "expected a path"]),
         ('[device]\nfactory = "rig"', ["device.factory", "module:function, such as rig:make"]),
         ("[space]\nreference = 'impact'\nlow_ms = '0'", ["space.low_ms", "expected a number"]),
-        ("[strategy.settings]\nhit_delay_ms = [0.183, 0.006]", ["hit_delay_ms", "in seconds? Multiply by 1000"]),
-        ("[limits]\nmin_iti_s = nan", ["limits.min_iti_s", "nan"]),
         ("[subject]\nkind = 'real'", ["subject.kind", "'real'", "'simulated' or 'recorded'"]),
         ("[subject]\nkind = 'Recordd'", ["subject.kind", "'Recordd'", "Did you mean recorded?"]),
         ("[space]\nreference = 'coil'", ["space.reference", "'coil'", "'impact' or 'valve'"]),
         ("[strategy]\nname = 'foo'", ["session.toml", "value of strategy.name", "'foo'", "default or "]),
         ("[subject]\ncohort = 'foo'", ["session.toml", "value of subject.cohort", "'foo'", "nonresponder"]),
-        (
-            "[space]\nreference = 'impact'\nlow_ms = 10\nhigh_ms = 5",
-            ["session.toml", "value of space", "(10.0, 5.0)", "low_ms < high_ms"],
-        ),
         ("[space]\nhigh_ms = 320", ["value of space", "needs its reference", '"impact", the', '"valve", the', "rig"]),
         (
             "[space]\nreference = 'valve'\nlow_ms = nan",
             ["session.toml", "value of space.low_ms", "got nan", "a finite number"],
         ),
-        ("[space]\nreference = 'valve'\nstep_ms = 0.3", ["session.toml", "value of space", "whole number of steps"]),
         ("[strategy.settings]\nmax_trials = 0", ["value of strategy.settings", "max_trials", "got 0", "at least 1"]),
         ("seed = = 7", ["session.toml", "not valid TOML", "line 1"]),
     ],
@@ -95,9 +87,7 @@ def test_a_bad_file_is_an_error_that_names_file_key_value_and_remedy(
     [
         ("[subject]\ncohort = 'recruitmnt'", "recruitment"),
         ("[strategy]\nname = 'defualt'", "default"),
-        ("[strategy.settings]\nacquisition = 'edge-varianc'", "edge-variance"),
         ("[strategy.settings]\nmuscle = 'forarm'", "forearm"),
-        ("[space]\nreference = 'impct'", "impact"),
     ],
 )
 def test_of_a_misspelt_value_the_one_that_was_meant_is_named(config_file: WriteFile, text: str, meant: str) -> None:
@@ -110,9 +100,6 @@ def test_of_a_misspelt_value_the_one_that_was_meant_is_named(config_file: WriteF
     [
         ("[limits]\nmin_iti_s = 5000", "Is it in ms"),
         ("[protocol]\niti_s = [5000, 8000]", "Is it in ms"),
-        ("[protocol]\ntms_alone = 10", "Is it in %"),
-        ("[strategy.settings]\nstop_expected_f1 = 92", "Is it in %"),
-        ("[strategy.settings]\nstop_no_window = 95", "Is it in %"),
         ("[strategy.settings]\nstop_width_ms = 0.025", r"Is it in s\? Multiply by 1000"),
         ("[visit]\nintensity_pct_mso = 0.6", r"Is it in parts of 1\? Multiply by 100"),
     ],
@@ -268,17 +255,6 @@ def test_a_log_of_other_software_has_no_configuration(tmp_path: Path, config: di
         run_of_log(read_session(tmp_path / "s.mcap"))
 
 
-@pytest.mark.parametrize(
-    "limits",
-    [{"min_iti_s": True}, {"max_pulses": 5.0}, {"period_s": "60"}],
-)
-def test_limits_of_another_kind_are_refused(tmp_path: Path, limits: dict[str, Any]) -> None:
-    file = tmp_path / "session.toml"
-    file.write_text(tomli_w.dumps({"limits": limits}))
-    with pytest.raises(ConfigError, match=next(iter(limits))):
-        load_config(file)
-
-
 @pytest.mark.slow
 def test_every_limit_of_a_configuration_is_the_sessions(tmp_path: Path) -> None:
     wanted = {"min_iti_s": 6, "max_pulses": 30, "max_block_pulses": 12, "rest_s": 90.0, "max_period_pulses": 40}
@@ -326,7 +302,7 @@ def test_the_space_that_nobody_named_is_said(config_file: WriteFile, text: str, 
 def test_a_space_can_be_a_list_of_isis_and_not_a_range_as_well(tmp_path: Path) -> None:
     path = tmp_path / "list.toml"
     path.write_text('[space]\nisis_ms = [10, 20, 50]\nreference = "impact"\n')
-    assert load_config(path).space.design() == DesignSpace.of([10, 20, 50], reference="impact")
+    assert load_config(path).space == DesignSpace.of([10, 20, 50], reference="impact")
     path.write_text('[space]\nisis_ms = [10, 20, 50]\nhigh_ms = 60.0\nreference = "impact"\n')
     with pytest.raises(ConfigError, match="exclude each other"):
         load_config(path)
@@ -336,10 +312,7 @@ def test_a_space_can_be_a_list_of_isis_and_not_a_range_as_well(tmp_path: Path) -
     ("text", "words"),
     [
         ('[device]\nfactory = "rig:make"\ntimeout_s = 30000', r"device.timeout_s.*Is it in ms"),
-        ('[device]\nfactory = "rig:make"\ntimeout_s = true', r"device.timeout_s.*finite number"),
         ("[limits]\nmax_coil_c = 4000.0", "such as 40"),
-        ('[visit]\nintensity_pct_rmt = "1.1"', "visit.intensity_pct_rmt.*expected a number"),
-        ("[visit]\nintensity_pct_rmt = 1.1", "Is it in parts of 1"),
         ("[protocol]\niti_s = [2.0, 4.0]", "intervals up to more than 5 s"),
     ],
 )
@@ -354,15 +327,6 @@ def test_a_strategys_intensity_in_parts_of_one_is_refused(config_file: WriteFile
     config = load_config(config_file("[strategy.settings]\nintensity_pct_rmt = 1.1"))
     with pytest.raises(InvalidValueError, match="the strategy's intensity_pct_rmt is probably in another unit"):
         session_for(config)
-
-
-def test_an_intensity_of_the_visit_that_the_settings_contradict_begins_nothing(
-    config_file: WriteFile, tmp_path: Path
-) -> None:
-    text = f"log = '{tmp_path}/s.mcap'\n[visit]\nintensity_pct_rmt = 110\n[strategy.settings]\nintensity_pct_rmt = 80"
-    with pytest.raises(InvalidValueError, match="the visit and the strategy state different intensities"):
-        session_for(load_config(config_file(text))).run()
-    assert not list(tmp_path.glob("s.mcap*"))
 
 
 def threshold_log(tmp_path: Path, muscle: str = "FCR", subject: str = "P07") -> Path:
@@ -397,7 +361,7 @@ def test_a_session_after_a_search_for_the_threshold_knows_its_pulses_and_counts_
     assert (len(header.earlier), header.given_before, header.limits.max_pulses) == (8, 8, 9)
     assert [trial.intensity_pct_rmt for trial in header.earlier[-2:]] == [110.0, 130.0]
     assert not header.earlier_same_level
-    said = told_imported(config)
+    said = imported_said(config)
     assert "6 pulses of the search for the threshold came before" in said
     assert "of FCR, at the same hot spot" in said
 
@@ -411,7 +375,7 @@ def test_a_search_of_another_muscle_or_person_is_refused_and_one_without_a_muscl
         with pytest.raises(ConfigError, match=says):
             session_for(config.with_overrides(log=tmp_path / "a.mcap"))
     log = threshold_log(tmp_path, "")
-    assert f"not stated in {log.name}" in told_imported(load_config(config_file(f'after = ["{log.name}"]\n{VISIT}')))
+    assert f"not stated in {log.name}" in imported_said(load_config(config_file(f'after = ["{log.name}"]\n{VISIT}')))
 
 
 @pytest.mark.parametrize(

@@ -158,7 +158,7 @@ def test_what_was_refused_before_firing_does_not_count(
 
 
 def test_earlier_stimuli_count_for_the_block_and_the_period(inner: ScriptedDevice, clock: VirtualClock) -> None:
-    limits = Limits(0, 200, 5.0, max_block_pulses=3, rest_s=60.0, max_period_pulses=4, period_s=1000.0)
+    limits = Limits(0, 200, min_iti_s=5.0, max_block_pulses=3, rest_s=60.0, max_period_pulses=4, period_s=1000.0)
     assert LimitedDevice(inner, limits, clock, earlier_s=(10.0, 15.0, 20.0)).wait_s() == 50.0
     assert LimitedDevice(inner, limits, clock, earlier_s=(100.0, 200.0, 300.0, 400.0)).wait_s() == 600.0
 
@@ -171,7 +171,7 @@ def test_of_two_threads_only_one_delivers_at_a_time() -> None:
 
     inner = ScriptedDevice(answer)
     clock = MonotonicClock()
-    limited = LimitedDevice(inner, Limits(0, 200, 0.05, 1000), clock)
+    limited = LimitedDevice(inner, Limits(0, 200, min_iti_s=0.05, max_pulses=1000), clock)
     limited.stage()
     clock.sleep_s(limited.wait_s())  # the interval before the first one
     refused: list[LimitExceededError] = []
@@ -197,10 +197,10 @@ def test_of_two_threads_only_one_delivers_at_a_time() -> None:
 
 
 def test_a_limit_cannot_be_loosened_while_the_device_is_in_use(limited: LimitedDevice, inner: ScriptedDevice) -> None:
-    loose = Limits(0, 1000, 0.0, 1000)
+    loose = Limits(0, 1000, min_iti_s=0.0, max_pulses=1000)
     with pytest.raises(AttributeError):
         limited.limits = loose  # type: ignore[misc]  # which is what is tested
-    mine, clock = Limits(0, 200, 5.0, 3), VirtualClock()
+    mine, clock = Limits(0, 200, min_iti_s=5.0, max_pulses=3), VirtualClock()
     device = LimitedDevice(inner, mine, clock)
     object.__setattr__(mine, "high_ms", 1000.0)
     device.stage()
@@ -246,7 +246,7 @@ def reporting(
     inner: ScriptedDevice, clock: VirtualClock, state: Readiness, **limits: Any
 ) -> tuple[Reporting, LimitedDevice]:
     device = Reporting(inner, state)
-    limited = LimitedDevice(device, Limits(0, 200, 5.0, 9, **limits), clock)
+    limited = LimitedDevice(device, Limits(0, 200, min_iti_s=5.0, max_pulses=9, **limits), clock)
     limited.stage()
     clock.sleep_s(limited.wait_s())
     return device, limited

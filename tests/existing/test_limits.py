@@ -18,7 +18,7 @@ from isiw.existing.answer import Answer, read_answer, write_answer, write_error
 from isiw.existing.gate import Gate, require_no_links
 from isiw.existing.layout import letters
 from isiw.existing.limits import LARGEST_FACTOR, require_file, seconds_for
-from isiw.existing.tables import Columns, unit_said
+from isiw.existing.quantities import Columns, unit_said
 from isiw.sweeps import Channel
 from isiw.text.sanitize import read_number
 from isiw.text.toml_files import DoubledKeyError, once_each

@@ -12,7 +12,7 @@ from export.recorded import note, sweep, write_sweeps
 from isiw.devices.protocol import DeviceInfo
 from isiw.export import export_logs
 from isiw.export.collection import pseudonymised
-from isiw.log.reader import read_session
+from isiw.log.frames import read_session
 
 SECRETS = ("Meier", "Anna", "cough", "2026", "COM3", "ward 7", "meier_monday")
 

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from isiw.errors import LogError
-from isiw.log.durable import DurableFile, begun, log_of, part_of
+from isiw.log.durable import DurableFile, begun
+from isiw.log.places import log_of, part_of
 
 
 def test_a_log_has_two_names_that_lead_to_each_other() -> None:

@@ -14,8 +14,8 @@ import pytest
 from hostile import IN_THE_WAY, at_once
 from isiw.devices.clock import VirtualClock
 from isiw.errors import LogError
-from isiw.log.durable import Fingerprint
 from isiw.log.headers import Header
+from isiw.log.places import Fingerprint
 from isiw.log.reader import read_session
 from isiw.log.salvage import Salvage, salvage, salvage_file
 from isiw.log.schema import Event

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import isiw
-from isiw.log.reader import read_session
+from isiw.log.frames import read_session
 from isiw.log.schema import Waveform, encode, without_samples
 from isiw.log.writer import LogWriter
 from isiw.sweeps import Channel

@@ -20,7 +20,7 @@ from isiw.log.schema import (
     Intent,
     PulseOutcome,
     Record,
-    ThresholdBelief,
+    ThresholdEstimateRecord,
     Waveform,
     decode,
     encode,
@@ -53,7 +53,7 @@ from log.written import make_header
         Intent(trial=3, isi_ms=None, intensity_pct_mso=62.0),
         PulseOutcome(trial=3, intensity_pct_mso=62.0, mep_mv=0.08),
         PulseOutcome(trial=3, intensity_pct_mso=62.0, reason="lost"),
-        ThresholdBelief(
+        ThresholdEstimateRecord(
             trial=3,
             estimate=ThresholdEstimate(None, 50.0, 60.0, 3.0, "why"),
             decision=StopDecision(stop=True, reason="r"),

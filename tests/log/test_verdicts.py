@@ -7,8 +7,9 @@ import pytest
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.findings import Kind
+from isiw.log.new_verdicts import acceptance, correction, exclusion
 from isiw.log.schema import Correction
-from isiw.log.verdicts import acceptance, correction, excluded_by, exclusion, under_all
+from isiw.log.verdicts import excluded_by, under_all
 from isiw.trials import Status, Trial, TrialTable
 
 

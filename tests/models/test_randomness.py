@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from isiw.models.shared.tables import SIMULATED, seeds, stream, systematic
+from isiw.models.shared.draws import SIMULATED, seeds, stream, systematic
 
 
 def draw(seed: int, step: int) -> list[float]:

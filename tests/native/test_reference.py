@@ -17,8 +17,8 @@ from isiw.models.particles.predictions import PersonSample
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.profile import ProfilePrior
 from isiw.models.particles.supra.predictions import SupraSample
+from isiw.models.shared.draws import LEVELS
 from isiw.models.shared.history import Circumstances
-from isiw.models.shared.tables import LEVELS
 from isiw.native import engine
 from isiw.native.arrays import COLUMNS, FIELDS, UNKNOWN
 from isiw.native.engine import log_likelihoods

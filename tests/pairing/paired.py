@@ -26,7 +26,7 @@ from isiw.window import Window
 from scripted import ScriptedDevice, WantedIsi
 
 SPACE = DesignSpace(0, 200, reference="valve")
-LIMITS = Limits(0, 200, 5.0, 400)
+LIMITS = Limits(0, 200, min_iti_s=5.0, max_pulses=400)
 BASE_MV, BEST_MS = 0.2, 100.0
 
 EVERY_ARM = tuple(Arm)

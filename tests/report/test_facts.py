@@ -15,7 +15,9 @@ from scripted import ScriptedDevice, scripted_strategy
 
 @pytest.fixture
 def record(tmp_path: Path) -> SessionRecord:
-    limits = Limits(0, 200, 6.0, 50, max_block_pulses=20, rest_s=90, max_coil_c=None, max_period_pulses=100)
+    limits = Limits(
+        0, 200, min_iti_s=6.0, max_pulses=50, max_block_pulses=20, rest_s=90, max_coil_c=None, max_period_pulses=100
+    )
     Session(
         ScriptedDevice(),
         scripted_strategy(2, seed=7),

@@ -21,7 +21,7 @@ from isiw.session.rig import Safeguards
 from isiw.trials import Status, Trial
 from scripted import FakeRealClock, ScriptedDevice, scripted_strategy
 
-LIMITS = Limits(0, 200, 5.0, 100, max_period_pulses=5, period_s=3600.0)
+LIMITS = Limits(0, 200, min_iti_s=5.0, max_pulses=100, max_period_pulses=5, period_s=3600.0)
 
 
 class MakeSession(Protocol):
@@ -145,7 +145,10 @@ def test_a_clock_that_is_set_forward_makes_no_stimulus_of_a_resumed_session_old(
 def test_a_loop_of_its_own_that_goes_on_says_that_the_clock_was_set(
     tmp_path: Path, clock: FakeRealClock, set_forward: Callable[[], None]
 ) -> None:
-    own: dict[str, Any] = {"limits": Limits(0, 200, 0.0, 9, max_period_pulses=3, period_s=3600.0), "clock": clock}
+    own: dict[str, Any] = {
+        "limits": Limits(0, 200, min_iti_s=0.0, max_pulses=9, max_period_pulses=3, period_s=3600.0),
+        "clock": clock,
+    }
     said: list[str] = []
     with open_session(scripted_strategy(9), tmp_path / "a.mcap", **own) as begun:
         for _ in range(3):
@@ -160,7 +163,7 @@ def test_a_loop_of_its_own_that_goes_on_says_that_the_clock_was_set(
 def test_stimuli_before_the_session_count_for_its_limit(tmp_path: Path, clock: FakeRealClock) -> None:
     lost = Trial(1, Status.MISTRIAL, 50.0, Kind.OUTCOME_UNKNOWN)
     before = (Trial(0, Status.ACCEPTED, 50.0, isi_ms=50.0, mep_mv=0.1), lost)
-    limits = Limits(0, 200, 5.0, 4)
+    limits = Limits(0, 200, min_iti_s=5.0, max_pulses=4)
     for folder in (tmp_path / "run", tmp_path / "own"):
         strategy = scripted_strategy(9)
         strategy.learn_all(before)

@@ -11,14 +11,14 @@ import pytest
 
 import isiw
 from isiw.errors import LogError
+from isiw.log.new_verdicts import exclusion
 from isiw.log.reader import read_session
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Intent
-from isiw.log.verdicts import exclusion
 from isiw.log.writer import LogWriter
 from isiw.models.particles.prior import Prior
 from isiw.session import Recorder, ThresholdRecorder, examination, open_threshold
-from isiw.session.assembly import BELIEF_VERSION
+from isiw.session.assembly import ESTIMATE_VERSION
 from isiw.session.examination import WindowExamination, examination_of
 from isiw.session.sink import Sink
 from isiw.strategy.threshold import IntensityRange, make_threshold_search
@@ -106,7 +106,7 @@ def test_a_header_says_what_its_log_is_of_and_one_of_a_threshold_has_no_isis(tmp
 
 def test_another_prior_has_another_belief_version() -> None:
     digest = hashlib.sha256(repr(Prior()).encode()).hexdigest()[:16]
-    assert {BELIEF_VERSION: digest} == {6: "107105ab9c6521ec"}  # of a new prior: the next number, and its digest
+    assert {ESTIMATE_VERSION: digest} == {6: "107105ab9c6521ec"}  # of a new prior: the next number, and its digest
 
 
 def test_an_option_that_a_session_does_not_have_is_refused(tmp_path: Path) -> None:

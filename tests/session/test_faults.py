@@ -53,7 +53,7 @@ def refusing(refusals: int, error: Exception | None = None) -> Callable[[Stimulu
 
 @pytest.mark.parametrize("error", [LogError("my own log cannot be written"), OSError("the disk"), ValueError("eh")])
 def test_whatever_a_device_fails_with_the_stimulus_may_have_been_given(log: Path, error: Exception) -> None:
-    limits = Limits(0, 200, 5.0, max_pulses=4)
+    limits = Limits(0, 200, min_iti_s=5.0, max_pulses=4)
     device = ScriptedDevice(refusing(1, error))
     with pytest.raises(type(error)):
         Session(device, scripted_strategy(9), log=log, limits=limits).run()
@@ -63,7 +63,7 @@ def test_whatever_a_device_fails_with_the_stimulus_may_have_been_given(log: Path
 
 def test_what_the_device_refused_before_firing_is_tried_again_and_does_not_count(log: Path, tmp_path: Path) -> None:
     undisturbed = Session(ScriptedDevice(), scripted_strategy(4), log=tmp_path / "undisturbed.mcap").run()
-    limits = Limits(0, 200, 5.0, max_pulses=4)
+    limits = Limits(0, 200, min_iti_s=5.0, max_pulses=4)
     result = Session(ScriptedDevice(refusing(2)), scripted_strategy(4), log=log, limits=limits).run()
     assert result.trials == undisturbed.trials
     record = read_session(log)

@@ -14,7 +14,7 @@ from isiw.devices.clock import VirtualClock
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, LogError
 from isiw.log.pulses import earlier_pulse_ages
-from isiw.log.schema import Intent, PulseOutcome, ThresholdBelief
+from isiw.log.schema import Intent, PulseOutcome, ThresholdEstimateRecord
 from isiw.session import ThresholdRecorder, open_session, open_threshold, read_threshold, resume_threshold
 from isiw.session.threshold import search_of
 from isiw.strategy.threshold import IntensityRange, MaximumLikelihood, ThresholdSearch, make_threshold_search
@@ -65,7 +65,11 @@ def test_what_is_asked_is_on_disk_before_it_can_be_given_and_told_before_it_is_l
         (intent,) = read_threshold(killed(log)).intents
         assert (intent.intensity_pct_mso, intent.isi_ms) == (asked, None)
         recorder.tell(0.2)
-        assert [type(entry) for entry in read_threshold(killed(log)).history] == [Intent, PulseOutcome, ThresholdBelief]
+        assert [type(entry) for entry in read_threshold(killed(log)).history] == [
+            Intent,
+            PulseOutcome,
+            ThresholdEstimateRecord,
+        ]
     record = read_threshold(log)
     assert record.finished
     assert record.losses == ()

@@ -17,9 +17,9 @@ from forked import Forked
 from isiw.devices.limits import Limits
 from isiw.errors import InvalidValueError
 from isiw.findings import Kind
-from isiw.log.reader import read_session
+from isiw.log.frames import read_session
+from isiw.log.new_verdicts import LOOKED_AT
 from isiw.log.schema import EstimateRecord, Event, Intent
-from isiw.log.verdicts import LOOKED_AT
 from isiw.report import final_statement
 from isiw.session.afterwards import exclude, include
 from isiw.session.loop import Session

@@ -110,7 +110,7 @@ def size_shown(wave: FloatArray, unit: FloatArray, shown: BoolArray) -> float:
 )
 def test_sums_over_all_sweeps_come_to_what_a_look_at_each_sweep_does(seed: int, response: TapResponse | None) -> None:
     rng, rig = np.random.default_rng(seed), TapRig(response, seed=seed)
-    taps, trials, told_by = TapResponses(), TrialTable(), dict[int, int]()
+    taps, trials, shown = TapResponses(), TrialTable(), dict[int, int]()
     corrections = known = 0
     for number in range(50):
         isi_ms = None if (kind := rng.random()) < 0.2 else float(rng.integers(0, 250 if kind < 0.4 else 80))
@@ -127,8 +127,8 @@ def test_sums_over_all_sweeps_come_to_what_a_look_at_each_sweep_does(seed: int, 
         taps, others = taps.corrected(trials)
         corrected, expected = {other.index: other for other in others}, set[int]()
         for trial in trials:
-            if (found := plainly(taps, trial, 2 * told_by.get(trial.index, 0))) is not None:
-                told_by[trial.index] = found[0]
+            if (found := plainly(taps, trial, 2 * shown.get(trial.index, 0))) is not None:
+                shown[trial.index] = found[0]
                 again, known = agree(taps, trial), known + 1
                 pairs = ((trial.mep_mv or 0.0, again.mep_mv or 0.0), (trial.tap_mv or 0.0, again.tap_mv or 0.0))
                 apart = [abs(new - old) > max(tap.SAME_MV, tap.SAME_SHARE * max(new, old)) for old, new in pairs]

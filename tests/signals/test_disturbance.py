@@ -9,7 +9,7 @@ from isiw.design import DesignSpace
 from isiw.findings import Kind, Severity
 from isiw.signals import SignalLimits, judge
 from isiw.signals.mep import at_rest, disturbance
-from isiw.signals.places import told_by
+from isiw.signals.places import shown_by
 from isiw.signals.rig import Evidence
 from isiw.signals.watch import findings
 from isiw.sweeps import Channel, Sweep
@@ -52,7 +52,7 @@ def test_hum_is_not_an_mep() -> None:
 
 def test_hum_is_said_after_four_trials_with_its_frequency_and_size() -> None:
     trials = [judged(trial, isi_ms, hum_uv=25.0, hz=60.0) for trial, isi_ms in enumerate((60.0, 90.0, 150.0, 250.0))]
-    told = [told_by(one, trial, LIMITS) for one, trial in trials]
+    told = [shown_by(one, trial, LIMITS) for one, trial in trials]
     found = next(findings(Evidence(limits=LIMITS, told=told)))
     assert (found.kind, found.severity) == (Kind.HUM, Severity.DOUBT)
     assert "60 Hz" in found.text
@@ -64,7 +64,7 @@ def test_hum_is_said_after_four_trials_with_its_frequency_and_size() -> None:
 def test_emg_without_hum_to_speak_of_is_left_as_it_is(hum_uv: float) -> None:
     for trial in range(20):
         one, found = judged(trial, 90.0, hum_uv=hum_uv)
-        assert told_by(one, found, LIMITS).disturbance is None
+        assert shown_by(one, found, LIMITS).disturbance is None
 
 
 def test_too_little_rest_for_three_periods_says_nothing() -> None:
@@ -93,7 +93,7 @@ def test_a_drift_is_said_after_four_trials_and_nothing_else_is_blamed_for_it(mep
     trials = [
         judged(n, isi_ms, drift_uv_s=1000.0, mep_uv=mep_uv) for n, isi_ms in enumerate((60.0, 90.0, 150.0, 250.0))
     ]
-    told = [told_by(one, trial, LIMITS) for one, trial in trials]
+    told = [shown_by(one, trial, LIMITS) for one, trial in trials]
     found = list(findings(Evidence(limits=LIMITS, told=told)))
     assert [(one.kind, one.severity) for one in found] == [(Kind.DRIFT, Severity.DOUBT)]
     assert "100 µV in 100 ms" in found[0].text

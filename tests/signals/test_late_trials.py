@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from isiw.design import DesignSpace
+from isiw.findings import is_silent
 from isiw.signals import amplitudes, places
-from isiw.signals.amplitudes import Response, Told, large, silent, small, stopped
+from isiw.signals.amplitudes import Counted, Response, large, silent, small, stopped
 from isiw.signals.limits import SignalLimits
 from isiw.signals.watch import Watch
 from isiw.strategy.outcomes import Outcome, Outcomes, found_step_mv
@@ -18,19 +19,19 @@ from isiw.sweeps import Measurement
 from isiw.trials import Status, Trial
 
 
-def told(rng: np.random.Generator) -> Told:
+def told(rng: np.random.Generator) -> Counted:
     """A trial of a series in which something is often odd."""
     mep_mv = float(rng.choice([0.0, 0.0, 5e-4, 0.002, 0.1, 0.1, 0.1001, 6.0, rng.gamma(2.0, 0.1)]))
     outside = Response(float(rng.choice([50.0, 51.0, 70.0])), 0.1) if rng.random() < 0.6 else None
     rest_uv = [None, 0.0, 3.0][rng.integers(3)]
-    return Told(mep_mv, [None, 10.0, 30.0, 90.0][rng.integers(4)], rest_uv, outside)
+    return Counted(mep_mv, [None, 10.0, 30.0, 90.0][rng.integers(4)], rest_uv, outside)
 
 
-def kinds_plainly(series: tuple[Told, ...]) -> set[str]:
+def kinds_plainly(series: tuple[Counted, ...]) -> set[str]:
     """What is found in some amplitudes by going through all of them."""
     found, meps_mv = set[str](), [one.mep_mv for one in series]
     seen = [mep_mv for mep_mv in meps_mv if mep_mv > 0]
-    if len(meps_mv) >= amplitudes.SILENT_FROM_THE_START and amplitudes.is_silent(meps_mv):
+    if len(meps_mv) >= amplitudes.SILENT_FROM_THE_START and is_silent(meps_mv):
         found.add("silent")
     if amplitudes.stopped_after([one.isi_ms for one in series], [one.stands_out for one in series]) is not None:
         found.add("stopped")
@@ -58,9 +59,9 @@ def test_what_is_odd_is_found_as_by_a_look_at_all_amplitudes() -> None:
     for _ in range(400):
         quiet = rng.random() < 0.3
         series = tuple(told(rng) for _ in range(rng.integers(1, 25)))
-        series += tuple(Told(0.0, 20.0) for _ in range(rng.integers(0, 60))) if quiet else ()
-        series += (Told(6.0, 20.0),) * 3 if rng.random() < 0.2 else ()
-        series = tuple(Told(0.0, one.isi_ms) for one in series) if rng.random() < 0.1 else series
+        series += tuple(Counted(0.0, 20.0) for _ in range(rng.integers(0, 60))) if quiet else ()
+        series += (Counted(6.0, 20.0),) * 3 if rng.random() < 0.2 else ()
+        series = tuple(Counted(0.0, one.isi_ms) for one in series) if rng.random() < 0.1 else series
         plain = kinds_plainly(series)
         found = {name for name, check in checks.items() if check(series) is not None}
         assert found == plain - {"misplaced"}
@@ -73,12 +74,12 @@ def test_what_is_odd_is_found_as_by_a_look_at_all_amplitudes() -> None:
 
 @pytest.mark.parametrize("step_mv", [0.1, 0.025, 0.002, 0.001])
 def test_a_step_of_amplitudes_is_found_after_each_trial_as_by_a_look_at_all_of_them(step_mv: float) -> None:
-    rng, outcomes, told_mv = np.random.default_rng(1), Outcomes("impact"), list[float]()
+    rng, outcomes, learnt_mv = np.random.default_rng(1), Outcomes("impact"), list[float]()
     for number in range(60):
         mep_mv = step_mv * int(rng.integers(0, 40)) if number < 50 else float(rng.gamma(2.0, 0.1))
         outcomes = outcomes.after(Outcome(10.0, mep_mv))
-        told_mv.append(mep_mv)
-        assert outcomes.step_mv == found_step_mv(told_mv)
+        learnt_mv.append(mep_mv)
+        assert outcomes.step_mv == found_step_mv(learnt_mv)
 
 
 @pytest.mark.slow

@@ -12,8 +12,8 @@ from isiw.design import DesignSpace
 from isiw.devices.simulated import RecordedPerson, Simulation, load_recordings
 from isiw.findings import Finding, Kind
 from isiw.signals import SignalLimits, judge
-from isiw.signals.amplitudes import Told
-from isiw.signals.places import told_by
+from isiw.signals.amplitudes import Counted
+from isiw.signals.places import shown_by
 from isiw.signals.rig import Evidence
 from isiw.signals.watch import findings
 from isiw.subjects.cohorts import cohort
@@ -50,18 +50,18 @@ def sweep(
 
 def after(
     sweeps: Iterable[Sweep], isis_ms: Sequence[float | None] = ISIS_MS, reference: Reference = "impact"
-) -> list[Told]:
+) -> list[Counted]:
     """These trials, each of which counts, as the checks look at them."""
     space = DesignSpace(0, 500, reference=reference)
     told = []
     for trial, (one, isi_ms) in enumerate(zip(sweeps, isis_ms, strict=True)):
         judged = judge(one, Stimulus(trial, isi_ms), space, LIMITS)
         assert judged.told
-        told.append(told_by(one, judged, LIMITS))
+        told.append(shown_by(one, judged, LIMITS))
     return told
 
 
-def outside(told: Iterable[Told]) -> int:
+def outside(told: Iterable[Counted]) -> int:
     """How many of some trials have a response outside the window."""
     return sum(one.outside is not None for one in told)
 
@@ -166,7 +166,7 @@ def misplaced_of(simulation: Simulation, space: DesignSpace, trials: int, limits
         isi_ms = None if trial % 6 == 5 else float(rng.uniform(space.low_ms + 5, space.high_ms - 5))
         one, stimulus = instance(Sweep, simulation.answer(Stimulus(trial, isi_ms))), Stimulus(trial, isi_ms)
         judged = judge(one, stimulus, space, limits)
-        told = told_by(one, judged, limits) if judged.told else None
+        told = shown_by(one, judged, limits) if judged.told else None
         found += told is not None and (told.outside is not None or told.cut_ms is not None)
     return found
 

@@ -321,7 +321,7 @@ def test_only_the_cohorts_that_say_so_have_outliers_drift_or_jitter() -> None:
             assert subject.outlier_probability == (0.06 if name == "outliers" else 0.0)
             assert subject.drift == (Drift(0.97, 0.12, (0.29, 0.20)) if name == "drift" else None)
             assert (subject.isi_jitter_ms > 0) == name.startswith("jitter")
-            assert subject.jitter_told == (name != "jitter-untold")
+            assert subject.jitter_reported == (name != "jitter-untold")
             assert subject.scale == 1.0
 
 
@@ -537,7 +537,7 @@ def test_the_window_does_not_depend_on_the_unit_above_the_least_excess(name: str
 
 def test_what_differs_from_trial_to_trial_leaves_the_truth_alone() -> None:
     subject = cohort("gaussian", 1, 3)[0]
-    disturbed = replace(subject, drift=Drift(), outlier_probability=0.06, isi_jitter_ms=5.0, jitter_told=False)
+    disturbed = replace(subject, drift=Drift(), outlier_probability=0.06, isi_jitter_ms=5.0, jitter_reported=False)
     np.testing.assert_array_equal(disturbed.expected_mep_mv(VALVE_SPACE), subject.expected_mep_mv(VALVE_SPACE))
     assert disturbed.baseline_mv == subject.baseline_mv
 
@@ -604,15 +604,15 @@ def test_from_the_valve_the_hit_delay_varies_unseen() -> None:
 def test_from_the_impact_the_realised_isi_varies_with_the_hit_delay_and_is_told() -> None:
     responder = replace(bare_subject(), hit_delay_sd_ms=3.0).begin(4)
     answers = [responder.respond(200.0, "impact") for _ in range(4000)]
-    told_ms = np.array([a.isi_ms for a in answers])
-    assert told_ms.mean() == pytest.approx(200.0, abs=4 * 3 / math.sqrt(4000))
-    assert told_ms.std() == pytest.approx(3.0, rel=4 / math.sqrt(2 * 4000))
-    np.testing.assert_allclose([1e3 * a.mep_mv for a in answers], told_ms, rtol=1e-4)
+    reported_ms = np.array([a.isi_ms for a in answers])
+    assert reported_ms.mean() == pytest.approx(200.0, abs=4 * 3 / math.sqrt(4000))
+    assert reported_ms.std() == pytest.approx(3.0, rel=4 / math.sqrt(2 * 4000))
+    np.testing.assert_allclose([1e3 * a.mep_mv for a in answers], reported_ms, rtol=1e-4)
 
 
 @pytest.mark.parametrize("told", [True, False])
 def test_jitter_moves_the_realised_isi_and_is_told_or_not(*, told: bool) -> None:
-    responder = bare_subject(isi_jitter_ms=4.0, jitter_told=told).begin(5)
+    responder = bare_subject(isi_jitter_ms=4.0, jitter_reported=told).begin(5)
     answers = [responder.respond(200.0, "impact") for _ in range(4000)]
     realised_ms = 1e3 * np.array([a.mep_mv for a in answers])
     assert realised_ms.std() == pytest.approx(4.0, rel=4 / math.sqrt(2 * 4000))

@@ -29,7 +29,7 @@ def person() -> SimulatedSubject:
         ("outlier_probability", 5),
         ("scale", -1),
         ("scale", 0),
-        ("jitter_told", "no"),
+        ("jitter_reported", "no"),
         ("conditioning", "laser"),
         ("stated_hit_delay_ms", 180.0),
         ("stated_hit_delay_ms", (180.0, -6.0)),

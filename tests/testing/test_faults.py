@@ -22,7 +22,7 @@ from scripted import ScriptedDevice, scripted_strategy
 
 Run: TypeAlias = tuple[list[Fired], SessionRecord]
 
-LIMITS = Limits(0, 200, 5.0, 10)
+LIMITS = Limits(0, 200, min_iti_s=5.0, max_pulses=10)
 
 
 @pytest.mark.parametrize("seed", [*range(4), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(4, 12))])

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from isiw.text import one_line, plain
+from isiw.text.sanitize import one_line, plain
 
 
 @pytest.mark.parametrize(

@@ -18,8 +18,7 @@ import typer
 from rich.console import Console
 
 import isiw
-from isiw.text import plain
-from isiw.text.sanitize import counted
+from isiw.text.sanitize import counted, plain
 
 if TYPE_CHECKING:
     from isiw.log.reader import SessionRecord
@@ -116,7 +115,7 @@ def exit_if_damaged(losses: Sequence[str]) -> None:
 
 def say_unread(record: SessionRecord) -> None:
     """Print which parts of a log's header this version cannot read."""
-    for sentence in record.told_unread:
+    for sentence in record.unread_said:
         show(sentence, style="yellow", stderr=True)
 
 

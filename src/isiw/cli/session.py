@@ -98,7 +98,7 @@ def run(  # noqa: PLR0913, PLR0917 - an option each
         )
         show(isiw.config.session.assumed_space(settings) or "Preparing the session …")
         session = isiw.config.session_for(settings)
-        if imported := isiw.config.session.told_imported(settings):
+        if imported := isiw.config.session.imported_said(settings):
             show(imported)
         _run_to_the_end(session, config, live=live)
 

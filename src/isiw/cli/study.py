@@ -27,8 +27,7 @@ from isiw.cli.console import (
     ticking,
     working,
 )
-from isiw.text import plain
-from isiw.text.sanitize import command, counted, read_whole
+from isiw.text.sanitize import command, counted, plain, read_whole
 
 if TYPE_CHECKING:
     import pandas as pd

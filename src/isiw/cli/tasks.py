@@ -46,15 +46,14 @@ def check(
         isiw.config.session.require_device(settings, config)
         device, space, said = isiw.config.device_for(settings), settings.design(), ""
         if not (yes or device.describe().simulated):
-            iti_s = max(settings.limits.min_iti_s, isiw.config.limits_for(settings).iti_s)
-            said = isiw.testing.device_table.announcement(device, iti_s)
+            said = isiw.testing.device_table.announcement(device, settings.limits.iti_s)
             show(said)
             typer.confirm("Is the coil on a phantom?", abort=True)
         try:
             isiw.testing.check_device(
                 lambda: isiw.config.device_for(settings),
                 space,
-                iti_s=settings.limits.min_iti_s,
+                iti_s=settings.limits.iti_s,
                 limits=isiw.config.limits_for(settings),
                 timeout_s=settings.timeout_s,
                 signals=settings.signals,

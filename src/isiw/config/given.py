@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 
 from isiw.config.run import RunConfig
 from isiw.errors import ConfigError
+from isiw.findings import require_percent
 from isiw.log.reader import SessionRecord, ThresholdRecord, read_any
 from isiw.log.salvage import salvage
 from isiw.log.verdicts import changed_after
@@ -16,7 +17,7 @@ from isiw.session.threshold import search_of
 from isiw.strategy.threshold.curve import CurvePulses
 from isiw.text.sanitize import command, counted
 from isiw.trials import Status, Stimulus, Trial
-from isiw.visit import different_muscles, require_percent
+from isiw.visit import different_muscles
 
 _COLUMNS: Final = ("intensity_pct_rmt", "mep_mv")
 
@@ -56,7 +57,7 @@ def _require_curve(config: RunConfig, searches: Sequence[ThresholdRecord]) -> No
     """Raise if the visit's pulses over the curve were not all given."""
     if config.visit.curve is None:
         return
-    plan = config.visit.curve.pulses(config.seed)
+    plan = CurvePulses(config.visit.curve.at_pct_mso, config.visit.curve.each, config.seed)
     for search in map(search_of, searches):
         if isinstance(search.method, CurvePulses) and not plan.left(search.pulses):
             return

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from isiw.config.run import RunConfig
 from isiw.config.sections import RobotConfig, SimulatedConfig, person_under
 from isiw.config.session import learns_from_earlier, simulated_device
+from isiw.devices.limits import USUAL_ITI_S
 from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import ConfigError, InvalidValueError, IsiwError, LimitExceededError, LogError
 from isiw.log.headers import RUN_KEY, Header
@@ -108,7 +109,7 @@ def changes_on_resume(config: RunConfig, record: SessionRecord) -> dict[str, Any
     _require_same_simulated(config, record)
     changes: dict[str, Any] = {}
     if "limits" in given:
-        said = config.limits.model_dump()
+        said = dict(vars(config.limits.stated(USUAL_ITI_S)))
         if said["intensity_pct_mso"] is None:
             said["intensity_pct_mso"] = header.limits.intensity_pct_mso
         changes["limits"] = dataclasses.replace(header.limits, **said)
@@ -138,9 +139,9 @@ def differences_on_resume(config: RunConfig, record: SessionRecord) -> tuple[str
 
 
 def _require_space(config: RunConfig, header: Header) -> None:
-    if not config.space_named or (space := config.space.design()) == header.space:
+    if not config.space_named or config.space == header.space:
         return
-    differing = [(key, was, now) for key, was, now in _differing("space", header.space, space) if was != now]
+    differing = [(key, was, now) for key, was, now in _differing("space", header.space, config.space) if was != now]
     raise ConfigError(
         "a session continues in the design space that it began with",
         got=", ".join(f"{key} = {now}" for key, _, now in differing),
@@ -185,9 +186,9 @@ def _unchangeable(config: RunConfig, header: Header) -> Iterator[tuple[str, obje
         yield from _differing("intervention", header.intervention.plan, config.intervention.plan())
     elif "protocol" in given:
         yield from _differing("protocol", header.protocol, config.protocol)
-    noted = config.visit.noted()
-    for name in config.visit.model_fields_set - {"subject"}:
-        yield f"visit.{name}", getattr(header.visit, name), getattr(noted, name)
+    for key, was, now in _differing("visit", header.visit, config.visit):
+        if now not in (None, ""):
+            yield key, was, now
 
 
 def _said(value: object) -> object:

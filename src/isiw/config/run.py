@@ -12,7 +12,6 @@ Every key may be left out. Example:
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final, Self, get_args
@@ -22,24 +21,23 @@ from pydantic import Field, model_validator
 from isiw.config.sections import (
     TIMEOUT_S,
     DeviceConfig,
-    InterventionConfig,
-    LimitsConfig,
+    PlannedIntervention,
     PlannedVisit,
     RobotConfig,
     Section,
-    SpaceConfig,
+    Space,
     StrategyConfig,
     SubjectConfig,
     require_together,
     require_units,
     robot_for,
 )
-from isiw.design import DesignSpace, missing_reference
-from isiw.devices.limits import Limits
+from isiw.design import VALVE_SPACE, DesignSpace, missing_reference
+from isiw.devices.limits import USUAL_ITI_S, Limits, PulseLimits
 from isiw.errors import ConfigError, did_you_mean
 from isiw.signals.limits import SignalLimits
 from isiw.text.toml_files import checked, read_toml
-from isiw.visit import VisitProtocol
+from isiw.visit import Visit, VisitProtocol
 
 _OPTIONS: Final[Mapping[str, tuple[str, str]]] = {
     "subject": ("subject", "kind"),
@@ -73,12 +71,12 @@ class RunConfig(Section):
     device: DeviceConfig | None = None
     visit: PlannedVisit = PlannedVisit()
     subject: SubjectConfig = SubjectConfig()
-    space: SpaceConfig = SpaceConfig(reference="valve")
+    space: Space = VALVE_SPACE
     strategy: StrategyConfig = StrategyConfig()
-    limits: LimitsConfig = LimitsConfig()
+    limits: PulseLimits = PulseLimits()
     protocol: VisitProtocol = VisitProtocol()
     signals: SignalLimits = SignalLimits()
-    intervention: InterventionConfig | None = None
+    intervention: PlannedIntervention | None = None
 
     @model_validator(mode="after")
     def _one_person(self) -> Self:
@@ -90,7 +88,7 @@ class RunConfig(Section):
                 "visit.subject. To simulate, remove [device].",
             )
         if self.robot is not None:
-            robot_for(self.robot, self.seed, self.subject, self.space.design())
+            robot_for(self.robot, self.seed, self.subject, self.space)
         return self
 
     @property
@@ -117,7 +115,7 @@ class RunConfig(Section):
                 expected=missing.expected,
                 remedy="Add [space] with low_ms, high_ms and the reference that the device counts from.",
             )
-        return self.space.design()
+        return self.space
 
     @property
     def timeout_s(self) -> float:
@@ -132,7 +130,7 @@ class RunConfig(Section):
                 nothing leaves it as it is.
         """
         _require_simulation(said.get("subject"))
-        values = self.model_dump(exclude_unset=True)  # what nobody set is not known to be wanted
+        values = {name: getattr(self, name) for name in self.model_fields_set}  # nobody else's are known to be wanted
         for option, value in said.items():
             if value in (None, [], ()):
                 continue
@@ -140,8 +138,15 @@ class RunConfig(Section):
             if section is None:
                 values[key] = value
             else:
-                values[section] = values.get(section, {}) | {key: value}
+                values[section] = _stated(values.get(section)) | {key: value}
         return checked(RunConfig, values, "the command line")
+
+
+def _stated(section: Section | Visit | dict[str, Any] | None) -> dict[str, Any]:
+    """What a section states, by its keys."""
+    if isinstance(section, Section):
+        return section.model_dump(exclude_unset=True)
+    return dict(vars(section)) if isinstance(section, Visit) else section or {}
 
 
 def _require_simulation(kind: str | None) -> None:
@@ -181,7 +186,7 @@ def load_config(path: str | Path | None = None) -> RunConfig:
     config.visit.noted().require_intensity()
     require_together(values)
     limits_for(config).require_effect()
-    config.protocol.require_effect(config.limits.min_iti_s)
+    config.protocol.require_effect(config.limits.iti_s)
     return config
 
 
@@ -200,4 +205,4 @@ def _read_from(folder: Path, config: RunConfig) -> RunConfig:
 
 def limits_for(config: RunConfig) -> Limits:
     """The limits of a session: the ISIs of the space, within the section on limits."""
-    return dataclasses.replace(Limits.of_space(config.space.design()), **config.limits.model_dump())
+    return config.limits.within(config.space).stated(USUAL_ITI_S)

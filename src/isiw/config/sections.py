@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self, TypeAlias
 
 from pydantic import (
     AfterValidator,
@@ -20,9 +20,8 @@ from pydantic import (
     model_validator,
 )
 
-from isiw.checks import choice, from_table, patience
-from isiw.design import DesignSpace, missing_reference
-from isiw.devices.limits import USUAL_ITI_S
+from isiw.checks import Flag, Text, choice, fields_of, patience, whole
+from isiw.design import DesignSpace, range_of
 from isiw.devices.robot.mechanism import LINE_DELAY_MS, EventTime, Geometry, SensorNoise
 from isiw.devices.robot.tapper import Tapper, TapperSettings, preset
 from isiw.devices.robot.vane.rotation import Vane
@@ -31,12 +30,11 @@ from isiw.errors import ConfigError
 from isiw.findings import STOP_WIDTH_MS
 from isiw.intervention import Intervention, Plan
 from isiw.strategy.catalogue import list_strategies, settings_for
-from isiw.strategy.threshold.curve import CurvePulses
+from isiw.strategy.threshold.curve import NamedPulses
 from isiw.subjects.after_effects import AFTER_EFFECTS, after_effect_of
 from isiw.subjects.cohorts import COHORTS, person_of
 from isiw.subjects.subject import SimulatedSubject
 from isiw.text.toml_files import checked
-from isiw.types import Reference
 from isiw.visit import Visit
 
 STOPS_NOTHING_MS: Final = 0.005
@@ -113,41 +111,24 @@ class SubjectConfig(SimulatedConfig):
     data: Path | None = None
 
 
-class SpaceConfig(Section):
-    """The design space, as in `isiw.DesignSpace`: a range with a step, or a list of ISIs."""
+_RANGE: Final = ("low_ms", "high_ms", "step_ms")
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
 
-    low_ms: float = 0.0
-    high_ms: float = 500.0
-    step_ms: float = 1.0
-    reference: Reference
-    tolerance_ms: float = 10.0
-    isis_ms: list[float] = Field(default_factory=list)
+def _listed(space: object) -> object:
+    """A design space as a file or a request states it, with the range of its list."""
+    if not isinstance(space, Mapping) or not isinstance(isis_ms := space.get("isis_ms"), list) or not isis_ms:
+        return space
+    if given := [key for key in _RANGE if key in space]:
+        raise ConfigError(
+            "a list of ISIs and a range exclude each other",
+            got=f"isis_ms and {', '.join(given)}",
+            remedy="Give either isis_ms, or low_ms, high_ms and step_ms.",
+        )
+    return {**space, **range_of(isis_ms)}
 
-    @model_validator(mode="before")
-    @classmethod
-    def _counted_from_something(cls, values: Any) -> Any:
-        if isinstance(values, Mapping) and "reference" not in values and values.keys() <= cls.model_fields.keys():
-            raise missing_reference()
-        return values
 
-    @model_validator(mode="after")
-    def _possible(self) -> Self:
-        self.design()
-        return self
-
-    def design(self) -> DesignSpace:
-        """The design space."""
-        if not self.isis_ms:
-            return DesignSpace(**self.model_dump(exclude={"isis_ms"}))
-        if given := self.model_fields_set & {"low_ms", "high_ms", "step_ms"}:
-            raise ConfigError(
-                "a list of ISIs and a range exclude each other",
-                got=f"isis_ms and {', '.join(sorted(given))}",
-                remedy="Give either isis_ms, or low_ms, high_ms and step_ms.",
-            )
-        return DesignSpace.of(self.isis_ms, reference=self.reference, tolerance_ms=self.tolerance_ms)
+Space: TypeAlias = Annotated[DesignSpace, BeforeValidator(_listed)]
+"""The design space: a range with a step, or a list of ISIs."""
 
 
 class StrategyConfig(Section):
@@ -170,25 +151,9 @@ class StrategyConfig(Section):
         return settings
 
 
-class LimitsConfig(Section):
-    """The limits, as in `isiw.Limits`; the ISI is limited to the grid of the design space."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
-
-    min_iti_s: float = Field(default=USUAL_ITI_S, ge=0.0)
-    max_pulses: int = Field(default=200, ge=1)
-    max_block_pulses: int | None = Field(default=None, ge=1)
-    rest_s: float = Field(default=120.0, gt=0.0)
-    max_period_pulses: int | None = Field(default=None, ge=1)
-    period_s: float = Field(default=3600.0, gt=0.0)
-    max_coil_c: float | None = None
-    intensity_pct_mso: float | None = Field(default=None, ge=0.0)
-    max_consecutive_mistrials: int = Field(default=3, ge=1)
-    max_intensity_pct_rmt: float | None = Field(default=None, gt=0.0)
-
-
-class InterventionConfig(Section):
-    """An intervention, which uses the window that a search has found; other keys are those of `isiw.intervention.Plan`.
+@dataclass(frozen=True)
+class PlannedIntervention(Plan):
+    """An intervention, which uses the window that a search has found.
 
     Args:
         changes_the_person: the statement that the intervention is meant to change the person; without it there is none.
@@ -196,19 +161,12 @@ class InterventionConfig(Section):
             nobody can draw it again.
     """
 
-    model_config = ConfigDict(frozen=True, extra="allow")
-
-    changes_the_person: bool = False
-    seed: int | None = None
-
-    @model_validator(mode="after")
-    def _possible(self) -> Self:
-        self.plan()
-        return self
+    changes_the_person: Flag = False
+    seed: Annotated[int, whole] | None = None
 
     def plan(self) -> Plan:
-        """The plan."""
-        return from_table(Plan, self.model_extra or {}, "intervention")
+        """The plan alone, as a log has it."""
+        return Plan(**fields_of(Plan, self))
 
     def drawn(self, subject: str) -> Intervention:
         """The plan with the arm that is drawn for a person; raise where nobody has stated what it is."""
@@ -274,36 +232,23 @@ class DeviceConfig(Section):
         return factory
 
 
-class VisitConfig(Section):
-    """Who is examined, and what is noted about it, as in `isiw.Visit`."""
+@dataclass(frozen=True)
+class PersonsVisit(Visit):
+    """Who is examined, and what is noted about it.
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+    Args:
+        subject: the person's code, never a name.
+    """
 
-    subject: str = ""
-    day: int | None = Field(default=None, ge=1)
-    operator: str = ""
-    muscle: str = ""
-    intensity_pct_rmt: float | None = Field(default=None, gt=0.0)
-    intensity_pct_mso: float | None = Field(default=None, gt=0.0)
-    electrodes: str = ""
+    subject: Text = ""
 
     def noted(self) -> Visit:
-        """The notes about the visit."""
-        return Visit(**self.model_dump(exclude={"subject", "curve"}))
+        """The notes alone, as a log has them."""
+        return Visit(**fields_of(Visit, self))
 
 
-class CurveConfig(Section):
-    """Pulses of TMS alone over the recruitment curve: the intensities, and how many at each."""
-
-    at_pct_mso: list[float] = Field(min_length=1)
-    each: int = Field(default=5, ge=1)
-
-    def pulses(self, seed: int) -> CurvePulses:
-        """The pulses, in an order of the seed."""
-        return CurvePulses(tuple(map(float, self.at_pct_mso)), self.each, seed)
-
-
-class PlannedVisit(VisitConfig):
+@dataclass(frozen=True)
+class PlannedVisit(PersonsVisit):
     """Who is examined, what is noted about it, and what comes before the pairs.
 
     Args:
@@ -311,7 +256,7 @@ class PlannedVisit(VisitConfig):
             intensities, and `each`, how many at each of them. A session without their log in `after` is refused.
     """
 
-    curve: CurveConfig | None = None
+    curve: NamedPulses | None = None
 
 
 def require_together(values: Mapping[str, Any]) -> None:

@@ -29,9 +29,9 @@ from isiw.devices.simulated import RecordedPerson, SimulatedDevice, SimulatedPer
 from isiw.errors import ConfigError, StrategyError
 from isiw.files import write_output
 from isiw.intervention import Intervention
-from isiw.log.durable import log_exists
 from isiw.log.headers import RUN_KEY, FirstStep
 from isiw.log.kinds import imported_sentence
+from isiw.log.places import log_exists
 from isiw.log.reader import SessionRecord, ThresholdRecord, read_session
 from isiw.log.schema import now
 from isiw.models.particles.prior import Prior
@@ -201,7 +201,7 @@ def _logs(config: RunConfig) -> list[Path]:
     return [path for path in config.earlier if not is_table(path)]
 
 
-def told_imported(config: RunConfig) -> str:
+def imported_said(config: RunConfig) -> str:
     """That some of the earlier sessions were none, in words; empty if all were."""
     records = [*sessions_after(config), *(read_session(path) for path in _logs(config))]
     imported = imported_sentence([record.path.name for record in records if record.header.imported])
@@ -246,7 +246,7 @@ def fresh_log_path(config: RunConfig) -> Path:
 def assumed_space(config: RunConfig) -> str | None:
     """That a new session has the design space that is assumed; None if somebody has named one."""
     is_stated = config.space_named or config.own_rig
-    return None if is_stated else f"No [space] is given, so ISIs are {config.space.design()}."
+    return None if is_stated else f"No [space] is given, so ISIs are {config.space}."
 
 
 def device_for(config: RunConfig) -> Device:
@@ -258,7 +258,7 @@ def device_for(config: RunConfig) -> Device:
     """
     if config.device is not None and config.device.factory is not None:
         return device_from_factory(config.device.factory, config.device.settings, config.device.folder)
-    return simulated_device(config.seed, config.subject, config.space.design(), config.subject.data, config.robot)
+    return simulated_device(config.seed, config.subject, config.space, config.subject.data, config.robot)
 
 
 def simulated_device(

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Protocol, runtime_checkable
 
-from isiw.devices.limits import Limits
+from isiw.devices.limits import PulseLimits
 from isiw.errors import LimitExceededError, NotDelivered
 
 ROUNDING_S = 1e-6
@@ -61,7 +61,7 @@ class VirtualClock:
 class Pacing:
     """The times of a session's stimuli, and the waits before each; the first waits too, as nobody knows what came."""
 
-    def __init__(self, limits: Limits, clock: Clock, earlier_s: Sequence[float] = ()) -> None:
+    def __init__(self, limits: PulseLimits, clock: Clock, earlier_s: Sequence[float] = ()) -> None:
         self._limits, self._clock = limits, clock
         self._since_s = clock.now_s()
         self._times_s = [self._since_s - age_s for age_s in sorted(earlier_s, reverse=True)]
@@ -78,7 +78,7 @@ class Pacing:
             times_s.append(max(now_s, last_s + interval_s, self._limits.earliest_s(times_s, self._since_s)))
         return times_s[-1] - now_s if intervals_s else 0.0
 
-    def begin_anew(self) -> None:
+    def begin_again(self) -> None:
         """From now on there may be stimuli; the next one comes a whole interval later at the earliest."""
         self._since_s = self._clock.now_s()
 

@@ -130,7 +130,7 @@ class LimitedDevice:
     def stage(self) -> None:
         """Get ready and arm; the next stimulus comes a whole interval later at the earliest."""
         self._device.stage()
-        self._pacing.begin_anew()
+        self._pacing.begin_again()
         if self._limits.intensity_pct_mso is None and self._limits.max_intensity_pct_rmt is None:
             self._limits = dataclasses.replace(
                 self._limits, intensity_pct_mso=readiness_of(self._device).intensity_pct_mso

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import Self
 
-from isiw.checks import Checked, Count, NonNegative, Number, Positive
+from isiw.checks import Checked, Count, NonNegative, Number, Positive, fields_of
 from isiw.design import DesignSpace, require_space
 from isiw.devices.protocol import Readiness
 from isiw.errors import InvalidValueError, LimitExceededError
@@ -23,16 +24,13 @@ MOST_COIL_C = 60.0
 """No coil that touches a person may be as hot as that [°C]."""
 
 
-@dataclass(frozen=True)
-class Limits(Checked):
-    """Limits on what may be delivered.
+@dataclass(frozen=True, kw_only=True)
+class PulseLimits(Checked):
+    """Limits on the pulses of a session, whatever their ISIs.
 
     Args:
-        low_ms: shortest ISI on the device's reference [ms].
-        high_ms: longest ISI [ms].
-        min_iti_s: shortest time between two deliveries [s]; by default 5 s, and none in a loop of your own.
+        min_iti_s: shortest time between two deliveries [s]; by default 5 s, and none in a loop of your own in Python.
         max_pulses: largest number of deliveries in a session, failed ones included.
-        step_ms: ISIs are whole multiples of it above the shortest [ms]; None if any ISI of the range is allowed.
         max_block_pulses: most deliveries in a row without a rest; None if none is needed.
         rest_s: a pause of this length is a rest [s].
         max_period_pulses: most deliveries in any period; None if they are not limited.
@@ -41,19 +39,15 @@ class Limits(Checked):
         intensity_pct_mso: the only intensity at which to deliver [% of the maximum stimulator output]; the device must
             report it. Where None, one that is reported when the device is staged may not change any more.
         max_consecutive_mistrials: a session pauses after so many rejected trials, or of a faulty rig, in a row.
-        isis_ms: the only ISIs that are allowed [ms]; by default all of the range, or of its grid.
         max_intensity_pct_rmt: the highest intensity that a device may be asked to set [% RMT]; None if it may be asked
             to set none. Where one is stated, a reported intensity may change from pulse to pulse.
 
     Raises:
-        InvalidValueError: ISIs that do not ascend, an invalid number, or both an only and a highest intensity.
+        InvalidValueError: an invalid number, or both an only and a highest intensity.
     """
 
-    low_ms: Number
-    high_ms: Number
     min_iti_s: NonNegative | None = None
     max_pulses: Count = 200
-    step_ms: Positive | None = None
     max_block_pulses: Count | None = None
     rest_s: Positive = 120.0
     max_period_pulses: Count | None = None
@@ -61,7 +55,6 @@ class Limits(Checked):
     max_coil_c: Number | None = None
     intensity_pct_mso: NonNegative | None = None
     max_consecutive_mistrials: Count = 3
-    isis_ms: tuple[float, ...] = ()
     max_intensity_pct_rmt: Positive | None = None
 
     def __post_init__(self) -> None:
@@ -73,39 +66,6 @@ class Limits(Checked):
                 f"max_intensity_pct_rmt = {self.max_intensity_pct_rmt:g}",
                 remedy="Leave out max_intensity_pct_rmt, or, in a session of several intensities, intensity_pct_mso.",
             )
-        if self.low_ms > self.high_ms:
-            raise InvalidValueError("the limits of the ISI must ascend", got=(self.low_ms, self.high_ms))
-
-    @classmethod
-    def of_space(
-        cls,
-        space: DesignSpace,
-        *,
-        min_iti_s: float | None = None,
-        max_pulses: int = 200,
-        max_consecutive_mistrials: int = 3,
-    ) -> Limits:
-        """Limits that allow exactly the ISIs of a design space.
-
-        Args:
-            space: the design space.
-            min_iti_s: as for `Limits` [s].
-            max_pulses: largest number of deliveries in a session.
-            max_consecutive_mistrials: as for `Limits`.
-
-        Raises:
-            InvalidValueError: no design space, or values that are not finite or limit nothing.
-        """
-        require_space(space)
-        return cls(
-            space.low_ms,
-            space.high_ms,
-            min_iti_s,
-            max_pulses,
-            None if space.isis_ms else space.step_ms,
-            max_consecutive_mistrials=max_consecutive_mistrials,
-            isis_ms=space.isis_ms,
-        )
 
     @property
     def iti_s(self) -> float:
@@ -117,7 +77,7 @@ class Limits(Checked):
         """True if it matters when earlier stimuli came, before the last interval."""
         return self.max_block_pulses is not None or self.max_period_pulses is not None
 
-    def stated(self, iti_s: float) -> Limits:
+    def stated(self, iti_s: float) -> Self:
         """The same with this interval [s], unless another one is stated."""
         return replace(self, min_iti_s=iti_s) if self.min_iti_s is None else self
 
@@ -152,38 +112,18 @@ class Limits(Checked):
                 remedy="Set a longer period_s [s] or fewer max_period_pulses, or leave out both.",
             )
 
+    def within(self, space: DesignSpace) -> Limits:
+        """The same, with exactly the ISIs of a design space."""
+        require_space(space)
+        own, step_ms = fields_of(PulseLimits, self), None if space.isis_ms else space.step_ms
+        return Limits(space.low_ms, space.high_ms, step_ms=step_ms, isis_ms=space.isis_ms, **own)
+
     def require_left(self, delivered: int) -> None:
         """Raise LimitExceededError if so many deliveries leave none."""
         if delivered >= self.max_pulses:
             raise LimitExceededError(
                 f"the limit of {self.max_pulses} pulses is reached",
                 remedy="This stimulus was not delivered. For more pulses raise max_pulses in the limits.",
-            )
-
-    def require_isi(self, isi_ms: float) -> None:
-        """Raise LimitExceededError if an ISI is beyond the range, or off the grid."""
-        if not self.low_ms <= isi_ms <= self.high_ms:
-            raise LimitExceededError(
-                "the ISI is beyond the limits",
-                got=isi_ms,
-                expected=f"{self.low_ms:g} to {self.high_ms:g} ms",
-                remedy="This stimulus was not delivered. Narrow the design space to the limits; widen the limits only "
-                "if your ethics approval allows it.",
-            )
-        if self.isis_ms and isi_ms not in self.isis_ms:
-            raise LimitExceededError(
-                "the ISI is not one of those that the limits list",
-                got=isi_ms,
-                expected=f"one of {', '.join(f'{one:g}' for one in self.isis_ms)} ms",
-                remedy="This stimulus was not delivered. Use the same list in the design space and in the limits.",
-            )
-        if self.step_ms and math.fabs(math.remainder(isi_ms - self.low_ms, self.step_ms)) > _GRID_TOLERANCE_MS:
-            raise LimitExceededError(
-                "the ISI is not on the grid of the limits",
-                got=isi_ms,
-                expected=f"{self.low_ms:g} ms and steps of {self.step_ms:g} ms",
-                remedy="This stimulus was not delivered. Use the same low_ms and step_ms in the design space and in "
-                "the limits.",
             )
 
     def require_intensity(self, pct_rmt: float | None) -> None:
@@ -237,3 +177,78 @@ class Limits(Checked):
         if self.max_period_pulses is not None and len(times_s) >= self.max_period_pulses:
             earliest.append(times_s[-self.max_period_pulses] + self.period_s)
         return max(earliest)
+
+
+@dataclass(frozen=True)
+class Limits(PulseLimits):
+    """Limits on what may be delivered: the ISIs, and what `PulseLimits` has.
+
+    Args:
+        low_ms: shortest ISI on the device's reference [ms].
+        high_ms: longest ISI [ms].
+        step_ms: ISIs are whole multiples of it above the shortest [ms]; None if any ISI of the range is allowed.
+        isis_ms: the only ISIs that are allowed [ms]; by default all of the range, or of its grid.
+
+    Raises:
+        InvalidValueError: ISIs that do not ascend, or as of `PulseLimits`.
+    """
+
+    low_ms: Number
+    high_ms: Number
+    step_ms: Positive | None = field(default=None, kw_only=True)
+    isis_ms: tuple[float, ...] = field(default=(), kw_only=True)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.low_ms > self.high_ms:
+            raise InvalidValueError("the limits of the ISI must ascend", got=(self.low_ms, self.high_ms))
+
+    @staticmethod
+    def of_space(
+        space: DesignSpace,
+        *,
+        min_iti_s: float | None = None,
+        max_pulses: int = 200,
+        max_consecutive_mistrials: int = 3,
+    ) -> Limits:
+        """Limits that allow exactly the ISIs of a design space.
+
+        Args:
+            space: the design space.
+            min_iti_s: as for `PulseLimits` [s].
+            max_pulses: largest number of deliveries in a session.
+            max_consecutive_mistrials: as for `PulseLimits`.
+
+        Raises:
+            InvalidValueError: no design space, or values that are not finite or limit nothing.
+        """
+        own = PulseLimits(
+            min_iti_s=min_iti_s, max_pulses=max_pulses, max_consecutive_mistrials=max_consecutive_mistrials
+        )
+        return own.within(space)
+
+    def require_isi(self, isi_ms: float) -> None:
+        """Raise LimitExceededError if an ISI is beyond the range, or off the grid."""
+        if not self.low_ms <= isi_ms <= self.high_ms:
+            raise LimitExceededError(
+                "the ISI is beyond the limits",
+                got=isi_ms,
+                expected=f"{self.low_ms:g} to {self.high_ms:g} ms",
+                remedy="This stimulus was not delivered. Narrow the design space to the limits; widen the limits only "
+                "if your ethics approval allows it.",
+            )
+        if self.isis_ms and isi_ms not in self.isis_ms:
+            raise LimitExceededError(
+                "the ISI is not one of those that the limits list",
+                got=isi_ms,
+                expected=f"one of {', '.join(f'{one:g}' for one in self.isis_ms)} ms",
+                remedy="This stimulus was not delivered. Use the same list in the design space and in the limits.",
+            )
+        if self.step_ms and math.fabs(math.remainder(isi_ms - self.low_ms, self.step_ms)) > _GRID_TOLERANCE_MS:
+            raise LimitExceededError(
+                "the ISI is not on the grid of the limits",
+                got=isi_ms,
+                expected=f"{self.low_ms:g} ms and steps of {self.step_ms:g} ms",
+                remedy="This stimulus was not delivered. Use the same low_ms and step_ms in the design space and in "
+                "the limits.",
+            )

@@ -17,7 +17,7 @@ from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, readine
 from isiw.devices.robot.waveforms import scale_of_mep
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.lazy import pd
-from isiw.signals.limits import MEP_WINDOW_MS
+from isiw.signals.spans import MEP_WINDOW_MS
 from isiw.subjects.subject import Response
 from isiw.sweeps import Channel, Measurement, Sweep
 from isiw.trials import MOST_ISI_SD_MS, Stimulus, Trial, TrialTable
@@ -182,8 +182,8 @@ class RecordedTrials:
             )
         trial = min(fitting, key=lambda candidate: abs((candidate.wanted_isi_ms or 0.0) - (asked_ms or 0.0)))
         self._left.remove(trial)
-        told = {field.name: getattr(trial, field.name) for field in dataclasses.fields(Measurement)}
-        return Measurement(**told | {"mep_mv": trial.mep_mv or 0.0})
+        values = {field.name: getattr(trial, field.name) for field in dataclasses.fields(Measurement)}
+        return Measurement(**values | {"mep_mv": trial.mep_mv or 0.0})
 
 
 PATTERN = "uef_*_ECR_epochs_uV_3kHz.csv.gz"

@@ -21,9 +21,9 @@ from isiw.estimate import WindowEstimate
 from isiw.existing.delivered import Delivered
 from isiw.files import made_folder, put
 from isiw.findings import Kind
-from isiw.log.durable import log_of
 from isiw.log.headers import Header
 from isiw.log.names import require_free
+from isiw.log.places import log_of
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Event, Record, Waveform, clock_ns
 from isiw.log.writer import LogWriter

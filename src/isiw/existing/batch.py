@@ -20,7 +20,7 @@ from isiw.existing.layout import Layout
 from isiw.existing.limits import ReadingLimits
 from isiw.existing.reading import read_people
 from isiw.files import folded, is_reserved
-from isiw.log.durable import log_exists
+from isiw.log.places import log_exists
 from isiw.visit import Visit
 
 if TYPE_CHECKING:  # a file is read, and perhaps refused, before what analyses it is loaded
@@ -72,7 +72,7 @@ def way_of(config: RunConfig | None, layout: Layout, *, simulated: bool = False,
         )
     return Way(
         layout,
-        config.space.design() if config.space_named else None,
+        config.space if config.space_named else None,
         config.strategy.name,
         config.seed,
         config.strategy.settings,

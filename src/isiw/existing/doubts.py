@@ -22,7 +22,7 @@ from isiw.text.sanitize import counted
 from isiw.types import FloatArray, Reference
 
 if TYPE_CHECKING:
-    from isiw.existing.tables import Columns
+    from isiw.existing.quantities import Columns
 
 ALL: Final = "*"
 """What `where` says of a column whose values are to be analysed together."""

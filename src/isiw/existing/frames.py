@@ -18,7 +18,7 @@ from isiw.errors import InvalidValueError
 from isiw.existing.cells import is_missing
 from isiw.existing.doubts import LEFT_OUT
 from isiw.existing.layout import COLUMNS, UNIT_WORDS, Layout, letters
-from isiw.existing.tables import require_one
+from isiw.existing.quantities import require_one
 from isiw.files import opened
 from isiw.lazy import pd, scipy
 from isiw.text.named_code import library

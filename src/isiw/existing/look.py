@@ -23,8 +23,8 @@ from isiw.existing.frames import named
 from isiw.existing.layout import Layout
 from isiw.existing.limits import ReadingLimits
 from isiw.existing.markers import marked, names_of, times_of
+from isiw.existing.quantities import Columns
 from isiw.existing.reading import people_of_contents
-from isiw.existing.tables import Columns
 from isiw.text.sanitize import command, counted
 from isiw.types import FloatArray, Reference
 

@@ -14,7 +14,7 @@ from typing import Any, Final
 from isiw.checks import MOST_MEP_MV
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.existing import doubts, formats, frames, recordings, tables
+from isiw.existing import doubts, formats, frames, quantities, recordings
 from isiw.existing.apart import read_apart
 from isiw.existing.cells import is_missing
 from isiw.existing.dates import dates_of, latest_of, times_of
@@ -26,7 +26,7 @@ from isiw.existing.limits import ReadingLimits, require_file, require_table, req
 from isiw.files import is_mcap
 from isiw.findings import INTENSITY_PCT, Kind
 from isiw.lazy import pd
-from isiw.log.durable import log_exists
+from isiw.log.places import log_exists
 from isiw.signals.judgement import judge_measurement
 from isiw.signals.limits import SignalLimits
 from isiw.sweeps import Measurement
@@ -154,7 +154,7 @@ def people_of(
 ) -> list[Delivered]:
     """The people of a table, in the order in which they come first; who has no code is called as the file is."""
     reference = layout.required_reference(source)
-    columns = tables.Columns.found(frame, layout, source)
+    columns = quantities.Columns.found(frame, layout, source)
     given = [columns[key].cells for key in ("isi", "mep", "asked")]
     rows = [n for n in columns.chosen(layout) if not all(is_missing(cells[n]) for cells in given)]
     if not rows:
@@ -183,7 +183,7 @@ def people_of(
 
 
 def _days(
-    columns: tables.Columns, rows: Sequence[int], dates: Mapping[int, dt.datetime]
+    columns: quantities.Columns, rows: Sequence[int], dates: Mapping[int, dt.datetime]
 ) -> dict[int | None, list[int]]:
     """The rows of each day, by a column of days, or by several dates; days without a number are counted."""
     named = "day" in columns.of
@@ -204,7 +204,7 @@ def _days(
 
 
 def _person(
-    columns: tables.Columns, rows: Sequence[int], layout: Layout, reference: Reference, subject: str
+    columns: quantities.Columns, rows: Sequence[int], layout: Layout, reference: Reference, subject: str
 ) -> Delivered:
     _require_ascending(columns, rows)
     columns.require_said(rows, layout.alone)
@@ -243,7 +243,7 @@ def _person(
 
 
 def _trial(
-    columns: tables.Columns, row: int, number: int, layout: Layout, space: DesignSpace, signals: SignalLimits
+    columns: quantities.Columns, row: int, number: int, layout: Layout, space: DesignSpace, signals: SignalLimits
 ) -> Trial:
     """One row as a trial: as the file judges it, or else as a session would."""
     alone = columns.tms_alone(row, layout.alone)
@@ -274,7 +274,7 @@ def _trial(
 
 
 def _with_intensities(
-    trials: Sequence[Trial], columns: tables.Columns, rows: Sequence[int]
+    trials: Sequence[Trial], columns: quantities.Columns, rows: Sequence[int]
 ) -> tuple[list[Trial], float | None]:
     """Trials of TMS alone with their intensities [% RMT], and that of all pairs; None where none is stated."""
     stated = [columns["intensity"].number(row) for row in rows]
@@ -293,7 +293,7 @@ def _with_intensities(
     return own, usual
 
 
-def _require_ascending(columns: tables.Columns, rows: Sequence[int]) -> None:
+def _require_ascending(columns: quantities.Columns, rows: Sequence[int]) -> None:
     """Raise if the rows are not in the order of delivery, on which drift and the start depend."""
     if (order := columns.of.get("order")) is None or "block" in columns.of:
         return

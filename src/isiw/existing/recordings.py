@@ -19,7 +19,7 @@ from isiw.existing.formats.contents import APART_S, Contents, Track, events_of
 from isiw.existing.frames import named
 from isiw.existing.layout import EMG_UNITS, MARKERS, UNIT_WORDS, Layout, required_unit
 from isiw.existing.markers import Pulse, marked, names_of, pulses_of
-from isiw.existing.tables import Columns, isis_of, require_one, unit_said
+from isiw.existing.quantities import Columns, isis_of, require_one, unit_said
 from isiw.findings import Kind
 from isiw.lazy import pd
 from isiw.signals.judgement import judge
@@ -99,21 +99,21 @@ def track_of(contents: Contents, key: str, layout: Layout) -> Track:
 
 def _pulses_of_rows(contents: Contents, emg: Track, layout: Layout) -> tuple[list[Pulse], tuple[str, ...], str]:
     """The pulses of sweeps that a row each says the ISI of, the columns that are not used, and whose they are."""
-    told = replace(layout, alone="") if layout.alone is None and contents.empty_is_alone else layout
-    columns = Columns.found(named(contents.trials), told, contents.source, needed=("isi",))
+    stated = replace(layout, alone="") if layout.alone is None and contents.empty_is_alone else layout
+    columns = Columns.found(named(contents.trials), stated, contents.source, needed=("isi",))
     if len(emg.stretches) != columns.rows:
         raise InvalidValueError(
             f"{contents.source} does not say the ISI of each sweep",
             got=f"{columns.rows} rows and {len(emg.stretches)} sweeps",
         )
-    rows, keys = columns.chosen(told), (origin_key(layout), "pulse", "alone")
+    rows, keys = columns.chosen(stated), (origin_key(layout), "pulse", "alone")
     marks = {key: np.array(marked(contents.events, key, layout)) for key in keys}
-    columns.require_said(rows, told.alone)
+    columns.require_said(rows, stated.alone)
     pulses = list[Pulse]()
     for row in rows:
         if columns.tap_alone(row):
             raise columns["isi"].refused(row, "is of a tap alone, whose sweep has no pulse", "Leave that sweep out.")
-        isi_ms = None if columns.tms_alone(row, told.alone) else columns["isi"].number(row)
+        isi_ms = None if columns.tms_alone(row, stated.alone) else columns["isi"].number(row)
         isi_s, sweep = None if isi_ms is None else isi_ms / 1e3, emg.stretches[row]
         at_tap = _is_tap(contents, marks, sweep.start_s, row, isi_ms)
         at_s = sweep.start_s + (contents.pulse_at_s or 0.0) + ((isi_s or 0.0) if at_tap else 0.0)

@@ -17,8 +17,8 @@ from isiw.export.emg import Run
 from isiw.export.tables import Columns, session_columns, session_facts, tidy
 from isiw.files import write_output
 from isiw.lazy import pd
-from isiw.log.reader import trial_columns
-from isiw.text import one_line
+from isiw.log.frames import trial_columns, trial_frame
+from isiw.text.sanitize import one_line
 from isiw.text.stimuli import StimulusWords
 
 BIDS_VERSION: Final = "1.11.0"
@@ -86,7 +86,7 @@ def _write_person(parts: Sequence[Part], folder: Path, columns: Iterable[str]) -
 def _write_session(part: Part, folder: Path) -> list[str]:
     """Write a session, and return what of it is left out."""
     name, home = _name(part), _home(part, folder)
-    trials = part.record.trials.rename_axis("trial").reset_index()
+    trials = trial_frame(part.record).rename_axis("trial").reset_index()
     _tsv(home / "beh" / f"{name}_task-{TASK}_beh.tsv", trials)
     files = [f"beh/{name}_task-{TASK}_beh.tsv"]
     found, left_out = emg.runs(part.record)

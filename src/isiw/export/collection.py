@@ -16,8 +16,8 @@ from typing import Final, NamedTuple
 
 from isiw.errors import InvalidValueError, LogError
 from isiw.findings import Kind
-from isiw.log.durable import kept_for, part_of
 from isiw.log.headers import Header
+from isiw.log.places import kept_for, part_of
 from isiw.log.reader import SessionRecord, read_salvaged, read_session, topics_of
 from isiw.log.records import Onset
 from isiw.log.salvage import only_in, salvage_file
@@ -94,7 +94,7 @@ def once_each(records: Sequence[SessionRecord]) -> tuple[list[SessionRecord], li
     """Each session once, from its fullest log, and a sentence for each log left out; copies that differ later stay."""
     kept: list[SessionRecord] = []
     left_out = []
-    for record in sorted(records, key=_told, reverse=True):
+    for record in sorted(records, key=_weight, reverse=True):
         copies = (_Copy(record, fuller) for fuller in kept if _begun(fuller) == _begun(record))
         copy = next((each for each in copies if each.is_left_out), None)
         if copy is None:
@@ -138,7 +138,7 @@ class _Copy:
         return f"{name} is left out: it is a part of {fuller}."
 
 
-def _told(record: SessionRecord) -> tuple[int | bool, ...]:
+def _weight(record: SessionRecord) -> tuple[int | bool, ...]:
     """The amount that a log tells of a session, the weightiest part first; a whole and closed one before its like."""
     outcomes = len(record.table) - len(_unknown(record))
     verdicts = sum(event.kind in VERDICTS for event in record.events)
@@ -244,7 +244,7 @@ def numbered(records: Sequence[SessionRecord]) -> list[Part]:
     return sorted(parts, key=lambda part: (part.subject, part.session))
 
 
-def told_twice(parts: Iterable[Part]) -> list[str]:
+def stated_twice(parts: Iterable[Part]) -> list[str]:
     """A sentence for each two sessions that have trials in common."""
     of_stimulus: dict[tuple[int, int], Part] = {}
     said = []

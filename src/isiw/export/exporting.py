@@ -14,7 +14,7 @@ from types import MappingProxyType
 from isiw.checks import choice
 from isiw.errors import InvalidValueError
 from isiw.export.bids import write_bids
-from isiw.export.collection import Part, log_losses, numbered, pseudonymised, read_logs, told_twice
+from isiw.export.collection import Part, log_losses, numbered, pseudonymised, read_logs, stated_twice
 from isiw.export.emg import EMG
 from isiw.export.tables import write_tables
 
@@ -96,7 +96,7 @@ def export_logs(source: str | Path, folder: str | Path, to: str = "csv", *, pseu
     parts = numbered(records)
     for part in parts:
         lacking += [f"{part}: {loss}" for loss in log_losses(part.record)]
-    lacking += told_twice(parts)
+    lacking += stated_twice(parts)
     with new_folder(folder) as beside:
         lacking += FORMATS[to](parts, beside) or ()
     trials = sum(len(part.record.table) for part in parts)

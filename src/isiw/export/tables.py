@@ -13,8 +13,9 @@ from isiw.estimate import Estimate
 from isiw.export.collection import Part, log_losses, stimulus_of
 from isiw.files import write_output
 from isiw.lazy import pd
-from isiw.log.reader import SessionRecord, trial_columns
-from isiw.text import one_line
+from isiw.log.frames import trial_columns, trial_frame
+from isiw.log.reader import SessionRecord
+from isiw.text.sanitize import one_line
 from isiw.text.stimuli import TAP, StimulusWords, meanings
 
 Columns = Mapping[str, tuple[str, str]]
@@ -116,7 +117,7 @@ def tidy(frame: pd.DataFrame) -> pd.DataFrame:
 
 def all_trials(parts: Sequence[Part]) -> pd.DataFrame:
     """The trials of all sessions, a row a trial, each with its person, session and number."""
-    frames = [part.record.trials.rename_axis("trial").reset_index().assign(**part.whose) for part in parts]
+    frames = [trial_frame(part.record).rename_axis("trial").reset_index().assign(**part.whose) for part in parts]
     table = pd.concat(frames, ignore_index=True).astype(dict.fromkeys(_WHOSE, object))
     return table[[*_WHOSE, *(name for name in table.columns if name not in _WHOSE)]]
 

@@ -18,52 +18,11 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO, Final, NamedTuple, Self
+from typing import IO
 
 from isiw.errors import LogError, os_errors
 from isiw.files import force, new_file, sync_folder, take_free_place
-
-_DAMAGED: Final = ".damaged"
-
-
-class Fingerprint(NamedTuple):
-    """Which file it is, and in which state: it differs if a file was written to, or another is in its place."""
-
-    device: int
-    inode: int
-    size: int
-    changed_ns: int
-
-    @classmethod
-    def of(cls, file: IO[bytes] | Path) -> Self:
-        """The fingerprint of an open file, or of the file at a path."""
-        found = file.stat() if isinstance(file, Path) else os.fstat(file.fileno())
-        return cls(found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns)
-
-
-def part_of(path: Path) -> Path:
-    """Where a log is while it is being written."""
-    if not path.name:
-        raise LogError("a log needs a file's name", got=str(path))
-    return path.with_name(f"{path.name}.part")
-
-
-def log_of(path: Path) -> Path:
-    """Where a log is once it is finished, from either of its names."""
-    if "\0" in str(path):
-        raise LogError("no file can have a NUL character in its path", got=str(path), remedy="Choose another path.")
-    return path.with_suffix("") if path.suffix == ".part" else path
-
-
-def log_exists(log: Path) -> bool:
-    """True if there is a log of this name, finished or still being written."""
-    return log.exists() or part_of(log).exists()
-
-
-def kept_for(path: Path) -> Path | None:
-    """The log whose damaged file is kept at a path; None if the path's name does not say so."""
-    name, damaged, number = path.name.rpartition(_DAMAGED)
-    return path.with_name(name) if damaged and name and (number.isdecimal() or not number) else None
+from isiw.log.places import DAMAGED
 
 
 class DurableFile:
@@ -203,7 +162,7 @@ def begun(path: Path, wanted: Path | None = None) -> Iterator[DurableFile]:
 
 def keep_damaged(damaged: Path, target: Path) -> None:
     """Keep a damaged file's bytes under a name of their own."""
-    names = (target.with_name(f"{target.name}{_DAMAGED}{number or ''}") for number in itertools.count())
+    names = (target.with_name(f"{target.name}{DAMAGED}{number or ''}") for number in itertools.count())
     kept = next(name for name in names if not os.path.lexists(name))
     try:
         kept.hardlink_to(damaged)

@@ -235,8 +235,8 @@ class Header(_Header):
     @property
     def conditioning(self) -> Conditioning:
         """The conditioning stimulus, as the strategy's settings or the device state it."""
-        told: Conditioning = self.strategy.settings.get("conditioning", self.device.conditioning)
-        return told
+        stated: Conditioning = self.strategy.settings.get("conditioning", self.device.conditioning)
+        return stated
 
     @property
     def stimulus(self) -> StimulusWords:
@@ -246,8 +246,8 @@ class Header(_Header):
     @property
     def detection_limit_mv(self) -> float | None:
         """The amplitude that 0 is known to be below [mV]: as the device or the strategy's settings state it."""
-        told = self.strategy.settings.get("detection_limit_mv")
-        return self.device.detection_limit_mv if told is None else float(told)
+        stated = self.strategy.settings.get("detection_limit_mv")
+        return self.device.detection_limit_mv if stated is None else float(stated)
 
 
 class ThresholdHeader(_Header):

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Final
 
 from isiw.errors import LogError
-from isiw.log.durable import log_of
 from isiw.log.headers import RUN_KEY, SERVED_KEY, AnyHeader, Header
+from isiw.log.places import log_of
 from isiw.text.sanitize import command
 
 OWN_LOOP: Final = "a loop of the lab's own"

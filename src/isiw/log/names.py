@@ -9,9 +9,9 @@ from typing import Final, cast
 
 from isiw.errors import LogError
 from isiw.files import in_the_way, is_reserved, twin
-from isiw.log.durable import log_of, part_of
 from isiw.log.headers import AnyHeader
 from isiw.log.kinds import continued_by
+from isiw.log.places import log_of, part_of
 from isiw.log.salvage import salvage_file
 from isiw.log.schema import decode
 

@@ -2,31 +2,25 @@
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final, Generic, TypeVar, cast
+from typing import Any, Generic, TypeVar, cast
 
 from isiw.errors import DamagedLogError, InvalidValueError, LogError
-from isiw.findings import lacking
-from isiw.lazy import pd
+from isiw.findings import is_silent, lacking
 from isiw.log.headers import SCHEMA_VERSION, Header, ThresholdHeader
 from isiw.log.kinds import LogKind, continued_by, of_another_kind
 from isiw.log.records import Onset, Records, unknown_of
 from isiw.log.salvage import Salvage, salvage
 from isiw.log.schema import EstimateRecord, Event, Intent, PulseOutcome, Record, waveform_topic
 from isiw.log.verdicts import VERDICTS, doubted_by, under_all
-from isiw.signals.amplitudes import is_silent
-from isiw.signals.measures import Measures, measures
-from isiw.signals.tap import TapResponses
 from isiw.strategy.decisions import StopDecision
 from isiw.summary import JUDGED_SINCE
-from isiw.sweeps import Channel, Sweep
+from isiw.sweeps import Channel
 from isiw.text.sanitize import command
-from isiw.text.stimuli import TAP, StimulusWords, meanings
 from isiw.trials import Trial, TrialTable
 
 HeaderT = TypeVar("HeaderT", Header, ThresholdHeader)
@@ -106,7 +100,7 @@ class SessionRecord(_StimuliRecord[Header]):
         strategy = header.strategy.name or "of a user's own objects"
         lines = [
             f"{kind} of {header.subject or 'an unnamed subject'}, {header.created}",
-            f"Strategy: {strategy}, seed {header.strategy.seed}, {header.space.told(header.stimulus)}",
+            f"Strategy: {strategy}, seed {header.strategy.seed}, {header.space.in_words(header.stimulus)}",
             f"Trials: {self.table.counted(header.stimulus)}"
             + (f", {len(self.unknown)} of unknown outcome" if self.unknown else ""),
         ]
@@ -114,7 +108,7 @@ class SessionRecord(_StimuliRecord[Header]):
             lines += [self.too_little or str(last), f"{'Ended' if last.stop else 'Not over'}: {last.reason}"]
             if self.is_judged_since:
                 lines.append(JUDGED_SINCE)
-        return "\n".join([*lines, *self.told_unread, *(f"Lost: {loss}" for loss in self.losses), f"Log: {self.path}"])
+        return "\n".join([*lines, *self.unread_said, *(f"Lost: {loss}" for loss in self.losses), f"Log: {self.path}"])
 
     @property
     def conceals(self) -> bool:
@@ -134,7 +128,7 @@ class SessionRecord(_StimuliRecord[Header]):
             )
 
     @property
-    def told_unread(self) -> tuple[str, ...]:
+    def unread_said(self) -> tuple[str, ...]:
         """A sentence for each part of the header that this version cannot read."""
         said = "The log's {} cannot be read by this version of isiw: {}"
         return tuple(said.format(part, why) for part, why in self.unread.items())
@@ -144,23 +138,6 @@ class SessionRecord(_StimuliRecord[Header]):
         """All trials whose outcome was logged, as they count after what an operator said about them."""
         trials = sorted((r for r in self.history if isinstance(r, Trial)), key=lambda trial: trial.index)
         return under_all(TrialTable(tuple(trials)), self.events)
-
-    @property
-    def trials(self) -> pd.DataFrame:
-        """All trials as a DataFrame, a row a trial, indexed by their number: onset, outcome, and the belief after it.
-
-        The columns are those of `isiw.log.reader.TRIAL_COLUMNS`.
-        """
-        return trial_frame(self.table, self.onsets, self.estimates, self.measures)
-
-    @cached_property
-    def measures(self) -> Mapping[int, Measures]:
-        """Measures of the sweeps of trials that count, beside the amplitude, by the trial's number."""
-        emg = {trial: channel for (trial, name), channel in self.waveforms.items() if name == "emg"}
-        signals, taps = self.header.signals, TapResponses(self.header.signals.mep_window_ms)
-        for trial in self.table if any(trial.tap_mv for trial in self.table) else ():
-            taps = taps.after(trial, Sweep({"emg": emg[trial.index]} if trial.index in emg else {}))
-        return {t.index: measures(emg[t.index], t, signals, taps) for t in self.table.told if t.index in emg}
 
     def require_end(self) -> None:
         """Raise if nobody knows how many stimuli were given."""
@@ -241,17 +218,7 @@ class SessionRecord(_StimuliRecord[Header]):
 
 
 def read_session(path: str | Path, *, channels: Iterable[str] | None = None) -> SessionRecord:
-    """Read a log, finished or not, whole or damaged; `losses` says what is missing.
-
-    Args:
-        path: the log, with or without `.part`.
-        channels: the channels whose samples are wanted, such as `["emg"]`; waveforms of others have none. All by
-            default; with fewer a log is read faster, and in less memory.
-
-    Raises:
-        LogError: no such file, not a log, or one from a newer version.
-        DamagedLogError: a log of which not even the header can be read.
-    """
+    """The session of a log, of whose channels these have samples; `isiw.log.frames.read_session` has it with tables."""
     return read_salvaged(salvage(path, topics_of(channels)))
 
 
@@ -277,7 +244,7 @@ def read_any(salvaged: Salvage, wanted: LogKind = LogKind.SEARCH) -> SessionReco
     read: dict[str, Any] = {
         "path": salvaged.path,
         "history": tuple(records.history),
-        "losses": records.told_losses,
+        "losses": records.losses_said,
         "finished": salvaged.finished,
         "end_lost": salvaged.end_lost,
         "delivered": records.delivered,
@@ -300,99 +267,3 @@ def require_records(records: Iterable[object]) -> None:
             raise InvalidValueError(
                 "this is not a session record", got=record, remedy="Read the log first: isiw.read_session(path)."
             )
-
-
-_COLUMNS: Final[Mapping[str, tuple[str, str]]] = {
-    "onset_s": ("s", "when it was about to be delivered, since the first stimulus of the log"),
-    "intent_utc": ("", "the same by the computer's clock, UTC"),
-    "status": ("", "accepted, or mistrial: nothing is learnt from it"),
-    "commanded_isi_ms": ("ms", "the commanded ISI; none for a control trial"),
-    "reason": ("", "why it is a mistrial"),
-    "isi_ms": ("ms", "the realised ISI"),
-    "isi_sd_ms": ("ms", "SD of the realised ISI; 0 if it was measured"),
-    "mep_mv": ("mV", "peak-to-peak amplitude of the MEP; 0 is below the detection limit"),
-    "mep_sd_mv": (
-        "mV",
-        "SD of the amplitude, as what {0.one} alone evokes varies",
-    ),
-    "tap_mv": ("mV", "what is left in it of what {0.one} alone evokes, in the mean; empty if that is not known"),
-    "mep_onset_ms": ("ms", "onset of the MEP after the magnetic pulse; empty without a sweep or an MEP"),
-    "mep_duration_ms": ("ms", "from its onset to its end"),
-    "mep_area_mv_ms": ("mV.ms", "area of the rectified EMG from its onset to its end"),
-    "silent_period_ms": ("ms", "of a contracted muscle, from the magnetic pulse until the EMG is back"),
-    "background_rms_uv": ("uV", "RMS of the EMG before the magnetic pulse"),
-    "t_valve_ms": ("ms", "the valve command, on the sweep's clock"),
-    "t_hit_ms": ("ms", "the {0.moment}, on the sweep's clock"),
-    "t_tms_ms": ("ms", "the magnetic pulse, on the sweep's clock"),
-    "excluded": ("", "whether an operator excluded it afterwards"),
-    "tap_alone": ("", "whether it was {0.one} without the magnetic pulse"),
-    "intensity_pct_rmt": (
-        "%",
-        "intensity of the pulse, of the resting motor threshold; empty for the usual one of the pairs",
-    ),
-    "overruled": ("", "why it had been a mistrial before an operator accepted it"),
-    "p_window": ("", "probability that there is a window, after this trial"),
-    "window_start_ms": ("ms", "start of the window that was reported after this trial; empty if none was"),
-    "window_end_ms": ("ms", "its end"),
-    "start_ms": ("ms", "posterior median of the start, given a window; infinite beyond the range"),
-    "start_low_ms": ("ms", "lower end of its 90 % interval"),
-    "start_high_ms": ("ms", "upper end of its 90 % interval"),
-    "end_ms": ("ms", "posterior median of the end, given a window; infinite beyond the range"),
-    "end_low_ms": ("ms", "lower end of its 90 % interval"),
-    "end_high_ms": ("ms", "upper end of its 90 % interval"),
-    "expected_f1": ("", "posterior mean of the F1 of the reported window"),
-    "next_isi_ms": ("ms", "the ISI that was chosen next"),
-}
-
-
-def trial_columns(first: StimulusWords) -> dict[str, tuple[str, str]]:
-    """Unit and meaning of each column of `trial_frame`, in their order."""
-    return meanings(_COLUMNS, first)
-
-
-TRIAL_COLUMNS: Final[Mapping[str, tuple[str, str]]] = trial_columns(TAP)
-"""The same after a tap."""
-
-_TEXTS: Final = ("status", "reason", "overruled")
-_FLAGS: Final = ("excluded", "tap_alone")
-_NUMBERS: Final = tuple(name for name in TRIAL_COLUMNS if name not in {*_TEXTS, *_FLAGS, "intent_utc"})
-_BELIEF: Final = tuple(TRIAL_COLUMNS)[tuple(TRIAL_COLUMNS).index("p_window") :]
-
-
-def trial_frame(
-    table: TrialTable,
-    onsets: Mapping[int, Onset],
-    estimates: Iterable[EstimateRecord],
-    measured: Mapping[int, Measures],
-) -> pd.DataFrame:
-    """All trials as a DataFrame, a row a trial, columns as in `TRIAL_COLUMNS`, indexed by `index`."""
-    beliefs = {estimate.trial: estimate for estimate in estimates}
-    times = {trial: {"onset_s": onset.onset_s, "intent_utc": onset.at_ns} for trial, onset in onsets.items()}
-    rows = [
-        times.get(trial.index, {})
-        | _outcome(trial)
-        | measured.get(trial.index, Measures())._asdict()
-        | _belief(beliefs.get(trial.index))
-        for trial in table
-    ]
-    index = pd.Index([trial.index for trial in table], name="index", dtype=int)
-    frame = pd.DataFrame(rows, index=index, columns=list(TRIAL_COLUMNS))
-    kinds = dict.fromkeys(_NUMBERS, "float64") | dict.fromkeys(_FLAGS, "bool")
-    return frame.astype(kinds).assign(intent_utc=pd.to_datetime(frame["intent_utc"], unit="ns", utc=True))
-
-
-def _outcome(trial: Trial) -> dict[str, Any]:
-    values = {field.name: getattr(trial, field.name) for field in dataclasses.fields(Trial) if field.name != "index"}
-    return values | {name: None if values[name] is None else str(values[name]) for name in _TEXTS}
-
-
-def _belief(estimate: EstimateRecord | None) -> dict[str, Any]:
-    if estimate is None:
-        return {}
-    window = estimate.window
-    special = {
-        "p_window": estimate.probability,
-        "window_start_ms": None if window is None else window.start_ms,
-        "window_end_ms": None if window is None else window.end_ms,
-    }
-    return special | {name: getattr(estimate, name) for name in _BELIEF if name not in special}

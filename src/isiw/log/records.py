@@ -166,7 +166,7 @@ class Records:
         return records
 
     @property
-    def told_losses(self) -> tuple[str, ...]:
+    def losses_said(self) -> tuple[str, ...]:
         """The losses, as many as somebody will read."""
         left = len(self.losses) - MOST_LOSSES
         listed = tuple(self.losses[:MOST_LOSSES])

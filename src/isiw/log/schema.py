@@ -90,8 +90,10 @@ class PulseOutcome(LogRecord):
     place_mm: tuple[float, float] | None = None
 
 
-class ThresholdBelief(LogRecord):
+class ThresholdEstimateRecord(LogRecord):
     """The estimate of a motor threshold after a pulse, and whether to stop."""
+
+    model_config = ConfigDict(title="ThresholdBelief")  # as its schema is called in every log
 
     trial: TrialNumber
     estimate: ThresholdEstimate
@@ -214,7 +216,7 @@ class Event(LogRecord):
 
 
 Record: TypeAlias = (
-    AnyHeader | Intent | Trial | Waveform | EstimateRecord | Event | PulseOutcome | ThresholdBelief | Production
+    AnyHeader | Intent | Trial | Waveform | EstimateRecord | Event | PulseOutcome | ThresholdEstimateRecord | Production
 )
 
 
@@ -225,7 +227,7 @@ _KINDS: dict[str, type[Any]] = {
     "/estimate": EstimateRecord,
     "/event": Event,
     "/threshold/pulse": PulseOutcome,
-    "/threshold/belief": ThresholdBelief,
+    "/threshold/belief": ThresholdEstimateRecord,
     "/production_header": ProductionHeader,
     "/production": Production,
 }

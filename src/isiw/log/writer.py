@@ -12,18 +12,11 @@ from mcap.writer import Writer
 
 from isiw.errors import LogError, os_errors
 from isiw.files import beside
-from isiw.log.durable import (
-    DurableFile,
-    Fingerprint,
-    begun,
-    claimed,
-    keep_damaged,
-    log_of,
-    part_of,
-)
+from isiw.log.durable import DurableFile, begun, claimed, keep_damaged
 from isiw.log.headers import AnyHeader, as_toml
 from isiw.log.moments import boot_id
 from isiw.log.names import COPYING, require_free
+from isiw.log.places import Fingerprint, log_of, part_of
 from isiw.log.salvage import Salvage, holds, salvage_file
 from isiw.log.schema import (
     ANNOUNCEMENT,

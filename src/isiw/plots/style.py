@@ -20,7 +20,7 @@ from isiw.errors import InvalidValueError
 from isiw.estimate import Estimate
 from isiw.files import write_output
 from isiw.log.reader import SessionRecord
-from isiw.text import one_line
+from isiw.text.sanitize import one_line
 from isiw.window import Interval
 
 INK, FAINT, BLUE, ORANGE, GREEN, RED = "#222222", "#8a8a8a", "#0072b2", "#e69f00", "#009e73", "#d55e00"

@@ -31,7 +31,7 @@ from isiw.plots.style import (
 from isiw.signals.impact import VALVE_MS
 from isiw.signals.limits import EMG_UNITS_MV
 from isiw.sweeps import Channel
-from isiw.text import plain
+from isiw.text.sanitize import plain
 from isiw.trials import Trial
 from isiw.types import BoolArray, FloatArray
 

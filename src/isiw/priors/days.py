@@ -30,7 +30,7 @@ from isiw.text.sanitize import command
 from isiw.types import FloatArray, IntArray
 from isiw.visit import MOST_APART_PCT_RMT
 
-TOLD_LOSSES: Final = 3
+LISTED_LOSSES: Final = 3
 """Losses that an error names; isiw show lists them all."""
 
 
@@ -69,7 +69,7 @@ def require_whole(record: SessionRecord, way_on: str = "in Python with isiw.prio
     if record.losses:
         raise DamagedLogError(
             "the log is damaged, so that what a person excluded may count as if nobody had",
-            got=f"{record.path}: {' '.join(record.losses[:TOLD_LOSSES])}",
+            got=f"{record.path}: {' '.join(record.losses[:LISTED_LOSSES])}",
             remedy=f"Leave it out; or, if what {command('show', record.path)} lists is right, let it count "
             f"all the same, {way_on}.",
         )
@@ -109,8 +109,8 @@ def _of_rig(prior: Prior, record: SessionRecord) -> Prior:
     start = prior.profile.start
     delay_ms = stated_hit_delay_ms(record) or start.hit_delay_ms
     profile = replace(prior.profile, start=replace(start, hit_delay_ms=delay_ms)).after(record.header.conditioning)
-    told = record.header.strategy.settings.get("muscle")
-    known = told if told in {muscle.name for muscle in prior.muscles} else None
+    stated = record.header.strategy.settings.get("muscle")
+    known = stated if stated in {muscle.name for muscle in prior.muscles} else None
     settings, visit = record.header.strategy.settings, record.header.visit
     stated_pct_rmt = settings.get("intensity_pct_rmt") or visit.intensity_pct_rmt or prior.intensity_pct_rmt
     return replace(prior, profile=profile, muscle=prior.muscle or known, intensity_pct_rmt=stated_pct_rmt)

@@ -20,7 +20,7 @@ from isiw.priors.differing import Difference
 from isiw.report.html import rendered, write_page
 from isiw.report.tables import first_facts
 from isiw.report.words import counts_sentence, finding_sentences
-from isiw.text import one_line
+from isiw.text.sanitize import one_line
 
 HEADINGS = ("session", "subject", "begun", "trials", "P(window)", "window", "start", "end")
 """The columns of the table."""
@@ -156,5 +156,5 @@ def comparison_page(records: Sequence[SessionRecord], differences: Sequence[Diff
             }
             for record in records
         ],
-        losses=[f"{record.path.name}: {loss}" for record in records for loss in (*record.told_unread, *record.losses)],
+        losses=[f"{record.path.name}: {loss}" for record in records for loss in (*record.unread_said, *record.losses)],
     )

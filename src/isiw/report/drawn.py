@@ -16,7 +16,7 @@ from isiw.report.words import answer_and_warnings
 from isiw.signals.limits import EMG_UNITS_MV
 from isiw.summary import tap_unmeasured
 from isiw.sweeps import Channel
-from isiw.text import plain
+from isiw.text.sanitize import plain
 from isiw.trials import Trial
 from isiw.types import FloatArray
 
@@ -41,7 +41,7 @@ _ROOM: Final = 0.35
 def drawn(record: SessionRecord) -> dict[str, Any]:
     """A session as numbers for the browser."""
     header = record.header
-    beliefs = {estimate.trial: _belief(record, estimate) for estimate in record.estimates}
+    estimated = {estimate.trial: _estimated(record, estimate) for estimate in record.estimates}
     return {
         "reference": header.space.reference,
         "isiAxis": header.stimulus.isi_axis(header.space.reference),
@@ -51,7 +51,7 @@ def drawn(record: SessionRecord) -> dict[str, Any]:
         "acquisition": plain(str(header.strategy.settings.get("acquisition", ""))),
         "scored": any(estimate.scores for estimate in record.estimates),
         "trials": [_trial(record, trial) for trial in record.table],
-        "beliefs": beliefs,
+        "beliefs": estimated,
         "fallbacks": {e.trial: plain(e.text) for e in record.events if e.kind == "fallback" and e.trial is not None},
     }
 
@@ -83,7 +83,7 @@ def _trial(record: SessionRecord, trial: Trial) -> dict[str, Any]:
     }
 
 
-def _belief(record: SessionRecord, estimate: EstimateRecord) -> dict[str, Any]:
+def _estimated(record: SessionRecord, estimate: EstimateRecord) -> dict[str, Any]:
     pairs = sum(trial.isi_ms is not None for trial in _known_by(record, estimate.trial))
     nothing = lacking(pairs, silent=record.is_silent, in_doubt=record.in_doubt)
     window = estimate.window if nothing is None else None

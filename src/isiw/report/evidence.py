@@ -13,7 +13,7 @@ import numpy as np
 from isiw import sentences
 from isiw.findings import IN_DOUBT, NO_MEP
 from isiw.log.reader import SessionRecord
-from isiw.signals.amplitudes import stopped_after, told_of
+from isiw.signals.amplitudes import counted_of, stopped_after
 from isiw.trials import Trial
 from isiw.types import ArrayLike, FloatArray
 from isiw.window import Window
@@ -143,7 +143,7 @@ def nothing_stood_out(trials: Sequence[Trial], window_ms: tuple[float, float] | 
     """
     of_pairs = [trial for trial in trials if trial.intensity_pct_rmt is None]
     known = [trial for trial in of_pairs if trial.mep_mv is not None and trial.background_rms_uv]
-    stood_out = [one.stands_out for one in told_of(known)]
+    stood_out = [one.stands_out for one in counted_of(known)]
     if len(known) >= ENOUGH_TO_STAND_OUT and not any(stood_out):
         return sentences.at_rest(window_ms, None)
     first = stopped_after([trial.isi_ms for trial in known], stood_out)

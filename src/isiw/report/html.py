@@ -11,8 +11,8 @@ from typing import Any, Final
 
 from isiw.errors import InvalidValueError
 from isiw.files import check_output, write_output
-from isiw.text import plain
 from isiw.text.named_code import library
+from isiw.text.sanitize import plain
 
 _ASSETS: Final = resources.files("isiw.report") / "assets"
 _SUFFIXES: Final = {".html", ".htm"}

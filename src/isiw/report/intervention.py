@@ -97,7 +97,7 @@ def contents_of(record: SessionRecord, states: Sequence[str] = ()) -> Interventi
         record.header.subject or "an unnamed subject",
         record.path.name,
         [*states, *given],
-        (*record.told_unread, *record.losses),
+        (*record.unread_said, *record.losses),
         [*facts, Fact("arm", arm), Fact("protocol", plan.protocol_code), more],
     )
 

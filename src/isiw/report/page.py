@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
+from isiw.log.frames import measures_of
 from isiw.log.reader import SessionRecord, require_records
 from isiw.plots.session import session_figure
 from isiw.plots.style import inline_svg
@@ -67,12 +68,13 @@ def report_page(record: SessionRecord, *, truth: Window | None = None) -> str:
     require_records((record,))
     if record.header.intervention is not None:
         return intervention_page(contents_of(record, _states(record)))
+    measured = measures_of(record)
     scripts = [library("plotly.offline", "report").get_plotlyjs(), asset("draw.js"), asset("page.js")]
     contents = {
         "pictures": _pictures(record, truth),
         "subject": record.header.subject or "an unnamed subject",
         "states": _states(record),
-        "losses": (*record.told_unread, *record.losses),
+        "losses": (*record.unread_said, *record.losses),
         "statement": [said for said in statement(record) if said.name not in _SAID_ABOVE],
         "fit": fit_sentence(record),
         "answers": answers(record),
@@ -83,7 +85,7 @@ def report_page(record: SessionRecord, *, truth: Window | None = None) -> str:
         "lost": lost_rows(record),
         "events": event_rows(record),
         "counted": counted_rows(record),
-        "trials": [trial_row(t, record.header.stimulus, record.measures.get(t.index)) for t in record.table],
+        "trials": [trial_row(t, record.header.stimulus, measured.get(t.index)) for t in record.table],
         "drawn": drawn(record),
         "log": record.path.name,
     }

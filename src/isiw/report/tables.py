@@ -35,7 +35,7 @@ def first_facts(record: SessionRecord) -> list[Fact]:
     versions = ", ".join(f"{package} {version}" for package, version in header.versions.items())
     own = {"trials": f"imported from {header.source}; {_whose(header.device.simulated)}"}
     session = {"device": _device(record), "limits": _limits(header.limits)}
-    told = {
+    groups = {
         "subject": _subject(record),
         "date": header.created.replace("T", " ").replace("+00:00", " UTC"),
         **(own if header.imported else session),
@@ -44,7 +44,7 @@ def first_facts(record: SessionRecord) -> list[Fact]:
         "version": f"isiw {header.isiw_version}" + (f" ({versions})" if versions else ""),
     }
     parts = {"date": "created", "version": "isiw_version"}
-    return [Fact(name, " ".join(_read(record, parts.get(name, name), value).split())) for name, value in told.items()]
+    return [Fact(name, " ".join(_read(record, parts.get(name, name), value).split())) for name, value in groups.items()]
 
 
 def further_facts(record: SessionRecord) -> list[Fact]:
@@ -58,19 +58,19 @@ def further_facts(record: SessionRecord) -> list[Fact]:
     }
     groups: dict[str, Any] = {
         "visit": header.visit,
-        "ISIs": header.space.told(header.stimulus),
+        "ISIs": header.space.in_words(header.stimulus),
         "tolerance": f"{header.space.tolerance_ms:g} ms",
         "judgement of a sweep": header.signals,
         **({} if header.imported else loop),
         "log": f"{record.path.name}, schema {header.schema_version}",
     }
-    told = {name: value if isinstance(value, str) else _fields(value) for name, value in groups.items()}
+    shown = {name: value if isinstance(value, str) else _fields(value) for name, value in groups.items()}
     parts = {
         "judgement of a sweep": "signals",
         "deadline of a delivery": "timeout_s",
         "deadline of a choice": "ask_deadline_s",
     }
-    return [Fact(name, _read(record, parts.get(name, name), value)) for name, value in told.items() if value]
+    return [Fact(name, _read(record, parts.get(name, name), value)) for name, value in shown.items() if value]
 
 
 def settings_facts(record: SessionRecord) -> list[Fact]:

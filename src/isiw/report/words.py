@@ -299,8 +299,8 @@ def _unstated_stimulus(record: SessionRecord) -> str:
 def _expects_a_tap(record: SessionRecord) -> str:
     """That a strategy expects windows as after a tap, if an electrical pulse came first."""
     name, estimate = record.header.strategy.name, record.estimates[-1]
-    states_beliefs = estimate.probability is not None and estimate.depressed_probability is None
-    if record.header.conditioning == "tap" or not states_beliefs or name not in list_strategies():
+    is_bayesian = estimate.probability is not None and estimate.depressed_probability is None
+    if record.header.conditioning == "tap" or not is_bayesian or name not in list_strategies():
         return ""
     if known_settings(name, {"conditioning": record.header.conditioning}):
         return ""

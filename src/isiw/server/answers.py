@@ -14,7 +14,7 @@ from isiw.estimate import Estimate, Reported
 from isiw.findings import Kind
 from isiw.session.state import State
 from isiw.strategy.decisions import StopDecision
-from isiw.text import plain
+from isiw.text.sanitize import plain
 from isiw.trials import Status, Trial
 
 _LONGEST_VALUE: Final = 200

@@ -11,7 +11,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
 
 from isiw.checks import MOST_TRIALS
-from isiw.config.sections import LimitsConfig, SpaceConfig, StrategyConfig, VisitConfig, require_together, require_units
+from isiw.config.sections import PersonsVisit, Space, StrategyConfig, require_together, require_units
+from isiw.design import VALVE_SPACE
+from isiw.devices.limits import PulseLimits
 from isiw.errors import InvalidValueError, IsiwError
 from isiw.log.schema import TrialNumber
 from isiw.server.answers import Refusal
@@ -78,13 +80,13 @@ class CreateRequest(_Request):
 
     id: str = Field(pattern=NAME, description="Letters, digits, - and _; the log is ID.mcap.")
     seed: int = Field(default=0, ge=0, lt=2**63, description="Seed of the strategy.")
-    visit: VisitConfig = VisitConfig()
-    space: SpaceConfig = Field(
-        default=SpaceConfig(reference="valve"),
+    visit: PersonsVisit = PersonsVisit()
+    space: Space = Field(
+        default=VALVE_SPACE,
         description="Without it, ISIs count from the valve command, from 0 to 500 ms.",
     )
     strategy: StrategyConfig = StrategyConfig()
-    limits: LimitsConfig = LimitsConfig()
+    limits: PulseLimits = PulseLimits()
     protocol: VisitProtocol = VisitProtocol()
     earlier: GivenPulses | None = Field(
         default=None, description="TMS alone that was given before; limits.max_pulses counts it."
@@ -132,7 +134,7 @@ class AskRequest(_Request):
     )
 
 
-_TOLD_BY: Any = Field(
+_CLIENT: Any = Field(
     default=None, pattern=KEY, description="The client's key, if any; another's than that which asked is refused."
 )
 
@@ -157,7 +159,7 @@ class TellRequest(_Request):
     intensity_pct_rmt: float | None = Field(
         default=None, description="Intensity of TMS alone [% RMT]; null for that of the pairs."
     )
-    client: str | None = _TOLD_BY
+    client: str | None = _CLIENT
 
 
 class MistrialRequest(_Request):
@@ -167,7 +169,7 @@ class MistrialRequest(_Request):
     reason: Text = Field(
         default="rejected", description="A reason that isiw knows, such as no impact; any other becomes a note."
     )
-    client: str | None = _TOLD_BY
+    client: str | None = _CLIENT
 
 
 _KEY: Final = r"^[A-Za-z0-9_-]{1,64}$"

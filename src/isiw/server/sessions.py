@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 import threading
 from collections.abc import Callable, Iterator
@@ -10,11 +9,11 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Final, TypeVar
 
-from isiw.devices.limits import Limits
+from isiw.devices.limits import USUAL_ITI_S
 from isiw.errors import ConfigError, error_text
 from isiw.files import made_folder, twin
-from isiw.log.durable import log_exists, log_of, part_of
 from isiw.log.headers import SERVED_KEY
+from isiw.log.places import log_exists, log_of, part_of
 from isiw.log.reader import SessionRecord, read_session
 from isiw.log.schema import Event
 from isiw.server.answers import EstimateAnswer, Refusal, SessionAnswer, SessionEntry, TrialRow
@@ -176,7 +175,7 @@ class Sessions:
                 self._opening.discard(name)
 
     def _begin(self, request: CreateRequest) -> SessionAnswer:
-        space, doubts = request.space.design(), list[str]()
+        space, doubts = request.space, list[str]()
         stated = {"intensity_pct_rmt": request.visit.intensity_pct_rmt}
         settings = known_settings(request.strategy.name, stated) | request.strategy.settings
         strategy = make_strategy(request.strategy.name, space=space, seed=request.seed, **settings)
@@ -190,7 +189,7 @@ class Sessions:
             strategy,
             self._path(request.id),
             earlier=request.earlier.trials if request.earlier else (),
-            limits=dataclasses.replace(Limits.of_space(space), **request.limits.model_dump()),
+            limits=request.limits.within(space).stated(USUAL_ITI_S),
             subject=request.visit.subject,
             visit=request.visit.noted(),
             protocol=request.protocol,

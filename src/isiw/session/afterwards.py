@@ -9,10 +9,11 @@ import isiw
 from isiw.errors import LogError
 from isiw.intervention import Arm
 from isiw.log.kinds import LogKind, kind_of, of_another_kind, require_session
+from isiw.log.new_verdicts import exclusion, inclusion
 from isiw.log.reader import read_salvaged
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event
-from isiw.log.verdicts import changed_after, exclusion, inclusion
+from isiw.log.verdicts import changed_after
 from isiw.log.writer import LogWriter
 from isiw.session.examination import estimate_record
 from isiw.session.replay import strategy_of

@@ -18,8 +18,8 @@ from isiw.devices.limits import USUAL_ITI_S, Limits
 from isiw.devices.protocol import Device
 from isiw.errors import InvalidValueError, StrategyError
 from isiw.intervention import Intervention
-from isiw.log.durable import log_of
 from isiw.log.headers import FirstStep, Header, StrategyRecipe
+from isiw.log.places import log_of
 from isiw.log.schema import now
 from isiw.native.library import version as engine_version
 from isiw.pairing.agenda import Agenda
@@ -40,9 +40,9 @@ from isiw.strategy.decisions import stimuli_left
 from isiw.strategy.strategy import Strategy
 from isiw.visit import Visit, VisitProtocol
 
-BELIEF_VERSION: Final = 6
+ESTIMATE_VERSION: Final = 6
 ENGINE_VERSION: Final = 4
-"""Which belief a session learns by, and which engine computes it, for its header."""
+"""Which prior a session learns by, and which engine computes it, for its header."""
 
 _PACKAGES = ("numpy", "torch", "botorch", "gpytorch")
 _version = cache(importlib.metadata.version)  # which reads a file
@@ -80,7 +80,7 @@ def require_parts(log: object, options: Mapping[str, Any] = MappingProxyType({})
     return log_of(Path(log))
 
 
-def require_untold(strategy: Strategy, trials: int = 0) -> None:
+def require_new(strategy: Strategy, trials: int = 0) -> None:
     """Raise if a strategy knows of more trials than a session has."""
     if strategy.delivered > trials:
         raise StrategyError(
@@ -131,7 +131,7 @@ def header_of(strategy: Strategy, **details: Any) -> Header:
         **begun(recipe.seed),
         strategy=logged,
         space=strategy.space,
-        belief_version=BELIEF_VERSION,
+        belief_version=ESTIMATE_VERSION,
         engine_version=ENGINE_VERSION,
         earlier=strategy.earlier,
         earlier_changed=strategy.earlier_changed,
@@ -250,8 +250,8 @@ def assembled(
         strategy.only_counts = True
 
         def attended() -> bool:
-            somebody = console.reads_keys or bool(sink.followers)
-            return somebody or safeguards.on_pause is not None or not rig.info.simulated
+            attended = console.reads_keys or bool(sink.followers)
+            return attended or safeguards.on_pause is not None or not rig.info.simulated
 
         steps.keep_to(Blocks(Agenda(intervention, strategy, strategy.seed), rig.clock, attended))
     return Parts(path, header, limits, safeguards, sink, rig, examination, pausing, steps)

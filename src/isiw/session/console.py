@@ -22,7 +22,7 @@ from isiw.session.pausing import Asking
 from isiw.session.sink import SessionUpdate
 from isiw.session.state import State
 from isiw.session.terminal import COLUMNS, ERASED, ESCAPE, Keys, Screen, columns, folded, is_terminal
-from isiw.text import plain
+from isiw.text.sanitize import plain
 from isiw.text.stimuli import TAP, StimulusWords
 from isiw.trials import TrialTable
 

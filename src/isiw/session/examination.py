@@ -17,8 +17,9 @@ from isiw import checks, summary
 from isiw.change import Change
 from isiw.errors import LimitExceededError, StrategyError, error_text
 from isiw.findings import Finding, Kind, Severity
+from isiw.log.new_verdicts import is_logged, or_remark
 from isiw.log.schema import EstimateRecord, Event, EventKind, Intent, Record
-from isiw.log.verdicts import changed_after, doubted_by, excluded_by, is_logged, or_remark, under_all
+from isiw.log.verdicts import changed_after, doubted_by, excluded_by, under_all
 from isiw.session.sink import Sink
 from isiw.strategy.choice import candidate_isis
 from isiw.strategy.decisions import StopDecision
@@ -55,7 +56,7 @@ class _Learner(Protocol[TableT, TrialT_contra]):
     def learn_again(self, trials: TableT, /) -> None: ...
     def judged(self, trials: TableT, verdict: Event, /) -> TableT: ...
     def decision(self) -> StopDecision: ...
-    def belief(self, trial: int, decision: StopDecision, next_isi_ms: float | None, /) -> Record: ...
+    def record(self, trial: int, decision: StopDecision, next_isi_ms: float | None, /) -> Record: ...
 
 
 class Known(NamedTuple):
@@ -198,7 +199,7 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
         decide: Callable[[], StopDecision] | None = None,
         ask_next: Callable[[], float | None] = lambda: None,
     ) -> Known | None:
-        """Learn what is not learnt yet, and log what is known then, as `log_belief` does; None if all was learnt."""
+        """Learn what is not learnt yet, and log what is known then, as `log_estimate` does; None if all was learnt."""
         trial = self.unconcluded
         if not self.overruled and trial is None:
             return None
@@ -212,7 +213,7 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
             self._learnt, self._learning = self.trials, trial
         if trial is not None:
             self._learn(trial)
-        known = self.log_belief(decide, ask_next) if len(self.trials) else None
+        known = self.log_estimate(decide, ask_next) if len(self.trials) else None
         if trial is not None:
             self.unconcluded = None
         return known
@@ -229,7 +230,7 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
         if doubt is not None and self._sink.is_open and self.is_new(doubt):
             self.event("doubt", f"{doubt}", finding=doubt.kind)
 
-    def log_belief(
+    def log_estimate(
         self,
         decide: Callable[[], StopDecision] | None = None,
         ask_next: Callable[[], float | None] = lambda: None,
@@ -238,7 +239,7 @@ class Examination(Generic[LearnerT, TableT, TrialT]):
         decision = self._freely(decide or self.learner.decision)
         known = Known(decision, None if decision.stop else ask_next())
         if self._sink.is_open:
-            self._sink.append(self._freely(self.learner.belief, len(self.trials) - 1, *known))
+            self._sink.append(self._freely(self.learner.record, len(self.trials) - 1, *known))
             self._sink.log.sync()
         return known
 
@@ -277,7 +278,7 @@ class _WindowLearner:
     def decision(self) -> StopDecision:
         return self.strategy.decision()
 
-    def belief(self, trial: int, decision: StopDecision, next_isi_ms: float | None) -> EstimateRecord:
+    def record(self, trial: int, decision: StopDecision, next_isi_ms: float | None) -> EstimateRecord:
         return estimate_record(self.strategy, trial, decision, next_isi_ms)
 
 

@@ -176,11 +176,11 @@ class Interrupts:
     def _watch(self) -> None:
         """Disarm at every signal, however busy the main thread is."""
         with suppress(OSError):  # closed at the end
-            while told := self._next():
-                if told[0] == _HANDLED:
+            while command := self._next():
+                if command[0] == _HANDLED:
                     self._disarmed += 1
                     self._heard = self._disarmed
-                elif told[0] in _SIGNALS:
+                elif command[0] in _SIGNALS:
                     self._heard += 1
                     self._disarm()
 

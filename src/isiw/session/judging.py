@@ -7,8 +7,9 @@ from collections.abc import Callable
 
 from isiw.errors import ImplausibleDataWarning, warn
 from isiw.findings import Finding
+from isiw.log.new_verdicts import LOOKED_AT, MANY_CHANGES, acceptance, change, exclusion, inclusion
 from isiw.log.schema import Event
-from isiw.log.verdicts import LOOKED_AT, MANY_CHANGES, acceptance, change, doubted_by, exclusion, inclusion
+from isiw.log.verdicts import doubted_by
 from isiw.session.examination import WindowExamination
 from isiw.strategy.strategy import Strategy
 from isiw.trials import TrialTable

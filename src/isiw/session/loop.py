@@ -15,7 +15,7 @@ from isiw.log.headers import Header
 from isiw.log.pulses import earlier_pulse_ages
 from isiw.log.schema import Event
 from isiw.log.writer import LogWriter
-from isiw.session.assembly import Options, assembled, require_fitting, require_untold
+from isiw.session.assembly import Options, assembled, require_fitting, require_new
 from isiw.session.console import OperatorConsole, Table
 from isiw.session.earlier import Earlier
 from isiw.session.judging import Judging
@@ -23,7 +23,7 @@ from isiw.session.pausing import Pause
 from isiw.session.sink import Follower, SessionResult, Wait
 from isiw.session.state import Fault, State, state_of
 from isiw.session.steps import ended, paused
-from isiw.session.terminal import goes_on, is_terminal, somebody_there
+from isiw.session.terminal import goes_on, is_attended, is_terminal
 from isiw.strategy.decisions import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.trials import TrialTable
@@ -164,7 +164,7 @@ class Session(Judging):
             self._sink.ended()
 
     def _run(self, *, progress: bool | None, keys: bool) -> SessionResult:
-        require_untold(self.strategy, len(self.trials))
+        require_new(self.strategy, len(self.trials))
         self.require_effect()
         earlier_s, sink = self._earlier_s(), self._sink
         shown = sink.on_trial is None and is_terminal(sys.stdout) if progress is None else progress
@@ -174,7 +174,7 @@ class Session(Judging):
                 for record in self._earlier.first_records:
                     sink.append(record)
                 if self.trials:
-                    self._steps.log_belief()
+                    self._steps.log_estimate()
                 self._rig.begin(self._header.given_before + len(self.trials), earlier_s)
                 self._take_up_blocks()
                 decision = self._steps.at_the_end()  # of a session that was resumed; it need not be armed for nothing
@@ -198,7 +198,7 @@ class Session(Judging):
         """Within, the operator's keys are heard, if there is an operator at a terminal; what decides about pauses."""
         if self._safeguards.on_pause is not None:
             yield self._safeguards.on_pause
-        elif keys and somebody_there():
+        elif keys and is_attended():
             with self._console.reading_keys():
                 yield self._console.goes_on
         elif self._sink.followers:

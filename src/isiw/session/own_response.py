@@ -6,8 +6,8 @@ from functools import partial
 from typing import Final
 
 from isiw.log.headers import Header
+from isiw.log.new_verdicts import correction
 from isiw.log.schema import Correction
-from isiw.log.verdicts import correction
 from isiw.session.examination import WindowExamination
 from isiw.signals.tap import TapResponses
 from isiw.strategy.decisions import OF_THE_WINDOW, StopDecision, stimuli_left

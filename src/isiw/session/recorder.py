@@ -15,14 +15,14 @@ from isiw.estimate import WindowEstimate
 from isiw.findings import IN_DOUBT, REMEDIES, Finding, Kind, Severity
 from isiw.log.headers import Header
 from isiw.log.moments import Ages
+from isiw.log.new_verdicts import isi_confirmed, isi_doubted, newly_doubted
 from isiw.log.schema import Event, Intent
-from isiw.log.verdicts import isi_confirmed, isi_doubted, newly_doubted
 from isiw.log.writer import LogWriter
 from isiw.session.earlier import Earlier
 from isiw.session.examination import Examination, examination_of
 from isiw.session.judging import Judging
 from isiw.session.sink import Sink
-from isiw.signals.amplitudes import Doubts, odd_amplitudes, told_of
+from isiw.signals.amplitudes import Doubts, counted_of, odd_amplitudes
 from isiw.signals.plausible import isi_far, require_plausible, require_plausible_range
 from isiw.signals.reported import unconfirmed
 from isiw.strategy.decisions import StopDecision
@@ -113,7 +113,7 @@ class Recorder(Recording[Trial], Judging):
         self._lock = threading.RLock()
         self._pacing = Pacing(header.limits, clock, ages.ages_s)
         self._detection_limit_mv = header.detection_limit_mv
-        self._doubts = Doubts.seen(told_of(self.trials), self._detection_limit_mv)
+        self._doubts = Doubts.seen(counted_of(self.trials), self._detection_limit_mv)
         for doubt in ages.doubts if header.limits.looks_back else ():
             self._examination.event("fault", doubt, durable=True)
             self._say(doubt, ClockWarning)
@@ -264,8 +264,8 @@ class Recorder(Recording[Trial], Judging):
         self._conclude(trial)
         if self._put_in_doubt():
             return
-        off, odd = isi_far(isi_ms, asked.isi_ms, space), odd_amplitudes(told_of(self.trials), self._detection_limit_mv)
-        self._doubts = self._doubts.after((off, *odd))
+        odd = odd_amplitudes(counted_of(self.trials), self._detection_limit_mv)
+        self._doubts = self._doubts.after((isi_far(isi_ms, asked.isi_ms, space), *odd))
         if self._doubts.new is not None:
             self._warn(self._doubts.new)
 

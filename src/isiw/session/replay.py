@@ -15,14 +15,15 @@ from isiw.errors import ConfigError, DeviceError, InvalidValueError, OtherVersio
 from isiw.log.headers import SCHEMA_VERSION, Header, StrategyRecipe
 from isiw.log.kinds import OWN_LOOP
 from isiw.log.moments import Ages, Moment
+from isiw.log.new_verdicts import MANY_CHANGES
 from isiw.log.pulses import pulse_ages
 from isiw.log.reader import SessionRecord
 from isiw.log.salvage import Salvage
 from isiw.log.schema import Event, Intent
-from isiw.log.verdicts import MANY_CHANGES, VERDICTS, changed_after, under
+from isiw.log.verdicts import VERDICTS, changed_after, under
 from isiw.log.writer import LogWriter
 from isiw.pairing.agenda import Agenda
-from isiw.session.assembly import BELIEF_VERSION, ENGINE_VERSION, versions
+from isiw.session.assembly import ENGINE_VERSION, ESTIMATE_VERSION, versions
 from isiw.session.earlier import Earlier
 from isiw.session.examination import relearned
 from isiw.signals.limits import SignalLimits
@@ -30,7 +31,7 @@ from isiw.signals.tap import TapResponses
 from isiw.strategy.catalogue import remade_strategy, settings_for
 from isiw.strategy.strategy import Strategy
 from isiw.sweeps import Sweep
-from isiw.text import plain
+from isiw.text.sanitize import plain
 from isiw.trials import Trial, TrialTable
 
 _COMPARED_AT_EACH_END = 50
@@ -169,7 +170,7 @@ def _known_settings(recipe: StrategyRecipe) -> dict[str, Any]:
 
 def _require_other_versions(intent: Intent, asked_ms: float, header: Header) -> None:
     """Raise if the strategy has no reason to ask something else than it did."""
-    now = SCHEMA_VERSION, BELIEF_VERSION, ENGINE_VERSION
+    now = SCHEMA_VERSION, ESTIMATE_VERSION, ENGINE_VERSION
     same = (header.schema_version, header.belief_version, header.engine_version) == now
     if same and versions() == {**header.versions, "isiw": header.isiw_version}:
         raise StrategyError(

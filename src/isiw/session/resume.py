@@ -13,9 +13,9 @@ from isiw.devices.clock import MonotonicClock
 from isiw.devices.limits import USUAL_ITI_S, Limits
 from isiw.devices.protocol import Device, DeviceInfo, HasMemory, info_of
 from isiw.errors import InvalidValueError, LogError
-from isiw.log.durable import log_exists
 from isiw.log.headers import Header
 from isiw.log.kinds import OWN_LOOP, LogKind, continued_by, of_another_kind, require_session
+from isiw.log.places import log_exists
 from isiw.log.reader import SessionRecord, read_any, read_salvaged
 from isiw.log.salvage import Salvage, salvage
 from isiw.log.writer import LogWriter
@@ -26,8 +26,8 @@ from isiw.session.assembly import (
     header_of,
     require_fitting,
     require_known,
+    require_new,
     require_parts,
-    require_untold,
 )
 from isiw.session.examination import estimate_record
 from isiw.session.intensities import stimulus_of
@@ -78,7 +78,7 @@ def open_session(
     """
     require_known("open_session", options, OwnLoopOptions)
     path = require_parts(log, options, strategy=(strategy, Strategy))
-    require_untold(strategy)
+    require_new(strategy)
     if trials := tuple(earlier):
         strategy.learn_all(trials)
     stated = _stated(strategy.space, options)

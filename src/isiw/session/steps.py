@@ -110,14 +110,14 @@ class Steps:
         of_them = f", {before} of them before the session," if before else ""
         decision = StopKind.LIMIT.stop(f"The limit of {self._header.limits.max_pulses} pulses{of_them} is reached.")
         self._examination.event("limit", decision.reason)
-        self._examination.log_belief(lambda: decision)
+        self._examination.log_estimate(lambda: decision)
         return decision
 
-    def log_belief(self) -> None:
+    def log_estimate(self) -> None:
         """Log what is known after the last trial, which a session that ended then may not have corrected others by."""
         self._own_response.correct()
         if self._examination.conclude(self._decision, self._known_isi_ms) is None:
-            self._examination.log_belief(self._decision, self._known_isi_ms)
+            self._examination.log_estimate(self._decision, self._known_isi_ms)
 
     def last_pair_came(self, ago_s: float | None) -> None:
         """The last pair of an intervention that is resumed was delivered so long ago [s]; None if it was not yet."""

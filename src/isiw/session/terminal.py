@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, Final, Self
 
-from isiw.text import plain
+from isiw.text.sanitize import plain
 
 if sys.platform == "win32":
     import msvcrt
@@ -66,7 +66,7 @@ def folded(text: str) -> str:
     return "\n".join(folds)
 
 
-def somebody_there() -> bool:
+def is_attended() -> bool:
     """True if an operator at a terminal sees what is shown, and can press keys."""
     here = threading.current_thread() is threading.main_thread()  # a program with threads of its own has its own keys
     return here and is_terminal(sys.stdin) and is_terminal(sys.stderr)

@@ -10,7 +10,7 @@ from typing import Any
 from isiw.checks import number, text, whole
 from isiw.devices.clock import Clock, MonotonicClock, Pacing, VirtualClock
 from isiw.devices.limited import require_real_time
-from isiw.devices.limits import Limits
+from isiw.devices.limits import PulseLimits
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DamagedLogError, InvalidValueError, LimitExceededError
 from isiw.log.headers import StrategyRecipe, ThresholdHeader
@@ -18,7 +18,7 @@ from isiw.log.kinds import LogKind, of_another_kind
 from isiw.log.pulses import pulse_ages
 from isiw.log.reader import SessionRecord, ThresholdRecord, read_any
 from isiw.log.salvage import salvage
-from isiw.log.schema import Event, Intent, PulseOutcome, ThresholdBelief
+from isiw.log.schema import Event, Intent, PulseOutcome, ThresholdEstimateRecord
 from isiw.log.writer import LogWriter
 from isiw.session.assembly import begun, require_parts
 from isiw.session.examination import Examination
@@ -215,8 +215,8 @@ class _ThresholdLearner:
     def decision(self) -> StopDecision:
         return self.search.decision()
 
-    def belief(self, trial: int, decision: StopDecision, _: float | None) -> ThresholdBelief:
-        return ThresholdBelief(trial=trial, estimate=self.search.estimate(), decision=decision)
+    def record(self, trial: int, decision: StopDecision, _: float | None) -> ThresholdEstimateRecord:
+        return ThresholdEstimateRecord(trial=trial, estimate=self.search.estimate(), decision=decision)
 
 
 class ThresholdRecorder(Recording[PulseOutcome]):
@@ -245,7 +245,7 @@ class ThresholdRecorder(Recording[PulseOutcome]):
         self._examination: Examination[_ThresholdLearner, _Pulses, PulseOutcome] = Examination(
             _ThresholdLearner(search), _Pulses(tuple(earlier)), self._sink
         )
-        self._pacing = Pacing(Limits(0.0, 0.0, header.min_iti_s), clock, ages_s)  # a pulse alone has no ISI
+        self._pacing = Pacing(PulseLimits(min_iti_s=header.min_iti_s), clock, ages_s)
         self._asked: float | None = None
         self.place_mm: tuple[float, float] | None = None
 

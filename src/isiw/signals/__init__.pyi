@@ -10,7 +10,6 @@ from .impact import impact_times as impact_times
 from .judgement import judge as judge
 from .judgement import judge_measurement as judge_measurement
 from .judgement import wrong_isi as wrong_isi
-from .limits import MEP_WINDOWS_MS as MEP_WINDOWS_MS
 from .limits import SignalLimits as SignalLimits
 from .mep import background_rms as background_rms
 from .mep import mep_amplitude as mep_amplitude
@@ -18,4 +17,5 @@ from .mep import mep_amplitudes as mep_amplitudes
 from .mep import mep_onset as mep_onset
 from .mep import mep_onsets as mep_onsets
 from .mep import mep_present as mep_present
+from .spans import MEP_WINDOWS_MS as MEP_WINDOWS_MS
 from .waveforms import is_saturated as is_saturated

@@ -14,16 +14,16 @@ CUT_OFF_MS: Final = 2.0
 """Pulse, event and ISI, each cut off to whole ms, disagree by less; a rig that is wrong about one of them, by more."""
 
 
-def timed_isi_ms(told: Measurement | Trial, space: DesignSpace) -> float | None:
-    """The ISI by the times of the pulse and of the event that it counts from [ms]; None where one is not told."""
-    start_ms = told.t_hit_ms if space.reference == "impact" else told.t_valve_ms
-    return None if start_ms is None or told.t_tms_ms is None else told.t_tms_ms - start_ms
+def timed_isi_ms(source: Measurement | Trial, space: DesignSpace) -> float | None:
+    """The ISI by the times of the pulse and of the event that it counts from [ms]; None if one is missing."""
+    start_ms = source.t_hit_ms if space.reference == "impact" else source.t_valve_ms
+    return None if start_ms is None or source.t_tms_ms is None else source.t_tms_ms - start_ms
 
 
-def contradicts_its_times(told: Measurement | Trial, space: DesignSpace) -> bool:
+def contradicts_its_times(source: Measurement | Trial, space: DesignSpace) -> bool:
     """Whether the realised ISI is another one than the times say."""
-    timed_ms = timed_isi_ms(told, space)
-    return timed_ms is not None and told.isi_ms is not None and abs(timed_ms - told.isi_ms) >= CUT_OFF_MS
+    timed_ms = timed_isi_ms(source, space)
+    return timed_ms is not None and source.isi_ms is not None and abs(timed_ms - source.isi_ms) >= CUT_OFF_MS
 
 
 def require_agreement(measurement: Measurement, stimulus: Stimulus, space: DesignSpace) -> None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from isiw.findings import ENOUGH_PAIRS, Finding, Kind, Severity
+from isiw.findings import Finding, Kind, Severity, zeros_are_usual
 from isiw.lazy import scipy
 from isiw.trials import RESPONSE_MV, Trial
 
@@ -32,7 +32,7 @@ class Response(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Told:
+class Counted:
     """A trial that counts, as the checks of several trials look at it."""
 
     mep_mv: float  # 0 is below the detection limit
@@ -51,10 +51,10 @@ class Told:
         return self.mep_mv > OF_REST * (self.rest_uv or 0.0) / 1000
 
 
-def told_of(trials: Iterable[Trial]) -> tuple[Told, ...]:
+def counted_of(trials: Iterable[Trial]) -> tuple[Counted, ...]:
     """Those of some trials that count and have an amplitude, at the intensity of the pairs."""
     comparable = (t for t in trials if t.told and t.intensity_pct_rmt is None)
-    return tuple(Told(t.mep_mv, t.isi_ms, t.background_rms_uv) for t in comparable if t.mep_mv is not None)
+    return tuple(Counted(t.mep_mv, t.isi_ms, t.background_rms_uv) for t in comparable if t.mep_mv is not None)
 
 
 SMALL_MV, LARGE_MV = 8e-4, 4.0
@@ -75,15 +75,12 @@ ALIKE = ((6, 0.015), (8, 0.05))
 """So many in a row with a CV below this: from pulse to pulse MEPs have a CV of .3 and more; what a stimulator itself
 puts into the EMG has less. So may mains hum, which is smaller than a response where the muscle counts as at rest."""
 
-MANY_BELOW_MV = 0.02
-"""Of a detection limit from here on, amplitudes of 0 are usual: most pulses below the threshold evoke less."""
-
 
 def _doubt(kind: Kind, text: str, remedy: str) -> Finding:
     return Finding(kind, Severity.DOUBT, text, remedy)
 
 
-def equal(told: Sequence[Told]) -> Finding | None:
+def equal(told: Sequence[Counted]) -> Finding | None:
     """Amplitudes that are one like the other."""
     meps_mv = [one.mep_mv for one in told[-max(in_a_row for in_a_row, _ in ALIKE) :]]
     last = meps_mv[-EQUAL_IN_A_ROW:]
@@ -99,7 +96,7 @@ def equal(told: Sequence[Told]) -> Finding | None:
     return None
 
 
-def silent(told: Sequence[Told]) -> Finding | None:
+def silent(told: Sequence[Counted]) -> Finding | None:
     """No MEP from the start on."""
     if len(told) < SILENT_FROM_THE_START or any(one.mep_mv for one in told):
         return None
@@ -108,7 +105,7 @@ def silent(told: Sequence[Told]) -> Finding | None:
     return _doubt(Kind.SILENT, text, ask)
 
 
-def stopped(told: Sequence[Told]) -> Finding | None:
+def stopped(told: Sequence[Counted]) -> Finding | None:
     """No MEP any more, though there were some."""
     if any(one.stands_out for one in told[-STOPPED_IN_A_ROW:]):
         return None
@@ -119,7 +116,7 @@ def stopped(told: Sequence[Told]) -> Finding | None:
     return _doubt(Kind.STOPPED, text, "Does the stimulator still fire? Is the coil still in place?")
 
 
-def small(told: Sequence[Told]) -> Finding | None:
+def small(told: Sequence[Counted]) -> Finding | None:
     """Amplitudes below EMG at rest."""
     last = _last_seen_mv(told)
     if len(last) < IN_A_ROW or max(last) >= SMALL_MV:
@@ -128,7 +125,7 @@ def small(told: Sequence[Told]) -> Finding | None:
     return _doubt(Kind.SMALL, text, "Are they in V? Or is the amplifier off, or its gain applied twice?")
 
 
-def large(told: Sequence[Told]) -> Finding | None:
+def large(told: Sequence[Counted]) -> Finding | None:
     """Amplitudes that are large from the start, or larger by more than any muscle changes."""
     last = _last_seen_mv(told)
     if len(last) < IN_A_ROW or (usual_mv := statistics.geometric_mean(last)) < LARGE_MV:
@@ -142,12 +139,6 @@ def large(told: Sequence[Told]) -> Finding | None:
         return None
     text = f"The last {IN_A_ROW} amplitudes are {times:.0f} times as large as those before"
     return _doubt(Kind.JUMP, text, "Has their unit changed, from mV to µV or from V to mV?")
-
-
-def is_silent(meps_mv: Sequence[float], detection_limit_mv: float | None = None) -> bool:
-    """Whether enough amplitudes were told, and each is 0, where the detection limit is too low for that."""
-    enough = len(meps_mv) >= ENOUGH_PAIRS and not _zeros_are_usual(detection_limit_mv)
-    return enough and not any(meps_mv)
 
 
 def stopped_after(isis_ms: Sequence[float | None], answered: Sequence[bool]) -> int | None:
@@ -168,25 +159,20 @@ def stopped_after(isis_ms: Sequence[float | None], answered: Sequence[bool]) -> 
     return first if by_chance < STOPPED_BY_CHANCE else None
 
 
-def _last_seen_mv(told: Sequence[Told]) -> list[float]:
+def _last_seen_mv(told: Sequence[Counted]) -> list[float]:
     """The last amplitudes above the detection limit."""
     seen = islice((one.mep_mv for one in reversed(told) if one.mep_mv > 0), IN_A_ROW)
     return list(seen)[::-1]
 
 
-def _zeros_are_usual(detection_limit_mv: float | None) -> bool:
-    """Whether amplitudes of 0 say little, since much is below the detection limit."""
-    return detection_limit_mv is not None and detection_limit_mv >= MANY_BELOW_MV
-
-
-def odd_amplitudes(told: Sequence[Told], detection_limit_mv: float | None = None) -> Iterator[Finding]:
+def odd_amplitudes(told: Sequence[Counted], detection_limit_mv: float | None = None) -> Iterator[Finding]:
     """What is odd about the amplitudes so far, in the order of the checks.
 
     Args:
         told: the trials that count so far.
         detection_limit_mv: below which an amplitude is 0 [mV]; None if it is unknown.
     """
-    of_zeros = () if _zeros_are_usual(detection_limit_mv) else (silent, stopped)
+    of_zeros = () if zeros_are_usual(detection_limit_mv) else (silent, stopped)
     yield from filter(None, (find(told) for find in (equal, *of_zeros, small, large)))
 
 
@@ -198,7 +184,7 @@ class Doubts:
     new: Finding | None = None
 
     @classmethod
-    def seen(cls, told: tuple[Told, ...], detection_limit_mv: float | None = None) -> Doubts:
+    def seen(cls, told: tuple[Counted, ...], detection_limit_mv: float | None = None) -> Doubts:
         """What was odd about amplitudes on their way; whoever goes on with them has seen it."""
         ways = (odd_amplitudes(told[:n], detection_limit_mv) for n in range(1, len(told) + 1))
         return cls(frozenset(finding.kind for way in ways for finding in way))

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from isiw.signals.limits import TAP_MS
+from isiw.signals.spans import TAP_MS
 from isiw.types import BoolArray, FloatArray, IntArray
 
 STEP_MS: Final = 0.25

@@ -16,9 +16,10 @@ from isiw.errors import DeviceError, InvalidValueError
 from isiw.findings import MISTRIALS, Kind
 from isiw.signals.agreement import pulse_with_tap_alone, require_agreement, tap_with_tms_alone
 from isiw.signals.impact import impact_time
-from isiw.signals.limits import ACCELERATION_UNITS, EMG_UNITS_MV, TAP_MS, SignalLimits
+from isiw.signals.limits import ACCELERATION_UNITS, EMG_UNITS_MV, SignalLimits
 from isiw.signals.mep import TAP_SPAN_MS, at_rest, disturbance, known_background_rms, mep_amplitudes
 from isiw.signals.plausible import before_impact, implausible_amplitude
+from isiw.signals.spans import TAP_MS
 from isiw.signals.waveforms import is_blanked, is_recording, is_saturated
 from isiw.sweeps import Channel, Measurement, Sweep
 from isiw.trials import Status, Stimulus, Trial
@@ -67,8 +68,8 @@ def _judge_emg(emg: Channel, timed: Trial, limits: SignalLimits) -> Trial:
     if is_blanked(emg_mv, emg.rate_hz, pulse, span_ms):
         return _mistrial(timed, Kind.MISSING_CHANNEL)
     if mep_mv == 0 or implausible_amplitude(mep_mv) is not None:  # in a sweep even EMG at rest has more than 0
-        told_mv = mep_mv if mep_mv <= MOST_MEP_MV else None  # as where a sample is missing and the converter says so
-        measured = _mistrial(replace(timed, mep_mv=told_mv), Kind.IMPLAUSIBLE)
+        kept_mv = mep_mv if mep_mv <= MOST_MEP_MV else None  # as where a sample is missing and the converter says so
+        measured = _mistrial(replace(timed, mep_mv=kept_mv), Kind.IMPLAUSIBLE)
     else:
         measured = replace(timed, status=Status.ACCEPTED, reason=None, mep_mv=mep_mv)
     return _mistrial(measured, Kind.BACKGROUND_ACTIVITY) if _is_tense(measured, limits) else measured

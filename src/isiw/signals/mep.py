@@ -14,7 +14,7 @@ import numpy as np
 
 from isiw.errors import InvalidValueError
 from isiw.findings import Kind
-from isiw.signals.limits import MEP_WINDOW_MS, TAP_MS
+from isiw.signals.spans import MEP_WINDOW_MS, TAP_MS
 from isiw.signals.waveforms import (
     PULSE_GUARD_MS,
     as_waveforms,

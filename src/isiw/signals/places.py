@@ -14,7 +14,7 @@ from itertools import takewhile
 import numpy as np
 
 from isiw.findings import Finding, Kind, Severity
-from isiw.signals.amplitudes import OF_REST, Response, Told
+from isiw.signals.amplitudes import OF_REST, Counted, Response
 from isiw.signals.limits import ARTEFACT_MS, EMG_UNITS_MV, SignalLimits
 from isiw.signals.mep import SPAN_S, Disturbance, at_rest, disturbance
 from isiw.signals.rig import Evidence, tap_span_ms
@@ -53,12 +53,12 @@ VARIES = 1.5
 """From the smallest to the largest of several MEPs it is more than this; the end of an artefact is always the same."""
 
 
-def told_by(sweep: Sweep, trial: Trial, limits: SignalLimits, before_emg: FloatArray | None = None) -> Told:
+def shown_by(sweep: Sweep, trial: Trial, limits: SignalLimits, before_emg: FloatArray | None = None) -> Counted:
     """A trial as the checks of several trials look at it, with what its sweep shows."""
     rest_uv, emg = trial.background_rms_uv, sweep.channels["emg"]
     repeats = before_emg is not None and np.array_equal(emg.values, before_emg)
     found = disturbance(EMG_UNITS_MV[emg.unit] * emg.values, emg.rate_hz, at_rest(emg, trial))
-    told = Told(trial.mep_mv or 0.0, trial.isi_ms, rest_uv, disturbance=found, repeats=repeats)
+    told = Counted(trial.mep_mv or 0.0, trial.isi_ms, rest_uv, disturbance=found, repeats=repeats)
     if found is not None:
         quiet = replace(emg, values=emg.values - found.course_mv / EMG_UNITS_MV[emg.unit])
         sweep = replace(sweep, channels={**sweep.channels, "emg": quiet})
@@ -114,7 +114,7 @@ def drift(evidence: Evidence) -> Finding | None:
     return Finding(Kind.DRIFT, Severity.DOUBT, text, remedy)
 
 
-def _last_disturbed(told: Sequence[Told], by: str) -> list[Disturbance]:
+def _last_disturbed(told: Sequence[Counted], by: str) -> list[Disturbance]:
     """What disturbs the last trials, back to the first that this does not disturb."""
     found = takewhile(lambda one: one is not None and getattr(one, by), (one.disturbance for one in reversed(told)))
     return [one for one in found if one is not None]
@@ -210,7 +210,7 @@ def _only_falls(sweep: Sweep, trial: Trial, window_ms: tuple[float, float], rest
     return bool((steps <= 0).all() and np.ptp(emg_mv[within] - fitted(share)) <= OF_REST * rest_uv / 1000)
 
 
-def _last_alike(told: Sequence[Told]) -> list[tuple[float | None, Response]]:
+def _last_alike(told: Sequence[Counted]) -> list[tuple[float | None, Response]]:
     """The last responses since an MEP in the window, and their ISIs, back to one at another time after the pulse."""
     found = list[tuple[float | None, Response]]()
     for one in reversed(told):

@@ -14,7 +14,7 @@ import numpy as np
 
 from isiw.design import DesignSpace
 from isiw.findings import REMEDIES, REST_UV, Finding, Kind, Severity
-from isiw.signals.amplitudes import Told
+from isiw.signals.amplitudes import Counted
 from isiw.signals.impact import impact_time
 from isiw.signals.judgement import of_one_length
 from isiw.signals.limits import ARTEFACT_MS, EMG_UNITS_MV, SignalLimits
@@ -34,7 +34,7 @@ class Evidence:
     trial: Trial | None = None
     answer: Sweep | Measurement | None = None
     limits: SignalLimits = _USUAL_LIMITS
-    told: Sequence[Told] = ()  # the trials that count so far
+    told: Sequence[Counted] = ()  # the trials that count so far
     detection_limit_mv: float | None = None
 
 

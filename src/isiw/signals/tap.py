@@ -17,8 +17,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from isiw.signals.courses import GRID_MS, STEP_MS, Courses, Span, Sums, size_at_rest_mv, within
-from isiw.signals.limits import EMG_UNITS_MV, HIT_DELAY_MS, MEP_WINDOW_MS, TAP_MS
+from isiw.signals.limits import EMG_UNITS_MV
 from isiw.signals.mep import EARLIEST_ONSET_MS, at_rest, disturbance
+from isiw.signals.spans import HIT_DELAY_MS, MEP_WINDOW_MS, TAP_MS
 from isiw.signals.taps_alone import LEAST_WEIGHT, is_inside
 from isiw.signals.waveforms import PULSE_GUARD_MS, samples
 from isiw.sweeps import Sweep
@@ -93,7 +94,7 @@ class _Places(NamedTuple):
 
     spans: IntArray  # (n, 2)
     counts: IntArray  # how many sweeps show all of it
-    told_by: IntArray  # on how many its trial's amplitude rests
+    rests_on: IntArray  # on how many its trial's amplitude rests
     are_free: BoolArray
 
     @classmethod
@@ -110,14 +111,14 @@ class _Places(NamedTuple):
         return _Places(
             np.vstack([self.spans, span]),
             np.append(self.counts, count),
-            np.append(self.told_by, 0),
+            np.append(self.rests_on, 0),
             np.append(self.are_free, is_free),
         )
 
     def due(self, *, rest: bool) -> BoolArray:
         """Those of which twice as much is known as their amplitudes rest on; new ones, if free of any response."""
-        known = (self.counts >= np.maximum(2 * self.told_by, LEAST_SHOWN)) & rest
-        return np.where(self.are_free, self.told_by == 0, known)
+        known = (self.counts >= np.maximum(2 * self.rests_on, LEAST_SHOWN)) & rest
+        return np.where(self.are_free, self.rests_on == 0, known)
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,17 +193,17 @@ class TapResponses:
         due = self.places.due(rest=self.courses.has_rest)
         if not due.any():
             return self, []
-        wanted, told_by, found = set(compress(self.windows, due)), self.places.told_by.copy(), []
+        wanted, rests_on, found = set(compress(self.windows, due)), self.places.rests_on.copy(), []
         for trial in (trial for trial in trials if trial.index in wanted):
             if (left := self._left(trial.index)) is None:
                 continue
-            told_by[self.windows[trial.index].row] = left.shown
+            rests_on[self.windows[trial.index].row] = left.shown
             again = self.measured(trial)
             pairs = ((trial.mep_mv or 0.0, again.mep_mv or 0.0), (trial.tap_mv or 0.0, again.tap_mv or 0.0))
             differs = any(abs(new - old) > max(SAME_MV, SAME_SHARE * max(new, old)) for old, new in pairs)
             if trial.counts and differs:
                 found.append(again)
-        return replace(self, places=self.places._replace(told_by=told_by)), found
+        return replace(self, places=self.places._replace(rests_on=rests_on)), found
 
     def wants_taps(self, window: Window | None, trials: TrialTable) -> bool:
         """Whether a window rests on trials whose part of the tap's response few sweeps, or none, have shown."""

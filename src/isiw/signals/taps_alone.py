@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from isiw.signals.limits import HIT_DELAY_MS, MEP_WINDOW_MS, TAP_MS
+from isiw.signals.spans import HIT_DELAY_MS, MEP_WINDOW_MS, TAP_MS
 from isiw.window import Window
 
 LEAST_SHOWN: Final = 3

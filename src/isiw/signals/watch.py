@@ -12,9 +12,9 @@ from typing import Final
 from isiw.design import DesignSpace
 from isiw.findings import REMEDIES, Finding, Kind, Severity
 from isiw.signals import places, rig
-from isiw.signals.amplitudes import Doubts, Told, odd_amplitudes, told_of
+from isiw.signals.amplitudes import Counted, Doubts, counted_of, odd_amplitudes
 from isiw.signals.limits import SignalLimits
-from isiw.signals.places import told_by
+from isiw.signals.places import shown_by
 from isiw.signals.rig import Evidence, too_early_by_chance
 from isiw.sweeps import Measurement, Sweep
 from isiw.trials import Trial, TrialTable
@@ -58,7 +58,7 @@ class Watch:
     in_a_row: int = 0  # trials that were rejected, or show a faulty rig
     early_ms: float | None = None
     early: int = 0  # pulses in a row, at this ISI, that came before the impact by chance
-    told: tuple[Told, ...] = ()  # the trials that count, with what their sweeps show
+    told: tuple[Counted, ...] = ()  # the trials that count, with what their sweeps show
     emg: FloatArray | None = field(default=None, compare=False, repr=False)
     doubts: Doubts = field(default_factory=Doubts)
     paused_for: frozenset[Kind] = frozenset()  # what a person has seen: of trials that count, it is said once
@@ -66,7 +66,7 @@ class Watch:
 
     def resumed(self, trials: TrialTable, paused_for: Iterable[Kind]) -> Watch:
         """The same after earlier trials; whoever resumes the session has seen their doubts and its pauses."""
-        seen, told = frozenset(paused_for), told_of(trials)
+        seen, told = frozenset(paused_for), counted_of(trials)
         doubts = Doubts.seen(told, self.detection_limit_mv)
         return replace(self, told=told, doubts=Doubts(doubts.raised | seen), paused_for=seen)
 
@@ -90,18 +90,18 @@ class Watch:
             learned = replace(before, in_a_row=count, pause=pause if count >= self.max_in_a_row else None)
         if trial.commanded_isi_ms is not None:  # a control trial says nothing about an ISI
             learned = replace(learned, early_ms=None, early=0)
-        return _after_told(learned, trial, answer)
+        return _after_counted(learned, trial, answer)
 
 
-def _after_told(watch: Watch, trial: Trial, answer: Sweep | Measurement) -> Watch:
+def _after_counted(watch: Watch, trial: Trial, answer: Sweep | Measurement) -> Watch:
     """After a trial that may count: what is odd about it and those before."""
     if trial.mep_mv is None or not trial.told or trial.intensity_pct_rmt is not None:
         return watch
     if isinstance(answer, Sweep):
-        told = told_by(answer, trial, watch.signals, watch.emg)
+        told = shown_by(answer, trial, watch.signals, watch.emg)
         watch = replace(watch, emg=answer.channels["emg"].values.copy())  # a device may fill one buffer again and again
     else:
-        told = Told(trial.mep_mv, trial.isi_ms, trial.background_rms_uv)
+        told = Counted(trial.mep_mv, trial.isi_ms, trial.background_rms_uv)
     watch = replace(watch, told=(*watch.told, told))
     evidence = Evidence(limits=watch.signals, told=watch.told, detection_limit_mv=watch.detection_limit_mv)
     doubts = watch.doubts.after(findings(evidence))

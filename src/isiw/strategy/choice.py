@@ -116,19 +116,19 @@ class Asked:
         asked_ms = self.batch_ms if self.choice is None else (self.choice.isi_ms, *self.batch_ms)
         if not asked_ms:
             return None
-        told = (isi_ms, isi_ms if mep_mv is None else max(isi_ms, mep_mv), 1000 * isi_ms)
-        near_ms = [_nearest(asked_ms, value) for value in told]
-        meant = (near for near, value in zip(near_ms, told, strict=True) if not off_by(value, near, space))
+        readings = (isi_ms, isi_ms if mep_mv is None else max(isi_ms, mep_mv), 1000 * isi_ms)
+        near_ms = [_nearest(asked_ms, value) for value in readings]
+        meant = (near for near, value in zip(near_ms, readings, strict=True) if not off_by(value, near, space))
         return next(meant, near_ms[0])
 
     def after(self, isi_ms: float | None) -> Asked:
         """The same after a trial; nothing is left of the batch if the ISI is one that was asked since."""
         if isi_ms is None or not self.batch_ms:
             return self.again()
-        told_ms = _nearest(self.batch_ms, isi_ms)
-        if self.choice is not None and _nearest((told_ms, self.choice.isi_ms), isi_ms) != told_ms:
+        reported_ms = _nearest(self.batch_ms, isi_ms)
+        if self.choice is not None and _nearest((reported_ms, self.choice.isi_ms), isi_ms) != reported_ms:
             return Asked()
-        index = self.batch_ms.index(told_ms)
+        index = self.batch_ms.index(reported_ms)
         return Asked(batch_ms=(*self.batch_ms[:index], *self.batch_ms[index + 1 :]))
 
 

@@ -86,7 +86,7 @@ class Course:
     """The trials of b people so far, the posterior, and what is asked of each next.
 
     `alone` of the `told` trials were TMS alone; `earlier` are the states that the stopping rule looks back on. What was
-    learnt before the first ask, `known` pairs and `known_told` trials, counts for no plan and no budget.
+    learnt before the first ask, `known` pairs and `known_all` trials, counts for no plan and no budget.
     """
 
     method: Method
@@ -98,20 +98,20 @@ class Course:
     earlier: tuple[Estimates, ...] = ()
     paired: bool = False
     known: int = 0
-    known_told: int = 0
+    known_all: int = 0
 
     def begun_here(self) -> Course:
         """The course whose first trial is the next one, whatever was learnt before."""
-        known, told = self.known + self.paired_trials, self.known_told + self.told
-        return replace(self, told=0, alone=0, earlier=(), paired=False, known=known, known_told=told)
+        known, told = self.known + self.paired_trials, self.known_all + self.told
+        return replace(self, told=0, alone=0, earlier=(), paired=False, known=known, known_all=told)
 
     def again(self, seed: int, observations: Iterable[Observation | None]) -> Course:
         """The course of the same people after some trials from the beginning; None is a change."""
         course = self.method.begin(seed, self.people)
         for observation in observations:
             course = course.noting_change() if observation is None else course.after(observation)
-        told, alone = course.told - self.known_told, course.alone - (self.known_told - self.known)
-        return replace(course, told=told, alone=alone, known=self.known, known_told=self.known_told)
+        told, alone = course.told - self.known_all, course.alone - (self.known_all - self.known)
+        return replace(course, told=told, alone=alone, known=self.known, known_all=self.known_all)
 
     def after(self, observation: Observation) -> Course:
         """The course after one more trial of each person; all of them pairs of stimuli, or all TMS alone."""
@@ -225,9 +225,9 @@ class Course:
     def estimate(self, person: int = 0) -> WindowEstimate:
         """The estimate of the window of one person."""
         estimate = self.estimates.estimate(person)
-        if not self.known_told:
+        if not self.known_all:
             return estimate
-        return estimate.noting(change=Later(lambda: estimate.change and estimate.change.counted_from(self.known_told)))
+        return estimate.noting(change=Later(lambda: estimate.change and estimate.change.counted_from(self.known_all)))
 
     def decision(self, person: int = 0, mistrials: int = 0, *, silent: bool = False) -> StopDecision:
         """The decision to stop with one person or not, with its reason."""

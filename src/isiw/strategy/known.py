@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from isiw.estimate import WindowEstimate
-from isiw.findings import lacking
-from isiw.signals.amplitudes import is_silent
+from isiw.findings import is_silent, lacking
 from isiw.strategy.course import Course
 from isiw.strategy.decisions import StopDecision, for_lack
 from isiw.strategy.outcomes import Outcomes

@@ -54,9 +54,9 @@ class Outcome(Checked):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        told = self.mep_mv, self.mep_interval_mv, self.response
-        if sum(value is not None for value in told) != 1:
-            raise InvalidValueError("tell needs one of mep_mv, mep_interval_mv and response", got=told)
+        given = self.mep_mv, self.mep_interval_mv, self.response
+        if sum(value is not None for value in given) != 1:
+            raise InvalidValueError("tell needs one of mep_mv, mep_interval_mv and response", got=given)
 
     @classmethod
     def of(cls, trial: Trial) -> Outcome:

@@ -8,7 +8,7 @@ from functools import cached_property
 
 from isiw.design import DesignSpace
 from isiw.findings import IN_DOUBT, Finding
-from isiw.signals.amplitudes import Doubts, Told, odd_amplitudes
+from isiw.signals.amplitudes import Counted, Doubts, odd_amplitudes
 from isiw.signals.plausible import isi_far
 from isiw.signals.reported import doubtful_from, is_far, unconfirmed
 from isiw.strategy.outcomes import Outcome
@@ -50,6 +50,6 @@ class Reported:
             far = is_far(isi_ms - asked_ms, self.space, isi_sd_ms)
             reported = replace(self, asked=(*self.asked, (len(pulses) - 1, far)))
         of_pairs = [one for one in pulses if one.intensity_pct_rmt is None]
-        told = [Told(one.mep_mv, one.isi_ms) for one in of_pairs if one.mep_mv is not None]
+        told = [Counted(one.mep_mv, one.isi_ms) for one in of_pairs if one.mep_mv is not None]
         odd = (IN_DOUBT if reported.doubted else found, *odd_amplitudes(told, detection_limit_mv))
         return replace(reported, doubts=self.doubts.after(odd))

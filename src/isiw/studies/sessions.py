@@ -172,8 +172,8 @@ def examine(sessions: Sequence[SimulatedSession], crowd: Alone | _Batch) -> pd.D
         responses = [person.respond(trial, choice) for person, choice in zip(people, choices, strict=True)]
         answered_s = time.perf_counter()
         crowd.tell(responses)
-        told_s = time.perf_counter()
-        spent_ms = [1e3 * spent_s / len(people) for spent_s in (asked_s - began_s, told_s - answered_s)]
+        learnt_s = time.perf_counter()
+        spent_ms = [1e3 * spent_s / len(people) for spent_s in (asked_s - began_s, learnt_s - answered_s)]
         for person in people:
             person.note(trial, dict(zip(TIMES, spent_ms, strict=True)))
         if all(person.ended for person in people):

@@ -251,7 +251,7 @@ def _low_response_subject(rng: np.random.Generator) -> SimulatedSubject:
 
 
 def _jitter_subject(rng: np.random.Generator, *, told: bool) -> SimulatedSubject:
-    return replace(_gain_subject(rng), isi_jitter_ms=float(rng.uniform(1, 5)), jitter_told=told)
+    return replace(_gain_subject(rng), isi_jitter_ms=float(rng.uniform(1, 5)), jitter_reported=told)
 
 
 def _nonresponder(rng: np.random.Generator, *, kind: bool) -> SimulatedSubject:

@@ -79,7 +79,7 @@ class SimulatedSubject(Checked):
         input_correlation: lag-1 correlation of the input noise.
         outlier_probability: share of trials replaced by an artefact of 0.1–0.5 mV.
         isi_jitter_ms: SD of the realised about the commanded ISI, beside the hit delay's [ms].
-        jitter_told: whether the jittered ISI is reported, or the commanded one with its SD.
+        jitter_reported: whether the jittered ISI is reported, or the commanded one with its SD.
         scale: factor on every amplitude.
         stated_hit_delay_ms: mean and SD over people of the hit delay that the rig states [ms]; by default the robot's.
         stated_intensity_pct_rmt: intensity of the pulse as the visit states it [% RMT]; None if it does not.
@@ -101,7 +101,7 @@ class SimulatedSubject(Checked):
     input_correlation: Annotated[float, partial(number, least=-1, most=1)] = 0.0
     outlier_probability: Share = 0.0
     isi_jitter_ms: NonNegative = 0.0
-    jitter_told: Flag = True
+    jitter_reported: Flag = True
     scale: Positive = 1.0
     stated_hit_delay_ms: MeanAndSd = (180.0, 6.0)
     stated_intensity_pct_rmt: Positive | None = None
@@ -239,7 +239,7 @@ class Responder:
         isi_ms = None if isi_ms is None else number("an ISI [ms]", isi_ms)
         choice("the reference", reference, get_args(Reference))
         noise = self._next_noise()
-        told_ms, from_impact_ms = (None, None) if isi_ms is None else self._stimulate(isi_ms, reference)
+        reported_ms, from_impact_ms = (None, None) if isi_ms is None else self._stimulate(isi_ms, reference)
         facilitation = 0.0
         if from_impact_ms is not None and pulse:
             facilitation = float(self.subject.facilitation(np.asarray(from_impact_ms), "impact", self._trials))
@@ -254,8 +254,8 @@ class Responder:
         mep_mv *= subject.scale
         if step_mv := subject.amplitude_step_mv:
             mep_mv = step_mv * np.round(mep_mv / step_mv)
-        unseen_ms = 0.0 if subject.jitter_told or isi_ms is None else subject.isi_jitter_ms
-        return Response(told_ms, float(mep_mv), unseen_ms)
+        unseen_ms = 0.0 if subject.jitter_reported or isi_ms is None else subject.isi_jitter_ms
+        return Response(reported_ms, float(mep_mv), unseen_ms)
 
     def _remember(self, facilitation: float) -> None:
         """What a pair leaves behind."""
@@ -318,11 +318,11 @@ class Responder:
         subject, rng = self.subject, self._rng
         late_ms = subject.hit_delay_sd_ms * rng.standard_normal()
         realised_ms = isi_ms + subject.isi_jitter_ms * rng.standard_normal()
-        told_ms = realised_ms if subject.jitter_told else isi_ms
+        reported_ms = realised_ms if subject.jitter_reported else isi_ms
         from_impact_ms = realised_ms - late_ms
         if reference == "valve":
-            return told_ms, from_impact_ms - subject.hit_delay_ms
-        return told_ms - late_ms, from_impact_ms
+            return reported_ms, from_impact_ms - subject.hit_delay_ms
+        return reported_ms - late_ms, from_impact_ms
 
     def _next_noise(self) -> TrialNoise:
         subject, rng = self.subject, self._rng

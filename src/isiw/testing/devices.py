@@ -22,7 +22,7 @@ from isiw.log.schema import waveform_topic
 from isiw.session.rig import Rig, Safeguards, exclusive, own_reference
 from isiw.session.sink import Sink
 from isiw.signals import SignalLimits, judge, judge_measurement
-from isiw.signals.amplitudes import Told
+from isiw.signals.amplitudes import Counted
 from isiw.signals.rig import Evidence, too_early_by_chance
 from isiw.signals.watch import findings
 from isiw.sweeps import Measurement, Sweep
@@ -224,7 +224,7 @@ def _require_usable(deliveries: Sequence[Delivery], rules: _Rules, *, real: bool
             lost[kind] += 1
             texts.setdefault(kind, delay if delay and kind is Kind.ISI_OFF else f"{found}")
     said = [f"{n} of {len(deliveries)} trials would be rejected: {texts[kind]}" for kind, n in lost.items()] + said
-    told = [Told(delivery.trial.mep_mv) for delivery in deliveries if delivery.trial.mep_mv is not None]
+    told = [Counted(delivery.trial.mep_mv) for delivery in deliveries if delivery.trial.mep_mv is not None]
     said += [f"{doubt}" for doubt in findings(Evidence(told=told)) if doubt.kind is not Kind.EQUAL][:1]
     if (late := late_deflection(deliveries)) is not None:
         said.append(late)

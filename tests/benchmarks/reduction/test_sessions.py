@@ -121,15 +121,15 @@ def test_the_conventional_sweep_is_judged_by_the_true_window() -> None:
 
 @pytest.mark.slow
 def test_a_live_pulse_before_the_impact_is_counted_and_not_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    told_ms: list[float] = []
+    reported_ms: list[float] = []
     usual = Strategy.tell
 
     def tell(strategy: Strategy, isi_ms: float, mep_mv: float) -> None:
-        told_ms.append(isi_ms)
+        reported_ms.append(isi_ms)
         usual(strategy, isi_ms, mep_mv)
 
     monkeypatch.setattr(Strategy, "tell", tell)
     sessions = [Session("nr", "gaussian", person, 3, LIVE, accelerometer=True, horizon=8) for person in range(4)]
     delivered = sum(play(one, recorded_person("gaussian", one.person, 3))["trials"] for one in sessions)
-    assert min(told_ms) >= 0
-    assert len(told_ms) < delivered  # NR asks 0 ms first, where every second pulse comes too early
+    assert min(reported_ms) >= 0
+    assert len(reported_ms) < delivered  # NR asks 0 ms first, where every second pulse comes too early

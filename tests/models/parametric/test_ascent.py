@@ -1,7 +1,7 @@
 import torch
 
 from isiw.models.parametric.importance import find_modes
-from isiw.models.parametric.tables import Tensor
+from isiw.models.parametric.tensors import Tensor
 
 FAR = torch.tensor([[3.0, 0.0, 0.0], [-3.0, 0.5, 0.0]], dtype=torch.double)
 PRECISIONS = torch.diag_embed(torch.tensor([[9.0, 4.0, 1.0], [4.0, 1.0, 2.0]], dtype=torch.double))

@@ -14,7 +14,7 @@ from isiw.models.parametric.importance import (
     importance_sample,
     worth,
 )
-from isiw.models.parametric.tables import Tensor
+from isiw.models.parametric.tensors import Tensor
 from isiw.types import ArrayLike
 
 DIMENSIONS = 4

@@ -16,7 +16,7 @@ from isiw.models.parametric import sampling as parametric_sampling
 from isiw.models.parametric.importance import Effort
 from isiw.models.parametric.law import Likelihood, WindowPrior
 from isiw.models.parametric.sampling import Chains
-from isiw.models.parametric.tables import Trials
+from isiw.models.parametric.tensors import Trials
 from isiw.models.protocol import (
     Conditions,
     HasEvidence,
@@ -30,8 +30,8 @@ from isiw.models.protocol import (
     SamplesWindows,
     SimulatesPeople,
 )
+from isiw.models.shared.draws import OUTCOMES
 from isiw.models.shared.scales import Scale
-from isiw.models.shared.tables import OUTCOMES
 from isiw.subjects.cohorts import cohort
 from isiw.testing import check_model
 from known import known

@@ -10,7 +10,7 @@ import torch
 from isiw.design import VALVE_SPACE
 from isiw.models.parametric.law import Likelihood, Unknowns, WindowPrior, levels, log_likelihood
 from isiw.models.parametric.sampling import WindowProgram
-from isiw.models.parametric.tables import Trials
+from isiw.models.parametric.tensors import Trials
 from known import known
 
 LIKELIHOODS: tuple[Likelihood, ...] = ("gamma", "log-normal", "input-noise")

@@ -28,8 +28,8 @@ from isiw.models.particles.records import (
     STARTLED,
 )
 from isiw.models.protocol import Observation
+from isiw.models.shared.draws import systematic
 from isiw.models.shared.history import Circumstances, History, neutral
-from isiw.models.shared.tables import systematic
 from isiw.native.arrays import UNKNOWN
 from isiw.native.engine import elementary, log_likelihoods
 from isiw.native.law import Crowd

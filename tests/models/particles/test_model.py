@@ -29,8 +29,8 @@ from isiw.models.protocol import (
     SamplesWindows,
     SimulatesPeople,
 )
+from isiw.models.shared.draws import systematic
 from isiw.models.shared.history import History, neutral
-from isiw.models.shared.tables import systematic
 from isiw.models.windows import grid_of
 from isiw.native.engine import log_likelihoods
 from isiw.subjects.cohorts import cohort

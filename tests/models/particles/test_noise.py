@@ -11,8 +11,8 @@ from isiw.models.particles import records
 from isiw.models.particles.noise import NoiseKind
 from isiw.models.particles.predictions import drawn_mep_mv
 from isiw.models.particles.records import FORM, LOG_RATIO, NOISE, PRESENT, SHAPE, START, WIDTH
+from isiw.models.shared.draws import LEVELS
 from isiw.models.shared.history import neutral
-from isiw.models.shared.tables import LEVELS
 from isiw.native import engine
 from isiw.native.arrays import FIELDS
 from isiw.subjects.responses import EmgFloor, GainResponse, RecruitmentResponse, ResponseCurve, TrialNoise

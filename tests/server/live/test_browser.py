@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Page
 
 from browsing import IN_CHROMIUM, broken_rules, chromium, hard_to_read, screenshots
-from isiw.text import plain
+from isiw.text.sanitize import plain
 from server.live.watched import HOSTILE, Watched
 
 pytestmark = IN_CHROMIUM

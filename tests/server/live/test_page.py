@@ -16,7 +16,7 @@ from isiw.errors import ConfigError
 from isiw.log.writer import LogWriter
 from isiw.server.live.page import FILES, file_of
 from isiw.server.live.view import Shown, View
-from isiw.text import plain
+from isiw.text.sanitize import plain
 from server.live.watched import HOSTILE, Watched
 from server.serving import NOBODY, done, refused
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from isiw.errors import InvalidValueError
-from isiw.strategy.threshold.bayes import DISTANCES_PCT, ODD, RecruitmentBelief, log_likelihood
+from isiw.strategy.threshold.bayes import DISTANCES_PCT, ODD, RecruitmentPrior, log_likelihood
 from isiw.subjects.responses import EmgFloor, RecruitmentResponse
 from isiw.subjects.thresholds import StimulatedPerson
 
-BELIEF = RecruitmentBelief()
+PRIOR = RecruitmentPrior()
 
 
 def without_odd(
@@ -20,12 +20,12 @@ def without_odd(
 
 
 def test_at_the_threshold_half_of_the_pulses_are_answered_whatever_the_curve() -> None:
-    at_threshold = without_odd(log_likelihood(BELIEF, None, responded=True)[DISTANCES_PCT == 0])
+    at_threshold = without_odd(log_likelihood(PRIOR, None, responded=True)[DISTANCES_PCT == 0])
     assert at_threshold == pytest.approx(0.5, abs=0.005)
 
 
 def test_all_amplitudes_together_are_certain() -> None:
-    few = RecruitmentBelief(slopes_per_pct=(0.3,), amplitudes_mv=(0.1, 1.0))
+    few = RecruitmentPrior(slopes_per_pct=(0.3,), amplitudes_mv=(0.1, 1.0))
     amplitudes = np.geomspace(few.visible_mv, 30.0, 100)
     densities = [np.exp(log_likelihood(few, mep, responded=mep > 0.05)) for mep in amplitudes.tolist()]
     hidden = np.exp(log_likelihood(few, 0.0, responded=False))
@@ -34,7 +34,7 @@ def test_all_amplitudes_together_are_certain() -> None:
 
 
 def test_it_is_what_simulated_people_do() -> None:
-    one = RecruitmentBelief(slopes_per_pct=(0.3,), sigmas_x_pct=(7.0,), amplitudes_mv=(0.3,), sigma_y=0.4)
+    one = RecruitmentPrior(slopes_per_pct=(0.3,), sigmas_x_pct=(7.0,), amplitudes_mv=(0.3,), sigma_y=0.4)
     response = RecruitmentResponse(EmgFloor(one.floor_mv, one.floor_log_sd), 0.3, 0.3, 100.0, 0.0, 7.0, 0.4)
     person = StimulatedPerson(50.0, response)
     believed = without_odd(log_likelihood(one, None, responded=True))[:, 0]
@@ -44,11 +44,11 @@ def test_it_is_what_simulated_people_do() -> None:
 
 
 def test_a_large_mep_says_farther_above_than_a_small_one() -> None:
-    small, large = (log_likelihood(BELIEF, mep, responded=True).sum(axis=1) for mep in (0.06, 0.6))
+    small, large = (log_likelihood(PRIOR, mep, responded=True).sum(axis=1) for mep in (0.06, 0.6))
     assert DISTANCES_PCT[np.argmax(large)] > DISTANCES_PCT[np.argmax(small)] + 3
 
 
 @pytest.mark.parametrize("wrong", [{"slopes_per_pct": (0.3, 0.2)}, {"sigma_y": 0.0}, {"visible_mv": 0.06}])
 def test_a_belief_that_cannot_be_is_refused(wrong: dict[str, object]) -> None:
     with pytest.raises(InvalidValueError):
-        RecruitmentBelief(**wrong)  # type: ignore[arg-type] # what is tested
+        RecruitmentPrior(**wrong)  # type: ignore[arg-type] # what is tested

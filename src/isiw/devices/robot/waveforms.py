@@ -13,7 +13,7 @@ import numpy as np
 
 from isiw.devices.robot.mechanism import SEPARATION_RAD, Taps, drive, pressure_kpa, rebound, restitution
 from isiw.lazy import scipy
-from isiw.signals.limits import MEP_WINDOW_MS
+from isiw.signals.spans import MEP_WINDOW_MS
 from isiw.types import ArrayLike, FloatArray
 
 UNITS: Mapping[str, str] = MappingProxyType(

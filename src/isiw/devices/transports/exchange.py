@@ -20,8 +20,7 @@ from isiw.checks import Bounds, from_table, number
 from isiw.devices.protocol import DeviceInfo, require_staged
 from isiw.errors import DeviceError, InvalidValueError, NotDelivered
 from isiw.sweeps import Channel, Sweep
-from isiw.text import plain
-from isiw.text.sanitize import read_number
+from isiw.text.sanitize import plain, read_number
 from isiw.trials import Stimulus
 
 _T = TypeVar("_T")

@@ -297,13 +297,13 @@ class LineDevice:
         line = self._line
         if line is None:
             return not self._may_be_armed
-        believable = line.trusted or self._commands.disarm.numbered
+        is_certain = line.trusted or self._commands.disarm.numbered
         try:
             line.ask(self._commands.disarm, timeout_s=self._limit_s(self._commands.disarm))
         except DeviceError:
             return False
-        self._may_be_armed = self._may_be_armed and not believable
-        return believable
+        self._may_be_armed = self._may_be_armed and not is_certain
+        return is_certain
 
     def _close(self) -> None:
         line, self._line = self._line, None

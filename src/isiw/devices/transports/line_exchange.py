@@ -32,8 +32,8 @@ _T = TypeVar("_T")
 
 _LONGEST_LINE = 1000
 _MOST_READS = 5
-_MOST_TOLD = 5
-_LONGEST_TOLD = 80
+_MOST_LISTED = 5
+_LONGEST_SHOWN = 80
 _STARTING_S = 10.0
 _REPEATING_S = 0.5  # for which a watchdog repeats itself
 
@@ -216,7 +216,7 @@ class Line:
         said = {} if found is None else found.groupdict()
         if found is not None and ("sequence" not in said or _is(number, said["sequence"])):
             self.trusted = True
-            raise DeviceError("the instrument refuses", got=(said.get("reason") or line)[:_LONGEST_TOLD])
+            raise DeviceError("the instrument refuses", got=(said.get("reason") or line)[:_LONGEST_SHOWN])
 
     def _lines_until(
         self, deadline_s: float, given_up: Callable[[], bool], heartbeat: LineHeartbeat | None
@@ -252,13 +252,13 @@ class _Others:
     """Lines that answer nothing: how many, and the last few of them."""
 
     def __init__(self) -> None:
-        self.last: deque[str] = deque(maxlen=_MOST_TOLD)
+        self.last: deque[str] = deque(maxlen=_MOST_LISTED)
         self._count = 0
 
     def add(self, line: str) -> None:
         if line:
             self._count += 1
-            self.last.append(line[:_LONGEST_TOLD])
+            self.last.append(line[:_LONGEST_SHOWN])
 
     def say(self, when: str) -> None:
         if self._count:

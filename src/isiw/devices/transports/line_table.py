@@ -314,15 +314,15 @@ class LineCommands(Checked):
         super().__post_init__()
         _require_one(_ISI, self.set.fields, "the command set must hold the ISI", "{isi_ms}, {isi_us} or {isi_s}")
         _require_one(_ISI, self.read_back.groups, "the answer to read_back must say the ISI", r"(?P<isi_ms>[\d.]+)")
-        told = self.fire.groups | self._result_groups
-        _require_one(_ISI, told, "the answer to fire or result must say the realised ISI", r"(?P<isi_ms>[\d.]+)")
+        groups = self.fire.groups | self._result_groups
+        _require_one(_ISI, groups, "the answer to fire or result must say the realised ISI", r"(?P<isi_ms>[\d.]+)")
         try:
-            groups = re.compile(self.refusal).groupindex
+            said = re.compile(self.refusal).groupindex
         except (re.error, TypeError) as error:
             raise InvalidValueError(f"the pattern of a refusal is invalid: {error}", got=self.refusal) from error
-        if not groups.keys() <= {"sequence", "reason"}:
+        if not said.keys() <= {"sequence", "reason"}:
             raise InvalidValueError(
-                "a refusal says something unknown", got=sorted(groups), expected="the groups sequence and reason"
+                "a refusal says something unknown", got=sorted(said), expected="the groups sequence and reason"
             )
 
     @property

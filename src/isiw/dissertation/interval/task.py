@@ -35,7 +35,7 @@ from isiw.log.records import Records
 from isiw.log.salvage import Salvage, salvage
 from isiw.log.schema import Event, now
 from isiw.log.writer import LogWriter
-from isiw.session.terminal import Keys, Screen, somebody_there
+from isiw.session.terminal import Keys, Screen, is_attended
 from isiw.text.sanitize import counted
 from isiw.types import ArrayLike, FloatArray
 
@@ -174,7 +174,7 @@ def _record_of(found: Salvage) -> ProductionRecord:
         records.header_of((ProductionHeader,), PRODUCTION_VERSION),
         tuple(record for record in records.history if isinstance(record, Production)),
         tuple(record for record in records.history if isinstance(record, Event)),
-        records.told_losses,
+        records.losses_said,
     )
 
 
@@ -308,7 +308,7 @@ def _ready(rest_s: float) -> float:
             "key presses in a Windows console are read every 100 ms, too coarse to time them",
             remedy="Run the task in a terminal of Linux or macOS.",
         )
-    if not somebody_there():
+    if not is_attended():
         raise DeviceError(
             "the task needs a person who sees the terminal and presses its keys",
             got="input or output that is no terminal",

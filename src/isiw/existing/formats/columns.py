@@ -15,7 +15,7 @@ from isiw.existing import frames
 from isiw.existing.cells import Column, is_missing, with_decimals
 from isiw.existing.formats.contents import Contents, Track, events_of, parted, time_of
 from isiw.existing.layout import EMG_UNITS, ISI_UNITS_MS, MARKERS, UNIT_WORDS, Layout
-from isiw.existing.tables import require_one, unit_said
+from isiw.existing.quantities import require_one, unit_said
 from isiw.lazy import pd
 from isiw.types import FloatArray
 

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.existing import frames, tables
+from isiw.existing import frames, quantities
 from isiw.existing.formats import columns
 from isiw.existing.formats.contents import Contents, Track, parted
 from isiw.existing.layout import EMG_UNITS, Layout, letters
@@ -24,7 +24,7 @@ def read(path: Path, layout: Layout) -> Contents:
     if "emg" not in layout.channels:
         return columns.read(path, layout)
     arrays = frames.read_arrays(path)
-    tables.require_one("array", path.name, layout.channels["emg"], arrays)
+    quantities.require_one("array", path.name, layout.channels["emg"], arrays)
     if arrays[layout.channels["emg"]].squeeze().ndim > 1:
         return _sweeps(arrays, layout, path.name)
     return columns.read(path, layout)
@@ -49,8 +49,8 @@ def _sweeps(arrays: Mapping[str, Any], layout: Layout, source: str) -> Contents:
             columns.require_period(rate_hz, float(array.item()), None, f"{other!r} of {source}")
         if array.size == sweeps.size // count != count:
             _require_zero(other, array.ravel(), rate_hz, pulse_at_ms, source)
-    said = "".join([name, *(f" ({unit})" for unit in tables.units_beside("emg", name, beside).values())])
-    unit = tables.unit_said(said, EMG_UNITS) or ""
+    said = "".join([name, *(f" ({unit})" for unit in quantities.units_beside("emg", name, beside).values())])
+    unit = quantities.unit_said(said, EMG_UNITS) or ""
     flat = (sweeps if sweeps.shape[0] == count else sweeps.T).ravel()
     stretches = parted(range(0, flat.size, flat.size // count), flat.size, rate_hz)
     track = Track.of_values(name, rate_hz, stretches, flat, unit)

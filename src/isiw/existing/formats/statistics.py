@@ -7,7 +7,7 @@ from pathlib import Path
 from isiw.existing.doubts import doubtful_words
 from isiw.existing.formats.contents import Contents
 from isiw.existing.layout import EMG_UNITS, ISI_UNITS_MS, Layout
-from isiw.existing.tables import unit_said
+from isiw.existing.quantities import unit_said
 from isiw.text.named_code import library
 
 _READERS = {".sav": "read_sav", ".zsav": "read_sav", ".por": "read_por", ".dta": "read_dta"}

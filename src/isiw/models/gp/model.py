@@ -28,8 +28,8 @@ from isiw.models.gp.prior import (
     scale_of,
 )
 from isiw.models.protocol import Observation
+from isiw.models.shared.draws import systematic
 from isiw.models.shared.history import AmplitudeHistory, FloorKind, FloorTreatment, OfAmplitudes, PersonTrials
-from isiw.models.shared.tables import systematic
 from isiw.models.windows import Runs, SampledProfiles, grid_of, profile_grid, sampled_estimate
 from isiw.types import Array, Singles
 from isiw.window import least_excess_mv

@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 
 from isiw.checks import Checked, Count, Positive, whole
 from isiw.lazy import torch
-from isiw.models.parametric.tables import Tensor
+from isiw.models.parametric.tensors import Tensor
 
 LogDensity = Callable[[Tensor], Tensor]
 """Unnormalised log density of latents (m, d), shape (m,)."""

@@ -18,7 +18,7 @@ from isiw.checks import Checked, number
 from isiw.design import DesignSpace
 from isiw.lazy import torch
 from isiw.models.parametric.normal import log_between
-from isiw.models.parametric.tables import Tensor
+from isiw.models.parametric.tensors import Tensor
 from isiw.models.shared.scales import AnyScale, PositiveScale, Scale
 from isiw.models.shared.start import Knots, Span, StartPrior
 

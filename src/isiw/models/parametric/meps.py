@@ -10,7 +10,7 @@ from torch.distributions import constraints
 
 from isiw.lazy import torch
 from isiw.models.parametric.law import Likelihood, Unknowns, draw_log_mep, levels, log_likelihood
-from isiw.models.parametric.tables import Tensor, averaged_over_isi
+from isiw.models.parametric.tensors import Tensor, averaged_over_isi
 
 
 class MepLaw(TorchDistribution):

@@ -20,10 +20,10 @@ from isiw.lazy import torch
 from isiw.models.parametric.importance import Effort
 from isiw.models.parametric.law import Likelihood, Unknowns, WindowPrior, draw_log_mep, levels, log_likelihood
 from isiw.models.parametric.sampling import Chains, WindowProgram, sample_person
-from isiw.models.parametric.tables import Tensor, Trials, interpolated, step_generator, table_levels
+from isiw.models.parametric.tensors import Tensor, Trials, interpolated, step_generator, table_levels
 from isiw.models.protocol import Observation, PriorPerson
+from isiw.models.shared.draws import OUTCOMES, SIMULATED, systematic
 from isiw.models.shared.history import History, observed, without_known
-from isiw.models.shared.tables import OUTCOMES, SIMULATED, systematic
 from isiw.models.windows import Runs, SampledProfiles, profile_grid, sampled_estimate
 from isiw.types import Array, ArrayLike, FloatArray, Singles
 from isiw.window import Window, least_excess_mv

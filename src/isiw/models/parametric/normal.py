@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from isiw.lazy import torch
-from isiw.models.parametric.tables import Tensor
+from isiw.models.parametric.tensors import Tensor
 
 
 def log_between(low: Tensor, high: Tensor) -> Tensor:

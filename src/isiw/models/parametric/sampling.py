@@ -13,8 +13,8 @@ from isiw.lazy import pyro, torch
 from isiw.models import parametric
 from isiw.models.parametric.importance import Effort, Modes, Proposal, WeightedDraws, importance_sample, worth
 from isiw.models.parametric.law import Likelihood, Unknowns, WindowPrior, latent_names
-from isiw.models.parametric.tables import Tensor, Trials
-from isiw.models.shared.tables import systematic
+from isiw.models.parametric.tensors import Tensor, Trials
+from isiw.models.shared.draws import systematic
 
 TREE_DEPTH: Final = 6
 """Latents are of the order of one: 63 leaps reach far enough, and a chain between two modes stays affordable."""

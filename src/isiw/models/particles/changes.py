@@ -20,8 +20,8 @@ from isiw.change import Change as EstimatedChange
 from isiw.checks import Checked, Positive, Share
 from isiw.errors import InvalidValueError
 from isiw.models.particles.mixture import Mixture
+from isiw.models.shared.draws import normal_below
 from isiw.models.shared.scales import PositiveLaw, Scale
-from isiw.models.shared.tables import normal_below
 from isiw.types import Array, BoolArray, FloatArray, IntArray
 
 INTENSITY_PCT: Final = 9.0

@@ -24,7 +24,7 @@ from isiw.models.particles.predictions import PersonSample, drawn_mep_mv
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.swarm import Moving, Swarm
 from isiw.models.protocol import AtIntensity, Observation, PriorPerson
-from isiw.models.shared.tables import NOTED, SIMULATED, seeds, stream
+from isiw.models.shared.draws import NOTED, SIMULATED, seeds, stream
 from isiw.models.windows import EXCLUDED_AT, SampledHypotheses, SampledProfiles, grid_of, profile_grid, sampled_estimate
 from isiw.native.law import Crowd, Law
 from isiw.types import ArrayLike, FloatArray

@@ -15,7 +15,7 @@ import numpy as np
 from isiw.design import DesignSpace
 from isiw.models.particles.records import FLOOR_SD, LOG_FLOOR, REST, SLOPE
 from isiw.models.shared import history
-from isiw.models.shared.tables import LEVELS, OUTCOMES
+from isiw.models.shared.draws import LEVELS, OUTCOMES
 from isiw.models.windows import Runs, grid_of
 from isiw.native import engine
 from isiw.types import Array, FloatArray, IntArray, Singles

@@ -18,8 +18,8 @@ from isiw.models.particles.latents import Latents
 from isiw.models.particles.misfit import Bets, probability_below
 from isiw.models.particles.mixture import log_sum
 from isiw.models.particles.noise import recruits
+from isiw.models.shared.draws import seeds
 from isiw.models.shared.history import BY_CURVES, SHIFT, History
-from isiw.models.shared.tables import seeds
 from isiw.native.engine import log_likelihoods
 from isiw.native.law import Crowd, Law
 from isiw.types import FloatArray, Singles

@@ -19,7 +19,7 @@ from isiw.checks import (
     require_sum_of_one,
 )
 from isiw.design import DesignSpace
-from isiw.models.shared.tables import normal_below
+from isiw.models.shared.draws import normal_below
 from isiw.types import Array, FloatArray
 
 BEFORE_MS: Final = 100.0

@@ -21,7 +21,7 @@ from isiw.report.tables import first_facts
 from isiw.session.loop import Session
 from isiw.session.sink import SessionUpdate
 from isiw.session.state import SENTENCES, State
-from isiw.text import plain
+from isiw.text.sanitize import plain
 from isiw.trials import Trial
 
 MOST_EVENTS: Final = 100

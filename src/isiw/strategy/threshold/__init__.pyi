@@ -2,7 +2,7 @@ from . import hotspot as hotspot
 from .bayes import BayesThreshold as BayesThreshold
 from .bayes import FiveOfTen as FiveOfTen
 from .bayes import MaximumLikelihood as MaximumLikelihood
-from .bayes import RecruitmentBelief as RecruitmentBelief
+from .bayes import RecruitmentPrior as RecruitmentPrior
 from .curve import CurvePulses as CurvePulses
 from .pulses import IntensityRange as IntensityRange
 from .pulses import Pulse as Pulse

@@ -173,7 +173,7 @@ _Possible: TypeAlias = Annotated[tuple[float, ...], partial(ascending, above=0)]
 
 
 @dataclass(frozen=True)
-class RecruitmentBelief(Checked):
+class RecruitmentPrior(Checked):
     """The possible recruitment curves before the first pulse; all combinations are equally likely.
 
     Args:
@@ -199,51 +199,51 @@ class RecruitmentBelief(Checked):
 
 
 @lru_cache(maxsize=256)
-def log_likelihood(belief: RecruitmentBelief, mep_mv: float | None, *, responded: bool) -> FloatArray:
+def log_likelihood(prior: RecruitmentPrior, mep_mv: float | None, *, responded: bool) -> FloatArray:
     """Logarithm of the probability of what came of a pulse, by `DISTANCES_PCT` and recruitment curve, shape (t, c)."""
-    if mep_mv is not None and mep_mv >= belief.visible_mv:
-        density = _with_input_noise(belief, _density(belief, mep_mv))
+    if mep_mv is not None and mep_mv >= prior.visible_mv:
+        density = _with_input_noise(prior, _density(prior, mep_mv))
         return np.asarray(np.log((1 - ODD) * density + ODD * _ODD_DENSITY))
-    larger = _with_input_noise(belief, _exceeding(belief, RESPONSE_MV if mep_mv is None else belief.visible_mv))
+    larger = _with_input_noise(prior, _exceeding(prior, RESPONSE_MV if mep_mv is None else prior.visible_mv))
     return np.asarray(np.log((1 - ODD) * (larger if responded else 1 - larger) + 0.5 * ODD))
 
 
-def _log_evoked(belief: RecruitmentBelief) -> FloatArray:
+def _log_evoked(prior: RecruitmentPrior) -> FloatArray:
     """Logarithm of the MEP without noise, by input, slope and amplitude."""
-    log_share = scipy.special.log_expit(np.array(belief.slopes_per_pct) * _INPUTS_PCT[:, None])
-    return np.asarray(log_share[..., None] + np.log(belief.amplitudes_mv))
+    log_share = scipy.special.log_expit(np.array(prior.slopes_per_pct) * _INPUTS_PCT[:, None])
+    return np.asarray(log_share[..., None] + np.log(prior.amplitudes_mv))
 
 
-def _above_floor(belief: RecruitmentBelief, amplitude_mv: float) -> FloatArray:
+def _above_floor(prior: RecruitmentPrior, amplitude_mv: float) -> FloatArray:
     """Excess of an amplitude above the floor, by the floor's nodes [mV]."""
-    return np.maximum(amplitude_mv - belief.floor_mv * np.exp(belief.floor_log_sd * _FLOOR_Z), 1e-3)
+    return np.maximum(amplitude_mv - prior.floor_mv * np.exp(prior.floor_log_sd * _FLOOR_Z), 1e-3)
 
 
-def _exceeding(belief: RecruitmentBelief, amplitude_mv: float) -> FloatArray:
+def _exceeding(prior: RecruitmentPrior, amplitude_mv: float) -> FloatArray:
     """Probability of a larger MEP without input noise, by input, slope and amplitude."""
-    z = (_log_evoked(belief)[..., None] - np.log(_above_floor(belief, amplitude_mv))) / belief.sigma_y
+    z = (_log_evoked(prior)[..., None] - np.log(_above_floor(prior, amplitude_mv))) / prior.sigma_y
     return np.asarray(scipy.special.ndtr(z) @ _FLOOR_WEIGHTS)
 
 
-def _density(belief: RecruitmentBelief, amplitude_mv: float) -> FloatArray:
+def _density(prior: RecruitmentPrior, amplitude_mv: float) -> FloatArray:
     """Density of an MEP by its logarithm without input noise, by input, slope and amplitude."""
-    evoked_mv = _above_floor(belief, amplitude_mv)
-    z = (_log_evoked(belief)[..., None] - np.log(evoked_mv)) / belief.sigma_y
-    return np.asarray(scipy.stats.norm.pdf(z) / belief.sigma_y @ (_FLOOR_WEIGHTS * amplitude_mv / evoked_mv))
+    evoked_mv = _above_floor(prior, amplitude_mv)
+    z = (_log_evoked(prior)[..., None] - np.log(evoked_mv)) / prior.sigma_y
+    return np.asarray(scipy.stats.norm.pdf(z) / prior.sigma_y @ (_FLOOR_WEIGHTS * amplitude_mv / evoked_mv))
 
 
-def _with_input_noise(belief: RecruitmentBelief, by_input: FloatArray) -> FloatArray:
+def _with_input_noise(prior: RecruitmentPrior, by_input: FloatArray) -> FloatArray:
     """The same by distance and recruitment curve, whose order is input noise, slope, amplitude."""
     inputs_last = np.moveaxis(by_input, 0, -1)[..., None]
-    by_curve = (_input_noise(belief) @ inputs_last)[..., 0]
+    by_curve = (_input_noise(prior) @ inputs_last)[..., 0]
     return np.moveaxis(by_curve, -1, 0).reshape(len(DISTANCES_PCT), -1)
 
 
 @lru_cache(maxsize=4)
-def _input_noise(belief: RecruitmentBelief) -> FloatArray:
+def _input_noise(prior: RecruitmentPrior) -> FloatArray:
     """Weights of the inputs, by input noise, slope, amplitude and distance."""
-    sigmas, centres = np.array(belief.sigmas_x_pct), _INPUTS_PCT[::4]
-    larger = np.einsum("stx,xka->skat", _weights(centres, sigmas[:, None]), _exceeding(belief, RESPONSE_MV))
+    sigmas, centres = np.array(prior.sigmas_x_pct), _INPUTS_PCT[::4]
+    larger = np.einsum("stx,xka->skat", _weights(centres, sigmas[:, None]), _exceeding(prior, RESPONSE_MV))
     thresholds = np.array([np.interp(0.5, curve, centres) for curve in larger.reshape(-1, len(centres))])
     return _weights(thresholds.reshape(larger.shape[:-1])[..., None] + DISTANCES_PCT, sigmas[:, None, None, None])
 
@@ -275,7 +275,7 @@ class BayesThreshold(Checked):
     prior_sd_pct_mso: Positive = 18.0
     stop_sd_pct_mso: Positive = 2.0
     max_pulses: Count = 40
-    curves: RecruitmentBelief = field(default_factory=RecruitmentBelief)
+    curves: RecruitmentPrior = field(default_factory=RecruitmentPrior)
 
     @property
     def budget(self) -> int:
@@ -284,7 +284,7 @@ class BayesThreshold(Checked):
 
     def posterior(self, pulses: Sequence[Pulse]) -> FloatArray:
         """Probability of each of `THRESHOLDS_PCT_MSO` after some pulses."""
-        told = sum((_told(self.curves, pulse) for pulse in pulses), start=np.zeros((1, 1)))
+        told = sum((_log_likelihood(self.curves, pulse) for pulse in pulses), start=np.zeros((1, 1)))
         prior = scipy.stats.norm.logpdf(THRESHOLDS_PCT_MSO, self.prior_mean_pct_mso, self.prior_sd_pct_mso)
         log = prior + scipy.special.logsumexp(told, axis=1)
         return np.asarray(np.exp(log - scipy.special.logsumexp(log)))
@@ -315,7 +315,7 @@ class BayesThreshold(Checked):
 
 
 @lru_cache(maxsize=256)
-def _told(curves: RecruitmentBelief, pulse: Pulse) -> FloatArray:
+def _log_likelihood(curves: RecruitmentPrior, pulse: Pulse) -> FloatArray:
     """Log-likelihood of a pulse by threshold and recruitment curve."""
     at_distance = log_likelihood(curves, pulse.mep_mv, responded=pulse.responded)
     distances = np.clip(100 * (pulse.intensity_pct_mso / THRESHOLDS_PCT_MSO - 1), DISTANCES_PCT[0], DISTANCES_PCT[-1])

@@ -20,15 +20,12 @@ _OF_THE_ORDER: Final = 45
 
 
 @dataclass(frozen=True)
-class CurvePulses(Checked):
-    """Asks for the intensities that were named, each so often, in an order that the seed draws.
-
-    A pulse that was lost is asked for again; there is no pulse beyond those named.
+class NamedPulses(Checked):
+    """Pulses of TMS alone over the recruitment curve, in no order.
 
     Args:
         at_pct_mso: the intensities [% MSO].
         each: how many pulses at each of them.
-        seed: of the order.
 
     Raises:
         InvalidValueError: no intensity, or one that is named twice.
@@ -36,7 +33,6 @@ class CurvePulses(Checked):
 
     at_pct_mso: tuple[Positive, ...] = ()
     each: Count = 5
-    seed: Natural = 0
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -51,6 +47,21 @@ class CurvePulses(Checked):
     def budget(self) -> int:
         """Number of pulses; see `ThresholdMethod`."""
         return self.each * len(self.at_pct_mso)
+
+
+@dataclass(frozen=True)
+class CurvePulses(NamedPulses):
+    """Asks for the intensities that were named, each so often, in an order that the seed draws.
+
+    A pulse that was lost is asked for again; there is no pulse beyond those named.
+
+    Args:
+        at_pct_mso: as of `NamedPulses`.
+        each: as of `NamedPulses`.
+        seed: of the order.
+    """
+
+    seed: Natural = 0
 
     def require_within(self, space: IntensityRange) -> None:
         """Raise if an intensity is beyond the range, or off its grid."""

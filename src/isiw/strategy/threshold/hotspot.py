@@ -12,7 +12,7 @@ import numpy as np
 from isiw.checks import Checked, Count, Positive
 from isiw.lazy import scipy
 from isiw.strategy.decisions import StopDecision, StopKind
-from isiw.strategy.threshold.bayes import DISTANCES_PCT, RecruitmentBelief, log_likelihood
+from isiw.strategy.threshold.bayes import DISTANCES_PCT, RecruitmentPrior, log_likelihood
 from isiw.strategy.threshold.pulses import IntensityRange, Pulse, ThresholdEstimate
 from isiw.types import FloatArray
 
@@ -39,7 +39,7 @@ class BayesHotSpot(Checked):
 
     half_width_mm: Positive = 25.0
     step_mm: Positive = 5.0
-    curves: RecruitmentBelief = field(default_factory=RecruitmentBelief)
+    curves: RecruitmentPrior = field(default_factory=RecruitmentPrior)
     stop_sd_mm: Positive = 4.0
     max_pulses: Count = 30
 
@@ -52,7 +52,7 @@ class BayesHotSpot(Checked):
 
     def posterior(self, pulses: Sequence[Pulse]) -> FloatArray:
         """Probabilities by place, and by what else is unknown: spread and intensity, shape (t, c)."""
-        log = sum((_told(self, pulse) for pulse in pulses), start=np.zeros((1, 1, 1)))
+        log = sum((_log_likelihood(self, pulse) for pulse in pulses), start=np.zeros((1, 1, 1)))
         shape = (len(self.places_mm), len(SPREADS_MM) * len(INTENSITIES_PCT))
         return np.asarray(scipy.special.softmax(np.broadcast_to(log, (*shape, log.shape[-1]))).sum(axis=-1))
 
@@ -73,9 +73,9 @@ class BayesHotSpot(Checked):
         """The posterior's mean, and how far from it the hot spot may be, once a pulse evoked an MEP."""
         if not any(pulse.responded for pulse in pulses):
             return ThresholdEstimate(None, reason="No pulse evoked an MEP yet, so the hot spot is not known either.")
-        belief = self.posterior(pulses).sum(axis=1)
-        mean = belief @ self.places_mm
-        sd_mm = float(np.sqrt(belief @ ((self.places_mm - mean) ** 2).sum(axis=1)))
+        weights = self.posterior(pulses).sum(axis=1)
+        mean = weights @ self.places_mm
+        sd_mm = float(np.sqrt(weights @ ((self.places_mm - mean) ** 2).sum(axis=1)))
         return ThresholdEstimate(None, hot_spot_mm=(float(mean[0]), float(mean[1])), hot_spot_sd_mm=sd_mm)
 
     def decision(self, pulses: Sequence[Pulse], space: IntensityRange) -> StopDecision:
@@ -98,7 +98,7 @@ def _distances(settings: BayesHotSpot, coil: FloatArray) -> FloatArray:
 
 
 @lru_cache(maxsize=64)  # a megabyte each
-def _told(settings: BayesHotSpot, pulse: Pulse) -> FloatArray:
+def _log_likelihood(settings: BayesHotSpot, pulse: Pulse) -> FloatArray:
     """Log-likelihood of a pulse by the hot spot's place, what else is unknown, and recruitment curve."""
     table = log_likelihood(settings.curves, pulse.mep_mv, responded=pulse.responded)
     distances = _distances(settings, np.array([pulse.place_mm]))[0]

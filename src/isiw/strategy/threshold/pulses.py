@@ -161,10 +161,10 @@ class ThresholdEstimate:
             return f"Hot spot: {place_text(self.hot_spot_mm)}, within about {self.hot_spot_sd_mm or 0.0:.0f} mm."
         if self.threshold_pct_mso is None:
             return f"No threshold can be stated. {self.reason}"
-        told = f"Resting motor threshold: {self.threshold_pct_mso:.1f} % MSO"
+        said = f"Resting motor threshold: {self.threshold_pct_mso:.1f} % MSO"
         if self.low_pct_mso is None or self.high_pct_mso is None:
-            return f"{told}."
-        return f"{told} (90 % interval {self.low_pct_mso:.1f}–{self.high_pct_mso:.1f})."
+            return f"{said}."
+        return f"{said} (90 % interval {self.low_pct_mso:.1f}–{self.high_pct_mso:.1f})."
 
     def within(self, space: IntensityRange) -> ThresholdEstimate:
         """The same, without its number if that is beyond the range of intensities."""

@@ -124,8 +124,8 @@ class ThresholdSearch:
         self.space.require(intensity_pct_mso)
         if mep_mv is not None:
             mep_mv = number("mep_mv", mep_mv, least=0)
-            told_mv = [pulse.mep_mv for pulse in self.pulses if pulse.mep_mv is not None]
-            require_amplitude(mep_mv, implausible_scale([*told_mv, mep_mv]))
+            earlier_mv = [pulse.mep_mv for pulse in self.pulses if pulse.mep_mv is not None]
+            require_amplitude(mep_mv, implausible_scale([*earlier_mv, mep_mv]))
         pulse = Pulse(intensity_pct_mso, mep_mv, response, self.place_mm)
         if pulse.place_mm and mep_mv is None:
             raise InvalidValueError("the hot spot is found by amplitudes", got=response, expected="an amplitude in mV")

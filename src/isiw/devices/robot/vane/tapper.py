@@ -17,7 +17,7 @@ from isiw.devices.protocol import DeviceInfo
 from isiw.devices.robot.tapper import Tapper
 from isiw.devices.robot.vane.rotation import ATMOSPHERE_BAR, PA_PER_BAR, Rotations, Vane, rotate
 from isiw.signals.impact import VALVE_MS, impact_time
-from isiw.signals.limits import MEP_WINDOWS_MS
+from isiw.signals.spans import MEP_WINDOWS_MS
 from isiw.sweeps import Channel, Sweep
 from isiw.trials import Stimulus
 from isiw.types import FloatArray

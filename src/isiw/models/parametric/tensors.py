@@ -9,8 +9,8 @@ from typing import Final, NamedTuple, TypeAlias
 import numpy as np
 
 from isiw.lazy import torch
+from isiw.models.shared.draws import LEVELS
 from isiw.models.shared.history import History
-from isiw.models.shared.tables import LEVELS
 
 Tensor: TypeAlias = "torch.Tensor"
 
