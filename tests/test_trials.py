@@ -145,17 +145,6 @@ def test_a_table_is_printed_as_its_counts() -> None:
     assert str(table) == "4 delivered, 1 told, 2 mistrials (2 no pulse), 1 excluded"
 
 
-def test_the_frame_has_a_row_a_trial_and_its_values() -> None:
-    frame = TrialTable((accepted(0, 0.07), mistrial(2))).to_frame()
-    assert frame.index.tolist() == [0, 2]
-    assert frame.loc[0, "mep_mv"] == 0.07
-    assert frame.loc[2, "reason"] == "no pulse"
-
-
-def test_the_frame_of_no_trials_has_the_same_columns() -> None:
-    assert TrialTable().to_frame().columns.tolist() == TrialTable((accepted(0),)).to_frame().columns.tolist()
-
-
 def test_an_amplitude_in_microvolts_is_no_measurement_and_no_trial() -> None:
     with pytest.raises(InvalidValueError, match=r"Divide by 1000"):
         Measurement(2000.0, 50.0)

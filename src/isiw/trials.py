@@ -22,7 +22,6 @@ from isiw.checks import (
 )
 from isiw.errors import InvalidValueError
 from isiw.findings import MISTRIALS, Kind
-from isiw.lazy import pd
 from isiw.text.stimuli import TAP, StimulusWords
 
 MOST_ISI_SD_MS: Final = 50.0
@@ -262,9 +261,3 @@ class TrialTable:
     def told(self) -> tuple[Trial, ...]:
         """The trials that a strategy learns from."""
         return tuple(trial for trial in self.trials if trial.told)
-
-    def to_frame(self) -> pd.DataFrame:
-        """The trials as a DataFrame, a row a trial, columns as in `Trial`, indexed by `index`."""
-        columns = [f.name for f in dataclasses.fields(Trial)]
-        rows = [[getattr(trial, name) for name in columns] for trial in self.trials]
-        return pd.DataFrame(rows, columns=columns).set_index("index")

@@ -96,7 +96,7 @@ def test_a_session_goes_on_within_the_limits_that_the_configuration_says_now(isi
     assert "device.timeout_s is 7.0 from here on; it was 30.0." in result.output
     assert "signals.background_uv is 25.0 from here on; it was 10.0." in result.output
     record = read_session("s.mcap")
-    assert len(record.trials) == 5
+    assert len(record.table) == 5
     assert (record.header.limits.max_pulses, record.header.limits.min_iti_s) == (5, 5.0)
     assert (record.header.signals.background_uv, record.header.timeout_s) == (25.0, 7.0)
 

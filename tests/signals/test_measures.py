@@ -11,7 +11,7 @@ import pytest
 
 from isiw.design import DesignSpace
 from isiw.findings import Kind
-from isiw.log.frames import read_session
+from isiw.log.frames import measures_of, read_session
 from isiw.session.loop import Session
 from isiw.session.rig import Safeguards
 from isiw.signals import MEP_WINDOWS_MS, SignalLimits, judge
@@ -100,7 +100,7 @@ def test_a_log_of_a_robots_sweeps_is_measured_too(tmp_path: Path) -> None:
         progress=False
     )
     record = read_session(tmp_path / "s.mcap")
-    assert set(record.measures) == {trial.index for trial in record.table.told}
+    assert set(measures_of(record)) == {trial.index for trial in record.table.told}
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Self
+from typing import Any, Self
 
 from isiw.checks import Checked, Count, NonNegative, Number, Positive, fields_of
 from isiw.design import DesignSpace, require_space
@@ -204,28 +204,17 @@ class Limits(PulseLimits):
             raise InvalidValueError("the limits of the ISI must ascend", got=(self.low_ms, self.high_ms))
 
     @staticmethod
-    def of_space(
-        space: DesignSpace,
-        *,
-        min_iti_s: float | None = None,
-        max_pulses: int = 200,
-        max_consecutive_mistrials: int = 3,
-    ) -> Limits:
+    def of_space(space: DesignSpace, **limits: Any) -> Limits:
         """Limits that allow exactly the ISIs of a design space.
 
         Args:
             space: the design space.
-            min_iti_s: as for `PulseLimits` [s].
-            max_pulses: largest number of deliveries in a session.
-            max_consecutive_mistrials: as for `PulseLimits`.
+            **limits: fields of `PulseLimits`.
 
         Raises:
             InvalidValueError: no design space, or values that are not finite or limit nothing.
         """
-        own = PulseLimits(
-            min_iti_s=min_iti_s, max_pulses=max_pulses, max_consecutive_mistrials=max_consecutive_mistrials
-        )
-        return own.within(space)
+        return PulseLimits(**limits).within(space)
 
     def require_isi(self, isi_ms: float) -> None:
         """Raise LimitExceededError if an ISI is beyond the range, or off the grid."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Mapping
-from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
@@ -30,11 +29,6 @@ class FramedRecord(SessionRecord):
         The columns are those of `isiw.log.frames.TRIAL_COLUMNS`.
         """
         return trial_frame(self)
-
-    @cached_property
-    def measures(self) -> Mapping[int, Measures]:
-        """Measures of the sweeps of trials that count, beside the amplitude, by the trial's number."""
-        return measures_of(self)
 
 
 def read_session(path: str | Path, *, channels: Iterable[str] | None = None) -> FramedRecord:

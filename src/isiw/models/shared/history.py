@@ -68,11 +68,6 @@ class History:
         """Lower and upper ends of the log MEPs [log mV], shape (b, n, 2)."""
         return self.columns[..., 2:4]
 
-    @property
-    def shares_factor(self) -> bool:
-        """True if an unknown factor of known parts makes the trials depend on each other, given a person."""
-        return bool(self.columns[..., _OF_A_TRIAL + Circumstances._fields.index("known_log_sd")].any())
-
     def appended(self, trial: History) -> History:
         """This history and one more trial."""
         return History(np.concatenate((self.columns, trial.columns), axis=1))
