@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final, TypeVar
 
 from isiw.devices.limits import Limits
-from isiw.errors import ConfigError, error_text
+from isiw.errors import error_text
 from isiw.files import made_folder, twin
 from isiw.log.durable import log_exists, log_of, part_of
 from isiw.log.headers import SERVED_KEY
@@ -180,12 +180,6 @@ class Sessions:
         stated = {"intensity_pct_rmt": request.visit.intensity_pct_rmt}
         settings = known_settings(request.strategy.name, stated) | request.strategy.settings
         strategy = make_strategy(request.strategy.name, space=space, seed=request.seed, **settings)
-        if strategy.intensities:
-            raise ConfigError(
-                "pairs of several intensities are not asked over HTTP",
-                got=strategy.intensities.named_pct_rmt,
-                remedy="Leave out intensities_pct_rmt, or run the session with isiw run or in Python.",
-            )
         recorder = open_session(
             strategy,
             self._path(request.id),
@@ -249,6 +243,7 @@ def _stood(name: str, record: SessionRecord) -> SessionAnswer:
         told=len(record.table.told),
         open_trial=unknown[-1].trial if unknown else None,
         open_isi_ms=unknown[-1].isi_ms if unknown else None,
+        open_intensity_pct_rmt=unknown[-1].intensity_pct_rmt if unknown else None,
         stop=decision is not None and decision.stop,
         reason=decision.reason if decision else "No trial has an outcome yet.",
     )

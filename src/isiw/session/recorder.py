@@ -308,7 +308,8 @@ class Recorder(Recording[Trial], Judging):
             asked = self._require_asked()
             if known != reason:
                 self._examination.note(str(reason), trial=asked.trial)
-            self._conclude(Trial(asked.trial, Status.MISTRIAL, asked.isi_ms, known))
+            pct_rmt = None if asked.isi_ms is None else self._of_pair(asked.intensity_pct_rmt)
+            self._conclude(Trial(asked.trial, Status.MISTRIAL, asked.isi_ms, known, intensity_pct_rmt=pct_rmt))
         lost = len(list(itertools.takewhile(lambda trial: trial.reason is not None, reversed(self.trials.trials))))
         if lost == self._limits.max_consecutive_mistrials:
             mistrials = "1 mistrial" if lost == 1 else f"{lost} mistrials in a row, the last one"
