@@ -1,5 +1,6 @@
 """A session in which pairs have several intensities, each of which was named, set and noted."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from isiw.devices.clock import VirtualClock
 from isiw.devices.limited import LimitedDevice
 from isiw.devices.limits import Limits
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, StrategyError
+from isiw.session.recorder import Recorder
 from isiw.session.sink import SessionUpdate
 from isiw.subjects.cohorts import person_of
 from isiw.subjects.subject import Response
@@ -138,6 +140,31 @@ def test_a_loop_of_ones_own_is_asked_for_an_intensity_and_reports_it(tmp_path: P
             outcome = responder.respond(own.ask(), "impact", intensity_pct_rmt=own.intensity_pct_rmt)
             own.tell(outcome.isi_ms, outcome.mep_mv)
     assert [trial.intensity_pct_rmt for trial in isiw.read_session(log).table] == [None, 100.0, 110.0]
+
+
+JUDGED: dict[str, Callable[[Recorder], object]] = {
+    "note": lambda own: own.note_change("the coil moved"),
+    "exclude": lambda own: [own.exclude(trial.index) for trial in own.trials.told[:1]],
+    "include": lambda own: (own.exclude(0), own.include(0)),
+}
+
+
+@pytest.mark.parametrize("verdict", JUDGED)
+def test_a_verdict_while_a_pair_is_open_leaves_it_the_intensity_that_was_asked(tmp_path: Path, verdict: str) -> None:
+    limits = replace(Limits.of_space(SPACE), max_intensity_pct_rmt=110.0)
+    visit, log = Visit(intensity_pct_rmt=90.0), tmp_path / "own.mcap"
+    with isiw.open_session(mixed(), log=log, limits=limits, visit=visit, clock=VirtualClock()) as own:
+        for trial in range(6):
+            isi_ms, asked = own.ask(), own.intensity_pct_rmt
+            if trial:
+                JUDGED[verdict](own)
+            assert own.intensity_pct_rmt == asked
+            own.mistrial("rejected") if trial == 1 else own.tell(isi_ms, 0.1)
+    record = isiw.read_session(log)
+    logged = [trial.intensity_pct_rmt or 90.0 for trial in record.table]
+    assert logged == [intent.intensity_pct_rmt for intent in record.intents]
+    assert (logged[1], record.table[1].status) == (100.0, "mistrial")
+    assert {trial.intensity_pct_rmt for trial in record.table[2:]} != {None}
 
 
 def test_only_a_model_with_a_law_of_intensities_takes_pairs_of_several() -> None:

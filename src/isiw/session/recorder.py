@@ -126,6 +126,8 @@ class Recorder(Recording[Trial], Judging):
     @property
     def intensity_pct_rmt(self) -> float | None:
         """The intensity of the pair that was asked [% RMT]; None where all pairs of the session have the usual one."""
+        if (asked := self.asked) is not None:  # what a verdict since then would choose is another pair's
+            return asked.intensity_pct_rmt
         return self.strategy.intensity_pct_rmt
 
     def _of_pair(self, pct_rmt: float | None) -> float | None:
@@ -308,8 +310,8 @@ class Recorder(Recording[Trial], Judging):
             asked = self._require_asked()
             if known != reason:
                 self._examination.note(str(reason), trial=asked.trial)
-            pct_rmt = None if asked.isi_ms is None else self._of_pair(asked.intensity_pct_rmt)
-            self._conclude(Trial(asked.trial, Status.MISTRIAL, asked.isi_ms, known, intensity_pct_rmt=pct_rmt))
+            own: Any = {"tap_alone": asked.tap_alone, "intensity_pct_rmt": self._of_pair(asked.intensity_pct_rmt)}
+            self._conclude(Trial(asked.trial, Status.MISTRIAL, asked.isi_ms, known, **own))
         lost = len(list(itertools.takewhile(lambda trial: trial.reason is not None, reversed(self.trials.trials))))
         if lost == self._limits.max_consecutive_mistrials:
             mistrials = "1 mistrial" if lost == 1 else f"{lost} mistrials in a row, the last one"
