@@ -209,5 +209,13 @@ SHARE: Final = UnitScale(most=1.0, too_large=("%", 100))
 INTENSITY_PCT: Final = UnitScale(3.0, too_small=("parts of 1", 100))
 """Nobody stimulates with so low an intensity; 1.2 is meant as 120 %."""
 
+
+def require_percent(what: str, intensity_pct: float | None) -> None:
+    """Raise if an intensity [%] is probably in another unit; None is none."""
+    if intensity_pct is not None:
+        scale = INTENSITY_PCT
+        scale.require(f"{what} is probably in another unit", intensity_pct, f"at least {scale.least:g} %")
+
+
 STOP_WIDTH_MS: Final = UnitScale(1.0, too_small=("s", 1000))
 """No interval of an edge is as narrow as the least; a width of 0.005 and less is meant to stop nothing."""

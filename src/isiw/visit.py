@@ -22,7 +22,7 @@ from isiw.checks import (
     share,
 )
 from isiw.errors import InvalidValueError
-from isiw.findings import INTENSITY_PCT, INTERVAL_S
+from isiw.findings import INTERVAL_S, require_percent
 
 _ITI_DRAWS, _CONTROL_DRAWS = 1, 2
 """What is drawn, so that the two never share their draws."""
@@ -94,13 +94,6 @@ class Visit(Checked):
         if own is not None and others is not None and abs(own - others) > MOST_APART_PCT_RMT:
             return f"different intensities, {own:g} and {others:g} % of RMT"
         return None
-
-
-def require_percent(what: str, intensity_pct: float | None) -> None:
-    """Raise if an intensity [%] is probably in another unit; None is none."""
-    if intensity_pct is not None:
-        scale = INTENSITY_PCT
-        scale.require(f"{what} is probably in another unit", intensity_pct, f"at least {scale.least:g} %")
 
 
 def different_muscles(noted: Iterable[str]) -> list[str]:
@@ -184,8 +177,9 @@ class VisitProtocol(Checked):
 
         Raises:
             InvalidValueError: a rest that is no longer than the longest interval, intervals that the limits replace, or
-                an intensity of TMS alone where there is none.
+                an intensity of TMS alone where there is none, or in another unit.
         """
+        require_percent("the protocol's alone_pct_rmt", self.alone_pct_rmt)
         if self.alone_pct_rmt is not None and not self.tms_alone:
             raise InvalidValueError(
                 "an intensity of TMS alone has no effect in a protocol without TMS alone",

@@ -194,6 +194,10 @@ def test_pulses_that_were_given_before_are_known_before_the_first_ask_and_after_
             "message"
         ]
     )
+    parts = {"mep_mv": [0.02], "intensity_pct_rmt": [1.2]}
+    said = refused(client.post("/sessions", json={**PLAN, "id": "P09", "earlier": parts}), 422, "InvalidValueError")
+    assert "Multiply by 100" in said["remedy"]
+    assert not (tmp_path / "P09.mcap").exists()
 
 
 def test_tms_alone_that_was_refused_stays_open_until_it_is_told_rightly(client: httpx.Client, session: str) -> None:

@@ -167,6 +167,31 @@ def test_a_verdict_while_a_pair_is_open_leaves_it_the_intensity_that_was_asked(t
     assert {trial.intensity_pct_rmt for trial in record.table[2:]} != {None}
 
 
+def test_a_loop_of_ones_own_refuses_an_intensity_in_another_unit_and_logs_one_beyond_the_limits(tmp_path: Path) -> None:
+    limits = replace(Limits.of_space(SPACE), max_intensity_pct_rmt=110.0)
+    visit, log = Visit(intensity_pct_rmt=90.0), tmp_path / "own.mcap"
+    with isiw.open_session(mixed(), log=log, limits=limits, visit=visit, clock=VirtualClock()) as own:
+        own.tell(own.ask(), 0.1, intensity_pct_rmt=110.0)
+        for paired, wrong, right in ((False, 1.2, 120.0), (True, 0.9, 110.5)):
+            isi_ms = own.ask() if paired else None
+            with pytest.raises(InvalidValueError, match="in another unit"):
+                own.tell(isi_ms, 0.1, intensity_pct_rmt=wrong)
+            own.tell(isi_ms, 0.1, intensity_pct_rmt=right)
+    record = isiw.read_session(log)
+    assert [trial.intensity_pct_rmt for trial in record.table.told] == [110.0, 120.0, 110.5]
+    assert [(event.kind, event.trial, event.text) for event in record.events if event.kind == "limit"] == [
+        ("limit", 1, "A pulse was given at 120 % RMT, beyond the limit of 110 % RMT."),
+        ("limit", 2, "A pulse was given at 110.5 % RMT, beyond the limit of 110 % RMT."),
+    ]
+
+
+def test_pulses_given_before_with_an_intensity_in_another_unit_are_refused(tmp_path: Path) -> None:
+    pulse = Trial.of(None, 0.5, intensity_pct_rmt=1.2)
+    with pytest.raises(InvalidValueError, match="in another unit"):
+        isiw.open_session(mixed(), log=tmp_path / "own.mcap", earlier=[pulse], visit=Visit(intensity_pct_rmt=90.0))
+    assert not (tmp_path / "own.mcap").exists()
+
+
 def test_only_a_model_with_a_law_of_intensities_takes_pairs_of_several() -> None:
     with pytest.raises(StrategyError, match="cannot learn from pairs of several intensities"):
         isiw.make_strategy("gp-straddle", SPACE, intensities_pct_rmt=NAMED)

@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 
 from isiw.config.run import RunConfig
 from isiw.errors import ConfigError
+from isiw.findings import require_percent
 from isiw.log.reader import SessionRecord, ThresholdRecord, read_any
 from isiw.log.salvage import salvage
 from isiw.log.verdicts import changed_after
@@ -16,7 +17,7 @@ from isiw.session.threshold import search_of
 from isiw.strategy.threshold.curve import CurvePulses
 from isiw.text.sanitize import command, counted
 from isiw.trials import Status, Stimulus, Trial
-from isiw.visit import different_muscles, require_percent
+from isiw.visit import different_muscles
 
 _COLUMNS: Final = ("intensity_pct_rmt", "mep_mv")
 

@@ -11,6 +11,7 @@ from isiw.acquisition.registry import ACQUISITIONS, OWN
 from isiw.checks import whole
 from isiw.design import VALVE_SPACE, DesignSpace, require_space
 from isiw.errors import StrategyError, did_you_mean
+from isiw.findings import require_percent
 from isiw.models.particles.profile import ProfilePrior
 from isiw.models.protocol import profile_of
 from isiw.strategy.intensities import NONE, Intensities, intensities_for
@@ -25,7 +26,6 @@ from isiw.strategy.settings.common import (
     settings_values,
 )
 from isiw.strategy.strategy import Strategy
-from isiw.visit import require_percent
 
 
 @dataclass(frozen=True)

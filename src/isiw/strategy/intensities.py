@@ -10,9 +10,9 @@ import numpy as np
 
 from isiw.checks import Checked, Flag, can
 from isiw.errors import InvalidValueError, StrategyError
+from isiw.findings import require_percent
 from isiw.models.protocol import ForeseesIntensities, Posterior, pairs_pct_rmt_of
 from isiw.strategy.choice import Choice
-from isiw.visit import require_percent
 
 
 @dataclass(frozen=True)
