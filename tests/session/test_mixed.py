@@ -13,6 +13,8 @@ from isiw.devices.clock import VirtualClock
 from isiw.devices.limited import LimitedDevice
 from isiw.devices.limits import Limits
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, StrategyError
+from isiw.models.particles.prior import Prior
+from isiw.priors.days import recalled
 from isiw.session.recorder import Recorder
 from isiw.session.sink import SessionUpdate
 from isiw.subjects.cohorts import person_of
@@ -61,6 +63,13 @@ def test_the_acquisition_function_chooses_only_among_the_named_ones(tmp_path: Pa
     strategy = mixed(chooses_intensity=True)
     result = session(tmp_path / "chosen.mcap", strategy).run()
     assert {trial.intensity_pct_rmt for trial in result.trials} <= {None, 100.0, 110.0}
+
+
+def test_another_day_learns_from_such_a_session_what_the_session_itself_did(tmp_path: Path) -> None:
+    result = session(tmp_path / "mixed.mcap", mixed()).run()
+    posterior = recalled(isiw.read_session(result.log), Prior(), particles=100)
+    assert posterior.estimate().start_ms == pytest.approx(result.estimate.start_ms)
+    assert posterior.estimate().probability == pytest.approx(result.estimate.probability)
 
 
 def test_tms_alone_may_have_an_intensity_of_its_own(tmp_path: Path) -> None:

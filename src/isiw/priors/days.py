@@ -42,9 +42,8 @@ def recalled(record: SessionRecord, prior: Prior, *, particles: int = 1000) -> P
     if (limit_mv := record.header.detection_limit_mv) is not None:
         model = replace(model, detection_limit_mv=limit_mv)
     posterior = model.begin(record.header.space, seed=record.header.seed)
-    told = Outcomes(record.header.space.reference, record.header.strategy.settings.get("amplitude_step_mv")).of(
-        record.table
-    )
+    step_mv = record.header.strategy.settings.get("amplitude_step_mv")
+    told = Outcomes(record.header.space.reference, step_mv, pairs_pct_rmt=model.pairs_pct_rmt).of(record.table)
     for outcome in told.pulses:
         posterior = model.update(posterior, told.observation(outcome))
     return posterior
