@@ -115,6 +115,11 @@ def test_intervals_that_the_limits_replace_are_refused_where_they_are_stated(iti
         VisitProtocol(iti_s=iti_s).require_effect(5.0)
 
 
+def test_an_intensity_of_tms_alone_in_another_unit_is_refused_where_it_is_stated() -> None:
+    with pytest.raises(InvalidValueError, match=r"alone_pct_rmt is probably in another unit.*Multiply by 100"):
+        VisitProtocol(tms_alone=0.2, alone_pct_rmt=1.0).require_effect(5.0)
+
+
 @pytest.mark.parametrize("iti_s", [(2.0, 6.0), (5.0, 5.0), None])
 def test_intervals_of_which_some_are_longer_than_the_limits_are_kept(iti_s: tuple[float, float] | None) -> None:
     VisitProtocol(iti_s=iti_s).require_effect(5.0)

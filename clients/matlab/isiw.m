@@ -71,8 +71,9 @@ classdef isiw < handle
       this.asked = [];
     end
 
-    function [trial, isi_ms] = ask(this)
-      % The next trial's number and its ISI [ms], which is on disk as about to be delivered.
+    function [trial, isi_ms, intensity_pct_rmt] = ask(this)
+      % The next trial's number and its ISI [ms], which is on disk as about to be delivered; the intensity to set for it
+      % [% RMT], [] in a session whose pairs all have the usual one.
       if ~isempty(this.asked)
         error('isiw:TrialOpen', ['trial %d was requested and has no outcome; it may have been delivered. ' ...
               'Tell it, or call mistrial(%d, ''outcome unknown'').'], this.asked, this.asked);
@@ -80,17 +81,22 @@ classdef isiw < handle
       answer = this.post(this.path('ask'), {'trial', number(this.trials), 'client', this.key});
       trial = answer.trial;
       isi_ms = answer.isi_ms;
+      intensity_pct_rmt = answer.intensity_pct_rmt;
       this.asked = trial;
     end
 
-    function tell(this, trial, isi_ms, mep_mv, confirm)
+    function tell(this, trial, isi_ms, mep_mv, confirm, intensity_pct_rmt)
       % The realised ISI [ms] ([] for TMS alone, as the trial lab.trials) and the MEP from peak to peak [mV]. CONFIRM is
-      % true to confirm realised ISIs that are far from those asked, after the error isiw:InDoubt.
+      % true to confirm realised ISIs that are far from those asked, after the error isiw:InDoubt. INTENSITY_PCT_RMT is
+      % the one that was set [% RMT]; it is needed where ask has answered one.
       if nargin < 5
         confirm = false;
       end
+      if nargin < 6
+        intensity_pct_rmt = [];
+      end
       pairs = {'trial', number(trial), 'isi_ms', number(isi_ms), 'mep_mv', number(mep_mv), ...
-               'client', this.key, 'confirm', truth(confirm)};
+               'client', this.key, 'confirm', truth(confirm), 'intensity_pct_rmt', number(intensity_pct_rmt)};
       this.conclude(this.post(this.path('tell'), pairs));
     end
 

@@ -178,8 +178,9 @@ class VisitProtocol(Checked):
 
         Raises:
             InvalidValueError: a rest that is no longer than the longest interval, intervals that the limits replace, or
-                an intensity of TMS alone where there is none.
+                an intensity of TMS alone where there is none, or in another unit.
         """
+        require_percent("the protocol's alone_pct_rmt", self.alone_pct_rmt)
         if self.alone_pct_rmt is not None and not self.tms_alone:
             raise InvalidValueError(
                 "an intensity of TMS alone has no effect in a protocol without TMS alone",

@@ -35,6 +35,13 @@ PLAN: dict[str, Any] = {
     "limits": {"min_iti_s": 0.0},
 }
 
+SEVERAL: dict[str, Any] = {
+    "visit": {**PLAN["visit"], "intensity_pct_rmt": 90},
+    "strategy": {"name": "even", "settings": {**SETTINGS, "intensities_pct_rmt": [90, 110]}},
+    "limits": {"min_iti_s": 0.0, "max_intensity_pct_rmt": 110},
+}
+"""A plan whose pairs have two intensities in turn."""
+
 
 @contextmanager
 def client_of(folder: Path, **rules: Any) -> Iterator[httpx.Client]:

@@ -83,6 +83,33 @@ def test_pulses_over_the_curve_are_given_before_and_within_a_session(tmp_path: P
     assert known == [(0.02, 95.0), (0.9, 115.0), (1.4, 130.0), (1.1, 120.0)]
 
 
+SEVERAL = """
+lab = isiw(getenv('ISIW_URL'), getenv('ISIW_TOKEN'));
+settings = struct('intensities_pct_rmt', [90 110], 'particles', 10);
+lab.create('P07', struct('visit', struct('intensity_pct_rmt', 90), 'strategy', struct('name', 'even', 'settings', ...
+  settings), 'limits', struct('min_iti_s', 0, 'max_intensity_pct_rmt', 110)));
+while lab.trials < 3
+  [trial, isi_ms, intensity_pct_rmt] = lab.ask();
+  try
+    lab.tell(trial, isi_ms, 0.1);
+  catch problem
+    disp(problem.identifier);
+  end
+  lab.tell(trial, isi_ms, 0.1, false, intensity_pct_rmt);
+end
+lab.close();
+"""
+
+
+def test_pairs_of_several_intensities_are_told_with_what_was_set(tmp_path: Path) -> None:
+    (tmp_path / "several.m").write_text(SEVERAL)
+    with client_of(tmp_path / "sessions") as client:
+        ran = octave(client, str(tmp_path / "several.m"))
+    assert (ran.returncode, ran.stdout.split()) == (0, ["isiw:InvalidValueError"] * 3), ran.stderr
+    table = read_session(tmp_path / "sessions" / "P07.mcap").table
+    assert [trial.intensity_pct_rmt for trial in table] == [None, 110.0, None]
+
+
 DOUBTED = """
 warning('off', 'isiw:Doubt');
 lab = isiw(getenv('ISIW_URL'), getenv('ISIW_TOKEN'));

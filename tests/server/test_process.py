@@ -19,7 +19,7 @@ from isiw.cli import app
 from isiw.errors import ConfigError, InvalidValueError
 from isiw.log.reader import read_session
 from isiw.server import ServerSettings
-from server.serving import BEARER, NOBODY, client_of, created, done, refused, server, told
+from server.serving import BEARER, NOBODY, SEVERAL, client_of, created, done, refused, server, told
 
 OPENSSL = shutil.which("openssl") or ""
 
@@ -49,6 +49,31 @@ def test_a_killed_server_loses_nothing_and_a_new_one_resumes_by_the_id(tmp_path:
     record = read_session(tmp_path / "P07.mcap")
     assert [trial.reason for trial in record.table] == [None, None, None, "outcome unknown", None]
     assert "came too late" in record.events[-1].text
+
+
+@pytest.mark.slow
+def test_a_session_of_several_intensities_goes_on_after_a_kill_with_the_one_whose_turn_it_is(tmp_path: Path) -> None:
+    def tell_one() -> float:
+        asked = done(client.post(f"{session}/ask"))
+        outcome = {name: asked[name] for name in ("trial", "isi_ms", "intensity_pct_rmt")} | {"mep_mv": 0.1}
+        done(client.post(f"{session}/tell", json=outcome))
+        set_pct_rmt: float = asked["intensity_pct_rmt"]
+        return set_pct_rmt
+
+    with server(tmp_path) as (process, url), client_at(url) as client:
+        session = created(client, **SEVERAL)
+        before = [tell_one() for _ in range(3)]
+        open_trial = done(client.post(f"{session}/ask"))
+        process.kill()
+        process.wait()
+    with client_of(tmp_path) as client:
+        stands = done(client.get(session))
+        assert (stands["open_trial"], stands["open_intensity_pct_rmt"]) == (3, open_trial["intensity_pct_rmt"])
+        done(client.post(f"{session}/resume"))
+        after = [tell_one() for _ in range(2)]
+    assert [*before, open_trial["intensity_pct_rmt"], *after] == [90.0, 110.0, 90.0, 110.0, 110.0, 90.0]
+    record = read_session(tmp_path / "P07.mcap")
+    assert [trial.intensity_pct_rmt for trial in record.table] == [None, 110.0, None, 110.0, 110.0, None]
 
 
 @pytest.mark.slow

@@ -22,7 +22,7 @@ from isiw.server.requests import AskRequest, CreateRequest, TellRequest
 from isiw.server.sessions import Sessions
 from isiw.session.examination import Examination
 from isiw.strategy.catalogue import make_strategy
-from server.serving import PLAN, SETTINGS, SPACE, client_of, created, done, mep_mv, refused, told
+from server.serving import PLAN, SETTINGS, SEVERAL, SPACE, client_of, created, done, mep_mv, refused, told
 
 
 @pytest.fixture
@@ -71,6 +71,38 @@ def test_the_strategy_is_told_the_intensity_that_the_visit_states(client: httpx.
     visit = PLAN["visit"] | {"intensity_pct_rmt": 110.0}
     created(client, "P08", visit=visit)
     assert read_session(tmp_path / "P08.mcap").header.strategy.settings["intensity_pct_rmt"] == 110.0
+
+
+def test_pairs_of_several_intensities_are_asked_and_logged_with_what_was_set(
+    client: httpx.Client, tmp_path: Path
+) -> None:
+    session = created(client, "P08", **SEVERAL)
+    set_pct_rmt, outcomes = (90.0, 110.0, 100.0, None), []
+    for given in set_pct_rmt:  # the third was delivered with another intensity than asked, the fourth with none known
+        asked = done(client.post(f"{session}/ask"))
+        outcomes.append({"trial": asked["trial"], "isi_ms": asked["isi_ms"], "mep_mv": 0.1, "intensity_pct_rmt": given})
+        assert asked["intensity_pct_rmt"] == (90.0, 110.0)[asked["trial"] % 2]
+        assert done(client.get(session))["open_intensity_pct_rmt"] == asked["intensity_pct_rmt"]
+        if given is not None:
+            told = done(client.post(f"{session}/tell", json=outcomes[-1]))
+            assert done(client.post(f"{session}/tell", json=outcomes[-1])) == told
+    error = refused(client.post(f"{session}/tell", json=outcomes[3]), 422, "InvalidValueError")
+    assert (error["field"], "intensity_pct_rmt = 110" in error["expected"]) == ("intensity_pct_rmt", True)
+    done(client.post(f"{session}/mistrial", json={"trial": 3}))
+    refused(client.post(f"{session}/tell", json=outcomes[1] | {"intensity_pct_rmt": 90}), 409, "OtherOutcome")
+    record = read_session(tmp_path / "P08.mcap")
+    assert [intent.intensity_pct_rmt for intent in record.intents] == [90.0, 110.0, 90.0, 110.0]
+    assert [trial.intensity_pct_rmt for trial in record.table] == [None, 110.0, 100.0, 110.0]
+    assert [trial.status for trial in record.table] == ["accepted", "accepted", "accepted", "mistrial"]
+
+
+@pytest.mark.parametrize("most", [None, 100])
+def test_an_intensity_beyond_the_limits_is_refused_before_there_is_a_session(
+    client: httpx.Client, tmp_path: Path, most: float | None
+) -> None:
+    plan = {**PLAN, **SEVERAL, "limits": {"max_intensity_pct_rmt": most}}
+    assert "110 % RMT" in refused(client.post("/sessions", json=plan), 422, "InvalidValueError")["got"]
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_intent_is_on_disk_before_the_answer(client: httpx.Client, session: str, tmp_path: Path) -> None:
@@ -162,6 +194,10 @@ def test_pulses_that_were_given_before_are_known_before_the_first_ask_and_after_
             "message"
         ]
     )
+    parts = {"mep_mv": [0.02], "intensity_pct_rmt": [1.2]}
+    said = refused(client.post("/sessions", json={**PLAN, "id": "P09", "earlier": parts}), 422, "InvalidValueError")
+    assert "Multiply by 100" in said["remedy"]
+    assert not (tmp_path / "P09.mcap").exists()
 
 
 def test_tms_alone_that_was_refused_stays_open_until_it_is_told_rightly(client: httpx.Client, session: str) -> None:

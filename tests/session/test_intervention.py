@@ -15,6 +15,7 @@ import pytest
 
 from isiw.devices.clock import VirtualClock
 from isiw.errors import InvalidValueError, LogError, StrategyError
+from isiw.existing.reading import read_people
 from isiw.export.collection import read_logs
 from isiw.intervention import Arm, Part
 from isiw.log import moments, writer
@@ -24,6 +25,7 @@ from isiw.pairing.agenda import Agenda
 from isiw.pairing.pulses import pairing_of
 from isiw.plots.session import session_figure
 from isiw.plots.timeline import timeline_figure
+from isiw.report.comparison import comparison_rows, correlation_sentence, counts_table
 from isiw.report.words import final_statement, trial_rows
 from isiw.server.live.view import View
 from isiw.session.afterwards import open_arm
@@ -334,6 +336,9 @@ SHOWING: dict[str, Callable[[Path], object]] = {
     "timeline": lambda log: timeline_figure(read_session(log)),
     "table": lambda log: trial_rows(read_session(log)),
     "export": read_logs,
+    "counts": lambda log: counts_table(read_session(log), 0.05, 0.4),
+    "comparison": lambda log: comparison_rows([read_session(log)]),
+    "correlation": lambda log: correlation_sentence(read_session(log), read_session(log)),
 }
 
 
@@ -351,6 +356,20 @@ def test_nothing_is_made_of_a_concealed_log_until_somebody_opens_it_which_is_log
     assert [event.text for event in after.events if event.kind == "opening"] == ["The arm was opened: taps alone."]
     assert "Arm: taps alone." in final_statement(after)
     assert len(SHOWING["table"](log)) == len(PLAN.slots)  # type: ignore[arg-type]
+    assert len(SHOWING["comparison"](log)) == 1  # type: ignore[arg-type]
+
+
+def test_the_printed_result_says_of_a_concealed_arm_that_it_is(log: Path) -> None:
+    result = session(log, intervention(Arm.TAP_ALONE)).run()
+    for shown in (str(result), repr(result)):
+        assert "The arm is concealed. Open it when nobody has to be blind: isiw pair --open" in shown
+        assert not re.search(r"tap|Trials", shown)
+
+
+def test_the_trials_of_an_intervention_are_no_search_that_could_be_analysed(log: Path) -> None:
+    session(log, intervention(arms=(Arm.WINDOW,))).run()
+    with pytest.raises(LogError, match="teaches no window"):
+        read_people(log)
 
 
 def test_the_header_names_no_arm_that_was_drawn(log: Path) -> None:

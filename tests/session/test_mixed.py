@@ -1,5 +1,6 @@
 """A session in which pairs have several intensities, each of which was named, set and noted."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,9 @@ from isiw.devices.clock import VirtualClock
 from isiw.devices.limited import LimitedDevice
 from isiw.devices.limits import Limits
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, StrategyError
+from isiw.models.particles.prior import Prior
+from isiw.priors.days import recalled
+from isiw.session.recorder import Recorder
 from isiw.session.sink import SessionUpdate
 from isiw.subjects.cohorts import person_of
 from isiw.subjects.subject import Response
@@ -59,6 +63,13 @@ def test_the_acquisition_function_chooses_only_among_the_named_ones(tmp_path: Pa
     strategy = mixed(chooses_intensity=True)
     result = session(tmp_path / "chosen.mcap", strategy).run()
     assert {trial.intensity_pct_rmt for trial in result.trials} <= {None, 100.0, 110.0}
+
+
+def test_another_day_learns_from_such_a_session_what_the_session_itself_did(tmp_path: Path) -> None:
+    result = session(tmp_path / "mixed.mcap", mixed()).run()
+    posterior = recalled(isiw.read_session(result.log), Prior(), particles=100)
+    assert posterior.estimate().start_ms == pytest.approx(result.estimate.start_ms)
+    assert posterior.estimate().probability == pytest.approx(result.estimate.probability)
 
 
 def test_tms_alone_may_have_an_intensity_of_its_own(tmp_path: Path) -> None:
@@ -138,6 +149,56 @@ def test_a_loop_of_ones_own_is_asked_for_an_intensity_and_reports_it(tmp_path: P
             outcome = responder.respond(own.ask(), "impact", intensity_pct_rmt=own.intensity_pct_rmt)
             own.tell(outcome.isi_ms, outcome.mep_mv)
     assert [trial.intensity_pct_rmt for trial in isiw.read_session(log).table] == [None, 100.0, 110.0]
+
+
+JUDGED: dict[str, Callable[[Recorder], object]] = {
+    "note": lambda own: own.note_change("the coil moved"),
+    "exclude": lambda own: [own.exclude(trial.index) for trial in own.trials.told[:1]],
+    "include": lambda own: (own.exclude(0), own.include(0)),
+}
+
+
+@pytest.mark.parametrize("verdict", JUDGED)
+def test_a_verdict_while_a_pair_is_open_leaves_it_the_intensity_that_was_asked(tmp_path: Path, verdict: str) -> None:
+    limits = replace(Limits.of_space(SPACE), max_intensity_pct_rmt=110.0)
+    visit, log = Visit(intensity_pct_rmt=90.0), tmp_path / "own.mcap"
+    with isiw.open_session(mixed(), log=log, limits=limits, visit=visit, clock=VirtualClock()) as own:
+        for trial in range(6):
+            isi_ms, asked = own.ask(), own.intensity_pct_rmt
+            if trial:
+                JUDGED[verdict](own)
+            assert own.intensity_pct_rmt == asked
+            own.mistrial("rejected") if trial == 1 else own.tell(isi_ms, 0.1)
+    record = isiw.read_session(log)
+    logged = [trial.intensity_pct_rmt or 90.0 for trial in record.table]
+    assert logged == [intent.intensity_pct_rmt for intent in record.intents]
+    assert (logged[1], record.table[1].status) == (100.0, "mistrial")
+    assert {trial.intensity_pct_rmt for trial in record.table[2:]} != {None}
+
+
+def test_a_loop_of_ones_own_refuses_an_intensity_in_another_unit_and_logs_one_beyond_the_limits(tmp_path: Path) -> None:
+    limits = replace(Limits.of_space(SPACE), max_intensity_pct_rmt=110.0)
+    visit, log = Visit(intensity_pct_rmt=90.0), tmp_path / "own.mcap"
+    with isiw.open_session(mixed(), log=log, limits=limits, visit=visit, clock=VirtualClock()) as own:
+        own.tell(own.ask(), 0.1, intensity_pct_rmt=110.0)
+        for paired, wrong, right in ((False, 1.2, 120.0), (True, 0.9, 110.5)):
+            isi_ms = own.ask() if paired else None
+            with pytest.raises(InvalidValueError, match="in another unit"):
+                own.tell(isi_ms, 0.1, intensity_pct_rmt=wrong)
+            own.tell(isi_ms, 0.1, intensity_pct_rmt=right)
+    record = isiw.read_session(log)
+    assert [trial.intensity_pct_rmt for trial in record.table.told] == [110.0, 120.0, 110.5]
+    assert [(event.kind, event.trial, event.text) for event in record.events if event.kind == "limit"] == [
+        ("limit", 1, "A pulse was given at 120 % RMT, beyond the limit of 110 % RMT."),
+        ("limit", 2, "A pulse was given at 110.5 % RMT, beyond the limit of 110 % RMT."),
+    ]
+
+
+def test_pulses_given_before_with_an_intensity_in_another_unit_are_refused(tmp_path: Path) -> None:
+    pulse = Trial.of(None, 0.5, intensity_pct_rmt=1.2)
+    with pytest.raises(InvalidValueError, match="in another unit"):
+        isiw.open_session(mixed(), log=tmp_path / "own.mcap", earlier=[pulse], visit=Visit(intensity_pct_rmt=90.0))
+    assert not (tmp_path / "own.mcap").exists()
 
 
 def test_only_a_model_with_a_law_of_intensities_takes_pairs_of_several() -> None:

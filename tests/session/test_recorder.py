@@ -26,6 +26,7 @@ from isiw.errors import (
     InvalidValueError,
     LimitExceededError,
     LogError,
+    OutOfSpaceError,
     StrategyError,
 )
 from isiw.findings import Kind
@@ -274,6 +275,15 @@ def test_a_tap_alone_is_told_without_being_asked_and_says_what_is_its_own(log: P
         assert isinstance(again, Recorder)
         assert again.estimate().probability == told
         assert again.strategy.spent == 3
+
+
+def test_a_tap_alone_that_is_lost_is_logged_as_one(log: Path) -> None:
+    with open_session(scripted_strategy(9), log) as session:
+        with pytest.raises(OutOfSpaceError):
+            session.tell(900.0, 0.1, pulse=False)
+        session.mistrial(Kind.REJECTED)
+    record = read_session(log)
+    assert [(trial.tap_alone, trial.reason) for trial in record.table] == [(True, Kind.REJECTED)]
 
 
 def test_tms_alone_that_was_given_is_logged_at_once_whatever_the_limits_allow(log: Path, space: DesignSpace) -> None:

@@ -111,6 +111,16 @@ def test_an_intensity_of_a_tap_alone_is_refused() -> None:
     assert strategy.delivered == 0
 
 
+def test_an_intensity_in_another_unit_is_refused_but_one_of_an_old_log_is_learnt() -> None:
+    strategy = small()
+    for isi_ms in (None, strategy.ask()):
+        with pytest.raises(InvalidValueError, match=r"in another unit.*Multiply by 100"):
+            strategy.tell(isi_ms, 0.5, intensity_pct_rmt=1.2)
+    assert strategy.delivered == 0
+    strategy.learn(Trial.of(None, 0.5, intensity_pct_rmt=1.2))
+    assert strategy.delivered == 1
+
+
 def test_amplitudes_over_the_curve_do_not_look_like_a_slip_of_unit() -> None:
     strategy = small()
     for number in range(6):

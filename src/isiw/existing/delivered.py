@@ -16,6 +16,7 @@ from isiw.design import MOST_ISIS, DesignSpace
 from isiw.errors import InvalidValueError, LogError
 from isiw.existing.layout import EMG_UNITS, ISI_UNITS_MS
 from isiw.findings import AMPLITUDE_MV, Kind
+from isiw.log.kinds import require_search
 from isiw.signals.limits import SignalLimits
 from isiw.signals.plausible import implausible_scale
 from isiw.sweeps import Channel
@@ -159,8 +160,9 @@ def anywhere(reference: Reference) -> DesignSpace:
 
 
 def read_log(path: str | Path) -> Delivered:
-    """The trials of a log, as they count after an operator's verdicts."""
+    """The trials of a log of a search for a window, as they count after an operator's verdicts."""
     record = isiw.read_session(path)
+    require_search(record.path, record.header)
     if record.losses:
         raise LogError("the log is damaged, so that trials may be missing", got=str(path), remedy=f"{record.losses[0]}")
     header = record.header

@@ -88,6 +88,16 @@ def require_session(path: Path, header: Header) -> None:
         )
 
 
+def require_search(path: Path, header: Header) -> None:
+    """Raise if a log is of an intervention: its trials are no search for a window, even once its arm is open."""
+    if header.intervention is not None:
+        raise LogError(
+            "an intervention is meant to change the person, and teaches no window",
+            got=str(path),
+            remedy="Leave this log out, and give that of the search for the window.",
+        )
+
+
 def imported_sentence(names: Sequence[str]) -> str:
     """That some logs are of no session, in words; empty if there are none."""
     return f"Imported, and no sessions of isiw: {', '.join(names)}." if names else ""

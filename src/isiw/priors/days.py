@@ -18,6 +18,7 @@ import numpy as np
 from isiw.checks import Checked, Positive, Share, mean_and_sd, share
 from isiw.errors import DamagedLogError, InvalidValueError, LogError
 from isiw.lazy import sklearn
+from isiw.log.kinds import require_search
 from isiw.log.reader import SessionRecord, require_records
 from isiw.models.particles import ParticleModel, ParticlePosterior
 from isiw.models.particles.latents import LATENTS, Latents, used_by
@@ -41,9 +42,8 @@ def recalled(record: SessionRecord, prior: Prior, *, particles: int = 1000) -> P
     if (limit_mv := record.header.detection_limit_mv) is not None:
         model = replace(model, detection_limit_mv=limit_mv)
     posterior = model.begin(record.header.space, seed=record.header.seed)
-    told = Outcomes(record.header.space.reference, record.header.strategy.settings.get("amplitude_step_mv")).of(
-        record.table
-    )
+    step_mv = record.header.strategy.settings.get("amplitude_step_mv")
+    told = Outcomes(record.header.space.reference, step_mv, pairs_pct_rmt=model.pairs_pct_rmt).of(record.table)
     for outcome in told.pulses:
         posterior = model.update(posterior, told.observation(outcome))
     return posterior
@@ -52,12 +52,7 @@ def recalled(record: SessionRecord, prior: Prior, *, particles: int = 1000) -> P
 def require_meps(record: SessionRecord) -> None:
     """Check that there is something to learn from a session."""
     record.require_read("seed", "strategy", "device", "visit", "subject")
-    if record.header.intervention is not None:
-        raise LogError(
-            "an intervention is meant to change the person, and teaches no window",
-            got=str(record.path),
-            remedy="Leave this log out, and give that of the search for the window.",
-        )
+    require_search(record.path, record.header)
     silent = "no MEP to learn from: every amplitude is 0, below the detection limit"
     lacking = silent if record.is_silent else None if record.table.told else "no accepted trial to learn from"
     if lacking is not None:

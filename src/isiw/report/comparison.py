@@ -40,6 +40,7 @@ def comparison_rows(records: Sequence[SessionRecord]) -> list[tuple[str, ...]]:
     """The cells of that table, a row a session; empty if nothing is known."""
     rows: list[tuple[str, ...]] = []
     for number, record in enumerate(records, start=1):
+        record.require_open()
         begun, last = record.header.created[:16].replace("T", " "), record.found
         who = (str(number), one_line(record.header.subject) or "unnamed", begun, str(len(record.table.told)))
         chance = "–" if last is None or last.probability is None else f"{last.probability:.2f}"
@@ -80,7 +81,9 @@ def correlation_sentence(record: SessionRecord, measured: SessionRecord) -> str:
     Raises:
         InvalidValueError: an estimate without a profile, no pairs that count, ISIs from different events, or too few
             in common.
+        LogError: measured MEPs that would show the concealed arm of an intervention.
     """
+    measured.require_open()
     found, trials = record.found, by_isi(measured.table)
     if found is None or not found.profile_mv:
         raise InvalidValueError("the log has no estimated profile", got=str(record.path))
@@ -101,7 +104,9 @@ def counts_table(record: SessionRecord, threshold_mv: float | None, share: float
 
     Raises:
         InvalidValueError: as for `count_trials`.
+        LogError: the arm of an intervention is concealed.
     """
+    record.require_open()
     study = count_trials(by_isi(record.table), threshold_mv, share)
     rows = study.counts.itertuples()
     lines = [f"{row.Index:5g} ms  {row.trials:6d}  {row.responses:9d}  {row.share:5.2f}" for row in rows]

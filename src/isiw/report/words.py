@@ -77,7 +77,7 @@ def intervention_statement(record: SessionRecord, intervention: Intervention, co
     way_on = continued_by(record.path, record.header, config, end_lost=record.end_lost)
     arm = f"Arm: {intervention.arm.words}."
     if record.conceals:
-        arm = f"The arm is concealed. Open it when nobody has to be blind: {command('pair', '--open', record.path)}"
+        arm = sentences.concealed(record.path)
     way_on = over or f"The intervention is not over. Do: continue it with {way_on}"
     return "\n".join([way_on, f"Delivered: {done}.", *_change(record), arm])
 

@@ -133,6 +133,7 @@ class SessionAnswer(OkAnswer):
     told: int = Field(description="How many of these count.")
     open_trial: int | None = Field(default=None, description="The trial that began and has no outcome yet.")
     open_isi_ms: float | None = Field(default=None, description="Its ISI [ms].")
+    open_intensity_pct_rmt: float | None = Field(default=None, description="Its intensity [% RMT], as ask has it.")
     wait_s: float = Field(default=0.0, description="How long until the next stimulus is allowed [s].")
     stop: bool
     reason: str = Field(description="Why to stop, or to continue.")
@@ -156,6 +157,9 @@ class AskAnswer(OkAnswer):
 
     trial: int = Field(description="Its number, for tell or mistrial.")
     isi_ms: float = Field(description="The ISI to deliver [ms].")
+    intensity_pct_rmt: float | None = Field(
+        description="The intensity to set for it [% RMT]; null where all pairs of the session have the usual one."
+    )
     again: bool = Field(description="Whether it was answered before: deliver it only if it was not delivered yet.")
 
 

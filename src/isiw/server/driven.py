@@ -101,6 +101,7 @@ class DrivenSession:
             told=len(trials.told),
             open_trial=None if asked is None else asked.trial,
             open_isi_ms=None if asked is None else asked.isi_ms,
+            open_intensity_pct_rmt=None if asked is None else asked.intensity_pct_rmt,
             wait_s=self.recorder.wait_s(),
             stop=decision.stop,
             reason=decision.reason,
@@ -157,15 +158,18 @@ class DrivenSession:
             raise given_once(asked.trial, asked.isi_ms)
         self.require_no_wait(request.wait_s)  # another client may have been faster
         isi_ms = self.recorder.ask(request.deadline_s)
-        return AskAnswer(trial=comes_next, isi_ms=isi_ms, again=asked is not None)
+        set_pct_rmt = self.recorder.intensity_pct_rmt
+        return AskAnswer(trial=comes_next, isi_ms=isi_ms, intensity_pct_rmt=set_pct_rmt, again=asked is not None)
 
     def tell(self, request: TellRequest) -> TrialAnswer:
         """Log the outcome of a trial; told again it is answered as at first."""
+        is_pair = request.pulse and request.isi_ms is not None
         if request.trial in self._outcomes:
-            return self._known(request.trial, _in_words(request))
-        self._require_next(request.trial, asked=request.pulse and request.isi_ms is not None)
+            return self._known(request.trial, _in_words(self._as_logged(request) if is_pair else request))
+        self._require_next(request.trial, asked=is_pair)
         with self._refusals_of(request.trial, _in_words(request)):
             self._require_given_to(request.client)
+            self._require_intensity(request)
             self.recorder.tell(
                 request.isi_ms,
                 request.mep_mv,
@@ -192,6 +196,26 @@ class DrivenSession:
         asked = self.recorder.asked
         if client is not None and asked is not None and asked.isi_ms is not None:
             require_own(self.client, client, asked.trial)
+
+    def _require_intensity(self, request: TellRequest) -> None:
+        """Raise if a pair is reported without its intensity, as by software that has never set the one it was given."""
+        asked = self.recorder.asked
+        given = None if asked is None else asked.intensity_pct_rmt
+        if given is not None and request.intensity_pct_rmt is None and request.pulse and request.isi_ms is not None:
+            raise Refusal(
+                422,
+                "InvalidValueError",
+                "pairs of this session have several intensities, and it is not stated which one was set",
+                expected=f"intensity_pct_rmt = {given:g}, as ask has answered, or that which was delivered",
+                remedy="Set the intensity that ask answers before each pulse, and report it with the outcome. If "
+                "it was not set and is not known, make the trial a mistrial.",
+                field="intensity_pct_rmt",
+            )
+
+    def _as_logged(self, request: TellRequest) -> TellRequest:
+        """The outcome of a pair as the log has it, where the usual intensity is none."""
+        is_usual = request.intensity_pct_rmt == self.recorder.strategy.usual_pct_rmt
+        return request.model_copy(update={"intensity_pct_rmt": None}) if is_usual else request
 
     @contextmanager
     def _refusals_of(self, trial: int, words: str) -> Iterator[None]:

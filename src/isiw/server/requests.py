@@ -157,7 +157,9 @@ class TellRequest(_Request):
         default=False, description="True confirms realised ISIs that are far from those asked; otherwise InDoubt."
     )
     intensity_pct_rmt: float | None = Field(
-        default=None, description="Intensity of TMS alone [% RMT]; null for that of the pairs."
+        default=None,
+        description="The intensity that was set [% RMT]: needed of a pair whose ask stated one; of any other pulse, "
+        "null for that of the pairs.",
     )
     client: str | None = _CLIENT
 

@@ -179,12 +179,6 @@ class Sessions:
         stated = {"intensity_pct_rmt": request.visit.intensity_pct_rmt}
         settings = known_settings(request.strategy.name, stated) | request.strategy.settings
         strategy = make_strategy(request.strategy.name, space=space, seed=request.seed, **settings)
-        if strategy.intensities:
-            raise ConfigError(
-                "pairs of several intensities are not asked over HTTP",
-                got=strategy.intensities.named_pct_rmt,
-                remedy="Leave out intensities_pct_rmt, or run the session with isiw run or in Python.",
-            )
         recorder = open_session(
             strategy,
             self._path(request.id),
@@ -248,6 +242,7 @@ def _stood(name: str, record: SessionRecord) -> SessionAnswer:
         told=len(record.table.told),
         open_trial=unknown[-1].trial if unknown else None,
         open_isi_ms=unknown[-1].isi_ms if unknown else None,
+        open_intensity_pct_rmt=unknown[-1].intensity_pct_rmt if unknown else None,
         stop=decision is not None and decision.stop,
         reason=decision.reason if decision else "No trial has an outcome yet.",
     )

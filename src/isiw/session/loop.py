@@ -191,7 +191,9 @@ class Session(Judging):
                 if not (self._rig.staged_once or self._earlier.first_records):
                     log.discard()
                 raise
-        return SessionResult(self.strategy.estimate(), decision, self.trials, log.path)
+        intervention = self._header.intervention
+        conceals = intervention is not None and intervention.conceals
+        return SessionResult(self.strategy.estimate(), decision, self.trials, log.path, conceals)
 
     @contextmanager
     def _operated(self, *, keys: bool) -> Iterator[Callable[[str], bool]]:

@@ -126,6 +126,8 @@ class Recorder(Recording[Trial], Judging):
     @property
     def intensity_pct_rmt(self) -> float | None:
         """The intensity of the pair that was asked [% RMT]; None where all pairs of the session have the usual one."""
+        if (asked := self.asked) is not None:  # what a verdict since then would choose is another pair's
+            return asked.intensity_pct_rmt
         return self.strategy.intensity_pct_rmt
 
     def _of_pair(self, pct_rmt: float | None) -> float | None:
@@ -213,7 +215,8 @@ class Recorder(Recording[Trial], Judging):
             mep_interval_mv: as for `Strategy.tell` [mV].
             pulse: False is a tap alone, as for `Strategy.tell`, which was given without a request.
             confirm: whether all realised ISIs are right, however far from those asked; it is logged.
-            intensity_pct_rmt: as for `Strategy.tell` [% RMT]; of a pair by default the one that was asked for.
+            intensity_pct_rmt: as for `Strategy.tell` [% RMT]; of a pair by default the one that was asked for. One
+                beyond the limits is learnt, and an event of the log says so.
 
         Raises:
             InvalidValueError: nothing was asked, a value that cannot be, a slip of unit or order, a pulse before the
@@ -246,7 +249,7 @@ class Recorder(Recording[Trial], Judging):
         isi_ms = None if isi_ms is None else number("a realised ISI [ms]", isi_ms)
         asked = self._require_asked()
         require_plausible(isi_ms, mep_mv, asked.isi_ms, space, outcome.isi_sd_ms)
-        require_plausible_range(outcome.mep_sd_mv, outcome.mep_interval_mv)
+        require_plausible_range(outcome.mep_sd_mv, outcome.mep_interval_mv, outcome.intensity_pct_rmt)
         isi_ms = None if isi_ms is None else space.check_realised(isi_ms)
         if (isi_ms is None or not pulse) != (asked.isi_ms is None) or asked.tap_alone is pulse:
             raise InvalidValueError(
@@ -261,6 +264,7 @@ class Recorder(Recording[Trial], Judging):
                       intensity_pct_rmt=outcome.intensity_pct_rmt)  # fmt: skip
         if self.in_doubt and asked.isi_ms is not None:
             self._confirm(confirm=confirm)
+        self._log_beyond(trial)
         self._conclude(trial)
         if self._put_in_doubt():
             return
@@ -268,6 +272,13 @@ class Recorder(Recording[Trial], Judging):
         self._doubts = self._doubts.after((isi_far(isi_ms, asked.isi_ms, space), *odd))
         if self._doubts.new is not None:
             self._warn(self._doubts.new)
+
+    def _log_beyond(self, trial: Trial) -> None:
+        """Log that a pulse was stronger than the limits allow, ahead of its trial: it was given all the same."""
+        most, pct_rmt = self._limits.max_intensity_pct_rmt, trial.intensity_pct_rmt
+        if most is not None and pct_rmt is not None and pct_rmt > most:
+            beyond = f"A pulse was given at {pct_rmt:g} % RMT, beyond the limit of {most:g} % RMT."
+            self._examination.event("limit", beyond, trial.index)
 
     def _confirm(self, *, confirm: bool) -> None:
         """Let the trials in doubt count where they are confirmed, and raise where they are not."""
@@ -308,7 +319,8 @@ class Recorder(Recording[Trial], Judging):
             asked = self._require_asked()
             if known != reason:
                 self._examination.note(str(reason), trial=asked.trial)
-            self._conclude(Trial(asked.trial, Status.MISTRIAL, asked.isi_ms, known))
+            own: Any = {"tap_alone": asked.tap_alone, "intensity_pct_rmt": self._of_pair(asked.intensity_pct_rmt)}
+            self._conclude(Trial(asked.trial, Status.MISTRIAL, asked.isi_ms, known, **own))
         lost = len(list(itertools.takewhile(lambda trial: trial.reason is not None, reversed(self.trials.trials))))
         if lost == self._limits.max_consecutive_mistrials:
             mistrials = "1 mistrial" if lost == 1 else f"{lost} mistrials in a row, the last one"

@@ -13,6 +13,7 @@ from isiw.devices.clock import MonotonicClock
 from isiw.devices.limits import USUAL_ITI_S, Limits
 from isiw.devices.protocol import Device, DeviceInfo, HasMemory, info_of
 from isiw.errors import InvalidValueError, LogError
+from isiw.findings import require_percent
 from isiw.log.headers import Header
 from isiw.log.kinds import OWN_LOOP, LogKind, continued_by, of_another_kind, require_session
 from isiw.log.places import log_exists
@@ -69,7 +70,8 @@ def open_session(
         DeviceError: the log is of a simulated device.
         InvalidValueError: `lost_pulses` is no number of stimuli, or the log's end is there; a subject that is no text,
             or another than the log's; a protocol with control trials; a rest or a period that limits nothing, a limit
-            on intensity or coil temperature, which are unknown here, or limits that do not hold the strategy's plan.
+            on intensity or coil temperature, which are unknown here, limits that do not hold the strategy's plan, or
+            an intensity of earlier trials that is in another unit.
         LogError: there is a log already, or it cannot be written or read.
         StrategyError: the strategy knows of trials already, or asks something else than the log says it asked.
 
@@ -80,6 +82,8 @@ def open_session(
     path = require_parts(log, options, strategy=(strategy, Strategy))
     require_new(strategy)
     if trials := tuple(earlier):
+        for trial in trials:
+            require_percent("the intensity of a trial that was given before", trial.intensity_pct_rmt)
         strategy.learn_all(trials)
     stated = _stated(strategy.space, options)
     if resume and log_exists(path):

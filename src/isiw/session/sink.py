@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple, Protocol
 
+from isiw import sentences
 from isiw.errors import InvalidValueError, error_text
 from isiw.estimate import WindowEstimate
 from isiw.log.schema import Event, Record
@@ -49,15 +50,20 @@ class SessionResult:
         decision: why it ended.
         trials: all its trials.
         log: its log.
+        conceals: whether the arm of an intervention is concealed, so that nothing may be shown that tells it.
     """
 
     estimate: WindowEstimate
     decision: StopDecision
     trials: TrialTable
     log: Path
+    conceals: bool = False
 
     def __str__(self) -> str:
-        return f"{self.estimate}\nTrials: {self.trials}\nEnded: {self.decision.reason}\nLog: {self.log}"
+        trials = sentences.concealed(self.log) if self.conceals else f"Trials: {self.trials}"
+        return f"{self.estimate}\n{trials}\nEnded: {self.decision.reason}\nLog: {self.log}"
+
+    __repr__ = __str__  # in a notebook, too, a concealed arm stays so
 
 
 class Wait(NamedTuple):

@@ -8,7 +8,7 @@ from typing import Final
 
 from isiw.checks import number
 from isiw.design import DesignSpace
-from isiw.findings import AMPLITUDE_MV, Finding, Kind, Severity, refused
+from isiw.findings import AMPLITUDE_MV, Finding, Kind, Severity, refused, require_percent
 from isiw.trials import MOST_ISI_SD_MS
 
 AT_REST_MV = 2e-3
@@ -47,8 +47,9 @@ def require_amplitude(mep_mv: float, besides: Finding | None = None) -> None:
         raise refused(found, mep_mv)
 
 
-def require_plausible_range(sd_mv: float, ends_mv: tuple[float, float] | None) -> None:
-    """Refuse an end of an interval that no muscle gives, and an SD that no amplitudes of a muscle have [mV]."""
+def require_plausible_range(sd_mv: float, ends_mv: tuple[float, float] | None, pct_rmt: float | None) -> None:
+    """Refuse ends of an interval and an SD that no muscle gives [mV], and an intensity that is not in % RMT."""
+    require_percent("intensity_pct_rmt", pct_rmt)
     for end_mv in ends_mv or ():
         if AMPLITUDE_MV.most < end_mv < math.inf:
             require_amplitude(end_mv)

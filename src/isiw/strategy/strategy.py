@@ -241,8 +241,8 @@ class Strategy:
 
         Raises:
             InvalidValueError: a value that cannot be, not exactly one of `mep_mv`, `mep_interval_mv` and `response`, an
-                amplitude that no muscle gives, swapped arguments, seconds, a pulse before the impact, an ISI that is
-                too uncertain, a tap alone without ISI or amplitude or with an intensity, or ISIs to be confirmed.
+                amplitude that no muscle gives, swapped arguments, another unit, a pulse before the impact, an ISI that
+                is too uncertain, a tap alone without ISI or amplitude or with an intensity, or ISIs to be confirmed.
             OutOfSpaceError: an ISI beyond the space and its tolerance.
             StrategyError: a kind of outcome that the model cannot learn from, such as a pair of another intensity.
 
@@ -260,7 +260,7 @@ class Strategy:
         require_plausible(plain_ms, plain_mv, asked_ms, self.space, isi_sd_ms)
         realised_ms = None if isi_ms is None else self.space.check_realised(isi_ms)
         outcome = Outcome(realised_ms, mep_mv, response, isi_sd_ms, mep_sd_mv, mep_interval_mv, None, intensity_pct_rmt)
-        require_plausible_range(outcome.mep_sd_mv, outcome.mep_interval_mv)
+        require_plausible_range(outcome.mep_sd_mv, outcome.mep_interval_mv, outcome.intensity_pct_rmt)
         reported = self._reported if plain_ms is None else self._reported.confirmed_by(confirm=flag("confirm", confirm))
         self._learn(outcome)
         self._reported = reported.after(self._outcomes.pulses, asked_ms, self.detection_limit_mv)
