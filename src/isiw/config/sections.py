@@ -286,6 +286,9 @@ class VisitConfig(Section):
     intensity_pct_rmt: float | None = Field(default=None, gt=0.0)
     intensity_pct_mso: float | None = Field(default=None, gt=0.0)
     electrodes: str = ""
+    age_years: float | None = Field(default=None, ge=1.0, le=120.0)
+    height_cm: float | None = Field(default=None, ge=50.0, le=260.0)
+    tap_n: float | None = Field(default=None, ge=0.1, le=1000.0)
 
     def noted(self) -> Visit:
         """The notes about the visit."""
