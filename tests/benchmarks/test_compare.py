@@ -102,7 +102,7 @@ def test_without_even_isis_no_ratio_to_them_is_given() -> None:
 
 def test_the_sentences_have_the_figures() -> None:
     first, second, third = said(FOUND)
-    assert "on 20 simulated people of `recruitment`" in first.lower()
+    assert "on 20 simulated people with noise as near the motor threshold (`recruitment`)" in first.lower()
     assert "from 10 stimuli on, evenly spaced ISIs from 20: 50 % fewer (ratio .50" in first
     assert "of 2 other ways" in second
     assert "2 have a lower mean F1" in second

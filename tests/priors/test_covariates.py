@@ -10,8 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy import stats
+from typer.testing import CliRunner
 
 from isiw import priors
+from isiw.cli import app
+from isiw.config.run import RunConfig
+from isiw.config.session import settings_with_prior
+from isiw.devices.protocol import DeviceInfo
 from isiw.errors import InvalidValueError
 from isiw.models.particles.places import Place
 from isiw.models.shared.scales import Scale
@@ -92,6 +97,11 @@ def test_heights_in_logs_are_learnt_kept_in_the_file_and_used_for_who_states_one
     short, tall = (priors.load(path, Visit(height_cm=height)).profile.places[0] for height in (165.0, 185.0))
     assert tall.start_ms.law[0] - short.start_ms.law[0] == pytest.approx(18.0)
     assert priors.load(path).profile.places[0].start_ms == known_place(lab).start_ms
+    shown = CliRunner().invoke(app, ["prior", "show", str(path)])
+    assert "Windows start +0.9 ± 0.3 ms for each 1 more of height_cm (people learnt from: 175 ± 10)." in shown.output
+    config = RunConfig(prior=path, visit={"height_cm": 185.0}, space={"reference": "valve"})  # type: ignore[arg-type]
+    settings = settings_with_prior(config, DeviceInfo("bench", "valve"))
+    assert settings["prior"].profile.places[0].start_ms == tall.start_ms
 
 
 def known_place(lab: priors.LabPrior) -> Place:
