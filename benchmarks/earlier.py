@@ -22,6 +22,7 @@ def logged_session(
     trials: int,
     folder: Path,
     hit_delay_ms: tuple[float, float] | None = None,
+    visit: isiw.Visit | None = None,
 ) -> Path:
     """Run a session of so many trials with the default, from the valve command, and return its log.
 
@@ -32,12 +33,13 @@ def logged_session(
         trials: how many.
         folder: where the log is written.
         hit_delay_ms: what the rig states of it, mean and SD [ms]; None where it states nothing.
+        visit: what is noted of the person.
     """
     respond = partial(subject.begin(seed).respond, reference="valve")
     device = isiw.SimulatedDevice(isiw.SimulatedPerson(respond, "valve", hit_delay_ms=hit_delay_ms))
     never = {"stop_width_ms": 1e-3, "stop_no_window": 1.0, "stop_expected_f1": 1.0, "stop_gain": 0.0}
     strategy = isiw.make_strategy(seed=seed, max_trials=trials, hit_delay_ms=hit_delay_ms, **never)
-    return isiw.Session(device, strategy, log=folder / f"{name}.mcap", subject=name).run().log
+    return isiw.Session(device, strategy, log=folder / f"{name}.mcap", subject=name, visit=visit).run().log
 
 
 def measured(examine: Callable[[Any], pd.DataFrame], units: Sequence[Any], workers: int, out: Path) -> pd.DataFrame:

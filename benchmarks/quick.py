@@ -38,6 +38,7 @@ QUICK: Final[Mapping[str, str]] = {
     "compare": "--people 2 --slow-people 1 --trials 20 --rows 3 --cohorts recruitment "
     "--parts named,regressions,particles,gp,botorch,supra,parametric --out OUT",
     "core_size": "--out OUT",
+    "covariates": "--labs 1 --people 1 --out OUT",
     "deaths": "--kills 9 --out OUT",
     "dissertation": "--few --out OUT",
     "fair_opponent": "--people 3 --trials 12 --out OUT",

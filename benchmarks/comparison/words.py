@@ -40,6 +40,12 @@ PEOPLE: Final[Mapping[str, str]] = {
     "recorded": "responses that were recorded (`recorded`)",
 }
 
+WHO: Final[Mapping[str, str]] = {
+    "recruitment": "simulated people with noise as near the motor threshold (`recruitment`)",
+    "gaussian": "simulated people with constant-CV noise (`gaussian`)",
+    RECORDED: "simulated windows of people whose MEPs were recorded",
+}
+
 
 def sentences(table: pd.DataFrame, rows: pd.DataFrame) -> list[str]:
     """What follows: what choosing saves, how the ways to choose differ, and whom not to trust.
@@ -65,27 +71,26 @@ def savings(table: pd.DataFrame, cohorts: Iterable[str]) -> str:
         cohorts: the cohorts.
     """
     defaults = table[table["strategy"] == DEFAULT].set_index("cohort", drop=False)
-    found = "; ".join(saving(defaults.loc[cohort].to_dict()) for cohort in cohorts if cohort in defaults.index)
-    return f"{found[0].upper()}{found[1:]}."
+    found = [saving(defaults.loc[cohort].to_dict()) for cohort in cohorts if cohort in defaults.index]
+    return " ".join(f"{each[0].upper()}{each[1:]}." for each in found)
 
 
 def saving(line: Mapping[str, Any]) -> str:
     """How many stimuli isiw's default needs to a lasting F1, against even ISIs: to the largest F1 that both reach.
 
     Args:
-        line: that of the default with a cohort, with the columns of `measures.table_of`.
+        line: that of isiw's default with a cohort, with the columns of `measures.table_of`.
     """
     both = [each for each in CRITERIA if line[f"bound_{each}"] == ""]
     wanted = both[-1] if both else CRITERIA[0]
     names = ("stimuli", "even", "ratio", "low", "high")
     reached, even, ratio, low, high = (line[f"{name}_{wanted}"] for name in names)
-    who = f"on {line['people']} simulated people of `{line['cohort']}`"
-    if line["cohort"] == RECORDED:
-        who = f"on {line['people']} simulated windows of people whose MEPs were recorded"
+    people = WHO.get(line["cohort"], f"simulated people of `{line['cohort']}`")
+    who = f"on {line['people']} {people}"
     f1 = f"a mean F1 of {_criterion(wanted)}"
     if math.isinf(reached):
-        return f"{who} the default does not keep {f1} within {line['trials']} stimuli"
-    has = f"{who} the default keeps {f1} from {reached:.0f} stimuli on, evenly spaced ISIs"
+        return f"{who} isiw's default does not keep {f1} within {line['trials']} stimuli"
+    has = f"{who} isiw's default keeps {f1} from {reached:.0f} stimuli on, evenly spaced ISIs"
     if math.isinf(even):
         return f"{has} not within {line['trials']}"
     found, ends = f"{has} from {even:.0f}", _interval(low, high)

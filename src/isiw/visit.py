@@ -51,9 +51,14 @@ class Visit(Checked):
         intensity_pct_rmt: intensity of the pulse [% of the resting motor threshold]; None if it is not noted.
         intensity_pct_mso: the same [% of the maximum stimulator output]; None if it is not noted.
         electrodes: which, and where they are.
+        age_years: the person's age; None, as of the next two, if it is not noted. A lab's prior learns how windows go
+            with these three.
+        height_cm: the person's height [cm].
+        tap_n: strength of the tap, as its peak force [N].
 
     Raises:
-        InvalidValueError: a day below 1, an intensity that is not positive, or a note that is no text.
+        InvalidValueError: a day below 1, an intensity that is not positive, a note that is no text, or an age, a height
+            or a force that nobody has.
     """
 
     day: Count | None = None
@@ -62,6 +67,9 @@ class Visit(Checked):
     intensity_pct_rmt: Positive | None = None
     intensity_pct_mso: Positive | None = None
     electrodes: Text = ""
+    age_years: Annotated[float, partial(number, least=1, most=120)] | None = None
+    height_cm: Annotated[float, partial(number, least=50, most=260)] | None = None
+    tap_n: Annotated[float, partial(number, least=0.1, most=1000)] | None = None
 
     def require_intensity(self, assumed_pct_rmt: float | None = None) -> None:
         """Raise if an intensity is probably in another unit, or not the one that the strategy assumes.

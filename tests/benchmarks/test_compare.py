@@ -102,7 +102,7 @@ def test_without_even_isis_no_ratio_to_them_is_given() -> None:
 
 def test_the_sentences_have_the_figures() -> None:
     first, second, third = said(FOUND)
-    assert "on 20 simulated people of `recruitment`" in first.lower()
+    assert "on 20 simulated people with noise as near the motor threshold (`recruitment`)" in first.lower()
     assert "from 10 stimuli on, evenly spaced ISIs from 20: 50 % fewer (ratio .50" in first
     assert "of 2 other ways" in second
     assert "2 have a lower mean F1" in second
@@ -229,11 +229,11 @@ def test_a_comparison_with_one_person_says_that_it_cannot() -> None:
 def test_what_a_gaussian_process_says_of_itself_is_what_was_measured() -> None:
     rows = pd.DataFrame(json.loads(FAMILY.read_text(encoding="utf-8"))["All rows"])
     named = [name for name in isiw.list_strategies() if name.startswith("gp-")]
-    own = rows[(rows["cohort"] == "recruitment") & rows["strategy"].isin(named)]
-    assert sorted(own["strategy"]) == sorted(named)
+    own = rows[(rows["cohort"] == "recruitment") & rows["strategy"].isin(named)].set_index("strategy")
+    assert sorted(own.index) == sorted(named)
     for name in named:
         said = measured_of(name)
         assert said is not None
-        assert said.sessions == own["people"].sum()
-        assert said.coverage == pytest.approx(np.average(own["coverage_20"], weights=own["people"]), abs=0.005)
-        assert said.excess_f1 == pytest.approx(np.average(own["excess_20"], weights=own["people"]), abs=0.005)
+        assert said.people == own["people"][name]
+        assert said.coverage == pytest.approx(own.loc[name, ["coverage_20", "coverage_40"]], abs=0.005)
+        assert said.wrong == pytest.approx(own.loc[name, ["wrong_20", "wrong_40"]], abs=0.005)

@@ -12,6 +12,7 @@ from isiw.devices.protocol import DeviceInfo, Readiness
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, NotDelivered
 from isiw.sweeps import Measurement
 from isiw.trials import Stimulus
+from isiw.visit import Visit
 from scripted import ScriptedDevice
 
 LIMITS = Limits(low_ms=0, high_ms=200, min_iti_s=5.0, max_pulses=3)
@@ -300,6 +301,35 @@ def test_an_intensity_is_the_same_up_to_what_a_conversion_loses(inner: ScriptedD
     device.state = Readiness(intensity_pct_mso=55.000001)
     limited.deliver(Stimulus(0, 10), 1.0)
     assert len(inner.delivered) == 1
+
+
+def test_another_intensity_than_the_visit_notes_delivers_nothing(inner: ScriptedDevice, clock: VirtualClock) -> None:
+    device = Reporting(inner, Readiness(intensity_pct_mso=60.0))
+    limited = LimitedDevice(device, Limits(0, 200, 5.0, 9), clock, noted=Visit(intensity_pct_mso=55.0))
+    limited.stage()
+    clock.sleep_s(limited.wait_s())
+    with pytest.raises(LimitExceededError, match=r"60 % MSO.*55 % MSO"):
+        limited.deliver(Stimulus(0, 10), 1.0)
+    assert inner.delivered == []
+
+
+@pytest.mark.parametrize(("reported", "stops"), [(55.0, False), (55.4, False), (50.0, True), (None, False)])
+def test_a_device_that_reports_another_intensity_than_it_was_asked_to_set_fires_no_more(
+    inner: ScriptedDevice, clock: VirtualClock, reported: float | None, *, stops: bool
+) -> None:
+    device = Reporting(inner, Readiness(intensity_pct_mso=45.0))
+    visit = Visit(intensity_pct_rmt=90.0, intensity_pct_mso=45.0)
+    limited = LimitedDevice(device, Limits(0, 200, 5.0, 9, max_intensity_pct_rmt=110.0), clock, noted=visit)
+    limited.stage()
+    for trial in range(2):
+        clock.sleep_s(limited.wait_s())
+        if trial and stops:
+            with pytest.raises(LimitExceededError, match=r"has set another intensity.*50 % MSO.*55\.0 % MSO"):
+                limited.deliver(Stimulus(trial, 10, intensity_pct_rmt=90.0), 1.0)
+        else:
+            limited.deliver(Stimulus(trial, 10, intensity_pct_rmt=110.0), 1.0)
+            device.state = Readiness(intensity_pct_mso=reported)
+    assert len(inner.delivered) == 2 - stops
 
 
 def test_a_whole_interval_passes_after_each_arming(inner: ScriptedDevice, clock: VirtualClock) -> None:

@@ -6,6 +6,7 @@ import pytest
 
 from isiw.design import DesignSpace
 from isiw.models.windows import Runs, SampledProfiles, best_window, edge_samples, profile_grid, sampled_estimate
+from isiw.strategy.catalogue import make_strategy
 from known import known
 
 SPACE = DesignSpace(0, 9, reference="impact")
@@ -94,6 +95,16 @@ def test_the_best_isi_is_told_of_samples_that_have_one_and_what_is_excluded_of_a
     assert known(estimate.best_isi) == (3.0, 3.0, 4.0)
     assert known(estimate.largest_excluded).mep_mv == pytest.approx(0.05)
     assert sampled_estimate(masks("0000000000"), flat(1), SPACE).best_isi is None
+
+
+def test_no_window_is_more_probable_than_came_true() -> None:
+    everywhere = masks("0111000000", "0111000000")
+    estimate = sampled_estimate(everywhere, flat(2), SPACE, most_probable=0.98)
+    assert (estimate.probability, estimate.expected_f1) == (0.98, 0.98)
+    sure = make_strategy("gp-straddle", DesignSpace(0, 300, reference="impact"), seed=1)
+    for isi_ms in range(0, 300, 25):
+        sure.tell(isi_ms, 2.0 + isi_ms / 1000 if 70 < isi_ms < 180 else 0.02 + isi_ms / 1e5)
+    assert sure.estimate().probability == 0.98
 
 
 def test_a_profile_is_reported_up_to_both_ends_of_the_range() -> None:

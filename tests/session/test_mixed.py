@@ -12,6 +12,7 @@ from isiw.config.session import session_for
 from isiw.devices.clock import VirtualClock
 from isiw.devices.limited import LimitedDevice
 from isiw.devices.limits import Limits
+from isiw.devices.protocol import Readiness
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, StrategyError
 from isiw.models.particles.prior import Prior
 from isiw.priors.days import recalled
@@ -107,6 +108,25 @@ def test_an_intensity_beyond_the_limits_ends_the_session_before_anything_is_give
         with pytest.raises(InvalidValueError, match="beyond the limits"):
             session(tmp_path / "high.mcap", mixed(), most=most).run()
     assert not (tmp_path / "high.mcap").exists()
+
+
+def test_a_session_stops_before_it_fires_where_the_device_reports_another_intensity(tmp_path: Path) -> None:
+    class Stuck(isiw.SimulatedDevice):
+        """Reports one intensity, whatever it was asked to set."""
+
+        def readiness(self) -> Readiness:
+            return Readiness(intensity_pct_mso=45.0)
+
+    responder = person_of("recruitment", 0, 1).begin(1)
+    stuck = Stuck(
+        isiw.SimulatedPerson(lambda isi_ms, **_: responder.respond(isi_ms, "impact"), "impact", sets_intensity=True)
+    )
+    visit = Visit(intensity_pct_rmt=90.0, intensity_pct_mso=45.0)
+    with pytest.raises(LimitExceededError, match=r"45 % MSO.*50\.0 % MSO, which is 100 % RMT"):
+        session(tmp_path / "stuck.mcap", mixed(), device=stuck, visit=visit).run()
+    record = isiw.read_session(tmp_path / "stuck.mcap")
+    assert [trial.intensity_pct_rmt for trial in record.table] == [None, 100.0]
+    assert "has set another intensity" in record.events[-1].text
 
 
 def test_no_intensity_is_set_that_the_limits_do_not_allow() -> None:

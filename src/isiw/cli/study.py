@@ -130,6 +130,8 @@ def show_prior(
 
 def _print(lab: LabPrior, table: pd.DataFrame) -> None:
     show(table.to_string(float_format=lambda value: f"{value:.3g}", na_rep=""))
+    for slope in lab.slopes:
+        show(str(slope))
     trials = counted(sum(session.trials for session in lab.sessions), "trial")
     show(f"Learnt from {counted(len(lab.sessions), 'session')} with {trials}.", style="bold")
 

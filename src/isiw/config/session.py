@@ -103,7 +103,7 @@ def settings_with_prior(config: RunConfig, device: DeviceInfo) -> dict[str, Any]
     _require_people(config, earlier, device, nobodys, any_intensity=second_step)
     if lab is not None:
         _require_like(config, Visit(muscle=lab.noted_muscle), config.prior)
-    before = None if lab is None else lab.joined()
+    before = None if lab is None else lab.joined(visit=config.visit.noted())
     if second_step:
         return settings | {"prior": above(*earlier, prior=before, law=_law(config, earlier))}
     return settings | {"prior": after(*earlier, prior=before)}

@@ -11,6 +11,10 @@ from isiw.devices.limits import Limits
 from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, readiness_of, require_staged
 from isiw.errors import DeviceError, LimitExceededError, NotDelivered
 from isiw.trials import Stimulus
+from isiw.visit import Visit
+
+MOST_ROUNDED_PCT_MSO = 0.51
+"""Stimulators set whole per cent of their output [% MSO]."""
 
 
 def require_real_time(info: DeviceInfo, clock: Clock) -> None:
@@ -41,6 +45,30 @@ def require_within_device(info: DeviceInfo, limits: Limits) -> None:
         )
 
 
+def require_set(noted: Visit, asked_pct_rmt: float | None, state: Readiness) -> None:
+    """Raise LimitExceededError if a device that sets intensities reports another one than it was last asked to set.
+
+    Args:
+        noted: the usual intensity, as a share of the threshold and of the stimulator's output; without both nothing is
+            compared.
+        asked_pct_rmt: the intensity that it was asked to set last [% RMT]; None if none since it was staged.
+        state: what it reports.
+    """
+    reported, usual_mso, usual_rmt = state.intensity_pct_mso, noted.intensity_pct_mso, noted.intensity_pct_rmt
+    if asked_pct_rmt is None or reported is None or usual_mso is None or usual_rmt is None:
+        return
+    asked_mso = usual_mso * asked_pct_rmt / usual_rmt
+    if abs(reported - asked_mso) > MOST_ROUNDED_PCT_MSO:
+        raise LimitExceededError(
+            "the device has set another intensity than it was asked for",
+            got=f"{reported:g} % MSO",
+            expected=f"{asked_mso:.1f} % MSO, which is {asked_pct_rmt:g} % RMT where {usual_rmt:g} % RMT is "
+            f"{usual_mso:g} % MSO",
+            remedy="This stimulus was not delivered, and the one before may have had that intensity: exclude it. "
+            "Correct what the device sets, or the two intensities under [visit]; then resume the session.",
+        )
+
+
 class LimitedDevice:
     """A device that refuses what exceeds its limits, before anything is delivered. Safe to use from several threads.
 
@@ -58,13 +86,15 @@ class LimitedDevice:
         earlier_s: Sequence[float] = (),
         dead_man: Callable[[], bool] | None = None,
         waits_for_nobody: bool = False,
+        noted: Visit | None = None,
     ) -> None:
         info = device.describe()
         if not waits_for_nobody:
             require_real_time(info, clock)
         require_within_device(info, limits)
         self._device, self._info, self._dead_man = device, info, dead_man
-        self._limits = Limits(**dataclasses.asdict(limits))
+        self._limits, self._noted = Limits(**dataclasses.asdict(limits)), noted or Visit()
+        self._last_set_pct_rmt: float | None = None
         self._delivered = delivered
         self._pacing = Pacing(self._limits, clock, earlier_s)
         self.wait_s, self.ahead_s = self._pacing.wait_s, self._pacing.ahead_s
@@ -103,6 +133,7 @@ class LimitedDevice:
                 remedy="This stimulus was not delivered. Continue when the device is ready.",
             )
         self._limits.require_state(state)
+        require_set(self._noted, self._last_set_pct_rmt, state)
         if self._dead_man is not None and self._dead_man() is not True:
             raise LimitExceededError(
                 "the dead man's switch is not held",
@@ -131,10 +162,11 @@ class LimitedDevice:
         """Get ready and arm; the next stimulus comes a whole interval later at the earliest."""
         self._device.stage()
         self._pacing.begin_again()
+        self._last_set_pct_rmt = None
         if self._limits.intensity_pct_mso is None and self._limits.max_intensity_pct_rmt is None:
-            self._limits = dataclasses.replace(
-                self._limits, intensity_pct_mso=readiness_of(self._device).intensity_pct_mso
-            )
+            reported = readiness_of(self._device).intensity_pct_mso
+            own = reported if reported is None else self._noted.intensity_pct_mso or reported
+            self._limits = dataclasses.replace(self._limits, intensity_pct_mso=own)
         self._staged = True
 
     def deliver(self, stimulus: Stimulus, timeout_s: float) -> Answer:
@@ -144,12 +176,15 @@ class LimitedDevice:
             self.check(stimulus)
             require_staged(self._info.name, staged=self._staged)  # the check may take long, and `stop` come meanwhile
             self._delivered += 1
+            last_pct_rmt, self._last_set_pct_rmt = self._last_set_pct_rmt, None  # not known, if delivering fails
             try:
                 with self._pacing.delivering():
-                    return self._device.deliver(stimulus, timeout_s)
+                    answer = self._device.deliver(stimulus, timeout_s)
             except (NotDelivered, LimitExceededError):
                 self._delivered -= 1
                 raise
+            self._last_set_pct_rmt = stimulus.intensity_pct_rmt or last_pct_rmt
+            return answer
 
     def stop(self) -> None:
         """Disarm; from here on nothing is delivered until the next `stage`."""

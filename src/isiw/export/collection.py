@@ -71,7 +71,7 @@ def _changed(record: SessionRecord, person: _Person) -> SessionRecord:
         update={
             "subject": person.pseudonym,
             "created": (_begin(record.header) + shift).isoformat(timespec="seconds"),
-            "visit": replace(record.header.visit, operator=""),
+            "visit": replace(record.header.visit, operator="", age_years=None, height_cm=None),
             "device": replace(record.header.device, address=""),
             "config": {},
             "source": "",

@@ -155,9 +155,10 @@ def sampled_estimate(
     space: DesignSpace,
     hypotheses: SampledHypotheses | None = None,
     shift_pct_rmt: Callable[[], float | None] = lambda: None,
+    most_probable: float = 1.0,
 ) -> WindowEstimate:
-    """The estimate of the window of one person by equally weighted samples."""
-    probability = len(windows.found) / windows.samples
+    """The estimate of the window of one person by equally weighted samples, at most so probable."""
+    probability = min(len(windows.found) / windows.samples, most_probable)
     first, last = windows.hulls
     edges = edge_samples(windows, space)
     middle = (len(edges) - 1) // 2

@@ -15,6 +15,7 @@ from isiw.models.particles.prior import Prior
 from isiw.priors.lab import SCHEMA_VERSION, LabPrior
 from isiw.strategy.settings.common import as_toml
 from isiw.text.toml_files import checked, read_toml
+from isiw.visit import Visit
 
 
 def write_lab_prior(lab: LabPrior, path: str | Path, *, overwrite: bool = False) -> Path:
@@ -67,16 +68,17 @@ def read_lab_prior(path: str | Path) -> LabPrior:
     return checked(LabPrior, _upgraded(values), str(path))
 
 
-def load(path: str | Path) -> Prior:
+def load(path: str | Path, visit: Visit | None = None) -> Prior:
     """A prior with a lab's laws in it, for `isiw.make_strategy(prior=...)`.
 
     Args:
         path: the file.
+        visit: as for `LabPrior.joined`.
 
     Raises:
         ConfigError: as from `read_lab_prior`.
     """
-    return read_lab_prior(path).joined()
+    return read_lab_prior(path).joined(visit=visit)
 
 
 def _upgraded(values: dict[str, Any]) -> dict[str, Any]:

@@ -22,6 +22,7 @@ from isiw.models.particles.laws import Floor, Gain, Muscle, NoiseShares
 from isiw.models.particles.places import MOST_APART_MS, Place
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.profile import ProfilePrior, ShapeShares
+from isiw.priors.covariates import Slope, expected, slopes_of
 from isiw.priors.days import (
     recalled,
     require_each_once,
@@ -47,7 +48,7 @@ from isiw.priors.population import (
     usual_shares,
 )
 from isiw.types import Conditioning, FloatArray, Reference
-from isiw.visit import MOST_APART_PCT_RMT, different_muscles
+from isiw.visit import MOST_APART_PCT_RMT, Visit, different_muscles
 
 _T = TypeVar("_T")
 
@@ -89,6 +90,7 @@ class LabPrior(Checked):
         floor: the EMG floor.
         gain: responses with noise of a constant CV.
         muscle: recruitment curves.
+        slopes: how the start of windows goes with what is noted of people.
         schema_version: of the file.
         isiw_version: the version that learnt it.
 
@@ -104,6 +106,7 @@ class LabPrior(Checked):
     floor: Floor | None = None
     gain: Gain | None = None
     muscle: Muscle | None = None
+    slopes: tuple[Slope, ...] = ()
     schema_version: Annotated[int, partial(whole, least=1, most=SCHEMA_VERSION)] = SCHEMA_VERSION
     isiw_version: str = isiw.__version__
 
@@ -125,11 +128,18 @@ class LabPrior(Checked):
         """Whose EMG was recorded, as the sessions note it; empty if none does."""
         return next((session.muscle for session in self.sessions if session.muscle), "")
 
-    def joined(self, usual: Prior | None = None) -> Prior:
-        """A prior in which the lab's laws stand beside those of people in general, by default the built-in ones."""
-        usual = usual or Prior()
+    def joined(self, usual: Prior | None = None, visit: Visit | None = None) -> Prior:
+        """A prior in which the lab's laws stand beside those of people in general.
+
+        Args:
+            usual: that of people in general, by default the built-in one.
+            visit: what is noted of the next person, with whose age, height and tap windows may go.
+        """
+        usual, place = usual or Prior(), self.place
+        if place is not None and visit is not None:
+            place = expected(place, self.slopes, visit)
         own = usual.profile if self.place is None else usual.profile.after(self.place.conditioning)
-        profile = replace(own, p_window=self.p_window, shapes=self.shapes, places=_given(self.place))
+        profile = replace(own, p_window=self.p_window, shapes=self.shapes, places=_given(place))
         return replace(
             usual,
             profile=profile,
@@ -187,9 +197,14 @@ def learn(
         posteriors.append(recalled(record, prior))
         on_done(record)
     rng = np.random.default_rng(seed)
-    population = learnt(people_of(posteriors), hyper_prior(prior, space), usual_shares(prior), rng)
+    people = people_of(posteriors)
+    population = learnt(people, hyper_prior(prior, space), usual_shares(prior), rng)
     stated_ms = next(filter(None, map(stated_hit_delay_ms, records)), None)
-    return _lab_prior(population, prior, sessions, (space.reference, stated_ms, conditioning))
+    lab = _lab_prior(population, prior, sessions, (space.reference, stated_ms, conditioning))
+    if lab.place is None:
+        return lab
+    visits = [record.header.visit for record in records]
+    return replace(lab, slopes=slopes_of(visits, people.blocks["place"], population.laws["place"], rng))
 
 
 def _learnt_session(record: SessionRecord) -> LearntSession:

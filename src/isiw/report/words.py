@@ -311,15 +311,15 @@ def _expects_a_tap(record: SessionRecord) -> str:
 
 
 def _measured(record: SessionRecord) -> str:
-    """What the strategy keeps of what it claims, of one that few people were tried with; empty for the others."""
+    """What the strategy keeps of what it claims, of one that claims more than is so; empty for the others."""
     name = record.header.strategy.name
     if (found := measured_of(name)) is None or not record.rests_on_data:
         return ""
+    (held, later), (wrong, lastly) = ([round(100 * share) for share in each] for each in (found.coverage, found.wrong))
     return (
-        f"{name} was tried on few people: in {found.sessions} simulated sessions of its family with noise as near the "
-        f"motor threshold, its 90 % intervals held {100 * found.coverage:.0f} % of the true edges after 20 stimuli, "
-        f"and it expected an F1 that was {abs(found.excess_f1):.2f} {'above' if found.excess_f1 > 0 else 'below'} the "
-        "actual one."
+        f"{name} claims more than came true on {found.people} simulated people with noise as near the motor threshold: "
+        f"its 90 % intervals held {held} % of the true edges after 20 stimuli and {later} % after 40, and "
+        f"{wrong} % and {lastly} % of its answers were sure and wrong, with an F1 at least .35 lower than expected."
     )
 
 

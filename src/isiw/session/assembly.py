@@ -218,12 +218,13 @@ def assembled(
     limits = (options.get("limits") or Limits.of_space(strategy.space)).stated(USUAL_ITI_S)
     intervention = options.get("intervention")
     sink = Sink(options.get("on_trial"), hides=intervention.hides if intervention else lambda _: False)
-    rig = Rig(device, limits, options.get("clock"), safeguards, sink, away=console.away)
+    noted = options.get("visit") or Visit()
+    rig = Rig(device, limits, options.get("clock"), safeguards, sink, away=console.away, noted=noted)
     require_matching(rig.info, strategy, protocol)
     header = header_of(
         strategy,
         subject=text("subject", options.get("subject", "")),
-        visit=options.get("visit") or Visit(),
+        visit=noted,
         protocol=protocol,
         limits=limits,
         device=rig.info,

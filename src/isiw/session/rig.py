@@ -30,7 +30,7 @@ from isiw.session.sink import Sink
 from isiw.signals.limits import EMG_UNITS_MV
 from isiw.strategy.strategy import Strategy
 from isiw.types import Reference
-from isiw.visit import VisitProtocol
+from isiw.visit import Visit, VisitProtocol
 
 _driven: set[int] = set()
 _guard = threading.Lock()
@@ -122,12 +122,13 @@ class Rig:
         *,
         away: Callable[[], AbstractContextManager[None]] = nullcontext,
         waits_for_nobody: bool = False,
+        noted: Visit | None = None,
     ) -> None:
         stuck = "The session does not react. The device is disarmed."
         self.interrupts = Interrupts(self.disarm, lambda: end_process(stuck, sink.writer, INTERRUPTED), away)
         self.staged_once = self.is_armed = False
         self._raw, self._limits, self._safeguards, self._sink = device, limits, safeguards, sink
-        self._waits_for_nobody = waits_for_nobody
+        self._waits_for_nobody, self._noted = waits_for_nobody, noted
         self._punctual = PunctualDevice(
             device,
             safeguards.deadlines,
@@ -149,6 +150,7 @@ class Rig:
             earlier_s=earlier_s,
             dead_man=self._safeguards.dead_man,
             waits_for_nobody=self._waits_for_nobody,
+            noted=self._noted,
         )
 
     @property
