@@ -182,7 +182,8 @@ class RecordedTrials:
                 "no recorded trial is left to answer with",
                 got="the usual intensity" if pct_rmt is None else f"{pct_rmt:g} % RMT",
                 remedy="Give the limits as many max_pulses as there are recorded pairs at that intensity, or replay a "
-                "longer recording. Where trials were mistrials for their ISI, give the space a tolerance_ms wider than its range.",
+                "longer recording. Where trials were mistrials for their ISI, give the space a tolerance_ms wider than "
+                "its range.",
             )
         trial = min(fitting, key=lambda candidate: abs((candidate.wanted_isi_ms or 0.0) - (asked_ms or 0.0)))
         self._left.remove(trial)

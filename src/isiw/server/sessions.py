@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final, TypeVar
 
 from isiw.devices.limits import USUAL_ITI_S
-from isiw.errors import ConfigError, error_text
+from isiw.errors import error_text
 from isiw.files import made_folder, twin
 from isiw.log.headers import SERVED_KEY
 from isiw.log.places import log_exists, log_of, part_of
