@@ -90,7 +90,7 @@ def observed(observation: Observation, detection_limit_mv: float, response_thres
     if observation.known_mv is not None:
         columns[:, 0, _OF_A_TRIAL : _OF_A_TRIAL + 3] = observation.known_mv
     if observation.shift_pct_rmt is not None:
-        columns[:, 0, SHIFT] = observation.shift_pct_rmt
+        columns[:, 0, SHIFT], columns[:, 0, BY_CURVES] = observation.shift_pct_rmt, 0.0  # until curves predict it
     return History(columns)
 
 
