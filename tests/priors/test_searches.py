@@ -25,7 +25,7 @@ OVER_PCT_MSO = tuple(range(45, 78, 4))
 
 
 def searched(
-    log: Path, seed: int, *, subject: str | None = None, muscle: str = "", simulated: bool = False, each: int = 3
+    log: Path, seed: int, *, subject: str | None = None, muscle: str = "", simulated: bool = False, each: int = 2
 ) -> Path:
     """Pulses over the curve of a person with MEPs of 6 mV at most, a floor of 10 µV, and 50 µV at 50 % MSO."""
     rng = np.random.default_rng([seed, 69])
@@ -49,14 +49,14 @@ def largest(lab: LabPrior) -> tuple[float, float]:
 
 @pytest.mark.slow
 def test_pulses_over_the_curve_teach_what_the_labs_curves_are_like_and_few_people_change_little(tmp_path: Path) -> None:
-    logs = [searched(tmp_path / f"{seed}.mcap", seed) for seed in range(6)]
-    one, all_of = priors.learn(logs[:1]), priors.learn(logs)
-    (first, usual), (last, _) = largest(one), largest(all_of)
-    assert usual < first < last
-    assert last > 4 * usual
-    assert known(all_of.muscle).share > (one.muscle.share if one.muscle else 0.0)
-    assert math.log(known(all_of.muscle).ratio.median) == pytest.approx(math.log(600), abs=0.7)
-    assert [session.trials for session in all_of.sessions] == [3 * len(OVER_PCT_MSO)] * 6
+    logs = [searched(tmp_path / f"{seed}.mcap", seed) for seed in range(5)]
+    two, all_of = priors.learn(logs[:2]), priors.learn(logs)
+    (first, usual), (last, _) = largest(two), largest(all_of)
+    assert usual <= first < last
+    assert last > 3 * usual
+    assert known(all_of.muscle).share > (two.muscle.share if two.muscle else 0.0)
+    assert math.log(known(all_of.muscle).ratio.median) == pytest.approx(math.log(600), abs=0.9)
+    assert [session.trials for session in all_of.sessions] == [2 * len(OVER_PCT_MSO)] * 5
 
 
 @pytest.mark.usefixtures("few_sweeps")
@@ -74,7 +74,7 @@ def test_a_search_and_a_session_of_one_person_are_one_person(tmp_path: Path) -> 
     session = write_log(tmp_path / "s.mcap", trials=3, subject="P1")
     lab = priors.learn([session, searched(tmp_path / "t.mcap", 1, each=1)])
     assert [each.subject for each in lab.sessions] == ["P1", "P1"]
-    assert known(lab.floor).share < 0.5  # of one person
+    assert lab.floor is None  # of one person no law is made, of two there is
 
 
 def test_a_search_that_does_not_belong_to_the_others_is_refused(tmp_path: Path) -> None:
