@@ -47,7 +47,7 @@ def without_curve(strategy: Strategy) -> float:
 def test_pulses_over_the_curve_teach_the_largest_mep_of_those_who_have_one() -> None:
     model = ParticleModel(Prior(other_curve=0.0), particles=600)
     posterior = model.begin(VALVE_SPACE, 5)
-    for _ in range(2):
+    for _ in range(4):
         for pct_rmt, mep_mv in CURVE:
             observation = Observation.of([None], [mep_mv], shift_pct_rmt=[pct_rmt - model.pairs_pct_rmt])
             posterior = model.update(posterior, observation)

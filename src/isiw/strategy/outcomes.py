@@ -166,7 +166,7 @@ class Outcomes:
         )
 
     def _shift_pct_rmt(self, outcome: Outcome) -> list[float] | None:
-        """By how much a pulse is stronger than the pairs' [% RMT]: NaN if the model has no law of that; None if unstated.
+        """By how much a pulse is stronger than the pairs' [% RMT]: NaN without a law of it, None if it is not stated.
 
         TMS alone of a stated intensity is a pulse over the curve, also where it is the pairs' (decision 54).
         """

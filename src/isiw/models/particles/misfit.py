@@ -88,7 +88,7 @@ def probability_below(trial: History, crowd: Crowd, law: Law, who: BoolArray) ->
     values, kinds = np.ascontiguousarray(crowd.values[:, ::EACH]), np.ascontiguousarray(crowd.kinds[:, ::EACH])
     fields, weights = law.meanings(values, kinds, -1), np.exp(crowd.log_weights[:, ::EACH]) * who[:, ::EACH]
     columns, ends = trial.columns.copy(), trial.columns[..., 2:4]
-    columns[..., 2] = -np.inf
+    columns[..., 2], columns[..., BY_CURVES] = -np.inf, np.nan
 
     def below(end: Singles) -> FloatArray:
         columns[..., 3] = end

@@ -107,9 +107,10 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
         return replace(self, swarm=self.swarm.as_usual(self.law, self.usual))
 
     def after(self, observation: Observation) -> ParticlePosterior:
-        """The posterior after one more trial; a pulse given alone may be of another curve than the pairs."""
-        alone = bool(np.isnan(observation.isi_ms).all()) and observation.shift_pct_rmt is not None
-        own = replace(self, swarm=self.swarm.doubting(self.model.prior.other_curve)) if alone else self
+        """The posterior after one more trial; a pulse given alone first may be of another curve than the pairs."""
+        given = self.swarm.before_pairs and bool(np.isnan(observation.isi_ms).all())
+        doubted = given and observation.shift_pct_rmt is not None
+        own = replace(self, swarm=self.swarm.doubting(self.model.prior.other_curve)) if doubted else self
         return super(ParticlePosterior, own).after(observation)
 
     def noting_change(self) -> ParticlePosterior:
@@ -185,8 +186,9 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
     def _against_curve(self, person: int) -> float | None:
         """How strongly the pairs speak against the curve of pulses given alone."""
         swarm, one = self.swarm, slice(person, person + 1)
-        weights = np.exp(swarm.log_weights[person]) * swarm.of_given
-        return against_curve(self.model.prior, Latents(*(each[one] for each in swarm.latents)), weights, swarm.history)
+        prior, weights = self.model.prior, np.exp(swarm.log_weights[person]) * swarm.of_given
+        prior = prior if swarm.halves > 1 else replace(prior, other_curve=0.0)
+        return against_curve(prior, Latents(*(each[one] for each in swarm.latents)), weights, swarm.history)
 
 
 def _excluded_shift_pct_rmt(prior: Prior, latents: Latents) -> float | None:

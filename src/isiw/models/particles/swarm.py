@@ -18,7 +18,7 @@ from isiw.models.particles.latents import Latents
 from isiw.models.particles.misfit import Bets, probability_below
 from isiw.models.particles.mixture import log_sum
 from isiw.models.particles.noise import recruits
-from isiw.models.shared.history import BY_CURVES, SHIFT, History
+from isiw.models.shared.history import BY_CURVES, COUNTS, SHIFT, History
 from isiw.models.shared.tables import seeds
 from isiw.native.arrays import Seeds
 from isiw.native.engine import log_likelihoods
@@ -33,6 +33,10 @@ LEAST_ACCEPTED = 0.05
 
 LEAST_DISTINCT = 0.4
 """Share of the particles that must differ from each other after the moves."""
+
+
+OF_GIVEN = 0.3
+"""As how much of a trial a pulse alone counts that was given before the pairs (decision 54)."""
 
 
 class Health(NamedTuple):
@@ -142,6 +146,17 @@ class Swarm:
         return replace(self, crowd=crowd, history=History(self.history.columns.repeat(2, axis=0)), halves=2)
 
     @property
+    def before_pairs(self) -> bool:
+        """True if no pair was learnt yet."""
+        return bool(np.isnan(self.history.isi_ms).all())
+
+    @property
+    def given(self) -> int:
+        """How many pulses alone of stated intensities it has learnt; their number lets no pair move less."""
+        first = self.history.columns[0]
+        return int((np.isnan(first[:, 0]) & ~np.isnan(first[:, BY_CURVES])).sum())
+
+    @property
     def of_given(self) -> BoolArray:
         """Which particles learn from pulses given alone, (p,)."""
         particles = self.log_weights.shape[1]
@@ -161,7 +176,8 @@ class Swarm:
         elsewhere = ~np.isnan(told.columns[:: self.halves, :, BY_CURVES])
         who = ~elsewhere | self.of_given & recruits(self.latents.noise)
         below = probability_below(trial, self.crowd, law, who)
-        sweeps = tuple(moves.sweeps_after(trials, resampled=worn) for worn in (False, True))
+        of_session = trials - self.given
+        sweeps = tuple(moves.sweeps_after(of_session, resampled=worn) for worn in (False, True))
         learnt, found = self._learnt(told, law, crowd, (moves.min_ess, sweeps, seeds(seed, trials, len(crowd.kinds))))
         with np.errstate(invalid="ignore"):  # where there were no moves, no share of them was accepted
             health = Health(found[:, 1], found[:, 3] / found[:, 2], found[:, 5] / found[:, 4])
@@ -184,8 +200,9 @@ class Swarm:
         if self.halves == 1:
             evidence = found[:, 0]
         else:  # each half is normalised, and what is found is its share times the likelihood
-            by_half, of_curves = found[:, 0].reshape(people, 2), told.columns[::2, 0, BY_CURVES]
-            by_half[:, 1] += np.where(np.isnan(told.isi_ms[::2, 0]), np.nan_to_num(of_curves), 0.0)
+            by_half = found[:, 0].reshape(people, 2)
+            if self.before_pairs:  # what one half does not learn is as probable to it as to the other
+                by_half[:, 1] += np.nan_to_num(told.columns[::2, 0, BY_CURVES])
             evidence = log_sum(by_half)
             crowd.log_weights[:] += (by_half - evidence[:, np.newaxis]).reshape(-1, 1)
         crowd = Crowd(*(each.reshape(people, particles, *each.shape[2:]) for each in crowd))
@@ -194,14 +211,17 @@ class Swarm:
     def _as_curves_have_it(self, trial: History, law: Law, rows: Crowd) -> History:
         """A trial as each half has it; at another intensity with the density that its curves predict (decision 45)."""
         columns = trial.columns.repeat(self.halves, axis=0)
-        elsewhere = ~np.isnan(columns[..., BY_CURVES])
+        elsewhere = ~np.isnan(columns[..., BY_CURVES]) & ((columns[..., SHIFT] != 0) | self.before_pairs)
         if not elsewhere.any():
+            columns[..., BY_CURVES] = np.nan
             return History(columns)
-        if self.halves > 1:
+        if self.before_pairs:
+            columns[elsewhere, COUNTS] = OF_GIVEN
+        if self.halves > 1 and self.before_pairs:
             unheeded = elsewhere & np.isnan(columns[..., 0]) & (np.arange(len(columns)) % 2 > 0)[:, np.newaxis]
             columns[unheeded, 2:4], columns[unheeded, SHIFT] = (-np.inf, np.inf), 0.0
             elsewhere &= ~unheeded
-        columns[..., BY_CURVES] = np.nan
+        columns[..., BY_CURVES] = np.where(elsewhere, 0.0, np.nan)
         curved = recruits(rows.kinds[..., 1])
         likely = log_likelihoods(law.meanings(rows.values, rows.kinds, -1), columns)
         joint, among = (
