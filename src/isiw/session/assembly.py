@@ -40,7 +40,7 @@ from isiw.strategy.decisions import stimuli_left
 from isiw.strategy.strategy import Strategy
 from isiw.visit import Visit, VisitProtocol
 
-BELIEF_VERSION: Final = 6
+BELIEF_VERSION: Final = 7
 ENGINE_VERSION: Final = 4
 """Which belief a session learns by, and which engine computes it, for its header."""
 

@@ -151,12 +151,6 @@ class Swarm:
         return bool(np.isnan(self.history.isi_ms).all())
 
     @property
-    def given(self) -> int:
-        """How many pulses alone of stated intensities it has learnt; their number lets no pair move less."""
-        first = self.history.columns[0]
-        return int((np.isnan(first[:, 0]) & ~np.isnan(first[:, BY_CURVES])).sum())
-
-    @property
     def of_given(self) -> BoolArray:
         """Which particles learn from pulses given alone, (p,)."""
         particles = self.log_weights.shape[1]
@@ -176,8 +170,7 @@ class Swarm:
         elsewhere = ~np.isnan(told.columns[:: self.halves, :, BY_CURVES])
         who = ~elsewhere | self.of_given & recruits(self.latents.noise)
         below = probability_below(trial, self.crowd, law, who)
-        of_session = trials - self.given
-        sweeps = tuple(moves.sweeps_after(of_session, resampled=worn) for worn in (False, True))
+        sweeps = tuple(moves.sweeps_after(trials, resampled=worn) for worn in (False, True))
         learnt, found = self._learnt(told, law, crowd, (moves.min_ess, sweeps, seeds(seed, trials, len(crowd.kinds))))
         with np.errstate(invalid="ignore"):  # where there were no moves, no share of them was accepted
             health = Health(found[:, 1], found[:, 3] / found[:, 2], found[:, 5] / found[:, 4])
@@ -201,7 +194,7 @@ class Swarm:
             evidence = found[:, 0]
         else:  # each half is normalised, and what is found is its share times the likelihood
             by_half = found[:, 0].reshape(people, 2)
-            if self.before_pairs:  # what one half does not learn is as probable to it as to the other
+            if self.before_pairs and np.isnan(told.isi_ms).all():  # as probable to the half that does not learn it
                 by_half[:, 1] += np.nan_to_num(told.columns[::2, 0, BY_CURVES])
             evidence = log_sum(by_half)
             crowd.log_weights[:] += (by_half - evidence[:, np.newaxis]).reshape(-1, 1)
@@ -215,10 +208,10 @@ class Swarm:
         if not elsewhere.any():
             columns[..., BY_CURVES] = np.nan
             return History(columns)
-        if self.before_pairs:
-            columns[elsewhere, COUNTS] = OF_GIVEN
-        if self.halves > 1 and self.before_pairs:
-            unheeded = elsewhere & np.isnan(columns[..., 0]) & (np.arange(len(columns)) % 2 > 0)[:, np.newaxis]
+        given = elsewhere & np.isnan(columns[..., 0]) & self.before_pairs
+        columns[given, COUNTS] = OF_GIVEN
+        if self.halves > 1:
+            unheeded = given & (np.arange(len(columns)) % 2 > 0)[:, np.newaxis]
             columns[unheeded, 2:4], columns[unheeded, SHIFT] = (-np.inf, np.inf), 0.0
             elsewhere &= ~unheeded
         columns[..., BY_CURVES] = np.where(elsewhere, 0.0, np.nan)
