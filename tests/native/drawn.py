@@ -102,6 +102,7 @@ def trials(number: int, rng: np.random.Generator, *, known_log_sd: float = 0.0) 
                 known_log_sd=known_log_sd * rng.random(),
                 shift_pct_rmt=rng.choice([0.0, -5.0]),
                 log_by_curves=rng.choice([math.nan, math.nan, -1.3]),
+                counts=rng.choice([1.0, 0.3]),
             )
         )
     return found
@@ -112,7 +113,7 @@ def columns(told: list[reference.Trial]) -> Singles:
     made = [
         [
             *(trial.isi_ms, trial.isi_sd_ms, trial.low, trial.high, trial.order, trial.known_mv, trial.known_sd_mv),
-            *(trial.known_log_sd, trial.shift_pct_rmt, trial.log_by_curves),
+            *(trial.known_log_sd, trial.shift_pct_rmt, trial.log_by_curves, trial.counts),
         ]
         for trial in told
     ]

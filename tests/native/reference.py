@@ -56,6 +56,7 @@ class Trial:
     known_log_sd: float = 0.0
     shift_pct_rmt: float = 0.0
     log_by_curves: float = math.nan  # log likelihood under kinds of noise that know no other intensity
+    counts: float = 1.0  # power of the likelihood
 
 
 @dataclass(frozen=True)
@@ -254,7 +255,7 @@ def between_ends(mean: Values | float, sd: Values | float, low: float, high: flo
 
 
 def likelihood(particle: Particle, trial: Trial, factor: float = 1.0) -> float:
-    """Density of a log MEP, or the probability of an interval; an ISI that is known with an SD is integrated out."""
+    """Density of a log MEP, or the probability of an interval, to a power; an ISI known with an SD integrated out."""
     if not (particle.curved or math.isnan(trial.log_by_curves)):
         return math.exp(trial.log_by_curves)
     floor, found = log_floor_of(particle, trial.order), 0.0
@@ -263,7 +264,7 @@ def likelihood(particle: Particle, trial: Trial, factor: float = 1.0) -> float:
         law = outcome_of(particle, trial, level, factor)
         exact = trial.low == trial.high
         found += weight * (law.density(trial.low - floor) if exact else law.mass(trial.low - floor, trial.high - floor))
-    return found
+    return math.pow(found, trial.counts)
 
 
 def group_of(isi_ms: float) -> int:

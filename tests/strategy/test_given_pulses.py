@@ -11,8 +11,10 @@ import pytest
 
 from isiw.design import VALVE_SPACE
 from isiw.errors import InvalidValueError
+from isiw.models.particles.laws import NoiseShares
 from isiw.models.particles.model import ParticleModel
 from isiw.models.particles.noise import NoiseKind
+from isiw.models.particles.prior import Prior
 from isiw.models.particles.records import LOG_FLOOR, LOG_RATIO
 from isiw.models.protocol import Observation
 from isiw.strategy.catalogue import make_strategy
@@ -43,9 +45,9 @@ def without_curve(strategy: Strategy) -> float:
 
 
 def test_pulses_over_the_curve_teach_the_largest_mep_of_those_who_have_one() -> None:
-    model = ParticleModel(particles=600)
+    model = ParticleModel(Prior(other_curve=0.0), particles=600)
     posterior = model.begin(VALVE_SPACE, 5)
-    for _ in range(2):
+    for _ in range(4):
         for pct_rmt, mep_mv in CURVE:
             observation = Observation.of([None], [mep_mv], shift_pct_rmt=[pct_rmt - model.pairs_pct_rmt])
             posterior = model.update(posterior, observation)
@@ -59,17 +61,35 @@ def test_kinds_of_noise_that_know_no_other_intensity_are_neither_favoured_nor_ex
     assert without_curve(given(small())) == pytest.approx(without_curve(small()), abs=0.25)
 
 
-def test_the_intensity_of_the_pairs_is_tms_alone_as_ever() -> None:
-    plain, stated = small(), small()
-    for _, mep_mv in CURVE:
-        plain.tell(None, mep_mv)
-        stated.tell(None, mep_mv, intensity_pct_rmt=90.0)
-    assert plain.ask() == stated.ask()
-    assert plain.estimate().hypotheses == stated.estimate().hypotheses
-    at_100 = small(intensity_pct_rmt=100.0)
-    for _, mep_mv in CURVE:
-        at_100.tell(None, mep_mv, intensity_pct_rmt=100.0)
-    assert at_100.estimate().hypotheses != plain.estimate().hypotheses
+def apart(strategy: Strategy) -> float:
+    """The probability that pulses given alone are of another curve than the pairs."""
+    swarm = strategy.posterior.swarm  # type: ignore[attr-defined] # of the default
+    return float(np.exp(swarm.log_weights[0])[~swarm.of_given].sum())
+
+
+def test_pulses_alone_of_a_stated_intensity_leave_open_whether_the_pairs_have_their_curve() -> None:
+    strategy = small()
+    assert apart(strategy) == 0
+    for pct_rmt, mep_mv in CURVE:
+        strategy.tell(None, mep_mv, intensity_pct_rmt=pct_rmt)
+        assert apart(strategy) == pytest.approx(Prior().other_curve)
+    strategy.tell(None, 0.05, intensity_pct_rmt=90.0)  # that of the pairs is one of the curve, too
+    assert apart(strategy) == pytest.approx(Prior().other_curve)
+
+
+def test_pulses_of_another_curve_are_left_and_those_of_the_same_are_not() -> None:
+    prior = Prior(noise=NoiseShares(0.0, 0.0, 1.0, 0.0, 0.0))
+    another = [(pct_rmt - 18.0, mep_mv) for pct_rmt, mep_mv in CURVE * 2]
+    right, wrong = given(small(prior=prior)), given(small(prior=prior), another)
+    silent_mv = 0.02 * np.exp(0.3 * np.random.default_rng(2).standard_normal(8))
+    for strategy in (right, wrong):
+        for pair, mep_mv in enumerate(silent_mv.tolist()):
+            strategy.tell(60.0 * pair, mep_mv)
+    assert apart(right) < 0.5 < apart(wrong)
+
+
+def test_a_prior_may_know_that_pulses_and_pairs_have_one_curve() -> None:
+    assert apart(given(small(prior=Prior(other_curve=0.0)))) == 0
 
 
 @pytest.mark.parametrize("name", ["nr", "supra-threshold"])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 FIELDS: Final = 27
 """Of a particle; their names and order are those of `isiw.models.particles.records`."""
 
-COLUMNS: Final = 10
+COLUMNS: Final = 11
 """Of a trial, likewise."""
 
 KINDS: Final = 5

@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import partial
+from functools import partial, reduce
 from typing import Annotated, Final, TypeAlias
 
 import numpy as np
@@ -19,7 +19,7 @@ from isiw.checks import Checked, Positive, Share, mean_and_sd, share
 from isiw.errors import DamagedLogError, InvalidValueError, LogError
 from isiw.lazy import sklearn
 from isiw.log.kinds import require_search
-from isiw.log.reader import SessionRecord, require_records
+from isiw.log.reader import SessionRecord, ThresholdRecord, require_records
 from isiw.models.particles import ParticleModel, ParticlePosterior
 from isiw.models.particles.latents import LATENTS, Latents, used_by
 from isiw.models.particles.mixture import log_sum
@@ -28,6 +28,7 @@ from isiw.models.particles.prior import Prior
 from isiw.priors.population import Component, beside, columns, floor, gain, mixed, mixed_shares, muscle, place
 from isiw.strategy.outcomes import Outcomes
 from isiw.text.sanitize import command
+from isiw.trials import Trial
 from isiw.types import FloatArray, IntArray
 from isiw.visit import MOST_APART_PCT_RMT
 
@@ -35,18 +36,29 @@ LISTED_LOSSES: Final = 3
 """Losses that an error names; isiw show lists them all."""
 
 
-def recalled(record: SessionRecord, prior: Prior, *, particles: int = 1000) -> ParticlePosterior:
-    """The posterior after a logged session; the hit delay is what its rig stated, or else what the prior says."""
+def recalled(
+    record: SessionRecord, prior: Prior, *, given: Sequence[Trial] = (), particles: int = 1000
+) -> ParticlePosterior:
+    """The posterior after a logged session; the hit delay is what its rig stated, or else what the prior says.
+
+    Pulses of TMS alone that were given before it teach the recruitment curve; the session's level may be another one.
+    """
     require_meps(record)
     model = ParticleModel(_of_rig(prior, record), particles=particles)
     if (limit_mv := record.header.detection_limit_mv) is not None:
         model = replace(model, detection_limit_mv=limit_mv)
     posterior = model.begin(record.header.space, seed=record.header.seed)
     step_mv = record.header.strategy.settings.get("amplitude_step_mv")
+    before = after_pulses(posterior, given).noting_change()
     told = Outcomes(record.header.space.reference, step_mv, pairs_pct_rmt=model.pairs_pct_rmt).of(record.table)
-    for outcome in told.pulses:
-        posterior = model.update(posterior, told.observation(outcome))
-    return posterior
+    return reduce(model.update, map(told.observation, told.pulses), before)
+
+
+def after_pulses(posterior: ParticlePosterior, given: Sequence[Trial]) -> ParticlePosterior:
+    """A posterior after pulses of TMS alone at intensities of their own."""
+    model = posterior.model
+    told = Outcomes(posterior.space.reference, pairs_pct_rmt=model.pairs_pct_rmt).of(given)
+    return reduce(model.update, map(told.observation, told.pulses), posterior)
 
 
 def require_meps(record: SessionRecord) -> None:
@@ -59,7 +71,9 @@ def require_meps(record: SessionRecord) -> None:
         raise LogError(f"the session has {lacking}", got=str(record.path), remedy="Leave this log out.")
 
 
-def require_whole(record: SessionRecord, way_on: str = "in Python with isiw.priors.after(..., damaged=True)") -> None:
+def require_whole(
+    record: SessionRecord | ThresholdRecord, way_on: str = "in Python with isiw.priors.after(..., damaged=True)"
+) -> None:
     """Check that nothing is lost of a session that is learnt from: an exclusion may be among it."""
     if record.losses:
         raise DamagedLogError(

@@ -7,16 +7,18 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Final, TypeVar
+from typing import Annotated, Any, Final, TypeAlias, TypeVar
 
 import numpy as np
 
 import isiw
 from isiw.checks import MOST_OF_A_KIND, Checked, share, whole
-from isiw.design import IMPACT_SPACE, VALVE_SPACE
+from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, LogError
 from isiw.lazy import pd
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.reader import SessionRecord, ThresholdRecord, read_any
+from isiw.log.salvage import salvage
+from isiw.models.particles import ParticleModel
 from isiw.models.particles.latents import LATENTS
 from isiw.models.particles.laws import Floor, Gain, Muscle, NoiseShares
 from isiw.models.particles.places import MOST_APART_MS, Place
@@ -24,6 +26,7 @@ from isiw.models.particles.prior import Prior
 from isiw.models.particles.profile import ProfilePrior, ShapeShares
 from isiw.priors.covariates import Slope, expected, slopes_of
 from isiw.priors.days import (
+    after_pulses,
     recalled,
     require_each_once,
     require_meps,
@@ -47,10 +50,14 @@ from isiw.priors.population import (
     place,
     usual_shares,
 )
+from isiw.session.given import given_pulses
+from isiw.trials import Trial
 from isiw.types import Conditioning, FloatArray, Reference
 from isiw.visit import MOST_APART_PCT_RMT, Visit, different_muscles
 
 _T = TypeVar("_T")
+
+AnyRecord: TypeAlias = SessionRecord | ThresholdRecord
 
 SCHEMA_VERSION: Final = 2
 
@@ -68,7 +75,7 @@ _EACH_KIND: Final = "Learn a prior from each kind of session."
 
 @dataclass(frozen=True)
 class LearntSession(Checked):
-    """A session that was learnt from."""
+    """A session, or a search for the threshold, that was learnt from."""
 
     sha256: str  # of its log's bytes
     subject: str
@@ -162,10 +169,11 @@ def learn(
     seed: int = 0,
     on_done: Callable[[SessionRecord], None] = lambda _record: None,
 ) -> LabPrior:
-    """Learn a lab's prior from the logs of its sessions, one a person.
+    """Learn a lab's prior from the logs of its sessions, one a person, and of searches for the threshold.
 
     The built-in model learns the trials whatever the sessions were run with, so that no person counts twice if
-    a session was run with an earlier prior of the lab.
+    a session was run with an earlier prior of the lab. Pulses of searches and over recruitment curves teach the floor
+    and the curve of the person that their log names, together with a session of that person or alone.
 
     Args:
         logs: their paths.
@@ -175,27 +183,34 @@ def learn(
         on_done: called after each session.
 
     Raises:
-        LogError: no list, no log in it, one that cannot be read or has no MEP, the same log or person twice, or
-            sessions of different events, hit delays, conditioning stimuli, muscles or intensities, or some simulated.
+        LogError: no list, no log in it, one that cannot be read or has no MEP, the same log or person twice, a search
+            that does not say of whom it is, or sessions of different events, hit delays, conditioning stimuli, muscles
+            or intensities, or some simulated.
         DamagedLogError: a log is damaged.
-        InvalidValueError: a seed that is no whole number from 0 on, or two logs of one session.
+        InvalidValueError: a seed that is no whole number from 0 on, two logs of one session, or a search for the hot
+            spot or without a threshold.
     """
     seed = whole("seed", seed, least=0)
     if isinstance(logs, str | Path):
         raise LogError("logs must be a list of paths", got=str(logs), remedy=f'Write ["{logs}"] for a single one.')
-    records = [read_session(path) for path in logs]
-    for record in records:
+    read = [read_any(salvage(path)) for path in logs]
+    records = [record for record in read if isinstance(record, SessionRecord)]
+    for record in read:
         if not damaged:
             require_whole(record, "with damaged=True, or isiw prior learn --damaged")
-        require_meps(record)
-    sessions = tuple(_learnt_session(record) for record in records)
-    _require_different(records, sessions, again=again)
-    conditioning, space = records[0].header.conditioning, records[0].header.space
+        if isinstance(record, SessionRecord):
+            require_meps(record)
+    sessions = tuple(_learnt_session(record) for record in read)
+    _require_different(read, records, sessions, again=again)
+    given = _pulses_of_people([record for record in read if isinstance(record, ThresholdRecord)])
+    conditioning, space = (records[0].header.conditioning, records[0].header.space) if records else _NO_SESSION
     prior = Prior(ProfilePrior().after(conditioning))
     posteriors = []
     for record in records:
-        posteriors.append(recalled(record, prior))
+        posteriors.append(recalled(record, prior, given=given.pop(record.header.subject, ())))
         on_done(record)
+    for number, pulses in enumerate(given.values()):
+        posteriors.append(after_pulses(_OF_CURVES.begin(space, seed + number), pulses))
     rng = np.random.default_rng(seed)
     people = people_of(posteriors)
     population = learnt(people, hyper_prior(prior, space), usual_shares(prior), rng)
@@ -207,25 +222,51 @@ def learn(
     return replace(lab, slopes=slopes_of(visits, people.blocks["place"], population.laws["place"], rng))
 
 
-def _learnt_session(record: SessionRecord) -> LearntSession:
+_NO_SESSION: Final[tuple[Conditioning, DesignSpace]] = ("tap", VALVE_SPACE)
+"""What windows would be counted from, of which pulses of TMS alone teach nothing."""
+
+_OF_CURVES: Final = ParticleModel(Prior(noise=NoiseShares(0.0, 0.0, 0.95, 0.0, 0.05), other_curve=0.0))
+"""Pulses of TMS alone say nothing of kinds of noise without a curve, nor of the curve of pairs that nobody gave."""
+
+
+def _pulses_of_people(searches: Sequence[ThresholdRecord]) -> dict[str, tuple[Trial, ...]]:
+    """The pulses of each person's searches, by the person."""
+    people: dict[str, list[ThresholdRecord]] = {}
+    for record in searches:
+        if not record.header.subject:
+            raise LogError(
+                "this search for the threshold does not say of whom it is",
+                got=str(record.path),
+                remedy="Leave it out: its person may be another log's.",
+            )
+        people.setdefault(record.header.subject, []).append(record)
+    return {subject: given_pulses(sorted(own, key=lambda one: one.header.created)) for subject, own in people.items()}
+
+
+def _learnt_session(record: SessionRecord | ThresholdRecord) -> LearntSession:
     header, digest = record.header, hashlib.sha256(record.path.read_bytes()).hexdigest()
-    simulated, muscle = header.device.simulated, header.visit.muscle.strip()
-    return LearntSession(digest, header.subject, len(record.table.told), simulated, muscle)
+    if isinstance(record, SessionRecord):
+        trials, muscle = len(record.table.told), record.header.visit.muscle
+    else:
+        trials, muscle = record.given, record.header.muscle
+    return LearntSession(digest, header.subject, trials, header.device.simulated, muscle.strip())
 
 
-def _require_different(records: Sequence[SessionRecord], sessions: Sequence[LearntSession], *, again: bool) -> None:
-    """Raise if one log or person would count twice, or if sessions do not belong together."""
-    if not records:
+def _require_different(
+    read: Sequence[AnyRecord], records: Sequence[SessionRecord], sessions: Sequence[LearntSession], *, again: bool
+) -> None:
+    """Raise if one log or person would count twice, or if logs do not belong together."""
+    if not read:
         raise LogError("there is no session to learn from", remedy="Name at least one log.")
     hashes = [session.sha256 for session in sessions]
-    _require_once(records, hashes, "two logs are the same", "Name it once.")
+    _require_once(read, hashes, "two logs are the same", "Name it once.")
     if not again:
-        subjects = [session.subject for session in sessions]
+        subjects = [record.header.subject for record in records]
         remedy = "Leave one out, or count each session as a person of its own: again=True, or --again."
         _require_once(records, subjects, "two logs are of the same person, or do not say of whom", remedy)
     require_each_once(records)
     if len({session.simulated for session in sessions}) > 1:
-        simulated = [str(record.path) for record in records if record.header.device.simulated]
+        simulated = [str(record.path) for record in read if record.header.device.simulated]
         raise LogError("some of the sessions are simulated, others are not", got=simulated, remedy="Leave these out.")
     kinds: dict[str, Collection[str]] = {
         "count ISIs from different events": {record.header.space.reference for record in records},
@@ -252,7 +293,7 @@ def _require_different(records: Sequence[SessionRecord], sessions: Sequence[Lear
         )
 
 
-def _require_once(records: Sequence[SessionRecord], keys: Sequence[str], what: str, remedy: str) -> None:
+def _require_once(records: Sequence[AnyRecord], keys: Sequence[str], what: str, remedy: str) -> None:
     first: dict[str, Path] = {}
     for record, key in zip(records, keys, strict=True):
         if key in first:

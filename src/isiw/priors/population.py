@@ -29,6 +29,9 @@ from isiw.types import BoolArray, Conditioning, FloatArray, IntArray, Reference
 LATENT_BLOCKS: Final = {"place": ("start", "width"), "floor": ("floor",), "gain": ("gain",), "muscle": ("recruitment",)}
 """What sessions teach laws of, and the blocks of latents in each."""
 
+_OF_PULSES: Final = {"floor", "muscle"}
+"""What pulses of TMS alone teach."""
+
 Component = TypeVar("Component", Place, Floor, Gain, Muscle)
 _Shares = TypeVar("_Shares", ShapeShares, NoiseShares)
 
@@ -242,7 +245,7 @@ def people_of(posteriors: Sequence[ParticlePosterior]) -> People:
 
 
 def _person(posterior: ParticlePosterior) -> tuple[dict[str, LatentBlock], dict[str, IntArray]]:
-    """The blocks of one person's particles by name, and the discrete latents."""
+    """The blocks of one person's particles by name, and the discrete latents: without a pair floor and curve alone."""
     latents, _ = posterior.swarm.picked(posterior.law, PARTICLES)
     densities = posterior.model.prior.log_densities(latents.values, posterior.space)
     values, used = latents.values[0].astype(float), used_by(latents.noise, latents.present)[0]
@@ -250,13 +253,13 @@ def _person(posterior: ParticlePosterior) -> tuple[dict[str, LatentBlock], dict[
         name: LatentBlock(
             values[:, columns(name)],
             densities["place" if name == "place" else LATENT_BLOCKS[name][0]][0],
-            np.all(used[:, columns(name)], axis=-1),
+            np.all(used[:, columns(name)], axis=-1) & (posterior.pairs > 0 or name in _OF_PULSES),
         )
         for name in LATENT_BLOCKS
     }
     shape = np.where(latents.present, latents.shape, -1)
     kinds = {"window": latents.present.astype(np.int64), "shape": shape, "noise": latents.noise}
-    return blocks, {name: kind[0] for name, kind in kinds.items()}
+    return blocks, {name: kind[0] if posterior.pairs else np.full_like(kind[0], -1) for name, kind in kinds.items()}
 
 
 def drawn_from(prior: Prior, space: DesignSpace, size: int) -> FloatArray:

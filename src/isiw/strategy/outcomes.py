@@ -166,9 +166,12 @@ class Outcomes:
         )
 
     def _shift_pct_rmt(self, outcome: Outcome) -> list[float] | None:
-        """By how much a pulse is stronger than the pairs' [% RMT]: NaN if the model has no law of that; None for 0."""
+        """By how much a pulse is stronger than the pairs' [% RMT]: NaN without a law of it, None if it is not stated.
+
+        TMS alone of a stated intensity is a pulse over the curve, also where it is the pairs' (decision 54).
+        """
         stated = outcome.intensity_pct_rmt
-        if stated is None or stated == self.pairs_pct_rmt:
+        if stated is None or (stated == self.pairs_pct_rmt and outcome.isi_ms is not None):
             return None
         return [math.nan if self.pairs_pct_rmt is None else stated - self.pairs_pct_rmt]
 

@@ -56,7 +56,7 @@ def test_larger_amplitudes_are_less_probably_exceeded() -> None:
     below = []
     for mep_mv in (1e-4, 0.01, 0.05, 10.0):
         trial = observed(Observation.of(np.array([250.0]), np.array([mep_mv])), 0.005, 0.02, 0)
-        low, high = probability_below(trial, posterior.swarm.crowd, posterior.law)[0]
+        low, high = probability_below(trial, posterior.swarm.crowd, posterior.law, np.ones((1, 1000), dtype=bool))[0]
         assert low == high
         below.append(high)
     assert below == sorted(below)

@@ -21,7 +21,7 @@ from isiw.models.particles.prior import Prior
 from isiw.models.shared.history import BY_CURVES, History
 from isiw.native.engine import log_likelihoods
 from isiw.native.law import Crowd, Law
-from isiw.types import FloatArray, Singles
+from isiw.types import BoolArray, FloatArray, Singles
 
 AT_THE_BOUNDARY: Final = 2
 """By so many trials the place of a change may be off."""
@@ -76,19 +76,17 @@ class Bets:
         return Bets(log_won, np.maximum(self.most, log_sum(log_won) - math.log(log_won.shape[1])))
 
 
-def probability_below(trial: History, crowd: Crowd, law: Law) -> FloatArray:
+def probability_below(trial: History, crowd: Crowd, law: Law, who: BoolArray) -> FloatArray:
     """Predictive probabilities of an amplitude below the lower and the upper end of a trial's, (b, 2).
-
-    Recruitment curves alone predict a pulse at another intensity than the pairs' (decision 45).
 
     Args:
         trial: the trial of each person.
         crowd: the weighted particles before it.
         law: what they mean.
+        who: which particles predict it: of a pulse at another intensity recruitment curves alone, (b, p) (decision 45).
     """
     values, kinds = np.ascontiguousarray(crowd.values[:, ::EACH]), np.ascontiguousarray(crowd.kinds[:, ::EACH])
-    fields, elsewhere = law.meanings(values, kinds, -1), ~np.isnan(trial.columns[..., BY_CURVES])
-    weights = np.exp(crowd.log_weights[:, ::EACH]) * (~elsewhere | recruits(kinds[..., 1]))
+    fields, weights = law.meanings(values, kinds, -1), np.exp(crowd.log_weights[:, ::EACH]) * who[:, ::EACH]
     columns, ends = trial.columns.copy(), trial.columns[..., 2:4]
     columns[..., 2], columns[..., BY_CURVES] = -np.inf, np.nan
 
@@ -102,20 +100,20 @@ def probability_below(trial: History, crowd: Crowd, law: Law) -> FloatArray:
     return np.stack((high if point else below(ends[..., 0]), high), axis=-1)
 
 
-def against_curve(prior: Prior, latents: Latents, history: History) -> float | None:
+def against_curve(prior: Prior, latents: Latents, weights: FloatArray, history: History) -> float | None:
     """The Bayes factor of pairs that do not follow the curve of pulses given alone, over pairs that do.
 
-    They do not follow it where the noise has no recruitment curve, of which those pulses say nothing, or where
-    something changed between the two. The odds before the pairs are the prior's (decision 45).
+    They do not follow it where they have a curve of their own, where the noise has no recruitment curve, of which those
+    pulses say nothing, or where something changed between the two. The odds before the pairs are the prior's.
 
     Args:
         prior: the prior over people.
-        latents: equally weighted particles of one person, (1, p).
+        latents: the particles of one person, (1, p).
+        weights: of those that learn from pulses given alone, 0 of others, (p,).
         history: the trials.
 
     Returns:
-        None where no pulse was given alone at another intensity, or the prior leaves no choice between noise with a
-        curve and noise without.
+        None where no pulse was given alone at another intensity, or the prior leaves no choice.
     """
     elsewhere = np.flatnonzero(~np.isnan(history.columns[0, :, BY_CURVES]) & np.isnan(history.isi_ms[0]))
     if not len(elsewhere):
@@ -123,10 +121,9 @@ def against_curve(prior: Prior, latents: Latents, history: History) -> float | N
     change, given = prior.change(latents), elsewhere[-1] + 1
     stepped = np.abs(change.log_gain) + np.abs(change.log_scale) + np.abs(change.shift_pct_rmt) / INTENSITY_PCT
     changed = (np.abs(change.after - given) <= AT_THE_BOUNDARY) & (stepped > MATTERS)
-    follows = (recruits(latents.noise) & ~changed).sum()
-    with_curve = prior.noise.recruitment + prior.noise.rectified
-    without = prior.noise.constant_cv + prior.noise.missing + prior.noise.all_or_none
-    if not with_curve or not without:
+    follows = float(weights @ (recruits(latents.noise) & ~changed)[0])
+    beforehand = (prior.noise.recruitment + prior.noise.rectified) * (1.0 - prior.other_curve)
+    if not 0.0 < beforehand < 1.0:
         return None
-    # Where no particle speaks against the curve nothing does, however improbable that was beforehand.
-    return float((latents.noise.size - follows) / (follows + 0.5) * with_curve / without)
+    least = 0.5 / len(weights)  # particles know no smaller share
+    return max(0.0, 1.0 - follows) / (follows + least) * beforehand / (1.0 - beforehand)

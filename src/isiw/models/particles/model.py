@@ -106,6 +106,13 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
         """The same with the prior that ISIs are chosen with; see `ExpectsTheUsual`."""
         return replace(self, swarm=self.swarm.as_usual(self.law, self.usual))
 
+    def after(self, observation: Observation) -> ParticlePosterior:
+        """The posterior after one more trial; a pulse given alone first may be of another curve than the pairs."""
+        given = self.swarm.before_pairs and bool(np.isnan(observation.isi_ms).all())
+        doubted = given and observation.shift_pct_rmt is not None
+        own = replace(self, swarm=self.swarm.doubting(self.model.prior.other_curve)) if doubted else self
+        return super(ParticlePosterior, own).after(observation)
+
     def noting_change(self) -> ParticlePosterior:
         """The posterior if somebody has seen that something changes now; see `NotesChanges`."""
         trials, before, latents = self.trials, self.model.prior.changes, self.swarm.latents
@@ -114,7 +121,7 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
         changes = before.noting(trials)
         model = replace(self.model, prior=replace(self.model.prior, changes=changes))
         rng = stream(self.seed, NOTED + len(changes.noted))
-        kind, noted = changes.where_noted((len(latents.change), self.model.particles), rng)
+        kind, noted = changes.where_noted(latents.change.shape, rng)
         # Particles that nothing has touched so far stand for those, too, in which something changes now.
         untouched = self.model.prior.untouched(latents, trials)
         share, left = changes.noted_share / before.untouched(trials), 1.0 - changes.noted_share
@@ -173,10 +180,15 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
             unusual=Later(lambda: prior.unusual(latents, self.space)),
             change=Later(lambda: prior.change(latents).named(self.trials)),
             time_alone=Later(lambda: float((prior.of_time(latents, self.trials) & ~latents.present).mean())),
-            misfit=Later(
-                lambda: Misfit(self.swarm.bets.worth(person), against_curve(prior, latents, self.swarm.history))
-            ),
+            misfit=Later(lambda: Misfit(self.swarm.bets.worth(person), self._against_curve(person))),
         )
+
+    def _against_curve(self, person: int) -> float | None:
+        """How strongly the pairs speak against the curve of pulses given alone."""
+        swarm, one = self.swarm, slice(person, person + 1)
+        prior, weights = self.model.prior, np.exp(swarm.log_weights[person]) * swarm.of_given
+        prior = prior if swarm.halves > 1 else replace(prior, other_curve=0.0)
+        return against_curve(prior, Latents(*(each[one] for each in swarm.latents)), weights, swarm.history)
 
 
 def _excluded_shift_pct_rmt(prior: Prior, latents: Latents) -> float | None:

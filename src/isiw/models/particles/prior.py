@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from isiw.checks import Checked, Positive, choice
+from isiw.checks import Checked, Positive, Share, choice
 from isiw.design import DesignSpace
 from isiw.models.particles.changes import INTENSITY_PCT, MATTERS, Change, ChangeKind, ChangePrior
 from isiw.models.particles.latents import BLOCKS, RECTIFIED, Latents, latents_of
@@ -65,6 +65,7 @@ class Prior(Checked):
         floors: laws of the EMG floor.
         session: prior of the drift of amplitudes within a session.
         changes: prior of what else changes within a session.
+        other_curve: probability that pulses given alone at other intensities are of another curve than the pairs.
         muscle: the name of the muscle, if it is known; the others that have a name are then left out.
         intensity_pct_rmt: intensity of the pulse if it is stated [% RMT].
     """
@@ -88,6 +89,7 @@ class Prior(Checked):
     )
     session: SessionPrior = field(default_factory=SessionPrior)
     changes: ChangePrior = field(default_factory=ChangePrior)
+    other_curve: Share = 0.25
     muscle: str | None = None
     intensity_pct_rmt: Positive | None = None
 

@@ -19,10 +19,11 @@ from isiw.models.particles.misfit import Bets, probability_below
 from isiw.models.particles.mixture import log_sum
 from isiw.models.particles.noise import recruits
 from isiw.models.shared.draws import seeds
-from isiw.models.shared.history import BY_CURVES, SHIFT, History
+from isiw.models.shared.history import BY_CURVES, COUNTS, SHIFT, History
+from isiw.native.arrays import Seeds
 from isiw.native.engine import log_likelihoods
 from isiw.native.law import Crowd, Law
-from isiw.types import FloatArray, Singles
+from isiw.types import BoolArray, FloatArray, Singles
 
 LEAST_ESS = 0.01
 """Effective sample size before resampling, as a share of the particles: below it a trial contradicted the belief."""
@@ -32,6 +33,10 @@ LEAST_ACCEPTED = 0.05
 
 LEAST_DISTINCT = 0.4
 """Share of the particles that must differ from each other after the moves."""
+
+
+OF_GIVEN = 0.3
+"""As how much of a trial a pulse alone counts that was given before the pairs (decision 54)."""
 
 
 class Health(NamedTuple):
@@ -95,6 +100,7 @@ class Swarm:
     history: History
     bets: Bets  # against the law
     health: Health | None = None  # after the last trial; None before the first
+    halves: int = 1  # 2 where the second half of the particles does not learn from pulses given alone
 
     @classmethod
     def of(cls, law: Law, people: int, particles: int, seed: int) -> Swarm:
@@ -125,35 +131,95 @@ class Swarm:
         """What is wrong with the particles; see `isiw.models.protocol.ReportsTrouble`."""
         return None if self.health is None else trouble_of(self.health, distinct_share(self.crowd.log_likelihood))
 
+    def doubting(self, share: float) -> Swarm:
+        """The same where pulses given alone come, with a probability, from another curve than the pairs.
+
+        Half of the particles learn nothing from such pulses, and so are what they would be without them; the pairs say
+        which half is right (decision 54). Each half has rows of its own in the history.
+        """
+        if self.halves > 1 or not share:
+            return self
+        doubled = (np.concatenate((each, each), axis=1) for each in self.crowd)
+        parts = np.log([1.0 - share, share]).repeat(self.log_weights.shape[1])
+        crowd = Crowd(*doubled)
+        crowd = crowd._replace(log_weights=crowd.log_weights + parts)
+        return replace(self, crowd=crowd, history=History(self.history.columns.repeat(2, axis=0)), halves=2)
+
+    @property
+    def before_pairs(self) -> bool:
+        """True if no pair was learnt yet."""
+        return bool(np.isnan(self.history.isi_ms).all())
+
+    @property
+    def of_given(self) -> BoolArray:
+        """Which particles learn from pulses given alone, (p,)."""
+        particles = self.log_weights.shape[1]
+        return np.arange(particles) < particles // self.halves
+
+    @property
+    def _rows(self) -> Crowd:
+        """The particles of each half of each person, to be changed."""
+        people, particles = self.log_weights.shape
+        rows = people * self.halves, particles // self.halves
+        return Crowd(*(each.reshape(*rows, *each.shape[2:]) for each in self.crowd.copied()))
+
     def after(self, trial: History, law: Law, moves: Moving, seed: int) -> Swarm:
         """The particles after one more trial: weighed, resampled where too few carry the posterior, and moved."""
-        trial = self._as_curves_have_it(trial, law)
-        history = self.history.appended(trial)
-        below = probability_below(trial, self.crowd, law)
-        kept, resampled = (moves.sweeps_after(history.trials, resampled=worn) for worn in (False, True))
-        crowd, dice = self.crowd.copied(), seeds(seed, history.trials, len(self.evidence))
-        found = law.learn(history.columns, moves.min_ess, (kept, resampled), dice, crowd)
+        crowd, trials = self._rows, self.trials + 1
+        told = self._as_curves_have_it(trial, law, crowd)
+        elsewhere = ~np.isnan(told.columns[:: self.halves, :, BY_CURVES])
+        who = ~elsewhere | self.of_given & recruits(self.latents.noise)
+        below = probability_below(trial, self.crowd, law, who)
+        sweeps = tuple(moves.sweeps_after(trials, resampled=worn) for worn in (False, True))
+        learnt, found = self._learnt(told, law, crowd, (moves.min_ess, sweeps, seeds(seed, trials, len(crowd.kinds))))
         with np.errstate(invalid="ignore"):  # where there were no moves, no share of them was accepted
             health = Health(found[:, 1], found[:, 3] / found[:, 2], found[:, 5] / found[:, 4])
-        return Swarm(crowd, self.evidence + found[:, 0], history, self.bets.after(below), health)
+        return replace(learnt, bets=self.bets.after(below), health=health)
 
     def weighed(self, trial: History, law: Law) -> Swarm:
         """The same particles, weighed by one more trial as well."""
-        history, crowd = self.history.appended(self._as_curves_have_it(trial, law)), self.crowd.copied()
-        found = law.learn(history.columns, 0.0, (0, 0), np.zeros(len(self.evidence), dtype=np.uint64), crowd)
-        return Swarm(crowd, self.evidence + found[:, 0], history, self.bets)
+        crowd = self._rows
+        told = self._as_curves_have_it(trial, law, crowd)
+        nothing = np.zeros(len(crowd.kinds), dtype=np.uint64)
+        return replace(self._learnt(told, law, crowd, (0.0, (0, 0), nothing))[0], health=None)
 
-    def _as_curves_have_it(self, trial: History, law: Law) -> History:
-        """A trial at another intensity, with the density that recruitment curves predict (decision 45)."""
-        elsewhere = trial.columns[..., SHIFT] != 0
+    def _learnt(
+        self, told: History, law: Law, crowd: Crowd, how: tuple[float, tuple[int, ...], Seeds]
+    ) -> tuple[Swarm, FloatArray]:
+        """The swarm after a trial as each half has it; and what the engine found, by half of each person."""
+        history, (min_ess, (kept, resampled), dice) = self.history.appended(told), how
+        found = law.learn(history.columns, min_ess, (kept, resampled), dice, crowd)
+        people, particles = self.log_weights.shape
+        if self.halves == 1:
+            evidence = found[:, 0]
+        else:  # each half is normalised, and what is found is its share times the likelihood
+            by_half = found[:, 0].reshape(people, 2)
+            if self.before_pairs and np.isnan(told.isi_ms).all():  # as probable to the half that does not learn it
+                by_half[:, 1] += np.nan_to_num(told.columns[::2, 0, BY_CURVES])
+            evidence = log_sum(by_half)
+            crowd.log_weights[:] += (by_half - evidence[:, np.newaxis]).reshape(-1, 1)
+        crowd = Crowd(*(each.reshape(people, particles, *each.shape[2:]) for each in crowd))
+        return replace(self, crowd=crowd, evidence=self.evidence + evidence, history=history), found
+
+    def _as_curves_have_it(self, trial: History, law: Law, rows: Crowd) -> History:
+        """A trial as each half has it; at another intensity with the density that its curves predict (decision 45)."""
+        columns = trial.columns.repeat(self.halves, axis=0)
+        elsewhere = ~np.isnan(columns[..., BY_CURVES]) & ((columns[..., SHIFT] != 0) | self.before_pairs)
         if not elsewhere.any():
-            return trial
-        curved = recruits(self.latents.noise)
-        likely = log_likelihoods(law.meanings(*self.latents, -1), trial.columns)
+            columns[..., BY_CURVES] = np.nan
+            return History(columns)
+        given = elsewhere & np.isnan(columns[..., 0]) & self.before_pairs
+        columns[given, COUNTS] = OF_GIVEN
+        if self.halves > 1:
+            unheeded = given & (np.arange(len(columns)) % 2 > 0)[:, np.newaxis]
+            columns[unheeded, 2:4], columns[unheeded, SHIFT] = (-np.inf, np.inf), 0.0
+            elsewhere &= ~unheeded
+        columns[..., BY_CURVES] = np.where(elsewhere, 0.0, np.nan)
+        curved = recruits(rows.kinds[..., 1])
+        likely = log_likelihoods(law.meanings(rows.values, rows.kinds, -1), columns)
         joint, among = (
-            log_sum(np.where(curved, each, -np.inf)) for each in (self.log_weights + likely, self.log_weights)
+            log_sum(np.where(curved, each, -np.inf)) for each in (rows.log_weights + likely, rows.log_weights)
         )
-        columns = trial.columns.copy()
         predicted = np.where(np.isfinite(among), joint - among, 0.0)
         columns[..., BY_CURVES] = np.where(elsewhere, predicted[:, np.newaxis], np.nan)
         return History(columns)

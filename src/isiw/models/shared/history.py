@@ -25,12 +25,15 @@ class Circumstances(NamedTuple):
     known_log_sd: float = 0.0  # of a factor that trials of nearly the same ISI share, natural log
     shift_pct_rmt: float = 0.0  # by how much the pulse is stronger than usual
     log_by_curves: float = math.nan  # log density for kinds of noise without a law of other intensities
+    counts: float = 1.0  # as how much of a trial it counts
 
 
 _OF_A_TRIAL: Final = 5
 """Columns of a trial before its circumstances."""
 
-SHIFT, BY_CURVES = (_OF_A_TRIAL + Circumstances._fields.index(name) for name in ("shift_pct_rmt", "log_by_curves"))
+SHIFT, BY_CURVES, COUNTS = (
+    _OF_A_TRIAL + Circumstances._fields.index(name) for name in ("shift_pct_rmt", "log_by_curves", "counts")
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +41,7 @@ class History:
     """The trials so far; amplitudes are intervals of log mV, which are points if the amplitude is known.
 
     The columns are those of a trial in the compiled engine: realised ISI (NaN is TMS alone) and its SD [ms], lower and
-    upper end of the log MEP, how many trials came before, and the fields of `Circumstances`, shape (b, n, 10).
+    upper end of the log MEP, how many trials came before, and the fields of `Circumstances`, shape (b, n, 11).
     """
 
     columns: Singles
@@ -85,7 +88,7 @@ def observed(observation: Observation, detection_limit_mv: float, response_thres
     if observation.known_mv is not None:
         columns[:, 0, _OF_A_TRIAL : _OF_A_TRIAL + 3] = observation.known_mv
     if observation.shift_pct_rmt is not None:
-        columns[:, 0, SHIFT] = observation.shift_pct_rmt
+        columns[:, 0, SHIFT], columns[:, 0, BY_CURVES] = observation.shift_pct_rmt, 0.0  # until curves predict it
     return History(columns)
 
 
@@ -102,7 +105,7 @@ def _ends(mep_mv: float, high_mv: float, response: float, limit: float, threshol
 
 
 def neutral(trials: int) -> Singles:
-    """Columns of so many trials that nothing but their order is known of, shape (n, 12)."""
+    """Columns of so many trials that nothing but their order is known of, shape (n, 11)."""
     columns = np.zeros((trials, _OF_A_TRIAL + len(Circumstances._fields)), dtype=np.float32)
     columns[:, _OF_A_TRIAL - 1], columns[:, _OF_A_TRIAL:] = np.arange(trials), Circumstances()
     return columns

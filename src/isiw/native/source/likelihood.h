@@ -259,7 +259,7 @@ INLINE Reals of_trial(const Group *group, const Trial *trial, float factor_at, i
                                : density(&made, &group->curve, rectified, low);
         likelihood = uncertain ? likelihood + share[node] * found : found;
     }
-    return log_v(likelihood);
+    return trial->of[COUNTS] * log_v(likelihood);
 }
 
 /* The group of trials that share a factor of their known parts. */

@@ -50,6 +50,7 @@ enum {
     KNOWN_LOG_SD, /* of a factor that trials of nearly the same ISI share */
     SHIFT,        /* by how much the pulse is stronger [% RMT] */
     BY_CURVES,    /* log density for kinds of noise that know no other intensity; not a number where they know it */
+    COUNTS,       /* as how much of a trial it counts: the power of its likelihood */
     COLUMNS
 };
 
