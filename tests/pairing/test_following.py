@@ -24,8 +24,11 @@ def begun() -> Followed:
 
 
 def after(best_ms: float, share: float = 1.0, pairs: int = 60) -> Followed:
-    """What is known after pairs around the usual best ISI, of a window that is elsewhere or enhances less."""
+    """What is known after TMS alone and pairs around the usual best ISI, of a window elsewhere or one that enhances
+    less."""
     followed = begun()
+    for number in range(10):
+        followed = followed.after(trial(number, None, BASE_MV * VARIED[number]))
     for number in range(pairs):
         isi_ms = BEST_MS + (-25.0, 0.0, 25.0)[number % 3]
         mep_mv = BASE_MV + share * float(np.exp(-0.5 * ((isi_ms - best_ms) / 20.0) ** 2))
@@ -35,7 +38,7 @@ def after(best_ms: float, share: float = 1.0, pairs: int = 60) -> Followed:
 
 @pytest.mark.parametrize("best_ms", [80.0, 100.0, 125.0])
 def test_a_window_that_has_moved_is_found_where_it_is(best_ms: float) -> None:
-    median, low, high = after(best_ms).interval(SHIFTS_MS, 1)
+    median, low, high = after(best_ms).interval(SHIFTS_MS, 2)
     assert low <= best_ms - BEST_MS <= high
     assert abs(median - (best_ms - BEST_MS)) < 8.0
     best = after(best_ms)
@@ -43,10 +46,10 @@ def test_a_window_that_has_moved_is_found_where_it_is(best_ms: float) -> None:
 
 
 def test_an_enhancement_that_is_gone_is_noticed() -> None:
-    left, _, high = after(100.0, share=0.0).interval(SHARES, 2)
-    assert left <= 0.25
+    left, _, high = after(100.0, share=0.0).interval(SHARES, 3)
+    assert left <= 0.33
     assert high < 1.0
-    assert after(100.0).interval(SHARES, 2)[0] >= 0.75
+    assert after(100.0).interval(SHARES, 3)[0] >= 0.75
 
 
 def test_tms_alone_says_nothing_of_the_place_but_of_the_level() -> None:
@@ -54,7 +57,7 @@ def test_tms_alone_says_nothing_of_the_place_but_of_the_level() -> None:
     for number in range(10):
         followed = followed.after(trial(number, None, 2.0 * BASE_MV))
     assert followed.p_inside == pytest.approx(begun().p_inside)
-    assert followed.weights[..., 5:].sum() > 0.8
+    assert followed.weights[..., 3:].sum() > 0.8
 
 
 def test_a_probe_is_where_the_next_mep_says_most_and_among_those_that_are_allowed() -> None:

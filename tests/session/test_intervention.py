@@ -380,6 +380,17 @@ def test_a_strategy_that_found_no_window_has_none_to_use(log: Path) -> None:
         Session(device(), scripted_strategy(3), log=log, intervention=intervention())
 
 
+def test_a_range_beside_the_window_is_refused_before_anything_is_delivered(log: Path) -> None:
+    with pytest.raises(InvalidValueError, match=r"the range of the plan holds no ISI of the window.*70–130 ms"):
+        session(log, intervention(range_ms=(20.0, 60.0)))
+    assert not log.exists()
+
+
+def test_pairs_of_a_control_arm_are_no_probes(log: Path) -> None:
+    session(log, intervention(Arm.OUTSIDE)).run()
+    assert not any(pair.probe for pair in pairing_of(read_session(log)).pairs)
+
+
 def test_other_things_than_interventions_are_refused(log: Path) -> None:
     with pytest.raises(InvalidValueError, match="intervention"):
         Session(device(), knowing(), log=log, intervention="window")  # type: ignore[arg-type]
