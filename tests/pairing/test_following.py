@@ -49,7 +49,7 @@ def test_an_enhancement_that_is_gone_is_noticed() -> None:
     left, _, high = after(100.0, share=0.0).interval(SHARES, 3)
     assert left <= 0.33
     assert high < 1.0
-    assert after(100.0).interval(SHARES, 3)[0] >= 0.75
+    assert after(100.0).interval(SHARES, 3)[0] >= 0.67
 
 
 def test_tms_alone_says_nothing_of_the_place_but_of_the_level() -> None:

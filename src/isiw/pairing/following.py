@@ -42,8 +42,11 @@ _LOG_LEAST: Final = math.log(_LEAST_MV)
 _FREEDOM: Final = 5.0
 """Degrees of freedom of the amplitudes' law, a t law of logarithms: one odd MEP moves no window."""
 
-_LOG_SDS: Final = (0.3, 1.2)
-"""Between these lies the SD of an MEP about its expectation, natural log."""
+_ALONE_LOG_SD, _EVOKED_LOG_SD, _AS_TRIALS = 0.35, 0.9, 6
+"""SD of an MEP, natural log, without enhancement and of what the tap adds; the latter counts as so many trials, beside
+those of the search (docs/physiology.md)."""
+
+_MOST_LOG_SD: Final = 1.2
 
 
 @dataclass(frozen=True)
@@ -92,7 +95,7 @@ class Followed:
         baseline_mv: sampled expected MEPs of TMS alone [mV], shape (s,).
         profiles_mv: expected MEPs of each profile at each shift [mV], shape (s, shifts, t).
         inside: whether each ISI is in the window of each profile at each shift, in 0–1, same shape.
-        log_sd: SD of an MEP about its expectation, natural log.
+        log_sd: SD of an MEP that is enhanced, natural log.
         weights: the posterior, (stays and moves, s, shifts, shares, levels).
     """
 
@@ -128,7 +131,9 @@ class Followed:
         movement, grid = movement or Movement(), space.grid_ms
         isi_ms = grid[np.unique(np.linspace(0, len(grid) - 1, min(len(grid), 121)).round().astype(int))]
         profiles, masks = posterior.profiles_mv(isi_ms)[0], posterior.window_masks(isi_ms)[0]
-        picked = np.linspace(0, len(profiles) - 1, min(movement.profiles, len(profiles))).round().astype(int)
+        with_window = np.flatnonzero(masks.any(axis=-1))
+        known = with_window if with_window.size else np.arange(len(profiles))
+        picked = known[np.linspace(0, len(known) - 1, min(movement.profiles, len(known))).round().astype(int)]
         baseline = np.asarray(posterior.baselines_mv()[0], dtype=float)[picked]
         shifted, inside = _shifted(profiles[picked], isi_ms), _shifted(masks[picked], isi_ms)
         flat = np.zeros((len(picked), len(SHIFTS_MS), len(SHARES), len(LOG_LEVELS)))
@@ -145,10 +150,11 @@ class Followed:
             expected = np.broadcast_to(self.baseline_mv[:, None, None], self.weights.shape[1:4])
         else:
             expected = self._enhanced(self._at(self.profiles_mv, trial.isi_ms))
-        log_mv = np.maximum(np.log(expected)[..., None] + LOG_LEVELS, _LOG_LEAST)
-        off = (math.log(max(trial.mep_mv, _LEAST_MV)) - log_mv) * (1.0 / self.log_sd)
+        log_sd = self._log_sd_of(expected)[..., None]
+        log_mv = np.maximum(np.log(expected)[..., None] + LOG_LEVELS - 0.5 * log_sd**2, _LOG_LEAST)
+        off = (math.log(max(trial.mep_mv, _LEAST_MV)) - log_mv) / log_sd
         tail = 1.0 + off * off * (1.0 / _FREEDOM)
-        likely = 1.0 / (tail * tail * tail)  # the power of a t law with 5 degrees of freedom
+        likely = 1.0 / (log_sd * tail * tail * tail)  # the power of a t law with 5 degrees of freedom
         weights = self.weights * likely
         known = replace(self, weights=weights / weights.sum())
         return known if trial.isi_ms is None else known.moved()
@@ -167,6 +173,13 @@ class Followed:
         shape = ways.shape
         ways = (ways.reshape(-1, shape[3] * shape[4]) @ movement.changing).reshape(shape)
         return replace(self, weights=ways)
+
+    def _log_sd_of(self, expected_mv: FloatArray) -> FloatArray:
+        """SD of MEPs about their expectation, natural log: the larger, the more of them is enhancement."""
+        base = self.baseline_mv[:, None, None]
+        share = np.clip(1.0 - base / expected_mv, 0.0, 1.0)
+        spread: FloatArray = np.hypot((1.0 - share) * _ALONE_LOG_SD, share * self.log_sd)
+        return spread
 
     def _at(self, values: FloatArray, isi_ms: float) -> FloatArray:
         """Values at an ISI between those at which they are known, (s, shifts)."""
@@ -253,14 +266,12 @@ def _steps(number: int, share: float) -> FloatArray:
 
 
 def _log_sd(trials: Sequence[Trial], isi_ms: FloatArray, profile_mv: FloatArray, baseline_mv: float) -> float:
-    """SD of MEPs about what is expected of them, natural log."""
-    low, high = _LOG_SDS
-    pulses = [trial for trial in trials if trial.told and trial.mep_mv is not None and trial.intensity_pct_rmt is None]
-    if len(pulses) < 4:
-        return (low + high) / 2
-    expected = [
-        baseline_mv if trial.isi_ms is None else float(np.interp(trial.isi_ms, isi_ms, profile_mv)) for trial in pulses
-    ]
+    """SD of enhanced MEPs about what is expected of them, natural log."""
+    pulses = [t for t in trials if t.told and t.mep_mv is not None and t.isi_ms is not None]
+    expected = np.array([float(np.interp(trial.isi_ms or 0.0, isi_ms, profile_mv)) for trial in pulses])
     mep_mv = np.array([trial.mep_mv for trial in pulses], dtype=float)
-    off = np.log(np.maximum(mep_mv, _LEAST_MV)) - np.log(np.maximum(expected, _LEAST_MV))
-    return float(np.clip(1.48 * np.median(np.abs(off - np.median(off))), low, high))
+    enhanced = expected > 2.0 * baseline_mv
+    off = np.log(np.maximum(mep_mv[enhanced], _LEAST_MV) / expected[enhanced])
+    off = off - np.median(off) if off.size else off
+    squares = _AS_TRIALS * _EVOKED_LOG_SD**2 + float(np.sum(np.minimum(np.abs(off), 2.0) ** 2))
+    return min(math.sqrt(squares / (_AS_TRIALS + off.size)), _MOST_LOG_SD)
