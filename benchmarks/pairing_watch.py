@@ -39,7 +39,7 @@ BOUND = 1.645
 PLAN = Plan("benchmark", before=1, after=1, pairs=200)
 LEAVING, WIDTHS_MS = "leaving", (25.0, 50.0)
 COHORTS = LEAVING, "narrow-unstated", "narrow", "recruitment"
-STATED = dict.fromkeys((LEAVING, "narrow-unstated"), {"conditioning": "electrical"})
+STATED = {name: {"conditioning": "electrical"} for name in (LEAVING, "narrow-unstated")}
 """What is stated of the stimulus, as it is known where windows are so narrow."""
 
 PLANS = {"watching": PLAN, "without": replace(PLAN, probes=0.0, follow_ms=0.0)}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import sys
@@ -31,8 +32,9 @@ from isiw.session.blocks import Blocks
 from isiw.session.loop import Session
 from isiw.session.resume import open_session, resume
 from isiw.session.rig import Safeguards
+from isiw.sweeps import Measurement
 from isiw.trials import Stimulus, Trial
-from pairing.paired import EVERY_ARM, device, intervention, knowing, planned, session
+from pairing.paired import EVERY_ARM, answering, device, intervention, knowing, planned, session
 from scripted import FakeRealClock, scripted_strategy
 from session.test_following import Remembering
 
@@ -322,6 +324,28 @@ def test_console_and_live_page_are_the_same_whatever_the_arm(
     assert "Block 3 of 3 of the intervention begins." in shown[0][0]
     assert len(shown[0][1]) == 10
     assert all(each == shown[0] for each in shown)
+
+
+def test_the_live_page_counts_what_is_left_while_pairs_are_concealed(log: Path) -> None:
+    rig, usual, pages = device(), answering(), dict[int, dict[str, Any]]()
+    one = session(log, on=rig)
+    view = View(one)
+
+    def answer(stimulus: Stimulus) -> Measurement:
+        if stimulus.trial in {2, 20, 52, 55}:
+            pages[stimulus.trial] = json.loads(view.shown().json)
+        return usual(stimulus)
+
+    rig.answer = answer
+    one.follow(view)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(type(view), "is_attended", lambda _: False)
+        patched.setattr("isiw.session.blocks.Blocks.announcement", lambda *_: None)
+        patched.setattr("isiw.server.live.view.UPDATE_S", 0.0)
+        patched.setattr("isiw.server.live.view.SHARE", 1e9)
+        one.run()
+    assert {trial: page["left"] for trial, page in pages.items()} == {trial: 59 - trial for trial in pages}
+    assert {trial: page["hides"] for trial, page in pages.items()} == {2: False, 20: True, 52: True, 55: False}
 
 
 def _without_times(text: str) -> str:
