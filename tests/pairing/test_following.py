@@ -9,6 +9,7 @@ from isiw.errors import StrategyError
 from isiw.findings import Kind
 from isiw.pairing.following import SHARES, SHIFTS_MS, Followed
 from isiw.trials import Status, Trial
+from isiw.types import Array
 from pairing.paired import BASE_MV, BEST_MS, SPACE, KnownWindow, knowing
 from scripted import RememberingPosterior
 
@@ -68,6 +69,33 @@ def test_a_probe_is_where_the_next_mep_says_most_and_among_those_that_are_allowe
     assert 8.0 < abs(everywhere - BEST_MS) < 60.0  # at a flank
     allowed = unsure.isi_ms[(unsure.isi_ms >= 95) & (unsure.isi_ms <= 105)]
     assert 95.0 <= unsure.news(allowed) <= 105.0
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_noise_is_not_followed_where_the_window_stays(seed: int) -> None:
+    followed, noise = begun(), np.exp(0.9 * np.random.default_rng(seed).standard_normal(100))
+    for number in range(100):
+        isi_ms = BEST_MS + (20.0 * (-1) ** (number // 10) if number % 10 == 0 else 0.0)
+        expected = BASE_MV + float(np.exp(-0.5 * ((isi_ms - BEST_MS) / 20.0) ** 2))
+        followed = followed.after(trial(number, isi_ms, expected * noise[number]))
+        assert abs(followed.isi_ms[int(np.argmax(followed.enhancement_mv))] - BEST_MS) < 10.0
+
+
+def test_meps_vary_as_enhanced_ones_do_and_not_as_those_at_the_floor() -> None:
+    floor = [trial(k, 10.0, 0.01) for k in range(30)]
+    noise = np.exp(0.9 * np.random.default_rng(1).standard_normal(8))
+    enhanced = [trial(30 + k, BEST_MS, (BASE_MV + 1.0) * noise[k]) for k in range(8)]
+    assert 0.6 < Followed.begin(KnownWindow(SPACE), SPACE, [*floor, *enhanced]).log_sd < 1.2
+
+
+def test_a_profile_without_a_window_is_none_that_moves() -> None:
+    class Doubtful(KnownWindow):
+        def window_masks(self, isi_ms: Array) -> Array:
+            masks: Array = super().window_masks(isi_ms) * np.array([[0.0], [1.0]])
+            return masks
+
+    followed = Followed.begin(Doubtful(SPACE), SPACE, ())
+    assert float(np.interp(BEST_MS, followed.isi_ms, followed.p_inside)) == pytest.approx(1.0)
 
 
 def test_a_lost_trial_teaches_nothing() -> None:

@@ -215,11 +215,6 @@ class Followed:
         best = self.isi_ms[self.profiles_mv[:, len(SHIFTS_MS) // 2].argmax(-1)]
         return _interval((best[:, None] + SHIFTS_MS).ravel(), self._placed.sum(-1).ravel(), level)
 
-    @property
-    def p_moves(self) -> float:
-        """The probability that the window moves now."""
-        return float(self.weights[1].sum())
-
     def news(self, allowed: FloatArray) -> float:
         """The ISI, of some [ms], at which the next MEP says most of where the window is, and what is left of it."""
         columns = np.searchsorted(self.isi_ms, allowed)
