@@ -83,12 +83,12 @@ def test_the_isi_follows_a_window_that_moves_within_what_the_operator_allowed(lo
     def moving(trial: int) -> float:
         return 100.0 + 0.6 * trial
 
-    allowed = intervention(arms=(Arm.WINDOW,), range_ms=(60.0, 112.0), follow_ms=6.0)
-    session(log, allowed, device(moving), strategy=knowing(earlier=6)).run()
+    allowed = intervention(arms=(Arm.WINDOW,), range_ms=(60.0, 125.0), follow_ms=6.0)
+    session(log, allowed, device(moving), strategy=knowing(earlier=40)).run()  # from them, how little MEPs vary
     pairs = pairing_of(read_session(log)).pairs
     blocks = [[p.isi_ms for p in pairs[first : first + 20] if not p.probe] for first in (0, 20, 40)]
     assert blocks[2][-1] >= blocks[0][0] + 4.0
-    assert all(60.0 <= pair.isi_ms <= 112.0 for pair in pairs)
+    assert all(60.0 <= pair.isi_ms <= 125.0 for pair in pairs)
     for before, block in zip([[100.0], *blocks], blocks, strict=False):
         assert max(abs(isi_ms - before[-1]) for isi_ms in block) <= 6.5  # the grid's step
 
