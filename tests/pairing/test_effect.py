@@ -44,6 +44,21 @@ def test_without_a_drift_the_interval_is_within_that_which_allows_for_one() -> N
         assert narrow.high / narrow.low < wide.high / wide.low
 
 
+def test_pulses_that_are_like_the_one_before_say_less_of_a_change() -> None:
+    def width(order: list[int]) -> float:
+        """With the pulses of each ten, which have one level, in an order of their sizes."""
+        pulses = list(visit(2).pulses)
+        for first in range(0, len(pulses), 10):
+            ten = pulses[first : first + 10]
+            sizes = sorted(pulse.mep_mv for pulse in ten)
+            pulses[first : first + 10] = [replace(pulse, mep_mv=sizes[k]) for pulse, k in zip(ten, order, strict=True)]
+        steady = change_of(pulses, pairs=50).pooled.steady
+        return math.log(steady.high / steady.low)
+
+    by_turns = [0, 9, 1, 8, 2, 7, 3, 6, 4, 5]
+    assert width(sorted(by_turns)) > 1.1 * width(by_turns)
+
+
 def test_pulses_at_several_intensities_are_one_answer_and_means_are_compared_at_the_same_ones() -> None:
     plan = InterventionPlan(pairs=50, tests_pct_rmt=(110.0, 120.0, 130.0))
     ratios = [math.log(effect.pooled.ratio) for effect in changes(1.6, plan=plan) if effect.pooled.ratio is not None]

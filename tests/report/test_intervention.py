@@ -8,13 +8,17 @@ import pytest
 from isiw.intervention import Arm
 from isiw.log.reader import read_session
 from isiw.pairing import Delivered
+from isiw.pairing.agenda import Agenda
+from isiw.pairing.course import FollowedPair, course_of
+from isiw.pairing.pulses import pairing_of
 from isiw.pairing.words import NOT_YET
 from isiw.report.intervention import InterventionContents, intervention_page
 from isiw.report.page import report_page
 from isiw.report.words import final_statement
 from isiw.session.afterwards import open_arm
 from isiw.session.sink import SessionUpdate
-from pairing.paired import intervention, session
+from known import known
+from pairing.paired import intervention, knowing, session
 from pairing.tested import visit
 from report.sessions import HOSTILE, Page
 
@@ -36,6 +40,28 @@ def test_a_page_shows_the_change_each_block_the_dose_and_the_window() -> None:
     ):
         assert said in page.words
     assert "taken" in page.words  # the subject's code is text
+
+
+@pytest.mark.needs_pictures
+def test_a_page_shows_the_course_of_the_window_that_was_followed() -> None:
+    course = [FollowedPair(1 + k, k // 25, 88.0 + k // 25, k % 10 == 0, 90.0, 80.0, 99.0, 0.9) for k in range(50)]
+    words = Page(intervention_page(InterventionContents(PULSES, DELIVERED, course=course))).words
+    for said in ("90 % interval of the best ISI", "inside the window (expected)", "outside"):
+        assert said in words
+
+
+def test_a_course_is_what_was_known_at_each_pair(tmp_path: Path) -> None:
+    session(tmp_path / "s.mcap", intervention(arms=(Arm.WINDOW,), before=6)).run()
+    record = read_session(tmp_path / "s.mcap")
+    agenda = Agenda(known(record.header.intervention), knowing(), record.header.seed)
+    course = course_of(agenda, record.table, record.header.seed)
+    assert [pair.number for pair in course] == list(range(1, 51))
+    assert [pair.block for pair in course] == [0] * 20 + [1] * 20 + [2] * 10
+    assert [pair.isi_ms for pair in course] == [pair.isi_ms for pair in pairing_of(record).pairs]
+    assert sum(pair.probe for pair in course) == 5
+    assert all(pair.low_ms <= pair.best_ms <= pair.high_ms for pair in course)
+    assert max(abs(pair.best_ms - 100.0) for pair in course) < 10.0
+    assert min(pair.p_inside for pair in course if not pair.probe) > 0.8
 
 
 def test_a_concealed_arm_is_not_shown_though_the_change_is() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import sys
@@ -33,8 +34,9 @@ from isiw.session.blocks import Blocks
 from isiw.session.loop import Session
 from isiw.session.resume import open_session, resume
 from isiw.session.rig import Safeguards
+from isiw.sweeps import Measurement
 from isiw.trials import Stimulus, Trial
-from pairing.paired import EVERY_ARM, device, intervention, knowing, planned, session
+from pairing.paired import EVERY_ARM, answering, device, intervention, knowing, planned, session
 from scripted import FakeRealClock, scripted_strategy
 from session.test_following import Remembering
 
@@ -83,12 +85,12 @@ def test_the_isi_follows_a_window_that_moves_within_what_the_operator_allowed(lo
     def moving(trial: int) -> float:
         return 100.0 + 0.6 * trial
 
-    allowed = intervention(arms=(Arm.WINDOW,), range_ms=(60.0, 112.0), follow_ms=6.0)
-    session(log, allowed, device(moving), strategy=knowing(earlier=6)).run()
+    allowed = intervention(arms=(Arm.WINDOW,), range_ms=(60.0, 125.0), follow_ms=6.0)
+    session(log, allowed, device(moving), strategy=knowing(earlier=40)).run()  # from them, how little MEPs vary
     pairs = pairing_of(read_session(log)).pairs
     blocks = [[p.isi_ms for p in pairs[first : first + 20] if not p.probe] for first in (0, 20, 40)]
     assert blocks[2][-1] >= blocks[0][0] + 4.0
-    assert all(60.0 <= pair.isi_ms <= 112.0 for pair in pairs)
+    assert all(60.0 <= pair.isi_ms <= 125.0 for pair in pairs)
     for before, block in zip([[100.0], *blocks], blocks, strict=False):
         assert max(abs(isi_ms - before[-1]) for isi_ms in block) <= 6.5  # the grid's step
 
@@ -326,6 +328,28 @@ def test_console_and_live_page_are_the_same_whatever_the_arm(
     assert all(each == shown[0] for each in shown)
 
 
+def test_the_live_page_counts_what_is_left_while_pairs_are_concealed(log: Path) -> None:
+    rig, usual, pages = device(), answering(), dict[int, dict[str, Any]]()
+    one = session(log, on=rig)
+    view = View(one)
+
+    def answer(stimulus: Stimulus) -> Measurement:
+        if stimulus.trial in {2, 20, 52, 55}:
+            pages[stimulus.trial] = json.loads(view.shown().json)
+        return usual(stimulus)
+
+    rig.answer = answer
+    one.follow(view)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(type(view), "is_attended", lambda _: False)
+        patched.setattr("isiw.session.blocks.Blocks.announcement", lambda *_: None)
+        patched.setattr("isiw.server.live.view.UPDATE_S", 0.0)
+        patched.setattr("isiw.server.live.view.SHARE", 1e9)
+        one.run()
+    assert {trial: page["left"] for trial, page in pages.items()} == {trial: 59 - trial for trial in pages}
+    assert {trial: page["hides"] for trial, page in pages.items()} == {2: False, 20: True, 52: True, 55: False}
+
+
 def _without_times(text: str) -> str:
     text = re.sub(r'"waitS":[^,]*', "", text)
     return re.sub(r"\d{4}-\d\d-\d\d[T ][\d:+]+", "", text)
@@ -397,6 +421,17 @@ def test_a_loop_of_the_labs_own_cannot_continue_an_intervention(log: Path) -> No
 def test_a_strategy_that_found_no_window_has_none_to_use(log: Path) -> None:
     with pytest.raises(StrategyError, match="cannot be used"):
         Session(device(), scripted_strategy(3), log=log, intervention=intervention())
+
+
+def test_a_range_beside_the_window_is_refused_before_anything_is_delivered(log: Path) -> None:
+    with pytest.raises(InvalidValueError, match=r"the range of the plan holds no ISI of the window.*70–130 ms"):
+        session(log, intervention(range_ms=(20.0, 60.0)))
+    assert not log.exists()
+
+
+def test_pairs_of_a_control_arm_are_no_probes(log: Path) -> None:
+    session(log, intervention(Arm.OUTSIDE)).run()
+    assert not any(pair.probe for pair in pairing_of(read_session(log)).pairs)
 
 
 def test_other_things_than_interventions_are_refused(log: Path) -> None:

@@ -47,11 +47,12 @@ class Agenda:
             low_ms, high_ms = self.plan.range_ms
             allowed = allowed[(allowed >= low_ms) & (allowed <= high_ms)]
         self._allowed_ms = allowed
-        if Arm.WINDOW in self.plan.arms and not allowed.size:
+        if Arm.WINDOW in self.plan.arms and self.plan.range_ms is not None and not self._window.mask(allowed).any():
             raise InvalidValueError(
-                "the range of the plan holds no ISI of the design space",
+                "the range of the plan holds no ISI of the window",
                 got=self.plan.range_ms,
-                expected=f"{self._space}",
+                expected=f"ISIs of the window that was found, {self._window}",
+                remedy="Write another range_ms under [intervention], or leave it out.",
             )
         outside = self._begun.isi_ms[self._begun.p_inside <= OUTSIDE]
         self._outside_ms = outside[np.isin(outside, allowed)]  # the range holds for every pair
@@ -106,12 +107,22 @@ class Agenda:
         """
         trials = tuple(trials)
         slot = self.plan.slots[len(trials)]
-        self._learn(trials)
+        if self.plan.probes or self.plan.follow_ms:
+            self._learn(trials)
         if self._arm is Arm.OUTSIDE:
             return _turn(self._outside_ms, slot.place)
         if self.plan.is_probe(slot, self._seed):
             return self._followed.news(self._allowed_ms)
         return self._space.snap(_turn(self._used_ms(), slot.place))
+
+    def followed(self, trials: Iterable[Trial]) -> Followed:
+        """What is known of the window after some trials.
+
+        Args:
+            trials: all so far, as they count now.
+        """
+        self._learn(tuple(trials))
+        return self._followed
 
     def _learn(self, trials: Sequence[Trial]) -> None:
         """Follow the window through the trials that are not learnt yet; through all of them where one was judged."""

@@ -2,7 +2,8 @@
 
 What the search for the window taught are profiles, sampled from its posterior; the window's law itself knows none that
 moves. So each profile is shifted, and its enhancement scaled, by what changes at random from pair to pair: a hidden
-Markov model on a grid of shifts, shares of the enhancement and levels, whose filter is exact.
+Markov model on a grid of shifts, shares of the enhancement and levels, whose filter is exact. A window moves only while
+it is one that moves; most stay, and so noise alone is not followed.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import Final
 
 import numpy as np
 
-from isiw.checks import Checked, Count, Positive
+from isiw.checks import Checked, Count, Positive, Share
 from isiw.design import DesignSpace
 from isiw.errors import StrategyError
 from isiw.models.protocol import Posterior, SamplesProfiles, SamplesWindows
@@ -27,20 +28,25 @@ _MOST_SHIFT_MS: Final = 60.0
 SHIFTS_MS: Final = np.arange(-_MOST_SHIFT_MS, _MOST_SHIFT_MS + _STEP_MS / 2, _STEP_MS)
 """By how much the window may have moved [ms]."""
 
-SHARES: Final = np.array([1.0, 0.75, 0.5, 0.25, 0.0])
+SHARES: Final = np.array([1.0, 0.67, 0.33, 0.0])
 """What may be left of the enhancement."""
 
-LOG_LEVELS: Final = np.linspace(-1.2, 1.2, 9)
+LOG_LEVELS: Final = np.linspace(-1.0, 1.0, 5)
 """By what all that is evoked may have been multiplied, natural log."""
 
 _LEAST_MV: Final = 0.02
 """Smaller amplitudes are alike: they are the floor of the EMG [mV]."""
 
+_LOG_LEAST: Final = math.log(_LEAST_MV)
+
 _FREEDOM: Final = 5.0
 """Degrees of freedom of the amplitudes' law, a t law of logarithms: one odd MEP moves no window."""
 
-_LOG_SDS: Final = (0.3, 1.2)
-"""Between these lies the SD of an MEP about its expectation, natural log."""
+_ALONE_LOG_SD, _EVOKED_LOG_SD, _AS_TRIALS = 0.35, 0.9, 6
+"""SD of an MEP, natural log, without enhancement and of what the tap adds; the latter counts as so many trials, beside
+those of the search (docs/physiology.md)."""
+
+_MOST_LOG_SD: Final = 1.2
 
 
 @dataclass(frozen=True)
@@ -48,7 +54,10 @@ class Movement(Checked):
     """What changes from pair to pair, and how finely that is followed.
 
     Args:
-        shift_sd_ms: SD of the window's move from one pair to the next [ms].
+        shift_sd_ms: SD of the move from one pair to the next [ms], of a window that moves.
+        moves: probability that the window moves at first.
+        begins: probability that one that stays begins to move, from one pair to the next.
+        ends: probability that one that moves comes to rest.
         fading: probability that the enhancement moves to a neighbouring share.
         levelling: probability that the level moves to a neighbouring one.
         profiles: how many sampled profiles stand for what was known before.
@@ -58,14 +67,27 @@ class Movement(Checked):
     """
 
     shift_sd_ms: Positive = 1.2
+    moves: Share = 0.2
+    begins: Share = 0.004
+    ends: Share = 0.01
     fading: Positive = 0.02
     levelling: Positive = 0.02
     profiles: Count = 32
 
+    @cached_property
+    def shifting(self) -> FloatArray:
+        """Probabilities of shifts after a pair, by those before it, of a window that moves."""
+        return _steps(len(SHIFTS_MS), (self.shift_sd_ms / _STEP_MS) ** 2)
+
+    @cached_property
+    def changing(self) -> FloatArray:
+        """The same of shares and levels together."""
+        return np.kron(_steps(len(SHARES), self.fading), _steps(len(LOG_LEVELS), self.levelling))
+
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """What is known of a window after some pairs; `weights` are (s, shifts, shares, levels) and sum to 1.
+    """What is known of a window after some pairs; `weights` sum to 1.
 
     Args:
         movement: what changes from pair to pair.
@@ -73,8 +95,8 @@ class Followed:
         baseline_mv: sampled expected MEPs of TMS alone [mV], shape (s,).
         profiles_mv: expected MEPs of each profile at each shift [mV], shape (s, shifts, t).
         inside: whether each ISI is in the window of each profile at each shift, in 0–1, same shape.
-        log_sd: SD of an MEP about its expectation, natural log.
-        weights: the posterior.
+        log_sd: SD of an MEP that is enhanced, natural log.
+        weights: the posterior, (stays and moves, s, shifts, shares, levels).
     """
 
     movement: Movement
@@ -109,36 +131,55 @@ class Followed:
         movement, grid = movement or Movement(), space.grid_ms
         isi_ms = grid[np.unique(np.linspace(0, len(grid) - 1, min(len(grid), 121)).round().astype(int))]
         profiles, masks = posterior.profiles_mv(isi_ms)[0], posterior.window_masks(isi_ms)[0]
-        picked = np.linspace(0, len(profiles) - 1, min(movement.profiles, len(profiles))).round().astype(int)
+        with_window = np.flatnonzero(masks.any(axis=-1))
+        known = with_window if with_window.size else np.arange(len(profiles))
+        picked = known[np.linspace(0, len(known) - 1, min(movement.profiles, len(known))).round().astype(int)]
         baseline = np.asarray(posterior.baselines_mv()[0], dtype=float)[picked]
         shifted, inside = _shifted(profiles[picked], isi_ms), _shifted(masks[picked], isi_ms)
         flat = np.zeros((len(picked), len(SHIFTS_MS), len(SHARES), len(LOG_LEVELS)))
         flat[:, len(SHIFTS_MS) // 2, 0, :] = np.exp(-0.5 * (LOG_LEVELS / 0.4) ** 2)
         middle = np.median(profiles, axis=0), float(np.median(baseline))
-        return cls(movement, isi_ms, baseline, shifted, inside, _log_sd(earlier, isi_ms, *middle), flat / flat.sum())
+        ways = np.stack(((1.0 - movement.moves) * flat, movement.moves * flat)) / flat.sum()
+        return cls(movement, isi_ms, baseline, shifted, inside, _log_sd(earlier, isi_ms, *middle), ways)
 
     def after(self, trial: Trial) -> Followed:
         """What is known after one more trial that counts: a pair, behind which the window may move, or TMS alone."""
         if not trial.told or trial.mep_mv is None:
             return self
         if trial.isi_ms is None:
-            expected = np.broadcast_to(self.baseline_mv[:, None, None], self.weights.shape[:3])
+            expected = np.broadcast_to(self.baseline_mv[:, None, None], self.weights.shape[1:4])
         else:
             expected = self._enhanced(self._at(self.profiles_mv, trial.isi_ms))
-        log_mv = np.log(np.maximum(expected[..., None] * np.exp(LOG_LEVELS), _LEAST_MV))
-        off = (math.log(max(trial.mep_mv, _LEAST_MV)) - log_mv) / self.log_sd
-        likely = (1.0 + off**2 / _FREEDOM) ** (-(_FREEDOM + 1.0) / 2.0)
+        log_sd = self._log_sd_of(expected)[..., None]
+        log_mv = np.maximum(np.log(expected)[..., None] + LOG_LEVELS - 0.5 * log_sd**2, _LOG_LEAST)
+        off = (math.log(max(trial.mep_mv, _LEAST_MV)) - log_mv) / log_sd
+        tail = 1.0 + off * off * (1.0 / _FREEDOM)
+        likely = 1.0 / (log_sd * tail * tail * tail)  # the power of a t law with 5 degrees of freedom
         weights = self.weights * likely
         known = replace(self, weights=weights / weights.sum())
         return known if trial.isi_ms is None else known.moved()
 
     def moved(self) -> Followed:
         """What is known of the window at the next pair."""
-        steps = (self.movement.shift_sd_ms / _STEP_MS) ** 2, self.movement.fading, self.movement.levelling
-        weights = self.weights
-        for axis, share in enumerate(steps, start=1):
-            weights = _spread(weights, share, axis)
-        return replace(self, weights=weights)
+        movement = self.movement
+        stays, moves = self.weights
+        ways = np.stack(
+            (
+                (1.0 - movement.begins) * stays + movement.ends * moves,
+                movement.begins * stays + (1.0 - movement.ends) * moves,
+            )
+        )
+        ways[1] = np.tensordot(movement.shifting, ways[1], (1, 1)).swapaxes(0, 1)
+        shape = ways.shape
+        ways = (ways.reshape(-1, shape[3] * shape[4]) @ movement.changing).reshape(shape)
+        return replace(self, weights=ways)
+
+    def _log_sd_of(self, expected_mv: FloatArray) -> FloatArray:
+        """SD of MEPs about their expectation, natural log: the larger, the more of them is enhancement."""
+        base = self.baseline_mv[:, None, None]
+        share = np.clip(1.0 - base / expected_mv, 0.0, 1.0)
+        spread: FloatArray = np.hypot((1.0 - share) * _ALONE_LOG_SD, share * self.log_sd)
+        return spread
 
     def _at(self, values: FloatArray, isi_ms: float) -> FloatArray:
         """Values at an ISI between those at which they are known, (s, shifts)."""
@@ -154,21 +195,25 @@ class Followed:
     @cached_property
     def _placed(self) -> FloatArray:
         """Weights of profiles, shifts and shares, (s, shifts, shares)."""
-        placed: FloatArray = self.weights.sum(-1)
+        placed: FloatArray = self.weights.sum((0, -1))
         return placed
 
     @cached_property
     def enhancement_mv(self) -> FloatArray:
         """The expected enhancement at each ISI [mV], shape (t,)."""
         left = self._placed @ SHARES
-        mean: FloatArray = np.einsum("sd,sdt->t", left, self.profiles_mv - self.baseline_mv[:, None, None])
+        mean: FloatArray = _mean(left, self.profiles_mv) - float(left.sum(-1) @ self.baseline_mv)
         return mean
 
     @cached_property
     def p_inside(self) -> FloatArray:
         """The probability that each ISI is in the window, shape (t,)."""
-        inside: FloatArray = np.einsum("sd,sdt->t", self._placed.sum(-1), self.inside)
-        return inside
+        return _mean(self._placed.sum(-1), self.inside)
+
+    def best_ms(self, level: float = 0.9) -> tuple[float, float, float]:
+        """Median of the ISI of the largest enhancement [ms], and the ends of its central interval."""
+        best = self.isi_ms[self.profiles_mv[:, len(SHIFTS_MS) // 2].argmax(-1)]
+        return _interval((best[:, None] + SHIFTS_MS).ravel(), self._placed.sum(-1).ravel(), level)
 
     def news(self, allowed: FloatArray) -> float:
         """The ISI, of some [ms], at which the next MEP says most of where the window is, and what is left of it."""
@@ -177,18 +222,27 @@ class Followed:
             self.profiles_mv[:, :, None, columns] - self.baseline_mv[:, None, None, None]
         )
         log_mv = np.log(np.maximum(expected, _LEAST_MV))
-        mean = np.einsum("sdf,sdft->t", self._placed, log_mv)
-        spread = np.einsum("sdf,sdft->t", self._placed, log_mv**2) - mean**2
+        spread = _mean(self._placed, log_mv**2) - _mean(self._placed, log_mv) ** 2
         return float(allowed[int(np.argmax(spread))])
 
     def interval(self, values: FloatArray, axis: int, level: float = 0.9) -> tuple[float, float, float]:
-        """Median of the shift (axis 1) or of another change, and the ends of its central interval."""
-        weights = self.weights.sum(tuple(other for other in range(4) if other != axis))
-        order = np.argsort(values)
-        summed = np.cumsum(weights[order])
-        picks = [int(np.searchsorted(summed, share)) for share in (0.5, (1 - level) / 2, (1 + level) / 2)]
-        median, low, high = (float(values[order][min(pick, len(values) - 1)]) for pick in picks)
-        return median, low, high
+        """Median of the shift (axis 2) or of another change, and the ends of its central interval."""
+        weights = self.weights.sum(tuple(other for other in range(5) if other != axis))
+        return _interval(values, weights, level)
+
+
+def _interval(values: FloatArray, weights: FloatArray, level: float) -> tuple[float, float, float]:
+    order = np.argsort(values)
+    summed = np.cumsum(weights[order])
+    picks = [int(np.searchsorted(summed, share)) for share in (0.5, (1 - level) / 2, (1 + level) / 2)]
+    median, low, high = (float(values[order][min(pick, len(values) - 1)]) for pick in picks)
+    return median, low, high
+
+
+def _mean(weights: FloatArray, values: FloatArray) -> FloatArray:
+    """The mean of values (..., t) over all but the last axis, shape (t,)."""
+    mean: FloatArray = weights.ravel() @ values.reshape(weights.size, -1)
+    return mean
 
 
 def _shifted(values: FloatArray, isi_ms: FloatArray) -> FloatArray:
@@ -197,23 +251,22 @@ def _shifted(values: FloatArray, isi_ms: FloatArray) -> FloatArray:
     return np.asarray(rows)
 
 
-def _spread(weights: FloatArray, share: float, axis: int) -> FloatArray:
-    """Weights after a step to a neighbour, half of the share to each side; nothing leaves at the ends."""
+def _steps(number: int, share: float) -> FloatArray:
+    """Probabilities of a step to a neighbour, half of the share to each side; nothing leaves at the ends."""
     share = min(share, 1.0)
-    shape = np.moveaxis(weights, axis, 0)
-    up, down = np.concatenate((shape[:1], shape[:-1])), np.concatenate((shape[1:], shape[-1:]))
-    return np.moveaxis((1.0 - share) * shape + share / 2.0 * (up + down), 0, axis)
+    steps = (1.0 - share) * np.eye(number) + share / 2.0 * (np.eye(number, k=1) + np.eye(number, k=-1))
+    steps[0, 0] += share / 2.0
+    steps[-1, -1] += share / 2.0
+    return steps
 
 
 def _log_sd(trials: Sequence[Trial], isi_ms: FloatArray, profile_mv: FloatArray, baseline_mv: float) -> float:
-    """SD of MEPs about what is expected of them, natural log."""
-    low, high = _LOG_SDS
-    pulses = [trial for trial in trials if trial.told and trial.mep_mv is not None and trial.intensity_pct_rmt is None]
-    if len(pulses) < 4:
-        return (low + high) / 2
-    expected = [
-        baseline_mv if trial.isi_ms is None else float(np.interp(trial.isi_ms, isi_ms, profile_mv)) for trial in pulses
-    ]
+    """SD of enhanced MEPs about what is expected of them, natural log."""
+    pulses = [t for t in trials if t.told and t.mep_mv is not None and t.isi_ms is not None]
+    expected = np.array([float(np.interp(trial.isi_ms or 0.0, isi_ms, profile_mv)) for trial in pulses])
     mep_mv = np.array([trial.mep_mv for trial in pulses], dtype=float)
-    off = np.log(np.maximum(mep_mv, _LEAST_MV)) - np.log(np.maximum(expected, _LEAST_MV))
-    return float(np.clip(1.48 * np.median(np.abs(off - np.median(off))), low, high))
+    enhanced = expected > 2.0 * baseline_mv
+    off = np.log(np.maximum(mep_mv[enhanced], _LEAST_MV) / expected[enhanced])
+    off = off - np.median(off) if off.size else off
+    squares = _AS_TRIALS * _EVOKED_LOG_SD**2 + float(np.sum(np.minimum(np.abs(off), 2.0) ** 2))
+    return min(math.sqrt(squares / (_AS_TRIALS + off.size)), _MOST_LOG_SD)

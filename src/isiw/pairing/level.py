@@ -5,6 +5,9 @@ block has of its own), plus a drift that keeps .97 a stimulus, as in the default
 sizes, whose probabilities the pulses change. Levels are those of stretches of at most ten pulses, in which a drift
 hardly moves. Given a size the posterior of the levels, and of the person's curve, noise and floor, is taken as normal
 about its mode (Laplace); that of the change is then a mixture of normal laws.
+
+What the pulses say counts less than the likelihood has it, by `_worth`: at the mode the noise is smaller than it is, as
+levels were fitted to it, and noise on the input is a little alike in two pulses in a row.
 """
 
 from __future__ import annotations
@@ -26,6 +29,10 @@ STRETCH: Final = 10
 
 _MOST_STEPS, _TOLERANCE, _LEAST_SHARE = 60, 1e-3, 1e-3
 _CURVE: Final = len(LATENTS) - 1
+
+_ALIKE, _ALIKE_SD, _MOST_ALIKE = 0.06, 0.06, 0.5
+"""Correlation of what two pulses in a row say of the level: mean and SD over people, of whose noise on the input it is
+.1 (docs/physiology.md) while that on the output hides a part; and the most that is assumed."""
 
 
 @dataclass(frozen=True)
@@ -145,6 +152,10 @@ class _Quadratic(NamedTuple):
     gradient: FloatArray
     precision: FloatArray  # its negative curvature
 
+    def times(self, share: float) -> _Quadratic:
+        """That of pulses which say only this share of it."""
+        return _Quadratic(self.at, share * self.value, share * self.gradient, share * self.precision)
+
 
 def posterior(pulses: Pulses, stretches: Stretches, prior: LevelPrior) -> Posterior:
     """The posterior of the changes.
@@ -159,7 +170,9 @@ def posterior(pulses: Pulses, stretches: Stretches, prior: LevelPrior) -> Poster
     likelihood = _Likelihood(pulses, stretches, len(centre))
     # The middle size is near enough to each of the others for one point to expand about.
     start = np.concatenate((centre[:_CURVE], _first_levels(pulses, stretches, prior)))
-    about = likelihood.about(_mode(likelihood, centre, _inverse(prior, laws[len(laws) // 2]), start))
+    inverse = _inverse(prior, laws[len(laws) // 2])
+    about = likelihood.about(_mode(likelihood, centre, inverse, start))
+    about = about.times(_worth(likelihood, about, inverse, stretches, prior))
     found = [_given(about, centre, prior, law) for law in laws]
     logs = np.array([log_evidence for log_evidence, _, _ in found]) + np.log([chance for _, chance in prior.drifts])
     weights = np.exp(logs - logs.max())
@@ -218,6 +231,27 @@ def _mode(likelihood: _Likelihood, centre: FloatArray, inverse: FloatArray, star
             break
         at, value, each = at + share * step, reached, scored
     return at
+
+
+def _worth(
+    likelihood: _Likelihood, about: _Quadratic, inverse: FloatArray, stretches: Stretches, prior: LevelPrior
+) -> float:
+    """The share of what the likelihood says that the pulses are worth.
+
+    Of n pulses p went into what was fitted, so that the variance about it is too small by (n - p) / n; the prior of the
+    noise counts as further pulses. And n pulses whose neighbours correlate by r say as much as n (1 - r) / (1 + r).
+    """
+    by_level = likelihood.scores(about.at)[1][:, _CURVE:].sum(axis=1)
+    n, block = len(by_level), stretches.block[stretches.of_pulse]
+    fitted = float(np.trace(np.linalg.solve(about.precision + inverse, about.precision)))
+    known = 0.5 / float(prior.curve[1][LATENTS.index("log_output_sd")]) ** 2
+    neighbours = block[1:] == block[:-1]
+    pairs = max(1, int(neighbours.sum()))
+    alike = (by_level[1:] * by_level[:-1])[neighbours].sum() / pairs / max(float((by_level**2).mean()), 1e-12)
+    learnt = _ALIKE_SD**2 / (_ALIKE_SD**2 + 1.0 / pairs)
+    alike = _ALIKE + learnt * (alike + fitted / n - _ALIKE)  # what was fitted makes neighbours look opposed, by p / n
+    alike = float(np.clip(alike, 0.0, _MOST_ALIKE))
+    return (max(n - fitted, 1.0) + known) / (n + known) * (1.0 - alike) / (1.0 + alike)
 
 
 def _first_levels(pulses: Pulses, stretches: Stretches, prior: LevelPrior) -> FloatArray:

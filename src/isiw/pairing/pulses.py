@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from isiw.checks import Amplitude, Checked, Number, Positive, Text
-from isiw.intervention import Part, Plan
+from isiw.intervention import Arm, Part, Plan
 from isiw.log.kinds import LogKind, kind_of, of_another_kind
 from isiw.log.reader import SessionRecord
 
@@ -94,7 +94,8 @@ def pairing_of(record: SessionRecord) -> Pairing:
         if slot.part is Part.PAIRS:
             if trial.wanted_isi_ms is not None and not trial.tap_alone:
                 mep_mv = trial.mep_mv if trial.counts else None
-                at_s, probe = onset.onset_s - first_s, plan.is_probe(slot, record.header.seed)
+                at_s = onset.onset_s - first_s
+                probe = intervention.arm is Arm.WINDOW and plan.is_probe(slot, record.header.seed)
                 pairs.append(Delivered(trial.wanted_isi_ms, at_s, mep_mv, probe))
         elif trial.told and trial.mep_mv is not None:
             pct = slot.intensity_pct_rmt or usual_pct

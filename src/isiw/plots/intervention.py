@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from isiw.pairing.course import FollowedPair
 from isiw.pairing.effect import AfterEffect, BlockChange
 from isiw.pairing.pulses import Delivered, TestPulse
 from isiw.plots.style import BLUE, FAINT, GREEN, INK, ORANGE, RED, explain, saying, tidied
@@ -132,6 +133,39 @@ def dose_figure(delivered: Sequence[Delivered], window: Sequence[tuple[float, fl
     middle, reach = float(isi_ms.max() + isi_ms.min()) / 2, max(10.0, 0.6 * float(np.ptp(isi_ms)))
     left.set(xlabel="pairs", ylabel="ISI [ms]", ylim=(middle - reach, middle + reach))
     right.set(xlabel="time from the first pair [min]")
+    explain(figure, ncols=3)
+    return figure
+
+
+def course_figure(course: Sequence[FollowedPair]) -> Figure:
+    """The window that was followed: the best ISI with its interval, each pair, and how many of a block were inside.
+
+    Args:
+        course: what was known at each pair, in the order of delivery.
+    """
+    figure = Figure(figsize=(8.4, 3.4), layout="constrained")
+    above, below = figure.subplots(2, 1, height_ratios=(2.4, 1.0), sharex=True)
+    tidied(above, below)
+    number = np.array([pair.number for pair in course])
+    best, low, high, isi_ms = (
+        np.array([getattr(pair, name) for pair in course]) for name in ("best_ms", "low_ms", "high_ms", "isi_ms")
+    )
+    above.fill_between(number, low, high, color=BLUE, alpha=0.15, lw=0, label="90 % interval of the best ISI")
+    above.plot(number, best, color=BLUE, lw=1.4, label="best ISI")
+    for probe, colour, mark, label in ((False, INK, "o", "pair"), (True, ORANGE, "^", "probe of the window")):
+        which = np.array([pair.probe is probe for pair in course])
+        if which.any():
+            above.plot(number[which], isi_ms[which], mark, ms=3, color=colour, mew=0, alpha=0.8, label=label)
+    above.set(ylabel="ISI [ms]")
+    for block in dict.fromkeys(pair.block for pair in course):
+        those = [pair for pair in course if pair.block == block]
+        inside = sum(pair.p_inside for pair in those)
+        middle, width = (those[0].number + those[-1].number) / 2.0, 0.94 * len(those)
+        below.bar(middle, inside, width, color=GREEN, label="inside the window (expected)")
+        below.bar(middle, len(those) - inside, width, inside, color=FAINT, label="outside")
+        if block:
+            above.axvline(those[0].number - 0.5, color=FAINT, lw=0.8, ls=":")
+    below.set(xlabel="pair", ylabel="pairs")
     explain(figure, ncols=3)
     return figure
 

@@ -7,16 +7,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from isiw.errors import InvalidValueError
-from isiw.intervention import Part, Plan
+from isiw.errors import InvalidValueError, IsiwError
+from isiw.intervention import Arm, Part, Plan
 from isiw.log.reader import SessionRecord
 from isiw.pairing import words
+from isiw.pairing.agenda import Agenda
+from isiw.pairing.course import FollowedPair, course_of
 from isiw.pairing.effect import AfterEffect, BlockChange, change_of
 from isiw.pairing.pulses import Delivered, TestPulse, pairing_of
-from isiw.plots.intervention import change_figure, dose_figure
+from isiw.plots.intervention import change_figure, course_figure, dose_figure
 from isiw.plots.style import inline_svg
 from isiw.report.html import rendered, write_page
 from isiw.report.tables import Fact, first_facts
+from isiw.session.replay import strategy_of
 
 _OF_A_SEARCH: Final = frozenset({"strategy"})
 """Facts that mean nothing to an intervention."""
@@ -43,6 +46,7 @@ class InterventionContents:
         delivered: the pairs; None while the arm is concealed.
         stimuli: how many stimuli lie between the pulses before and after; None if that is the number of pairs.
         window: at some times [s from the first pair] where the window starts and ends [ms].
+        course: what was known of the window at each pair, if it was followed.
         subject: whose it is.
         log: the name of the log.
         states: what a reader must know before trusting the page.
@@ -54,6 +58,7 @@ class InterventionContents:
     delivered: Sequence[Delivered] | None
     stimuli: int | None = None
     window: Sequence[tuple[float, float, float]] = ()
+    course: Sequence[FollowedPair] = ()
     subject: str = "an unnamed subject"
     log: str = ""
     states: Sequence[str] = ()
@@ -85,6 +90,7 @@ def contents_of(record: SessionRecord, states: Sequence[str] = ()) -> Interventi
     plan, unfinished = pairing.plan, record.given < len(pairing.plan.slots)
     waits = record.conceals and unfinished
     given = [f"{record.given} of {len(plan.slots)} stimuli of the plan were given."] if unfinished else []
+    course, unknown = ((), []) if record.conceals else _course(record)
     facts = [fact for fact in first_facts(record) if fact.name not in _OF_A_SEARCH]
     more = Fact(
         "plan", f"{plan.before} before, {plan.pairs} pairs, {plan.after} in each block after, at each intensity"
@@ -94,12 +100,27 @@ def contents_of(record: SessionRecord, states: Sequence[str] = ()) -> Interventi
         None if record.conceals else pairing.pairs,
         plan.pairs,  # all of them, where there are pulses after them
         () if record.conceals else _window_course(record, plan),
+        course,
         record.header.subject or "an unnamed subject",
         record.path.name,
-        [*states, *given],
+        [*states, *given, *unknown],
         (*record.unread_said, *record.losses),
         [*facts, Fact("arm", arm), Fact("protocol", plan.protocol_code), more],
     )
+
+
+def _course(record: SessionRecord) -> tuple[tuple[FollowedPair, ...], list[str]]:
+    """What was known of the window at each pair, if it was followed, and why that cannot be said."""
+    header, intervention = record.header, record.header.intervention
+    if intervention is None or intervention.arm is not Arm.WINDOW or not header.strategy.name:
+        return (), []
+    if not (intervention.plan.probes or intervention.plan.follow_ms):
+        return (), []
+    try:
+        agenda = Agenda(intervention, strategy_of(header), header.seed)
+        return course_of(agenda, record.table, header.seed), []
+    except IsiwError as error:
+        return (), [f"The course of the window cannot be worked out by this version of isiw: {error}"]
 
 
 def _window_course(record: SessionRecord, plan: Plan) -> list[tuple[float, float, float]]:
@@ -151,6 +172,7 @@ def intervention_page(intervention: InterventionContents) -> str:
         rows=[] if effect is None else [_row(change) for change in (*effect.blocks, effect.pooled)],
         dose=words.CONCEALED if delivered is None else words.dose(delivered),
         pairs=inline_svg(dose_figure(delivered, intervention.window), "pairs") if delivered else "",
+        course=inline_svg(course_figure(intervention.course), "course") if intervention.course else "",
         facts=list(intervention.facts),
         log=f"Log: {intervention.log}" if intervention.log else "",
     )

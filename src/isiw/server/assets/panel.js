@@ -36,6 +36,7 @@ const panel = (() => {
   }
 
   function next(news, last) {
+    if (news.hides) return "concealed";
     const [number, belief] = Object.entries(news.drawn.beliefs)[0] ?? [null, null];
     if (last && belief && Number(number) < last.number) return news.state === "RUNS" ? "being chosen" : "–";
     if (!belief) return "–";

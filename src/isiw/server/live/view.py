@@ -144,6 +144,10 @@ class View:
         last = record.table[-1] if len(record.table) else None
         limit_uv = record.header.signals.most_background_uv
         readiness = self._session.readiness or Readiness()
+        delivered, intervention = len(self._session.trials), record.header.intervention
+        hides, unseen = intervention is not None and intervention.hides(delivered), 0
+        if update is not None and intervention is not None:
+            unseen = delivered - 1 - update.trial.index  # trials that would show a concealed arm
         return {
             "backgroundUv": None if last is None else last.background_rms_uv,
             "limitUv": limit_uv if math.isfinite(limit_uv) else None,
@@ -153,10 +157,11 @@ class View:
             "facts": self._facts,
             "unprotected": plain(unprotected(record.header.device) or ""),
             "drawn": drawn(record),
-            "delivered": len(self._session.trials),
+            "delivered": delivered,
             "most": max(0, record.header.limits.max_pulses - record.header.given_before),
-            "left": None if update is None else update.stimuli_left,
-            "leftS": None if update is None else update.left_s,
+            "left": None if update is None else update.stimuli_left - unseen,
+            "leftS": None if update is None or unseen else update.left_s,
+            "hides": hides,
             "events": [[event.trial, event.kind, plain(event.text)] for event in tuple(self._events)],
         }
 
