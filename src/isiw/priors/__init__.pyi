@@ -1,5 +1,7 @@
 from . import file as file
 from .above import above as above
+from .comparison import compared as compared
+from .comparison import densities as densities
 from .days import DayToDay as DayToDay
 from .days import after as after
 from .days import moved as moved
@@ -9,6 +11,4 @@ from .file import load as load
 from .file import read_lab_prior as read_lab_prior
 from .file import write_lab_prior as write_lab_prior
 from .lab import LabPrior as LabPrior
-from .lab import compared as compared
-from .lab import densities as densities
 from .lab import learn as learn
