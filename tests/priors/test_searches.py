@@ -43,8 +43,8 @@ def searched(
 
 def largest(lab: LabPrior) -> tuple[float, float]:
     """Median of the largest MEP over the floor in the next person of the lab, and in people in general."""
-    row = compared(lab).loc[LARGEST]
-    return float(row["lab median"]), float(row["built-in median"])
+    row = compared(lab).to_dict("index")[LARGEST]
+    return row["lab median"], row["built-in median"]
 
 
 @pytest.mark.slow
@@ -84,7 +84,7 @@ def test_a_search_that_does_not_belong_to_the_others_is_refused(tmp_path: Path) 
         ("simulated", {"simulated": True}, "some of the sessions are simulated"),
     ):
         with pytest.raises(LogError, match=said):
-            priors.learn([session, searched(tmp_path / f"{name}.mcap", 2, each=1, **other)])  # type: ignore[arg-type]
+            priors.learn([session, searched(tmp_path / f"{name}.mcap", 2, each=1, **other)])
     with pytest.raises(LogError, match="different muscles"):
         priors.learn([searched(tmp_path / f"{name}.mcap", 3, each=1, muscle=name) for name in ("FCR", "FDI")])
     broken = searched(tmp_path / "broken.mcap", 4, each=1)

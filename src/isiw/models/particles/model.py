@@ -188,7 +188,7 @@ class ParticlePosterior(SwarmPosterior[ParticleModel]):
         swarm, one = self.swarm, slice(person, person + 1)
         prior, weights = self.model.prior, np.exp(swarm.log_weights[person]) * swarm.of_given
         prior = prior if swarm.halves > 1 else replace(prior, other_curve=0.0)
-        return against_curve(prior, Latents(*(each[one] for each in swarm.latents)), weights, swarm.history)
+        return against_curve(prior, Latents._make(each[one] for each in swarm.latents), weights, swarm.history)
 
 
 def _excluded_shift_pct_rmt(prior: Prior, latents: Latents) -> float | None:

@@ -141,7 +141,7 @@ class Swarm:
             return self
         doubled = (np.concatenate((each, each), axis=1) for each in self.crowd)
         parts = np.log([1.0 - share, share]).repeat(self.log_weights.shape[1])
-        crowd = Crowd(*doubled)
+        crowd = Crowd._make(doubled)
         crowd = crowd._replace(log_weights=crowd.log_weights + parts)
         return replace(self, crowd=crowd, history=History(self.history.columns.repeat(2, axis=0)), halves=2)
 
@@ -154,14 +154,15 @@ class Swarm:
     def of_given(self) -> BoolArray:
         """Which particles learn from pulses given alone, (p,)."""
         particles = self.log_weights.shape[1]
-        return np.arange(particles) < particles // self.halves
+        heeds: BoolArray = np.arange(particles) < particles // self.halves
+        return heeds
 
     @property
     def _rows(self) -> Crowd:
         """The particles of each half of each person, to be changed."""
         people, particles = self.log_weights.shape
         rows = people * self.halves, particles // self.halves
-        return Crowd(*(each.reshape(*rows, *each.shape[2:]) for each in self.crowd.copied()))
+        return Crowd._make(each.reshape(*rows, *each.shape[2:]) for each in self.crowd.copied())
 
     def after(self, trial: History, law: Law, moves: Moving, seed: int) -> Swarm:
         """The particles after one more trial: weighed, resampled where too few carry the posterior, and moved."""
@@ -198,7 +199,7 @@ class Swarm:
                 by_half[:, 1] += np.nan_to_num(told.columns[::2, 0, BY_CURVES])
             evidence = log_sum(by_half)
             crowd.log_weights[:] += (by_half - evidence[:, np.newaxis]).reshape(-1, 1)
-        crowd = Crowd(*(each.reshape(people, particles, *each.shape[2:]) for each in crowd))
+        crowd = Crowd._make(each.reshape(people, particles, *each.shape[2:]) for each in crowd)
         return replace(self, crowd=crowd, evidence=self.evidence + evidence, history=history), found
 
     def _as_curves_have_it(self, trial: History, law: Law, rows: Crowd) -> History:
