@@ -82,7 +82,7 @@ class Movement(Checked):
     @cached_property
     def changing(self) -> FloatArray:
         """The same of shares and levels together."""
-        return np.kron(_steps(len(SHARES), self.fading), _steps(len(LOG_LEVELS), self.levelling))
+        return np.asarray(np.kron(_steps(len(SHARES), self.fading), _steps(len(LOG_LEVELS), self.levelling)), float)
 
 
 @dataclass(frozen=True, eq=False)
