@@ -118,3 +118,11 @@ def test_every_tutorial_can_be_downloaded_as_a_notebook() -> None:
     assert pages
     for page in pages:
         assert re.search(rf"\{{nb-download\}}`[^`]+ <{page.stem}\.ipynb>`", page.read_text("utf-8")), page
+
+
+def test_each_key_of_a_configuration_has_a_default_or_is_required_and_a_meaning() -> None:
+    keys = configuration.keys()
+    assert keys["intervention"]["protocol_code"][0] == "required"
+    assert [
+        f"{section}.{key}" for section, known in keys.items() for key, (_, meaning) in known.items() if not meaning
+    ] == []

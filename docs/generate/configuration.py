@@ -47,7 +47,7 @@ def _section(annotation: Any) -> Any:
 def _fields(section: Any) -> dict[str, tuple[str, str]]:
     meanings = {name: said for owner in reversed(section.__mro__) for name, said in arguments(owner).items()}
     if dataclasses.is_dataclass(section):
-        return {one.name: (_shown(one.default), meanings.get(one.name, "")) for one in dataclasses.fields(section)}
+        return {one.name: (_default(one), meanings.get(one.name, "")) for one in dataclasses.fields(section)}
     return {
         name: (
             "required" if field.is_required() else _shown(field.get_default(call_default_factory=True)),
@@ -55,6 +55,12 @@ def _fields(section: Any) -> dict[str, tuple[str, str]]:
         )
         for name, field in section.model_fields.items()
     }
+
+
+def _default(one: dataclasses.Field[Any]) -> str:
+    if one.default is not dataclasses.MISSING:
+        return _shown(one.default)
+    return "required" if one.default_factory is dataclasses.MISSING else "–"
 
 
 def _shown(value: Any) -> str:
@@ -114,10 +120,6 @@ def _study() -> str:
     parts = ["# Configuration of a study\n\nThe keys of STUDY.toml, which `isiw study run` reads.\n"]
     for title, kind in (("Outside sections", Study), ("Each of `strategies`", StudyStrategy)):
         meanings = arguments(kind)
-        rows = []
-        for one in dataclasses.fields(kind):
-            required = one.default is dataclasses.MISSING and one.default_factory is dataclasses.MISSING
-            default = "required" if required else _shown(one.default) if one.default is not dataclasses.MISSING else "–"
-            rows.append([code(one.name), default, cell(meanings.get(one.name, ""))])
+        rows = [[code(one.name), _default(one), cell(meanings.get(one.name, ""))] for one in dataclasses.fields(kind)]
         parts.append(f"\n## {title}\n\n{sentence(kind)}\n\n{table(['key', 'default', 'meaning'], rows)}")
     return "".join(parts)
