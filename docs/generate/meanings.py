@@ -52,6 +52,7 @@ MEANINGS: Final[Mapping[str, Mapping[str, str]]] = {
         "belief_version": "grows if the same settings come to another estimate; 1 in older logs.",
         "engine_version": "grows if the same settings are computed otherwise; 1 in older logs.",
         "earlier": "trials that were learnt before the first ISI was chosen.",
+        "earlier_changed": "places, among the earlier trials, of those after which a change was noted.",
         "earlier_given": "how many stimuli these and lost ones were; `max_pulses` counts them.",
         "earlier_same_level": "whether electrodes, coil and intensity are those of the earlier trials.",
         "first_step": "of a search above the threshold: the profile below it that it goes on from; None for none.",

@@ -79,7 +79,7 @@ def test_a_change_that_was_noted_in_the_search_is_known_afterwards_and_on_resumi
     searching = isiw.Session(
         device_for(config),
         described.strategy,
-        log=config.log,
+        log=tmp_path / "search.mcap",
         limits=described.header.limits,
         visit=config.visit.noted(),
         on_trial=noting,

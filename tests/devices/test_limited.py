@@ -305,7 +305,9 @@ def test_an_intensity_is_the_same_up_to_what_a_conversion_loses(inner: ScriptedD
 
 def test_another_intensity_than_the_visit_notes_delivers_nothing(inner: ScriptedDevice, clock: VirtualClock) -> None:
     device = Reporting(inner, Readiness(intensity_pct_mso=60.0))
-    limited = LimitedDevice(device, Limits(0, 200, 5.0, 9), clock, noted=Visit(intensity_pct_mso=55.0))
+    limited = LimitedDevice(
+        device, Limits(0, 200, min_iti_s=5.0, max_pulses=9), clock, noted=Visit(intensity_pct_mso=55.0)
+    )
     limited.stage()
     clock.sleep_s(limited.wait_s())
     with pytest.raises(LimitExceededError, match=r"60 % MSO.*55 % MSO"):
@@ -319,7 +321,9 @@ def test_a_device_that_reports_another_intensity_than_it_was_asked_to_set_fires_
 ) -> None:
     device = Reporting(inner, Readiness(intensity_pct_mso=45.0))
     visit = Visit(intensity_pct_rmt=90.0, intensity_pct_mso=45.0)
-    limited = LimitedDevice(device, Limits(0, 200, 5.0, 9, max_intensity_pct_rmt=110.0), clock, noted=visit)
+    limited = LimitedDevice(
+        device, Limits(0, 200, min_iti_s=5.0, max_pulses=9, max_intensity_pct_rmt=110.0), clock, noted=visit
+    )
     limited.stage()
     for trial in range(2):
         clock.sleep_s(limited.wait_s())

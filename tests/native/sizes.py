@@ -80,7 +80,7 @@ def predicted(case: Case, latents: Latents) -> None:
     sample.expected_mep_mv(isi_ms)
     windows = Runs.of_masks(masks[0])
     if len(windows.found):
-        best_window(windows, isi_ms)
+        best_window(windows, isi_ms.astype(float))
 
 
 def with_components(number: int) -> Prior:

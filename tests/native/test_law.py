@@ -17,15 +17,16 @@ from native.drawn import CASES
 def tables(monkeypatch: pytest.MonkeyPatch) -> Tables:
     """Those of the default's prior."""
     monkeypatch.setattr(jumps, "Law", lambda tables: tables)
-    made: Any = getattr(jumps.law_of, "__wrapped__", jumps.law_of)(CASES["default"].prior, CASES["default"].space)
+    made = jumps.law_of.__wrapped__(CASES["default"].prior, CASES["default"].space)
+    assert isinstance(made, Tables)
     return made
 
 
 def _blocks(tables: Tables, first: list[int], size: list[int]) -> Tables:
     """The same with other blocks, each of one component."""
     shares = np.zeros((len(first), tables.log_shares.shape[1]), dtype=np.float32)
-    each = dict.fromkeys(("log_shares", "below"), shares)
-    return tables._replace(first=np.array(first), size=np.array(size), components=np.ones(len(first), int), **each)
+    tables = tables._replace(first=np.array(first), size=np.array(size), components=np.ones(len(first), int))
+    return tables._replace(log_shares=shares, below=shares)
 
 
 def test_tables_of_a_prior_are_taken(tables: Tables) -> None:

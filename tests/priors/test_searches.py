@@ -12,7 +12,8 @@ from isiw import priors
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DamagedLogError, LogError
 from isiw.models.particles.prior import Prior
-from isiw.priors.lab import LabPrior, compared
+from isiw.priors.comparison import compared
+from isiw.priors.lab import LabPrior
 from isiw.session import open_threshold
 from isiw.strategy.threshold import IntensityRange, make_threshold_search
 from known import known

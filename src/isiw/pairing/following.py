@@ -82,7 +82,10 @@ class Movement(Checked):
     @cached_property
     def changing(self) -> FloatArray:
         """The same of shares and levels together."""
-        return np.asarray(np.kron(_steps(len(SHARES), self.fading), _steps(len(LOG_LEVELS), self.levelling)), float)
+        both: FloatArray = np.kron(_steps(len(SHARES), self.fading), _steps(len(LOG_LEVELS), self.levelling)).astype(
+            float
+        )
+        return both
 
 
 @dataclass(frozen=True, eq=False)

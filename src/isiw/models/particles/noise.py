@@ -23,4 +23,5 @@ class NoiseKind(IntEnum):
 
 def recruits(kind: IntArray) -> BoolArray:
     """Which particles have a recruitment curve, with a threshold or without, same shape."""
-    return (kind == NoiseKind.RECRUITMENT) | (kind == NoiseKind.RECTIFIED)
+    found: BoolArray = (kind == NoiseKind.RECRUITMENT) | (kind == NoiseKind.RECTIFIED)
+    return found
