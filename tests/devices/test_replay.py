@@ -62,6 +62,17 @@ def test_each_trial_answers_once(device: SimulatedDevice) -> None:
         device.deliver(Stimulus(3, 50.0), 1.0)
 
 
+def test_a_trial_at_another_intensity_answers_only_a_stimulus_of_that_intensity() -> None:
+    strong = replace(TABLE.told[0], index=6, isi_ms=48.0, intensity_pct_rmt=110.0)
+    alone = Trial(7, Status.ACCEPTED, None, mep_mv=0.9, intensity_pct_rmt=110.0)
+    recorded = RecordedTrials(TrialTable((*TABLE.trials, strong, alone)), "impact")
+    assert [recorded.answer(Stimulus(0, isi_ms)).isi_ms for isi_ms in (48.0, None, 48.0)] == [49.0, None, 52.0]
+    assert recorded.answer(Stimulus(3, 10.0, intensity_pct_rmt=110.0)).isi_ms == 48.0
+    assert recorded.answer(Stimulus(4, None, intensity_pct_rmt=110.0)).mep_mv == 0.9
+    with pytest.raises(DeviceError, match=r"no recorded trial.*got '100 % RMT'"):
+        recorded.answer(Stimulus(5, 10.0, intensity_pct_rmt=100.0))
+
+
 @pytest.fixture
 def person() -> SimulatedSubject:
     return cohort("gaussian", 1, 3)[0]

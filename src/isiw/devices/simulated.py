@@ -149,6 +149,8 @@ class DryRun(SimulatedDevice):
 class RecordedTrials:
     """A simulation that answers each stimulus with the recorded trial of the nearest ISI, each trial once.
 
+    Trials at another intensity than the usual one answer only a stimulus of that intensity.
+
     A session that asks what was asked before gets the same answers; another one gets the nearest there are, at the ISIs
     at which they were really recorded. These may be far from what is asked, so another strategy needs a space with a
     `tolerance_ms` wider than its range: beyond it a session takes the recorded trial for a mistrial and learns nothing
@@ -156,7 +158,7 @@ class RecordedTrials:
 
         record = isiw.read_session("session.mcap")
         space = dataclasses.replace(record.header.space, tolerance_ms=1000.0)
-        pairs = sum(trial.isi_ms is not None for trial in record.table.told)
+        pairs = sum(t.isi_ms is not None and t.intensity_pct_rmt is None for t in record.table.told)
         device = isiw.SimulatedDevice(isiw.RecordedTrials(record.table, space.reference))
         limits = isiw.Limits.of_space(space, max_pulses=pairs)
         isiw.Session(device, isiw.make_strategy(space=space), log="again.mcap", limits=limits).run()
@@ -173,12 +175,15 @@ class RecordedTrials:
     def answer(self, stimulus: Stimulus) -> Measurement:
         """The recorded answer nearest to the next pair of stimuli; a DeviceError if no trial is left."""
         asked_ms = stimulus.isi_ms
-        fitting = [trial for trial in self._left if (trial.isi_ms is None) == (asked_ms is None)]
+        alone, pct_rmt = asked_ms is None, stimulus.intensity_pct_rmt
+        fitting = [t for t in self._left if (t.isi_ms is None) == alone and t.intensity_pct_rmt == pct_rmt]
         if not fitting:
             raise DeviceError(
                 "no recorded trial is left to answer with",
-                remedy="Give the limits as many max_pulses as there are recorded pairs, or replay a longer recording. "
-                "Where trials were mistrials for their ISI, give the space a tolerance_ms wider than its range.",
+                got="the usual intensity" if pct_rmt is None else f"{pct_rmt:g} % RMT",
+                remedy="Give the limits as many max_pulses as there are recorded pairs at that intensity, or replay a "
+                "longer recording. Where trials were mistrials for their ISI, give the space a tolerance_ms wider than "
+                "its range.",
             )
         trial = min(fitting, key=lambda candidate: abs((candidate.wanted_isi_ms or 0.0) - (asked_ms or 0.0)))
         self._left.remove(trial)
