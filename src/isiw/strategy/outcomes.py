@@ -168,7 +168,7 @@ class Outcomes:
     def _shift_pct_rmt(self, outcome: Outcome) -> list[float] | None:
         """By how much a pulse is stronger than the pairs' [% RMT]: NaN without a law of it, None if it is not stated.
 
-        TMS alone of a stated intensity is a pulse over the curve, also where it is the pairs' (decision 54).
+        TMS alone of a stated intensity is a pulse over the curve, also where it is the pairs' (decision 53).
         """
         stated = outcome.intensity_pct_rmt
         if stated is None or (stated == self.pairs_pct_rmt and outcome.isi_ms is not None):

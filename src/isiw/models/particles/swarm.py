@@ -36,7 +36,7 @@ LEAST_DISTINCT = 0.4
 
 
 OF_GIVEN = 0.3
-"""As how much of a trial a pulse alone counts that was given before the pairs (decision 54)."""
+"""As how much of a trial a pulse alone counts that was given before the pairs (decision 53)."""
 
 
 class Health(NamedTuple):
@@ -135,7 +135,7 @@ class Swarm:
         """The same where pulses given alone come, with a probability, from another curve than the pairs.
 
         Half of the particles learn nothing from such pulses, and so are what they would be without them; the pairs say
-        which half is right (decision 54). Each half has rows of its own in the history.
+        which half is right (decision 53). Each half has rows of its own in the history.
         """
         if self.halves > 1 or not share:
             return self
