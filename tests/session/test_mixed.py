@@ -151,29 +151,38 @@ def test_a_loop_of_ones_own_is_asked_for_an_intensity_and_reports_it(tmp_path: P
     assert [trial.intensity_pct_rmt for trial in isiw.read_session(log).table] == [None, 100.0, 110.0]
 
 
-JUDGED: dict[str, Callable[[Recorder], object]] = {
-    "note": lambda own: own.note_change("the coil moved"),
-    "exclude": lambda own: [own.exclude(trial.index) for trial in own.trials.told[:1]],
-    "include": lambda own: (own.exclude(0), own.include(0)),
-}
+def note(own: Recorder) -> None:
+    own.note_change("the coil moved")
 
 
-@pytest.mark.parametrize("verdict", JUDGED)
-def test_a_verdict_while_a_pair_is_open_leaves_it_the_intensity_that_was_asked(tmp_path: Path, verdict: str) -> None:
+def exclude(own: Recorder) -> None:
+    for trial in own.trials.told[:1]:
+        own.exclude(trial.index)
+
+
+def include(own: Recorder) -> None:
+    own.exclude(0)
+    own.include(0)
+
+
+@pytest.mark.parametrize("judge", [note, exclude, include])
+def test_a_verdict_while_a_pair_is_open_leaves_it_the_intensity_that_was_asked(
+    tmp_path: Path, judge: Callable[[Recorder], None]
+) -> None:
     limits = replace(Limits.of_space(SPACE), max_intensity_pct_rmt=110.0)
     visit, log = Visit(intensity_pct_rmt=90.0), tmp_path / "own.mcap"
     with isiw.open_session(mixed(), log=log, limits=limits, visit=visit, clock=VirtualClock()) as own:
         for trial in range(6):
             isi_ms, asked = own.ask(), own.intensity_pct_rmt
             if trial:
-                JUDGED[verdict](own)
+                judge(own)
             assert own.intensity_pct_rmt == asked
             own.mistrial("rejected") if trial == 1 else own.tell(isi_ms, 0.1)
     record = isiw.read_session(log)
     logged = [trial.intensity_pct_rmt or 90.0 for trial in record.table]
     assert logged == [intent.intensity_pct_rmt for intent in record.intents]
     assert (logged[1], record.table[1].status) == (100.0, "mistrial")
-    assert {trial.intensity_pct_rmt for trial in record.table[2:]} != {None}
+    assert {trial.intensity_pct_rmt for trial in record.table.trials[2:]} != {None}
 
 
 def test_a_loop_of_ones_own_refuses_an_intensity_in_another_unit_and_logs_one_beyond_the_limits(tmp_path: Path) -> None:
