@@ -18,6 +18,7 @@ import numpy as np
 
 from isiw.checks import Checked, Count, Flag, NonNegative, Positive, Text, ascending, choice, number, share, whole
 from isiw.errors import InvalidValueError
+from isiw.findings import require_percent
 from isiw.visit import Control, VisitProtocol, interval_ends
 
 LEAST_PAIRS, MOST_PAIRS = 50, 300
@@ -171,6 +172,8 @@ class Plan(Checked):
                 got=self.protocol_code,
                 remedy='Write the code of your ethics approval, such as protocol_code = "2026-17".',
             )
+        for pct_rmt in self.intensities_pct_rmt:
+            require_percent("intensities_pct_rmt", pct_rmt)
         if self.rest_s <= self.iti_s[1]:
             raise InvalidValueError(
                 "the rest between two blocks of pairs is no longer than the interval between two pairs",

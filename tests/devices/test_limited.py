@@ -319,6 +319,7 @@ def test_another_intensity_than_the_visit_notes_delivers_nothing(inner: Scripted
 def test_a_device_that_reports_another_intensity_than_it_was_asked_to_set_fires_no_more(
     inner: ScriptedDevice, clock: VirtualClock, reported: float | None, *, stops: bool
 ) -> None:
+    inner.info = DeviceInfo("scripted", "valve", simulated=True, sets_intensity=True)
     device = Reporting(inner, Readiness(intensity_pct_mso=45.0))
     visit = Visit(intensity_pct_rmt=90.0, intensity_pct_mso=45.0)
     limited = LimitedDevice(

@@ -63,6 +63,7 @@ def test_a_digest_of_no_arm_of_the_plan_is_refused() -> None:
         ({"after_min": (15.0, 0.0)}, "ascend"),
         ({"range_ms": (90.0, 20.0)}, "ascend"),
         ({"protocol_code": " "}, "protocol"),
+        ({"intensities_pct_rmt": (1.0, 1.2)}, "in another unit"),
     ],
 )
 def test_a_plan_that_makes_no_sense_is_refused(changes: dict[str, Any], says: str) -> None:

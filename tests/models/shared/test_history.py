@@ -52,14 +52,14 @@ def test_an_interval_ends_where_it_was_told_to() -> None:
 def test_a_known_part_is_kept_and_taken_off_for_models_that_know_none() -> None:
     told = Observation.of([1.0], [0.3], known_mv=[(0.1, 0.05, 0.4)])
     trial = observed(told, LIMIT_MV, THRESHOLD_MV, order=0)
-    assert trial.columns[0, 0, 5:].tolist() == pytest.approx([0.1, 0.05, 0.4, 0.0, math.nan], nan_ok=True)
+    assert trial.columns[0, 0, 5:].tolist() == pytest.approx([0.1, 0.05, 0.4, 0.0, math.nan, 1.0], nan_ok=True)
     assert AmplitudeHistory.nothing(1).appended(told).mep_mv[0, 0] == pytest.approx(0.2)
 
 
 def test_the_intensity_of_a_pulse_is_kept_beside_its_known_part() -> None:
     told = Observation.of([None], [0.3], known_mv=[(0.0, 0.05, 0.0)], shift_pct_rmt=[20.0])
     trial = observed(told, LIMIT_MV, THRESHOLD_MV, order=0)
-    around = [0.0, 0.05, 0.0, 20.0, math.nan]
+    around = [0.0, 0.05, 0.0, 20.0, 0.0, 1.0]
     assert trial.columns[0, 0, 5:].tolist() == pytest.approx(around, nan_ok=True)
 
 
