@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -47,9 +48,15 @@ def test_no_message_has_one_of_the_worst_phrases() -> None:
     assert [each for each in said if PHRASES.search(each[1]) or CONTINUING.search(each[1])] == []
 
 
+@cache
+def parsed(path: Path) -> ast.Module:
+    """A module's code, which both tests read."""
+    return ast.parse(path.read_text("utf-8"))
+
+
 def messages(path: Path) -> Iterator[str]:
     """The texts in a module's code; docstrings are for developers."""
-    tree = ast.parse(path.read_text("utf-8"))
+    tree = parsed(path)
     bare = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
     for node in ast.walk(tree):
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in bare:
@@ -65,5 +72,5 @@ def identifiers(path: Path) -> set[str]:
     """The names that a module gives or uses."""
     kinds = {ast.Name: "id", ast.Attribute: "attr", ast.arg: "arg", ast.keyword: "arg", ast.alias: "name"}
     kinds |= dict.fromkeys((ast.FunctionDef, ast.ClassDef), "name")
-    nodes = ast.walk(ast.parse(path.read_text("utf-8")))
+    nodes = ast.walk(parsed(path))
     return {getattr(node, kinds[type(node)]) or "" for node in nodes if type(node) in kinds}

@@ -82,7 +82,14 @@ def test_epochs_that_contradict_their_events_are_asked_about() -> None:
         read_people(about.set_annotations(None), Layout("impact", channels={"emg": "FCR"}))
 
 
-@pytest.mark.parametrize("head", ["Interval=\t0.00025 s\n", "0.25 msec/sample\n", "Sampling rate: 4 kHz\n"])
+@pytest.mark.parametrize(
+    "head",
+    [
+        "Interval=\t0.00025 s\n",
+        pytest.param("0.25 msec/sample\n", marks=pytest.mark.slow),
+        pytest.param("Sampling rate: 4 kHz\n", marks=pytest.mark.slow),
+    ],
+)
 def test_a_rate_above_the_samples_or_beside_sweeps_is_compared_with_the_one_that_is_stated(
     head: str, tmp_path: Path
 ) -> None:

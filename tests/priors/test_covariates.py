@@ -53,6 +53,7 @@ def test_a_height_that_windows_go_with_is_learnt_and_nothing_of_an_age_that_all_
     assert slope.start_ms > 3 * slope.error_ms
 
 
+@pytest.mark.slow
 def test_a_height_that_tells_nothing_hardly_moves_a_prediction() -> None:
     found = [learnt(0.0, seed=seed)[0] for seed in range(6)]
     places = [expected(PLACE, (slope,), Visit(height_cm=slope.mean + slope.sd)) for slope in found]
