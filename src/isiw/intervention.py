@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property, partial
+from pathlib import Path
 from typing import Annotated, Final
 
 import numpy as np
@@ -19,6 +20,7 @@ import numpy as np
 from isiw.checks import Checked, Count, Flag, NonNegative, Positive, Text, ascending, choice, number, share, whole
 from isiw.errors import InvalidValueError
 from isiw.findings import require_percent
+from isiw.text.sanitize import command
 from isiw.visit import Control, VisitProtocol, interval_ends
 
 LEAST_PAIRS, MOST_PAIRS = 50, 300
@@ -291,3 +293,8 @@ def opened(digest: str, arms: Sequence[Arm]) -> Arm:
         if sealed(arm, salt) == digest:
             return arm
     raise InvalidValueError("the sealed arm is none of the plan's", got=digest, expected=f"one of {', '.join(arms)}")
+
+
+def concealed(log: Path) -> str:
+    """That the arm of an intervention is concealed, and how it is opened."""
+    return f"The arm is concealed. Open it when nobody has to be blind: {command('pair', '--open', log)}"

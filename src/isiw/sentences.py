@@ -8,14 +8,12 @@ from typing import TYPE_CHECKING, Final
 
 from isiw.design import DesignSpace
 from isiw.summary import chance, is_guess, is_sure, law_is_doubted
-from isiw.text.sanitize import command, counted
+from isiw.text.sanitize import counted
 from isiw.text.stimuli import TAP, StimulusWords
 from isiw.trials import Trial
 from isiw.window import MIN_EXCESS_MV, SURE, Window, rules_out
 
 if TYPE_CHECKING:  # an estimate prints itself in these words
-    from pathlib import Path
-
     from isiw.estimate import Edge, Estimate
 
 WORTH_SAYING: Final = 0.1
@@ -266,11 +264,6 @@ def later(starts_later: float | None, ends_later: float | None) -> str:
     chances = starts_later, ends_later
     start, end = (f"{'later' if p >= 0.5 else 'earlier'} ({100 * max(p, 1 - p):.0f} %)" for p in chances)
     return f"the window probably starts {start} and ends {end}; 50 % means unknown."
-
-
-def concealed(log: Path) -> str:
-    """That the arm of an intervention is concealed, and how it is opened."""
-    return f"The arm is concealed. Open it when nobody has to be blind: {command('pair', '--open', log)}"
 
 
 def asked(trial: Trial, first: StimulusWords = TAP) -> str:

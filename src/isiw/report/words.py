@@ -13,7 +13,7 @@ from isiw.change import Misfit
 from isiw.errors import InvalidValueError
 from isiw.estimate import Estimate
 from isiw.findings import Kind
-from isiw.intervention import Intervention, Part
+from isiw.intervention import Intervention, Part, concealed
 from isiw.log.headers import Header
 from isiw.log.kinds import continued_by
 from isiw.log.reader import SessionRecord, require_records
@@ -77,7 +77,7 @@ def intervention_statement(record: SessionRecord, intervention: Intervention, co
     way_on = continued_by(record.path, record.header, config, end_lost=record.end_lost)
     arm = f"Arm: {intervention.arm.words}."
     if record.conceals:
-        arm = sentences.concealed(record.path)
+        arm = concealed(record.path)
     way_on = over or f"The intervention is not over. Do: continue it with {way_on}"
     return "\n".join([way_on, f"Delivered: {done}.", *_change(record), arm])
 

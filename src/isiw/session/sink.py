@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple, Protocol
 
-from isiw import sentences
 from isiw.errors import InvalidValueError, error_text
 from isiw.estimate import WindowEstimate
+from isiw.intervention import concealed
 from isiw.log.schema import Event, Record
 from isiw.log.writer import LogWriter
 from isiw.strategy.decisions import StopDecision
@@ -60,7 +60,7 @@ class SessionResult:
     conceals: bool = False
 
     def __str__(self) -> str:
-        trials = sentences.concealed(self.log) if self.conceals else f"Trials: {self.trials}"
+        trials = concealed(self.log) if self.conceals else f"Trials: {self.trials}"
         return f"{self.estimate}\n{trials}\nEnded: {self.decision.reason}\nLog: {self.log}"
 
     __repr__ = __str__  # in a notebook, too, a concealed arm stays so
