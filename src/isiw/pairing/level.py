@@ -49,7 +49,8 @@ class LevelPrior(Checked):
         largest_mv: the largest MEP [mV].
         change_log_sd: SD of the change, natural log.
         block_log_sd: SD of what each block after the intervention has of its own, natural log.
-        drifts: sizes of the drift (SD, natural log), and the probability of each.
+        drifts: sizes of the drift (SD, natural log), and the probability of each; most of the one nearest to that of
+            recordings, .26.
         persistence: share of the drift that is kept from stimulus to stimulus.
     """
 
@@ -62,7 +63,7 @@ class LevelPrior(Checked):
     largest_mv: PositiveLaw = Scale(0.6, 1.2)
     change_log_sd: Positive = 1.0
     block_log_sd: Positive = 0.2
-    drifts: tuple[tuple[float, float], ...] = ((0.03, 0.25), (0.15, 0.25), (0.3, 0.25), (0.6, 0.25))
+    drifts: tuple[tuple[float, float], ...] = ((0.03, 0.15), (0.15, 0.25), (0.3, 0.4), (0.6, 0.2))
     persistence: Annotated[float, partial(number, least=0, below=1)] = 0.97
 
     @property
