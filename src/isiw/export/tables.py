@@ -16,7 +16,7 @@ from isiw.lazy import pd
 from isiw.log.frames import trial_columns, trial_frame
 from isiw.log.reader import SessionRecord
 from isiw.text.sanitize import one_line
-from isiw.text.stimuli import TAP, StimulusWords, meanings
+from isiw.text.stimuli import STIMULI, TAP, StimulusWords, meanings
 
 Columns = Mapping[str, tuple[str, str]]
 
@@ -108,7 +108,8 @@ def write_tables(parts: Sequence[Part], folder: Path, suffix: str) -> None:
 def session_columns(first: StimulusWords) -> dict[str, tuple[str, str]]:
     """Unit and meaning of the columns of sessions; the conditioning stimulus is one if it is not always a tap."""
     columns = meanings(_SESSION_COLUMNS, first)
-    return {name: said for name, said in columns.items() if name != "conditioning" or first != TAP}
+    left_out = "conditioning" if first == TAP else "tap_n" if first == STIMULI["electrical"] else ""
+    return {name: said for name, said in columns.items() if name != left_out}
 
 
 def tidy(frame: pd.DataFrame) -> pd.DataFrame:
