@@ -67,6 +67,17 @@ def test_pulses_that_are_named_again_count_once(config: RunConfig, tmp_path: Pat
     assert lengths[0] == lengths[1]
 
 
+def test_trials_that_a_later_session_had_learnt_count_once_whatever_the_order(
+    config: RunConfig, tmp_path: Path
+) -> None:
+    first, second = tmp_path / "search.mcap", tmp_path / "again.mcap"
+    session_for(config.with_overrides(log=second, earlier=[first])).run(progress=False)
+    own = sum(len(isiw.read_session(log).table) for log in (first, second))
+    for order in ([first, second], [second, first]):
+        both = config.with_overrides(earlier=order)
+        assert len(earlier_trials(both, info_of(device_for(both))).trials) == 30 + own
+
+
 def test_a_change_that_was_noted_in_the_search_is_known_afterwards_and_on_resuming(tmp_path: Path) -> None:
     (tmp_path / "visit.toml").write_text(CONFIG)
     config = load_config(tmp_path / "visit.toml").with_overrides(log=tmp_path / "search.mcap")

@@ -30,7 +30,7 @@ from isiw.errors import ConfigError, StrategyError
 from isiw.files import write_output
 from isiw.intervention import Intervention
 from isiw.log.headers import RUN_KEY, FirstStep
-from isiw.log.kinds import imported_sentence
+from isiw.log.kinds import imported_sentence, require_search
 from isiw.log.places import log_exists
 from isiw.log.reader import SessionRecord, ThresholdRecord, read_session
 from isiw.log.schema import now
@@ -168,17 +168,14 @@ def _require_people(
 def earlier_trials(config: RunConfig, device: DeviceInfo) -> Before:
     """The earlier trials of the visit, which count for the limits, and which a strategy learns before its first ask."""
     records, searches = [read_session(path) for path in _logs(config)], searches_after(config)
+    # A later session may have learnt the trials of an earlier one.
+    records.sort(key=lambda record: (record.header.created, record.header.given_before))
     _require_people(config, [*records, *searches], device)
     require_each_once([*records, *sessions_after(config)])
     for record in records:
         require_whole(record, "as a table: isiw export, then isiw analyse")
         header = record.header
-        if header.intervention is not None:
-            raise ConfigError(
-                "an intervention is meant to change the person, and teaches no window",
-                got=str(record.path),
-                remedy="Give the log of the search for the window.",
-            )
+        require_search(record.path, header)
         if (header.space.reference, header.conditioning) != (device.reference, device.conditioning):
             raise ConfigError(
                 "the ISIs of the earlier trials are not those of the session",

@@ -82,9 +82,8 @@ class Movement(Checked):
     @cached_property
     def changing(self) -> FloatArray:
         """The same of shares and levels together."""
-        both: FloatArray = np.kron(_steps(len(SHARES), self.fading), _steps(len(LOG_LEVELS), self.levelling)).astype(
-            float
-        )
+        shares, levels = _steps(len(SHARES), self.fading), _steps(len(LOG_LEVELS), self.levelling)
+        both: FloatArray = np.kron(shares, levels).astype(float)
         return both
 
 
