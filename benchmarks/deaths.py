@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+import psutil
 from rich.console import Console
 from rich.progress import track
 from threadpoolctl import threadpool_limits
@@ -74,10 +75,10 @@ def die(name: str, how: signal.Signals, moment: str, seed: int, folder: Path) ->
     rng, log = np.random.default_rng(seed), folder / "session.mcap"
     with RIGS[name](folder) as rig:
         trial = int(rng.integers(1, TRIALS))
-        killed_s = _killed(rig, how, moment, trial, float(rng.uniform(0, WITHIN_S[moment])), seed, log)
+        killed_s, left = _killed(rig, how, moment, trial, float(rng.uniform(0, WITHIN_S[moment])), seed, log)
         disarmed_s = _until_disarmed(rig, killed_s)
         given = rig.gave()
-        time.sleep(0.35)  # the watchdog disarms three times, and then closes the port
+        _until_ended(left)  # the watchdog disarms three times, which would stop a pair of the session that resumes
         resumed = isiw.resume(log, rig.device(), strategy(seed), limits=LIMITS, clock=isiw.MonotonicClock())
         known = len(resumed.trials)
         result = resumed.run(progress=False, keys=False)
@@ -96,8 +97,25 @@ def _until_disarmed(rig: Rig, killed_s: float) -> float:
     return time.monotonic() - killed_s
 
 
-def _killed(rig: Rig, how: signal.Signals, moment: str, trial: int, after_s: float, seed: int, log: Path) -> float:
-    """Run the session in a process, and kill it; when that was [s]."""
+def _until_ended(processes: list[psutil.Process]) -> None:
+    end_s = time.monotonic() + MOST_S
+    while not all(map(_has_ended, processes)):
+        if time.monotonic() > end_s:
+            raise AssertionError(f"the watchdog does not end: {processes}")
+        time.sleep(0.01)
+
+
+def _has_ended(process: psutil.Process) -> bool:
+    try:
+        return process.status() == psutil.STATUS_ZOMBIE  # that nobody waits for it is no matter of the device
+    except psutil.NoSuchProcess:
+        return True
+
+
+def _killed(
+    rig: Rig, how: signal.Signals, moment: str, trial: int, after_s: float, seed: int, log: Path
+) -> tuple[float, list[psutil.Process]]:
+    """Run the session in a process, and kill it; when that was [s], and the processes that it had started."""
     (heard, tells), (waits, goes) = os.pipe(), os.pipe()
     gc.freeze()
     child = os.fork()
@@ -110,6 +128,7 @@ def _killed(rig: Rig, how: signal.Signals, moment: str, trial: int, after_s: flo
         raise AssertionError(f"the session ended before trial {trial}: {os.waitpid(child, 0)[1]}")
     if moment == "delivering":
         rig.slow(seed)
+    left = psutil.Process(child).children(recursive=True)
     os.write(goes, b"!")
     time.sleep(after_s)
     rig.dead()
@@ -121,7 +140,7 @@ def _killed(rig: Rig, how: signal.Signals, moment: str, trial: int, after_s: flo
     os.close(goes)
     if not os.WIFSIGNALED(status):
         raise AssertionError(f"the session was not killed: {status}")
-    return killed_s
+    return killed_s, left
 
 
 def _live(rig: Rig, moment: str, trial: int, seed: int, log: Path, tells: int, waits: int) -> None:
