@@ -32,6 +32,9 @@ NEAR_MS: Final = 15.0
 LEAST_MV: Final = 0.001
 """Amplitudes below are not told apart [mV]."""
 
+ROWS: Final = 200
+"""So many trials are compared with all others at a time."""
+
 Expected: TypeAlias = tuple[Sequence[float], Sequence[float]]
 """ISIs [ms], and the MEP that is expected at each [mV]."""
 
@@ -96,14 +99,13 @@ def changed_with_time(window: Window | None, trials: Sequence[Trial], expected: 
         return None
     isi_ms, mep_mv = np.array(_placed(trials)).T
     usual_mv = None if expected is None else np.interp(isi_ms, *np.asarray(expected))
-    near = np.exp(-0.5 * (np.subtract.outer(isi_ms, isi_ms) / NEAR_MS) ** 2)
-    found = growth(mep_mv, usual_mv, near)
+    found = growth(mep_mv, usual_mv, isi_ms)
     p = _beyond(abs(found))
     return sentences.changed("grew" if found > 0 else "shrank", p) if p < BY_CHANCE else None
 
 
-def growth(meps_mv: ArrayLike, usual_mv: ArrayLike | None = None, weights: ArrayLike = 1.0) -> float:
-    """Kendall's statistic of amplitude against order [standard errors], in which each pair of trials has a weight.
+def growth(meps_mv: ArrayLike, usual_mv: ArrayLike | None = None, isis_ms: ArrayLike = 0.0) -> float:
+    """Kendall's statistic of amplitude against order [standard errors], where pairs of trials at near ISIs count most.
 
     Its variance, without any growth, is that of its projection on single trials and of what is left, a third of the
     squared weights each; of equal weights that is Kendall's own. Ties lower it by their share of all triples.
@@ -111,19 +113,26 @@ def growth(meps_mv: ArrayLike, usual_mv: ArrayLike | None = None, weights: Array
     Args:
         meps_mv: amplitudes in their order [mV], shape (n,).
         usual_mv: what is usual at their ISIs [mV], shape (n,), which they are divided by; None if not known.
-        weights: how much each pair of trials counts, shape (n, n).
+        isis_ms: their ISIs [ms], shape (n,); of one ISI, all pairs count alike.
     """
     sizes = scaled = np.asarray(meps_mv, float)
     if usual_mv is not None:
         scaled = np.maximum(sizes, LEAST_MV) / np.maximum(usual_mv, LEAST_MV)
-    n = sizes.size
-    larger = np.sign(np.subtract.outer(scaled, scaled)).T * (np.subtract.outer(sizes, sizes) != 0)
-    later = np.sign(np.subtract.outer(np.arange(n), np.arange(n))).T
-    each = np.broadcast_to(weights, (n, n)) * later
+    n, order = sizes.size, np.arange(sizes.size)
+    isi_ms = np.broadcast_to(np.asarray(isis_ms, float), n)
+    rose, squares, of_trials = 0.0, 0.0, np.zeros(n)
+    for some in np.array_split(order[:, np.newaxis], max(1, n // ROWS)):  # n² numbers do not fit in memory
+        later = slice(int(some[0, 0]), None)
+        weights = np.exp(-0.5 * ((isi_ms[later] - isi_ms[some]) / NEAR_MS) ** 2) * (order[later] > some)
+        of_trials[some[:, 0]] += weights.sum(axis=1)
+        of_trials[later] -= weights.sum(axis=0)
+        squares += float((weights**2).sum())
+        rises = np.sign(scaled[later] - scaled[some]) * (sizes[later] != sizes[some])
+        rose += float((weights * rises).sum())
     tied = _tied(scaled)
     untied = 1.0 - float((tied**3 - tied).sum()) / (n**3 - n)
-    variance = untied * float((each.sum(axis=0) ** 2).sum() + np.triu(each**2, 1).sum()) / 3
-    return float((np.triu(each, 1) * larger).sum()) / math.sqrt(variance) if variance > 0 else 0.0
+    variance = untied * (float((of_trials**2).sum()) + squares) / 3
+    return rose / math.sqrt(variance) if variance > 0 else 0.0
 
 
 def _tied(values: ArrayLike) -> FloatArray:

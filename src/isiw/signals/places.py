@@ -122,7 +122,7 @@ def _last_disturbed(told: Sequence[Counted], by: str) -> list[Disturbance]:
 
 def misplaced(evidence: Evidence) -> Finding | None:
     """Responses outside the window; not where there are few, or another cause is likely."""
-    alike = _last_alike(evidence.told)
+    alike = _last_alike(evidence.told) if evidence.told[-1].outside else []
     if len(alike) < IN_A_ROW or not _follow_the_pulse([isi_ms for isi_ms, _ in alike]):
         return None
     at_ms = statistics.median(response.at_ms for _, response in alike)
