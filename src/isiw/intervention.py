@@ -254,7 +254,17 @@ class Intervention(Checked):
 
     @classmethod
     def drawn(cls, plan: Plan, subject: str, seed: int | None = None) -> Intervention:
-        """An intervention with the arm that a seed draws for a person; without a seed nobody can draw it again."""
+        """An intervention with the arm that a seed draws for a person; without a seed nobody can draw it again.
+
+        Raises:
+            InvalidValueError: there are arms to draw by a seed, and the person has no code: all would have one arm.
+        """
+        if seed is not None and len(plan.arms) > 1 and not subject:
+            raise InvalidValueError(
+                "a seed draws each person's arm by their code, and this person has none",
+                got=f"seed = {seed} under [intervention], and no subject",
+                remedy="Write subject under [visit], or leave the seed out: then each arm is drawn by chance.",
+            )
         return cls(plan, sealed(drawn_arm(plan.arms, subject, seed)))
 
     @property

@@ -54,7 +54,7 @@ def test_intensities_that_nobody_can_set_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InvalidValueError, match="the device is simulated"):
         require_settable(several, LIMITS, DeviceInfo("a robot", "valve", simulated=True, tap_alone=True))
     rig = DeviceInfo("rig", "valve", tap_alone=True)
-    with pytest.raises(InvalidValueError, match="allows one alone"):
+    with pytest.raises(InvalidValueError, match="the limits, or what the device reports, allow one"):
         require_settable(several, dataclasses.replace(LIMITS, intensity_pct_mso=50.0), rig)
     require_settable(several, LIMITS, rig)
     refused = session(tmp_path / "s.mcap", intervention(intensities_pct_rmt=(100.0, 120.0)))

@@ -46,6 +46,14 @@ def test_a_sealed_arm_looks_different_each_time_and_is_none_of_the_words() -> No
     assert not any(arm in digest for digest in digests for arm in Arm)
 
 
+def test_a_seed_draws_no_arm_for_a_person_without_a_code() -> None:
+    several = planned(arms=(Arm.WINDOW, Arm.OUTSIDE))
+    with pytest.raises(InvalidValueError, match="by their code"):
+        Intervention.drawn(several, "", seed=3)
+    assert Intervention.drawn(several, "P07", seed=3).arm is Intervention.drawn(several, "P07", seed=3).arm
+    assert Intervention.drawn(planned(arms=(Arm.WINDOW,)), "", seed=3).arm is Arm.WINDOW
+
+
 def test_a_digest_of_no_arm_of_the_plan_is_refused() -> None:
     with pytest.raises(InvalidValueError, match="none of the plan's"):
         Intervention(planned(arms=(Arm.WINDOW, Arm.OUTSIDE)), sealed(Arm.TAP_ALONE))

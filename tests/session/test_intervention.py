@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 
 from isiw.devices.clock import VirtualClock
+from isiw.devices.protocol import Readiness
 from isiw.errors import InvalidValueError, LogError, StrategyError
 from isiw.existing.reading import read_people
 from isiw.export.collection import read_logs
@@ -455,6 +456,16 @@ def test_the_plan_waits_until_each_intensity_is_set_and_the_pulses_have_it_in_th
     record, named = read_session(log), [100.0, 100.0, 120.0, 120.0, 100.0, 120.0, 100.0, 120.0]
     assert [pulse.intensity_pct_rmt for pulse in pairing_of(record).tests] == named
     assert [trial.intensity_pct_rmt for trial in record.table if trial.commanded_isi_ms is None] == named
+
+
+def test_a_device_that_reports_its_intensity_refuses_several_by_hand_before_a_stimulus(log: Path) -> None:
+    rig = device(simulated=False)
+    rig.readiness = lambda: Readiness(intensity_pct_mso=50.0)  # type: ignore[attr-defined]
+    several = intervention(intensities_pct_rmt=(100.0, 120.0))
+    guards = Safeguards(on_pause=lambda _: True)
+    with pytest.raises(InvalidValueError, match="what the device reports"):
+        session(log, several, rig, clock=FakeRealClock(), safeguards=guards).run()
+    assert not rig.delivered
 
 
 def test_who_continues_amid_pulses_of_one_intensity_hears_which() -> None:

@@ -109,6 +109,21 @@ def test_an_intensity_beyond_the_limits_ends_the_session_before_anything_is_give
     assert not (tmp_path / "high.mcap").exists()
 
 
+def test_a_session_of_several_intensities_goes_on_with_a_highest_one_alone(tmp_path: Path) -> None:
+    log = tmp_path / "s.mcap"
+
+    def end(update: SessionUpdate) -> None:
+        if update.trial.index == 1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        session(log, mixed(), on_trial=end).run()
+    before = isiw.read_session(log).header
+    with pytest.raises(InvalidValueError, match="Write max_intensity_pct_rmt"):
+        isiw.resume(log, device(), mixed(), limits=Limits.of_space(SPACE)).run()
+    assert isiw.read_session(log).header == before
+
+
 def test_a_session_stops_before_it_fires_where_the_device_reports_another_intensity(tmp_path: Path) -> None:
     class Stuck(isiw.SimulatedDevice):
         """Reports one intensity, whatever it was asked to set."""

@@ -86,7 +86,7 @@ def require_settable(plan: Plan, limits: Limits, device: DeviceInfo, *, searched
             "the intensities of the plan cannot be set",
             got=f"intensities_pct_rmt = {plan.intensities_pct_rmt}",
             expected="none of its own: "
-            + ("the device is simulated" if device.simulated else "intensity_pct_mso under [limits] allows one alone"),
+            + ("the device is simulated" if device.simulated else "the limits, or what the device reports, allow one"),
             remedy="Leave out intensities_pct_rmt, so that all pulses have the intensity of the visit.",
         )
 

@@ -15,9 +15,11 @@ from isiw.log.headers import Header
 from isiw.log.pulses import earlier_pulse_ages
 from isiw.log.schema import Event
 from isiw.log.writer import LogWriter
+from isiw.pairing.fitting import require_settable
 from isiw.session.assembly import Options, assembled, require_fitting, require_new
 from isiw.session.console import OperatorConsole, Table
 from isiw.session.earlier import Earlier
+from isiw.session.intensities import require_intensities
 from isiw.session.judging import Judging
 from isiw.session.pausing import Pause
 from isiw.session.sink import Follower, SessionResult, Wait
@@ -260,6 +262,7 @@ class Session(Judging):
             self._header.protocol.require_effect(self._limits.iti_s)
             self._header.signals.require_behind_artefact()
             require_fitting(self.strategy, self._header)
+        require_intensities(self.strategy, self._header)
 
     def _judge(self, verdict: Callable[[TrialTable], Event]) -> None:
         self._examination.judge(verdict)
@@ -286,8 +289,11 @@ class Session(Judging):
 
     def _log_locked_limits(self) -> None:
         """Log the intensity that the device reported when it was armed, so that a resumed session is held to it."""
-        if self._rig.limited.limits != self._header.limits:
-            self._header = self._header.model_copy(update={"limits": self._rig.limited.limits})
+        limits, intervention = self._rig.limited.limits, self._header.intervention
+        if limits != self._header.limits:
+            if intervention is not None:
+                require_settable(intervention.plan, limits, self._header.device)
+            self._header = self._header.model_copy(update={"limits": limits})
             self._sink.append(self._header)
 
     def _take_up_blocks(self) -> None:
