@@ -187,3 +187,7 @@ def test_a_list_that_makes_no_space_is_refused(isis_ms: list[float], reference: 
 def test_a_list_whose_range_says_otherwise_is_refused() -> None:
     with pytest.raises(InvalidValueError, match=r"DesignSpace\.of"):
         dataclasses.replace(LISTED, high_ms=60)
+
+
+def test_a_sweep_of_a_list_leaves_out_what_is_nearer_than_its_step() -> None:
+    assert DesignSpace.of([10, 19, 20, 30], reference="impact").stops_ms(10).tolist() == [10, 20, 30]
