@@ -65,7 +65,7 @@ class Tests:
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
         """Tests that are not known were written since; they come first."""
-        if self.chosen:
+        if self.known:
             items[:] = [each for each in items if each.nodeid in self.chosen or each.nodeid not in self.known]
             items.sort(key=lambda item: self.chosen.get(item.nodeid, -1))
 
@@ -147,6 +147,10 @@ class Judge:
         self.seconds, self.failed = known["seconds"], set(known["failed"])
         self.lines = importlib.import_module("coverage").CoverageData(str(work / "lines"))
         self.lines.read()
+        since = [
+            path for path in (work / "tree/tests").rglob("test_*.py") if path.stat().st_mtime > kept.stat().st_mtime
+        ]
+        self.written_since = [str(path.relative_to(work / "tree")) for path in since]
 
     def at(self, module: str) -> Path:
         """The file of a module in the copy."""
@@ -165,7 +169,7 @@ class Judge:
             for test in quickest[:400]:
                 if (left_s := left_s - self.seconds[test]) > 0:
                     files[test.partition("::")[0]].append(test)
-            if files:
+            if files or (self.written_since and mine):
                 yield [test for each in files.values() for test in each]
 
     def verdict(self, fault: Fault) -> dict[str, Any]:
@@ -176,7 +180,7 @@ class Judge:
             shutil.rmtree(self.work / "tree" / ".hypothesis", ignore_errors=True)
             path.write_text(fault.made_in(source), encoding="utf-8")
             os.utime(path, (begin_s, begin_s))  # or its compiled file would be taken for that of the original
-            files = list(dict.fromkeys(test.partition("::")[0] for test in tests))
+            files = list(dict.fromkeys([*self.written_since, *(test.partition("::")[0] for test in tests)]))
             ended = in_child(self.work, 3 * MOST_S + 30, partial(run_tests, files, Tests(tests, self.seconds), "-x"))
             path.write_text(source, encoding="utf-8")
             os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))

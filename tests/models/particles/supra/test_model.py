@@ -13,8 +13,8 @@ from isiw.errors import InvalidValueError
 from isiw.metrics import f1
 from isiw.models.particles.latents import Latents
 from isiw.models.particles.supra import SupraModel
-from isiw.models.particles.supra.model import SupraPosterior
 from isiw.models.particles.supra.jumps import law_of
+from isiw.models.particles.supra.model import SupraPosterior
 from isiw.models.particles.supra.prior import BLOCKS, LATENTS, Segment, SupraPrior
 from isiw.models.protocol import SamplesDepression
 from isiw.models.shared.history import History
