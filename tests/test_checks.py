@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -14,6 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
+import isiw
 from isiw.checks import (
     Checked,
     Count,
@@ -212,3 +215,13 @@ def test_a_table_may_leave_out_state_none_and_have_lists_and_its_schema_has_the_
     schema = TypeAdapter(Read).json_schema()["properties"]
     assert (schema["share"]["minimum"], schema["share"]["exclusiveMaximum"]) == (0, 1)
     assert schema["most"]["anyOf"][0] == {"minimum": 1, "type": "integer"}
+
+
+def test_dataclasses_are_frozen_but_those_that_collect_what_a_file_has() -> None:
+    kind = re.compile(r"^@dataclass(?!\(frozen=True).*\nclass (\w+)", re.MULTILINE)
+    sources = sorted(Path(isiw.__path__[0]).rglob("*.py"))
+    assert [name for path in sources for name in kind.findall(path.read_text("utf-8"))] == [
+        "Records",
+        "Salvage",
+        "_Rows",
+    ]

@@ -187,3 +187,18 @@ def test_a_list_that_makes_no_space_is_refused(isis_ms: list[float], reference: 
 def test_a_list_whose_range_says_otherwise_is_refused() -> None:
     with pytest.raises(InvalidValueError, match=r"DesignSpace\.of"):
         dataclasses.replace(LISTED, high_ms=60)
+
+
+def test_a_sweep_of_a_list_leaves_out_what_is_nearer_than_its_step() -> None:
+    assert DesignSpace.of([10, 19, 20, 30], reference="impact").stops_ms(10).tolist() == [10, 20, 30]
+
+
+def test_a_long_list_is_shown_by_its_first_twelve_and_its_last() -> None:
+    listed = {count: str(DesignSpace.of(range(1, count + 1), reference="impact")) for count in (13, 14)}
+    assert listed[13].startswith("1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12 and 13 ms")
+    assert listed[14].startswith("1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, … and 14 ms")
+
+
+def test_a_range_in_seconds_is_refused_with_what_it_is_in_milliseconds() -> None:
+    with pytest.raises(InvalidValueError, match="low_ms=10, high_ms=300"):
+        DesignSpace(0.01, 0.3, reference="impact")

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
-from isiw.window import EDGE_LEVEL, Window, window_from_excess
+from isiw.window import EDGE_LEVEL, Window, bayes_factor, window_from_excess
 from known import known
 
 GRID_MS = np.arange(0.0, 100.0, 2.0)
@@ -271,3 +271,18 @@ def test_an_estimate_says_where_the_mep_is_depressed_only_where_that_was_looked_
     assert str(nowhere).endswith("Depressed: nowhere (probability of it: 0.04)")
     assert str(replace(nowhere, depressed_probability=0.1)).endswith("Depressed: undecided (probability of it: 0.10)")
     assert "epressed" not in str(WindowEstimate(0.9, Window(50, 80)))
+
+
+@pytest.mark.parametrize(
+    ("probability", "beforehand", "factor"),
+    [(0.9, 0.5, 9.0), (0.9, 0.75, 3.0), (0.75, 0.9, 1 / 3), (1.0, 0.5, math.inf), (0.0, 0.5, 0.0)],
+)
+def test_a_bayes_factor_is_by_what_the_odds_grew(probability: float, beforehand: float, factor: float) -> None:
+    assert bayes_factor(probability, beforehand) == pytest.approx(factor)
+
+
+@pytest.mark.parametrize("unknown", [(None, 0.5), (0.5, None), (0.5, 0.0), (0.5, 1.0)])
+def test_of_what_is_not_known_or_was_certain_there_is_no_bayes_factor(
+    unknown: tuple[float | None, float | None],
+) -> None:
+    assert bayes_factor(*unknown) is None

@@ -11,6 +11,7 @@ import torch
 
 from isiw.acquisition.fixed import EvenSpacing
 from isiw.acquisition.protocol import best_candidate, require_scores
+from isiw.acquisition.registry import ACQUISITIONS, acquisition_named
 from isiw.errors import StrategyError
 
 
@@ -57,3 +58,8 @@ def test_whole_numbers_are_scores() -> None:
 def test_scores_that_are_none_are_refused_with_what_was_expected(scores: Any, said: str) -> None:
     with pytest.raises(StrategyError, match=rf"EvenSpacing must score each ISI.*{said}"):
         require_scores(EvenSpacing(), scores, 3)
+
+
+@pytest.mark.parametrize("name", sorted(ACQUISITIONS))
+def test_acquisition_functions_of_the_same_settings_are_equal(name: str) -> None:
+    assert acquisition_named(name, 3) == acquisition_named(name, 3)

@@ -119,15 +119,17 @@ def test_no_period_holds_more_stimuli_than_its_limit() -> None:
     assert limits.earliest_s([0.0, 5.0, 10.0, 100.0], -100.0) == 105.0
 
 
-@pytest.mark.parametrize("coil_c", [None, 40.1, 99.0])
-def test_a_coil_that_is_hot_or_not_measured_is_refused(coil_c: float | None) -> None:
-    with pytest.raises(LimitExceededError, match="coil"):
+@pytest.mark.parametrize(("coil_c", "way_on"), [(None, "report coil_c"), (40.1, "coil cool"), (99.0, "coil cool")])
+def test_a_coil_that_is_hot_or_not_measured_is_refused_with_the_way_on(coil_c: float | None, way_on: str) -> None:
+    with pytest.raises(LimitExceededError, match=f"{way_on}, then resume"):
         Limits(0, 200, max_coil_c=40.0).require_state(Readiness(coil_c=coil_c))
 
 
-@pytest.mark.parametrize("intensity", [None, 54.9, 56.0])
-def test_another_or_an_unknown_intensity_is_refused(intensity: float | None) -> None:
-    with pytest.raises(LimitExceededError, match="intensity"):
+@pytest.mark.parametrize(
+    ("intensity", "way_on"), [(None, "report intensity_pct_mso"), (54.9, "intensity back"), (56.0, "intensity back")]
+)
+def test_another_or_an_unknown_intensity_is_refused_with_the_way_on(intensity: float | None, way_on: str) -> None:
+    with pytest.raises(LimitExceededError, match=f"{way_on}, then resume"):
         Limits(0, 200, intensity_pct_mso=55.0).require_state(Readiness(intensity_pct_mso=intensity))
 
 

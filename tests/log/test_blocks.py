@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import io
+import struct
+from pathlib import Path
+
 import pytest
 import zstandard
 from mcap.records import Chunk
 
-from isiw.log.blocks import MOST_RECORDS, LostBlockError, Unpacking, marked
+from isiw.log.blocks import MOST_RECORDS, LostBlockError, Unpacking, counted_records, marked
 from isiw.log.salvage import salvage
 
 
@@ -57,3 +61,24 @@ def test_blocks_that_cannot_be_read_use_up_what_a_file_may_unpack_to() -> None:
 def test_more_empty_records_than_a_log_may_hold_are_not_even_read() -> None:
     with pytest.raises(LostBlockError, match="too large"):
         Unpacking(0).records(block(bytes(9 * (MOST_RECORDS + 1))), 0)
+
+
+def test_counts_are_those_of_an_index_whose_checksum_and_end_are_right(finished_log: Path) -> None:
+    data = finished_log.read_bytes()
+    footer_at, beyond = len(data) - 37, struct.pack("<Q", 2**64 - 1)
+    lies = [data[:-1] + b"x", data[: footer_at + 9] + beyond + data[footer_at + 17 :], data[:9]]
+    found = counted_records(io.BytesIO(data))
+    assert found is not None
+    assert found.message_count > 8
+    assert [counted_records(io.BytesIO(each)) for each in lies] == [None, None, None]
+
+
+def test_blocks_behind_a_mark_of_nothing_are_found(finished_log: Path) -> None:
+    data = finished_log.read_bytes()
+    found = list(marked(data, len(data)))
+    (start, first), *_ = found
+    begin = data.index(first.data)
+    nothing = bytearray(data[start:begin] + bytes(4))
+    nothing[1] ^= 1  # the length of the record
+    both = bytes(nothing) + data
+    assert [block for _, block in marked(both, len(both))] == [block for _, block in found]

@@ -25,6 +25,7 @@ from isiw.log.schema import (
     decode,
     encode,
     json_schema,
+    log_time_ns,
     topic_of,
 )
 from isiw.log.writer import LogWriter
@@ -187,3 +188,9 @@ def test_a_logged_space_without_a_reference_counts_from_the_impact() -> None:
     logged = json.loads(make_header().model_dump_json())
     del logged["space"]["reference"]
     assert Header.model_validate_json(json.dumps(logged)).space.reference == "impact"
+
+
+@pytest.mark.parametrize(("now_ns", "held_ns"), [(0, 0), (2**64 - 1, 2**64 - 1), (2**64, 0), (-1, 0)])
+def test_every_time_is_held_that_fits_into_a_record(now_ns: int, held_ns: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("isiw.log.schema.time.time_ns", lambda: now_ns)
+    assert log_time_ns() == held_ns

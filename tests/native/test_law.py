@@ -42,6 +42,16 @@ def test_blocks_that_the_engine_has_no_room_for_are_refused(tables: Tables) -> N
             Law(_blocks(one, first, size))
 
 
+def test_a_law_of_starts_has_two_knots_at_least(tables: Tables) -> None:
+    two, one = (
+        tables._replace(**{name: getattr(tables, name)[:knots] for name in ("start_ms", "density", "quantiles")})
+        for knots in (2, 1)
+    )
+    assert Law(two)
+    with pytest.raises(ValueError, match="beyond themselves"):
+        Law(one)
+
+
 @pytest.mark.parametrize(("meaning", "changed"), [(27, {}), (28, {}), (29, {"apart": True}), (30, {"apart": True})])
 def test_latents_that_moves_write_or_compare_are_there(tables: Tables, meaning: int, changed: dict[str, Any]) -> None:
     at = tables.at.copy()

@@ -17,6 +17,7 @@ def test_every_stimulus_has_its_place_by_its_number() -> None:
     assert parts == [Part.BEFORE] * 6 + [Part.PAIRS] * 50 + [Part.AFTER] * 12
     assert [slot.number for slot in plan.slots] == list(range(68))
     assert [slot.number for slot in plan.slots if slot.first] == [0, 6, 26, 46, 56, 62]
+    assert [slot.number for slot in plan.slots if slot.last] == [5, 25, 45, 55, 61, 67]
     assert plan.slots[plan.last_pair].last
     assert plan.slots[plan.last_pair].part is Part.PAIRS
     assert [slot.intensity_pct_rmt for slot in plan.slots[:6]] == [100.0] * 3 + [120.0] * 3

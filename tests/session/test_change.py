@@ -36,7 +36,8 @@ def test_a_change_before_the_first_trial_is_between_what_was_given_before_and_th
     change = Change("amplitudes", 0.97, 2.9, 2.0, 4.1, 31)
     assert change.counted_from(0) == change
     assert change.counted_from(20) == Change("amplitudes", 0.97, 2.9, 2.0, 4.1, 11)
-    assert change.counted_from(40) is None
+    assert change.counted_from(33) == Change("amplitudes", 0.97, 2.9, 2.0, 4.1, 0)
+    assert change.counted_from(34) is None
     found = change_found(change.counted_from(32), TOLD)
     assert found is not None
     assert "do not fit each other: amplitudes are ×2.9 now (90 % interval ×2 to ×4.1)" in found.text

@@ -242,3 +242,12 @@ def test_only_true_goes_on_after_a_pause(tmp_path: Path, answer: Any) -> None:
     )  # fmt: skip
     session.run()
     assert len(device.delivered) == 1
+
+
+def test_a_wait_is_another_one_if_its_end_moves_or_it_becomes_a_rest(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("isiw.session.sink.time.monotonic", lambda: 100.0)
+    sink, waits = Sink(), []
+    for left_s, rests in ((5.0, False), (5.2, False), (7.0, False), (7.0, True), (None, False)):
+        sink.waiting(left_s, rests=rests)
+        waits.append(sink.wait)
+    assert waits == [(105.0, False), (105.0, False), (107.0, False), (107.0, True), None]

@@ -147,6 +147,15 @@ def test_a_window_whose_amplitudes_a_few_taps_alone_match_has_that_sentence_too(
         assert told.about_the_tap(Window(15.0, 45.0)) == {"tap_may_explain": explained, "tap_is_likely": explained}
 
 
+def test_responses_without_amplitudes_do_not_show_a_tap_that_is_known() -> None:
+    told = Outcomes("impact")
+    for isi_ms in (0.0, 30.0, 60.0):
+        told = told.after_tap(isi_ms, 0.05)
+    for isi_ms in (20.0, 25.0, 35.0, 40.0):
+        told = told.after(Outcome(isi_ms, response=True))
+    assert told.about_the_tap(Window(15.0, 45.0)) == {"tap_may_explain": False, "tap_is_likely": False}
+
+
 @pytest.mark.parametrize(("tap_mv", "likely"), [(0.0, False), (0.12, True)])
 def test_taps_alone_that_were_measured_at_no_isi_tell_whether_a_window_may_be_the_taps(
     tap_mv: float, *, likely: bool

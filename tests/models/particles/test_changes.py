@@ -42,6 +42,19 @@ def test_after_a_change_a_person_is_whoever_responds_so_at_the_next_trial(kind: 
     np.testing.assert_allclose(settled, changing, atol=2e-3)
 
 
+@pytest.mark.parametrize(("drift", "size", "matters"), [(0.0, 0.3, False), (0.0, 0.5, True), (1.0, 0.0, True)])
+def test_amplitudes_change_with_time_where_they_drift_or_step_by_a_half(
+    drift: float, size: float, *, matters: bool
+) -> None:
+    for kind in (ChangeKind.LEVEL, ChangeKind.INTENSITY, ChangeKind.SCALE):
+        latents, _ = people(kind)
+        values = latents.values.copy()
+        values[..., LATENTS.index("drift")] = drift
+        values[..., latents_of("changed", "change")] = math.log(9.5), size
+        found = CASE.prior.of_time(latents._replace(values=values), 200)
+        assert (found == matters).all(), kind
+
+
 def test_without_a_change_when_it_would_come_and_how_large_it_would_be_mean_nothing() -> None:
     latents, told = people(ChangeKind.NONE)
     values = latents.values.copy()

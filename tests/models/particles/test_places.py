@@ -109,6 +109,22 @@ def test_places_count_from_one_event_and_that_of_the_space() -> None:
             ParticleModel(prior_with(place), particles=10).begin(space, 0)
 
 
+@pytest.mark.parametrize(
+    ("learnt_with", "delay_ms", "is_of_it"),
+    [
+        ({}, 200.0, True),  # nobody stated it
+        ({"hit_delay_ms": (180.0, 5.0)}, None, True),
+        ({"hit_delay_ms": (180.0, 5.0)}, 190.0, True),
+        ({"hit_delay_ms": (180.0, 5.0)}, 190.1, False),
+        ({"hit_delay_ms": (180.0, 5.0), "reference": "impact"}, 200.0, True),
+    ],
+)
+def test_a_place_from_the_valve_is_of_rigs_whose_taps_are_as_late(
+    learnt_with: dict[str, Any], delay_ms: float | None, *, is_of_it: bool
+) -> None:
+    assert replace(HERE, **learnt_with).is_of_rig(None if delay_ms is None else (delay_ms, 5.0)) is is_of_it
+
+
 @pytest.mark.parametrize("wrong", [{"share": 1.5}, {"width_ms": (0.0, 0.1)}, {"reference": "tms"}])
 def test_an_impossible_place_is_refused(wrong: Any) -> None:
     with pytest.raises(InvalidValueError, match=next(iter(wrong))):

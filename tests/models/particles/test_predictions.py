@@ -6,7 +6,7 @@ import pytest
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.metrics import f1
 from isiw.models.particles.model import ParticleModel
-from isiw.models.particles.predictions import PersonSample
+from isiw.models.particles.predictions import PersonSample, _quantile, drawn_mep_mv
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.profile import ProfilePrior
 from isiw.models.protocol import Observation
@@ -58,3 +58,17 @@ def test_each_person_of_a_batch_has_a_band_of_its_own() -> None:
     posterior = model.update(model.begin(VALVE_SPACE, seed=5, people=2), Observation.of([100.0] * 2, [0.01, 1.0]))
     (_, small_mv), (_, large_mv) = (posterior.prediction_mv(0.9, person) for person in range(2))
     assert (small_mv < large_mv).all()
+
+
+@pytest.mark.parametrize("share", [0.05, 0.5, 0.95, 1.0])
+def test_a_quantile_of_particles_is_that_of_numpy(share: float) -> None:
+    values = np.random.default_rng(1).standard_normal((2, 192)).astype(np.float32)
+    np.testing.assert_allclose(_quantile(values, share), np.quantile(values, share, axis=-1), rtol=1e-5)
+
+
+def test_meps_are_drawn_as_often_below_a_quantile_as_it_says() -> None:
+    case, isi_ms, shares = Case(Prior(), VALVE_SPACE), np.float32(100.0), np.array([0.05, 0.5, 0.95])
+    fields = case.fields(case.drawn(1, 3))
+    drawn_mv = drawn_mep_mv(fields, np.full(400, isi_ms), np.random.default_rng(3))
+    quantiles_mv = PersonSample(fields, VALVE_SPACE).mep_quantiles_mv(np.array([isi_ms]), shares)[0, 0]
+    assert [(drawn_mv < quantile_mv).mean() for quantile_mv in quantiles_mv] == pytest.approx(shares, abs=0.07)

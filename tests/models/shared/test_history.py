@@ -49,6 +49,11 @@ def test_an_interval_ends_where_it_was_told_to() -> None:
     )
 
 
+def test_of_an_interval_its_middle_is_kept_and_of_an_amplitude_beside_it_itself() -> None:
+    told = Observation.of([1.0, 1.0], [0.1, 0.2], None, [None, None], [0.3, math.nan])
+    assert AmplitudeHistory.nothing(2).appended(told).mep_mv[:, 0] == pytest.approx([0.2, 0.2])
+
+
 def test_a_known_part_is_kept_and_taken_off_for_models_that_know_none() -> None:
     told = Observation.of([1.0], [0.3], known_mv=[(0.1, 0.05, 0.4)])
     trial = observed(told, LIMIT_MV, THRESHOLD_MV, order=0)

@@ -114,3 +114,9 @@ def test_an_invalid_prior_is_refused(wrong: dict[str, Any], said: str) -> None:
 def test_an_invalid_span_is_refused(wrong: tuple[float, ...]) -> None:
     with pytest.raises(InvalidValueError):
         Span(*wrong)
+
+
+def test_starts_have_a_density_from_a_tenth_of_a_second_before_a_range_to_its_end() -> None:
+    for beyond_ms, there in ((0.0, True), (0.1, False)):
+        ends_ms = np.array([VALVE_SPACE.low_ms - 100.0 - beyond_ms, VALVE_SPACE.high_ms + beyond_ms])
+        assert np.isfinite(StartPrior().log_density(ends_ms, VALVE_SPACE)).tolist() == [there, there]

@@ -6,6 +6,7 @@ import pytest
 
 from isiw.errors import InvalidValueError, LimitExceededError
 from isiw.strategy.threshold import IntensityRange, Pulse, ThresholdEstimate
+from isiw.strategy.threshold.pulses import one_sided
 
 SPACE = IntensityRange(20, 80)
 
@@ -58,3 +59,14 @@ def test_an_estimate_beyond_the_range_has_no_number() -> None:
     assert beyond.threshold_pct_mso is None
     assert "above the highest intensity, 80 % MSO" in beyond.reason
     assert "below" in ThresholdEstimate(19.0).within(SPACE).reason
+
+
+@pytest.mark.parametrize(("end_pct_mso", "response"), [(30.0, True), (80.0, False)])
+def test_six_pulses_all_alike_near_the_end_of_the_range_say_that_it_is_wrong(
+    end_pct_mso: float, *, response: bool
+) -> None:
+    space, away = IntensityRange(30, 80), 3.0 if response else -3.0
+    far = [Pulse(end_pct_mso + 1.5 * away, response=response)] * 6
+    near = [Pulse(end_pct_mso + away, response=response)] * 6
+    decisions = [one_sided([*far, *near[:count]], space) for count in (5, 6)]
+    assert [each is not None and each.stop for each in decisions] == [False, True]

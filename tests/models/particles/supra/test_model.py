@@ -13,8 +13,9 @@ from isiw.errors import InvalidValueError
 from isiw.metrics import f1
 from isiw.models.particles.latents import Latents
 from isiw.models.particles.supra import SupraModel
+from isiw.models.particles.supra.jumps import law_of
 from isiw.models.particles.supra.model import SupraPosterior
-from isiw.models.particles.supra.prior import LATENTS, Segment, SupraPrior
+from isiw.models.particles.supra.prior import BLOCKS, LATENTS, Segment, SupraPrior
 from isiw.models.protocol import SamplesDepression
 from isiw.models.shared.history import History
 from isiw.models.shared.scales import Scale
@@ -132,3 +133,15 @@ def test_a_segment_needs_a_probability_and_a_positive_shift() -> None:
 def test_invalid_settings_are_refused(settings: dict[str, float]) -> None:
     with pytest.raises(InvalidValueError, match=next(iter(settings))):
         SupraModel(**settings)  # type: ignore[arg-type] # what a user may write
+
+
+def test_starts_spread_as_much_as_where_nearly_all_are_evenly() -> None:
+    assert SupraPrior().spreads[:2] == pytest.approx([np.linspace(0, 95, 10_001).std()] * 2, rel=1e-3)
+
+
+def test_shifts_move_what_is_there_of_both_segments() -> None:
+    shifted = law_of(SupraPrior(), SPACE)._arrays["shifted"]  # noqa: SLF001 - what the engine is given
+    both, alone = ([*BLOCKS["enhanced"], *BLOCKS["depressed"]], [*BLOCKS["curve"], *BLOCKS["session"]])
+    moved = [{name for name, is_moved in zip(LATENTS, one, strict=False) if is_moved} for one in shifted[:, 0]]
+    there = [set(), set(BLOCKS["enhanced"]), set(BLOCKS["depressed"]), set(both)]
+    assert moved == [{*alone, *segments} for segments in there]
