@@ -22,15 +22,9 @@ from isiw.existing import answer, formats
 from isiw.existing.layout import Layout
 from isiw.existing.limits import ReadingLimits, passed, seconds_for
 
-_WAITS: Final = 5.0
-"""By the clock a process may take so many times its processor time, since it may wait for a disk."""
-
-_START_S: Final = 60.0
-"""So long it may take to start [s]."""
-
-_BYTES_A_ROW: Final = 10
-"""A row of a table has hardly less."""
-
+_WAITS: Final = 5.0  # by the clock a process may take so many times its processor time, since it may wait for a disk
+_START_S: Final = 60.0  # so long it may take to start [s]
+_BYTES_A_ROW: Final = 10  # a row of a table has hardly less
 _CHILD: Final = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from isiw.existing.child import main; main()"
 """What the process runs: it finds what this one finds, and nothing in the folder in which it is started."""
 

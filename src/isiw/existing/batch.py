@@ -27,12 +27,10 @@ if TYPE_CHECKING:  # a file is read, and perhaps refused, before what analyses i
     from isiw.config.run import RunConfig
     from isiw.existing.analysis import Analysis
 
-ANALYSED_KEY: Final = "isiw_analyse"
-"""Where a log keeps from which file and how it was made."""
+ANALYSED_KEY: Final = "isiw_analyse"  # where a log keeps from which file and how it was made
 
 
-_LONGEST_STEM: Final = 200
-"""What a file's name may have before its suffix [bytes]; most systems take 255 in all."""
+_LONGEST_STEM: Final = 200  # what a file's name may have before its suffix [bytes]; most systems take 255 in all
 
 
 class Person(NamedTuple):

@@ -37,8 +37,7 @@ _GROUPED: Final = {
 _NUMBER_BEFORE: Final = re.compile(r"^[-+\d.,\s]*(e[-+]?\d+)?\s*")
 _BLANKS: Final = re.compile(r"(?<=\d)[ '\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}](?=\d{3})")
 
-_MANY: Final = 2**16
-"""So many texts are remembered: in a long table most cells are like others."""
+_MANY: Final = 2**16  # so many texts are remembered: in a long table most cells are like others
 
 
 def is_missing(cell: Any) -> bool:

@@ -24,9 +24,7 @@ from isiw.types import FloatArray, Reference
 if TYPE_CHECKING:
     from isiw.existing.quantities import Columns
 
-ALL: Final = "*"
-"""What `where` says of a column whose values are to be analysed together."""
-
+ALL: Final = "*"  # what `where` says of a column whose values are to be analysed together
 _MEANS: Final = re.compile(r"means?|average|avg|median|mittel(wert)?|moyenne|\bn ?= ?\d+")
 _TITLES: Final = re.compile(r"\b(means?|averages?|averaged|avg|mittelwerte?)\b")
 """What the names of files and sheets, and titles, say of means."""
@@ -68,8 +66,7 @@ _FEW: Final = 3
 _ROWS_A_WORD: Final = 4
 _ROWS_A_NUMBER: Final = 6
 """With fewer rows for each of its words or numbers a column does not tell kinds of trials from each other."""
-_FEWEST: Final = 12
-"""In a table with fewer rows ISIs may come again by chance."""
+_FEWEST: Final = 12  # in a table with fewer rows ISIs may come again by chance
 _SHARED: Final = 0.8
 _ONE_SIDED: Final = 8.0
 """A sweep with an MEP that rises from its median by so many times what it falls below it has one half only."""

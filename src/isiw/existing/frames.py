@@ -27,12 +27,8 @@ from isiw.text.sanitize import counted
 TEXTS: Final = (".csv", ".tsv", ".txt", ".dat", ".tab")
 WORKBOOKS: Final = (".xlsx", ".xlsm")
 
-_LINES: Final = 100
-"""Within so many lines the columns' names are sought."""
-
-_HEAD: Final = 40
-"""So many bytes show how a text is encoded."""
-
+_LINES: Final = 100  # within so many lines the columns' names are sought
+_HEAD: Final = 40  # so many bytes show how a text is encoded
 _BLANKS: Final = r"\s+"
 
 _COUNT: Final = "If these trials count, show them as the others; if not, mark them in a column called exclude."

@@ -17,12 +17,10 @@ from isiw.files import opened
 from isiw.text.named_code import library
 
 _HDF5: Final = b"\x89HDF\r\n\x1a\n"
-_HDF5_AT: Final = (0, 512)
-"""Where a file of HDF5 begins: MATLAB's have a text of their own before it."""
+_HDF5_AT: Final = (0, 512)  # where a file of HDF5 begins: MATLAB's have a text of their own before it
 
 
-_NOTHING: Final = Path(os.devnull)
-"""Which libraries open as they ask the system what it is, and which holds nothing."""
+_NOTHING: Final = Path(os.devnull)  # which libraries open as they ask the system what it is, and which holds nothing
 
 
 class Gate:

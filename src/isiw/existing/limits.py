@@ -23,27 +23,16 @@ try:
 except ImportError:  # on Windows
     resource = None  # type: ignore[assignment]
 
-_BYTES_PER_S: Final = {True: 1e6, False: 4e6}
-"""A table has a second more for each so many bytes, and a recording."""
-
-_ROWS_PER_S: Final = 2e3
-"""A second more for each so many rows, once they are read: a trial is made of each."""
-
-_SIGNS: Final = (b"\t", b";", b",", b"|")
-"""What separates the cells of a text."""
-
-_BLANKS: Final = re.compile(rb"\s\S")
-"""Or else blanks do."""
-
-_BYTES_PER_SIGN: Final = 4
-"""A character takes no more."""
-
+_BYTES_PER_S: Final = {True: 1e6, False: 4e6}  # a table has a second more for each so many bytes, and a recording
+_ROWS_PER_S: Final = 2e3  # a second more for each so many rows, once they are read: a trial is made of each
+_SIGNS: Final = (b"\t", b";", b",", b"|")  # what separates the cells of a text
+_BLANKS: Final = re.compile(rb"\s\S")  # or else blanks do
+_BYTES_PER_SIGN: Final = 4  # a character takes no more
 _FIRST_LINES: Final = 100
 
 _CHUNK: Final = 2**20
 
-LARGEST_FACTOR: Final = 1e6
-"""By which limits are multiplied at most, so that each remains a number."""
+LARGEST_FACTOR: Final = 1e6  # by which limits are multiplied at most, so that each remains a number
 
 
 @dataclass(frozen=True)

@@ -31,12 +31,8 @@ from isiw.types import FloatArray, Reference
 if TYPE_CHECKING:  # the process that reads draws nothing
     from matplotlib.figure import Figure
 
-SWEEPS: Final = 3
-"""So many sweeps are drawn."""
-
-_MOST: Final = 30
-"""So many channels, events and columns are listed one by one."""
-
+SWEEPS: Final = 3  # so many sweeps are drawn
+_MOST: Final = 30  # so many channels, events and columns are listed one by one
 _TRIGGER: Final = 0.02
 """The largest share of a channel of triggers that is neither near its lowest nor near its highest value."""
 

@@ -34,9 +34,7 @@ _WHAT: Final = {
 _TWICE_S: Final = 3e-3
 """One trigger that is found twice within so short a time is one, and the first edge is when it was."""
 
-_SAME_PULSE_S: Final = 20e-3
-"""An event of a pulse alone marks the pulse that is marked within so short a time."""
-
+_SAME_PULSE_S: Final = 20e-3  # an event of a pulse alone marks the pulse that is marked within so short a time
 _EARLY_S: Final = 20e-3
 """A pulse that comes before a tap by at most so much was meant to follow it, and is TMS before the impact."""
 

@@ -34,8 +34,7 @@ from isiw.trials import Status, Stimulus, Trial
 from isiw.types import Reference
 from isiw.visit import Visit
 
-_STRONGEST_PCT_RMT: Final = 300.0
-"""No stimulator reaches more in a person whose threshold can be found [% RMT]."""
+_STRONGEST_PCT_RMT: Final = 300.0  # no stimulator reaches more in a person whose threshold can be found [% RMT]
 
 
 def read_people(

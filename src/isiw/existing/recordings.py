@@ -31,9 +31,7 @@ from isiw.types import FloatArray
 _BEFORE_MS: Final = 150.0
 _AFTER_MS: Final = 100.0
 """What is cut out of a continuous recording: from so long before the longest ISI to so long after the pulse."""
-_APART_MS: Final = 2.0
-"""An ISI in a table that differs by more from that of the events is another one."""
-
+_APART_MS: Final = 2.0  # an ISI in a table that differs by more from that of the events is another one
 _IF_NONE_COUNTS: Final = (
     "Is the EMG channel the right one, its unit right, and the marker of the pulse? Is the EMG at rest without mains "
     "hum, at most {:g} µV RMS? See docs/timing.md."

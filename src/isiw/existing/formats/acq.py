@@ -18,8 +18,7 @@ from isiw.types import FloatArray
 _SEGMENT: Final = re.compile(r"segment \d+", re.IGNORECASE)
 """What a marker says where recording began, or was continued later."""
 
-_TURNS: Final = 2**32
-"""Numbers of samples below 0 are read as if so many were added."""
+_TURNS: Final = 2**32  # numbers of samples below 0 are read as if so many were added
 
 
 def read(path: Path, _layout: Layout) -> Contents:

@@ -24,8 +24,7 @@ _PERIOD: Final = re.compile(
 )
 _RATE: Final = re.compile(r"(?:rate|sampl|frequency)[^\n\d]*(\d[\d.]*)\s*(k?)Hz", re.IGNORECASE)
 """What the lines above samples say of the time between them, or of their rate."""
-_FEW: Final = 0.01
-"""With a larger share of steps that are longer than usual, times have no pauses but are rounded."""
+_FEW: Final = 0.01  # with a larger share of steps that are longer than usual, times have no pauses but are rounded
 
 
 def read(path: Path, layout: Layout) -> Contents:

@@ -17,9 +17,7 @@ from isiw.existing.layout import UNIT_WORDS
 from isiw.lazy import pd
 from isiw.types import FloatArray
 
-PIECE: Final = 2**20
-"""So many samples are in memory at once if a whole channel is looked through."""
-
+PIECE: Final = 2**20  # so many samples are in memory at once if a whole channel is looked through
 APART_S: Final = 100.0
 """Sweeps without a time of their own, and what a pause of unknown length separates, are so far apart."""
 

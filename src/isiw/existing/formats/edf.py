@@ -24,8 +24,7 @@ _FIELDS: Final = {"label": 16, "transducer": 80, "unit": 8, "least": 8, "most": 
 _ROUNDED_S: Final = 1e-3
 """Times of records are rounded by so much; what is farther from the end of the record before is a gap."""
 
-_AT_ONCE: Final = 100
-"""So many records are read at once for their annotations."""
+_AT_ONCE: Final = 100  # so many records are read at once for their annotations
 
 
 class _Header(NamedTuple):

@@ -27,11 +27,8 @@ ADICHT: Final = (
     "In LabChart: File, Export, LabChart text (.txt), with block header, time and comments; or MATLAB (.mat). A "
     "layout says what is what: docs/your-data.md."
 )
-_FRAME: Final = 0x7FFE
-"""BioSig's type of an event where a new frame begins."""
-
-_WAVES, _EVENTS, _MARKS, _TEXTS = {1, 9}, {2, 3}, {5}, {8}
-"""sonpy's types of channels."""
+_FRAME: Final = 0x7FFE  # bioSig's type of an event where a new frame begins
+_WAVES, _EVENTS, _MARKS, _TEXTS = {1, 9}, {2, 3}, {5}, {8}  # sonpy's types of channels
 
 
 def _reader(module: str, install: str, way_in: str, *, on_windows: bool = False) -> Any:

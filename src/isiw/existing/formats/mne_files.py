@@ -23,8 +23,7 @@ _SCALES_V: Final = {"V": 1.0, "mV": 1e-3, "µV": 1e-6, "uV": 1e-6, "nV": 1e-9}
 _PAUSE: Final = re.compile(r"new segment|\bboundary\b", re.IGNORECASE)
 """What annotations say of a pause of unknown length."""
 
-_DATE: Final = 14
-"""The date of a marker of BrainVision has at least so many digits."""
+_DATE: Final = 14  # the date of a marker of BrainVision has at least so many digits
 
 
 def read(path: Path, _layout: Layout) -> Contents:

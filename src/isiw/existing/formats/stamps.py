@@ -13,12 +13,10 @@ from isiw.types import FloatArray, IntArray
 _GAP_S: Final = 2.5e-3
 """Samples that come later than expected by so much, and stay so, come after a gap; those that do not, jitter."""
 _AROUND_S: Final = 1.0
-_ENOUGH_S: Final = 10.0
-"""A stretch that is longer says at which rate its samples were really taken."""
+_ENOUGH_S: Final = 10.0  # a stretch that is longer says at which rate its samples were really taken
 
 
-_SCATTER_S: Final = 2e-3
-"""Times that scatter more are said."""
+_SCATTER_S: Final = 2e-3  # times that scatter more are said
 
 
 class Clocked(NamedTuple):
