@@ -13,7 +13,7 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.existing.cells import is_missing
 from isiw.existing.delivered import Delivered, anywhere, renumbered
-from isiw.existing.doubts import is_rectified, require_short
+from isiw.existing.doubts import is_rectified, require_said
 from isiw.existing.formats.columns import require_rate
 from isiw.existing.formats.contents import APART_S, Contents, Track, events_of
 from isiw.existing.frames import named
@@ -98,20 +98,20 @@ def track_of(contents: Contents, key: str, layout: Layout) -> Track:
 def _pulses_of_rows(contents: Contents, emg: Track, layout: Layout) -> tuple[list[Pulse], tuple[str, ...], str]:
     """The pulses of sweeps that a row each says the ISI of, the columns that are not used, and whose they are."""
     stated = replace(layout, alone="") if layout.alone is None and contents.empty_is_alone else layout
-    columns = Columns.found(named(contents.trials), stated, contents.source, needed=("isi",))
-    if len(emg.stretches) != columns.rows:
+    trials = named(contents.trials)
+    if len(emg.stretches) != len(trials):
         raise InvalidValueError(
             f"{contents.source} does not say the ISI of each sweep",
-            got=f"{columns.rows} rows and {len(emg.stretches)} sweeps",
+            got=f"{len(trials)} rows and {len(emg.stretches)} sweeps",
         )
-    rows, keys = columns.chosen(stated), (origin_key(layout), "pulse", "alone")
-    marks = {key: np.array(marked(contents.events, key, layout)) for key in keys}
-    columns.require_said(rows, stated.alone)
+    columns = Columns.found(trials, stated, contents.source, needed=("isi",))
+    require_said(columns)
+    marks = {key: np.array(marked(contents.events, key, layout)) for key in (origin_key(layout), "pulse", "alone")}
     pulses = list[Pulse]()
-    for row in rows:
+    for row in columns.rows:
         if columns.tap_alone(row):
             raise columns["isi"].refused(row, "is of a tap alone, whose sweep has no pulse", "Leave that sweep out.")
-        isi_ms = None if columns.tms_alone(row, stated.alone) else columns["isi"].number(row)
+        isi_ms = None if columns.tms_alone(row) else columns["isi"].number(row)
         isi_s, sweep = None if isi_ms is None else isi_ms / 1e3, emg.stretches[row]
         at_tap = _is_tap(contents, marks, sweep.start_s, row, isi_ms)
         at_s = sweep.start_s + (contents.pulse_at_s or 0.0) + ((isi_s or 0.0) if at_tap else 0.0)
@@ -119,8 +119,7 @@ def _pulses_of_rows(contents: Contents, emg: Track, layout: Layout) -> tuple[lis
         lost = layout.unmarked == "lost" and not columns["isi"].text(row)
         said = {"excluded": columns.lost(row) is not None}
         pulses.append(Pulse(at_s, isi_s, lost=lost, sweep_s=span_s, said=said))
-    require_short([1e3 * pulse.isi_s for pulse in pulses if pulse.isi_s is not None], layout, contents.source)
-    return pulses, columns.unused, _only_one(columns, rows, contents.source)
+    return pulses, tuple(columns.beside), _only_one(columns)
 
 
 def _is_tap(
@@ -157,13 +156,13 @@ def _require_same(what: str, isi_ms: float | None, seen_s: float | None) -> None
         )
 
 
-def _only_one(columns: Columns, rows: Sequence[int], source: str) -> str:
+def _only_one(columns: Columns) -> str:
     """The code of the only person whose sweeps these are; raise if there are several, or several days."""
     for key, what in (("day", "days"), ("subject", "people")):
-        several = {columns[key].text(row): None for row in rows}
+        several = {columns[key].text(row): None for row in columns.rows}
         if len(several) > 1:
             raise InvalidValueError(
-                f"the sweeps of {source} are of several {what}",
+                f"the sweeps of {columns.empty.of} are of several {what}",
                 got=f"{columns[key].name} {', '.join(several)}",
                 remedy=f'Analyse those of each by themselves: --where "{columns[key].name}={next(iter(several))}".',
             )
