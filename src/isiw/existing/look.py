@@ -146,13 +146,14 @@ def _times(at_s: FloatArray) -> str:
 def _triggers(contents: Contents) -> Iterator[tuple[str, FloatArray]]:
     """Channels of two levels, by when they leave the one at which they mostly are [s]."""
     for track in contents.tracks:
-        if track.kind != "emg" and (first := next(track.pieces(), None)) is not None and len(first[2]):
-            values = first[2]
-            low, high = values.min(), values.max()
-            between = (values > low + 0.1 * (high - low)) & (values < high - 0.1 * (high - low))
-            with suppress(IsiwError):  # of levels of which neither is rest
-                if high > low and between.mean() < _TRIGGER and len(at_s := track.onsets_s()) > 1:
-                    yield track.name, np.asarray(at_s)
+        first = None if track.kind == "emg" else next(track.pieces(), None)
+        if first is None:
+            continue
+        low, high = (values := first[1]).min(), values.max()
+        between = (values > low + 0.1 * (high - low)) & (values < high - 0.1 * (high - low))
+        with suppress(IsiwError):  # of levels of which neither is rest
+            if high > low and between.mean() < _TRIGGER and len(at_s := track.onsets_s()) > 1:
+                yield track.name, np.asarray(at_s)
 
 
 def _with_markers(contents: Contents, triggers: Mapping[str, FloatArray], layout: Layout) -> Layout:

@@ -237,12 +237,10 @@ def _cut(
     signals: Mapping[str, Track], span_s: tuple[float, float], pulse_s: float, origin_s: float | None, key: str
 ) -> Sweep:
     """What all channels have of a stretch without a gap, whose clock begins at the first sample of the EMG."""
-    cut: dict[str, Channel] = {}
-    start_s = span_s[0]
+    cut, start_s = dict[str, Channel](), span_s[0]
     for name, track in signals.items():
-        stretch = track.at(pulse_s)
-        if stretch is not None:
-            own_s, values = track.cut(stretch, *span_s)
+        if (found := track.cut(pulse_s, *span_s)) is not None:
+            own_s, values = found
             start_s = own_s if name == "emg" else start_s
             cut[name] = Channel(values, track.rate_hz, "mV" if name == "emg" else "V", 1e3 * (own_s - start_s))
     origin_ms = None if origin_s is None else 1e3 * (origin_s - start_s)
