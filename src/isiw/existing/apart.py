@@ -64,11 +64,9 @@ def read_apart(
         raise passed(path.name, "takes too long to read", None, seconds, " s of processor time")
     if found.get("memory") or status == -getattr(signal, "SIGKILL", 0):  # by the system, if memory is short
         raise passed(path.name, "takes too much memory to read", None, limits.memory_mb, " MB")
-    raise InvalidValueError(
-        f"{path.name} cannot be read: {found.get('fault', 'what reads it ended without an answer')}",
-        got=None if found else f"status {status}",
-        remedy="Is the file damaged? Save it again, as CSV if there is no other way. If it is large, say --larger 2.",
-    )
+    what = f"{path.name} cannot be read: {found.get('fault', 'what reads it ended without an answer')}"
+    remedy = "Is the file damaged? Save it again, as CSV if there is no other way. If it is large, say --larger 2."
+    raise InvalidValueError(what, got=None if found else f"status {status}", remedy=remedy)
 
 
 def _run(request: Mapping[str, Any], most_s: float) -> int | None:

@@ -63,11 +63,9 @@ def way_of(config: RunConfig | None, layout: Layout, *, simulated: bool = False,
     if config is None:
         return Way(layout, simulated=simulated, **reading)
     if config.prior is not None or config.after:
-        raise ConfigError(
-            "an analysis says what the trials themselves tell, and learns from no prior and no earlier session",
-            got=str(config.prior or config.after[0]),
-            remedy="Leave prior and after out of the configuration.",
-        )
+        what = "an analysis says what the trials themselves tell, and learns from no prior and no earlier session"
+        remedy = "Leave prior and after out of the configuration."
+        raise ConfigError(what, got=str(config.prior or config.after[0]), remedy=remedy)
     return Way(
         layout,
         config.space if config.space_named else None,
@@ -95,11 +93,8 @@ def read_files(
         if person.log is None or person.refused is not None:
             continue
         if log_exists(person.log) and not is_there(person):
-            raise LogError(
-                "there is another log already, and it is never overwritten",
-                got=str(person.log),
-                remedy="Choose another path, or move it away.",
-            )
+            what = "there is another log already, and it is never overwritten"
+            raise LogError(what, got=str(person.log), remedy="Choose another path, or move it away.")
     return found
 
 
@@ -108,11 +103,9 @@ def _read(source: Path, way: Way) -> Iterator[Person]:
     if layout.reference is None and way.space is not None:
         layout = replace(layout, reference=way.space.reference)
     if way.space is not None and layout.reference != way.space.reference:
-        raise InvalidValueError(
-            "the reference of the file is not that of the design space",
-            got=(layout.reference, way.space.reference),
-            remedy="ISIs of one cannot be compared with those of the other: correct one of them.",
-        )
+        what = "the reference of the file is not that of the design space"
+        remedy = "ISIs of one cannot be compared with those of the other: correct one of them."
+        raise InvalidValueError(what, got=(layout.reference, way.space.reference), remedy=remedy)
     for delivered in read_people(source, layout, subject=way.subject, limits=way.limits, also=way.also):
         beside = {name: sha256 for name, sha256 in delivered.files.items() if name != source.name}
         digest = delivered.files.get(source.name) or (hash_of(source) if source.is_file() else "")
@@ -137,11 +130,9 @@ def _placed(people: Sequence[Person], output: str | Path | None) -> list[Person]
         return list(people)
     if Path(output).suffix == ".mcap":
         if len(people) > 1:
-            raise InvalidValueError(
-                f"there are trials of {len(people)} people or days, and a log is of one",
-                got=codes_of([one.delivered for one in people]),
-                remedy="Name a folder with --output, or one of them with --only CODE.",
-            )
+            what = f"there are trials of {len(people)} people or days, and a log is of one"
+            remedy = "Name a folder with --output, or one of them with --only CODE."
+            raise InvalidValueError(what, got=codes_of([one.delivered for one in people]), remedy=remedy)
         return [one._replace(log=Path(output)) for one in people]
     days = [f"_day{day}" if (day := one.delivered.visit.day) else "" for one in people]
     stems = [code_in_names(one.delivered.subject) + day for one, day in zip(people, days, strict=True)]

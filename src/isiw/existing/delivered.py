@@ -78,10 +78,8 @@ class Delivered:
             raise InvalidValueError(f"{self.named} has more trials than any session", got=len(self.trials))
         isis_ms = [trial.isi_ms for trial in self.trials if trial.isi_ms is not None]
         if not isis_ms:
-            raise InvalidValueError(
-                f"{self.named} has no pair of stimuli",
-                remedy="Which column holds the ISIs, or which marker is of the tap?",
-            )
+            what = f"{self.named} has no pair of stimuli"
+            raise InvalidValueError(what, remedy="Which column holds the ISIs, or which marker is of the tap?")
         judged = [trial for trial in self.trials if trial.told or trial.reason is Kind.IMPLAUSIBLE]
         meps_mv = [trial.mep_mv for trial in judged if trial.mep_mv is not None]
         self._require_units(isis_ms, meps_mv)
@@ -104,19 +102,14 @@ class Delivered:
         isis_ms = self.isis_ms
         if not isis_ms:
             reasons = sorted({str(trial.reason) for trial in self.trials if trial.reason is not None})
-            raise InvalidValueError(
-                f"no trial of {self.named} counts",
-                got=", ".join(reasons) or None,
-                remedy="A trial counts if it has an ISI and an amplitude, and if no column excludes it.",
-            )
+            remedy = "A trial counts if it has an ISI and an amplitude, and if no column excludes it."
+            raise InvalidValueError(f"no trial of {self.named} counts", got=", ".join(reasons) or None, remedy=remedy)
         lowest, highest = round(min(isis_ms) / step_ms, 6), round(max(isis_ms) / step_ms, 6)  # of times in s, too
         low, high = math.floor(lowest), math.ceil(highest)
         if not 1 <= high - low < MOST_ISIS:
-            raise InvalidValueError(
-                f"the ISIs of {self.named} are {'all the same' if high == low else 'too far apart for a window'}",
-                got=(min(isis_ms), max(isis_ms)),
-                remedy="A window is found among several ISIs. Which column holds them, and in which unit?",
-            )
+            what = f"the ISIs of {self.named} are {'all the same' if high == low else 'too far apart for a window'}"
+            remedy = "A window is found among several ISIs. Which column holds them, and in which unit?"
+            raise InvalidValueError(what, got=(min(isis_ms), max(isis_ms)), remedy=remedy)
         return DesignSpace(low * step_ms, high * step_ms, step_ms, reference=self.reference)
 
     def _require_units(self, isis_ms: Sequence[float], meps_mv: Sequence[float]) -> None:
@@ -147,11 +140,8 @@ class Delivered:
             if self.sweeps
             else f"column holds them, say --column {key}=NAME"
         )
-        return InvalidValueError(
-            f"the {what} of {self.named} cannot be in {stated}",
-            got=got,
-            remedy=f"{said} another {other}.",
-        )
+        what = f"the {what} of {self.named} cannot be in {stated}"
+        return InvalidValueError(what, got=got, remedy=f"{said} another {other}.")
 
 
 def anywhere(reference: Reference) -> DesignSpace:

@@ -88,12 +88,9 @@ def require_of_kind(key: str, what: str, name: str, source: str) -> None:
     """Raise if a column's name says that its numbers are something else, whatever unit is stated."""
     for pattern, are, expected in _OTHERWISE[key]:
         if found := pattern.search(_words(name)):
-            raise InvalidValueError(
-                f"the {what} of {source} in the column {name!r} {are}",
-                got=found[0].strip(),
-                expected=expected,
-                remedy=f"Name the column that holds these: --column {key}=NAME.",
-            )
+            what = f"the {what} of {source} in the column {name!r} {are}"
+            remedy = f"Name the column that holds these: --column {key}=NAME."
+            raise InvalidValueError(what, got=found[0].strip(), expected=expected, remedy=remedy)
 
 
 def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, source: str) -> None:
@@ -146,12 +143,9 @@ def require_no_verdicts(beside: Iterable[Column]) -> None:
 def require_reference(isi: Column, reference: Reference | None) -> None:
     """Raise if the name of ISIs says that they count from another event than the one that is stated."""
     if reference is not None and (found := re.search(_ORIGINS[reference], _words(isi.name))):
-        raise InvalidValueError(
-            f"the column {isi.name!r} of {isi.of} counts from another event than is stated",
-            got=reference,
-            expected=f"what {found[0]!r} says",
-            remedy="Correct --reference, or name the column of the other ISIs: --column isi=NAME.",
-        )
+        what = f"the column {isi.name!r} of {isi.of} counts from another event than is stated"
+        remedy = "Correct --reference, or name the column of the other ISIs: --column isi=NAME."
+        raise InvalidValueError(what, got=reference, expected=f"what {found[0]!r} says", remedy=remedy)
 
 
 def require_short(delivered: Delivered, layout: Layout) -> None:
@@ -217,10 +211,9 @@ def _require_ascending(columns: Columns) -> None:
         times_of([*known.values()]) if odd else [order.number(row) or 0.0 for row in known]
     )  # or of the day, perhaps
     if places != sorted(places):
-        raise InvalidValueError(
-            f"the rows of {order.of} are not in the order of its column {order.name!r}",
-            remedy="Sort them as the trials were delivered, or name the column that says so: --column order=NAME.",
-        )
+        what = f"the rows of {order.of} are not in the order of its column {order.name!r}"
+        remedy = "Sort them as the trials were delivered, or name the column that says so: --column order=NAME."
+        raise InvalidValueError(what, remedy=remedy)
     times = Counter(places)
     repeated = next((text for text, place in zip(known.values(), places, strict=False) if times[place] > 1), None)
     if not odd and repeated is not None:
@@ -302,11 +295,9 @@ def _require_isis(columns: Columns) -> None:
             continue
         frequent = odd <= 0 and (times[odd] >= 2 * max(others.values()) or _is_named(columns, odd))
         if frequent or odd in {-1, -9, -99, -999, 99, 999} or odd > max(499.0, 2 * max(others)):
-            raise InvalidValueError(
-                f"{times[odd]} rows of {isi.of} have the ISI {odd:g} ms, which may stand for TMS alone",
-                expected="what an ISI is, and what is TMS alone",
-                remedy=f"Say --alone {odd / isi.factor:g} if they are TMS alone; if they are pairs, say --alone never.",
-            )
+            what = f"{times[odd]} rows of {isi.of} have the ISI {odd:g} ms, which may stand for TMS alone"
+            remedy = f"Say --alone {odd / isi.factor:g} if they are TMS alone; if they are pairs, say --alone never."
+            raise InvalidValueError(what, expected="what an ISI is, and what is TMS alone", remedy=remedy)
 
 
 def _is_named(columns: Columns, isi_ms: float) -> bool:

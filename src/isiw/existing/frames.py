@@ -188,10 +188,8 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
     """The sheet that is named, or the only one with trials, or the first."""
     library("openpyxl", "import")
     if not content.startswith(b"PK"):
-        raise InvalidValueError(
-            "this is no workbook that can be read, or one with a password",
-            remedy="Save it as .xlsx without a password, or as CSV.",
-        )
+        what = "this is no workbook that can be read, or one with a password"
+        raise InvalidValueError(what, remedy="Save it as .xlsx without a password, or as CSV.")
     book = pd.ExcelFile(io.BytesIO(content), engine="openpyxl")
     if layout.sheet is not None:
         require_one("sheet", "the workbook", layout.sheet, book.sheet_names)
@@ -211,11 +209,9 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
         heads = (
             f"{name} ({', '.join(str(cell) for cell in sheets[name][0] if not is_missing(cell))})" for name in filled
         )
-        raise InvalidValueError(
-            "no sheet of the workbook is known to hold ISIs and amplitudes",
-            got="; ".join(heads),
-            remedy="Say --sheet NAME, and --column isi=NAME --column mep=NAME.",
-        )
+        what = "no sheet of the workbook is known to hold ISIs and amplitudes"
+        remedy = "Say --sheet NAME, and --column isi=NAME --column mep=NAME."
+        raise InvalidValueError(what, got="; ".join(heads), remedy=remedy)
     chosen = (with_trials or filled or list(sheets))[0]
     rows = sheets[chosen]
     _require_whole(book.book, chosen, len(whole[chosen]) - len(rows) + (0 if layout.names else 1))
@@ -240,10 +236,9 @@ def _require_whole(book: Any, sheet: str, head: int) -> None:
     for pattern, are, remedy in (*_SHOWN_OTHERWISE, (crossed, "crossed out", _COUNT)):
         found = dict.fromkeys(int(number) for number in re.findall(pattern.encode(), content))
         if rows := [str(row) for row in found if row > head]:
+            what = f"{counted(len(rows), 'row')} of the sheet {sheet!r} {'is' if len(rows) == 1 else 'are'} {are}"
             raise InvalidValueError(
-                f"{counted(len(rows), 'row')} of the sheet {sheet!r} {'is' if len(rows) == 1 else 'are'} {are}",
-                got=f"row {', '.join(rows[:5])}{' and others' if len(rows) > 5 else ''}",
-                remedy=remedy,
+                what, got=f"row {', '.join(rows[:5])}{' and others' if len(rows) > 5 else ''}", remedy=remedy
             )
 
 
@@ -287,11 +282,9 @@ def of_vectors(arrays: Mapping[str, Any], layout: Layout) -> pd.DataFrame:
     of_isis = {name for name in vectors if name == layout.columns.get("isi") or letters(name) in COLUMNS["isi"]}
     longest = max((len(vectors[name]) for name in of_isis or vectors), default=0)
     if longest == 0:
-        raise InvalidValueError(
-            "the file has no vectors that could be the columns of a table",
-            got=", ".join(arrays) or "nothing that can be read",
-            remedy="Save vectors: save('P01.mat', 'isi_ms', 'mep_mv', '-v7').",
-        )
+        what = "the file has no vectors that could be the columns of a table"
+        remedy = "Save vectors: save('P01.mat', 'isi_ms', 'mep_mv', '-v7')."
+        raise InvalidValueError(what, got=", ".join(arrays) or "nothing that can be read", remedy=remedy)
     chosen = {name: vector for name, vector in vectors.items() if len(vector) == longest}
     units = {name: text for name, text in texts.items() if letters(name).endswith(("unit", "units"))}
     return pd.DataFrame({**chosen, **units})

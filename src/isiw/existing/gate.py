@@ -112,11 +112,8 @@ def require_no_links(path: Path) -> None:
 
         file.visititems_links(look)
     if found:
-        raise InvalidValueError(
-            f"{path.name} refers to other files, and only what is in it is read",
-            got=", ".join(found[:3]),
-            remedy="Save it as one file.",
-        )
+        what = f"{path.name} refers to other files, and only what is in it is read"
+        raise InvalidValueError(what, got=", ".join(found[:3]), remedy="Save it as one file.")
 
 
 def _real(path: Path) -> Path:

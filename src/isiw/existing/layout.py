@@ -141,11 +141,9 @@ class Layout(Checked):
     def required_reference(self, source: str) -> Reference:
         """The event that the ISIs of a file count from, which nobody but the lab knows."""
         if self.reference is None:
-            raise InvalidValueError(
-                f"the event from which the ISIs of {source} count is not stated",
-                expected=missing_reference().expected,
-                remedy="Say --reference impact or --reference valve.",
-            )
+            what = f"the event from which the ISIs of {source} count is not stated"
+            expected = missing_reference().expected
+            raise InvalidValueError(what, expected=expected, remedy="Say --reference impact or --reference valve.")
         return self.reference
 
     def unit_of(self, known: Mapping[str, float]) -> str | None:

@@ -109,11 +109,8 @@ def _chosen(columns: Sequence[Column], layout: Layout) -> list[int]:
         require_one("column", source, name, every)
         texts = [every[name].text(row) for row in range(len(columns[0].cells))]
         if wanted not in {doubts.ALL, *texts}:
-            raise InvalidValueError(
-                f"no row of {source} has this in its column {name!r}",
-                got=wanted,
-                expected=f"one of {', '.join([*dict.fromkeys(texts)][:9])}",
-            )
+            what = f"no row of {source} has this in its column {name!r}"
+            raise InvalidValueError(what, got=wanted, expected=f"one of {', '.join([*dict.fromkeys(texts)][:9])}")
         kept = [row for row in kept if wanted in {doubts.ALL, texts[row]}]
     return kept
 
@@ -159,11 +156,9 @@ def _named(key: str, names: list[str], layout: Layout, source: str) -> str | Non
     rivals = [known for known in found if known == found[0] or (key in _ASKED and (known in _VAGUE) == is_vague)]
     several = [name for known in rivals for name in fitting[known]]
     if len(several) > 1:
-        raise InvalidValueError(
-            f"several columns of {source} may hold the {key}",
-            got=" or ".join(several),
-            remedy=f'Say --column "{key}={several[0]}".' if len(set(several)) > 1 else "Rename one of them.",
-        )
+        what = f"several columns of {source} may hold the {key}"
+        remedy = f'Say --column "{key}={several[0]}".' if len(set(several)) > 1 else "Rename one of them."
+        raise InvalidValueError(what, got=" or ".join(several), remedy=remedy)
     return several[0] if several else None
 
 

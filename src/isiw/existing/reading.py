@@ -132,11 +132,8 @@ def _require_use(layout: Layout, used: Mapping[str, AbstractSet[str] | None], so
             continue
         known = used.get(name, set())
         if known is not None and (odd := value if name not in used else sorted({*value} - known)):
-            raise InvalidValueError(
-                f"{source} is {kind}, and has no use for {name}",
-                got=odd,
-                remedy="Leave it out, or choose its file. If these are samples in columns, say --channel emg=NAME.",
-            )
+            remedy = "Leave it out, or choose its file. If these are samples in columns, say --channel emg=NAME."
+            raise InvalidValueError(f"{source} is {kind}, and has no use for {name}", got=odd, remedy=remedy)
 
 
 def _in_memory(source: Any) -> Contents:

@@ -74,12 +74,8 @@ def required(layout: Layout, key: Literal["rate_hz", "pulse_at_ms"], what: str) 
 def require_rate(stated_hz: float, found_hz: float, where: str, remedy: str = _OF_LAYOUT) -> None:
     """Raise if a sampling rate that is stated is not the one that the file says."""
     if not 0.98 < found_hz / stated_hz < 1.02:
-        raise InvalidValueError(
-            f"the sampling rate is not the one that {where} says",
-            got=f"{stated_hz:g} Hz",
-            expected=f"{found_hz:g} Hz",
-            remedy=remedy,
-        )
+        what = f"the sampling rate is not the one that {where} says"
+        raise InvalidValueError(what, got=f"{stated_hz:g} Hz", expected=f"{found_hz:g} Hz", remedy=remedy)
 
 
 def clock_of(cells: pd.Series, name: str, rate_hz: float) -> tuple[float, dict[int, float]] | None:

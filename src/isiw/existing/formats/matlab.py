@@ -64,9 +64,8 @@ def _require_zero(name: str, times: Any, rate_hz: float, pulse_at_ms: float, sou
     columns.require_rate(rate_hz, clock[0], f"{name!r} of {source}")
     zero_ms = 1e3 / clock[0] * -times[0] * (len(times) - 1) / (times[-1] - times[0])
     if zero_ms > 0 and abs(zero_ms - pulse_at_ms) > 1.5e3 / rate_hz:
+        what = f"the pulse does not come where {name!r} of {source} is 0"
+        remedy = "Correct pulse_at_ms in the layout; if it is right, leave that vector out of the file."
         raise InvalidValueError(
-            f"the pulse does not come where {name!r} of {source} is 0",
-            got=f"{pulse_at_ms:g} ms",
-            expected=f"{zero_ms:g} ms after the first sample",
-            remedy="Correct pulse_at_ms in the layout; if it is right, leave that vector out of the file.",
+            what, got=f"{pulse_at_ms:g} ms", expected=f"{zero_ms:g} ms after the first sample", remedy=remedy
         )

@@ -41,11 +41,10 @@ def _require_whole_markers(path: Path) -> None:
         is_date = kind != "Comment" or len(fields[-1].strip()) >= _DATE
         dated = len(fields) == 5 and fields[1].strip().isdigit() and is_date
         if re.match(r"Mk\d+=", line) and len(fields) > 4 and not dated:
+            what = f"a comma stands in the text of a marker in {markers.name}, where it must be coded"
+            remedy = "Write that into the .vmrk with an editor; what wrote the file left it out."
             raise InvalidValueError(
-                f"a comma stands in the text of a marker in {markers.name}, where it must be coded",
-                got=line.strip(),
-                expected=r"\1 in its place, as BrainVision has it",
-                remedy="Write that into the .vmrk with an editor; what wrote the file left it out.",
+                what, got=line.strip(), expected=r"\1 in its place, as BrainVision has it", remedy=remedy
             )
 
 
