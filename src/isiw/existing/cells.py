@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import chain
 from numbers import Real
 from typing import Any, Final
 
@@ -137,14 +138,17 @@ class Column:
 def with_decimals(columns: Mapping[str, Column], stated: str | None) -> dict[str, Column]:
     """Columns with the decimal sign of each one's texts; one that may also group thousands is asked about."""
     signs = {key: _signs(column) for key, column in columns.items()}
-    all_signs = set[str]().union(*signs.values())
+    all_signs = {*chain.from_iterable(signs.values())}
     usual = stated or (all_signs.pop() if len(all_signs) == 1 else None)
     found = {}
     for key, column in columns.items():
         if stated is not None and signs[key] and stated not in signs[key]:
-            what = f"the column {column.name!r} of {column.of} has another decimal sign than the one that is stated"
-            expected = f"{''.join(signs[key])!r}, as its numbers have"
-            raise InvalidValueError(what, got=stated, expected=expected, remedy="Leave --decimal out, or correct it.")
+            raise InvalidValueError(
+                f"the column {column.name!r} of {column.of} has another decimal sign than the one that is stated",
+                got=stated,
+                expected=f"{''.join(signs[key])!r}, as its numbers have",
+                remedy="Leave --decimal out, or correct it.",
+            )
         if usual is None and not signs[key] and (doubtful := _doubtful(column)):
             raise InvalidValueError(
                 f"the {'comma' if ',' in doubtful else 'point'} in the column {column.name!r} of {column.of} may be a "
@@ -158,31 +162,27 @@ def with_decimals(columns: Mapping[str, Column], stated: str | None) -> dict[str
 
 def _signs(column: Column) -> set[str]:
     """The decimal signs that texts of a column have for certain."""
-    texts = [cell for cell in column.cells if isinstance(cell, str)]
-    return {
-        sign
-        for sign, other in (".,", ",.")
-        if any(
-            sign in text and not math.isnan(_value(text, sign)) and math.isnan(_value(text, other)) for text in texts
-        )
-    }
+    found = set[str]()
+    for text in {cell for cell in column.cells if isinstance(cell, str) and not {*cell}.isdisjoint(".,")}:
+        numbers = {sign: _value(text, sign) for sign in ".,"}
+        found |= {sign for sign, number in numbers.items() if sign in text and not math.isnan(number)
+                  and math.isnan(numbers["," if sign == "." else "."])}  # fmt: skip
+    return found
 
 
 def _doubtful(column: Column) -> str | None:
     """A text whose sign may be a decimal one, or group thousands; whole numbers beside points say that they group."""
     texts = [cell.strip() for cell in column.cells if isinstance(cell, str)]
     doubtful = [text for text in texts if any(grouped.fullmatch(text) for grouped in _GROUPED.values())]
-    if doubtful and ("," in doubtful[0] or any(text.isdigit() for text in texts)):
-        return doubtful[0]
-    return None
+    are_asked = bool(doubtful) and ("," in doubtful[0] or any(text.isdigit() for text in texts))
+    return doubtful[0] if are_asked else None
 
 
 def without_unit_in_cells(name: str, cells: list[Any]) -> tuple[str, list[Any]]:
     """A column whose cells all say the same unit, such as "12.5 ms", as one whose name says it."""
     texts = [cell for cell in cells if not is_missing(cell)]
-    ends = {_NUMBER_BEFORE.sub("", cell.casefold()) if isinstance(cell, str) else "" for cell in texts}
-    (unit,) = ends if len(ends) == 1 else ("",)
-    if unit not in UNIT_WORDS:
+    unit, *others = {_NUMBER_BEFORE.sub("", cell.casefold()) if isinstance(cell, str) else "" for cell in texts} or {""}
+    if others or unit not in UNIT_WORDS:
         return name, cells
     bare = [cell if is_missing(cell) else cell.strip()[: -len(unit)].strip() for cell in cells]
     return f"{name} ({UNIT_WORDS[unit]})", bare

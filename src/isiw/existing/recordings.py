@@ -183,10 +183,10 @@ def _require_same(what: str, isi_ms: float | None, seen_s: float | None) -> None
 
 def _only_one(columns: Columns) -> str:
     """The code of the only person whose sweeps these are; raise if there are several, or several days."""
-    for key, what in (("day", "days"), ("subject", "people")):
+    for key, kind in (("day", "days"), ("subject", "people")):
         several = {columns[key].text(row): None for row in columns.rows}
         if len(several) > 1:
-            what = f"the sweeps of {columns.empty.of} are of several {what}"
+            what = f"the sweeps of {columns.empty.of} are of several {kind}"
             remedy = f'Analyse those of each by themselves: --where "{columns[key].name}={next(iter(several))}".'
             raise InvalidValueError(what, got=f"{columns[key].name} {', '.join(several)}", remedy=remedy)
     return next(iter(several), "")
