@@ -187,12 +187,10 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
         )
     filled = [name for name, rows in sheets.items() if len(rows) > 1]
     if not with_trials and len(filled) > 1:
-        named_cells = (
-            (name, ", ".join(str(cell) for cell in sheets[name][0] if not is_missing(cell))) for name in filled
-        )
+        held = {name: ", ".join(str(cell) for cell in sheets[name][0] if not is_missing(cell)) for name in filled}
         raise InvalidValueError(
             "no sheet of the workbook is known to hold ISIs and amplitudes",
-            got="; ".join(f"{name} ({cells})" for name, cells in each),
+            got="; ".join(f"{name} ({cells})" for name, cells in held.items()),
             remedy="Say --sheet NAME, and --column isi=NAME --column mep=NAME.",
         )
     chosen = (with_trials or filled or list(sheets))[0]
