@@ -1,8 +1,4 @@
-"""Files of other programs are read by a process of its own, whose memory, time and files are limited.
-
-A small file can make a library that reads it take all memory or all time. Here that ends the process that reads, and
-isiw says which limit was reached.
-"""
+"""Files of other programs are read by a process of its own, whose memory, time and files are limited."""
 
 from __future__ import annotations
 
@@ -22,12 +18,11 @@ from isiw.existing import answer, formats
 from isiw.existing.layout import Layout
 from isiw.existing.limits import ReadingLimits, passed, seconds_for
 
-_WAITS: Final = 5.0  # by the clock a process may take so many times its processor time, since it may wait for a disk
-_START_S: Final = 60.0  # so long it may take to start [s]
+_WAITS: Final = 5.0  # by the clock a process may take so many times its processor time: it may wait for a disk
+_START_S: Final = 60.0  # so long it may take to start
 _BYTES_A_ROW: Final = 10  # a row of a table has hardly less
 _CHILD: Final = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from isiw.existing.child import main; main()"
 """What the process runs: it finds what this one finds, and nothing in the folder in which it is started."""
-
 _ONE_THREAD: Final = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 """Each thread of a library for matrices takes memory of its own."""
 
@@ -81,10 +76,9 @@ def _run(request: Mapping[str, Any], most_s: float) -> int | None:
     ) as process:
         try:
             process.communicate(json.dumps(request).encode(), timeout=most_s)
-        except subprocess.TimeoutExpired:
+        except BaseException as error:
             process.kill()
-            return None
-        except BaseException:
-            process.kill()
+            if isinstance(error, subprocess.TimeoutExpired):
+                return None
             raise
     return process.returncode

@@ -28,8 +28,6 @@ if TYPE_CHECKING:  # a file is read, and perhaps refused, before what analyses i
     from isiw.existing.analysis import Analysis
 
 ANALYSED_KEY: Final = "isiw_analyse"  # where a log keeps from which file and how it was made
-
-
 _LONGEST_STEM: Final = 200  # what a file's name may have before its suffix [bytes]; most systems take 255 in all
 
 
@@ -66,17 +64,9 @@ def way_of(config: RunConfig | None, layout: Layout, *, simulated: bool = False,
         what = "an analysis says what the trials themselves tell, and learns from no prior and no earlier session"
         remedy = "Leave prior and after out of the configuration."
         raise ConfigError(what, got=str(config.prior or config.after[0]), remedy=remedy)
-    return Way(
-        layout,
-        config.space if config.space_named else None,
-        config.strategy.name,
-        config.seed,
-        config.strategy.settings,
-        config.visit.subject,
-        config.visit.noted(),
-        simulated,
-        **reading,
-    )
+    visit, own = config.visit, config.strategy
+    space = config.space if config.space_named else None
+    return Way(layout, space, own.name, config.seed, own.settings, visit.subject, visit.noted(), simulated, **reading)
 
 
 def read_files(
@@ -90,11 +80,12 @@ def read_files(
         raise InvalidValueError("no person has this code", got=only, expected=codes)
     found = _placed(people, output)
     for person in found:
-        if person.log is None or person.refused is not None:
-            continue
-        if log_exists(person.log) and not is_there(person):
-            what = "there is another log already, and it is never overwritten"
-            raise LogError(what, got=str(person.log), remedy="Choose another path, or move it away.")
+        if person.log is not None and person.refused is None and log_exists(person.log) and not is_there(person):
+            what, remedy = (
+                "there is another log already, and it is never overwritten",
+                "Choose another path, or move it away.",
+            )
+            raise LogError(what, got=str(person.log), remedy=remedy)
     return found
 
 

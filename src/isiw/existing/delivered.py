@@ -8,7 +8,7 @@ import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final
+from typing import Final, NoReturn
 
 import isiw
 from isiw.checks import MOST_TRIALS
@@ -25,8 +25,7 @@ from isiw.trials import Trial, TrialTable
 from isiw.types import Conditioning, Reference
 from isiw.visit import Visit
 
-LONGEST_ISI_MS: Final = 5000.0
-"""Longer than any interval after which a tap is studied; a larger number is in another unit."""
+LONGEST_ISI_MS: Final = 5000.0  # no tap is studied after a longer interval; a larger number is in another unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,21 +126,19 @@ class Delivered:
         if longest_ms != 0 and not 1 <= longest_ms <= LONGEST_ISI_MS:
             longest = longest_ms / ISI_UNITS_MS[of_isis]
             fits = [unit for unit in ("ms", "s", "us") if 1 <= longest * ISI_UNITS_MS[unit] <= LONGEST_ISI_MS]
-            raise self._in_another_unit("ISIs", "isi", f"at most {longest:g} {of_isis}", of_isis, fits)
+            self._refuse_unit("ISIs", "isi", f"at most {longest:g} {of_isis}", of_isis, fits)
         if implausible_scale(meps_mv) is not None or usual_mv > AMPLITUDE_MV.most:
             usual = usual_mv / EMG_UNITS[of_meps]
             fits = [unit for unit in ("mV", "uV", "V", "nV") if 0.01 <= usual * EMG_UNITS[unit] <= AMPLITUDE_MV.most]
-            raise self._in_another_unit("amplitudes", "mep", f"{usual:.3g} {of_meps} in the median", of_meps, fits)
+            self._refuse_unit("amplitudes", "mep", f"{usual:.3g} {of_meps} in the median", of_meps, fits)
 
-    def _in_another_unit(self, what: str, key: str, got: str, stated: str, fits: Sequence[str]) -> InvalidValueError:
+    def _refuse_unit(self, what: str, key: str, got: str, stated: str, fits: Sequence[str]) -> NoReturn:
         said = f"If they are in {fits[0]}, say --unit {fits[0]}; if" if fits else "If"
-        other = (
-            "channel holds the EMG, say --channel emg=NAME"
-            if self.sweeps
-            else f"column holds them, say --column {key}=NAME"
-        )
+        other = f"column holds them, say --column {key}=NAME"
+        if self.sweeps:
+            other = "channel holds the EMG, say --channel emg=NAME"
         what = f"the {what} of {self.named} cannot be in {stated}"
-        return InvalidValueError(what, got=got, remedy=f"{said} another {other}.")
+        raise InvalidValueError(what, got=got, remedy=f"{said} another {other}.")
 
 
 def anywhere(reference: Reference) -> DesignSpace:

@@ -87,8 +87,7 @@ class ReadingLimits(Checked):
 def seconds_for(limits: ReadingLimits, path: Path, *, table: bool, rows: int = 0) -> float:
     """The processor time for one file, of which so many rows are known [s]."""
     parts = path.rglob("*") if path.is_dir() else path.parent.glob(f"{glob.escape(path.stem)}*")
-    whole = [path] if table else parts  # BrainVision has its samples beside it
-    size = sum(part.stat().st_size for part in whole if part.is_file())
+    size = sum(part.stat().st_size for part in ([path] if table else parts) if part.is_file())  # or samples beside it
     return limits.seconds + size / _BYTES_PER_S[table] + rows / _ROWS_PER_S
 
 
