@@ -81,11 +81,8 @@ def read_files(
     found = _placed(people, output)
     for person in found:
         if person.log is not None and person.refused is None and log_exists(person.log) and not is_there(person):
-            what, remedy = (
-                "there is another log already, and it is never overwritten",
-                "Choose another path, or move it away.",
-            )
-            raise LogError(what, got=str(person.log), remedy=remedy)
+            what = "there is another log already, and it is never overwritten"
+            raise LogError(what, got=str(person.log), remedy="Choose another path, or move it away.")
     return found
 
 
@@ -100,10 +97,9 @@ def _read(source: Path, way: Way) -> Iterator[Person]:
     for delivered in read_people(source, layout, subject=way.subject, limits=way.limits, also=way.also):
         beside = {name: sha256 for name, sha256 in delivered.files.items() if name != source.name}
         digest = delivered.files.get(source.name) or (hash_of(source) if source.is_file() else "")
-        own = delivered.visit
+        own, simulated = delivered.visit, way.simulated or delivered.simulated
         pct_rmt = way.visit.intensity_pct_rmt or own.intensity_pct_rmt
         visit = replace(way.visit, day=own.day or way.visit.day, intensity_pct_rmt=pct_rmt)
-        simulated = way.simulated or delivered.simulated
         made_of = {
             **({"file": source.name, "sha256": digest} | ({"beside": beside} if beside else {})),
             "layout": {key: value for key, value in asdict(layout).items() if value not in (None, {}, ())},
@@ -127,11 +123,11 @@ def _placed(people: Sequence[Person], output: str | Path | None) -> list[Person]
         return [one._replace(log=Path(output)) for one in people]
     days = [f"_day{day}" if (day := one.delivered.visit.day) else "" for one in people]
     stems = [code_in_names(one.delivered.subject) + day for one, day in zip(people, days, strict=True)]
-    times = Counter(map(folded, stems))  # names that are two here may be one file on other computers
-    return [
-        one._replace(log=Path(output) / f"{stem}.mcap", refused=_no_log_of_its_own(stem, times[folded(stem)]))
-        for one, stem in zip(people, stems, strict=True)
-    ]
+    times, found = Counter(map(folded, stems)), []  # names that are two here may be one file on other computers
+    for one, stem in zip(people, stems, strict=True):
+        refused = _no_log_of_its_own(stem, times[folded(stem)])
+        found.append(one._replace(log=Path(output) / f"{stem}.mcap", refused=refused))
+    return found
 
 
 def code_in_names(subject: str) -> str:
@@ -142,10 +138,9 @@ def code_in_names(subject: str) -> str:
 def _no_log_of_its_own(stem: str, times: int) -> InvalidValueError | None:
     """Why a person's log can have no such name; None if it can."""
     if times > 1:
+        what = "two of the people or days would have one log, here or on other systems"
         remedy = "Give each a code, or a day, of their own, that differs in more than capitals."
-        return InvalidValueError(
-            "two of the people or days would have one log, here or on other systems", got=stem, remedy=remedy
-        )
+        return InvalidValueError(what, got=stem, remedy=remedy)
     if len(stem.encode()) > _LONGEST_STEM:
         return InvalidValueError("this code is too long for the name of a log", got=stem, remedy="Give a shorter one.")
     if is_reserved(f"{stem}.mcap"):

@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import chain
 from numbers import Real
 from typing import Any, Final
@@ -128,11 +128,15 @@ class Column:
         whole = not isinstance(cell, str) and _float(cell).is_integer()
         return str(int(cell)) if whole else str(cell).strip()
 
+    @cached_property
+    def texts(self) -> list[str]:
+        """The cells of all rows as texts."""
+        return [self.text(row) for row in range(len(self.cells))]
+
     def refused(self, row: int, why: str, remedy: str) -> InvalidValueError:
         """The error that a cell of a row cannot be read."""
-        return InvalidValueError(
-            f"row {row + 1} of the column {self.name!r} of {self.of} {why}", got=self.cells[row], remedy=remedy
-        )
+        what = f"row {row + 1} of the column {self.name!r} of {self.of} {why}"
+        return InvalidValueError(what, got=self.cells[row], remedy=remedy)
 
 
 def with_decimals(columns: Mapping[str, Column], stated: str | None) -> dict[str, Column]:

@@ -61,16 +61,12 @@ _OTHERWISE: Final = {
     ),
 }  # fmt: skip
 """What the name of a column says of its numbers if they are no amplitudes or ISIs, and what is expected."""
-_POSSIBLE: Final = {"isi": (1.0, LONGEST_ISI_MS), "mep": (AMPLITUDE_MV.least, AMPLITUDE_MV.most)}
-"""Between which ISIs [ms] and amplitudes [mV] are."""
+_POSSIBLE: Final = {"isi": (1.0, LONGEST_ISI_MS), "mep": (AMPLITUDE_MV.least, AMPLITUDE_MV.most)}  # [ms], [mV]
 _FEW: Final = 3
-_ROWS_A_WORD: Final = 4
-_ROWS_A_NUMBER: Final = 6
-"""With fewer rows for each of its words or numbers a column does not tell kinds of trials from each other."""
+_ROWS_A_WORD, _ROWS_A_NUMBER = 4, 6  # with fewer for each a column does not tell kinds of trials from each other
 _FEWEST: Final = 12  # in a table with fewer rows ISIs may come again by chance
 _SHARED: Final = 0.8
-_ONE_SIDED: Final = 8.0
-"""A sweep with an MEP that rises from its median by so many times what it falls below it has one half only."""
+_ONE_SIDED: Final = 8.0  # a sweep has one half only if it rises from its median by so many times what it falls below
 
 
 def _words(name: str) -> str:
@@ -96,18 +92,21 @@ def require_of_kind(key: str, what: str, name: str, source: str) -> None:
 def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, source: str) -> None:
     """Raise if rows are means of several trials: their column says so, or their SDs or numbers are beside them."""
     others = {str(name): frame.iloc[:, place].tolist() for place, name in enumerate(frame.columns) if name != mep.name}
-    spreads = [
-        name for name in others if (words := {*re.findall(r"\w+", _words(name))} - _BESIDE) and words <= _SPREADS
-    ]
-    numbers = [name for name in others if letters(name) in _NUMBERS]
-    counted_in = [name for name in numbers if _are_counts(Column(name, others[name]))]
+    spreads = [name for name in others if set() < {*re.findall(r"\w+", _words(name))} - _BESIDE <= _SPREADS]
+    numbers = {name: Column(name, cells).texts for name, cells in others.items() if letters(name) in _NUMBERS}
+    counted_in = [  # whole numbers of trials from 2 on, few of which differ
+        name for name, texts in numbers.items()
+        if 2 * len({*texts}) <= len(texts) and all(text.isdigit() and int(text) > 1 for text in texts)
+    ]  # fmt: skip
     kinds = [cells for name, cells in others.items() if name != isi.name and 3 * len({*map(str, cells)}) <= len(cells)]
     rows = list(zip(map(str, isi.cells), *(map(str, cells) for cells in kinds), strict=True))
     once = len(rows) > 2 and len({*rows}) == len(rows)
     for name, cells in others.items():
-        if odd := next(filter(_is_sum, {cell for cell in cells if isinstance(cell, str)}), None):
-            remedy = "Delete the row if it is a sum or a mean; if it is a trial, write something else."
-            raise Column(name, cells, of=source).refused(cells.index(odd), "is none of a trial", remedy)
+        for odd in dict.fromkeys(cell for cell in cells if isinstance(cell, str)):
+            word = odd.strip().rstrip(":").casefold()
+            if word in _SPREADS | _SUMS or _MEANS.fullmatch(word):
+                remedy = "Delete the row if it is a sum or a mean; if it is a trial, write something else."
+                raise Column(name, cells, of=source).refused(cells.index(odd), "is none of a trial", remedy)
     title = _TITLES.search(_words(f"{source} {frame.attrs.get('title', '')}")) if once else None
     if title or _MEANS.search(_words(mep.name)) or (spreads and (numbers or once)) or (counted_in and once):
         beside = (spreads or counted_in or ([title[0]] if title else []))[:1]
@@ -117,18 +116,6 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, source:
             expected="a row for each trial, since the scatter of single trials says how sure a window is",
             remedy="Export the single trials; if these are, rename the column.",
         )
-
-
-def _is_sum(cell: str) -> bool:
-    """True if a cell says that its row is of several trials."""
-    word = cell.strip().rstrip(":").casefold()
-    return word in _SPREADS or word in _SUMS or _MEANS.fullmatch(word) is not None
-
-
-def _are_counts(column: Column) -> bool:
-    """True if a column has numbers of trials: whole ones from 2 on, few of which differ."""
-    texts = {column.text(row) for row in range(len(column.cells))}
-    return 2 * len(texts) <= len(column.cells) and all(text.isdigit() and int(text) > 1 for text in texts)
 
 
 def require_no_verdicts(beside: Iterable[Column]) -> None:
@@ -165,12 +152,8 @@ def is_rectified(sweeps: Sequence[FloatArray]) -> list[str]:
     """A sentence, if EMG has one half only: it rises from its level at rest, or falls, whatever that level is."""
     known = [sweep for sweep in sweeps if sweep.size and np.isfinite(sweep).all()]
     largest = sorted(known, key=lambda sweep: float(np.ptp(sweep)))[len(known) // 2 :]
-    one_sided = [
-        max(halves) > _ONE_SIDED * min(halves)
-        for sweep in largest
-        if (halves := (sweep.max() - np.median(sweep), np.median(sweep) - sweep.min()))
-    ]
-    if not known or sum(one_sided) < _SHARED * len(largest):
+    halves = [sorted((sweep.max() - np.median(sweep), np.median(sweep) - sweep.min())) for sweep in largest]
+    if not known or sum(more > _ONE_SIDED * less for less, more in halves) < _SHARED * len(largest):
         return []
     said = "The EMG has no negative half, or no other, as if it was rectified: amplitudes are about half of those from"
     return [f"{said} peak to peak. Choose the channel that was not rectified, if there is one."]
@@ -194,9 +177,8 @@ def require_codes(columns: Columns) -> None:
             remedy = "If NA is a person's code, write another one, such as N.A.; if the code is missing, fill it in."
             raise subject.refused(row, "may be a code, or stand for none", remedy)
     if any(texts.values()) and "" in texts.values():
-        raise subject.refused(
-            [*texts][[*texts.values()].index("")], "is empty", "Write the person's code into each row."
-        )
+        row = next(row for row, text in texts.items() if not text)
+        raise subject.refused(row, "is empty", "Write the person's code into each row.")
 
 
 def _require_ascending(columns: Columns) -> None:

@@ -72,14 +72,14 @@ class Columns:
         columns, of_units = dict[str, Column](), set[str]()
         for key, name in held.items():
             if name is not None:
-                said, cells = without_unit_in_cells(name, frame.iloc[:, names.index(name)].tolist())
                 units = units_beside(key, name, frame)
+                said, cells = without_unit_in_cells(name, frame.iloc[:, names.index(name)].tolist())
                 columns[key] = Column("".join([said, *(f" ({unit})" for unit in units.values())]), cells, of=source)
                 of_units |= units.keys()
         columns, stated = _scaled(columns, layout)
         if (subject := columns.pop("subject", None)) is not None:
             is_id = "subject" not in layout.columns and letters(subject.name) == "id"
-            if is_id and 1 < len(frame) == len({*map(subject.text, range(len(frame)))}):
+            if is_id and 1 < len(frame) == len({*subject.texts}):
                 held["subject"] = None  # each row has one of its own, so that it is of trials and not of people
             else:
                 columns["subject"] = replace(subject, of_codes=True)
@@ -95,7 +95,7 @@ class Columns:
         if (condition := columns.get("condition")) is not None:  # which may tell pairs from each other, too
             alone = ALONE | TAP_ALONE
             of_pairs = replace(condition, cells=["" if plain(str(cell)) in alone else cell for cell in condition.cells])
-            if len({plain(of_pairs.text(row)) for row in range(len(frame))} - {""}) > 1:
+            if len({*map(plain, of_pairs.texts)} - {""}) > 1:
                 beside[condition.name] = of_pairs
         empty = Column("", [None] * len(frame), of=source)
         return cls(columns, _chosen([*columns.values(), *beside.values()], layout), layout, stated, beside, empty)
@@ -103,11 +103,10 @@ class Columns:
 
 def _chosen(columns: Sequence[Column], layout: Layout) -> list[int]:
     """The rows whose cells say what is to be read, as the layout states."""
-    every, source = {column.name: column for column in columns}, columns[0].of
-    kept = [*range(len(columns[0].cells))]
+    every, source, kept = {one.name: one for one in columns}, columns[0].of, [*range(len(columns[0].cells))]
     for name, wanted in layout.where.items():
         require_one("column", source, name, every)
-        texts = [every[name].text(row) for row in range(len(columns[0].cells))]
+        texts = every[name].texts
         if wanted not in {doubts.ALL, *texts}:
             what = f"no row of {source} has this in its column {name!r}"
             raise InvalidValueError(what, got=wanted, expected=f"one of {', '.join([*dict.fromkeys(texts)][:9])}")
@@ -134,10 +133,8 @@ def require_one(kind: str, source: str, stated: str, names: Iterable[object], re
     """Raise if a file has nothing of a kind of the name that is stated, or more than one."""
     known = [str(name) for name in names]
     if stated not in known:
-        remedy = did_you_mean(stated, known) or remedy
-        raise InvalidValueError(
-            f"{source} has no such {kind}", got=stated, expected=f"one of {', '.join(known)}", remedy=remedy
-        )
+        remedy, expected = did_you_mean(stated, known) or remedy, f"one of {', '.join(known)}"
+        raise InvalidValueError(f"{source} has no such {kind}", got=stated, expected=expected, remedy=remedy)
     if known.count(stated) > 1:
         raise InvalidValueError(f"several {kind}s of {source} have this name", got=stated, remedy="Rename them.")
 
@@ -150,11 +147,10 @@ def _named(key: str, names: list[str], layout: Layout, source: str) -> str | Non
         require_one("column", source, stated, names)
         return stated
     free = [(name, letters(name)) for name in names if name not in layout.columns.values()]
-    fitting = {known: [name for name, plain in free if plain == known] for known in COLUMNS[key]}
-    found = [known for known in COLUMNS[key] if fitting[known]]
-    is_vague = bool(found) and found[0] in _VAGUE
-    rivals = [known for known in found if known == found[0] or (key in _ASKED and (known in _VAGUE) == is_vague)]
-    several = [name for known in rivals for name in fitting[known]]
+    found = [(known, name) for known in COLUMNS[key] for name, plain_name in free if plain_name == known]
+    first = found[0][0] if found else ""
+    several = [name for known, name in found
+               if known == first or (key in _ASKED and (known in _VAGUE) == (first in _VAGUE))]  # fmt: skip
     if len(several) > 1:
         what = f"several columns of {source} may hold the {key}"
         remedy = f'Say --column "{key}={several[0]}".' if len(set(several)) > 1 else "Rename one of them."
@@ -190,20 +186,18 @@ def unit_said(name: str, known: Mapping[str, float]) -> str | None:
     found, usual = ([unit for word in words if (unit := UNIT_WORDS.get(word.strip().casefold(), "")) in known]
                     for words in ([*inside, *bare[-1:]], bare))  # fmt: skip
     if len({*found}) > 1:
-        raise InvalidValueError(
-            f"the column {name!r} says two units", got=" and ".join(found), remedy="Leave the right one in its name."
-        )
+        remedy = "Leave the right one in its name."
+        raise InvalidValueError(f"the column {name!r} says two units", got=" and ".join(found), remedy=remedy)
     return next(reversed(found or usual), None)
 
 
 def _required_unit(key: str, what: str, column: Column, layout: Layout, known: Mapping[str, float]) -> str:
     """The column's unit, as it is stated or as its name says, which must not say that it is something else."""
     doubts.require_of_kind(key, what, column.name, column.of)
-    some = ", ".join(filter(None, map(column.text, range(min(5, len(column.cells)))))) or None
     if (other := unit_said(column.name, dict.fromkeys({*UNIT_WORDS.values()} - known.keys(), 1.0))) is not None:
+        what = f"the column {column.name!r} of {column.of} says a unit of no {what}"
         remedy = "Name the right column: --column KEY=NAME; if it is the right one, correct its name."
-        raise InvalidValueError(
-            f"the column {column.name!r} of {column.of} says a unit of no {what}", got=other, remedy=remedy
-        )
+        raise InvalidValueError(what, got=other, remedy=remedy)
+    some = ", ".join(filter(None, column.texts[:5])) or None
     what = f"the {what} of {column.of} in the column {column.name!r}"
     return required_unit(layout, known, unit_said(column.name, known), what, some)
