@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 from isiw.errors import InvalidValueError
-from isiw.existing import Delivered, Layout, ReadingLimits, read_people, reading
+from isiw.existing import Delivered, Layout, ReadingLimits, doubts, read_people
 from isiw.existing.answer import Answer, read_answer, write_answer, write_error
 from isiw.existing.gate import Gate, require_no_links
 from isiw.existing.layout import letters
@@ -157,7 +157,7 @@ def refused_cell() -> None:
 
 def numbered_rows() -> None:
     table = pd.DataFrame({"isi_ms": 10, "mep_mv": 0.3, "trial": range(40_000)})
-    reading._require_ascending(Columns.found(table, IMPACT, "P01.csv"), range(40_000))  # noqa: SLF001 - this part alone
+    doubts._require_ascending(Columns.found(table, IMPACT, "P01.csv"))  # noqa: SLF001 - this part alone
 
 
 @pytest.mark.parametrize(

@@ -43,9 +43,7 @@ from isiw.trials import Status, Trial, TrialTable
 from isiw.types import ArrayLike, FloatArray
 from isiw.visit import Visit
 
-MOST_ESTIMATES: Final = 50
-"""Of a long series of trials the estimate is logged after so many of them, evenly spread, and after the last."""
-
+MOST_ESTIMATES: Final = 50  # of a long series so many are logged, after trials evenly spread, and that of the last
 _END: Final = StopKind.OWN.stop("All trials are analysed. They were delivered without isiw, so no more can follow.")
 _NEVER: Final = 10**9
 
@@ -158,15 +156,9 @@ def analyse(
     isis, meps = _numbers("the ISIs", isi_ms), _numbers("the MEPs", mep_mv)
     if isis.shape != meps.shape or isis.ndim != 1:
         raise InvalidValueError("each trial has one ISI and one MEP", got=(isis.shape, meps.shape))
-    delivered = Delivered(
-        _trials(isis, meps, space),
-        space.reference,
-        subject=subject,
-        visit=visit or Visit(),
-        source="arrays",
-        simulated=simulated,
-    )
-    return analysed(delivered, make_strategy(strategy, space, seed, **settings))
+    table = TrialTable(tuple(_trial(n, *pair, space) for n, pair in enumerate(zip(isis, meps, strict=True))))
+    known = {"subject": subject, "visit": visit or Visit(), "source": "arrays", "simulated": simulated}
+    return analysed(Delivered(table, space.reference, **known), make_strategy(strategy, space, seed, **settings))
 
 
 def _numbers(what: str, values: ArrayLike) -> FloatArray:
@@ -174,21 +166,17 @@ def _numbers(what: str, values: ArrayLike) -> FloatArray:
     try:
         return np.ma.filled(np.ma.array(values, dtype=np.float64), np.nan)
     except (TypeError, ValueError) as error:
-        raise InvalidValueError(
-            f"{what} are not numbers", got=values, remedy="Write NaN for what is missing."
-        ) from error
+        remedy = "Write NaN for what is missing."
+        raise InvalidValueError(f"{what} are not numbers", got=values, remedy=remedy) from error
 
 
-def _trials(isis_ms: FloatArray, meps_mv: FloatArray, space: DesignSpace) -> TrialTable:
-    trials = []
-    for number, (isi, mep) in enumerate(zip(isis_ms.tolist(), meps_mv.tolist(), strict=True)):
-        isi_ms, mep_mv = None if np.isnan(isi) else isi, None if np.isnan(mep) else mep
-        lost = Kind.OUTCOME_UNKNOWN if mep_mv is None else None
-        if isi_ms is not None and before_impact(isi_ms, max(isi_ms, 0.0), space):
-            lost = Kind.TMS_BEFORE_IMPACT
-        status = Status.ACCEPTED if lost is None else Status.MISTRIAL
-        trials.append(Trial(number, status, isi_ms, isi_ms=isi_ms, mep_mv=mep_mv, reason=lost))
-    return TrialTable(tuple(trials))
+def _trial(number: int, isi: float, mep: float, space: DesignSpace) -> Trial:
+    isi_ms, mep_mv = (None if np.isnan(value) else float(value) for value in (isi, mep))
+    lost = Kind.OUTCOME_UNKNOWN if mep_mv is None else None
+    if isi_ms is not None and before_impact(isi_ms, max(isi_ms, 0.0), space):
+        lost = Kind.TMS_BEFORE_IMPACT
+    status = Status.ACCEPTED if lost is None else Status.MISTRIAL
+    return Trial(number, status, isi_ms, isi_ms=isi_ms, mep_mv=mep_mv, reason=lost)
 
 
 def analysed(delivered: Delivered, strategy: Strategy, config: Mapping[str, Any] | None = None) -> Analysis:
@@ -202,13 +190,11 @@ def analysed(delivered: Delivered, strategy: Strategy, config: Mapping[str, Any]
     Raises:
         StrategyError: the strategy has learnt or asked something before, or cannot learn from such trials.
     """
-    header = _header(delivered, strategy, config or {})
-    history = tuple(_history(delivered, strategy, header))
-    name = f"{delivered.subject or 'analysis'}{f'_day{delivered.visit.day}' if delivered.visit.day else ''}"
+    header, day = _header(delivered, strategy, config or {}), delivered.visit.day
     record = SessionRecord(
-        path=Path(f"{name}.mcap"),
+        path=Path(f"{delivered.subject or 'analysis'}{f'_day{day}' if day else ''}.mcap"),
         header=header,
-        history=history,
+        history=tuple(_history(delivered, strategy, header)),
         waveforms={(n, name): channel for n, sweep in delivered.sweeps.items() for name, channel in sweep.items()},
         losses=(),
         finished=True,
@@ -218,27 +204,16 @@ def analysed(delivered: Delivered, strategy: Strategy, config: Mapping[str, Any]
 
 
 def _header(delivered: Delivered, strategy: Strategy, config: Mapping[str, Any]) -> Header:
-    units = {name: channel.unit for sweep in delivered.sweeps.values() for name, channel in sweep.items()}
     device = DeviceInfo(
         "none: the trials were delivered without isiw",
         delivered.reference,
         simulated=delivered.simulated,
-        channels=units,
+        channels={name: channel.unit for sweep in delivered.sweeps.values() for name, channel in sweep.items()},
         conditioning=strategy.recipe.settings.get("conditioning", delivered.conditioning),
     )
     limits = replace(Limits.of_space(strategy.space, min_iti_s=0.0), max_pulses=max(1, len(delivered.trials)))
-    header = header_of(
-        strategy,
-        kind="imported",
-        source=delivered.source,
-        given_by=delivered.given_by,
-        subject=delivered.subject,
-        visit=delivered.visit,
-        device=device,
-        limits=limits,
-        signals=delivered.signals,
-        config=dict(config),
-    )
+    known = {name: getattr(delivered, name) for name in ("source", "given_by", "subject", "visit", "signals")}
+    header = header_of(strategy, kind="imported", device=device, limits=limits, config=dict(config), **known)
     moment = dt.datetime.fromtimestamp(clock_ns() / 1e9, dt.UTC)  # what tells one log of a person from the next
     return header.model_copy(update={"created": delivered.created or moment.isoformat(timespec="microseconds")})
 

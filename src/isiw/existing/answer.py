@@ -6,8 +6,9 @@ Nothing of it can be code: a reader of another library may have been led astray 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import fields, replace
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import fields
 from functools import cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple, get_type_hints
@@ -39,9 +40,9 @@ class _Shown(str):
 
 @cache
 def _person() -> type[BaseModel]:
-    """The fields of `Delivered` but for its waveforms."""
-    hints = get_type_hints(Delivered)
-    known: dict[str, Any] = {one.name: (hints[one.name], ...) for one in fields(Delivered) if one.name != "sweeps"}
+    """The fields of `Delivered` that are written as JSON for each person."""
+    hints, apart = get_type_hints(Delivered), {"sweeps", "files", "unused"}
+    known: dict[str, Any] = {one.name: (hints[one.name], ...) for one in fields(Delivered) if one.name not in apart}
     return create_model("Person", __config__=ConfigDict(ser_json_inf_nan="strings"), **known)
 
 
@@ -54,26 +55,24 @@ class Answer(NamedTuple):
 
 def write_answer(folder: Path, found: Answer, hashes: Mapping[str, str]) -> None:
     """Write what was read into a folder."""
-    written, channels, unused = [], [], dict[tuple[str, ...], int]()
+    channels = []
     with (folder / SAMPLES).open("wb") as samples:
         for number, person in enumerate(found.people):
             for trial, sweep in person.sweeps.items():
-                for name, channel in sweep.items():
-                    np.ascontiguousarray(channel.values, dtype="<f8").tofile(samples)
-                    channels.append([number, trial, name, len(channel.values), channel.rate_hz, channel.unit,
-                                     channel.t0_ms])  # fmt: skip
-            own = _person().model_construct(**{**vars(person), "files": hashes, "unused": ()}).model_dump_json()
-            written.append([own, unused.setdefault(person.unused, len(unused))])  # everybody of a table has the same
-    _write(folder, {"people": written, "unused": [*unused], "channels": channels, "said": found.said})
+                for name, one in sweep.items():
+                    np.ascontiguousarray(one.values, dtype="<f8").tofile(samples)
+                    channels.append([number, trial, name, len(one.values), one.rate_hz, one.unit, one.t0_ms])
+    people = [_person().model_construct(**vars(person)).model_dump_json() for person in found.people]
+    shared = {"files": hashes, "unused": found.people[0].unused if found.people else ()}  # by all people of a file
+    _write(folder, {"people": people, "shared": shared, "channels": channels, "said": found.said})
 
 
 def write_error(folder: Path, error: BaseException) -> None:
     """Write why nothing could be read into a folder."""
     if isinstance(error, IsiwError):
-        kind = next((name for name, known in _KINDS.items() if isinstance(error, known)), "InvalidValueError")
         got = None if error.got is None else errors.shortened(error.got)
         said = {"what": error.what, "got": got, "expected": error.expected, "remedy": error.remedy}
-        _write(folder, {"error": kind, "said": said})
+        _write(folder, {"error": type(error).__name__, "said": said})
     elif isinstance(error, OSError):
         name = None if error.filename is None else str(error.filename)
         _write(folder, {"system": [error.errno, error.strerror or str(error), name]})
@@ -85,30 +84,22 @@ def _write(folder: Path, values: Mapping[str, Any]) -> None:
     (folder / ANSWER).write_text(json.dumps(values), encoding="ascii")
 
 
-def read_answer(folder: Path) -> Answer | Mapping[str, Any]:
+def read_answer(folder: Path) -> Answer | dict[str, Any]:
     """What was read, or what failed in a way that isiw has no words for; an error in words is raised."""
-    values = json.loads((folder / ANSWER).read_text(encoding="ascii"))
+    values: dict[str, Any] = json.loads((folder / ANSWER).read_text(encoding="ascii"))
     if "error" in values:
         said = values["said"]
         said["got"] = None if said["got"] is None else _Shown(said["got"])
-        raise _KINDS[values["error"]](said.pop("what"), **said)
+        raise _KINDS.get(values["error"], errors.InvalidValueError)(said.pop("what"), **said)
     if "system" in values:
         raise OSError(*values["system"])
     if "people" not in values:
-        return dict(values)
-    unused = [tuple(names) for names in values["unused"]]
-    people = [
-        Delivered(**{**dict(_person().model_validate_json(text)), "unused": unused[which]})
-        for text, which in values["people"]
-    ]
-    return Answer(_with_samples(folder / SAMPLES, people, values["channels"]), values["said"])
-
-
-def _with_samples(path: Path, people: Sequence[Delivered], channels: Sequence[Any]) -> list[Delivered]:
-    samples = np.fromfile(path, dtype="<f8")
-    sweeps: list[dict[int, dict[str, Channel]]] = [{} for _ in people]
-    ends = np.cumsum([length for _, _, _, length, *_ in channels])
-    for (person, trial, name, length, rate_hz, unit, t0_ms), end in zip(channels, ends.tolist(), strict=True):
-        channel = Channel(samples[end - length : end], rate_hz, unit, t0_ms)
-        sweeps[person].setdefault(trial, {})[name] = channel
-    return [replace(person, sweeps=theirs) for person, theirs in zip(people, sweeps, strict=True)]
+        return values
+    samples, end = np.fromfile(folder / SAMPLES, dtype="<f8"), 0
+    sweeps: dict[int, dict[int, dict[str, Channel]]] = defaultdict(lambda: defaultdict(dict))
+    for person, trial, name, length, *about in values["channels"]:
+        begin, end = end, end + length
+        sweeps[person][trial][name] = Channel(samples[begin:end], *about)
+    shared = {"files": values["shared"]["files"], "unused": tuple(values["shared"]["unused"])}
+    own = (dict(_person().model_validate_json(text)) for text in values["people"])
+    return Answer([Delivered(**one, **shared, sweeps=sweeps[n]) for n, one in enumerate(own)], values["said"])

@@ -1,8 +1,4 @@
-"""Files of other programs are read by a process of its own, whose memory, time and files are limited.
-
-A small file can make a library that reads it take all memory or all time. Here that ends the process that reads, and
-isiw says which limit was reached.
-"""
+"""Files of other programs are read by a process of its own, whose memory, time and files are limited."""
 
 from __future__ import annotations
 
@@ -22,18 +18,11 @@ from isiw.existing import answer, formats
 from isiw.existing.layout import Layout
 from isiw.existing.limits import ReadingLimits, passed, seconds_for
 
-_WAITS: Final = 5.0
-"""By the clock a process may take so many times its processor time, since it may wait for a disk."""
-
-_START_S: Final = 60.0
-"""So long it may take to start [s]."""
-
-_BYTES_A_ROW: Final = 10
-"""A row of a table has hardly less."""
-
+_WAITS: Final = 5.0  # by the clock a process may take so many times its processor time: it may wait for a disk
+_START_S: Final = 60.0  # so long it may take to start
+_BYTES_A_ROW: Final = 10  # a row of a table has hardly less
 _CHILD: Final = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from isiw.existing.child import main; main()"
 """What the process runs: it finds what this one finds, and nothing in the folder in which it is started."""
-
 _ONE_THREAD: Final = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 """Each thread of a library for matrices takes memory of its own."""
 
@@ -70,11 +59,9 @@ def read_apart(
         raise passed(path.name, "takes too long to read", None, seconds, " s of processor time")
     if found.get("memory") or status == -getattr(signal, "SIGKILL", 0):  # by the system, if memory is short
         raise passed(path.name, "takes too much memory to read", None, limits.memory_mb, " MB")
-    raise InvalidValueError(
-        f"{path.name} cannot be read: {found.get('fault', 'what reads it ended without an answer')}",
-        got=None if found else f"status {status}",
-        remedy="Is the file damaged? Save it again, as CSV if there is no other way. If it is large, say --larger 2.",
-    )
+    what = f"{path.name} cannot be read: {found.get('fault', 'what reads it ended without an answer')}"
+    remedy = "Is the file damaged? Save it again, as CSV if there is no other way. If it is large, say --larger 2."
+    raise InvalidValueError(what, got=None if found else f"status {status}", remedy=remedy)
 
 
 def _run(request: Mapping[str, Any], most_s: float) -> int | None:
@@ -89,10 +76,9 @@ def _run(request: Mapping[str, Any], most_s: float) -> int | None:
     ) as process:
         try:
             process.communicate(json.dumps(request).encode(), timeout=most_s)
-        except subprocess.TimeoutExpired:
+        except BaseException as error:
             process.kill()
-            return None
-        except BaseException:
-            process.kill()
+            if isinstance(error, subprocess.TimeoutExpired):
+                return None
             raise
     return process.returncode

@@ -27,12 +27,8 @@ if TYPE_CHECKING:  # a file is read, and perhaps refused, before what analyses i
     from isiw.config.run import RunConfig
     from isiw.existing.analysis import Analysis
 
-ANALYSED_KEY: Final = "isiw_analyse"
-"""Where a log keeps from which file and how it was made."""
-
-
-_LONGEST_STEM: Final = 200
-"""What a file's name may have before its suffix [bytes]; most systems take 255 in all."""
+ANALYSED_KEY: Final = "isiw_analyse"  # where a log keeps from which file and how it was made
+_LONGEST_STEM: Final = 200  # what a file's name may have before its suffix [bytes]; most systems take 255 in all
 
 
 class Person(NamedTuple):
@@ -65,22 +61,12 @@ def way_of(config: RunConfig | None, layout: Layout, *, simulated: bool = False,
     if config is None:
         return Way(layout, simulated=simulated, **reading)
     if config.prior is not None or config.after:
-        raise ConfigError(
-            "an analysis says what the trials themselves tell, and learns from no prior and no earlier session",
-            got=str(config.prior or config.after[0]),
-            remedy="Leave prior and after out of the configuration.",
-        )
-    return Way(
-        layout,
-        config.space if config.space_named else None,
-        config.strategy.name,
-        config.seed,
-        config.strategy.settings,
-        config.visit.subject,
-        config.visit.noted(),
-        simulated,
-        **reading,
-    )
+        what = "an analysis says what the trials themselves tell, and learns from no prior and no earlier session"
+        remedy = "Leave prior and after out of the configuration."
+        raise ConfigError(what, got=str(config.prior or config.after[0]), remedy=remedy)
+    visit, own = config.visit, config.strategy
+    space = config.space if config.space_named else None
+    return Way(layout, space, own.name, config.seed, own.settings, visit.subject, visit.noted(), simulated, **reading)
 
 
 def read_files(
@@ -94,14 +80,9 @@ def read_files(
         raise InvalidValueError("no person has this code", got=only, expected=codes)
     found = _placed(people, output)
     for person in found:
-        if person.log is None or person.refused is not None:
-            continue
-        if log_exists(person.log) and not is_there(person):
-            raise LogError(
-                "there is another log already, and it is never overwritten",
-                got=str(person.log),
-                remedy="Choose another path, or move it away.",
-            )
+        if person.log is not None and person.refused is None and log_exists(person.log) and not is_there(person):
+            what = "there is another log already, and it is never overwritten"
+            raise LogError(what, got=str(person.log), remedy="Choose another path, or move it away.")
     return found
 
 
@@ -110,18 +91,15 @@ def _read(source: Path, way: Way) -> Iterator[Person]:
     if layout.reference is None and way.space is not None:
         layout = replace(layout, reference=way.space.reference)
     if way.space is not None and layout.reference != way.space.reference:
-        raise InvalidValueError(
-            "the reference of the file is not that of the design space",
-            got=(layout.reference, way.space.reference),
-            remedy="ISIs of one cannot be compared with those of the other: correct one of them.",
-        )
+        what = "the reference of the file is not that of the design space"
+        remedy = "ISIs of one cannot be compared with those of the other: correct one of them."
+        raise InvalidValueError(what, got=(layout.reference, way.space.reference), remedy=remedy)
     for delivered in read_people(source, layout, subject=way.subject, limits=way.limits, also=way.also):
         beside = {name: sha256 for name, sha256 in delivered.files.items() if name != source.name}
         digest = delivered.files.get(source.name) or (hash_of(source) if source.is_file() else "")
-        own = delivered.visit
+        own, simulated = delivered.visit, way.simulated or delivered.simulated
         pct_rmt = way.visit.intensity_pct_rmt or own.intensity_pct_rmt
         visit = replace(way.visit, day=own.day or way.visit.day, intensity_pct_rmt=pct_rmt)
-        simulated = way.simulated or delivered.simulated
         made_of = {
             **({"file": source.name, "sha256": digest} | ({"beside": beside} if beside else {})),
             "layout": {key: value for key, value in asdict(layout).items() if value not in (None, {}, ())},
@@ -139,19 +117,17 @@ def _placed(people: Sequence[Person], output: str | Path | None) -> list[Person]
         return list(people)
     if Path(output).suffix == ".mcap":
         if len(people) > 1:
-            raise InvalidValueError(
-                f"there are trials of {len(people)} people or days, and a log is of one",
-                got=codes_of([one.delivered for one in people]),
-                remedy="Name a folder with --output, or one of them with --only CODE.",
-            )
+            what = f"there are trials of {len(people)} people or days, and a log is of one"
+            remedy = "Name a folder with --output, or one of them with --only CODE."
+            raise InvalidValueError(what, got=codes_of([one.delivered for one in people]), remedy=remedy)
         return [one._replace(log=Path(output)) for one in people]
     days = [f"_day{day}" if (day := one.delivered.visit.day) else "" for one in people]
     stems = [code_in_names(one.delivered.subject) + day for one, day in zip(people, days, strict=True)]
-    times = Counter(map(folded, stems))  # names that are two here may be one file on other computers
-    return [
-        one._replace(log=Path(output) / f"{stem}.mcap", refused=_no_log_of_its_own(stem, times[folded(stem)]))
-        for one, stem in zip(people, stems, strict=True)
-    ]
+    times, found = Counter(map(folded, stems)), []  # names that are two here may be one file on other computers
+    for one, stem in zip(people, stems, strict=True):
+        refused = _no_log_of_its_own(stem, times[folded(stem)])
+        found.append(one._replace(log=Path(output) / f"{stem}.mcap", refused=refused))
+    return found
 
 
 def code_in_names(subject: str) -> str:
@@ -162,10 +138,9 @@ def code_in_names(subject: str) -> str:
 def _no_log_of_its_own(stem: str, times: int) -> InvalidValueError | None:
     """Why a person's log can have no such name; None if it can."""
     if times > 1:
+        what = "two of the people or days would have one log, here or on other systems"
         remedy = "Give each a code, or a day, of their own, that differs in more than capitals."
-        return InvalidValueError(
-            "two of the people or days would have one log, here or on other systems", got=stem, remedy=remedy
-        )
+        return InvalidValueError(what, got=stem, remedy=remedy)
     if len(stem.encode()) > _LONGEST_STEM:
         return InvalidValueError("this code is too long for the name of a log", got=stem, remedy="Give a shorter one.")
     if is_reserved(f"{stem}.mcap"):

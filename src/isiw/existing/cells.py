@@ -7,7 +7,8 @@ import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from itertools import chain
 from numbers import Real
 from typing import Any, Final
 
@@ -37,8 +38,7 @@ _GROUPED: Final = {
 _NUMBER_BEFORE: Final = re.compile(r"^[-+\d.,\s]*(e[-+]?\d+)?\s*")
 _BLANKS: Final = re.compile(r"(?<=\d)[ '\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}](?=\d{3})")
 
-_MANY: Final = 2**16
-"""So many texts are remembered: in a long table most cells are like others."""
+_MANY: Final = 2**16  # so many texts are remembered: in a long table most cells are like others
 
 
 def is_missing(cell: Any) -> bool:
@@ -128,17 +128,21 @@ class Column:
         whole = not isinstance(cell, str) and _float(cell).is_integer()
         return str(int(cell)) if whole else str(cell).strip()
 
+    @cached_property
+    def texts(self) -> list[str]:
+        """The cells of all rows as texts."""
+        return [self.text(row) for row in range(len(self.cells))]
+
     def refused(self, row: int, why: str, remedy: str) -> InvalidValueError:
         """The error that a cell of a row cannot be read."""
-        return InvalidValueError(
-            f"row {row + 1} of the column {self.name!r} of {self.of} {why}", got=self.cells[row], remedy=remedy
-        )
+        what = f"row {row + 1} of the column {self.name!r} of {self.of} {why}"
+        return InvalidValueError(what, got=self.cells[row], remedy=remedy)
 
 
 def with_decimals(columns: Mapping[str, Column], stated: str | None) -> dict[str, Column]:
     """Columns with the decimal sign of each one's texts; one that may also group thousands is asked about."""
     signs = {key: _signs(column) for key, column in columns.items()}
-    all_signs = set[str]().union(*signs.values())
+    all_signs = {*chain.from_iterable(signs.values())}
     usual = stated or (all_signs.pop() if len(all_signs) == 1 else None)
     found = {}
     for key, column in columns.items():
@@ -162,31 +166,27 @@ def with_decimals(columns: Mapping[str, Column], stated: str | None) -> dict[str
 
 def _signs(column: Column) -> set[str]:
     """The decimal signs that texts of a column have for certain."""
-    texts = [cell for cell in column.cells if isinstance(cell, str)]
-    return {
-        sign
-        for sign, other in (".,", ",.")
-        if any(
-            sign in text and not math.isnan(_value(text, sign)) and math.isnan(_value(text, other)) for text in texts
-        )
-    }
+    found = set[str]()
+    for text in {cell for cell in column.cells if isinstance(cell, str) and not {*cell}.isdisjoint(".,")}:
+        numbers = {sign: _value(text, sign) for sign in ".,"}
+        found |= {sign for sign, number in numbers.items() if sign in text and not math.isnan(number)
+                  and math.isnan(numbers["," if sign == "." else "."])}  # fmt: skip
+    return found
 
 
 def _doubtful(column: Column) -> str | None:
     """A text whose sign may be a decimal one, or group thousands; whole numbers beside points say that they group."""
     texts = [cell.strip() for cell in column.cells if isinstance(cell, str)]
     doubtful = [text for text in texts if any(grouped.fullmatch(text) for grouped in _GROUPED.values())]
-    if doubtful and ("," in doubtful[0] or any(text.isdigit() for text in texts)):
-        return doubtful[0]
-    return None
+    are_asked = bool(doubtful) and ("," in doubtful[0] or any(text.isdigit() for text in texts))
+    return doubtful[0] if are_asked else None
 
 
 def without_unit_in_cells(name: str, cells: list[Any]) -> tuple[str, list[Any]]:
     """A column whose cells all say the same unit, such as "12.5 ms", as one whose name says it."""
     texts = [cell for cell in cells if not is_missing(cell)]
-    ends = {_NUMBER_BEFORE.sub("", cell.casefold()) if isinstance(cell, str) else "" for cell in texts}
-    (unit,) = ends if len(ends) == 1 else ("",)
-    if unit not in UNIT_WORDS:
+    unit, *others = {_NUMBER_BEFORE.sub("", cell.casefold()) if isinstance(cell, str) else "" for cell in texts} or {""}
+    if others or unit not in UNIT_WORDS:
         return name, cells
     bare = [cell if is_missing(cell) else cell.strip()[: -len(unit)].strip() for cell in cells]
     return f"{name} ({UNIT_WORDS[unit]})", bare

@@ -13,9 +13,7 @@ from isiw.lazy import pd
 
 _DATE: Final = re.compile(r"(\d{1,2})([./-])(\d{1,2})\2\d{2,4}(?!\d)")
 _ZONE: Final = re.compile(r":.*(z|utc|gmt|[+-]\d\d:?\d\d)\s*$", re.IGNORECASE)
-_FURTHEST_BEHIND: Final = dt.timedelta(hours=12)
-"""Nowhere on Earth is the time of the day further behind UTC."""
-
+_FURTHEST_BEHIND: Final = dt.timedelta(hours=12)  # nowhere on Earth is the time of the day further behind UTC
 _REMEDY: Final = "Write dates as 2026-01-31."
 
 

@@ -8,7 +8,7 @@ import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final
+from typing import Final, NoReturn
 
 import isiw
 from isiw.checks import MOST_TRIALS
@@ -25,8 +25,7 @@ from isiw.trials import Trial, TrialTable
 from isiw.types import Conditioning, Reference
 from isiw.visit import Visit
 
-LONGEST_ISI_MS: Final = 5000.0
-"""Longer than any interval after which a tap is studied; a larger number is in another unit."""
+LONGEST_ISI_MS: Final = 5000.0  # no tap is studied after a longer interval; a larger number is in another unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,10 +77,8 @@ class Delivered:
             raise InvalidValueError(f"{self.named} has more trials than any session", got=len(self.trials))
         isis_ms = [trial.isi_ms for trial in self.trials if trial.isi_ms is not None]
         if not isis_ms:
-            raise InvalidValueError(
-                f"{self.named} has no pair of stimuli",
-                remedy="Which column holds the ISIs, or which marker is of the tap?",
-            )
+            what = f"{self.named} has no pair of stimuli"
+            raise InvalidValueError(what, remedy="Which column holds the ISIs, or which marker is of the tap?")
         judged = [trial for trial in self.trials if trial.told or trial.reason is Kind.IMPLAUSIBLE]
         meps_mv = [trial.mep_mv for trial in judged if trial.mep_mv is not None]
         self._require_units(isis_ms, meps_mv)
@@ -104,19 +101,14 @@ class Delivered:
         isis_ms = self.isis_ms
         if not isis_ms:
             reasons = sorted({str(trial.reason) for trial in self.trials if trial.reason is not None})
-            raise InvalidValueError(
-                f"no trial of {self.named} counts",
-                got=", ".join(reasons) or None,
-                remedy="A trial counts if it has an ISI and an amplitude, and if no column excludes it.",
-            )
+            remedy = "A trial counts if it has an ISI and an amplitude, and if no column excludes it."
+            raise InvalidValueError(f"no trial of {self.named} counts", got=", ".join(reasons) or None, remedy=remedy)
         lowest, highest = round(min(isis_ms) / step_ms, 6), round(max(isis_ms) / step_ms, 6)  # of times in s, too
         low, high = math.floor(lowest), math.ceil(highest)
         if not 1 <= high - low < MOST_ISIS:
-            raise InvalidValueError(
-                f"the ISIs of {self.named} are {'all the same' if high == low else 'too far apart for a window'}",
-                got=(min(isis_ms), max(isis_ms)),
-                remedy="A window is found among several ISIs. Which column holds them, and in which unit?",
-            )
+            what = f"the ISIs of {self.named} are {'all the same' if high == low else 'too far apart for a window'}"
+            remedy = "A window is found among several ISIs. Which column holds them, and in which unit?"
+            raise InvalidValueError(what, got=(min(isis_ms), max(isis_ms)), remedy=remedy)
         return DesignSpace(low * step_ms, high * step_ms, step_ms, reference=self.reference)
 
     def _require_units(self, isis_ms: Sequence[float], meps_mv: Sequence[float]) -> None:
@@ -134,24 +126,19 @@ class Delivered:
         if longest_ms != 0 and not 1 <= longest_ms <= LONGEST_ISI_MS:
             longest = longest_ms / ISI_UNITS_MS[of_isis]
             fits = [unit for unit in ("ms", "s", "us") if 1 <= longest * ISI_UNITS_MS[unit] <= LONGEST_ISI_MS]
-            raise self._in_another_unit("ISIs", "isi", f"at most {longest:g} {of_isis}", of_isis, fits)
+            self._refuse_unit("ISIs", "isi", f"at most {longest:g} {of_isis}", of_isis, fits)
         if implausible_scale(meps_mv) is not None or usual_mv > AMPLITUDE_MV.most:
             usual = usual_mv / EMG_UNITS[of_meps]
             fits = [unit for unit in ("mV", "uV", "V", "nV") if 0.01 <= usual * EMG_UNITS[unit] <= AMPLITUDE_MV.most]
-            raise self._in_another_unit("amplitudes", "mep", f"{usual:.3g} {of_meps} in the median", of_meps, fits)
+            self._refuse_unit("amplitudes", "mep", f"{usual:.3g} {of_meps} in the median", of_meps, fits)
 
-    def _in_another_unit(self, what: str, key: str, got: str, stated: str, fits: Sequence[str]) -> InvalidValueError:
+    def _refuse_unit(self, what: str, key: str, got: str, stated: str, fits: Sequence[str]) -> NoReturn:
         said = f"If they are in {fits[0]}, say --unit {fits[0]}; if" if fits else "If"
-        other = (
-            "channel holds the EMG, say --channel emg=NAME"
-            if self.sweeps
-            else f"column holds them, say --column {key}=NAME"
-        )
-        return InvalidValueError(
-            f"the {what} of {self.named} cannot be in {stated}",
-            got=got,
-            remedy=f"{said} another {other}.",
-        )
+        other = f"column holds them, say --column {key}=NAME"
+        if self.sweeps:
+            other = "channel holds the EMG, say --channel emg=NAME"
+        what = f"the {what} of {self.named} cannot be in {stated}"
+        raise InvalidValueError(what, got=got, remedy=f"{said} another {other}.")
 
 
 def anywhere(reference: Reference) -> DesignSpace:

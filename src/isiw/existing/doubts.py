@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.existing.cells import Column
-from isiw.existing.delivered import LONGEST_ISI_MS
+from isiw.existing.cells import Column, says_alone
+from isiw.existing.dates import times_of
+from isiw.existing.delivered import LONGEST_ISI_MS, Delivered
 from isiw.existing.layout import Layout, letters
 from isiw.findings import AMPLITUDE_MV
 from isiw.lazy import pd
@@ -24,9 +25,7 @@ from isiw.types import FloatArray, Reference
 if TYPE_CHECKING:
     from isiw.existing.quantities import Columns
 
-ALL: Final = "*"
-"""What `where` says of a column whose values are to be analysed together."""
-
+ALL: Final = "*"  # what `where` says of a column whose values are to be analysed together
 _MEANS: Final = re.compile(r"means?|average|avg|median|mittel(wert)?|moyenne|\bn ?= ?\d+")
 _TITLES: Final = re.compile(r"\b(means?|averages?|averaged|avg|mittelwerte?)\b")
 """What the names of files and sheets, and titles, say of means."""
@@ -62,17 +61,12 @@ _OTHERWISE: Final = {
     ),
 }  # fmt: skip
 """What the name of a column says of its numbers if they are no amplitudes or ISIs, and what is expected."""
-_POSSIBLE: Final = {"isi": (1.0, LONGEST_ISI_MS), "mep": (AMPLITUDE_MV.least, AMPLITUDE_MV.most)}
-"""Between which ISIs [ms] and amplitudes [mV] are."""
+_POSSIBLE: Final = {"isi": (1.0, LONGEST_ISI_MS), "mep": (AMPLITUDE_MV.least, AMPLITUDE_MV.most)}  # [ms], [mV]
 _FEW: Final = 3
-_ROWS_A_WORD: Final = 4
-_ROWS_A_NUMBER: Final = 6
-"""With fewer rows for each of its words or numbers a column does not tell kinds of trials from each other."""
-_FEWEST: Final = 12
-"""In a table with fewer rows ISIs may come again by chance."""
+_ROWS_A_WORD, _ROWS_A_NUMBER = 4, 6  # with fewer for each a column does not tell kinds of trials from each other
+_FEWEST: Final = 12  # in a table with fewer rows ISIs may come again by chance
 _SHARED: Final = 0.8
-_ONE_SIDED: Final = 8.0
-"""A sweep with an MEP that rises from its median by so many times what it falls below it has one half only."""
+_ONE_SIDED: Final = 8.0  # a sweep has one half only if it rises from its median by so many times what it falls below
 
 
 def _words(name: str) -> str:
@@ -90,29 +84,29 @@ def require_of_kind(key: str, what: str, name: str, source: str) -> None:
     """Raise if a column's name says that its numbers are something else, whatever unit is stated."""
     for pattern, are, expected in _OTHERWISE[key]:
         if found := pattern.search(_words(name)):
-            raise InvalidValueError(
-                f"the {what} of {source} in the column {name!r} {are}",
-                got=found[0].strip(),
-                expected=expected,
-                remedy=f"Name the column that holds these: --column {key}=NAME.",
-            )
+            what = f"the {what} of {source} in the column {name!r} {are}"
+            remedy = f"Name the column that holds these: --column {key}=NAME."
+            raise InvalidValueError(what, got=found[0].strip(), expected=expected, remedy=remedy)
 
 
 def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, source: str) -> None:
     """Raise if rows are means of several trials: their column says so, or their SDs or numbers are beside them."""
     others = {str(name): frame.iloc[:, place].tolist() for place, name in enumerate(frame.columns) if name != mep.name}
-    spreads = [
-        name for name in others if (words := {*re.findall(r"\w+", _words(name))} - _BESIDE) and words <= _SPREADS
-    ]
-    numbers = [name for name in others if letters(name) in _NUMBERS]
-    counted_in = [name for name in numbers if _are_counts(Column(name, others[name]))]
+    spreads = [name for name in others if set() < {*re.findall(r"\w+", _words(name))} - _BESIDE <= _SPREADS]
+    numbers = {name: Column(name, cells).texts for name, cells in others.items() if letters(name) in _NUMBERS}
+    counted_in = [  # whole numbers of trials from 2 on, few of which differ
+        name for name, texts in numbers.items()
+        if 2 * len({*texts}) <= len(texts) and all(text.isdigit() and int(text) > 1 for text in texts)
+    ]  # fmt: skip
     kinds = [cells for name, cells in others.items() if name != isi.name and 3 * len({*map(str, cells)}) <= len(cells)]
     rows = list(zip(map(str, isi.cells), *(map(str, cells) for cells in kinds), strict=True))
     once = len(rows) > 2 and len({*rows}) == len(rows)
     for name, cells in others.items():
-        if odd := next(filter(_is_sum, {cell for cell in cells if isinstance(cell, str)}), None):
-            remedy = "Delete the row if it is a sum or a mean; if it is a trial, write something else."
-            raise Column(name, cells, of=source).refused(cells.index(odd), "is none of a trial", remedy)
+        for odd in dict.fromkeys(cell for cell in cells if isinstance(cell, str)):
+            word = odd.strip().rstrip(":").casefold()
+            if word in _SPREADS | _SUMS or _MEANS.fullmatch(word):
+                remedy = "Delete the row if it is a sum or a mean; if it is a trial, write something else."
+                raise Column(name, cells, of=source).refused(cells.index(odd), "is none of a trial", remedy)
     title = _TITLES.search(_words(f"{source} {frame.attrs.get('title', '')}")) if once else None
     if title or _MEANS.search(_words(mep.name)) or (spreads and (numbers or once)) or (counted_in and once):
         beside = (spreads or counted_in or ([title[0]] if title else []))[:1]
@@ -122,18 +116,6 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, source:
             expected="a row for each trial, since the scatter of single trials says how sure a window is",
             remedy="Export the single trials; if these are, rename the column.",
         )
-
-
-def _is_sum(cell: str) -> bool:
-    """True if a cell says that its row is of several trials."""
-    word = cell.strip().rstrip(":").casefold()
-    return word in _SPREADS or word in _SUMS or _MEANS.fullmatch(word) is not None
-
-
-def _are_counts(column: Column) -> bool:
-    """True if a column has numbers of trials: whole ones from 2 on, few of which differ."""
-    texts = {column.text(row) for row in range(len(column.cells))}
-    return 2 * len(texts) <= len(column.cells) and all(text.isdigit() and int(text) > 1 for text in texts)
 
 
 def require_no_verdicts(beside: Iterable[Column]) -> None:
@@ -148,20 +130,17 @@ def require_no_verdicts(beside: Iterable[Column]) -> None:
 def require_reference(isi: Column, reference: Reference | None) -> None:
     """Raise if the name of ISIs says that they count from another event than the one that is stated."""
     if reference is not None and (found := re.search(_ORIGINS[reference], _words(isi.name))):
-        raise InvalidValueError(
-            f"the column {isi.name!r} of {isi.of} counts from another event than is stated",
-            got=reference,
-            expected=f"what {found[0]!r} says",
-            remedy="Correct --reference, or name the column of the other ISIs: --column isi=NAME.",
-        )
+        what = f"the column {isi.name!r} of {isi.of} counts from another event than is stated"
+        remedy = "Correct --reference, or name the column of the other ISIs: --column isi=NAME."
+        raise InvalidValueError(what, got=reference, expected=f"what {found[0]!r} says", remedy=remedy)
 
 
-def require_short(isis_ms: Sequence[float], layout: Layout, source: str) -> None:
+def require_short(delivered: Delivered, layout: Layout) -> None:
     """Raise if most ISIs are longer than those after which the effect of a tap is sought."""
-    usual_ms = statistics.median(isis_ms) if isis_ms else 0.0
+    usual_ms = statistics.median(trial.isi_ms for trial in delivered.trials if trial.isi_ms is not None)
     if usual_ms > layout.longest_isi_ms:
         raise InvalidValueError(
-            f"the ISIs of {source} are longer than those of paired stimulation",
+            f"the ISIs of {delivered.source} are longer than those of paired stimulation",
             got=f"{usual_ms:g} ms in the median",
             expected=f"at most {layout.longest_isi_ms:g} ms",
             remedy="Are they in another unit (--unit), or numbers of samples, or times between trials? If they are "
@@ -173,130 +152,94 @@ def is_rectified(sweeps: Sequence[FloatArray]) -> list[str]:
     """A sentence, if EMG has one half only: it rises from its level at rest, or falls, whatever that level is."""
     known = [sweep for sweep in sweeps if sweep.size and np.isfinite(sweep).all()]
     largest = sorted(known, key=lambda sweep: float(np.ptp(sweep)))[len(known) // 2 :]
-    one_sided = [
-        max(halves) > _ONE_SIDED * min(halves)
-        for sweep in largest
-        if (halves := (sweep.max() - np.median(sweep), np.median(sweep) - sweep.min()))
-    ]
-    if not known or sum(one_sided) < _SHARED * len(largest):
+    halves = [sorted((sweep.max() - np.median(sweep), np.median(sweep) - sweep.min())) for sweep in largest]
+    if not known or sum(more > _ONE_SIDED * less for less, more in halves) < _SHARED * len(largest):
         return []
     said = "The EMG has no negative half, or no other, as if it was rectified: amplitudes are about half of those from"
     return [f"{said} peak to peak. Choose the channel that was not rectified, if there is one."]
 
 
-def require_codes(texts: Sequence[str], rows: Sequence[int], columns: Columns) -> None:
-    """Raise if a code NA may be a person's initials, or stand for no code."""
-    others = {text for text in texts if text and text.upper() != "NA"}
-    if (
-        others
-        and len(others) < len(set(texts))
-        and not all(re.fullmatch(r"[A-Za-zÄÖÜäöü]{2,3}", one) for one in others)
-    ):
-        first = next((n for n, text in enumerate(texts) if text.upper() == "NA"), None)
-        if first is not None:
+def require_one_kind_each(columns: Columns) -> None:
+    """Raise if rows are not of one person's single trials of one muscle, in their order and in one unit."""
+    for doubt in (_require_ascending, require_said, _require_one_kind, _require_isis, _require_one_unit,
+                  _require_whole_blocks, _require_one_row_each):  # fmt: skip
+        doubt(columns)
+
+
+def require_codes(columns: Columns) -> None:
+    """Raise if a row has no code of a person and others have, or a code NA that may be initials, or stand for none."""
+    subject = columns["subject"]
+    texts = {row: subject.text(row) for row in columns.rows}
+    others = {text for text in texts.values() if text.upper() not in {"", "NA"}}
+    initials = all(re.fullmatch(r"[A-Za-zÄÖÜäöü]{2,3}", one) for one in others)
+    for row, text in texts.items():
+        if text.upper() == "NA" and others and not initials:
             remedy = "If NA is a person's code, write another one, such as N.A.; if the code is missing, fill it in."
-            raise columns.of["subject"].refused(rows[first], "may be a code, or stand for none", remedy)
+            raise subject.refused(row, "may be a code, or stand for none", remedy)
+    if any(texts.values()) and "" in texts.values():
+        row = next(row for row, text in texts.items() if not text)
+        raise subject.refused(row, "is empty", "Write the person's code into each row.")
 
 
-def require_one_unit(key: str, column: Column, rows: Sequence[int]) -> None:
-    """Raise if some numbers cannot be what they are, are about a thousand times the others, and none lies between."""
-    least, most = _POSSIBLE[key]
-    numbers = np.sort([number for row in rows if (number := column.number(row)) and number > 0])
-    apart = int(np.argmax(np.diff(np.log(numbers)))) + 1 if len(numbers) > 2 * _FEW else 0
-    low, high = numbers[:apart], numbers[apart:]
-    if min(len(low), len(high)) < _FEW or not (low[-1] < least or high[0] > most) or high[0] < 8 * low[-1]:
+def _require_ascending(columns: Columns) -> None:
+    """Raise if the rows are not in the order of delivery, on which drift and the start depend."""
+    if (order := columns.of.get("order")) is None or "block" in columns.of:
         return
-    if 300 < np.median(high) / np.median(low) < 3000:
+    known = {row: text for row in columns.rows if (text := order.text(row))}
+    odd = [row for row, text in known.items() if not re.sub("[.,]", "", text).lstrip("-").isdigit()]
+    if 0 < len(odd) < len(known):
+        raise order.refused(odd[0], "is none of a trial", "Delete the row if it is a sum or a mean.")
+    places = (
+        times_of([*known.values()]) if odd else [order.number(row) or 0.0 for row in known]
+    )  # or of the day, perhaps
+    if places != sorted(places):
+        what = f"the rows of {order.of} are not in the order of its column {order.name!r}"
+        remedy = "Sort them as the trials were delivered, or name the column that says so: --column order=NAME."
+        raise InvalidValueError(what, remedy=remedy)
+    times = Counter(places)
+    repeated = next((text for text, place in zip(known.values(), places, strict=False) if times[place] > 1), None)
+    if not odd and repeated is not None:
         raise InvalidValueError(
-            f"the column {column.name!r} of {column.of} seems to be in two units",
-            got=f"{len(low)} up to {low[-1] / column.factor:g} and {len(high)} from {high[0] / column.factor:g} on",
-            remedy="Write all of them in one.",
+            f"a trial has two rows and more in {order.of}, by its column {order.name!r}",
+            got=repeated,
+            remedy='Leave one row for each trial, such as that of one muscle: --where "muscle=FCR"; or name a column '
+            "of people or blocks: --column subject=NAME, --column block=NAME.",
         )
 
 
-def require_isis(columns: Columns, rows: Sequence[int], layout: Layout) -> None:
-    """Raise if one number among the ISIs is so frequent, or so far from the others, that it may stand for TMS alone."""
-    isi = columns["isi"]
-    isis_ms = [isi.number(row) for row in rows if not columns.tms_alone(row, layout.alone)]
-    if layout.alone is not None or len(isis_ms) < len(rows):
-        return
-    if (
-        "order" not in columns.of
-        and len(isis_ms) >= _FEWEST
-        and isis_ms in (list(range(len(isis_ms))), list(range(1, len(isis_ms) + 1)))
-    ):
-        remedy = (
-            "Name the column of the ISIs: --column isi=NAME; if these are, number the rows in a column called trial."
+def require_said(columns: Columns) -> None:
+    """Raise if it is not stated what rows without an ISI are, or if a row is both a pair and TMS alone."""
+    isi, condition, paired = columns["isi"], columns["condition"], columns.paired
+    both = [row for row in paired if columns.layout.alone is None and says_alone(condition.text(row), None)]
+    if both and not all(says_alone(condition.text(row), None) for row in columns.rows):  # one word in all means nothing
+        raise condition.refused(
+            both[0],
+            f"says TMS alone, and the ISI there is {isi.text(both[0])}",
+            "If it is TMS alone, leave its ISI empty, or say --alone with the number that stands there; if it is a "
+            "pair, rename the column.",
         )
+    of_trials = [
+        row for row in paired if not isi.text(row) and not columns.tap_alone(row) and columns.lost(row) is None
+    ]
+    empty = [row for row in of_trials if "mep" not in columns.of or columns["mep"].number(row) is not None]
+    if empty and "asked" not in columns.of:
         raise InvalidValueError(
-            f"the ISIs of {isi.of} in the column {isi.name!r} are the numbers of rows", remedy=remedy
-        )
-    times = Counter(isi_ms for isi_ms in isis_ms if isi_ms is not None)
-    for odd in {min(times, default=0.0), max(times, default=0.0)}:
-        others = {isi_ms: count for isi_ms, count in times.items() if isi_ms != odd}
-        if times[odd] < 3 or len(others) < 2:
-            continue
-        frequent = odd <= 0 and (times[odd] >= 2 * max(others.values()) or _is_named(columns, rows, odd))
-        if frequent or odd in {-1, -9, -99, -999, 99, 999} or odd > max(499.0, 2 * max(others)):
-            raise InvalidValueError(
-                f"{times[odd]} rows of {isi.of} have the ISI {odd:g} ms, which may stand for TMS alone",
-                expected="what an ISI is, and what is TMS alone",
-                remedy=f"Say --alone {odd / isi.factor:g} if they are TMS alone; if they are pairs, say --alone never.",
-            )
-
-
-def _is_named(columns: Columns, rows: Sequence[int], isi_ms: float) -> bool:
-    """True if a column that is not used has a word for the rows with one ISI that no other row has."""
-    has = {row: columns["isi"].number(row) == isi_ms for row in rows}
-    for column in columns.beside.values():
-        words, others = ({column.text(row) for row in rows if has[row] is of_isi} for of_isi in (True, False))
-        if len(words) == 1 and words.isdisjoint(others) and not next(iter(words)).isdigit():
-            return True
-    return False
-
-
-def require_one_row_each(columns: Columns, rows: Sequence[int], layout: Layout) -> None:
-    """Raise if the ISIs come twice as if each trial had a row a muscle: one after the other, or all of them again."""
-    texts = [columns["isi"].text(row) for row in rows]
-    if "order" in columns.of or layout.where or len(texts) < _FEWEST:
-        return
-    runs = [len([*each]) for _, each in groupby(texts)]
-    times, half = math.gcd(*runs), len(texts) // 2
-    meps = [columns["mep"].text(row) for row in rows]
-    again = (
-        texts[:half] == texts[half:]
-        and (  # neither realised ISIs nor amplitudes come again
-            meps[:half] == meps[half:]
-            or not all(
-                round(columns["isi"].number(row) or 0.0, 3).is_integer()
-                for row in rows
-                if not columns.tms_alone(row, layout.alone)
-            )
-        )
-    )
-    if (times > 1 and len(runs) > len({*texts})) or (again and len({*texts}) > 2):
-        raise InvalidValueError(
-            f"the ISIs of {columns['isi'].of} come {times if times > 1 else 2} times each, as if there was a row for "
-            "each of several muscles, or each row twice",
-            got=", ".join(texts[: 2 * max(times, 2)]),
-            remedy="Leave one row for each trial; if each row is one, number them in a column called trial.",
+            f"{counted(len(empty), 'row has', 'rows have')} an amplitude and no ISI in {isi.of}",
+            got=f"row {empty[0] + 1}",
+            remedy="If these are TMS alone, say --alone with what stands in their place, or --alone '' for an "
+            "empty cell; if not, mark them in a column called exclude.",
         )
 
 
-def require_one_kind(columns: Columns, rows: Sequence[int], layout: Layout, source: str) -> None:
+def _require_one_kind(columns: Columns) -> None:
     """Raise if an unused column has several values at each ISI, as one of muscles, people, sides or conditions has."""
     isi = columns["isi"]
-    placed = [(number, row) for row in rows if not columns.tms_alone(row, layout.alone)
-              and (number := isi.number(row)) is not None]  # fmt: skip
-    by_isi = [row for _, row in sorted(placed)]
+    by_isi = sorted((number, row) for row in columns.paired if (number := isi.number(row)) is not None)
     for name, column in columns.beside.items():
-        if name in layout.where:
-            continue
-        texts = [text for row in by_isi if (text := column.text(row))]
+        texts = [text for _, row in by_isi if (text := column.text(row))]
         are_words = not any(text.replace(".", "").lstrip("-").isdigit() for text in texts)
-        every = Counter(texts)
-        kinds = {text: count for text, count in every.items() if count >= _ROWS_A_WORD or not are_words}
-        if len(kinds) < 2 or sum(kinds.values()) < _SHARED * len(by_isi):
+        kinds = {text: count for text, count in Counter(texts).items() if count >= _ROWS_A_WORD or not are_words}
+        if name in columns.layout.where or len(kinds) < 2 or sum(kinds.values()) < _SHARED * len(by_isi):
             continue
         if not are_words and len(kinds) > len(by_isi) / _ROWS_A_NUMBER:
             continue
@@ -307,8 +250,96 @@ def require_one_kind(columns: Columns, rows: Sequence[int], layout: Layout, sour
         if sum(shares if are_words else (share == 1 for share in shares)) >= _SHARED * len(bins):
             few = ", ".join(list(kinds)[:3]) + (f" and {counted(len(kinds) - 3, 'other')}" if len(kinds) > 3 else "")
             raise InvalidValueError(
-                f"the column {name!r} of {source} has several values at each ISI, and nothing is read of it",
+                f"the column {name!r} of {isi.of} has several values at each ISI, and nothing is read of it",
                 got=few,
                 remedy=f'Say --where "{name}={next(iter(kinds))}" for one of them, --where "{name}={ALL}" if all are '
                 f'to be analysed together, or --column "subject={name}" if they are people.',
             )
+
+
+def _require_isis(columns: Columns) -> None:
+    """Raise if one number among the ISIs is so frequent, or so far from the others, that it may stand for TMS alone."""
+    isi, paired = columns["isi"], columns.paired
+    if columns.layout.alone is not None or len(paired) < len(columns.rows):
+        return
+    isis_ms = [isi.number(row) for row in paired]
+    numbers = (list(range(first, first + len(paired))) for first in (0, 1))
+    if "order" not in columns.of and len(paired) >= _FEWEST and isis_ms in numbers:
+        raise InvalidValueError(
+            f"the ISIs of {isi.of} in the column {isi.name!r} are the numbers of rows",
+            remedy="Name the column of the ISIs: --column isi=NAME; if these are, number the rows in a column called "
+            "trial.",
+        )
+    times = Counter(isi_ms for isi_ms in isis_ms if isi_ms is not None)
+    for odd in {min(times, default=0.0), max(times, default=0.0)}:
+        others = {isi_ms: count for isi_ms, count in times.items() if isi_ms != odd}
+        if times[odd] < 3 or len(others) < 2:
+            continue
+        frequent = odd <= 0 and (times[odd] >= 2 * max(others.values()) or _is_named(columns, odd))
+        if frequent or odd in {-1, -9, -99, -999, 99, 999} or odd > max(499.0, 2 * max(others)):
+            what = f"{times[odd]} rows of {isi.of} have the ISI {odd:g} ms, which may stand for TMS alone"
+            remedy = f"Say --alone {odd / isi.factor:g} if they are TMS alone; if they are pairs, say --alone never."
+            raise InvalidValueError(what, expected="what an ISI is, and what is TMS alone", remedy=remedy)
+
+
+def _is_named(columns: Columns, isi_ms: float) -> bool:
+    """True if a column that is not used has a word for the rows with one ISI that no other row has."""
+    has = {row: columns["isi"].number(row) == isi_ms for row in columns.rows}
+    for column in columns.beside.values():
+        words, others = ({column.text(row) for row in has if has[row] is of_isi} for of_isi in (True, False))
+        if len(words) == 1 and words.isdisjoint(others) and not next(iter(words)).isdigit():
+            return True
+    return False
+
+
+def _require_one_unit(columns: Columns) -> None:
+    """Raise if some numbers cannot be what they are, are about a thousand times the others, and none lies between."""
+    for key, (least, most) in _POSSIBLE.items():
+        column = columns[key]
+        numbers = np.sort([number for row in columns.paired if (number := column.number(row)) and number > 0])
+        apart = int(np.argmax(np.diff(np.log(numbers)))) + 1 if len(numbers) > 2 * _FEW else 0
+        low, high = numbers[:apart], numbers[apart:]
+        if min(len(low), len(high)) < _FEW or not (low[-1] < least or high[0] > most) or high[0] < 8 * low[-1]:
+            continue
+        if 300 < np.median(high) / np.median(low) < 3000:
+            raise InvalidValueError(
+                f"the column {column.name!r} of {column.of} seems to be in two units",
+                got=f"{len(low)} up to {low[-1] / column.factor:g} and {len(high)} from {high[0] / column.factor:g} on",
+                remedy="Write all of them in one.",
+            )
+
+
+def _require_whole_blocks(columns: Columns) -> None:
+    """Raise if a block comes back after another one, as muscles do."""
+    block, seen, last = columns["block"], set[str](), ""
+    for row in columns.rows if block.name not in columns.layout.where else ():
+        text = block.text(row)
+        if text and text != last and text in seen:
+            remedy = f'If it tells muscles apart, say --where "{block.name}={text}", or --where "{block.name}={ALL}".'
+            raise block.refused(row, "comes back after another block", remedy)
+        seen.add(text)
+        last = text
+
+
+def _require_one_row_each(columns: Columns) -> None:
+    """Raise if the ISIs come twice as if each trial had a row a muscle: one after the other, or all of them again."""
+    isi = columns["isi"]
+    texts, meps = ([columns[key].text(row) for row in columns.rows] for key in ("isi", "mep"))
+    if "order" in columns.of or columns.layout.where or len(texts) < _FEWEST:
+        return
+    runs = [len([*each]) for _, each in groupby(texts)]
+    times, half = math.gcd(*runs), len(texts) // 2
+    again = (
+        texts[:half] == texts[half:]
+        and (  # neither realised ISIs nor amplitudes come again
+            meps[:half] == meps[half:]
+            or not all(round(isi.number(row) or 0.0, 3).is_integer() for row in columns.paired)
+        )
+    )
+    if (times > 1 and len(runs) > len({*texts})) or (again and len({*texts}) > 2):
+        raise InvalidValueError(
+            f"the ISIs of {isi.of} come {times if times > 1 else 2} times each, as if there was a row for "
+            "each of several muscles, or each row twice",
+            got=", ".join(texts[: 2 * max(times, 2)]),
+            remedy="Leave one row for each trial; if each row is one, number them in a column called trial.",
+        )

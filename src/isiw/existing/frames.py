@@ -27,14 +27,9 @@ from isiw.text.sanitize import counted
 TEXTS: Final = (".csv", ".tsv", ".txt", ".dat", ".tab")
 WORKBOOKS: Final = (".xlsx", ".xlsm")
 
-_LINES: Final = 100
-"""Within so many lines the columns' names are sought."""
-
-_HEAD: Final = 40
-"""So many bytes show how a text is encoded."""
-
+_LINES: Final = 100  # within so many lines the columns' names are sought
+_HEAD: Final = 40  # so many bytes show how a text is encoded
 _BLANKS: Final = r"\s+"
-
 _COUNT: Final = "If these trials count, show them as the others; if not, mark them in a column called exclude."
 _SHOWN_OTHERWISE: Final = (
     (r'<row (?=[^>/]*hidden="(?:1|true)")[^>/]*?r="(\d+)"[^>/]*>', "hidden", _COUNT),
@@ -44,8 +39,6 @@ _SHOWN_OTHERWISE: Final = (
      "left out by a note", _COUNT),
 )  # fmt: skip
 """In a sheet's XML, rows that Excel shows otherwise than as their cells say, and what to do."""
-
-Rows = Sequence[Sequence[Any]]
 
 
 def read_frame(path: Path, layout: Layout) -> pd.DataFrame:
@@ -64,8 +57,7 @@ def read_frame(path: Path, layout: Layout) -> pd.DataFrame:
 
 def _content(path: Path) -> bytes:
     with opened(path) as file:
-        content: bytes = file.read()
-    return content
+        return file.read()
 
 
 def named(frame: pd.DataFrame | None) -> pd.DataFrame:
@@ -81,10 +73,9 @@ def _texts(content: bytes, layout: Layout) -> pd.DataFrame:
     text = _decoded(content)
     if "\0" in text:
         raise InvalidValueError("the file is no text, and so no table that can be read", remedy="Is it the right one?")
-    every = _lines(text)
+    every = [*io.StringIO(text, newline=None)]  # no other sign ends a line, since it may stand in a cell
     lines = every[layout.skip_lines :]
     first = 0 if layout.names else _first(lines, layout)
-    head = "".join(every[: layout.skip_lines + first])
     title, lines = " ".join(lines[:first]), lines[first:]
     if lines and lines[0].startswith("#"):  # each part of the file begins so, with names of its own
         ends = (n for n, line in enumerate(lines) if n and line.startswith("#"))
@@ -92,23 +83,16 @@ def _texts(content: bytes, layout: Layout) -> pd.DataFrame:
     lines = [line for line in lines if not line.startswith("# ")]
     separator = layout.separator or _separator(lines[0] if lines else "")
     table = _table([row for row in _split(lines, separator) if row], layout, title)
-    table.attrs["head"] = head
+    table.attrs["head"] = "".join(every[: layout.skip_lines + first])
     return table
-
-
-def _lines(text: str) -> list[str]:
-    """The lines of a text; no other sign than the ends of lines ends one, since it may stand in a cell."""
-    *lines, last = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    return [f"{line}\n" for line in lines] + ([last] if last else [])
 
 
 def _first(lines: Sequence[str], layout: Layout) -> int:
     """The line with the columns' names: those below it have as many cells, or at least it has a sign between names."""
     found = []
-    for number in range(min(_LINES, len(lines))):
-        line = lines[number].lstrip("# ")
-        separator = layout.separator or _separator(line)
-        names, *below = _split([line, *lines[number + 1 : number + 3]], separator)
+    for number, line in enumerate(lines[:_LINES]):
+        separator = layout.separator or _separator(line.lstrip("# "))
+        names, *below = _split([line.lstrip("# "), *lines[number + 1 : number + 3]], separator)
         if _is_header(names, layout):
             whole = all(len(row) >= len(names) for row in below if row)
             found.append((not whole, separator == _BLANKS, number))
@@ -119,23 +103,21 @@ def _is_header(cells: Sequence[Any], layout: Layout) -> bool:
     """True if cells are the names of columns, those of ISIs and amplitudes among them."""
     texts = [cell.strip() for cell in cells if isinstance(cell, str)]
     known = {letters(text) for text in texts}
-    stated = [*layout.columns.values(), *layout.channels.values()]
-    return all(name in texts for name in stated) and (
-        bool(layout.channels)
-        or all(key in layout.columns or not known.isdisjoint(COLUMNS[key]) for key in ("isi", "mep"))
-    )
+    if not {*layout.columns.values(), *layout.channels.values()} <= {*texts}:
+        return False
+    of_trials = (key in layout.columns or not known.isdisjoint(COLUMNS[key]) for key in ("isi", "mep"))
+    return bool(layout.channels) or all(of_trials)
 
 
-def _table(rows: Rows, layout: Layout, title: str) -> pd.DataFrame:
+def _table(rows: Sequence[Sequence[Any]], layout: Layout, title: str) -> pd.DataFrame:
     """Rows as a table that knows its title: below the names, or below those that are stated."""
     if not rows and not layout.names:
         raise InvalidValueError("the file is empty, and no table that can be read", remedy="Is it the right one?")
-    head = layout.names or ["" if is_missing(cell) else str(cell).strip() for cell in rows[0]]
-    names, body = [*head], rows if layout.names else rows[1:]
+    names = [*layout.names] or ["" if is_missing(cell) else str(cell).strip() for cell in rows[0]]
+    body = rows if layout.names else rows[1:]
     below = body[0] if body and not layout.names else ()
-    words = [cell.strip().strip("[]()").casefold() if isinstance(cell, str) else "" for cell in below]
-    units = [UNIT_WORDS.get(word) for word in words]
-    if any(units) and all(unit or is_missing(cell) for unit, cell in zip(units, body[0], strict=True)):
+    units = [UNIT_WORDS.get(str(cell).strip().strip("[]()").casefold()) for cell in below]
+    if any(units) and all(unit or is_missing(cell) for unit, cell in zip(units, below, strict=True)):
         names = [f"{name} ({unit})" if unit else name for name, unit in zip(names, units, strict=False)]
         body = body[1:]
     if not body:
@@ -143,24 +125,18 @@ def _table(rows: Rows, layout: Layout, title: str) -> pd.DataFrame:
     numbered = all(len(row) == len(names) + 1 and str(row[0]) == str(n) for n, row in enumerate(body, 1))
     if numbered and not all(is_missing(row[-1]) for row in body):  # those end with the sign that separates cells
         body = [row[1:] for row in body]  # R numbers its rows without naming the column of these numbers
-    table = pd.DataFrame([_cells(row, names, number) for number, row in enumerate(body, 1)], columns=names)
+    for number, row in enumerate(body, 1):
+        if not all(is_missing(cell) for cell in row[len(names) :]):
+            raise InvalidValueError(
+                f"row {number} has {len(row)} cells, but there are {len(names)} names, so that this is no table that "
+                "can be read",
+                got=" | ".join(map(str, row[: len(names) + 2])),
+                remedy="Is a decimal comma also what separates the cells? Save the file with another separator.",
+            )
+    cells = [[*row[: len(names)], *[""] * (len(names) - len(row))] for row in body]
+    table = pd.DataFrame(cells, columns=names)
     table.attrs["title"] = title
     return table
-
-
-def _cells(row: Sequence[Any], names: Sequence[str], number: int) -> list[Any]:
-    """As many cells of a row as there are names."""
-    over = len(row) - len(names)
-    if over > 0 and all(is_missing(cell) for cell in row[len(names) :]):
-        return list(row[: len(names)])
-    if over > 0:
-        raise InvalidValueError(
-            f"row {number} has {len(row)} cells, but there are {len(names)} names, so that this is no table that "
-            "can be read",
-            got=" | ".join(map(str, row[: len(names) + 2])),
-            remedy="Is a decimal comma also what separates the cells? Save the file with another separator.",
-        )
-    return [*row, *[""] * -over]
 
 
 def _decoded(content: bytes) -> str:
@@ -192,19 +168,18 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
     """The sheet that is named, or the only one with trials, or the first."""
     library("openpyxl", "import")
     if not content.startswith(b"PK"):
-        raise InvalidValueError(
-            "this is no workbook that can be read, or one with a password",
-            remedy="Save it as .xlsx without a password, or as CSV.",
-        )
+        what = "this is no workbook that can be read, or one with a password"
+        raise InvalidValueError(what, remedy="Save it as .xlsx without a password, or as CSV.")
     book = pd.ExcelFile(io.BytesIO(content), engine="openpyxl")
     if layout.sheet is not None:
         require_one("sheet", "the workbook", layout.sheet, book.sheet_names)
-    sheets, whole = dict[str, list[list[Any]]](), dict[str, list[list[Any]]]()
-    for name in [layout.sheet] if layout.sheet is not None else book.sheet_names:
+    sheets, heads = dict[str, list[list[Any]]](), dict[str, int]()
+    for name in [layout.sheet] if layout.sheet is not None else map(str, book.sheet_names):
         cells = book.parse(name, header=None, dtype=object, keep_default_na=False).to_numpy().tolist()
-        whole[str(name)], rows = cells, cells[layout.skip_lines :]
+        rows = cells[layout.skip_lines :]
         first = next((n for n, row in enumerate(rows[:_LINES]) if _is_header(row, layout)), 0)
-        sheets[str(name)] = rows if layout.names else rows[first:]
+        sheets[name] = rows if layout.names else rows[first:]
+        heads[name] = len(cells) - len(sheets[name]) + (0 if layout.names else 1)
     with_trials = [name for name, rows in sheets.items() if rows and _is_header(rows[0], layout)]
     if len(with_trials) > 1:
         raise InvalidValueError(
@@ -212,22 +187,20 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
         )
     filled = [name for name, rows in sheets.items() if len(rows) > 1]
     if not with_trials and len(filled) > 1:
-        heads = (
-            f"{name} ({', '.join(str(cell) for cell in sheets[name][0] if not is_missing(cell))})" for name in filled
-        )
+        held = {name: ", ".join(str(cell) for cell in sheets[name][0] if not is_missing(cell)) for name in filled}
         raise InvalidValueError(
             "no sheet of the workbook is known to hold ISIs and amplitudes",
-            got="; ".join(heads),
+            got="; ".join(f"{name} ({cells})" for name, cells in held.items()),
             remedy="Say --sheet NAME, and --column isi=NAME --column mep=NAME.",
         )
     chosen = (with_trials or filled or list(sheets))[0]
     rows = sheets[chosen]
-    _require_whole(book.book, chosen, len(whole[chosen]) - len(rows) + (0 if layout.names else 1))
+    _require_whole(book.book, chosen, heads[chosen])
     for cells in islice(book.book[chosen].iter_rows(), _LINES) if rows else ():
         shown = [_shown_in(cell.number_format) if isinstance(cell.value, int | float) else "" for cell in cells]
         if any(shown):  # Excel shows 1.2 as 120 %
-            rows[0] = [f"{name} ({unit})" if unit else name
-                       for name, unit in zip_longest(rows[0], shown[: len(rows[0])])]  # fmt: skip
+            pairs = zip_longest(rows[0], shown[: len(rows[0])])
+            rows[0] = [f"{name} ({unit})" if unit else name for name, unit in pairs]
             break
     return _table(rows, layout, chosen)
 
@@ -244,10 +217,9 @@ def _require_whole(book: Any, sheet: str, head: int) -> None:
     for pattern, are, remedy in (*_SHOWN_OTHERWISE, (crossed, "crossed out", _COUNT)):
         found = dict.fromkeys(int(number) for number in re.findall(pattern.encode(), content))
         if rows := [str(row) for row in found if row > head]:
+            what = f"{counted(len(rows), 'row')} of the sheet {sheet!r} {'is' if len(rows) == 1 else 'are'} {are}"
             raise InvalidValueError(
-                f"{counted(len(rows), 'row')} of the sheet {sheet!r} {'is' if len(rows) == 1 else 'are'} {are}",
-                got=f"row {', '.join(rows[:5])}{' and others' if len(rows) > 5 else ''}",
-                remedy=remedy,
+                what, got=f"row {', '.join(rows[:5])}{' and others' if len(rows) > 5 else ''}", remedy=remedy
             )
 
 
@@ -273,13 +245,11 @@ def _flat(values: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], Any]]:
     """The arrays in structures by their path; of a structure for each trial, the values of each of its fields."""
     for name, value in values.items():
         each = list(value) if isinstance(value, list) or (isinstance(value, np.ndarray) and value.ndim == 1) else []
+        inner = value if isinstance(value, dict) else {}
         if each and all(isinstance(one, dict) for one in each):
             inner = {key: [one.get(key, np.nan) for one in each] for key in each[0]}
-        else:
-            inner = value if isinstance(value, dict) else {}
-        if inner:
-            yield from (((name, *path), array) for path, array in _flat(inner))
-        else:
+        yield from (((name, *path), array) for path, array in _flat(inner))
+        if not inner:
             yield (name,), np.asarray(value)
 
 
@@ -291,11 +261,8 @@ def of_vectors(arrays: Mapping[str, Any], layout: Layout) -> pd.DataFrame:
     of_isis = {name for name in vectors if name == layout.columns.get("isi") or letters(name) in COLUMNS["isi"]}
     longest = max((len(vectors[name]) for name in of_isis or vectors), default=0)
     if longest == 0:
-        raise InvalidValueError(
-            "the file has no vectors that could be the columns of a table",
-            got=", ".join(arrays) or "nothing that can be read",
-            remedy="Save vectors: save('P01.mat', 'isi_ms', 'mep_mv', '-v7').",
-        )
-    chosen = {name: vector for name, vector in vectors.items() if len(vector) == longest}
+        what = "the file has no vectors that could be the columns of a table"
+        remedy = "Save vectors: save('P01.mat', 'isi_ms', 'mep_mv', '-v7')."
+        raise InvalidValueError(what, got=", ".join(arrays) or "nothing that can be read", remedy=remedy)
     units = {name: text for name, text in texts.items() if letters(name).endswith(("unit", "units"))}
-    return pd.DataFrame({**chosen, **units})
+    return pd.DataFrame({**{name: vector for name, vector in vectors.items() if len(vector) == longest}, **units})

@@ -17,12 +17,8 @@ from isiw.files import opened
 from isiw.text.named_code import library
 
 _HDF5: Final = b"\x89HDF\r\n\x1a\n"
-_HDF5_AT: Final = (0, 512)
-"""Where a file of HDF5 begins: MATLAB's have a text of their own before it."""
-
-
-_NOTHING: Final = Path(os.devnull)
-"""Which libraries open as they ask the system what it is, and which holds nothing."""
+_HDF5_AT: Final = 512  # where a file of HDF5 may begin, too: MATLAB's have a text of their own before it
+_NOTHING: Final = Path(os.devnull)  # which libraries open as they ask the system what it is, and which holds nothing
 
 
 class Gate:
@@ -33,8 +29,8 @@ class Gate:
     """
 
     def __init__(self, source: Path, also: Iterable[Path] = (), own: Iterable[Path] = ()) -> None:
-        self.source = source
-        self._folder = _real(source if source.is_dir() else source.parent)
+        self.source, self._is_folder = source, source.is_dir()
+        self._folder = _real(source if self._is_folder else source.parent)
         self._named = {_real(source), *map(_real, also)}
         self._code = [*map(_real, map(Path, _code_folders())), *map(_real, own)]  # a library has settings of its own
         self.read: dict[Path, None] = {}
@@ -51,30 +47,22 @@ class Gate:
             mode = path.stat().st_mode
         except (OSError, ValueError):  # whoever opens it sees that it is not there
             return
-        if stat.S_ISDIR(mode):
-            return
         real = _real(path)
-        if real == _NOTHING or any(real.is_relative_to(folder) for folder in self._code):
+        if stat.S_ISDIR(mode) or real == _NOTHING or any(real.is_relative_to(folder) for folder in self._code):
             return
-        if not self._may_be_read(real):
-            self.refused = self._elsewhere(path)
-            raise self.refused
-        if not stat.S_ISREG(mode):
+        inside = real.is_relative_to(self._folder) if self._is_folder else real.parent == self._folder
+        if not (inside or real in self._named):
+            self.refused = InvalidValueError(
+                f"{self.source.name} refers to a file elsewhere, and only files of its own folder are read",
+                got=str(path),
+                remedy="If it belongs to it, put it into that folder, or name it: --also FILE (in Python also=[FILE]).",
+            )
+        elif not stat.S_ISREG(mode):
             self.refused = InvalidValueError(f"a file of {self.source.name} is no regular file", got=str(path))
-            raise self.refused
-        self.read[real] = None
-
-    def _may_be_read(self, real: Path) -> bool:
-        if real in self._named or real.parent == self._folder:
-            return True
-        return self.source.is_dir() and real.is_relative_to(self._folder)
-
-    def _elsewhere(self, path: Path) -> InvalidValueError:
-        return InvalidValueError(
-            f"{self.source.name} refers to a file elsewhere, and only files of its own folder are read",
-            got=str(path),
-            remedy="If it belongs to it, put it into that folder, or name it: --also FILE (in Python also=[FILE]).",
-        )
+        else:
+            self.read[real] = None
+            return
+        raise self.refused
 
     def require_nothing_refused(self) -> None:
         """Raise if a file was refused, also if the library that wanted it went on without."""
@@ -83,11 +71,11 @@ class Gate:
 
     def hashes(self) -> dict[str, str]:
         """The SHA-256 of each file that was read, by its name, and below a folder that is the source by its path."""
-        found = {}
-        for path in sorted({*self.read, *({_real(self.source)} if self.source.is_file() else ())}):
-            inside = self.source.is_dir() and path.is_relative_to(self._folder)
+        found, source = dict[str, str](), _real(self.source)
+        for path in sorted({*self.read, *(() if self._is_folder else (source,))}):
+            inside = self._is_folder and path.is_relative_to(self._folder)
             name = path.relative_to(self._folder).as_posix() if inside else path.name
-            name = self.source.name if path == _real(self.source) else name
+            name = self.source.name if path == source else name
             while name in found:  # files of one name in several folders
                 name += "'"
             found[name] = hash_of(path)
@@ -102,7 +90,11 @@ def hash_of(path: Path) -> str:
 
 def require_no_links(path: Path) -> None:
     """Raise if a file of HDF5 says that parts of it are in other files, which its library opens past any hook."""
-    if not path.is_file() or not _is_hdf5(path):
+    if not path.is_file():
+        return
+    with opened(path) as file:
+        head = file.read(_HDF5_AT + len(_HDF5))
+    if not (head.startswith(_HDF5) or head.endswith(_HDF5)):
         return
     try:
         h5py = library("h5py", "import")
@@ -112,26 +104,16 @@ def require_no_links(path: Path) -> None:
         found: list[str] = []
 
         def look(name: str, link: Any) -> None:
+            thing = file.get(name) if isinstance(link, h5py.HardLink) else None
             if isinstance(link, h5py.ExternalLink):
                 found.append(f"{name} in {link.filename}")
-                return
-            thing = file.get(name) if isinstance(link, h5py.HardLink) else None
-            if isinstance(thing, h5py.Dataset) and (thing.external or thing.is_virtual):
+            elif isinstance(thing, h5py.Dataset) and (thing.external or thing.is_virtual):
                 found.append(name)
 
         file.visititems_links(look)
     if found:
-        raise InvalidValueError(
-            f"{path.name} refers to other files, and only what is in it is read",
-            got=", ".join(found[:3]),
-            remedy="Save it as one file.",
-        )
-
-
-def _is_hdf5(path: Path) -> bool:
-    with opened(path) as file:
-        head = file.read(max(_HDF5_AT) + len(_HDF5))
-    return any(head[at:].startswith(_HDF5) for at in _HDF5_AT)
+        what = f"{path.name} refers to other files, and only what is in it is read"
+        raise InvalidValueError(what, got=", ".join(found[:3]), remedy="Save it as one file.")
 
 
 def _real(path: Path) -> Path:

@@ -16,11 +16,7 @@ from isiw.text.toml_files import checked, read_toml
 from isiw.types import Reference
 
 ISI_UNITS_MS: Final[Mapping[str, float]] = {"ms": 1.0, "s": 1e3, "us": 1e-3, "µs": 1e-3, "μs": 1e-3}
-"""One of each unit in ms."""
-
-EMG_UNITS: Final[Mapping[str, float]] = {**EMG_UNITS_MV, "nV": 1e-6}
-"""One of each unit that files of others have, in mV."""
-
+EMG_UNITS: Final[Mapping[str, float]] = {**EMG_UNITS_MV, "nV": 1e-6}  # in mV
 _WORDS: Final = {
     "ms": "ms msec msecs millisec millisecond milliseconds millisekunden",
     "s": "s sec secs second seconds sekunden",
@@ -141,11 +137,9 @@ class Layout(Checked):
     def required_reference(self, source: str) -> Reference:
         """The event that the ISIs of a file count from, which nobody but the lab knows."""
         if self.reference is None:
-            raise InvalidValueError(
-                f"the event from which the ISIs of {source} count is not stated",
-                expected=missing_reference().expected,
-                remedy="Say --reference impact or --reference valve.",
-            )
+            what = f"the event from which the ISIs of {source} count is not stated"
+            expected = missing_reference().expected
+            raise InvalidValueError(what, expected=expected, remedy="Say --reference impact or --reference valve.")
         return self.reference
 
     def unit_of(self, known: Mapping[str, float]) -> str | None:

@@ -6,6 +6,7 @@ import glob
 import math
 import os
 import re
+import time
 import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
@@ -23,27 +24,14 @@ try:
 except ImportError:  # on Windows
     resource = None  # type: ignore[assignment]
 
-_BYTES_PER_S: Final = {True: 1e6, False: 4e6}
-"""A table has a second more for each so many bytes, and a recording."""
-
-_ROWS_PER_S: Final = 2e3
-"""A second more for each so many rows, once they are read: a trial is made of each."""
-
-_SIGNS: Final = (b"\t", b";", b",", b"|")
-"""What separates the cells of a text."""
-
-_BLANKS: Final = re.compile(rb"\s\S")
-"""Or else blanks do."""
-
-_BYTES_PER_SIGN: Final = 4
-"""A character takes no more."""
-
+_BYTES_PER_S: Final = {True: 1e6, False: 4e6}  # a table has a second more for each so many bytes, and a recording
+_ROWS_PER_S: Final = 2e3  # a second more for each so many rows, once they are read: a trial is made of each
+_SIGNS: Final = (b"\t", b";", b",", b"|")  # what separates the cells of a text
+_BLANKS: Final = re.compile(rb"\s\S")  # or else blanks do
+_BYTES_PER_SIGN: Final = 4  # a character takes no more
 _FIRST_LINES: Final = 100
-
 _CHUNK: Final = 2**20
-
-LARGEST_FACTOR: Final = 1e6
-"""By which limits are multiplied at most, so that each remains a number."""
+LARGEST_FACTOR: Final = 1e6  # by which limits are multiplied at most, so that each remains a number
 
 
 @dataclass(frozen=True)
@@ -99,8 +87,7 @@ class ReadingLimits(Checked):
 def seconds_for(limits: ReadingLimits, path: Path, *, table: bool, rows: int = 0) -> float:
     """The processor time for one file, of which so many rows are known [s]."""
     parts = path.rglob("*") if path.is_dir() else path.parent.glob(f"{glob.escape(path.stem)}*")
-    whole = [path] if table else parts  # BrainVision has its samples beside it
-    size = sum(part.stat().st_size for part in whole if part.is_file())
+    size = sum(part.stat().st_size for part in ([path] if table else parts) if part.is_file())  # or samples beside it
     return limits.seconds + size / _BYTES_PER_S[table] + rows / _ROWS_PER_S
 
 
@@ -124,19 +111,14 @@ def require_file(limits: ReadingLimits, path: Path, *, text: bool) -> None:
         if size > 1e6 * limits.file_mb:
             raise passed(path.name, "is too large", f"{size / 1e6:.0f} MB", limits.file_mb, " MB")
         if file.read(2) == b"PK":
-            _require_parts(limits, path.name, file)
+            try:
+                unpacked_mb = sum(part.file_size for part in zipfile.ZipFile(file).infolist()) / 1e6
+            except (zipfile.BadZipFile, ValueError, NotImplementedError):  # its reader says what is wrong
+                return
+            if unpacked_mb > limits.unpacked_mb:
+                raise passed(path.name, "unpacks to too much", f"{unpacked_mb:.0f} MB", limits.unpacked_mb, " MB")
         elif text:
             _require_lines(limits, path.name, file)
-
-
-def _require_parts(limits: ReadingLimits, source: str, file: IO[bytes]) -> None:
-    try:
-        with zipfile.ZipFile(file) as packed:
-            unpacked_mb = sum(part.file_size for part in packed.infolist()) / 1e6
-    except (zipfile.BadZipFile, ValueError, NotImplementedError):  # its reader says what is wrong
-        return
-    if unpacked_mb > limits.unpacked_mb:
-        raise passed(source, "unpacks to too much", f"{unpacked_mb:.0f} MB", limits.unpacked_mb, " MB")
 
 
 def _require_lines(limits: ReadingLimits, source: str, file: IO[bytes]) -> None:
@@ -145,14 +127,11 @@ def _require_lines(limits: ReadingLimits, source: str, file: IO[bytes]) -> None:
     while chunk := file.read(_CHUNK):
         for end in lines:
             lines[end] += chunk.count(end)
-    if (most := max(lines.values())) > limits.lines:
-        raise passed(source, "has too many lines", most, limits.lines)
+    _require_most(source, ("has too many lines", max(lines.values()), limits.lines))
     file.seek(0)
-    for _ in range(_FIRST_LINES):
-        line = file.readline()
+    for line in islice(file, _FIRST_LINES):
         cells = 1 + (max(map(line.count, _SIGNS)) or sum(1 for _ in islice(_BLANKS.finditer(line), limits.columns)))
-        if cells > limits.columns:
-            raise passed(source, "has too many columns", cells, limits.columns)
+        _require_most(source, ("has too many columns", cells, limits.columns))
         most = _BYTES_PER_SIGN * limits.cell_length * cells
         if len(line) > most:
             raise passed(source, "has too long a line for its cells", f"{len(line)} bytes", most, " bytes")
@@ -160,20 +139,18 @@ def _require_lines(limits: ReadingLimits, source: str, file: IO[bytes]) -> None:
 
 def require_table(limits: ReadingLimits, frame: pd.DataFrame, source: str) -> None:
     """Raise if a table has too many rows, columns or cells, or too long a name or text."""
-    names = "has too long a name of a column", map(str, frame.columns), limits.name_length
-    texts = (
-        (f"has too long a text in the column {name!r}", cells.tolist(), limits.cell_length)
-        for name, cells in frame.items()
-        if not pd.api.types.is_numeric_dtype(cells)
-    )
     _require_most(
         source,
         ("has too many columns", frame.shape[1], limits.columns),
         ("has too many rows", frame.shape[0], limits.rows),
         ("has too many cells", frame.size, limits.cells),
     )
-    for what, cells, most in (names, *texts):
-        longest = max((len(cell) for cell in cells if isinstance(cell, str | bytes)), default=0)
+    texts = [("has too long a name of a column", [*map(str, frame.columns)], limits.name_length)]
+    for name, cells in frame.items():
+        if not pd.api.types.is_numeric_dtype(cells):
+            texts.append((f"has too long a text in the column {name!r}", cells.tolist(), limits.cell_length))
+    for what, each, most in texts:
+        longest = max((len(cell) for cell in each if isinstance(cell, str | bytes)), default=0)
         if longest > most:
             raise passed(source, what, f"{longest} characters", most, " characters")
 
@@ -196,19 +173,15 @@ def _require_most(source: str, *counts: tuple[str, int, int]) -> None:
 def limit_memory(memory_mb: float) -> None:
     """Limit the memory that this process may take [MB], where the system can: Linux counts all of it, Windows none."""
     if resource is not None:
-        most = int(1e6 * memory_mb)
-        _, hard = resource.getrlimit(resource.RLIMIT_DATA)
-        resource.setrlimit(resource.RLIMIT_DATA, (_within(most, hard), hard))
+        _limit(resource.RLIMIT_DATA, int(1e6 * memory_mb))
 
 
 def limit_time(seconds: float) -> None:
     """Limit the processor time that this process may take from now on [s], where the system can."""
     if resource is not None:
-        used = resource.getrusage(resource.RUSAGE_SELF)
-        _, hard = resource.getrlimit(resource.RLIMIT_CPU)
-        most = math.ceil(used.ru_utime + used.ru_stime + seconds)
-        resource.setrlimit(resource.RLIMIT_CPU, (_within(most, hard), hard))
+        _limit(resource.RLIMIT_CPU, math.ceil(time.process_time() + seconds))
 
 
-def _within(most: int, hard: int) -> int:
-    return most if hard < 0 else min(most, hard)
+def _limit(kind: int, most: int) -> None:
+    _, hard = resource.getrlimit(kind)
+    resource.setrlimit(kind, (most if hard < 0 else min(most, hard), hard))

@@ -31,14 +31,9 @@ from isiw.types import FloatArray, Reference
 if TYPE_CHECKING:  # the process that reads draws nothing
     from matplotlib.figure import Figure
 
-SWEEPS: Final = 3
-"""So many sweeps are drawn."""
-
-_MOST: Final = 30
-"""So many channels, events and columns are listed one by one."""
-
-_TRIGGER: Final = 0.02
-"""The largest share of a channel of triggers that is neither near its lowest nor near its highest value."""
+SWEEPS: Final = 3  # so many sweeps are drawn
+_MOST: Final = 30  # so many channels, events and columns are listed one by one
+_TRIGGER: Final = 0.02  # the most of a channel of triggers that is neither near its lowest nor near its highest value
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,10 +105,8 @@ def seen_in(contents: Contents, path: Path, layout: Layout, limits: ReadingLimit
 
 def _reference(contents: Contents) -> Reference:
     """The reference that is proposed: the valve, if its command is marked and no tap is."""
-    empty = Layout()
-    return (
-        "valve" if marked(contents.events, "valve", empty) and not marked(contents.events, "tap", empty) else "impact"
-    )
+    valve, tap = (bool(marked(contents.events, key, Layout())) for key in ("valve", "tap"))
+    return "valve" if valve and not tap else "impact"
 
 
 def _of_recording(contents: Contents, triggers: Mapping[str, FloatArray]) -> Iterator[str]:
@@ -150,43 +143,36 @@ def _times(at_s: FloatArray) -> str:
 def _triggers(contents: Contents) -> Iterator[tuple[str, FloatArray]]:
     """Channels of two levels, by when they leave the one at which they mostly are [s]."""
     for track in contents.tracks:
-        if track.kind != "emg" and (first := next(track.pieces(), None)) is not None and len(first[2]):
-            values = first[2]
-            low, high = values.min(), values.max()
-            between = (values > low + 0.1 * (high - low)) & (values < high - 0.1 * (high - low))
-            with suppress(IsiwError):  # of levels of which neither is rest
-                if high > low and between.mean() < _TRIGGER and len(at_s := track.onsets_s()) > 1:
-                    yield track.name, np.asarray(at_s)
+        first = None if track.kind == "emg" else next(track.pieces(), None)
+        if first is None:
+            continue
+        low, high = (values := first[1]).min(), values.max()
+        between = (values > low + 0.1 * (high - low)) & (values < high - 0.1 * (high - low))
+        with suppress(IsiwError):  # of levels of which neither is rest
+            if high > low and between.mean() < _TRIGGER and len(at_s := track.onsets_s()) > 1:
+                yield track.name, np.asarray(at_s)
 
 
 def _with_markers(contents: Contents, triggers: Mapping[str, FloatArray], layout: Layout) -> Layout:
     """A layout that says which events, or which triggers, mark tap and pulse, if one kind follows the other."""
-    if not contents.tracks or (contents.trials is not None and contents.pulse_at_s is not None):
-        return layout
     key = "valve" if (layout.reference or _reference(contents)) == "valve" else "tap"
-    if all(marked(contents.events, one, layout) or one in layout.channels for one in (key, "pulse")):
+    known = all(marked(contents.events, one, layout) or one in layout.channels for one in (key, "pulse"))
+    if not contents.tracks or (contents.trials is not None and contents.pulse_at_s is not None) or known:
         return layout
     times = triggers or {name: times_of(contents.events, name) for name in names_of(contents.events)}
-    few = {
-        name: at_s for name, at_s in times.items() if len(at_s) > 1 and not re.match("bad|sweep", name, re.IGNORECASE)
-    }
-    follows = {
-        (one, other): _share(few[one], few[other], layout.longest_isi_ms / 1e3)
-        for one, other in permutations([*few][:_MOST], 2)
-    }
-    pair = max(follows, key=lambda both: follows[both], default=None)
-    if pair is None or follows[pair] < 0.5:
+    several = [name for name, at_s in times.items() if len(at_s) > 1 and not re.match("(?i)bad|sweep", name)]
+    shares = dict[tuple[str, str], float]()
+    for tap, pulse in permutations(several[:_MOST], 2):  # how many pulses follow a tap within the longest ISI
+        before = np.searchsorted(times[tap], times[pulse], side="right") - 1
+        after_s = times[pulse] - times[tap][np.maximum(before, 0)]
+        shares[tap, pulse] = float(((after_s >= 0) & (after_s <= layout.longest_isi_ms / 1e3)).mean())
+    pair = max(shares, key=lambda both: shares[both], default=None)
+    if pair is None or shares[pair] < 0.5:
         return layout
     said = dict(zip((key, "pulse"), pair, strict=True))
     if triggers:  # and no events that a marker could be of
         return replace(layout, markers={}).saying(channels=said)
     return layout.saying(markers=said)
-
-
-def _share(taps_s: FloatArray, pulses_s: FloatArray, longest_s: float) -> float:
-    """The share of events that follow another within the longest ISI."""
-    after_s = pulses_s - taps_s[np.maximum(np.searchsorted(taps_s, pulses_s, side="right") - 1, 0)]
-    return float(((after_s >= 0) & (after_s <= longest_s)).mean())
 
 
 def _of_table(contents: Contents, layout: Layout) -> Iterator[str]:
@@ -208,11 +194,11 @@ def _of_table(contents: Contents, layout: Layout) -> Iterator[str]:
 def _command(path: Path, layout: Layout) -> str:
     """The command line that says a layout."""
     words = ["analyse", str(path)]
-    for option, value in (("reference", layout.reference), ("alone", layout.alone), ("decimal", layout.decimal),
-                          ("sheet", layout.sheet), ("unmarked", layout.unmarked)):  # fmt: skip
-        words += [f"--{option}", value] if value is not None else []
-    for option, pairs in (("column", layout.columns), ("where", layout.where), ("marker", layout.markers),
-                          ("channel", layout.channels)):  # fmt: skip
+    for option in ("reference", "alone", "decimal", "sheet", "unmarked"):
+        if (value := getattr(layout, option)) is not None:
+            words += [f"--{option}", value]
+    for option in ("column", "where", "marker", "channel"):
+        pairs: Mapping[str, str] = getattr(layout, "where" if option == "where" else f"{option}s")
         words += [word for key, name in pairs.items() for word in (f"--{option}", f"{key}={name}")]
     words += [word for unit in layout.units for word in ("--unit", unit)]
     return command(*words, "-o", f"{path.stem}.mcap")

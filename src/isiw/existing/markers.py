@@ -16,29 +16,16 @@ from isiw.lazy import pd
 from isiw.text.sanitize import counted
 from isiw.types import FloatArray
 
-_KNOWN: Final[Mapping[str, tuple[str, ...]]] = {
-    "pulse": ("tms", "pulse", "tmspulse", "magneticpulse"),
-    "tap": ("tap", "impact", "hit", "electricalpulse", "conditioning", "pns"),
-    "valve": ("valve", "valvecommand"),
-    "alone": ("tmsalone", "tmsonly", "singlepulse", "pulsealone", "unconditioned"),
+_MARKS: Final[Mapping[str, tuple[str, str]]] = {
+    "pulse": ("the pulse of TMS", "tms pulse tmspulse magneticpulse"),
+    "tap": ("the tap (its impact) or the electrical pulse", "tap impact hit electricalpulse conditioning pns"),
+    "valve": ("the valve command", "valve valvecommand"),
+    "alone": ("TMS alone", "tmsalone tmsonly singlepulse pulsealone unconditioned"),
 }
-"""What events are called that need not be named, without blanks."""
-
-_WHAT: Final = {
-    "pulse": "the pulse of TMS",
-    "tap": "the tap (its impact) or the electrical pulse",
-    "valve": "the valve command",
-    "alone": "TMS alone",
-}
-
-_TWICE_S: Final = 3e-3
-"""One trigger that is found twice within so short a time is one, and the first edge is when it was."""
-
-_SAME_PULSE_S: Final = 20e-3
-"""An event of a pulse alone marks the pulse that is marked within so short a time."""
-
-_EARLY_S: Final = 20e-3
-"""A pulse that comes before a tap by at most so much was meant to follow it, and is TMS before the impact."""
+"""What is marked, in words, and what events of it are called that need not be named, without blanks."""
+_TWICE_S: Final = 3e-3  # a trigger that is found twice within so short a time is one, which came at the first edge
+_SAME_PULSE_S: Final = 20e-3  # an event of a pulse alone marks the pulse that is marked within so short a time
+_EARLY_S: Final = 20e-3  # a pulse at most so long before a tap was meant to follow it, and is TMS before the impact
 
 
 @dataclass(frozen=True)
@@ -51,6 +38,11 @@ class Pulse:
     lost: bool = False  # a tap came, and it is not known when
     sweep_s: tuple[float, float] | None = None  # where the file has a sweep of its own
     said: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def origin_s(self) -> float | None:
+        """When the tap came, or the valve command [s]."""
+        return None if self.isi_s is None else self.at_s - self.isi_s
 
 
 def times_of(events: pd.DataFrame, *names: str | None) -> FloatArray:
@@ -71,15 +63,14 @@ def names_of(events: pd.DataFrame) -> list[str]:
 
 def _fitting(events: pd.DataFrame, key: str, layout: Layout) -> list[str]:
     """The names of the events that mark something."""
-    names = names_of(events)
     if key in layout.channels:
         return [key]
+    names = names_of(events)
     if (stated := layout.markers.get(key)) is None:
-        return [name for name in names if _plain(name) in _KNOWN[key]]
+        return [name for name in names if _plain(name) in _MARKS[key][1].split()]
     number = re.sub(r"\D", "", stated)  # of which MNE may keep no more
-    fits = ([name for name in names if known(name)] for known in
-            (stated.__eq__, lambda name: _plain(stated) == _plain(name), number.__eq__))  # fmt: skip
-    return next(filter(None, fits), [])
+    fits = ([stated], [name for name in names if _plain(name) == _plain(stated)], [number])
+    return next((each for each in fits if each and {*each} <= {*names}), [])
 
 
 def _marker(events: pd.DataFrame, key: str, layout: Layout, source: str) -> str | None:
@@ -90,11 +81,9 @@ def _marker(events: pd.DataFrame, key: str, layout: Layout, source: str) -> str 
         expected = f"one of {', '.join(map(repr, names_of(events)))}"
         raise InvalidValueError(f"{source} has {what} of this name", got=layout.markers[key], expected=expected)
     if len(fitting) > 1:
-        raise InvalidValueError(
-            f"events of {len(fitting)} names in {source} may mark {_WHAT[key]}",
-            got=", ".join(fitting),
-            remedy=f'Say --marker "{key}={fitting[0]}", or give all that mark it one name.',
-        )
+        what = f"events of {len(fitting)} names in {source} may mark {_MARKS[key][0]}"
+        remedy = f'Say --marker "{key}={fitting[0]}", or give all that mark it one name.'
+        raise InvalidValueError(what, got=", ".join(fitting), remedy=remedy)
     return fitting[0] if fitting else None
 
 
@@ -107,22 +96,19 @@ def pulses_of(events: pd.DataFrame, key: str, layout: Layout, source: str) -> li
     """All pulses, each with the tap, or the valve command, that it belongs to."""
     found = {one: _marker(events, one, layout, source) for one in ("pulse", key, "alone", *layout.markers)}
     pulse_name, origin_name, alone_name = (found[one] for one in ("pulse", key, "alone"))
-    missing = [one for one in ("pulse", key) if found[one] is None]
-    if missing:
+    if missing := [one for one in ("pulse", key) if found[one] is None]:
         names = ", ".join(map(repr, names_of(events)))
         said = " ".join(f"--{'marker' if names else 'channel'} {one}=NAME" for one in missing)
-        raise InvalidValueError(
-            f"no event of {source} is known to mark {', nor '.join(_WHAT[one] for one in missing)}",
-            got=names or "no events, so that no event was found",
-            remedy=f"Say {said}. isiw analyse FILE --look says what is in the file.",
-        )
+        what = f"no event of {source} is known to mark {', nor '.join(_MARKS[one][0] for one in missing)}"
+        remedy = f"Say {said}. isiw analyse FILE --look says what is in the file."
+        raise InvalidValueError(what, got=names or "no events, so that no event was found", remedy=remedy)
     if origin_name == pulse_name:
         raise InvalidValueError(
             f"one event of {source} cannot mark both stimuli", got=pulse_name, remedy=f"Say --marker {key}=NAME."
         )
     at_s, origins_s = times_of(events, pulse_name), times_of(events, origin_name)
     origins_s = origins_s[np.diff(origins_s, prepend=-np.inf) > _TWICE_S]
-    alone_s = at_s[:0] if alone_name in {pulse_name, origin_name} else times_of(events, alone_name)
+    alone_s = times_of(events, None if alone_name in {pulse_name, origin_name} else alone_name)
     more_s = [at for at in alone_s.tolist() if not np.any(np.abs(at_s - at) <= _SAME_PULSE_S)]
     epochs = events[events["name"].astype(str) == "sweep"]
     pulses = [
@@ -135,12 +121,12 @@ def pulses_of(events: pd.DataFrame, key: str, layout: Layout, source: str) -> li
 
 def _require_one_each(pulses: list[Pulse], origins_s: FloatArray, layout: Layout, source: str) -> None:
     """Raise if a tap has two pulses after it, or a pulse two taps before it."""
-    came_s = [None if pulse.isi_s is None else round(pulse.at_s - pulse.isi_s, 9) for pulse in pulses]
-    last_s = -np.inf
-    for number, pulse in enumerate(pulses):
+    last_s, last_came_s = -np.inf, None
+    for pulse in pulses:
         begin_s = max(pulse.at_s - layout.longest_isi_ms / 1e3, last_s)
         taps = int(((origins_s > begin_s) & (origins_s <= pulse.at_s)).sum())
-        shared = number > 0 and came_s[number] is not None and came_s[number] == came_s[number - 1]
+        came_s = None if pulse.origin_s is None else round(pulse.origin_s, 9)
+        shared = came_s is not None and came_s == last_came_s
         if taps > 1 or shared:
             raise InvalidValueError(
                 f"two pulses of {source} have one tap" if shared else f"{taps} taps of {source} come before one pulse",
@@ -148,7 +134,7 @@ def _require_one_each(pulses: list[Pulse], origins_s: FloatArray, layout: Layout
                 expected=f"one of each within {layout.longest_isi_ms:g} ms",
                 remedy="Leave out the events that mark no stimulus, such as a second edge, or give them another name.",
             )
-        last_s = pulse.at_s + _EARLY_S
+        last_s, last_came_s = pulse.at_s + _EARLY_S, came_s
 
 
 def _placed(at_s: float, origins_s: FloatArray, epochs: pd.DataFrame, *, alone: bool, layout: Layout) -> Pulse:
@@ -158,32 +144,26 @@ def _placed(at_s: float, origins_s: FloatArray, epochs: pd.DataFrame, *, alone: 
     sweep_s = (float(said["onset"]), float(said["onset"] + said["duration"])) if said else None
     if sweep_s is not None:
         origins_s = origins_s[(origins_s >= sweep_s[0] - 1e-9) & (origins_s < sweep_s[1])]
-    condition = said.get("condition")
-    alone = alone or says_alone(condition, None)
     before = origins_s[(origins_s <= at_s) & (origins_s >= at_s - layout.longest_isi_ms / 1e3)]
     after = origins_s[(origins_s > at_s) & (origins_s <= at_s + _EARLY_S)]
-    nearest = [*before[-1:], *after[:1]]
+    nearest, condition = [*before[-1:], *after[:1]], said.get("condition")
     isi_s = float(at_s - nearest[0]) if nearest else None  # below 0 if the tap came shortly after
     lost = isi_s is None and isinstance(condition, str) and plain(condition) in {"paired", "unknown"}
-    return Pulse(at_s, isi_s, alone, lost, sweep_s, said)
+    return Pulse(at_s, isi_s, alone or says_alone(condition, None), lost, sweep_s, said)
 
 
 def _with_the_unmarked(pulses: list[Pulse], layout: Layout, source: str) -> list[Pulse]:
     """Pulses of which the file says whether a tap came, or the operator does."""
-    for pulse in pulses:
-        if pulse.alone and pulse.isi_s is not None:
-            raise InvalidValueError(
-                f"an event of {source} says TMS alone, and a tap came {1e3 * pulse.isi_s:.0f} ms before the pulse",
-                got=f"at {pulse.at_s:.3f} s",
-                remedy="Are both markers the right ones? Say --marker alone=NAME and --marker tap=NAME.",
-            )
     paired = [pulse for pulse in pulses if pulse.isi_s is not None]
+    if both := [pulse for pulse in paired if pulse.alone]:
+        came_ms = 1e3 * (both[0].isi_s or 0.0)
+        what = f"an event of {source} says TMS alone, and a tap came {came_ms:.0f} ms before the pulse"
+        remedy = "Are both markers the right ones? Say --marker alone=NAME and --marker tap=NAME."
+        raise InvalidValueError(what, got=f"at {both[0].at_s:.3f} s", remedy=remedy)
     if (early := sum((pulse.isi_s or 0.0) < 0 for pulse in paired)) > 2 and 2 * early > len(paired):
-        raise InvalidValueError(
-            f"most pulses of {source} come before the tap, so that they are probably swapped",
-            got=f"{early} of {len(paired)}",
-            remedy="Say which marker is of the tap and which of the pulse: --marker tap=NAME --marker pulse=NAME.",
-        )
+        what = f"most pulses of {source} come before the tap, so that they are probably swapped"
+        remedy = "Say which marker is of the tap and which of the pulse: --marker tap=NAME --marker pulse=NAME."
+        raise InvalidValueError(what, got=f"{early} of {len(paired)}", remedy=remedy)
     unmarked = [pulse for pulse in pulses if pulse.isi_s is None and not (pulse.alone or pulse.lost)]
     if not unmarked or not paired:
         return pulses

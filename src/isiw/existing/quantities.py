@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Final
 
 from isiw.errors import InvalidValueError, did_you_mean
@@ -13,21 +14,20 @@ from isiw.existing.cells import ALONE, TAP_ALONE, Column, plain, says_alone, wit
 from isiw.existing.layout import COLUMNS, EMG_UNITS, ISI_UNITS_MS, UNIT_WORDS, Layout, letters, required_unit
 from isiw.findings import Kind
 from isiw.lazy import pd
-from isiw.text.sanitize import counted
 
 _VAGUE: Final = frozenset({"interval", "delay", "soa", "amplitude", "amp", "peaktopeak", "peaktopeakamplitude",
                            "emgpeaktopeak", "p2pamplitude", "ptpamplitude", "p2p", "ptp"})  # fmt: skip
 """Names of columns that may also be of the interval between trials, or of the stimulus, and give way to others."""
-_ASKED: Final = frozenset({"isi", "mep", "status", "exclude"})
-"""Of which there may be two columns, that say different things."""
+_ASKED: Final = frozenset({"isi", "mep", "status", "exclude"})  # of which there may be two, that say different things
 
 
 @dataclass(frozen=True)
 class Columns:
-    """The columns of a table by what they hold."""
+    """The columns of a table by what they hold, and the rows that are read."""
 
     of: Mapping[str, Column]
-    rows: int
+    rows: Sequence[int]
+    layout: Layout
     units: tuple[str, str]
     beside: Mapping[str, Column]  # of which nothing is read
     empty: Column  # in the place of those that there are not
@@ -35,32 +35,10 @@ class Columns:
     def __getitem__(self, key: str) -> Column:
         return self.of.get(key, self.empty)
 
-    @property
-    def unused(self) -> tuple[str, ...]:
-        """The names of the columns of which nothing is read."""
-        return tuple(self.beside)
-
-    def chosen(self, layout: Layout) -> list[int]:
-        """The rows whose cells say what is to be read, as the layout states."""
-        every = {column.name: column for column in (*self.of.values(), *self.beside.values())}
-        kept = list(range(self.rows))
-        for name, wanted in layout.where.items():
-            require_one("column", self.empty.of, name, every)
-            if wanted != doubts.ALL:
-                found = dict.fromkeys(every[name].text(row) for row in range(self.rows))
-                if wanted not in found:
-                    raise InvalidValueError(
-                        f"no row of {self.empty.of} has this in its column {name!r}",
-                        got=wanted,
-                        expected=f"one of {', '.join(list(found)[:9])}",
-                    )
-                kept = [row for row in kept if every[name].text(row) == wanted]
-        return kept
-
-    def tms_alone(self, row: int, mark: str | None) -> bool:
+    def tms_alone(self, row: int) -> bool:
         """True if a row is TMS alone: its ISI says so, or its condition does, and it has no ISI, or 0 and less."""
         isi = self.of["isi"]
-        if says_alone(isi.cells[row], mark):
+        if says_alone(isi.cells[row], self.layout.alone):
             return True
         return says_alone(self["condition"].text(row), None) and (isi.number(row) or 0.0) <= 0
 
@@ -68,69 +46,40 @@ class Columns:
         """True if a row is a tap alone, by a column for it or by its condition."""
         return bool(self["tap_alone"].flag(row)) or plain(self["condition"].text(row)) in TAP_ALONE
 
+    @cached_property
+    def paired(self) -> list[int]:
+        """The rows that are not TMS alone."""
+        return [row for row in self.rows if not self.tms_alone(row)]
+
     def lost(self, row: int) -> Kind | None:
         """Why a row is marked as lost; None if it is not."""
-        judged = self["status"].flag(row)
         bad = self["exclude"].flag(row) and "status" not in self.of
-        if judged is not False and not bad:
-            return None
-        return Kind.of_mistrial(self["reason"].text(row))
-
-    def require_said(self, rows: Sequence[int], mark: str | None) -> None:
-        """Raise if it is not stated what rows without an ISI are, or if a row is both a pair and TMS alone."""
-        isi, condition = self.of["isi"], self["condition"]
-        alone = [row for row in rows if says_alone(condition.text(row), None)]
-        both = [row for row in alone if mark is None and not self.tms_alone(row, mark)]
-        if both and len(alone) < len(rows):  # who writes one word into all rows does not mean this
-            raise condition.refused(
-                both[0],
-                f"says TMS alone, and the ISI there is {isi.text(both[0])}",
-                "If it is TMS alone, leave its ISI empty, or say --alone with the number that stands there; if it is a "
-                "pair, rename the column.",
-            )
-        empty = [
-            row
-            for row in rows
-            if not isi.text(row) and not self.tms_alone(row, mark) and not self.tap_alone(row)
-            and "asked" not in self.of and self.lost(row) is None
-            and ("mep" not in self.of or self["mep"].number(row) is not None)
-        ]  # fmt: skip
-        if empty:
-            raise InvalidValueError(
-                f"{counted(len(empty), 'row has', 'rows have')} an amplitude and no ISI in {isi.of}",
-                got=f"row {empty[0] + 1}",
-                remedy="If these are TMS alone, say --alone with what stands in their place, or --alone '' for an "
-                "empty cell; if not, mark them in a column called exclude.",
-            )
+        return Kind.of_mistrial(self["reason"].text(row)) if bad or self["status"].flag(row) is False else None
 
     @classmethod
     def found(cls, frame: pd.DataFrame, layout: Layout, source: str, needed: Sequence[str] = ("isi", "mep")) -> Columns:
         """The columns of a table, as they are named or else as they are called."""
         names = [str(name) for name in frame.columns]
-        wanted = [key for key in COLUMNS if key != "mep" or key in needed]
-        held = {key: _named(key, names, layout, source) for key in wanted}
-        for key in needed:
-            if held[key] is None:
-                what = {"isi": "ISIs", "mep": "amplitudes of the MEPs"}[key]
+        held = {key: _named(key, names, layout, source) for key in COLUMNS if key != "mep" or key in needed}
+        for key, what in (("isi", "ISIs"), ("mep", "amplitudes of the MEPs")):
+            if key in needed and held[key] is None:
                 raise InvalidValueError(
                     f"no column of {source} is known to hold the {what}",
                     got=", ".join(name for name in names if name.strip()) or "no names",
                     remedy=f'Say --column "{key}=NAME"; if the names are not in the first line, describe the file: '
                     "--layout FILE.",
                 )
-        columns, of_units = {}, set[str]()
+        columns, of_units = dict[str, Column](), set[str]()
         for key, name in held.items():
             if name is not None:
+                units = units_beside(key, name, frame)
                 said, cells = without_unit_in_cells(name, frame.iloc[:, names.index(name)].tolist())
-                said_beside = units_beside(key, name, frame)
-                columns[key] = Column(
-                    "".join([said, *(f" ({unit})" for unit in said_beside.values())]), cells, of=source
-                )
-                of_units |= said_beside.keys()
-        columns, units = _scaled(columns, layout)
+                columns[key] = Column("".join([said, *(f" ({unit})" for unit in units.values())]), cells, of=source)
+                of_units |= units.keys()
+        columns, stated = _scaled(columns, layout)
         if (subject := columns.pop("subject", None)) is not None:
             is_id = "subject" not in layout.columns and letters(subject.name) == "id"
-            if is_id and 1 < len(frame) == len({*map(subject.text, range(len(frame)))}):
+            if is_id and 1 < len(frame) == len({*subject.texts}):
                 held["subject"] = None  # each row has one of its own, so that it is of trials and not of people
             else:
                 columns["subject"] = replace(subject, of_codes=True)
@@ -146,38 +95,46 @@ class Columns:
         if (condition := columns.get("condition")) is not None:  # which may tell pairs from each other, too
             alone = ALONE | TAP_ALONE
             of_pairs = replace(condition, cells=["" if plain(str(cell)) in alone else cell for cell in condition.cells])
-            if len({plain(of_pairs.text(row)) for row in range(len(frame))} - {""}) > 1:
+            if len({*map(plain, of_pairs.texts)} - {""}) > 1:
                 beside[condition.name] = of_pairs
-        return cls(columns, len(frame), units, beside, Column("", [None] * len(frame), of=source))
+        empty = Column("", [None] * len(frame), of=source)
+        return cls(columns, _chosen([*columns.values(), *beside.values()], layout), layout, stated, beside, empty)
+
+
+def _chosen(columns: Sequence[Column], layout: Layout) -> list[int]:
+    """The rows whose cells say what is to be read, as the layout states."""
+    every, source, kept = {one.name: one for one in columns}, columns[0].of, [*range(len(columns[0].cells))]
+    for name, wanted in layout.where.items():
+        require_one("column", source, name, every)
+        texts = every[name].texts
+        if wanted not in {doubts.ALL, *texts}:
+            what = f"no row of {source} has this in its column {name!r}"
+            raise InvalidValueError(what, got=wanted, expected=f"one of {', '.join([*dict.fromkeys(texts)][:9])}")
+        kept = [row for row in kept if wanted in {doubts.ALL, texts[row]}]
+    return kept
 
 
 def _scaled(columns: Mapping[str, Column], layout: Layout) -> tuple[dict[str, Column], tuple[str, str]]:
     """Columns whose numbers are in ms, mV or µV by the units that are stated; those of ISIs and amplitudes besides."""
-    columns = dict(columns)
     numeric = ("isi", "mep", "asked", "isi_sd", "background", "intensity")
-    columns |= with_decimals({key: columns[key] for key in numeric if key in columns}, layout.decimal)
-    isi_unit = _required_unit("isi", "ISIs", columns["isi"], layout, ISI_UNITS_MS)
-    factors, mep_unit = {"isi": ISI_UNITS_MS[isi_unit]}, "mV"
-    if "mep" in columns:
-        mep_unit = _required_unit("mep", "amplitudes", columns["mep"], layout, EMG_UNITS)
-        factors["mep"] = EMG_UNITS[mep_unit]
-    for key in ("asked", "isi_sd"):
-        if key in columns:
-            factors[key] = ISI_UNITS_MS[unit_said(columns[key].name, ISI_UNITS_MS) or isi_unit]
-    if "background" in columns:
-        factors["background"] = 1e3 * EMG_UNITS[unit_said(columns["background"].name, EMG_UNITS) or "uV"]
-    columns |= {key: replace(columns[key], factor=factor) for key, factor in factors.items()}
-    return columns, (isi_unit, mep_unit)
+    scaled = {**columns, **with_decimals({key: columns[key] for key in numeric if key in columns}, layout.decimal)}
+    isi_unit = _required_unit("isi", "ISIs", scaled["isi"], layout, ISI_UNITS_MS)
+    mep_unit = _required_unit("mep", "amplitudes", scaled["mep"], layout, EMG_UNITS) if "mep" in scaled else "mV"
+    factors = {"isi": ISI_UNITS_MS[isi_unit], "mep": EMG_UNITS[mep_unit]}
+    for key, known, usual in (("asked", ISI_UNITS_MS, isi_unit), ("isi_sd", ISI_UNITS_MS, isi_unit),
+                              ("background", EMG_UNITS, "uV")):  # fmt: skip
+        if key in scaled:
+            factors[key] = known[unit_said(scaled[key].name, known) or usual] * (1e3 if known is EMG_UNITS else 1.0)
+    scaled |= {key: replace(scaled[key], factor=factor) for key, factor in factors.items() if key in scaled}
+    return scaled, (isi_unit, mep_unit)
 
 
 def require_one(kind: str, source: str, stated: str, names: Iterable[object], remedy: str | None = None) -> None:
     """Raise if a file has nothing of a kind of the name that is stated, or more than one."""
     known = [str(name) for name in names]
     if stated not in known:
-        remedy = did_you_mean(stated, known) or remedy
-        raise InvalidValueError(
-            f"{source} has no such {kind}", got=stated, expected=f"one of {', '.join(known)}", remedy=remedy
-        )
+        remedy, expected = did_you_mean(stated, known) or remedy, f"one of {', '.join(known)}"
+        raise InvalidValueError(f"{source} has no such {kind}", got=stated, expected=expected, remedy=remedy)
     if known.count(stated) > 1:
         raise InvalidValueError(f"several {kind}s of {source} have this name", got=stated, remedy="Rename them.")
 
@@ -190,17 +147,14 @@ def _named(key: str, names: list[str], layout: Layout, source: str) -> str | Non
         require_one("column", source, stated, names)
         return stated
     free = [(name, letters(name)) for name in names if name not in layout.columns.values()]
-    fitting = {known: [name for name, plain in free if plain == known] for known in COLUMNS[key]}
-    found = [known for known in COLUMNS[key] if fitting[known]]
-    is_vague = bool(found) and found[0] in _VAGUE
-    rivals = [known for known in found if known == found[0] or (key in _ASKED and (known in _VAGUE) == is_vague)]
-    several = [name for known in rivals for name in fitting[known]]
+    found = [(known, name) for known in COLUMNS[key] for name, plain_name in free if plain_name == known]
+    first = found[0][0] if found else ""
+    several = [name for known, name in found
+               if known == first or (key in _ASKED and (known in _VAGUE) == (first in _VAGUE))]  # fmt: skip
     if len(several) > 1:
-        raise InvalidValueError(
-            f"several columns of {source} may hold the {key}",
-            got=" or ".join(several),
-            remedy=f'Say --column "{key}={several[0]}".' if len(set(several)) > 1 else "Rename one of them.",
-        )
+        what = f"several columns of {source} may hold the {key}"
+        remedy = f'Say --column "{key}={several[0]}".' if len(set(several)) > 1 else "Rename one of them."
+        raise InvalidValueError(what, got=" or ".join(several), remedy=remedy)
     return several[0] if several else None
 
 
@@ -232,20 +186,18 @@ def unit_said(name: str, known: Mapping[str, float]) -> str | None:
     found, usual = ([unit for word in words if (unit := UNIT_WORDS.get(word.strip().casefold(), "")) in known]
                     for words in ([*inside, *bare[-1:]], bare))  # fmt: skip
     if len({*found}) > 1:
-        raise InvalidValueError(
-            f"the column {name!r} says two units", got=" and ".join(found), remedy="Leave the right one in its name."
-        )
+        remedy = "Leave the right one in its name."
+        raise InvalidValueError(f"the column {name!r} says two units", got=" and ".join(found), remedy=remedy)
     return next(reversed(found or usual), None)
 
 
 def _required_unit(key: str, what: str, column: Column, layout: Layout, known: Mapping[str, float]) -> str:
     """The column's unit, as it is stated or as its name says, which must not say that it is something else."""
     doubts.require_of_kind(key, what, column.name, column.of)
-    some = ", ".join(filter(None, map(column.text, range(min(5, len(column.cells)))))) or None
     if (other := unit_said(column.name, dict.fromkeys({*UNIT_WORDS.values()} - known.keys(), 1.0))) is not None:
+        what = f"the column {column.name!r} of {column.of} says a unit of no {what}"
         remedy = "Name the right column: --column KEY=NAME; if it is the right one, correct its name."
-        raise InvalidValueError(
-            f"the column {column.name!r} of {column.of} says a unit of no {what}", got=other, remedy=remedy
-        )
+        raise InvalidValueError(what, got=other, remedy=remedy)
+    some = ", ".join(filter(None, column.texts[:5])) or None
     what = f"the {what} of {column.of} in the column {column.name!r}"
     return required_unit(layout, known, unit_said(column.name, known), what, some)

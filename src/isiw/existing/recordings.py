@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from collections.abc import Set as AbstractSet
 from dataclasses import replace
 from itertools import pairwise
@@ -13,7 +13,7 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.existing.cells import is_missing
 from isiw.existing.delivered import Delivered, anywhere, renumbered
-from isiw.existing.doubts import is_rectified, require_short
+from isiw.existing.doubts import is_rectified, require_said
 from isiw.existing.formats.columns import require_rate
 from isiw.existing.formats.contents import APART_S, Contents, Track, events_of
 from isiw.existing.frames import named
@@ -28,12 +28,8 @@ from isiw.sweeps import Channel, Sweep
 from isiw.trials import Status, Stimulus, Trial
 from isiw.types import FloatArray
 
-_BEFORE_MS: Final = 150.0
-_AFTER_MS: Final = 100.0
-"""What is cut out of a continuous recording: from so long before the longest ISI to so long after the pulse."""
-_APART_MS: Final = 2.0
-"""An ISI in a table that differs by more from that of the events is another one."""
-
+_BEFORE_S, _AFTER_S = 0.15, 0.1  # of a continuous recording, before the longest ISI and after the pulse
+_APART_MS: Final = 2.0  # an ISI in a table that differs by more from that of the events is another one
 _IF_NONE_COUNTS: Final = (
     "Is the EMG channel the right one, its unit right, and the marker of the pulse? Is the EMG at rest without mains "
     "hum, at most {:g} µV RMS? See docs/timing.md."
@@ -45,75 +41,106 @@ OF_SWEEPS: Final[Mapping[str, AbstractSet[str]]] = {
 }
 """What columns, channels and markers can hold that is used of sweeps whose ISIs are stated."""
 
-Found = tuple[Stimulus, Sweep, Mapping[str, Any]]
-"""What was given, what was recorded of it, and what the file says of it."""
-
 
 def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
-    """The trials of what a file holds, whose sweeps are cut already or are yet to be cut out."""
+    """The trials of what a file holds, whose sweeps are cut already or yet to be cut out, judged as in a session."""
+    source, key = contents.source, origin_key(layout)
+    contents, signals, unit = _with_signals(contents, layout)
+    reference, unused, person = layout.required_reference(source), tuple[str, ...](), ""
+    if contents.trials is None or contents.pulse_at_s is None:
+        pulses = pulses_of(contents.events, key, layout, source)
+    else:
+        pulses, unused, person = _pulses_of_rows(contents, signals["emg"], layout)
+    if any(after.at_s - before.at_s < _AFTER_S for before, after in pairwise(pulses)):
+        what = f"two pulses of {source} are less than {1e3 * _AFTER_S:g} ms apart"
+        raise InvalidValueError(what, remedy="Is the marker of the pulse the right one? Say --marker pulse=NAME.")
+    limits = SignalLimits() if layout.mep_window_ms is None else SignalLimits(mep_window_ms=layout.mep_window_ms)
+    longest_s, trials, sweeps = max((pulse.isi_s or 0.0 for pulse in pulses), default=0.0), list[Trial](), {}
+    bad = contents.events[contents.events["name"].astype(str).str.lower().str.startswith("bad")]  # as MNE takes them
+    for number, pulse in enumerate(pulses):
+        sweep = _cut(signals, pulse, pulse.at_s - _BEFORE_S - longest_s, key)
+        if sweep.channels:
+            sweeps[number] = sweep.channels
+        for isi_ms in isis_of(pulse.said) if pulse.isi_s is not None else ():
+            _require_same(f"the trial at {pulse.at_s:.3f} s of {source}", isi_ms, pulse.isi_s)
+        if pulse.lost:
+            trials.append(Trial(number, Status.MISTRIAL, None, reason=Kind.NO_IMPACT))
+            continue
+        asked_ms = pulse.said.get("commanded_isi_ms")  # what the file says, or else what the events do
+        asked_ms = max(1e3 * (pulse.isi_s or 0.0), 0.0) if is_missing(asked_ms) else float(asked_ms)
+        stimulus = Stimulus(number, None if pulse.isi_s is None else asked_ms)
+        judged = judge(sweep, stimulus, anywhere(reference), limits)
+        begin_s, end_s = min(pulse.at_s - _BEFORE_S, pulse.origin_s or pulse.at_s), pulse.at_s + _AFTER_S
+        is_bad = bool(((bad["onset"] <= end_s) & (bad["onset"] + bad["duration"] >= begin_s)).any())
+        trials.append(replace(judged, excluded=is_bad or pulse.said.get("excluded") in {True, "true", "True"}))
+    if trials and not any(trial.told for trial in trials):
+        reasons = sorted({str(trial.reason) for trial in trials if trial.reason})
+        what = f"no sweep of {source} counts"
+        remedy = " ".join([*contents.notes, _IF_NONE_COUNTS.format(limits.background_uv)])
+        raise InvalidValueError(what, got=", ".join(reasons) or "excluded ones", remedy=remedy)
+    emg = [channels["emg"].values for channels in sweeps.values() if "emg" in channels]
+    return Delivered(
+        renumbered(trials),
+        reference,
+        subject=person or subject,
+        source=source,
+        signals=limits,
+        units=("ms", unit),
+        sweeps=sweeps,
+        unused=unused,
+        notes=(*contents.notes, *is_rectified(emg)),
+    )
+
+
+def _with_signals(contents: Contents, layout: Layout) -> tuple[Contents, dict[str, Track], str]:
+    """Contents with the events of triggers, the channels that are no triggers, the EMG in mV, and what unit it had."""
     held = {"emg": None, **dict.fromkeys(key for key in layout.channels if key != "events")}
-    tracks = {key: track_of(contents, key, layout) for key in held}
+    tracks = {key: _track_of(contents, key, layout) for key in held}
     if layout.rate_hz is not None:
         require_rate(layout.rate_hz, tracks["emg"].rate_hz, contents.source)
     triggers = events_of((key, at_s, 0.0) for key in MARKERS if key in tracks for at_s in tracks[key].onsets_s())
     events = pd.concat([each for each in (contents.events, triggers) if len(each)] or [triggers], ignore_index=True)
-    tracks["emg"] = tracks["emg"].with_unit(unit_said(tracks["emg"].name, EMG_UNITS))
-    said, what = tracks["emg"].unit, f"the channel {tracks['emg'].name!r} of {contents.source}"
-    known, notes = UNIT_WORDS.get(said.strip().casefold()), contents.notes
-    unit = required_unit(layout, EMG_UNITS, known, what, said or None)
+    emg = tracks["emg"].with_unit(unit_said(tracks["emg"].name, EMG_UNITS))
+    known, notes = UNIT_WORDS.get(emg.unit.strip().casefold()), contents.notes
+    what = f"the channel {emg.name!r} of {contents.source}"
+    unit = required_unit(layout, EMG_UNITS, known, what, emg.unit or None)
     if known not in {None, unit}:
-        notes = (*notes, f"{contents.source} says {said}, and {unit} is used, as stated.")
+        notes = (*notes, f"{contents.source} says {emg.unit}, and {unit} is used, as stated.")
     signals = {key: track for key, track in tracks.items() if key not in MARKERS}
-    signals["emg"] = signals["emg"].scaled(EMG_UNITS[unit])  # in mV
-    contents = replace(contents, events=events, notes=notes)
-    layout.required_reference(contents.source)
-    unused, person = tuple[str, ...](), ""
-    if contents.trials is None or contents.pulse_at_s is None:
-        pulses = pulses_of(contents.events, origin_key(layout), layout, contents.source)
-    else:
-        pulses, unused, person = _pulses_of_rows(contents, signals["emg"], layout)
-    sweeps = sweeps_of(contents, signals, pulses, layout)
-    return replace(delivered_of(contents, unit, sweeps, layout, person or subject), unused=unused)
+    return replace(contents, events=events, notes=notes), {**signals, "emg": emg.scaled(EMG_UNITS[unit])}, unit
 
 
-def track_of(contents: Contents, key: str, layout: Layout) -> Track:
+def _track_of(contents: Contents, key: str, layout: Layout) -> Track:
     """The channel that holds something: the one that is named, or the only one that may."""
-    tracks = contents.tracks
-    stated = layout.channels.get(key)
-    if stated is not None:
-        require_one("channel", contents.source, stated, [track.name for track in tracks])
-        return next(track for track in tracks if track.name == stated)
-    fitting = [track for track in tracks if track.kind == key] or [
-        track for track in tracks if key in track.name.casefold()
-    ]
+    tracks, names = contents.tracks, [track.name for track in contents.tracks]
+    if (stated := layout.channels.get(key)) is not None:
+        require_one("channel", contents.source, stated, names)
+        return tracks[names.index(stated)]
+    fitting = [track for track in tracks if track.kind == key]
+    fitting = fitting or [track for track in tracks if key in track.name.casefold()]
     fitting = fitting or [track for track in tracks if track.kind not in {"stim", "misc", "markers"}]
     if len(fitting) != 1:
-        names = [track.name for track in tracks]
-        raise InvalidValueError(
-            f"several channels of {contents.source}, or none, may hold the EMG",
-            got=", ".join(names) or "no channels",
-            remedy=f'Say --channel "{key}={(fitting or tracks)[0].name}".' if tracks else "Is it the right file?",
-        )
+        what = f"several channels of {contents.source}, or none, may hold the EMG"
+        remedy = f'Say --channel "{key}={(fitting or tracks)[0].name}".' if tracks else "Is it the right file?"
+        raise InvalidValueError(what, got=", ".join(names) or "no channels", remedy=remedy)
     return fitting[0]
 
 
 def _pulses_of_rows(contents: Contents, emg: Track, layout: Layout) -> tuple[list[Pulse], tuple[str, ...], str]:
     """The pulses of sweeps that a row each says the ISI of, the columns that are not used, and whose they are."""
     stated = replace(layout, alone="") if layout.alone is None and contents.empty_is_alone else layout
-    columns = Columns.found(named(contents.trials), stated, contents.source, needed=("isi",))
-    if len(emg.stretches) != columns.rows:
-        raise InvalidValueError(
-            f"{contents.source} does not say the ISI of each sweep",
-            got=f"{columns.rows} rows and {len(emg.stretches)} sweeps",
-        )
-    rows, keys = columns.chosen(stated), (origin_key(layout), "pulse", "alone")
-    marks = {key: np.array(marked(contents.events, key, layout)) for key in keys}
-    columns.require_said(rows, stated.alone)
+    trials = named(contents.trials)
+    if len(emg.stretches) != len(trials):
+        what = f"{contents.source} does not say the ISI of each sweep"
+        raise InvalidValueError(what, got=f"{len(trials)} rows and {len(emg.stretches)} sweeps")
+    columns = Columns.found(trials, stated, contents.source, needed=("isi",))
+    require_said(columns)
+    marks = {key: np.array(marked(contents.events, key, layout)) for key in (origin_key(layout), "pulse", "alone")}
     pulses = list[Pulse]()
-    for row in rows:
+    for row in columns.rows:
         if columns.tap_alone(row):
             raise columns["isi"].refused(row, "is of a tap alone, whose sweep has no pulse", "Leave that sweep out.")
-        isi_ms = None if columns.tms_alone(row, stated.alone) else columns["isi"].number(row)
+        isi_ms = None if columns.tms_alone(row) else columns["isi"].number(row)
         isi_s, sweep = None if isi_ms is None else isi_ms / 1e3, emg.stretches[row]
         at_tap = _is_tap(contents, marks, sweep.start_s, row, isi_ms)
         at_s = sweep.start_s + (contents.pulse_at_s or 0.0) + ((isi_s or 0.0) if at_tap else 0.0)
@@ -121,26 +148,21 @@ def _pulses_of_rows(contents: Contents, emg: Track, layout: Layout) -> tuple[lis
         lost = layout.unmarked == "lost" and not columns["isi"].text(row)
         said = {"excluded": columns.lost(row) is not None}
         pulses.append(Pulse(at_s, isi_s, lost=lost, sweep_s=span_s, said=said))
-    require_short([1e3 * pulse.isi_s for pulse in pulses if pulse.isi_s is not None], layout, contents.source)
-    return pulses, columns.unused, _only_one(columns, rows, contents.source)
+    return pulses, tuple(columns.beside), _only_one(columns)
 
 
 def _is_tap(
     contents: Contents, marks: Mapping[str, FloatArray], start_s: float, row: int, isi_ms: float | None
 ) -> bool:
     """True if a sweep is about the tap, and not about the pulse; raise if its events are not those of its row."""
-    (key, taps_s), (_, pulses_s), _ = within = [
-        (name, (times_s - start_s)[(times_s >= start_s) & (times_s < start_s + APART_S / 2)])
-        for name, times_s in marks.items()
-    ]
-    zero_s = contents.pulse_at_s or 0.0
-    at_zero = [name for name, times_s in within if np.isclose(times_s, zero_s, rtol=0, atol=1e-6).any()]
+    zero_s, within = contents.pulse_at_s or 0.0, {name: times_s - start_s for name, times_s in marks.items()}
+    within = {name: times_s[(times_s >= 0) & (times_s < APART_S / 2)] for name, times_s in within.items()}
+    (key, taps_s), (_, pulses_s), _ = within.items()
+    at_zero = [name for name, times_s in within.items() if np.isclose(times_s, zero_s, rtol=0, atol=1e-6).any()]
     if len(contents.events) and not at_zero:
-        raise InvalidValueError(
-            f"it is not known what comes at time 0 of the sweeps of {contents.source}",
-            got=" or ".join(names_of(contents.events)),
-            remedy=f"Say which marker is of the pulse and which of the tap: --marker pulse=NAME --marker {key}=NAME.",
-        )
+        what = f"it is not known what comes at time 0 of the sweeps of {contents.source}"
+        remedy = f"Say which marker is of the pulse and which of the tap: --marker pulse=NAME --marker {key}=NAME."
+        raise InvalidValueError(what, got=" or ".join(names_of(contents.events)), remedy=remedy)
     if len(pulses_s) == len(taps_s) == 1:
         _require_same(f"row {row + 1} of {contents.source}", isi_ms, float(pulses_s[0] - taps_s[0]))
     elif len(marks[key]) and not len(taps_s) and isi_ms is not None and 0 < isi_ms <= 1e3 * zero_s:
@@ -159,16 +181,14 @@ def _require_same(what: str, isi_ms: float | None, seen_s: float | None) -> None
         )
 
 
-def _only_one(columns: Columns, rows: Sequence[int], source: str) -> str:
+def _only_one(columns: Columns) -> str:
     """The code of the only person whose sweeps these are; raise if there are several, or several days."""
-    for key, what in (("day", "days"), ("subject", "people")):
-        several = {columns[key].text(row): None for row in rows}
+    for key, kind in (("day", "days"), ("subject", "people")):
+        several = {columns[key].text(row): None for row in columns.rows}
         if len(several) > 1:
-            raise InvalidValueError(
-                f"the sweeps of {source} are of several {what}",
-                got=f"{columns[key].name} {', '.join(several)}",
-                remedy=f'Analyse those of each by themselves: --where "{columns[key].name}={next(iter(several))}".',
-            )
+            what = f"the sweeps of {columns.empty.of} are of several {kind}"
+            remedy = f'Analyse those of each by themselves: --where "{columns[key].name}={next(iter(several))}".'
+            raise InvalidValueError(what, got=f"{columns[key].name} {', '.join(several)}", remedy=remedy)
     return next(iter(several), "")
 
 
@@ -177,77 +197,15 @@ def origin_key(layout: Layout) -> str:
     return "tap" if layout.reference == "impact" else "valve"
 
 
-def delivered_of(contents: Contents, unit: str, sweeps: Sequence[Found], layout: Layout, subject: str) -> Delivered:
-    """The sweeps as trials, judged as in a session."""
-    reference = layout.required_reference(contents.source)
-    signals = SignalLimits() if layout.mep_window_ms is None else SignalLimits(mep_window_ms=layout.mep_window_ms)
-    trials: list[Trial] = []
-    for stimulus, sweep, said in sweeps:
-        if said.get("lost"):
-            trials.append(Trial(stimulus.trial, Status.MISTRIAL, None, reason=Kind.NO_IMPACT))
-            continue
-        judged = judge(sweep, stimulus, anywhere(reference), signals)
-        trials.append(replace(judged, excluded=said.get("excluded") in {True, "true", "True"}))
-    if trials and not any(trial.told for trial in trials):
-        reasons = sorted({str(trial.reason) for trial in trials if trial.reason})
-        raise InvalidValueError(
-            f"no sweep of {contents.source} counts",
-            got=", ".join(reasons) or "excluded ones",
-            remedy=" ".join([*contents.notes, _IF_NONE_COUNTS.format(signals.background_uv)]),
-        )
-    emg = [sweep.channels["emg"].values for _, sweep, _ in sweeps if "emg" in sweep.channels]
-    return Delivered(
-        renumbered(trials),
-        reference,
-        subject=subject,
-        source=contents.source,
-        signals=signals,
-        units=("ms", unit),
-        sweeps={number: sweep.channels for number, (_, sweep, _) in enumerate(sweeps) if sweep.channels},
-        notes=(*contents.notes, *is_rectified(emg)),
-    )
-
-
-def sweeps_of(contents: Contents, signals: Mapping[str, Track], pulses: Sequence[Pulse], layout: Layout) -> list[Found]:
-    """A stretch of the recording for each pulse, with what came before it."""
-    if any(after.at_s - before.at_s < _AFTER_MS / 1e3 for before, after in pairwise(pulses)):
-        raise InvalidValueError(
-            f"two pulses of {contents.source} are less than {_AFTER_MS:g} ms apart",
-            remedy="Is the marker of the pulse the right one? Say --marker pulse=NAME.",
-        )
-    longest_s = max((pulse.isi_s or 0.0 for pulse in pulses), default=0.0)
-    events, found = contents.events, list[Found]()
-    bad = events[events["name"].astype(str).str.lower().str.startswith("bad")]  # as MNE takes them
-    for number, pulse in enumerate(pulses):
-        begin_s = pulse.at_s - _BEFORE_MS / 1e3 - longest_s
-        span_s = pulse.sweep_s or (begin_s, pulse.at_s + _AFTER_MS / 1e3)
-        origin_s = None if pulse.isi_s is None else pulse.at_s - pulse.isi_s
-        sweep = _cut(signals, span_s, pulse.at_s, origin_s, origin_key(layout))
-        said: dict[str, Any] = {**pulse.said, "lost": pulse.lost}
-        for isi_ms in isis_of(pulse.said) if pulse.isi_s is not None else ():
-            _require_same(f"the trial at {pulse.at_s:.3f} s of {contents.source}", isi_ms, pulse.isi_s)
-        judged_s = min(pulse.at_s - _BEFORE_MS / 1e3, origin_s or pulse.at_s), pulse.at_s + _AFTER_MS / 1e3
-        if ((bad["onset"] <= judged_s[1]) & (bad["onset"] + bad["duration"] >= judged_s[0])).any():
-            said["excluded"] = True
-        asked_ms: Any = said.get("commanded_isi_ms")  # what the file says, or else what the events do
-        if pulse.isi_s is not None and is_missing(asked_ms):
-            asked_ms = max(1e3 * pulse.isi_s, 0.0)
-        found.append((Stimulus(number, None if pulse.isi_s is None else float(asked_ms)), sweep, said))
-    return found
-
-
-def _cut(
-    signals: Mapping[str, Track], span_s: tuple[float, float], pulse_s: float, origin_s: float | None, key: str
-) -> Sweep:
+def _cut(signals: Mapping[str, Track], pulse: Pulse, begin_s: float, key: str) -> Sweep:
     """What all channels have of a stretch without a gap, whose clock begins at the first sample of the EMG."""
-    cut: dict[str, Channel] = {}
-    start_s = span_s[0]
+    begin_s, end_s = pulse.sweep_s or (begin_s, pulse.at_s + _AFTER_S)
+    cut, start_s = dict[str, Channel](), begin_s
     for name, track in signals.items():
-        stretch = track.at(pulse_s)
-        if stretch is not None:
-            own_s, values = track.cut(stretch, *span_s)
+        if (found := track.cut(pulse.at_s, begin_s, end_s)) is not None:
+            own_s, values = found
             start_s = own_s if name == "emg" else start_s
             cut[name] = Channel(values, track.rate_hz, "mV" if name == "emg" else "V", 1e3 * (own_s - start_s))
-    origin_ms = None if origin_s is None else 1e3 * (origin_s - start_s)
+    origin_ms = None if pulse.origin_s is None else 1e3 * (pulse.origin_s - start_s)
     begin: dict[str, Any] = {"t_valve_ms" if key == "valve" else "t_hit_ms": origin_ms}
-    return Sweep(cut, t_tms_ms=1e3 * (pulse_s - start_s), **begin)
+    return Sweep(cut, t_tms_ms=1e3 * (pulse.at_s - start_s), **begin)

@@ -23,9 +23,7 @@ from isiw.trials import Trial
 from isiw.types import FloatArray
 from isiw.window import Window
 
-NEAR_MS: Final = 2.5
-"""Half of the dissertation's step between two ISIs: an answer that is farther away is not of the ISI that was asked."""
-
+NEAR_MS: Final = 2.5  # half of the dissertation's step between ISIs; what is farther away answers another one
 SHARED: Final = (
     "The trials that answer are among those of the answer from all trials, so that the two agree more than two "
     "sessions of this person would. Each amplitude is as it was recorded at its place in the session: drift and a "
@@ -86,31 +84,27 @@ class Replay:
 
     def __str__(self) -> str:
         found = "no window" if self.window is None else f"the window {self.window}"
-        lines = [line for name in self.strategies if (line := self._unanswered(name))]
-        lines.append(f"All {self.pairs} pairs of stimuli say: {found}. F1 against that, by the number of stimuli:")
-        lines += [line for name in self.strategies for line in self._lines(name)]
-        return "\n".join([*lines, SHARED])
+        said = f"All {self.pairs} pairs of stimuli say: {found}. F1 against that, by the number of stimuli:"
+        lines = [line for name in self.strategies for line in self._lines(name)]
+        return "\n".join([*filter(None, map(self._unanswered, self.strategies)), said, *lines, SHARED])
 
     def _unanswered(self, name: str) -> str:
         """How many of a strategy's ISIs no trial answered; empty if one answered each."""
         far_ms = np.concatenate([run.far_ms for run in self.runs if run.strategy == name])
         share = float((far_ms > NEAR_MS).mean())
-        if not share:
-            return ""
-        return (
+        said = (
             f"{name}: {100 * share:.0f} % of its ISIs could not be answered: no trial was left within {NEAR_MS:g} ms, "
             f"and the nearest one answered, at most {far_ms.max():.0f} ms away."
         )
+        return said if share else ""
 
     def _lines(self, name: str) -> Iterator[str]:
         scores = self.f1_by_trial(name)
-        at = [n for n in (5, 10, 15, 20, 30, 40, 60, 80, 100) if n <= scores.shape[1]]
         low, middle, high = np.quantile(scores, (0.0, 0.5, 1.0), axis=0)
-        cells = [f"{n}: {middle[n - 1]:.2f} ({low[n - 1]:.2f}–{high[n - 1]:.2f})" for n in at]
-        yield f"{name}  {', '.join(cells)}"
+        at = [n for n in (5, 10, 15, 20, 30, 40, 60, 80, 100) if n <= scores.shape[1]]
+        yield f"{name}  {', '.join(f'{n}: {middle[n - 1]:.2f} ({low[n - 1]:.2f}–{high[n - 1]:.2f})' for n in at)}"
         runs = [run for run in self.runs if run.strategy == name]
-        stops = [run.stopped for run in runs if run.stopped is not None]
-        if stops:
+        if stops := [run.stopped for run in runs if run.stopped is not None]:
             yield f"  It would have stopped after {np.median(stops):.0f} ({len(stops)} of {len(runs)} seeds)."
 
     def plot(self, path: str | Path, *, overwrite: bool = False) -> Path:
@@ -170,9 +164,7 @@ def _run(
     name: str, space: DesignSpace, seed: int, pairs: Sequence[Trial], trials: int, settings: dict[str, Any]
 ) -> StrategyRun:
     strategy, rng, left = make_strategy(name, space, seed, **settings), np.random.default_rng([seed, 1]), list(pairs)
-    windows: list[Window | None] = []
-    far_ms: list[float] = []
-    stopped = None
+    windows, far_ms, stopped = list[Window | None](), list[float](), None
     for _ in range(trials):
         asked_ms = strategy.ask()
         gaps_ms = np.abs([(trial.wanted_isi_ms or 0.0) - asked_ms for trial in left])

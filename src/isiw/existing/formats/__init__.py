@@ -61,12 +61,9 @@ def format_of(path: Path) -> Format:
     name = path.name.casefold()
     found = next((one for one in FORMATS if name.endswith(one.suffixes)), None)
     if found is None or (path.is_dir() and not name.endswith(".mff")):
-        raise InvalidValueError(
-            "this cannot be read",
-            got=path.name,
-            expected=f"a file of {', '.join(suffix for one in FORMATS for suffix in one.suffixes)}",
-            remedy="Save or export it as one of these, such as CSV; of BrainVision's files name the .vhdr.",
-        )
+        expected = f"a file of {', '.join(suffix for one in FORMATS for suffix in one.suffixes)}"
+        remedy = "Save or export it as one of these, such as CSV; of BrainVision's files name the .vhdr."
+        raise InvalidValueError("this cannot be read", got=path.name, expected=expected, remedy=remedy)
     return found
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.existing import frames
 from isiw.existing.cells import Column, is_missing, with_decimals
-from isiw.existing.formats.contents import Contents, Track, events_of, parted, time_of
+from isiw.existing.formats.contents import Contents, Track, events_of, parted, timed
 from isiw.existing.layout import EMG_UNITS, ISI_UNITS_MS, MARKERS, UNIT_WORDS, Layout
 from isiw.existing.quantities import require_one, unit_said
 from isiw.lazy import pd
@@ -24,8 +24,8 @@ _PERIOD: Final = re.compile(
 )
 _RATE: Final = re.compile(r"(?:rate|sampl|frequency)[^\n\d]*(\d[\d.]*)\s*(k?)Hz", re.IGNORECASE)
 """What the lines above samples say of the time between them, or of their rate."""
-_FEW: Final = 0.01
-"""With a larger share of steps that are longer than usual, times have no pauses but are rounded."""
+_FEW: Final = 0.01  # with a larger share of steps that are longer than usual, times have no pauses but are rounded
+_OF_LAYOUT: Final = "Correct rate_hz in the layout; what has another rate must be a file of its own."
 
 
 def read(path: Path, layout: Layout) -> Contents:
@@ -33,8 +33,12 @@ def read(path: Path, layout: Layout) -> Contents:
     frame, source = frames.read_frame(path, layout), path.name
     if "emg" not in layout.channels:
         return Contents(source, trials=frame)
-    rate_hz = required(layout, "rate_hz", f"the sampling rate of {source}")
-    _require_head(frame.attrs.get("head", ""), rate_hz, source)
+    rate_hz, head = required(layout, "rate_hz", f"the sampling rate of {source}"), frame.attrs.get("head", "")
+    for number, word in _PERIOD.findall(head):
+        if (unit := UNIT_WORDS.get(word.casefold())) in ISI_UNITS_MS and float(number):
+            require_period(rate_hz, float(number), unit, f"the head of {source}")
+    for number, kilo in _RATE.findall(head):
+        require_rate(rate_hz, float(number) * (1e3 if kilo else 1.0), f"the head of {source}")
     remedy = "If no line holds their names, write names = [...] into the layout."
     for name in layout.channels.values():
         require_one("column", source, name, frame, remedy)
@@ -46,18 +50,16 @@ def read(path: Path, layout: Layout) -> Contents:
             require_rate(rate_hz, clock[0], f"the column {name!r} of {source}")
             pauses_s = pauses_s or clock[1]
     stretches = parted(blocks if len(blocks) > 1 else pauses_s, len(block), rate_hz, pauses_s)
-    tracks = list[Track]()
+    tracks, texts = list[Track](), list[tuple[str, float, float]]()
     for key, name in layout.channels.items():
-        if key != "events":
-            values = _numbers(frame, name, layout, source)
-            unit, kind = unit_said(name, EMG_UNITS) or "", "stim" if key in MARKERS else ""
-            tracks.append(Track.of_values(name, rate_hz, stretches, values, unit, kind))
-    rows = []
-    for at, text in enumerate(frame[layout.channels["events"]].tolist() if "events" in layout.channels else ()):
-        if not is_missing(text):
-            rows.append((str(text).lstrip("#* "), time_of(at, stretches, rate_hz), 0.0))
-    if len(blocks) > 1:
-        rows += [("sweep", one.start_s, one.samples / rate_hz) for one in stretches]
+        if key == "events":
+            each = enumerate(frame[name].tolist())
+            texts = [(str(text).lstrip("#* "), at, 0.0) for at, text in each if not is_missing(text)]
+        else:
+            values, kind = _numbers(frame, name, layout, source), "stim" if key in MARKERS else ""
+            tracks.append(Track.of_values(name, rate_hz, stretches, values, unit_said(name, EMG_UNITS) or "", kind))
+    rows = timed(texts, stretches, rate_hz)
+    rows += [("sweep", one.start_s, one.samples / rate_hz) for one in stretches if len(blocks) > 1]
     return Contents(source, tuple(tracks), events_of(rows))
 
 
@@ -69,18 +71,11 @@ def required(layout: Layout, key: Literal["rate_hz", "pulse_at_ms"], what: str) 
     return value
 
 
-_OF_LAYOUT: Final = "Correct rate_hz in the layout; what has another rate must be a file of its own."
-
-
 def require_rate(stated_hz: float, found_hz: float, where: str, remedy: str = _OF_LAYOUT) -> None:
     """Raise if a sampling rate that is stated is not the one that the file says."""
     if not 0.98 < found_hz / stated_hz < 1.02:
-        raise InvalidValueError(
-            f"the sampling rate is not the one that {where} says",
-            got=f"{stated_hz:g} Hz",
-            expected=f"{found_hz:g} Hz",
-            remedy=remedy,
-        )
+        what = f"the sampling rate is not the one that {where} says"
+        raise InvalidValueError(what, got=f"{stated_hz:g} Hz", expected=f"{found_hz:g} Hz", remedy=remedy)
 
 
 def clock_of(cells: pd.Series, name: str, rate_hz: float) -> tuple[float, dict[int, float]] | None:
@@ -114,15 +109,6 @@ def require_period(stated_hz: float, period: float, unit: str | None, where: str
     found_hz = _rate_of(period, unit, stated_hz)
     if unit is not None or 0.1 < found_hz / stated_hz < 10:  # or else it is of something else
         require_rate(stated_hz, found_hz, where)
-
-
-def _require_head(head: str, rate_hz: float, source: str) -> None:
-    """Raise if the lines above the samples say another rate."""
-    for number, word in _PERIOD.findall(head):
-        if (unit := UNIT_WORDS.get(word.casefold())) in ISI_UNITS_MS and float(number):
-            require_period(rate_hz, float(number), unit, f"the head of {source}")
-    for number, kilo in _RATE.findall(head):
-        require_rate(rate_hz, float(number) * (1e3 if kilo else 1.0), f"the head of {source}")
 
 
 def _numbers(frame: pd.DataFrame, name: str, layout: Layout, source: str) -> FloatArray:

@@ -17,17 +17,10 @@ from isiw.existing.layout import UNIT_WORDS
 from isiw.lazy import pd
 from isiw.types import FloatArray
 
-PIECE: Final = 2**20
-"""So many samples are in memory at once if a whole channel is looked through."""
-
-APART_S: Final = 100.0
-"""Sweeps without a time of their own, and what a pause of unknown length separates, are so far apart."""
-
-_ROWS: Final = 2**20
-"""So many rows are read of a file beside a recording; without a number pandas opens files of the system."""
-
-_SAME: Final = 1.5
-"""An event of a channel of codes is one that is noted, too, if both have one name, and so many samples between them."""
+PIECE: Final = 2**20  # so many samples are in memory at once if a whole channel is looked through
+APART_S: Final = 100.0  # between sweeps without a time of their own, and for a pause of unknown length
+_ROWS: Final = 2**20  # of a file beside a recording; without a number pandas opens files of the system
+_SAME: Final = 1.5  # so many samples apart a code and an event of one name are one event
 
 
 class Stretch(NamedTuple):
@@ -50,10 +43,15 @@ def parted(
     return tuple(found)
 
 
-def time_of(sample: float, stretches: Sequence[Stretch], rate_hz: float) -> float:
-    """When a sample was taken, which may be between two of them [s]."""
-    stretch = next((one for one in reversed(stretches) if one.first <= sample + 0.5), Stretch(0, 0, 0.0))
-    return stretch.start_s + (sample - stretch.first) / rate_hz
+def timed(
+    noted: Iterable[tuple[str, float, float]], stretches: Sequence[Stretch], rate_hz: float
+) -> list[tuple[str, float, float]]:
+    """Events that are noted by their samples, which may be between two, by when these were taken [s]."""
+    found = []
+    for name, sample, lasts_s in noted:
+        stretch = next((one for one in reversed(stretches) if one.first <= sample + 0.5), Stretch(0, 0, 0.0))
+        found.append((name, stretch.start_s + (sample - stretch.first) / rate_hz, lasts_s))
+    return found
 
 
 def part_of(values: Any, first: int, last: int) -> FloatArray:
@@ -90,39 +88,37 @@ class Track:
             return replace(self, unit=self.unit or known or "")
         return replace(self, unit=f"{self.unit} in one place, and {said} in another")
 
-    def at(self, time_s: float) -> Stretch | None:
-        """The stretch that a time is in; None in a gap."""
+    def cut(self, inside_s: float, begin_s: float, end_s: float) -> tuple[float, FloatArray] | None:
+        """What the stretch about a time has between two others: when that begins [s], and numbers; None in a gap."""
         slack_s = 0.5 / self.rate_hz
-        for stretch in self.stretches:
-            if stretch.start_s - slack_s <= time_s < stretch.start_s + stretch.samples / self.rate_hz + slack_s:
-                return stretch
+        for first, samples, start_s in self.stretches:
+            if start_s - slack_s <= inside_s < start_s + samples / self.rate_hz + slack_s:
+                begin = round((begin_s - start_s) * self.rate_hz)
+                end = max(0, min(begin + round((end_s - begin_s) * self.rate_hz), samples))
+                begin = max(0, begin)
+                return start_s + begin / self.rate_hz, self.read(first + begin, first + end)
         return None
 
-    def cut(self, stretch: Stretch, begin_s: float, end_s: float) -> tuple[float, FloatArray]:
-        """What one stretch has between two times: when its first sample was taken [s], and its numbers."""
-        first = round((begin_s - stretch.start_s) * self.rate_hz)
-        last = first + round((end_s - begin_s) * self.rate_hz)
-        first, last = max(0, first), max(0, min(last, stretch.samples))
-        return stretch.start_s + first / self.rate_hz, self.read(stretch.first + first, stretch.first + last)
-
-    def pieces(self) -> Iterator[tuple[Stretch, int, FloatArray]]:
-        """The numbers of all stretches, some at a time: the stretch, which of its samples comes first, and they."""
-        for stretch in self.stretches:
-            for begin in range(0, stretch.samples, PIECE):
-                end = min(begin + PIECE, stretch.samples)
-                yield stretch, begin, self.read(stretch.first + begin, stretch.first + end)
+    def pieces(self) -> Iterator[tuple[float, FloatArray, float]]:
+        """All numbers, some at a time: when the first was taken [s], they, and the one before without a gap, or it."""
+        for first, samples, start_s in self.stretches:
+            before = None
+            for begin in range(0, samples, PIECE):
+                values = self.read(first + begin, first + min(begin + PIECE, samples))
+                yield start_s + begin / self.rate_hz, values, float(values[0] if before is None else before)
+                before = values[-1]
 
     def onsets_s(self) -> list[float]:
         """When a trigger leaves the level at which it mostly is [s]; raise if it is as long at the other one."""
-        ends = [(values.min(), values.max()) for _, _, values in self.pieces()]
+        ends = [(values.min(), values.max()) for _, values, _ in self.pieces()]
         middle = (min(low for low, _ in ends) + max(high for _, high in ends)) / 2 if ends else 0.0
         rises, falls, high = list[float](), list[float](), 0
-        for stretch, begin, values, before in self._with_last():
+        for at_s, values, before in self.pieces():
             above = values > middle
             high += int(above.sum())
-            turns = np.diff(above.astype(np.int8), prepend=np.int8((values[0] if before is None else before) > middle))
-            for times, turn in ((rises, 1), (falls, -1)):
-                times += [stretch.start_s + (begin + int(at)) / self.rate_hz for at in np.flatnonzero(turns == turn)]
+            turns = np.diff(above.astype(np.int8), prepend=np.int8(before > middle))
+            rises += (at_s + np.flatnonzero(turns > 0) / self.rate_hz).tolist()
+            falls += (at_s + np.flatnonzero(turns < 0) / self.rate_hz).tolist()
         spans_s = np.diff(sorted([*rises, *falls]))
         if len(spans_s) > 2 and 0.5 < np.median(spans_s[0::2]) / np.median(spans_s[1::2]) < 2:
             raise InvalidValueError(
@@ -139,26 +135,18 @@ class Track:
         One that rises while another lasts adds its bits to it: where these bits have come alone, they are the code.
         """
         found = list[tuple[float, int, int]]()
-        for stretch, begin, values, last in self._with_last():
+        for at_s, values, last in self.pieces():
             codes = np.rint(values).astype(np.int64)
-            steps = np.diff(codes, prepend=codes[0] if last is None else round(last))
-            found += [
-                (stretch.start_s + (begin + int(at)) / self.rate_hz, int(codes[at]), int(codes[at] - steps[at]))
-                for at in np.flatnonzero(steps > 0)
-            ]
+            old = np.append(round(last), codes[:-1])
+            up = np.flatnonzero(codes > old)
+            times_s = (at_s + up / self.rate_hz).tolist()
+            found += zip(times_s, codes[up].tolist(), old[up].tolist(), strict=True)
         alone = {code for _, code, before in found if before == 0}
         return [
             (at, code ^ before if before & code == before and code not in alone and code ^ before in alone else code)
             for at, code, before in found
             if code > 0
         ]
-
-    def _with_last(self) -> Iterator[tuple[Stretch, int, FloatArray, float | None]]:
-        """The numbers of all stretches, some at a time, and the last number before them in the same stretch."""
-        last = None
-        for stretch, begin, values in self.pieces():
-            yield stretch, begin, values, last if begin else None
-            last = float(values[-1])
 
 
 def text_of(*values: Any) -> str:
@@ -203,24 +191,19 @@ class Contents:
     def with_bids(self, path: Path) -> Contents:
         """The same with the events and the units of channels that BIDS has in files beside a recording."""
         channels, events = (_beside(path, what) for what in ("channels", "events"))
-        units = {
-            str(name): unit for name, unit in zip(channels.get("name", ()), channels.get("units", ()), strict=False)
-        }
+        units = dict(zip(map(str, channels.get("name", ())), channels.get("units", ()), strict=False))
         tracks = tuple(one.with_unit(units.get(one.name)) for one in self.tracks)
         if not len(events):
             return replace(self, tracks=tracks)
-        if "sample" in events and tracks:
-            off = (events["onset"] * tracks[0].rate_hz - events["sample"]).abs().median()
-            if off > 0.1 * tracks[0].rate_hz:
-                raise InvalidValueError(
-                    f"the onsets of events beside {self.source} are not those of their samples",
-                    got=f"a difference of {off:.0f} samples",
-                    expected=f"seconds, at {tracks[0].rate_hz:g} Hz",
-                    remedy="Correct the onsets, or the samples, in the file of events.",
-                )
-        named = [
-            events[column] for column in ("trial_type", "value") if column in events and events[column].notna().any()
-        ]
+        off = (events["onset"] * tracks[0].rate_hz - events.get("sample", np.nan)).abs().median() if tracks else 0.0
+        if tracks and off > 0.1 * tracks[0].rate_hz:
+            raise InvalidValueError(
+                f"the onsets of events beside {self.source} are not those of their samples",
+                got=f"a difference of {off:.0f} samples",
+                expected=f"seconds, at {tracks[0].rate_hz:g} Hz",
+                remedy="Correct the onsets, or the samples, in the file of events.",
+            )
+        named = [events[one] for one in ("trial_type", "value") if one in events and events[one].notna().any()]
         names = [text_of(each) for each in named[0]] if named else ""
         return replace(self, tracks=tracks, events=events.assign(name=names))
 

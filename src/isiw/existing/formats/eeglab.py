@@ -12,7 +12,7 @@ import numpy as np
 
 from isiw.errors import InvalidValueError
 from isiw.existing.formats.columns import require_rate
-from isiw.existing.formats.contents import Contents, Track, events_of, part_of, parted, text_of, time_of
+from isiw.existing.formats.contents import Contents, Track, events_of, part_of, parted, text_of, timed
 from isiw.existing.layout import EMG_UNITS, Layout
 from isiw.files import opened
 from isiw.text.named_code import library
@@ -34,31 +34,21 @@ def read(path: Path, layout: Layout) -> Contents:
     if times_ms.size > 1 and times_ms.dtype.kind == "f":
         found_hz = 1e3 * (times_ms.size - 1) / float(times_ms[-1] - times_ms[0])
         require_rate(rate_hz, found_hz, f"EEG.times of {path.name}", "Correct EEG.srate or EEG.times, and save again.")
-    places = _listed(eeg.get("chanlocs"))
-    events = [one for one in _listed(eeg.get("event")) if not _empty(one.get("latency"))]
-    pauses = {math.ceil(float(one["latency"]) - 1.0): _number(one.get("duration")) / rate_hz
-              for one in events if text_of(one.get("type")) == "boundary"}  # fmt: skip
+    noted = [(text_of(one.get("type")), float(one["latency"]) - 1.0, _number(one.get("duration")) / rate_hz)
+             for one in _listed(eeg.get("event")) if not _empty(one.get("latency"))]  # fmt: skip
+    pauses = {math.ceil(at): lasts_s for name, at, lasts_s in noted if name == "boundary"} if trials == 1 else {}
     cuts: Iterable[int] = range(samples, trials * samples, samples) if trials > 1 else pauses
-    stretches = parted(cuts, trials * samples, rate_hz, {} if trials > 1 else pauses)
-    tracks, count, data = [], int(eeg["nbchan"]), eeg["data"]
+    stretches = parted(cuts, trials * samples, rate_hz, pauses)
+    tracks, count, data, places = [], int(eeg["nbchan"]), eeg["data"], _listed(eeg.get("chanlocs"))
     whole = None if isinstance(data, str) else np.reshape(data, (count, -1), order="F")
     for n in range(count):
         place = places[n] if n < len(places) else {}
-        label = str(place.get("labels") or f"channel {n + 1}")
         kind = place["type"].casefold() if isinstance(place.get("type"), str) else ""
-        read = partial(_beside, path, data, count, n) if whole is None else partial(part_of, whole[n])
-        tracks.append(Track(label, rate_hz, stretches, read, "uV", kind))
-    rows = [
-        (
-            text_of(one["type"]),
-            time_of(float(one["latency"]) - 1.0, stretches, rate_hz),
-            _number(one.get("duration")) / rate_hz,
-        )
-        for one in events
-        if text_of(one.get("type")) != "boundary"
-    ]
+        part = partial(_beside, path, data, count, n) if whole is None else partial(part_of, whole[n])
+        tracks.append(Track(str(place.get("labels") or f"channel {n + 1}"), rate_hz, stretches, part, "uV", kind))
+    events = events_of(timed((one for one in noted if one[0] != "boundary"), stretches, rate_hz))
     notes = () if layout.unit_of(EMG_UNITS) else (_ASSUMED,)
-    return Contents(path.name, tuple(tracks), events_of(rows), notes=notes).with_bids(path)
+    return Contents(path.name, tuple(tracks), events, notes=notes).with_bids(path)
 
 
 def _beside(path: Path, name: str, count: int, channel: int, first: int, last: int) -> FloatArray:

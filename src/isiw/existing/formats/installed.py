@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from isiw.errors import ConfigError
-from isiw.existing.formats.contents import Contents, Stretch, Track, events_of, parted, time_of
+from isiw.existing.formats.contents import Contents, Stretch, Track, events_of, parted, timed
 from isiw.existing.layout import Layout
 from isiw.text.named_code import library
 from isiw.types import FloatArray
@@ -27,11 +27,8 @@ ADICHT: Final = (
     "In LabChart: File, Export, LabChart text (.txt), with block header, time and comments; or MATLAB (.mat). A "
     "layout says what is what: docs/your-data.md."
 )
-_FRAME: Final = 0x7FFE
-"""BioSig's type of an event where a new frame begins."""
-
-_WAVES, _EVENTS, _MARKS, _TEXTS = {1, 9}, {2, 3}, {5}, {8}
-"""sonpy's types of channels."""
+_FRAME: Final = 0x7FFE  # BioSig's type of an event where a new frame begins
+_WAVES, _EVENTS, _MARKS, _TEXTS = {1, 9}, {2, 3}, {5}, {8}  # sonpy's types of channels
 
 
 def _reader(module: str, install: str, way_in: str, *, on_windows: bool = False) -> Any:
@@ -51,17 +48,11 @@ def cfs(path: Path, _layout: Layout) -> Contents:
     rate_hz, count = float(said["Samplingrate"]), len(values)
     events = [(int(one["TYP"], 16), float(one["POS"]), one) for one in said.get("EVENT", ())]
     frames = parted((round(at * rate_hz) for kind, at, _ in events if kind == _FRAME), count, rate_hz)
-    tracks = [
-        Track.of_values(one["Label"], rate_hz, frames, values[:, index], one.get("PhysicalUnit", ""))
-        for index, one in enumerate(said["CHANNEL"][: values.shape[1]])
-    ]
-    rows = [("sweep", frame.start_s, frame.samples / rate_hz) for frame in frames if len(frames) > 1]
-    rows += [
-        (str(one.get("Description") or kind), time_of(at * rate_hz, frames, rate_hz), 0.0)
-        for kind, at, one in events
-        if kind != _FRAME
-    ]
-    return Contents(path.name, tuple(tracks), events_of(rows))
+    tracks = [Track.of_values(one["Label"], rate_hz, frames, values[:, index], one.get("PhysicalUnit", ""))
+              for index, one in enumerate(said["CHANNEL"][: values.shape[1]])]  # fmt: skip
+    noted = [(str(one.get("Description") or kind), at * rate_hz, 0.0) for kind, at, one in events if kind != _FRAME]
+    sweeps = [("sweep", frame.start_s, frame.samples / rate_hz) for frame in frames if len(frames) > 1]
+    return Contents(path.name, tuple(tracks), events_of([*sweeps, *timed(noted, frames, rate_hz)]))
 
 
 def smrx(path: Path, _layout: Layout) -> Contents:
@@ -103,8 +94,7 @@ def adicht(path: Path, _layout: Layout) -> Contents:
         rate_hz, unit = float(channel.fs[0]), ", ".join(sorted({unit for unit in channel.units if unit}))
         stretches = parted(firsts, firsts[-1], rate_hz)
         tracks.append(Track.of_values(channel.name, rate_hz, stretches, np.concatenate(parts), unit))
-        if not rows:  # comments say how long after the beginning of their record they are
-            for first, record in zip(firsts, held.records, strict=False):
-                times = [(one.text, first + float(one.time) * rate_hz) for one in record.comments]
-                rows += [(text, time_of(at, stretches, rate_hz), 0.0) for text, at in times]
+        noted = [(one.text, first + float(one.time) * rate_hz, 0.0)  # which is since the beginning of its record
+                 for first, record in zip(firsts, held.records, strict=False) for one in record.comments]  # fmt: skip
+        rows = rows or timed(noted, stretches, rate_hz)
     return Contents(path.name, tuple(tracks), events_of(rows))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,39 +20,34 @@ _PERIODS: Final = frozenset({"interval", "samplinginterval", "sampleinterval", "
 
 def read(path: Path, layout: Layout) -> Contents:
     """A table of vectors, a recording in vectors, or sweeps beside a vector of their ISIs."""
-    if "emg" not in layout.channels:
+    source, name = path.name, layout.channels.get("emg")
+    if name is None:
         return columns.read(path, layout)
     arrays = frames.read_arrays(path)
-    quantities.require_one("array", path.name, layout.channels["emg"], arrays)
-    if arrays[layout.channels["emg"]].squeeze().ndim > 1:
-        return _sweeps(arrays, layout, path.name)
-    return columns.read(path, layout)
-
-
-def _sweeps(arrays: Mapping[str, Any], layout: Layout, source: str) -> Contents:
+    quantities.require_one("array", source, name, arrays)
+    if arrays[name].squeeze().ndim < 2:
+        return columns.read(path, layout)
     rate_hz = columns.required(layout, "rate_hz", f"the sampling rate of {source}")
     pulse_at_ms = columns.required(layout, "pulse_at_ms", f"the time of the pulse in a sweep of {source}")
-    beside, name = frames.of_vectors(arrays, layout), layout.channels["emg"]
-    count = len(beside)
-    sweeps = np.asarray(arrays[name], dtype=np.float64)
-    if sweeps.ndim != 2 or count not in sweeps.shape:
+    beside, sweeps = frames.of_vectors(arrays, layout), np.asarray(arrays[name], dtype=np.float64)
+    if sweeps.ndim != 2 or (count := len(beside)) not in sweeps.shape:
         raise InvalidValueError(
             f"the sweeps of {source} are not as many as its ISIs, in a matrix",
-            got=f"{' × '.join(map(str, sweeps.shape))} samples and {count} ISIs",
+            got=f"{' × '.join(map(str, sweeps.shape))} samples and {len(beside)} ISIs",
             remedy="Save a row or a column for each ISI.",
         )
     for other, array in arrays.items():
-        if array.size == 1 and letters(other) in _RATES and array.dtype.kind in "fiu":
-            columns.require_rate(rate_hz, float(array.item()), f"{other!r} of {source}")
-        if array.size == 1 and letters(other) in _PERIODS and array.dtype.kind in "fiu" and array.item() > 0:
-            columns.require_period(rate_hz, float(array.item()), None, f"{other!r} of {source}")
+        number = float(array.item()) if array.size == 1 and array.dtype.kind in "fiu" else 0.0
+        if number and letters(other) in _RATES:
+            columns.require_rate(rate_hz, number, f"{other!r} of {source}")
+        if number > 0 and letters(other) in _PERIODS:
+            columns.require_period(rate_hz, number, None, f"{other!r} of {source}")
         if array.size == sweeps.size // count != count:
             _require_zero(other, array.ravel(), rate_hz, pulse_at_ms, source)
     said = "".join([name, *(f" ({unit})" for unit in quantities.units_beside("emg", name, beside).values())])
-    unit = quantities.unit_said(said, EMG_UNITS) or ""
     flat = (sweeps if sweeps.shape[0] == count else sweeps.T).ravel()
     stretches = parted(range(0, flat.size, flat.size // count), flat.size, rate_hz)
-    track = Track.of_values(name, rate_hz, stretches, flat, unit)
+    track = Track.of_values(name, rate_hz, stretches, flat, quantities.unit_said(said, EMG_UNITS) or "")
     return Contents(source, (track,), trials=beside, pulse_at_s=pulse_at_ms / 1e3)
 
 
@@ -64,9 +58,8 @@ def _require_zero(name: str, times: Any, rate_hz: float, pulse_at_ms: float, sou
     columns.require_rate(rate_hz, clock[0], f"{name!r} of {source}")
     zero_ms = 1e3 / clock[0] * -times[0] * (len(times) - 1) / (times[-1] - times[0])
     if zero_ms > 0 and abs(zero_ms - pulse_at_ms) > 1.5e3 / rate_hz:
+        what = f"the pulse does not come where {name!r} of {source} is 0"
+        remedy = "Correct pulse_at_ms in the layout; if it is right, leave that vector out of the file."
         raise InvalidValueError(
-            f"the pulse does not come where {name!r} of {source} is 0",
-            got=f"{pulse_at_ms:g} ms",
-            expected=f"{zero_ms:g} ms after the first sample",
-            remedy="Correct pulse_at_ms in the layout; if it is right, leave that vector out of the file.",
+            what, got=f"{pulse_at_ms:g} ms", expected=f"{zero_ms:g} ms after the first sample", remedy=remedy
         )

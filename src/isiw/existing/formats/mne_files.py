@@ -11,20 +11,15 @@ from typing import Any, Final
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.existing.formats.contents import Contents, Stretch, Track, events_of, parted, time_of, with_codes
+from isiw.existing.formats.contents import Contents, Stretch, Track, events_of, parted, timed, with_codes
 from isiw.existing.layout import Layout
 from isiw.files import opened
 from isiw.text.named_code import library
 from isiw.types import FloatArray
 
-_SCALES_V: Final = {"V": 1.0, "mV": 1e-3, "µV": 1e-6, "uV": 1e-6, "nV": 1e-9}
-"""The units that MNE knows, in V; numbers in others it leaves as they are."""
-
-_PAUSE: Final = re.compile(r"new segment|\bboundary\b", re.IGNORECASE)
-"""What annotations say of a pause of unknown length."""
-
-_DATE: Final = 14
-"""The date of a marker of BrainVision has at least so many digits."""
+_SCALES_V: Final = {"V": 1.0, "mV": 1e-3, "µV": 1e-6, "uV": 1e-6, "nV": 1e-9}  # numbers in others stay as they are
+_PAUSE: Final = re.compile(r"new segment|\bboundary\b", re.IGNORECASE)  # of unknown length, as annotations say it
+_DATE: Final = 14  # the date of a marker of BrainVision has at least so many digits
 
 
 def read(path: Path, _layout: Layout) -> Contents:
@@ -46,11 +41,10 @@ def _require_whole_markers(path: Path) -> None:
         is_date = kind != "Comment" or len(fields[-1].strip()) >= _DATE
         dated = len(fields) == 5 and fields[1].strip().isdigit() and is_date
         if re.match(r"Mk\d+=", line) and len(fields) > 4 and not dated:
+            what = f"a comma stands in the text of a marker in {markers.name}, where it must be coded"
+            remedy = "Write that into the .vmrk with an editor; what wrote the file left it out."
             raise InvalidValueError(
-                f"a comma stands in the text of a marker in {markers.name}, where it must be coded",
-                got=line.strip(),
-                expected=r"\1 in its place, as BrainVision has it",
-                remedy="Write that into the .vmrk with an editor; what wrote the file left it out.",
+                what, got=line.strip(), expected=r"\1 in its place, as BrainVision has it", remedy=remedy
             )
 
 
@@ -70,49 +64,42 @@ def of_raw(raw: Any, source: str = "the recording") -> Contents:
         return raw.get_data(picks=[index], start=first, stop=last, verbose="ERROR")[0]
 
     tracks = tuple(_tracks(raw, stretches, values))
-    events = [(name, time_of(at, stretches, rate_hz), lasts) for name, at, lasts in noted]
-    return Contents(source, tracks, with_codes(events, tracks))
+    return Contents(source, tracks, with_codes(timed(noted, stretches, rate_hz), tracks))
 
 
 def of_epochs(epochs: Any, source: str = "the epochs") -> Contents:
     """The sweeps of `mne.Epochs`: their metadata say the ISIs, or their annotations the stimuli."""
-    data = {index: epochs.get_data(picks=[index], verbose="ERROR")[:, 0] for index in range(len(epochs.ch_names))}
-    length, rate_hz = len(epochs.times), float(epochs.info["sfreq"])
-    stretches = parted(range(0, length * len(epochs), length), length * len(epochs), rate_hz)
-    flat = {index: values.ravel() for index, values in data.items()}
+    flat = [epochs.get_data(picks=[index], verbose="ERROR")[:, 0].ravel() for index in range(len(epochs.ch_names))]
+    length, zero_s = len(epochs.times), -float(epochs.tmin)
+    stretches = parted(range(0, length * len(epochs), length), length * len(epochs), float(epochs.info["sfreq"]))
     tracks = tuple(_tracks(epochs, stretches, lambda index, first, last: flat[index][first:last]))
-    zero_s = -float(epochs.tmin)
-    noted = [
-        (str(one[2]), stretch.start_s + float(one[0]) + zero_s, float(one[1]))
+    noted = {
+        (str(name), round(stretch.start_s + float(at) + zero_s, 6)): float(lasts)
         for stretch, each in zip(stretches, epochs.get_annotations_per_epoch(), strict=True)
-        for one in each
-    ]
+        for at, lasts, name in each
+    }
     if epochs.metadata is not None:
-        names, known = (
-            {code: name for name, code in epochs.event_id.items()},
-            {(one[0], round(one[1], 6)) for one in noted},
-        )
-        zeros = [
-            (names[code], one.start_s + zero_s, 0.0) for code, one in zip(epochs.events[:, 2], stretches, strict=True)
-        ]
-        events = events_of([*noted, *(one for one in zeros if (one[0], round(one[1], 6)) not in known)])
-        return Contents(source, tracks, events, epochs.metadata, zero_s, empty_is_alone=True)
-    if not noted:
-        raise InvalidValueError(
-            f"{source} do not hold the ISIs",
-            expected="a column isi_ms in their metadata, or annotations of the stimuli",
-        )
-    return Contents(source, tracks, events_of(noted))
+        names = {code: name for name, code in epochs.event_id.items()}
+        for code, stretch in zip(epochs.events[:, 2], stretches, strict=True):
+            noted.setdefault((names[code], round(stretch.start_s + zero_s, 6)), 0.0)
+    elif not noted:
+        expected = "a column isi_ms in their metadata, or annotations of the stimuli"
+        raise InvalidValueError(f"{source} do not hold the ISIs", expected=expected)
+    events = events_of((name, at, lasts) for (name, at), lasts in noted.items())
+    if epochs.metadata is None:
+        return Contents(source, tracks, events)
+    return Contents(source, tracks, events, epochs.metadata, zero_s, empty_is_alone=True)
 
 
 def _tracks(held: Any, stretches: tuple[Stretch, ...], values: Callable[[int, int, int], Any]) -> Iterator[Track]:
     units = getattr(held, "_orig_units", None) or {}
     for index, (name, kind) in enumerate(zip(held.ch_names, held.get_channel_types(), strict=True)):
         said = units.get(name, "V")
-        read = partial(_in_unit, values, _SCALES_V.get(said, 1.0), index)
         usual = "" if kind == "misc" and said not in {"V", "n/a", ""} else kind
-        yield Track(str(name), float(held.info["sfreq"]), stretches, read, "" if said == "n/a" else said, usual)
+        part, unit = partial(_part, values, index), "" if said == "n/a" else said
+        track = Track(str(name), float(held.info["sfreq"]), stretches, part, unit, usual)
+        yield track.scaled(1.0 / _SCALES_V.get(said, 1.0))
 
 
-def _in_unit(values: Callable[[int, int, int], Any], unit_v: float, index: int, first: int, last: int) -> FloatArray:
-    return np.asarray(values(index, first, last), dtype=np.float64) / unit_v
+def _part(values: Callable[[int, int, int], Any], index: int, first: int, last: int) -> FloatArray:
+    return np.asarray(values(index, first, last), dtype=np.float64)

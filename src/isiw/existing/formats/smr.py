@@ -14,8 +14,7 @@ from isiw.existing.layout import Layout
 from isiw.text.named_code import library
 from isiw.types import FloatArray
 
-_LEVEL, _MARKER, _TEXTS = 4, 5, 8
-"""Kinds of channels: a level's events are both of its edges; a marker has a code of four bytes, or a text."""
+_LEVEL, _MARKER, _TEXTS = 4, 5, 8  # a level's events are both of its edges; a marker has four bytes, or a text
 _EVER_S: Final = 1e6
 
 
@@ -40,8 +39,7 @@ def read(path: Path, _layout: Layout) -> Contents:
 def _part(raw: Any, index: int, firsts: list[int], first: int, last: int) -> FloatArray:
     """Numbers of a channel, of the segment in which they are."""
     segment = int(np.searchsorted(firsts, first, side="right")) - 1
-    begin = firsts[segment]
-    chunk = raw.get_analogsignal_chunk(0, segment, first - begin, last - begin, index)
+    chunk = raw.get_analogsignal_chunk(0, segment, first - firsts[segment], last - firsts[segment], index)
     return np.asarray(chunk[:, 0], dtype=np.float64)
 
 
@@ -55,16 +53,11 @@ def _events(raw: Any, index: int) -> list[tuple[str, float, float]]:
         spans_s = np.diff(times_s)
         first = int(len(spans_s) > 1 and np.median(spans_s[0::2]) > np.median(spans_s[1::2]))
         times_s, labels = times_s[first::2], labels[first::2]
-    title = str(channel["name"])
-    return [
-        (_name(title, kind, str(label)), at_s, 0.0)
-        for at_s, label in zip(times_s.tolist(), labels.tolist(), strict=True)
-        if math.isfinite(at_s)
-    ]
-
-
-def _name(title: str, kind: int, label: str) -> str:
-    """What an event is called: its text, its channel and code, or its channel."""
-    if kind == _TEXTS:
-        return label.strip("\0 ") or title
-    return f"{title} {int(label) & 0xFF}" if kind == _MARKER and label.lstrip("-").isdigit() else title
+    title, rows = str(channel["name"]), []
+    for at_s, said in zip(times_s.tolist(), map(str, labels.tolist()), strict=True):
+        name = said.strip("\0 ") or title if kind == _TEXTS else title
+        if kind == _MARKER and said.lstrip("-").isdigit():
+            name = f"{title} {int(said) & 0xFF}"
+        if math.isfinite(at_s):
+            rows.append((name, at_s, 0.0))
+    return rows

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -10,15 +11,10 @@ from isiw.errors import InvalidValueError
 from isiw.existing.formats.contents import Stretch
 from isiw.types import FloatArray, IntArray
 
-_GAP_S: Final = 2.5e-3
-"""Samples that come later than expected by so much, and stay so, come after a gap; those that do not, jitter."""
+_GAP_S: Final = 2.5e-3  # samples that are later than expected by so much, for good, come after a gap; others jitter
 _AROUND_S: Final = 1.0
-_ENOUGH_S: Final = 10.0
-"""A stretch that is longer says at which rate its samples were really taken."""
-
-
-_SCATTER_S: Final = 2e-3
-"""Times that scatter more are said."""
+_ENOUGH_S: Final = 10.0  # a stretch that is longer says at which rate its samples were really taken
+_SCATTER_S: Final = 2e-3  # times that scatter more are said
 
 
 class Clocked(NamedTuple):
@@ -49,17 +45,18 @@ def clocked(
     least_s = max(_GAP_S, 1.5 * nominal_s, 2.0 * float(jitter_s))
     late = (np.flatnonzero(np.diff(late_s) > 0.8 * least_s) + 1).tolist()
     begins = [0, *_gaps(late_s, late, (0, len(times_s)), around, least_s)]
-    ends = [*begins[1:], len(times_s)]
-    spans = [slice(*span) for span in zip(begins, ends, strict=True)]
+    spans = [slice(*span) for span in pairwise([*begins, len(times_s)])]
     longest = max(spans, key=lambda span: index[span.stop - 1] - index[span.start])
-    period_s = _period_s(times_s[longest], index[longest], nominal_s)
+    period_s = nominal_s
+    if times_s[longest][-1] - times_s[longest][0] >= _ENOUGH_S:  # by a line through all of them
+        centred = index[longest] - index[longest].mean()
+        period_s = float(centred @ (times_s[longest] - times_s[longest].mean()) / (centred @ centred))
     stretches, scatter = [], list[FloatArray]()
     for span, last in zip(spans, [*index[begins[1:]].tolist(), samples or len(times_s)], strict=True):
         first = int(index[span.start])
-        even_s = period_s * (index[span] - first)
-        start_s = float(np.median(times_s[span] - even_s))
-        stretches.append(Stretch(first, last - first, start_s))
-        scatter.append(np.abs(times_s[span] - even_s - start_s))
+        late_s = times_s[span] - period_s * (index[span] - first)
+        stretches.append(Stretch(first, last - first, float(np.median(late_s))))
+        scatter.append(np.abs(late_s - stretches[-1].start_s))
     scatter_s = float(np.quantile(np.concatenate(scatter), 0.95))
     note = f"The times of {what} scatter by {1e3 * scatter_s:.1f} ms: MEPs may lie elsewhere."
     return Clocked(1.0 / period_s, tuple(stretches), (note,) if scatter_s > _SCATTER_S else ())
@@ -77,11 +74,3 @@ def _gaps(late_s: FloatArray, places: list[int], span: tuple[int, int], around: 
     surest = max(sure, key=lambda place: sure[place])
     sides = [_gaps(late_s, places, side, around, least_s) for side in ((span[0], surest), (surest, span[1]))]
     return [*sides[0], surest, *sides[1]]
-
-
-def _period_s(times_s: FloatArray, index: IntArray, nominal_s: float) -> float:
-    """The time from one sample to the next, by a line through all of them; the nominal one if they are few."""
-    if times_s[-1] - times_s[0] < _ENOUGH_S:
-        return nominal_s
-    centred = index - index.mean()
-    return float(centred @ (times_s - times_s.mean()) / (centred @ centred))

@@ -1,16 +1,15 @@
 """XDF of LabRecorder (Lab Streaming Layer): streams with clock offsets, of which those with texts are markers.
 
-pyxdf reads all samples one by one and as a whole. It gets a file in which a stream of numbers at a rate has texts: each
-says where some samples in a row are, and has the time of the first of them.
+pyxdf reads all samples one by one and as a whole. In the file that it gets, a stream of numbers at a rate has others:
+where samples in a row begin, how far they are apart, and how many they are, at the time of the first of them.
 """
 
 from __future__ import annotations
 
 import gzip
 import io
-import struct
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import suppress
 from functools import lru_cache, partial
 from itertools import accumulate
@@ -25,102 +24,91 @@ from isiw.existing.formats.stamps import clocked
 from isiw.existing.layout import Layout
 from isiw.files import opened
 from isiw.text.named_code import library
-from isiw.types import FloatArray, IntArray
+from isiw.types import FloatArray
 
 BOUNDARY: Final = bytes.fromhex("43a546dccbf5410fb30ed5467383cbe4")
 _HEADER, _SAMPLES, _FOOTER = 2, 3, 6
 _LATE_S: Final = 1e-3
-_MOST: Final = 2**31
-"""A chunk that is longer [bytes] is damaged."""
+_MOST: Final = 2**31  # a chunk that is longer [bytes] is damaged
+_ROW: Final = np.dtype([("stamped", "u1"), ("at_s", "<f8"), ("place", "<f8"), ("step", "<f8"), ("count", "<f8")])
+_OF_MARKERS: Final = ("marker", "trig", "ttl", "stim", "event")
 
 
 def read(path: Path, _layout: Layout) -> Contents:
     """The channels and markers of all streams, on one clock; gaps are found here, since pyxdf smooths them away."""
-    load, numbers = library("pyxdf", "import").load_xdf, dict[int, _Numbers]()
-    streams, _ = load(_shortened(path, numbers), dejitter_timestamps=False, verbose=False)
-    streams = [stream for stream in streams if len(stream["time_stamps"])]
-    begun_s = min((float(stream["time_stamps"][0]) for stream in streams), default=0.0)
-    hosts = {_said(stream["info"], "hostname") for stream in streams}
+    load, held = library("pyxdf", "import").load_xdf, dict[int, _Stream]()
+    found, _ = load(_shortened(path, held), dejitter_timestamps=False, verbose=False)
+    streams = [(held[one["info"]["stream_id"]], one) for one in found if len(one["time_stamps"])]
+    begun_s = min((float(stream["time_stamps"][0]) for _, stream in streams), default=0.0)
+    several = len({own.said.findtext("hostname") for own, _ in streams}) > 1
     tracks, rows, notes = list[Track](), list[tuple[str, float, float]](), list[str]()
-    for stream in streams:
-        info, times_s = stream["info"], np.asarray(stream["time_stamps"]) - begun_s
-        name, held = _said(info, "name"), numbers.get(info["stream_id"])
-        if len(hosts) > 1 and not len(stream["clock_times"]):
-            notes.append(f"The stream {name} has no clock offsets, and another computer recorded beside it.")
-        if held is not None:
-            firsts = held.places([text for (text,) in stream["time_series"]])
-            found = clocked(times_s, held.rate_hz, f"the stream {name}", firsts[:-1], int(firsts[-1]))
-            notes += found.notes
-            for channel, (label, unit, kind) in enumerate(_channels(info, held.count)):
-                part = partial(held.read, channel)
-                tracks.append(Track(label, found.rate_hz, found.stretches, part, unit, kind))
-        elif _are_markers(info):  # no EMG has numbers at no rate
-            rows += [(text_of(*one), at, 0.0) for one, at in zip(stream["time_series"], times_s.tolist(), strict=True)]
-    return Contents(path.name, tuple(tracks), events_of(rows), notes=tuple(notes))
+    for own, stream in streams:
+        times_s, values = np.asarray(stream["time_stamps"]) - begun_s, stream["time_series"]
+        if several and not len(stream["clock_times"]):
+            notes.append(f"The stream {own.name} has no clock offsets, and another computer recorded beside it.")
+        if own.has_numbers:
+            own.rows = np.asarray(values, dtype=np.int64).tolist()
+            own.firsts = [0, *accumulate(count for _, _, count in own.rows)]
+            clock = clocked(times_s, own.rate_hz, f"the stream {own.name}", np.array(own.firsts[:-1]), own.firsts[-1])
+            notes += clock.notes
+            for n, (label, unit, kind) in enumerate(own.channels()):
+                tracks.append(Track(label, clock.rate_hz, clock.stretches, partial(own.read, n), unit, kind))
+        elif own.form.startswith(("string", "int")) or any(word in own.kind for word in _OF_MARKERS):
+            rows += [(text_of(*one), at, 0.0) for one, at in zip(values, times_s.tolist(), strict=True)]
+    return Contents(path.name, tuple(tracks), events_of(rows), notes=tuple(notes))  # no EMG has numbers at no rate
 
 
-def _are_markers(info: Mapping[str, Any]) -> bool:
-    """True for texts, and for numbers that are whole ones, or of a type that says so."""
-    form, kind = (_said(info, key).casefold() for key in ("channel_format", "type"))
-    return form.startswith(("string", "int")) or any(
-        word in kind for word in ("marker", "trig", "ttl", "stim", "event")
-    )
+class _Stream:
+    """A stream by its header, and where in the file its samples are if they are numbers at a rate."""
 
+    def __init__(self, path: Path, said: ET.Element) -> None:
+        self.path, self.said, self.name = path, said, said.findtext("name") or ""
+        self.form, self.kind = (said.findtext(key, "").strip().casefold() for key in ("channel_format", "type"))
+        self.count, self.rate_hz = int(said.findtext("channel_count", "")), float(said.findtext("nominal_srate") or 0.0)
+        self.has_numbers = self.rate_hz > 0 and self.form != "string"
+        self.type = np.dtype(self.form.replace("double", "float") if self.has_numbers else "u1").newbyteorder("<")
+        self.last_s, self.samples, self.shown = 0.0, 0, 0  # so far
+        self.rows, self.firsts = list[list[int]](), list[int]()
 
-def _said(info: Mapping[str, Any] | None, key: str) -> Any:
-    """What a description says, whose every entry is a list: a text, or a description; empty if nothing."""
-    return ((info or {}).get(key) or [""])[0] or ""
+    def channels(self) -> Iterator[tuple[str, str, str]]:
+        """The label, unit and type of each channel."""
+        described = self.said.findall("desc/channels/channel")
+        for n in range(self.count):
+            one = described[n] if n < len(described) else ET.Element("channel")
+            label = one.findtext("label") or (self.name if self.count == 1 else f"{self.name} {n + 1}")
+            yield label, one.findtext("unit") or "", (one.findtext("type") or self.kind).casefold()
 
-
-def _channels(info: Mapping[str, Any], count: int) -> Iterator[tuple[str, str, str]]:
-    """The label, unit and type of each channel of a stream."""
-    described, name = _said(_said(info, "desc") or None, "channels") or {}, _said(info, "name")
-    each = [*described.get("channel", ())[:count], *[None] * count][:count]
-    for number, said in enumerate(each, 1):
-        label = _said(said, "label") or (name if count == 1 else f"{name} {number}")
-        yield label, _said(said, "unit"), (_said(said, "type") or _said(info, "type")).casefold()
-
-
-class _Numbers:
-    """The samples of a stream of numbers in a file, of which those in a row are as far from each other."""
-
-    def __init__(self, path: Path, said: ET.Element, rate_hz: float) -> None:
-        self.path, self.rate_hz, self.count = path, rate_hz, int(said.findtext("channel_count", ""))
-        self.type = np.dtype(said.findtext("channel_format", "").strip().replace("double", "float")).newbyteorder("<")
-        self.last_s, self.samples, self.texts = 0.0, 0, 0  # so far
-        self.firsts, self.rows = [0], list[list[int]]()
+    def described(self, said: ET.Element) -> bytes:
+        """A header, or the footer, by what pyxdf gets of the samples."""
+        for one in said if self.has_numbers else ():
+            one.text = {"channel_format": "double64", "channel_count": "3"}.get(one.tag, one.text)
+            if one.tag == "sample_count":  # by which pyxdf sees those too many
+                one.text = f"{self.shown - max(0, self.samples - int(one.text or 0))}"
+        return ET.tostring(said)
 
     def shortened(self, at: int, content: bytes) -> bytes:
-        """A chunk, whose content begins at a byte of the file, with texts in the place of samples."""
+        """A chunk, whose content begins at a byte of the file, by the samples in a row."""
         head, width = 5 + content[4], self.count * self.type.itemsize
         count, begins, end = int.from_bytes(content[5:head], "little"), list[int](), head
         for _ in range(count):  # numbers are behind the sample's time, if it has one
-            begins.append(end + 9 if content[end] else end + 1)
+            begins.append(end + (9 if content[end] else 1))
             end = begins[-1] + width
         if not count or end > len(content):
             raise IndexError("the chunk holds no samples, or is damaged")
-        number, steps = np.arange(count), np.diff(begins, prepend=head - width)
+        places, steps = np.array(begins), np.diff(begins, prepend=head - width)
         stamped = np.flatnonzero(steps > 1 + width)
-        stamps_s = [struct.unpack_from("<d", content, begins[one] - 8)[0] for one in stamped]
-        since = np.searchsorted(stamped, number, side="right")
-        known, known_s = np.append(-1, stamped)[since], np.append(self.last_s, stamps_s)[since]
-        times_s = known_s + (number - known) / self.rate_hz
+        stamps = np.frombuffer(content, np.uint8)[places[stamped, None] + np.arange(-8, 0)]
+        since = np.searchsorted(stamped, np.arange(count), side="right")
+        last_s = np.append(self.last_s, stamps.copy().view("<f8"))[since]
+        times_s = last_s + (np.arange(count) - np.append(-1, stamped)[since]) / self.rate_hz
         late = np.abs(np.diff(times_s) - 1 / self.rate_hz) > _LATE_S
         uneven = np.diff(steps, append=steps[-1])[1:] != 0
-        firsts = np.unique([0, *np.flatnonzero(late | uneven) + 1, count - 1]).tolist()
-        self.last_s, self.samples, self.texts = float(times_s[-1]), self.samples + count, self.texts + len(firsts)
-        found = [content[:4], b"\x08", len(firsts).to_bytes(8, "little")]
-        for first, after in zip(firsts, [*firsts[1:], count], strict=True):
-            step = int(steps[first + 1]) if after > first + 1 else 0
-            text = f"{at + begins[first]} {step} {after - first}".encode()
-            found.append(struct.pack("<Bd", 8, times_s[first]) + bytes([1, len(text)]) + text)
-        return b"".join(found)
-
-    def places(self, texts: Iterable[str]) -> IntArray:
-        """Of the samples in a row the first, by what pyxdf has kept of their texts, and how many samples there are."""
-        self.rows = [[int(word) for word in text.split()] for text in texts]
-        self.firsts = [0, *accumulate(count for _, _, count in self.rows)]
-        return np.array(self.firsts)
+        firsts = np.unique([0, *np.flatnonzero(late | uneven) + 1, count - 1])
+        rows = np.zeros(len(firsts), _ROW)
+        rows["stamped"], rows["at_s"], rows["place"] = 8, times_s[firsts], at + places[firsts]
+        rows["step"], rows["count"] = np.append(steps, 0)[firsts + 1], np.diff(firsts, append=count)
+        self.last_s, self.samples, self.shown = float(times_s[-1]), self.samples + count, self.shown + len(rows)
+        return content[:4] + b"\x08" + len(rows).to_bytes(8, "little") + rows.tobytes()
 
     def read(self, channel: int, first: int, last: int) -> FloatArray:
         """The numbers of a channel from one sample to before another."""
@@ -135,34 +123,23 @@ class _Numbers:
         return np.concatenate(found)
 
 
-def _shortened(path: Path, numbers: dict[int, _Numbers]) -> io.BytesIO:
-    """A file in which streams of numbers at a rate, which are gathered, have texts in place of their samples."""
+def _shortened(path: Path, held: dict[int, _Stream]) -> io.BytesIO:
+    """A file with rows of samples in the place of numbers at a rate; its streams are gathered."""
     parts = [b"XDF:"]
     for at, tag, content in _chunks(path):
         stream, kept = int.from_bytes(content[:4], "little"), content
-        if tag in {_HEADER, _FOOTER}:
-            with suppress(ET.ParseError):
+        with suppress(ET.ParseError, KeyError):  # of which pyxdf makes what it can
+            if tag in {_HEADER, _FOOTER}:
                 said = ET.fromstring(content[4:].decode("utf-8", "replace"))  # noqa: S314 - as pyxdf does; see apart.py
-                kept = content[:4] + _described(path, stream, said, numbers)
-        elif tag == _SAMPLES and stream in numbers:
-            try:
-                kept = numbers[stream].shortened(at, content)
-            except (IndexError, struct.error):  # a damaged chunk is left out
-                continue
-        parts.append(b"\x08" + (len(kept) + 2).to_bytes(8, "little") + tag.to_bytes(2, "little") + kept)
+                held |= {stream: _Stream(path, said)} if tag == _HEADER else {}
+                kept = content[:4] + held[stream].described(said)
+            elif tag == _SAMPLES and held[stream].has_numbers:
+                kept = b""
+                with suppress(IndexError):  # a damaged chunk is left out
+                    kept = held[stream].shortened(at, content)
+        if kept:
+            parts.append(b"\x08" + (len(kept) + 2).to_bytes(8, "little") + tag.to_bytes(2, "little") + kept)
     return io.BytesIO(b"".join(parts))
-
-
-def _described(path: Path, stream: int, said: ET.Element, numbers: dict[int, _Numbers]) -> bytes:
-    """What the header or the footer of a stream says of itself, once its numbers are texts."""
-    rate_hz, held = float(said.findtext("nominal_srate") or 0.0), numbers.get(stream)
-    if rate_hz and said.findtext("channel_format") != "string":
-        numbers[stream] = _Numbers(path, said, rate_hz)
-        for one in said:
-            one.text = {"channel_format": "string", "channel_count": "1"}.get(one.tag, one.text)
-    if held is not None and (counted := said.find("sample_count")) is not None:  # by which pyxdf sees those too many
-        counted.text = f"{held.texts - max(0, held.samples - int(counted.text or 0))}"
-    return ET.tostring(said)
 
 
 def _chunks(path: Path) -> Iterator[tuple[int, int, bytes]]:
@@ -183,11 +160,11 @@ def _chunks(path: Path) -> Iterator[tuple[int, int, bytes]]:
             file.seek(at + found + len(BOUNDARY))
 
 
-def _opened(path: Path) -> Any:
-    return io.BytesIO(_unpacked(path)) if path.suffix.casefold() == ".xdfz" else opened(path)
-
-
 @lru_cache(maxsize=1)
 def _unpacked(path: Path) -> bytes:
     with opened(path) as packed:
         return gzip.decompress(packed.read())
+
+
+def _opened(path: Path) -> Any:
+    return io.BytesIO(_unpacked(path)) if path.suffix.casefold() == ".xdfz" else opened(path)
