@@ -52,8 +52,8 @@ HEAVY: Final = "botorch hypothesis matplotlib.pyplot mcap.reader mcap.writer pyr
 """What is imported once for all faults."""
 EARLY: Final = "ignore::pytest.PytestAssertRewriteWarning"
 """What is imported before pytest is none of the tests."""
-MOST_S: Final = 30.0
-"""Tests of as many seconds a fault meets at most, and once more of other modules; three times as long ends it."""
+MOST, MOST_S = 400, 30.0
+"""So many tests, of as many seconds, a fault meets at most, and once more of other modules; thrice as many again."""
 
 
 class Tests:
@@ -133,8 +133,8 @@ def in_child(work: Path, most_s: float, run: Callable[[], dict[str, Any]]) -> di
 class Judge:
     """The copy of the tree, and which tests execute what."""
 
-    def __init__(self, work: Path, files: dict[str, Path], paths: Sequence[str]) -> None:
-        self.work, self.files, kept = work, files, work / "seconds.json"
+    def __init__(self, work: Path, files: dict[str, Path], paths: Sequence[str], patience: int) -> None:
+        self.work, self.files, self.patience, kept = work, files, patience, work / "seconds.json"
         shutil.rmtree(work / "tree", ignore_errors=True)
         left_out = shutil.ignore_patterns(".git", "__pycache__", ".hypothesis", "dist")
         shutil.copytree(ROOT, work / "tree", ignore=left_out)
@@ -165,8 +165,8 @@ class Judge:
         mirror = "/".join(["tests", *parts[:-1], f"test_{parts[-1]}.py"])
         for mine in (True, False):
             quickest = sorted((each for each in found if each.startswith(mirror) is mine), key=self.seconds.__getitem__)
-            files, left_s = defaultdict[str, list[str]](list), MOST_S
-            for test in quickest[:400]:
+            files, left_s = defaultdict[str, list[str]](list), self.patience * MOST_S
+            for test in quickest[: self.patience * MOST]:
                 if (left_s := left_s - self.seconds[test]) > 0:
                     files[test.partition("::")[0]].append(test)
             if files or (self.written_since and mine):
@@ -181,7 +181,9 @@ class Judge:
             path.write_text(fault.made_in(source), encoding="utf-8")
             os.utime(path, (begin_s, begin_s))  # or its compiled file would be taken for that of the original
             files = list(dict.fromkeys([*self.written_since, *(test.partition("::")[0] for test in tests)]))
-            ended = in_child(self.work, 3 * MOST_S + 30, partial(run_tests, files, Tests(tests, self.seconds), "-x"))
+            ended = in_child(
+                self.work, 3 * self.patience * MOST_S + 30, partial(run_tests, files, Tests(tests, self.seconds), "-x")
+            )
             path.write_text(source, encoding="utf-8")
             os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
             if ended["code"]:
@@ -239,7 +241,7 @@ def main(
         sources = {module: path.read_text(encoding="utf-8") for module, path in files.items()}
         places.write_text(json.dumps(drawn(sources, faults, seed)), encoding="utf-8")
     kept.touch()
-    judge = Judge(work.resolve(), files, paths)
+    judge = Judge(work.resolve(), files, paths, patience=3 if again else 1)
     rows = [json.loads(line) for line in kept.read_text().splitlines()]
     verdicts = {row["number"]: row["verdict"] for row in rows}
     for number, fault in enumerate(map(Fault._make, json.loads(places.read_text())), 1):
