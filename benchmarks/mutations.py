@@ -36,7 +36,7 @@ import isiw
 from benchmarks.core_size import PARTS, drawn_in
 from benchmarks.faults import Fault, drawn, statement
 from benchmarks.provenance import facts_of
-from benchmarks.quick import understood
+from benchmarks.quick import FOLDER, understood
 from benchmarks.tables import write_tables
 
 ROOT: Final = Path(isiw.__file__).parents[2]
@@ -220,7 +220,7 @@ def report(rows: pd.DataFrame, facts: dict[str, object], out: Path) -> None:
 
 def main(
     out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("mutations"),
-    work: Annotated[Path, typer.Option(help="Where the copy lies, and what was judged.")] = Path("mutations_work"),
+    work: Annotated[Path, typer.Option(help="Where the copy lies, and what was judged.")] = FOLDER / "mutations_work",
     faults: Annotated[int, typer.Option(help="How many.")] = 200,
     seed: Annotated[int, typer.Option(help="Of the draw.")] = 10_000,
     room: Annotated[str, typer.Option(help="A room, or a module of the core above all rooms, alone.")] = "",
