@@ -4,8 +4,8 @@
 
 A place of the core (`benchmarks.core_size`) is drawn, then one of the faults of `benchmarks.faults` there. It meets the
 quick tests that execute its statement, those of its module first; where it is executed on import, those that execute
-anything of its module. What was drawn and judged is kept in `--work`; `--again` judges what was not found once more, by
-the tests as they are now. It needs `isiw[benchmarks,test]`.
+anything of its module. What was drawn and judged is kept in `--work`; `--again` judges some once more, by the tests as
+they are now. It needs `isiw[benchmarks,test]`.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ import isiw
 from benchmarks.core_size import PARTS, drawn_in
 from benchmarks.faults import Fault, drawn, statement
 from benchmarks.provenance import facts_of
-from benchmarks.quick import understood
+from benchmarks.quick import FOLDER, understood
 from benchmarks.tables import write_tables
 
 ROOT: Final = Path(isiw.__file__).parents[2]
@@ -52,8 +52,8 @@ HEAVY: Final = "botorch hypothesis matplotlib.pyplot mcap.reader mcap.writer pyr
 """What is imported once for all faults."""
 EARLY: Final = "ignore::pytest.PytestAssertRewriteWarning"
 """What is imported before pytest is none of the tests."""
-MOST_S: Final = 30.0
-"""Tests of as many seconds a fault meets at most, and once more of other modules; three times as long ends it."""
+MOST, MOST_S = 400, 30.0
+"""So many tests, of as many seconds, a fault meets at most, and once more of other modules; again any number."""
 
 
 class Tests:
@@ -133,8 +133,8 @@ def in_child(work: Path, most_s: float, run: Callable[[], dict[str, Any]]) -> di
 class Judge:
     """The copy of the tree, and which tests execute what."""
 
-    def __init__(self, work: Path, files: dict[str, Path], paths: Sequence[str]) -> None:
-        self.work, self.files, kept = work, files, work / "seconds.json"
+    def __init__(self, work: Path, files: dict[str, Path], paths: Sequence[str], most: int) -> None:
+        self.work, self.files, self.most, kept = work, files, most, work / "seconds.json"
         shutil.rmtree(work / "tree", ignore_errors=True)
         left_out = shutil.ignore_patterns(".git", "__pycache__", ".hypothesis", "dist")
         shutil.copytree(ROOT, work / "tree", ignore=left_out)
@@ -166,7 +166,7 @@ class Judge:
         for mine in (True, False):
             quickest = sorted((each for each in found if each.startswith(mirror) is mine), key=self.seconds.__getitem__)
             files, left_s = defaultdict[str, list[str]](list), MOST_S
-            for test in quickest[:400]:
+            for test in quickest[: self.most]:
                 if (left_s := left_s - self.seconds[test]) > 0:
                     files[test.partition("::")[0]].append(test)
             if files or (self.written_since and mine):
@@ -174,9 +174,11 @@ class Judge:
 
     def verdict(self, fault: Fault) -> dict[str, Any]:
         """Whether the tests find a fault, and which does."""
-        path, begin_s, met, found = self.at(fault.module), time.monotonic(), 0, ("not found", "")
+        path, begin_s, met = self.at(fault.module), time.monotonic(), 0
         source, stat = path.read_text(encoding="utf-8"), path.stat()
-        for tests in self.tests_of(fault, source):
+        is_there = "\n".join(fault.before) in source
+        found = ("not found" if is_there else "gone", "")
+        for tests in self.tests_of(fault, source) if is_there else ():
             shutil.rmtree(self.work / "tree" / ".hypothesis", ignore_errors=True)
             path.write_text(fault.made_in(source), encoding="utf-8")
             os.utime(path, (begin_s, begin_s))  # or its compiled file would be taken for that of the original
@@ -203,7 +205,7 @@ def report(rows: pd.DataFrame, facts: dict[str, object], out: Path) -> None:
     rows["room"] = rows["module"].str.split(".").str[1]
     tables = {}
     for title, keep in (("As drawn", "first"), ("By the tests as they are now", "last")):
-        each = rows[~rows["number"].duplicated(keep=keep)]
+        each = rows[~rows["number"].duplicated(keep=keep) & (rows["verdict"] != "gone")]
         counts = pd.crosstab(each["room"], each["verdict"], margins=True, margins_name="all")
         found = binomtest(int((each["verdict"] != "not found").sum()), len(each))
         low, high = found.proportion_ci(method="wilson")
@@ -218,12 +220,11 @@ def report(rows: pd.DataFrame, facts: dict[str, object], out: Path) -> None:
 
 def main(
     out: Annotated[Path, typer.Option(help="Path of the results, without suffix.")] = Path("mutations"),
-    work: Annotated[Path, typer.Option(help="Where the copy lies, and what was judged.")] = Path("mutations_work"),
+    work: Annotated[Path, typer.Option(help="Where the copy lies, and what was judged.")] = FOLDER / "mutations_work",
     faults: Annotated[int, typer.Option(help="How many.")] = 200,
     seed: Annotated[int, typer.Option(help="Of the draw.")] = 10_000,
     room: Annotated[str, typer.Option(help="A room, or a module of the core above all rooms, alone.")] = "",
-    *,
-    again: Annotated[bool, typer.Option(help="Judge what was not found once more.")] = False,
+    again: Annotated[str, typer.Option(help="The numbers of faults to be judged once more: 3,10.")] = "",
 ) -> None:
     """Draw faults, make and judge them."""
     work.mkdir(parents=True, exist_ok=True)
@@ -239,11 +240,11 @@ def main(
         sources = {module: path.read_text(encoding="utf-8") for module, path in files.items()}
         places.write_text(json.dumps(drawn(sources, faults, seed)), encoding="utf-8")
     kept.touch()
-    judge = Judge(work.resolve(), files, paths)
+    judge = Judge(work.resolve(), files, paths, most=4000 if again else MOST)
     rows = [json.loads(line) for line in kept.read_text().splitlines()]
-    verdicts = {row["number"]: row["verdict"] for row in rows}
+    judged = {row["number"] for row in rows}
     for number, fault in enumerate(map(Fault._make, json.loads(places.read_text())), 1):
-        if number not in verdicts or (again and verdicts[number] == "not found"):
+        if number not in judged or f"{number}" in again.split(","):
             rows.append({"number": number, **judge.verdict(fault)})
             with kept.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(rows[-1]) + "\n")

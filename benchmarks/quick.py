@@ -60,7 +60,7 @@ QUICK: Final[Mapping[str, str]] = {
     "lsl_throughput": "--seconds 5",
     "measured_windows": "--sweeps 2",
     "mixed_intensities": "--people 1 --out OUT",
-    "mutations": "--faults 3 --room window --work OUT_work --out OUT",
+    "mutations": "--faults 3 --room window --work OUT_of_a_room --out OUT",
     "pairing_watch": "--people 1 --trials 8 --out OUT",
     "people": "--cohorts gaussian,recruitment --people 3 --trials 10 --out OUT",
     "plausibility": "--people 2 --trials 20 --rigs 5 --out OUT",

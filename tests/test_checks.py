@@ -29,6 +29,7 @@ from isiw.checks import (
     choice,
     deadline,
     number,
+    share,
     whole,
 )
 from isiw.errors import ConfigError, InvalidValueError
@@ -225,3 +226,12 @@ def test_dataclasses_are_frozen_but_those_that_collect_what_a_file_has() -> None
         "Salvage",
         "_Rows",
     ]
+
+
+@pytest.mark.parametrize(
+    ("value", "is_in_percent"), [(50, True), (100, True), (101, False), (-1, False), ("50", False)]
+)
+def test_a_share_that_may_be_in_percent_is_refused_with_that_way_out(value: object, *, is_in_percent: bool) -> None:
+    with pytest.raises(InvalidValueError, match="from 0 to 1") as refused:
+        share("p", value)
+    assert ("Is it in %? Divide by 100." in str(refused.value)) == is_in_percent

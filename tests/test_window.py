@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
+from isiw.summary import chance
 from isiw.window import EDGE_LEVEL, Window, bayes_factor, window_from_excess
 from known import known
 
@@ -286,3 +287,18 @@ def test_of_what_is_not_known_or_was_certain_there_is_no_bayes_factor(
     unknown: tuple[float | None, float | None],
 ) -> None:
     assert bayes_factor(*unknown) is None
+
+
+@pytest.mark.parametrize(
+    ("probability", "beforehand", "said"),
+    [
+        (0.5, 1 / 11, "10"),
+        (0.5, 1 / 101, "100"),
+        (0.5, 1 / 102, "above 100"),
+        (0.5, 0.99, "0.01"),
+        (0.001, 0.5, "below 0.01"),
+    ],
+)
+def test_a_bayes_factor_is_said_as_far_as_it_matters(probability: float, beforehand: float, said: str) -> None:
+    estimate = WindowEstimate(probability, None, beforehand=beforehand)
+    assert chance(estimate) == f" (probability of a window: {probability:.2f}, Bayes factor {said})"

@@ -217,7 +217,7 @@ def write_output(path: str | Path, content: bytes, *, overwrite: bool = False) -
     return target
 
 
-def check_output(path: str | Path, *, overwrite: bool = False) -> None:
+def check_output(path: str | Path, *, overwrite: bool) -> None:
     """Check that `write_output` may write a file; for whoever has long work to do before."""
     target = Path(path)
     if target.parent.is_dir() and not os.access(target.parent, os.W_OK):

@@ -57,7 +57,7 @@ def chance(estimate: Estimate) -> str:
         return ""
     said, factor = "", bayes_factor(estimate.probability, estimate.beforehand)
     if factor is not None:
-        size = "above 100" if factor > 100 else "below 0.01" if factor < 0.01 else f"{factor:.2g}"
+        size = "above 100" if factor > 100 else "below 0.01" if factor < 0.01 else f"{float(f'{factor:.2g}'):g}"
         said = f", Bayes factor {size}"
     of = "probability" if estimate.window is not None and not is_guess(estimate) else "probability of a window:"
     return f" ({of} {estimate.probability:.2f}{said})"

@@ -44,6 +44,13 @@ def test_where_the_clock_stood_still_or_ran_backwards_the_log_says_how_long_it_w
     assert onsets_s((90.0, 7.0), (3.0, 12.0), (9.0, 12.5)) == [0.0, 5.0, 11.0]
 
 
+def test_a_computer_that_slept_has_gone_on_as_its_own_clock_says() -> None:
+    onsets = Onsets()
+    for trial, (t_s, boot_s) in enumerate([(0.0, 50.0), (10.0, 60.0), (11.0, 660.0), (11.0, 660.5), (3.0, 661.0)]):
+        onsets.take(Intent(trial=trial, isi_ms=5.0, t_s=t_s, boot_id="this start", boot_s=boot_s), 0)
+    assert [onset.onset_s for onset in onsets.by_trial.values()] == [0.0, 10.0, 610.0, 610.5, 611.0]
+
+
 def test_a_stimulus_that_was_refused_is_not_the_first() -> None:
     onsets = Onsets()
     for t_s in (100.0, 101.0):

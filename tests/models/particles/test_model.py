@@ -342,7 +342,7 @@ def test_intervals_hold_what_they_promise_on_the_models_own_people() -> None:
     [
         {"particles": 1},
         {"particles": 2.5},
-        {"particles": 10**9},
+        {"particles": 100_001},
         {"thinned": 0},
         {"detection_limit_mv": 0.0},
     ],
@@ -350,6 +350,10 @@ def test_intervals_hold_what_they_promise_on_the_models_own_people() -> None:
 def test_an_invalid_model_is_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(InvalidValueError):
         ParticleModel(**wrong)
+
+
+def test_a_model_may_have_as_many_particles_as_anything_may_be_counted() -> None:
+    assert ParticleModel(particles=100_000).particles == 100_000
 
 
 @pytest.mark.parametrize("wrong", [{"sweeps": -1}, {"max_trial_sweeps": 0.5}, {"min_ess": 1.5}])

@@ -400,3 +400,7 @@ def test_starts_and_widths_of_ones_own_are_kept_whatever_comes_first() -> None:
 def test_a_stimulus_that_is_neither_tap_nor_pulse_is_refused() -> None:
     with pytest.raises(InvalidValueError, match="conditioning"):
         ProfilePrior(conditioning="puff")  # type: ignore[arg-type] # is refused
+
+
+def test_a_far_drift_has_its_share_of_the_sessions() -> None:
+    assert Prior(session=SessionPrior(far_drift_share=0.2)).mixtures["session"].shares == pytest.approx([0.8, 0.2])

@@ -56,9 +56,13 @@ def test_a_prior_that_trusts_no_stimulator_is_even_over_the_range() -> None:
     assert np.abs(shares - 0.2).max() < 0.02  # three SDs of a share are 0.009
 
 
-def test_where_no_start_is_expected_all_are_as_likely() -> None:
+@pytest.mark.parametrize("p_anywhere", [0.04, 0.0])
+def test_where_no_start_is_expected_all_are_as_likely(p_anywhere: float) -> None:
     space = DesignSpace(900, 1300, reference="valve")
-    shares = np.histogram(starts_ms(StartPrior(), space), 5, (space.low_ms - 100, space.high_ms))[0] / MANY
+    shares = (
+        np.histogram(starts_ms(StartPrior(p_anywhere=p_anywhere), space), 5, (space.low_ms - 100, space.high_ms))[0]
+        / MANY
+    )
     assert np.abs(shares - 0.2).max() < 0.02
 
 
