@@ -228,4 +228,5 @@ class EstimateAnswer(Reported, OkAnswer):
             text = f"{estimate}\n{JUDGED_SINCE}" if judged_since else str(estimate)
             return cls(text=text, judged_since=judged_since, **known)
         profile = ("grid_ms", "profile_mv", "band_low_mv", "band_high_mv")
-        return cls(text=too_little, judged_since=judged_since, probability=None, **{name: known[name] for name in profile})
+        kept = {name: known[name] for name in profile}
+        return cls(text=too_little, judged_since=judged_since, probability=None, **kept)
