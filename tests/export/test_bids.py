@@ -19,9 +19,11 @@ from export.recorded import SAMPLES, alone, emg_mv, sweep, write_sweeps
 from isiw.devices.protocol import DeviceInfo
 from isiw.errors import ConfigError, InvalidValueError
 from isiw.export import export_logs
+from isiw.export.bids import TASK
 from isiw.export.emg import Layout, Run
 from isiw.findings import Kind
 from isiw.log.frames import read_session
+from isiw.signals.limits import SignalLimits
 from isiw.sweeps import Channel
 from isiw.text.stimuli import STIMULI
 from isiw.trials import Status, Stimulus, Trial
@@ -177,6 +179,21 @@ def test_a_data_set_of_taps_says_so_and_needs_no_column_for_it(data_set: Path) -
         "sweep: a trial's waveforms; and in it valve: the valve command, tap: the impact, tms: the pulse"
     )
     assert "at which a tap on the tendon enhances" in (data_set / "README").read_text("utf-8")
+
+
+def test_the_task_says_whether_the_muscle_is_contracted(log: Path, tmp_path: Path) -> None:
+    contracted = SignalLimits(contracted=True)
+    write_sweeps(log.parent / "c.mcap", {0: sweep(0)}, signals=contracted, created="2026-12-24T10:00:00+00:00")
+    export_logs(log.parent, tmp_path / "out", "bids")
+    found = {
+        path.name: json.loads(path.read_text("utf-8"))["TaskDescription"].rpartition("The muscle is ")[2]
+        for path in (tmp_path / "out").rglob(f"*task-{TASK}*.json")
+        if not path.name.endswith("events.json")
+    }
+    assert found[f"task-{TASK}_beh.json"] == "contracted or at rest."
+    assert {said for name, said in found.items() if "ses-01" in name} == {"at rest."}
+    assert {said for name, said in found.items() if "ses-02" in name} == {"contracted."}
+    assert len(found) == 5
 
 
 @pytest.mark.slow

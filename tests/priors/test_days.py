@@ -14,6 +14,9 @@ from isiw import priors
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
 from isiw.errors import DamagedLogError, InvalidValueError, LogError
 from isiw.log.reader import read_session
+from isiw.log.salvage import salvage
+from isiw.log.schema import Event
+from isiw.log.writer import LogWriter
 from isiw.models.particles.prior import Prior
 from isiw.priors.days import recalled
 from isiw.session.afterwards import exclude
@@ -115,6 +118,15 @@ def test_a_third_day_knows_both(first: Any, next_day: Any, folder: Path) -> None
     assert sum(place.share for place in third.profile.places[:known]) == pytest.approx(0.3 * 0.7)
     assert third.profile.p_place == pytest.approx(0.7 + 0.3 * 0.7)
     assert third == priors.after(second, prior=next_day)
+
+
+def test_a_change_that_was_noted_is_one_to_whatever_learns_the_session(tmp_path: Path) -> None:
+    path = write_log(tmp_path / "changed.mcap", person(), trials=18)
+    with LogWriter.continuing(path, salvage(path), read_session(path).header) as log:
+        log.append(Event(kind="change", trial=8, text="another gain"))
+    posterior = recalled(read_session(path), Prior(), particles=100)
+    assert posterior.model.prior.changes.noted == (9,)
+    assert priors.after(read_session(path)).changes == Prior().changes  # the next day has none of it
 
 
 def test_a_window_that_stayed_probably_did_not_move_and_one_elsewhere_did(first: Any, folder: Path) -> None:

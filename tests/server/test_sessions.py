@@ -20,8 +20,10 @@ from isiw.server.answers import Refusal
 from isiw.server.driven import DrivenSession
 from isiw.server.requests import AskRequest, CreateRequest, TellRequest
 from isiw.server.sessions import Sessions
+from isiw.session.afterwards import exclude
 from isiw.session.examination import Examination
 from isiw.strategy.catalogue import make_strategy
+from isiw.summary import JUDGED_SINCE
 from server.serving import PLAN, SETTINGS, SEVERAL, SPACE, client_of, created, done, mep_mv, refused, told
 
 
@@ -408,6 +410,20 @@ def test_a_closed_session_can_be_looked_at_and_goes_on_once_it_is_resumed(client
     refused(client.post(f"{session}/ask"), 409, "NotOpen")
     assert done(client.post(f"{session}/resume"))["trials"] == 3
     assert len(told(client, session, 1)) == 1
+
+
+def test_what_was_excluded_in_a_closed_log_makes_its_answers_outdated(
+    client: httpx.Client, session: str, tmp_path: Path
+) -> None:
+    told(client, session, 5)
+    closed = done(client.post(f"{session}/close"))
+    assert closed["state"] == "ENDED"
+    assert done(client.get(session)) == closed
+    answers = [session, f"{session}/estimate", f"{session}/decision"]
+    assert [done(client.get(answer))["judged_since"] for answer in answers] == [False] * 3
+    exclude(tmp_path / "P07.mcap", 2, "coughed")
+    assert [done(client.get(answer))["judged_since"] for answer in answers] == [True] * 3
+    assert JUDGED_SINCE in done(client.get(f"{session}/estimate"))["text"]
 
 
 def test_after_a_restart_the_limits_hold_that_were_logged(tmp_path: Path) -> None:

@@ -12,9 +12,10 @@ import pytest
 
 from isiw.design import DesignSpace
 from isiw.errors import ConfigError, StudyError
+from isiw.native import library
 from isiw.studies.execution import Failure
 from isiw.studies.plan import Unit, load_study
-from isiw.studies.store import Store, begin_store, open_store
+from isiw.studies.store import Store, begin_store, code_checksum, open_store
 from studies.tiny import tiny
 
 
@@ -36,6 +37,17 @@ def test_a_unit_is_left_until_it_is_kept(store: Store) -> None:
     store.keep(units[1], rows_of(units[1]))
     assert store.left() == [units[0], *units[2:]]
     assert open_store(store.folder).left() == store.left()
+
+
+def test_a_study_is_not_continued_with_another_engine(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    store.require_same_code()
+    monkeypatch.setattr(library, "sources", lambda: "0123456789abcdef")
+    code_checksum.cache_clear()
+    try:
+        with pytest.raises(StudyError, match="isiw was changed since"):
+            store.require_same_code()
+    finally:
+        code_checksum.cache_clear()
 
 
 def test_rows_come_sorted_whatever_the_order_in_which_units_were_finished(store: Store) -> None:

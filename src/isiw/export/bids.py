@@ -19,7 +19,6 @@ from isiw.files import write_output
 from isiw.lazy import pd
 from isiw.log.frames import trial_columns, trial_frame
 from isiw.text.sanitize import one_line
-from isiw.text.stimuli import StimulusWords
 
 BIDS_VERSION: Final = "1.11.0"
 TASK: Final = "pairedstimulation"
@@ -27,6 +26,9 @@ _PEOPLE: Final[Columns] = {
     "subject": ("", "the person's code"),
     "simulated": ("", "whether this person was simulated in all sessions"),
 }
+
+_MUSCLE: Final = {False: "at rest", True: "contracted"}
+"""What it is said to be, by whether the session has it contracted."""
 
 _README: Final = """# Sessions of isiw
 
@@ -109,19 +111,21 @@ def _write_session(part: Part, folder: Path) -> list[str]:
     return [f"{part}: {sentence}" for sentence in left_out]
 
 
-def _task(first: StimulusWords) -> dict[str, Any]:
-    given = f"{first.given[0].upper()}{first.given[1:]}"
+def _task(parts: Sequence[Part]) -> dict[str, Any]:
+    given = stimulus_of(parts).given
+    muscle = sorted({_MUSCLE[part.record.header.signals.contracted] for part in parts}, reverse=True)
     return {
         "TaskName": TASK,
-        "TaskDescription": f"{given}, and after an inter-stimulus interval a pulse of transcranial magnetic "
-        "stimulation; in control trials one of them alone. The muscle is at rest.",
+        "TaskDescription": f"{given[0].upper()}{given[1:]}, and after an inter-stimulus interval a pulse of "
+        "transcranial magnetic stimulation; in control trials one of them alone. "
+        f"The muscle is {' or '.join(muscle)}.",
     }
 
 
 def _sidecar(run: Run, part: Part) -> dict[str, Any]:
     """The contents of `_emg.json`; what nobody has noted is said to be so."""
     visit, device = part.record.header.visit, part.record.header.device
-    return _task(part.record.header.stimulus) | {
+    return _task([part]) | {
         "SamplingFrequency": run.layout.rate_hz,
         "RecordingType": "epoched",
         "EpochLength": run.sweep_s,
@@ -143,10 +147,10 @@ def _said(what: str, text: str) -> str:
 
 def _write_heads(folder: Path, parts: Sequence[Part], lacking: Iterable[str]) -> None:
     every = stimulus_of(parts)
-    _json(folder / f"task-{TASK}_beh.json", _behaviour(every))
-    for part in parts:  # of which each says which stimulus it has, if not all have one
-        if (first := part.record.header.stimulus) != every:
-            _json(_home(part, folder) / "beh" / f"{_name(part)}_task-{TASK}_beh.json", _behaviour(first))
+    _json(folder / f"task-{TASK}_beh.json", _behaviour(parts))
+    for part in parts:  # of which each says what its task was, if not all have one
+        if _task([part]) != _task(parts):
+            _json(_home(part, folder) / "beh" / f"{_name(part)}_task-{TASK}_beh.json", _behaviour([part]))
     _json(folder / "sessions.json", _described(session_columns(every)))
     _json(folder / "participants.json", _described(_PEOPLE))
     _json(
@@ -165,8 +169,8 @@ def _write_heads(folder: Path, parts: Sequence[Part], lacking: Iterable[str]) ->
     write_output(folder / "README", text.encode())
 
 
-def _behaviour(first: StimulusWords) -> dict[str, Any]:
-    return _task(first) | _described({"trial": ("", "its number"), **trial_columns(first)})
+def _behaviour(parts: Sequence[Part]) -> dict[str, Any]:
+    return _task(parts) | _described({"trial": ("", "its number"), **trial_columns(stimulus_of(parts))})
 
 
 def _name(part: Part) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from isiw.errors import InvalidValueError, IsiwError
-from isiw.native.stamp import require_built_of
+from isiw.native.stamp import require_built_of, stated
 
 LEVELS: Final = ("x86-64-v4", "x86-64-v3", "x86-64-v2", "base")
 """What the library is compiled for, the fastest first: AVX-512, AVX2, SSE4.2, and processors that are no x86."""
@@ -91,6 +91,11 @@ def level() -> str:
 def version() -> str:
     """The version of the engine, and its level; two computers with both alike ask the same ISIs."""
     return f"{VERSION}, {level()}"
+
+
+def sources() -> str:
+    """The digest of the sources that the engine was compiled from, wherever that was."""
+    return stated(_library())[1]
 
 
 def call(name: str, *arguments: object) -> None:

@@ -13,6 +13,11 @@ LONGEST: Final = 200
 """Of a library's statement of how it was made [bytes]."""
 
 
+def stated(library: ctypes.CDLL) -> list[str]:
+    """How a library says that it was made: a word, the digest of its sources, and that of everything else."""
+    return (ctypes.c_char * LONGEST).in_dll(library, "isiw_sources").value.decode().split(":")
+
+
 def require_built_of(library: ctypes.CDLL, folder: Path) -> None:
     """Have a library be of the sources in a folder; an installed package has no such folder, and nothing to compare.
 
@@ -21,11 +26,11 @@ def require_built_of(library: ctypes.CDLL, folder: Path) -> None:
     """
     if not folder.is_dir():
         return
-    stated, expected = (ctypes.c_char * LONGEST).in_dll(library, "isiw_sources").value.decode(), digest(folder)
-    if expected not in stated.split(":"):
+    said, expected = stated(library), digest(folder)
+    if expected not in said:
         raise IsiwError(
             "the compiled engine was made of other sources than those beside it",
-            got=stated,
+            got=":".join(said),
             expected=f"isiw-sources:{expected}",
             remedy="Run pip install -e . again, in the folder of isiw.",
         )

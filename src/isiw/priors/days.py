@@ -20,6 +20,7 @@ from isiw.errors import DamagedLogError, InvalidValueError, LogError
 from isiw.lazy import sklearn
 from isiw.log.kinds import require_search
 from isiw.log.reader import SessionRecord, ThresholdRecord, require_records
+from isiw.log.verdicts import changed_after
 from isiw.models.particles import ParticleModel, ParticlePosterior
 from isiw.models.particles.latents import LATENTS, Latents, used_by
 from isiw.models.particles.mixture import log_sum
@@ -50,8 +51,11 @@ def recalled(
     posterior = model.begin(record.header.space, seed=record.header.seed)
     step_mv = record.header.strategy.settings.get("amplitude_step_mv")
     before = after_pulses(posterior, given).noting_change()
-    told = Outcomes(record.header.space.reference, step_mv, pairs_pct_rmt=model.pairs_pct_rmt).of(record.table)
-    return reduce(model.update, map(told.observation, told.pulses), before)
+    told = Outcomes(record.header.space.reference, step_mv, pairs_pct_rmt=model.pairs_pct_rmt)
+    changes = changed_after(record.events)
+    for trial in record.table:
+        told = told.of([trial]).changing() if trial.index in changes else told.of([trial])
+    return reduce(lambda one, what: one.noting_change() if what is None else one.after(what), told.observations, before)
 
 
 def after_pulses(posterior: ParticlePosterior, given: Sequence[Trial]) -> ParticlePosterior:
@@ -268,6 +272,7 @@ def _another_day(posterior: ParticlePosterior, law: DayToDay) -> Prior:
     return replace(
         usual,
         profile=profile,
+        changes=replace(usual.changes, noted=()),  # which were that day's
         noise=mixed_shares(_shares(latents.noise, len(fields(kinds))), kinds, law.p_other),
         floors=beside(usual.floors, _laws(latents, "floor", floor, law)),
         gains=beside(usual.gains, _laws(latents, "gain", gain, law)),

@@ -14,10 +14,13 @@ from isiw.estimate import Estimate, Reported
 from isiw.findings import Kind
 from isiw.session.state import State
 from isiw.strategy.decisions import StopDecision
+from isiw.summary import JUDGED_SINCE
 from isiw.text.sanitize import plain
 from isiw.trials import Status, Trial
 
 _LONGEST_VALUE: Final = 200
+
+_JUDGED_SINCE: Final = "Whether trials were excluded or included after this, in the log of a closed session."
 
 
 class Refusal(RequestError):  # noqa: N818 - an answer as much as an error
@@ -120,6 +123,7 @@ class DecisionAnswer(OkAnswer):
 
     stop: bool
     reason: str
+    judged_since: bool = Field(default=False, description=_JUDGED_SINCE)
 
 
 class SessionAnswer(OkAnswer):
@@ -137,6 +141,7 @@ class SessionAnswer(OkAnswer):
     wait_s: float = Field(default=0.0, description="How long until the next stimulus is allowed [s].")
     stop: bool
     reason: str = Field(description="Why to stop, or to continue.")
+    judged_since: bool = Field(default=False, description=_JUDGED_SINCE)
 
 
 class SessionEntry(BaseModel):
@@ -213,12 +218,15 @@ class EstimateAnswer(Reported, OkAnswer):
     model_config = ConfigDict(json_schema_serialization_defaults_required=True)
 
     text: str = Field(description="In words.")
+    judged_since: bool = Field(default=False, description=_JUDGED_SINCE)
 
     @classmethod
-    def about(cls, estimate: Estimate, too_little: str | None = None) -> Self:
+    def about(cls, estimate: Estimate, too_little: str | None = None, *, judged_since: bool = False) -> Self:
         """The answer of an estimate; if too little was measured, without what is said of a window."""
         known = estimate.model_dump(include={*Reported.model_fields})
         if too_little is None:
-            return cls(text=str(estimate), **known)
+            text = f"{estimate}\n{JUDGED_SINCE}" if judged_since else str(estimate)
+            return cls(text=text, judged_since=judged_since, **known)
         profile = ("grid_ms", "profile_mv", "band_low_mv", "band_high_mv")
-        return cls(text=too_little, probability=None, **{name: known[name] for name in profile})
+        kept = {name: known[name] for name in profile}
+        return cls(text=too_little, judged_since=judged_since, probability=None, **kept)

@@ -25,7 +25,7 @@ from isiw.server.requests import (
     TellRequest,
 )
 from isiw.session.recorder import Recorder
-from isiw.session.state import state_of
+from isiw.session.state import State, state_of
 from isiw.strategy.decisions import StopDecision, StopKind
 from isiw.trials import Status, Trial
 
@@ -83,7 +83,7 @@ class DrivenSession:
         stands = self.stands()
         self.closed = True
         self.recorder.close()
-        return stands.model_copy(update={"open": False})
+        return stands.model_copy(update={"open": False, "state": State.ENDED, "wait_s": 0.0})
 
     def outcomes_after(self, trial: int) -> list[TrialAnswer]:
         """The outcomes of the trials after one, in order."""

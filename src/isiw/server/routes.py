@@ -190,7 +190,7 @@ def estimate(folder: Folder, name: Name) -> Response:
 def decision(folder: Folder, name: Name) -> Response:
     """The decision to stop or not, and why."""
     stands = folder.stands(name)
-    return _json(DecisionAnswer(stop=stands.stop, reason=stands.reason))
+    return _json(DecisionAnswer(stop=stands.stop, reason=stands.reason, judged_since=stands.judged_since))
 
 
 @router.get("/sessions/{id}/trials", responses=_errors(404, 409), response_model=TrialsAnswer)

@@ -245,10 +245,11 @@ def _stood(name: str, record: SessionRecord) -> SessionAnswer:
         open_intensity_pct_rmt=unknown[-1].intensity_pct_rmt if unknown else None,
         stop=decision is not None and decision.stop,
         reason=decision.reason if decision else "No trial has an outcome yet.",
+        judged_since=decision is not None and record.is_judged_since,
     )
 
 
 def _estimated(name: str, record: SessionRecord) -> EstimateAnswer:
     if not record.estimates:
         raise not_open(name)
-    return EstimateAnswer.about(record.estimates[-1], record.too_little)
+    return EstimateAnswer.about(record.estimates[-1], record.too_little, judged_since=record.is_judged_since)

@@ -28,6 +28,7 @@ from isiw.errors import StudyError, os_errors
 from isiw.files import TEMPORARY, opened, put
 from isiw.lazy import pa, parquet, pd
 from isiw.log.durable import claim
+from isiw.native import library
 from isiw.studies.execution import Failure
 from isiw.studies.plan import Study, Unit, begun_study, study_values
 from isiw.text.sanitize import command
@@ -36,8 +37,8 @@ from isiw.text.toml_files import read_toml
 
 @cache
 def code_checksum() -> str:
-    """The CRC-32 of isiw's modules, whatever their line endings."""
-    root, checksum = Path(isiw.__file__).parent, 0
+    """The CRC-32 of isiw's modules, whatever their line endings, and of the sources of its compiled engine."""
+    root, checksum = Path(isiw.__file__).parent, zlib.crc32(library.sources().encode())
     for path in sorted(root.rglob("*.py")):
         checksum = zlib.crc32(path.relative_to(root).as_posix().encode(), checksum)
         checksum = zlib.crc32(path.read_bytes().replace(b"\r\n", b"\n"), checksum)
