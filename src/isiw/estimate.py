@@ -268,7 +268,7 @@ def _central(edges_ms: FloatArray, level: float) -> FloatArray:
     tail = (1.0 - level) / 2.0
     # An order statistic never averages a finite edge with an infinite one; of two as near, that of an even index.
     picks = [round((len(edges_ms) - 1) * share) for share in (tail, 1.0 - tail)]
-    central_ms: FloatArray = np.partition(edges_ms, picks, axis=0)[picks]
+    central_ms: FloatArray = np.sort(edges_ms, axis=0)[picks]
     return central_ms
 
 

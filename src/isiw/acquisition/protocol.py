@@ -160,4 +160,4 @@ def _as_expected(posterior: Posterior, isi_ms: float) -> Posterior:
     isi = np.array([isi_ms], dtype=np.float32)
     profiles_mv = posterior.profiles_mv(isi)[..., 0]
     middle = (profiles_mv.shape[1] - 1) // 2
-    return posterior.condition(isi, np.partition(profiles_mv, middle, axis=1)[:, middle])
+    return posterior.condition(isi, np.sort(profiles_mv, axis=1)[:, middle])

@@ -162,7 +162,7 @@ def sampled_estimate(
     first, last = windows.hulls
     edges = edge_samples(windows, space)
     middle = (len(edges) - 1) // 2
-    start, end = np.partition(edges, middle, axis=0)[middle].tolist() if len(edges) else (None, None)
+    start, end = np.sort(edges, axis=0)[middle].tolist() if len(edges) else (None, None)
     reported, f1 = best_window(windows, space.grid_ms) if probability >= 0.5 else (None, 1.0)
     profiles = cache(profiles)
     return WindowEstimate(
@@ -192,7 +192,7 @@ def _band_mv(profiles: SampledProfiles) -> FloatArray:
     # As `np.quantile` interpolates, which takes three times as long for so few samples.
     place = (len(profiles.mep_mv) - 1) * np.array(_BAND)
     low, high = np.floor(place).astype(int), np.ceil(place).astype(int)
-    ordered = np.partition(profiles.mep_mv, np.unique((low, high)), axis=0)
+    ordered = np.sort(profiles.mep_mv, axis=0)
     band_mv: FloatArray = ordered[low] + (place - low)[:, np.newaxis] * (ordered[high] - ordered[low]).astype(float)
     return band_mv
 
