@@ -4,8 +4,8 @@
 
 A place of the core (`benchmarks.core_size`) is drawn, then one of the faults of `benchmarks.faults` there. It meets the
 quick tests that execute its statement, those of its module first; where it is executed on import, those that execute
-anything of its module. What was drawn and judged is kept in `--work`; `--again` judges some once more, by the tests as
-they are now. It needs `isiw[benchmarks,test]`.
+anything of its module or import it. What was drawn and judged is kept in `--work`; `--again` judges some once more, by
+the tests as they are now. It needs `isiw[benchmarks,test]`.
 """
 
 from __future__ import annotations
@@ -136,7 +136,7 @@ class Judge:
     def __init__(self, work: Path, files: dict[str, Path], paths: Sequence[str], most: int) -> None:
         self.work, self.files, self.most, kept = work, files, most, work / "seconds.json"
         shutil.rmtree(work / "tree", ignore_errors=True)
-        left_out = shutil.ignore_patterns(".git", "__pycache__", ".hypothesis", "dist")
+        left_out = shutil.ignore_patterns(".git", "__pycache__", ".hypothesis", "dist", FOLDER.name)
         shutil.copytree(ROOT, work / "tree", ignore=left_out)
         for name in HEAVY.split():
             importlib.import_module(name)
@@ -160,7 +160,9 @@ class Judge:
         """The tests of its module that execute its statement, then others, each quickest first for half a minute."""
         tests = self.lines.contexts_by_lineno(str(self.at(fault.module)))
         found = {test for line in statement(source, fault.line) for test in tests.get(line, ())}
-        found = ({test for each in tests.values() for test in each} if found == {""} else found) - {"", *self.failed}
+        if found == {""}:  # on import, as a field is
+            found = {test for each in tests.values() for test in each} | self.importing(fault.module)
+        found -= {"", *self.failed}
         parts = fault.module.split(".")[1:]
         mirror = "/".join(["tests", *parts[:-1], f"test_{parts[-1]}.py"])
         for mine in (True, False):
@@ -171,6 +173,12 @@ class Judge:
                     files[test.partition("::")[0]].append(test)
             if files or (self.written_since and mine):
                 yield [test for each in files.values() for test in each]
+
+    def importing(self, module: str) -> set[str]:
+        """The tests of files that import a module by its name."""
+        files = {test.partition("::")[0] for test in self.seconds}
+        files = {file for file in files if f"from {module} import" in (self.work / "tree" / file).read_text("utf-8")}
+        return {test for test in self.seconds if test.partition("::")[0] in files}
 
     def verdict(self, fault: Fault) -> dict[str, Any]:
         """Whether the tests find a fault, and which does."""
