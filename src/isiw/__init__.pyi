@@ -18,6 +18,7 @@ from . import strategy as strategy
 from . import studies as studies
 from . import subjects as subjects
 from . import testing as testing
+from .decision import StopDecision as StopDecision
 from .design import IMPACT_SPACE as IMPACT_SPACE
 from .design import VALVE_SPACE as VALVE_SPACE
 from .design import DesignSpace as DesignSpace
@@ -63,7 +64,6 @@ from .session.rig import Safeguards as Safeguards
 from .strategy.catalogue import list_settings as list_settings
 from .strategy.catalogue import list_strategies as list_strategies
 from .strategy.catalogue import make_strategy as make_strategy
-from .strategy.decisions import StopDecision as StopDecision
 from .strategy.strategy import Strategy as Strategy
 from .sweeps import Channel as Channel
 from .sweeps import Measurement as Measurement

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from isiw.decision import StopDecision
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
 from isiw.findings import Kind
@@ -28,7 +29,6 @@ from isiw.log.schema import (
     topic_of,
 )
 from isiw.log.writer import LogWriter
-from isiw.strategy.decisions import StopDecision
 from isiw.strategy.threshold import ThresholdEstimate
 from isiw.sweeps import Channel
 from isiw.trials import Status, Trial

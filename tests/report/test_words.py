@@ -10,6 +10,7 @@ import pytest
 
 from isiw import sentences
 from isiw.change import Misfit
+from isiw.decision import StopKind
 from isiw.design import DesignSpace
 from isiw.log.headers import StrategyRecipe
 from isiw.log.reader import SessionRecord, read_session
@@ -18,7 +19,6 @@ from isiw.report.words import TRIAL_HEADINGS, counts_sentence, final_statement, 
 from isiw.session.afterwards import exclude
 from isiw.session.loop import Session
 from isiw.strategy.catalogue import measured_of
-from isiw.strategy.decisions import StopKind
 from isiw.sweeps import Channel, Measurement
 from isiw.trials import Status, Trial
 from isiw.types import Reference

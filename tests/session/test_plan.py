@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from isiw.decision import StopKind
 from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
@@ -17,7 +18,6 @@ from isiw.report.words import final_statement, truth_sentence
 from isiw.session.loop import Session
 from isiw.session.resume import open_session
 from isiw.strategy.catalogue import list_strategies, make_strategy
-from isiw.strategy.decisions import StopKind
 from isiw.subjects.cohorts import person_of
 from isiw.visit import VisitProtocol
 from isiw.window import Window

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from isiw.decision import StopDecision
 from isiw.estimate import WindowEstimate
 from isiw.findings import Kind
 from isiw.log.reader import read_session
@@ -16,7 +17,6 @@ from isiw.session.console import PROGRESS_HEADINGS, PROGRESS_LEGEND, fitted, pro
 from isiw.session.loop import Session
 from isiw.session.sink import SessionUpdate
 from isiw.session.terminal import COLUMNS
-from isiw.strategy.decisions import StopDecision
 from isiw.text.stimuli import STIMULI
 from isiw.trials import Status, Trial
 from isiw.window import Window

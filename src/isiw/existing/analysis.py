@@ -13,6 +13,7 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 
+from isiw.decision import StopKind
 from isiw.design import DesignSpace, require_space
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
@@ -36,7 +37,6 @@ from isiw.session.examination import estimate_record
 from isiw.signals.plausible import before_impact
 from isiw.signals.watch import Watch
 from isiw.strategy.catalogue import make_strategy
-from isiw.strategy.decisions import StopKind
 from isiw.strategy.strategy import Strategy
 from isiw.sweeps import Measurement, Sweep
 from isiw.trials import Status, Trial, TrialTable

@@ -9,6 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Generic, TypeVar, cast
 
+from isiw.decision import StopDecision
 from isiw.errors import DamagedLogError, InvalidValueError, LogError
 from isiw.findings import is_silent, lacking
 from isiw.log.headers import SCHEMA_VERSION, Header, ThresholdHeader
@@ -17,7 +18,6 @@ from isiw.log.records import Onset, Records, unknown_of
 from isiw.log.salvage import Salvage, salvage
 from isiw.log.schema import EstimateRecord, Event, Intent, PulseOutcome, Record, waveform_topic
 from isiw.log.verdicts import VERDICTS, doubted_by, under_all
-from isiw.strategy.decisions import StopDecision
 from isiw.summary import JUDGED_SINCE
 from isiw.sweeps import Channel
 from isiw.text.sanitize import command

@@ -31,15 +31,15 @@ from pydantic import ConfigDict, Field, FiniteFloat, TypeAdapter
 from pydantic_core import PydanticSerializationError
 
 from isiw.checks import MOST_MEP_MV, MOST_TRIALS
+from isiw.decision import StopDecision, StopKind
 from isiw.errors import InvalidValueError, LogError, error_text
 from isiw.estimate import Estimate, WindowEstimate
 from isiw.findings import Kind
 from isiw.log.headers import ANY_HEADER, AnyHeader, Header, LogRecord, Production, ProductionHeader, ThresholdHeader
 from isiw.log.moments import Moment
-from isiw.strategy.decisions import StopDecision, StopKind
-from isiw.strategy.threshold.pulses import ThresholdEstimate
 from isiw.sweeps import Channel
 from isiw.text.toml_files import refuse_doubled
+from isiw.threshold import ThresholdEstimate
 from isiw.trials import Stimulus, Trial
 from isiw.types import Numbers
 

@@ -8,10 +8,10 @@ from typing import Final
 import numpy as np
 
 from isiw.acquisition.protocol import golden_index
+from isiw.decision import StopDecision, StopKind
 from isiw.errors import InvalidValueError
 from isiw.intervention import Arm, Intervention, Part, Slot
 from isiw.pairing.following import Followed
-from isiw.strategy.decisions import StopDecision, StopKind
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Trial
 from isiw.types import FloatArray

@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 
 from isiw import sentences, summary
 from isiw.change import Misfit
+from isiw.decision import OF_THE_WINDOW, StopKind
 from isiw.errors import InvalidValueError
 from isiw.estimate import Estimate
 from isiw.findings import Kind
@@ -24,7 +25,6 @@ from isiw.pairing.pulses import pairing_of
 from isiw.report.evidence import changed_with_time, contradiction, no_comparison, nothing_measured, nothing_stood_out
 from isiw.session.examination import change_found
 from isiw.strategy.catalogue import known_settings, list_strategies, measured_of
-from isiw.strategy.decisions import OF_THE_WINDOW, StopKind
 from isiw.text.sanitize import command, counted
 from isiw.text.stimuli import TAP, StimulusWords
 from isiw.trials import Trial

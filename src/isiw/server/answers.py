@@ -9,11 +9,11 @@ from typing import Any, Final, Literal, Self
 from fastapi import Response
 from pydantic import BaseModel, ConfigDict, Field
 
+from isiw.decision import StopDecision
 from isiw.errors import IsiwError, LimitExceededError, LogError, RequestError, error_text
 from isiw.estimate import Estimate, Reported
 from isiw.findings import Kind
 from isiw.session.state import State
-from isiw.strategy.decisions import StopDecision
 from isiw.text.sanitize import plain
 from isiw.trials import Status, Trial
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Final
 
+from isiw.decision import StopDecision, StopKind
 from isiw.errors import InvalidValueError, LimitExceededError, LogError
 from isiw.estimate import Estimate
 from isiw.findings import Kind
@@ -26,7 +27,6 @@ from isiw.server.requests import (
 )
 from isiw.session.recorder import Recorder
 from isiw.session.state import state_of
-from isiw.strategy.decisions import StopDecision, StopKind
 from isiw.trials import Status, Trial
 
 BUSY_S: Final = 5.0

@@ -15,6 +15,7 @@ import numpy as np
 
 from isiw import checks, summary
 from isiw.change import Change
+from isiw.decision import StopDecision
 from isiw.errors import LimitExceededError, StrategyError, error_text
 from isiw.findings import Finding, Kind, Severity
 from isiw.log.new_verdicts import is_logged, or_remark
@@ -22,7 +23,6 @@ from isiw.log.schema import EstimateRecord, Event, EventKind, Intent, Record
 from isiw.log.verdicts import changed_after, doubted_by, excluded_by, under_all
 from isiw.session.sink import Sink
 from isiw.strategy.choice import candidate_isis
-from isiw.strategy.decisions import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Trial, TrialTable
 from isiw.types import FloatArray

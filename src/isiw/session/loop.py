@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Unpack
 
+from isiw.decision import StopDecision
 from isiw.devices.protocol import Device, Readiness
 from isiw.errors import ClockWarning, NotDelivered, warn
 from isiw.log.headers import Header
@@ -24,7 +25,6 @@ from isiw.session.sink import Follower, SessionResult, Wait
 from isiw.session.state import Fault, State, state_of
 from isiw.session.steps import ended, paused
 from isiw.session.terminal import goes_on, is_attended, is_terminal
-from isiw.strategy.decisions import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.trials import TrialTable
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 from functools import partial
 from typing import Final
 
+from isiw.decision import OF_THE_WINDOW, StopDecision
 from isiw.log.headers import Header
 from isiw.log.new_verdicts import correction
 from isiw.log.schema import Correction
 from isiw.session.examination import WindowExamination
 from isiw.signals.tap import TapResponses
-from isiw.strategy.decisions import OF_THE_WINDOW, StopDecision, stimuli_left
+from isiw.strategy.decisions import stimuli_left
 from isiw.sweeps import Sweep
 from isiw.trials import Trial
 from isiw.visit import PAIRS_FIRST

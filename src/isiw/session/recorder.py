@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any, Generic, Self, TypeVar
 
 from isiw.checks import flag, number
+from isiw.decision import StopDecision
 from isiw.devices.clock import ROUNDING_S, Clock, Pacing
 from isiw.devices.protocol import Readiness
 from isiw.errors import ClockWarning, InvalidValueError
@@ -25,7 +26,6 @@ from isiw.session.sink import Sink
 from isiw.signals.amplitudes import Doubts, counted_of, odd_amplitudes
 from isiw.signals.plausible import isi_far, require_plausible, require_plausible_range
 from isiw.signals.reported import unconfirmed
-from isiw.strategy.decisions import StopDecision
 from isiw.strategy.outcomes import Outcome
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Status, Stimulus, Trial, TrialTable, require_pulse

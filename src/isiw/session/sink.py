@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple, Protocol
 
+from isiw.decision import StopDecision
 from isiw.errors import InvalidValueError, error_text
 from isiw.estimate import WindowEstimate
 from isiw.intervention import concealed
 from isiw.log.schema import Event, Record
 from isiw.log.writer import LogWriter
-from isiw.strategy.decisions import StopDecision
 from isiw.trials import Trial, TrialTable
 
 

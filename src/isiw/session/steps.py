@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Iterable
 from typing import Final
 
+from isiw.decision import StopDecision, StopKind
 from isiw.devices.protocol import Answer
 from isiw.errors import DeviceError, DeviceTimeoutError, IsiwError, LimitExceededError, NotDelivered, error_text
 from isiw.findings import Finding
@@ -26,7 +27,7 @@ from isiw.session.state import Fault
 from isiw.signals.judgement import judge, judge_measurement
 from isiw.signals.tap import TapResponses
 from isiw.signals.watch import Watch
-from isiw.strategy.decisions import StopDecision, StopKind, stimuli_left
+from isiw.strategy.decisions import stimuli_left
 from isiw.strategy.strategy import Strategy
 from isiw.sweeps import Measurement, Sweep
 from isiw.text.sanitize import shown

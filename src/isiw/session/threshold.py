@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from isiw.checks import number, text, whole
+from isiw.decision import StopDecision
 from isiw.devices.clock import Clock, MonotonicClock, Pacing, VirtualClock
 from isiw.devices.limited import require_real_time
 from isiw.devices.limits import PulseLimits
@@ -23,10 +24,10 @@ from isiw.log.writer import LogWriter
 from isiw.session.assembly import begun, require_parts
 from isiw.session.examination import Examination
 from isiw.session.recorder import Recording
-from isiw.strategy.decisions import StopDecision
 from isiw.strategy.threshold.curve import CurvePulses
-from isiw.strategy.threshold.pulses import Pulse, ThresholdEstimate
+from isiw.strategy.threshold.pulses import Pulse
 from isiw.strategy.threshold.search import ThresholdSearch, make_threshold_search
+from isiw.threshold import ThresholdEstimate
 from isiw.trials import Stimulus
 from isiw.visit import interval_s
 

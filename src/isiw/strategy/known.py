@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from isiw.decision import StopDecision
 from isiw.estimate import WindowEstimate
 from isiw.findings import is_silent, lacking
 from isiw.strategy.course import Course
-from isiw.strategy.decisions import StopDecision, for_lack
+from isiw.strategy.decisions import for_lack
 from isiw.strategy.outcomes import Outcomes
 
 

@@ -8,17 +8,10 @@ from functools import partial
 from typing import Annotated, Final
 
 from isiw.checks import Checked, Count, Positive, Share, number
+from isiw.decision import OF_THE_WINDOW, StopDecision, StopKind
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
-from isiw.strategy.decisions import (
-    OF_THE_WINDOW,
-    Progress,
-    StopDecision,
-    StopKind,
-    StoppingRule,
-    looks_back,
-    stimuli_left,
-)
+from isiw.strategy.decisions import Progress, StoppingRule, looks_back, stimuli_left
 from isiw.text.sanitize import counted
 from isiw.window import SURE
 
