@@ -14,7 +14,7 @@ from isiw.trials import Trial
 from isiw.window import MIN_EXCESS_MV, SURE, Window, rules_out
 
 if TYPE_CHECKING:  # an estimate prints itself in these words
-    from isiw.estimate import Edge, Estimate
+    from isiw.figures import Edge, Estimate
 
 WORTH_SAYING: Final = 0.1
 """Probability from which on an unusual window is mentioned."""

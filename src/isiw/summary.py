@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from isiw.change import Change
+from isiw.figures import Estimate
 from isiw.text.stimuli import STIMULI, StimulusWords, words_of
 from isiw.window import LEAST_FACTOR, SURE, bayes_factor, rules_out
-
-if TYPE_CHECKING:
-    from isiw.estimate import Estimate
 
 _EITHER: Final = words_of(STIMULI)
 

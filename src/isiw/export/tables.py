@@ -9,8 +9,8 @@ from typing import Any, Final
 
 from isiw.dissertation.response_counts import by_isi, count_trials
 from isiw.errors import InvalidValueError
-from isiw.estimate import Estimate
 from isiw.export.collection import Part, log_losses, stimulus_of
+from isiw.figures import Estimate
 from isiw.files import write_output
 from isiw.lazy import pd
 from isiw.log.frames import trial_columns, trial_frame

@@ -14,13 +14,32 @@ from isiw.log.reader import SessionRecord
 from isiw.log.schema import EstimateRecord
 from isiw.signals.measures import Measures, measures
 from isiw.signals.tap import TapResponses
+from isiw.summary import JUDGED_SINCE, summary
 from isiw.sweeps import Sweep
 from isiw.text.stimuli import TAP, StimulusWords, meanings
 from isiw.trials import Trial
 
 
 class FramedRecord(SessionRecord):
-    """A session as its log has it, with its trials as a DataFrame."""
+    """A session as its log has it, with its trials as a DataFrame, which prints itself in a few lines."""
+
+    def __str__(self) -> str:
+        header, last = self.header, self.estimates[-1] if self.estimates else None
+        if self.conceals:
+            return f"An intervention with {header.subject or 'an unnamed subject'}, its arm concealed\nLog: {self.path}"
+        kind = "Imported trials" if header.imported else "Session"
+        strategy = header.strategy.name or "of a user's own objects"
+        lines = [
+            f"{kind} of {header.subject or 'an unnamed subject'}, {header.created}",
+            f"Strategy: {strategy}, seed {header.strategy.seed}, {header.space.in_words(header.stimulus)}",
+            f"Trials: {self.table.counted(header.stimulus)}"
+            + (f", {len(self.unknown)} of unknown outcome" if self.unknown else ""),
+        ]
+        if last is not None:
+            lines += [self.too_little or summary(last), f"{'Ended' if last.stop else 'Not over'}: {last.reason}"]
+            if self.is_judged_since:
+                lines.append(JUDGED_SINCE)
+        return "\n".join([*lines, *self.unread_said, *(f"Lost: {loss}" for loss in self.losses), f"Log: {self.path}"])
 
     @property
     def trials(self) -> pd.DataFrame:

@@ -37,8 +37,8 @@ from isiw.devices.protocol import DeviceInfo
 from isiw.errors import InvalidValueError, LogError
 from isiw.intervention import Intervention
 from isiw.signals.limits import SignalLimits
+from isiw.strategy.threshold.estimate import IntensityRange
 from isiw.text.stimuli import STIMULI, StimulusWords
-from isiw.threshold import IntensityRange
 from isiw.trials import Trial
 from isiw.types import Conditioning, Reference
 from isiw.visit import Visit, VisitProtocol

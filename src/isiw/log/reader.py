@@ -18,7 +18,6 @@ from isiw.log.records import Onset, Records, unknown_of
 from isiw.log.salvage import Salvage, salvage
 from isiw.log.schema import EstimateRecord, Event, Intent, PulseOutcome, Record, waveform_topic
 from isiw.log.verdicts import VERDICTS, doubted_by, under_all
-from isiw.summary import JUDGED_SINCE
 from isiw.sweeps import Channel
 from isiw.text.sanitize import command
 from isiw.trials import Trial, TrialTable
@@ -91,24 +90,6 @@ class SessionRecord(_StimuliRecord[Header]):
 
     waveforms: Mapping[tuple[int, str], Channel] = field(default_factory=dict, repr=False)
     onsets: Mapping[int, Onset] = field(default_factory=dict, repr=False)
-
-    def __str__(self) -> str:
-        header, last = self.header, self.estimates[-1] if self.estimates else None
-        if self.conceals:
-            return f"An intervention with {header.subject or 'an unnamed subject'}, its arm concealed\nLog: {self.path}"
-        kind = "Imported trials" if header.imported else "Session"
-        strategy = header.strategy.name or "of a user's own objects"
-        lines = [
-            f"{kind} of {header.subject or 'an unnamed subject'}, {header.created}",
-            f"Strategy: {strategy}, seed {header.strategy.seed}, {header.space.in_words(header.stimulus)}",
-            f"Trials: {self.table.counted(header.stimulus)}"
-            + (f", {len(self.unknown)} of unknown outcome" if self.unknown else ""),
-        ]
-        if last is not None:
-            lines += [self.too_little or str(last), f"{'Ended' if last.stop else 'Not over'}: {last.reason}"]
-            if self.is_judged_since:
-                lines.append(JUDGED_SINCE)
-        return "\n".join([*lines, *self.unread_said, *(f"Lost: {loss}" for loss in self.losses), f"Log: {self.path}"])
 
     @property
     def conceals(self) -> bool:

@@ -33,13 +33,13 @@ from pydantic_core import PydanticSerializationError
 from isiw.checks import MOST_MEP_MV, MOST_TRIALS
 from isiw.decision import StopDecision, StopKind
 from isiw.errors import InvalidValueError, LogError, error_text
-from isiw.estimate import Estimate, WindowEstimate
+from isiw.figures import Estimate
 from isiw.findings import Kind
 from isiw.log.headers import ANY_HEADER, AnyHeader, Header, LogRecord, Production, ProductionHeader, ThresholdHeader
 from isiw.log.moments import Moment
+from isiw.strategy.threshold.estimate import ThresholdEstimate
 from isiw.sweeps import Channel
 from isiw.text.toml_files import refuse_doubled
-from isiw.threshold import ThresholdEstimate
 from isiw.trials import Stimulus, Trial
 from isiw.types import Numbers
 
@@ -146,12 +146,6 @@ class EstimateRecord(Estimate):
     stop: bool = False
     reason: str = ""
     stop_kind: StopKind = StopKind.OWN
-
-    @classmethod
-    def after(cls, trial: int, estimate: WindowEstimate, decision: StopDecision, next_isi_ms: float | None) -> Self:
-        """The record of an estimate."""
-        stops = {"stop": decision.stop, "reason": decision.reason, "stop_kind": decision.kind}
-        return cls.of(estimate, trial=trial, next_isi_ms=next_isi_ms, **stops)
 
     @property
     def decision(self) -> StopDecision:

@@ -10,7 +10,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from isiw.design import DesignSpace
-from isiw.estimate import BestISI, WindowEstimate
+from isiw.estimate import WindowEstimate
+from isiw.figures import BestISI
 from isiw.lazy import Later
 from isiw.native.engine import expected_f1
 from isiw.types import Array, BoolArray, FloatArray, IntArray, Singles

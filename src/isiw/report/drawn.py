@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from isiw.estimate import Edge
+from isiw.figures import Edge
 from isiw.findings import lacking
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import EstimateRecord

@@ -12,7 +12,7 @@ from isiw import sentences, summary
 from isiw.change import Misfit
 from isiw.decision import OF_THE_WINDOW, StopKind
 from isiw.errors import InvalidValueError
-from isiw.estimate import Estimate
+from isiw.figures import Estimate
 from isiw.findings import Kind
 from isiw.intervention import Intervention, Part, concealed
 from isiw.log.headers import Header

@@ -11,9 +11,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from isiw.decision import StopDecision
 from isiw.errors import IsiwError, LimitExceededError, LogError, RequestError, error_text
-from isiw.estimate import Estimate, Reported
+from isiw.figures import Estimate, Reported
 from isiw.findings import Kind
 from isiw.session.state import State
+from isiw.summary import summary
 from isiw.text.sanitize import plain
 from isiw.trials import Status, Trial
 
@@ -219,6 +220,6 @@ class EstimateAnswer(Reported, OkAnswer):
         """The answer of an estimate; if too little was measured, without what is said of a window."""
         known = estimate.model_dump(include={*Reported.model_fields})
         if too_little is None:
-            return cls(text=str(estimate), **known)
+            return cls(text=summary(estimate), **known)
         profile = ("grid_ms", "profile_mv", "band_low_mv", "band_high_mv")
         return cls(text=too_little, probability=None, **{name: known[name] for name in profile})

@@ -10,7 +10,7 @@ from typing import Final
 
 from isiw.decision import StopDecision, StopKind
 from isiw.errors import InvalidValueError, LimitExceededError, LogError
-from isiw.estimate import Estimate
+from isiw.figures import Estimate
 from isiw.findings import Kind
 from isiw.log.new_verdicts import KeyTakenError
 from isiw.log.reader import SessionRecord
@@ -110,7 +110,7 @@ class DrivenSession:
     def estimate(self) -> EstimateAnswer:
         """The estimate of the window now."""
         estimate = self.recorder.estimate()
-        return EstimateAnswer.about(Estimate.of(estimate), estimate.too_little)
+        return EstimateAnswer.about(estimate.in_figures(Estimate), estimate.too_little)
 
     def require_no_wait(self, most_s: float) -> None:
         """Raise if the next stimulus is not allowed soon."""

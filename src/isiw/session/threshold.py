@@ -25,9 +25,9 @@ from isiw.session.assembly import begun, require_parts
 from isiw.session.examination import Examination
 from isiw.session.recorder import Recording
 from isiw.strategy.threshold.curve import CurvePulses
+from isiw.strategy.threshold.estimate import ThresholdEstimate
 from isiw.strategy.threshold.pulses import Pulse
 from isiw.strategy.threshold.search import ThresholdSearch, make_threshold_search
-from isiw.threshold import ThresholdEstimate
 from isiw.trials import Stimulus
 from isiw.visit import interval_s
 

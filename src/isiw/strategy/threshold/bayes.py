@@ -20,8 +20,8 @@ import numpy as np
 from isiw.checks import Checked, Count, Positive, ascending, number, whole
 from isiw.decision import StopDecision, StopKind
 from isiw.lazy import scipy
+from isiw.strategy.threshold.estimate import IntensityRange, ThresholdEstimate
 from isiw.strategy.threshold.pulses import Pulse
-from isiw.threshold import IntensityRange, ThresholdEstimate
 from isiw.trials import RESPONSE_MV
 from isiw.types import FloatArray
 

@@ -13,8 +13,8 @@ from isiw.checks import Checked, Count, Natural, Positive
 from isiw.decision import StopDecision, StopKind
 from isiw.errors import InvalidValueError, LimitExceededError
 from isiw.strategy.threshold.bayes import BayesThreshold
+from isiw.strategy.threshold.estimate import IntensityRange, ThresholdEstimate
 from isiw.strategy.threshold.pulses import Pulse
-from isiw.threshold import IntensityRange, ThresholdEstimate
 
 _OF_THE_ORDER: Final = 45
 """Its randomness is no other one of the same seed."""

@@ -13,8 +13,8 @@ from isiw.checks import Checked, Count, Positive
 from isiw.decision import StopDecision, StopKind
 from isiw.lazy import scipy
 from isiw.strategy.threshold.bayes import DISTANCES_PCT, RecruitmentPrior, log_likelihood
+from isiw.strategy.threshold.estimate import IntensityRange, ThresholdEstimate
 from isiw.strategy.threshold.pulses import Pulse
-from isiw.threshold import IntensityRange, ThresholdEstimate
 from isiw.types import FloatArray
 
 INTENSITIES_PCT: Final = (95.0, 105.0, 115.0, 125.0, 135.0, 150.0)

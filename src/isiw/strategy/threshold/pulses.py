@@ -12,7 +12,7 @@ import numpy as np
 from isiw.checks import Amplitude, Checked, Flag, number
 from isiw.decision import StopDecision, StopKind
 from isiw.errors import InvalidValueError
-from isiw.threshold import IntensityRange, ThresholdEstimate
+from isiw.strategy.threshold.estimate import IntensityRange, ThresholdEstimate
 from isiw.trials import RESPONSE_MV
 
 ENOUGH_AT_THE_END: Final = 6

@@ -12,10 +12,10 @@ from isiw.errors import InvalidValueError
 from isiw.signals.plausible import implausible_scale, require_amplitude
 from isiw.strategy.threshold.bayes import BayesThreshold, FiveOfTen, MaximumLikelihood
 from isiw.strategy.threshold.curve import CurvePulses
+from isiw.strategy.threshold.estimate import IntensityRange, ThresholdEstimate
 from isiw.strategy.threshold.hotspot import BayesHotSpot
 from isiw.strategy.threshold.pulses import Pulse, ThresholdMethod, hardly_larger, not_growing, one_sided
 from isiw.text.toml_files import checked
-from isiw.threshold import IntensityRange, ThresholdEstimate
 
 METHODS: Final[Mapping[str, type[BayesThreshold | MaximumLikelihood | FiveOfTen | CurvePulses]]] = {
     "bayes": BayesThreshold,
