@@ -13,8 +13,9 @@ import numpy as np
 
 from isiw.checks import number
 from isiw.devices.clock import Clock
+from isiw.devices.info import DeviceInfo, Readiness
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, require_staged
+from isiw.devices.protocol import Answer, Device, require_staged
 from isiw.errors import DeviceError, NotDelivered
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import Event, Intent

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from isiw.design import DesignSpace
+from isiw.devices.info import Readiness
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import Readiness
 from isiw.errors import InvalidValueError, LimitExceededError
 
 LIMITS = Limits(low_ms=0, high_ms=200, min_iti_s=5.0, max_pulses=3)

@@ -16,7 +16,7 @@ import pandas as pd
 import pytest
 
 from export.recorded import SAMPLES, alone, emg_mv, sweep, write_sweeps
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 from isiw.errors import ConfigError, InvalidValueError
 from isiw.export import export_logs
 from isiw.export.emg import Layout, Run

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from export.recorded import note, sweep, write_sweeps
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 from isiw.export import export_logs
 from isiw.export.collection import pseudonymised
 from isiw.log.frames import read_session, trial_frame

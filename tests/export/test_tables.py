@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from export.recorded import note, sweep, write_sweeps
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 from isiw.errors import InvalidValueError, LogError
 from isiw.export import export_logs
 from isiw.export.tables import session_facts

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 from isiw.dissertation.interval.task import answer, begin_log, continue_log, read_productions, session_blocks
 from isiw.errors import DamagedLogError, InvalidValueError, LogError
 from isiw.log.headers import AnyHeader, Block, StrategyRecipe, ThresholdHeader

@@ -15,8 +15,8 @@ import pytest
 
 from isiw.design import IMPACT_SPACE, DesignSpace
 from isiw.devices.clock import VirtualClock
+from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, LogError, StrategyError
 from isiw.findings import Kind
 from isiw.log.frames import read_session

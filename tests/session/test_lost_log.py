@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 from isiw.errors import LogError
 from isiw.log.reader import read_session
 from isiw.session.loop import Session

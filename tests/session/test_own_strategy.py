@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 from isiw.errors import StrategyError
 from isiw.log.reader import read_session
 from isiw.session.loop import Session

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from isiw.design import DesignSpace
+from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import CallbackDevice, DeviceInfo
+from isiw.devices.protocol import CallbackDevice
 from isiw.findings import Kind, Severity
 from isiw.log.reader import read_session
 from isiw.plots.session import session_figure

@@ -24,7 +24,8 @@ from isiw.config.given import (
 from isiw.config.run import RunConfig, limits_for
 from isiw.config.sections import RobotConfig, SimulatedConfig, SubjectConfig, robot_for
 from isiw.design import DesignSpace
-from isiw.devices.protocol import Device, DeviceInfo, info_of
+from isiw.devices.info import DeviceInfo
+from isiw.devices.protocol import Device, info_of
 from isiw.devices.simulated import RecordedPerson, SimulatedDevice, SimulatedPerson, load_recordings
 from isiw.errors import ConfigError, StrategyError
 from isiw.files import write_output

@@ -7,8 +7,9 @@ import threading
 from collections.abc import Callable, Sequence
 
 from isiw.devices.clock import ROUNDING_S, Clock, Pacing, VirtualClock
+from isiw.devices.info import DeviceInfo, Readiness
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, readiness_of, require_staged
+from isiw.devices.protocol import Answer, Device, readiness_of, require_staged
 from isiw.errors import DeviceError, LimitExceededError, NotDelivered
 from isiw.trials import Stimulus
 from isiw.visit import Visit

@@ -10,7 +10,7 @@ from typing import Any, Self
 
 from isiw.checks import Checked, Count, NonNegative, Number, Positive, fields_of
 from isiw.design import DesignSpace, require_space
-from isiw.devices.protocol import Readiness
+from isiw.devices.info import Readiness
 from isiw.errors import InvalidValueError, LimitExceededError
 from isiw.visit import interval_s
 

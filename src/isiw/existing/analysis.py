@@ -15,8 +15,8 @@ from matplotlib.figure import Figure
 
 from isiw.decision import StopKind
 from isiw.design import DesignSpace, require_space
+from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import DeviceInfo
 from isiw.errors import InvalidValueError, LogError, os_errors
 from isiw.estimate import WindowEstimate
 from isiw.existing.delivered import Delivered

@@ -32,8 +32,8 @@ from pydantic import (
 
 from isiw.checks import Checked, choice, mean_and_sd, number, whole
 from isiw.design import DesignSpace
+from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import DeviceInfo
 from isiw.errors import InvalidValueError, LogError
 from isiw.intervention import Intervention
 from isiw.signals.limits import SignalLimits

@@ -14,13 +14,13 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from isiw.errors import DamagedLogError, LogError
-from isiw.files import is_mcap, opened
 from isiw.log.headers import Header
 from isiw.log.moments import Ages, Moment
 from isiw.log.places import kept_for, log_exists, log_of
 from isiw.log.reader import of_production, read_any
 from isiw.log.salvage import Salvage, holds, salvage
 from isiw.log.schema import Event, Intent, Message, Record, decode
+from isiw.opening import is_mcap, opened
 from isiw.text.sanitize import counted
 from isiw.trials import Trial
 

@@ -34,8 +34,8 @@ from isiw.log.schema import (
     decode,
 )
 from isiw.sweeps import Channel
+from isiw.text.parsing import parsed, read_json
 from isiw.text.sanitize import counted
-from isiw.text.toml_files import parsed, read_json
 from isiw.trials import Trial
 
 

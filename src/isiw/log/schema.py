@@ -39,7 +39,7 @@ from isiw.log.headers import ANY_HEADER, AnyHeader, Header, LogRecord, Productio
 from isiw.log.moments import Moment
 from isiw.strategy.threshold.estimate import ThresholdEstimate
 from isiw.sweeps import Channel
-from isiw.text.toml_files import refuse_doubled
+from isiw.text.parsing import refuse_doubled
 from isiw.trials import Stimulus, Trial
 from isiw.types import Numbers
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
+from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import DeviceInfo
 from isiw.errors import InvalidValueError
 from isiw.intervention import Arm, Part, Plan, Slot
 

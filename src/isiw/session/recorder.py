@@ -10,7 +10,7 @@ from typing import Any, Generic, Self, TypeVar
 from isiw.checks import flag, number
 from isiw.decision import StopDecision
 from isiw.devices.clock import ROUNDING_S, Clock, Pacing
-from isiw.devices.protocol import Readiness
+from isiw.devices.info import Readiness
 from isiw.errors import ClockWarning, InvalidValueError
 from isiw.estimate import WindowEstimate
 from isiw.findings import IN_DOUBT, REMEDIES, Finding, Kind, Severity

@@ -9,8 +9,8 @@ from typing import Any, Final, NamedTuple
 
 from isiw.change import MOST_NOTED
 from isiw.checks import MOST_TRIALS, whole
+from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import DeviceInfo
 from isiw.errors import ConfigError, DeviceError, InvalidValueError, OtherVersionsWarning, StrategyError, warn
 from isiw.log.headers import SCHEMA_VERSION, Header, StrategyRecipe
 from isiw.log.kinds import OWN_LOOP

@@ -10,8 +10,9 @@ from typing import Any, Unpack, overload
 from isiw.checks import text
 from isiw.design import DesignSpace
 from isiw.devices.clock import MonotonicClock
+from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import USUAL_ITI_S, Limits
-from isiw.devices.protocol import Device, DeviceInfo, HasMemory, info_of
+from isiw.devices.protocol import Device, HasMemory, info_of
 from isiw.errors import InvalidValueError, LogError
 from isiw.findings import require_percent
 from isiw.log.headers import Header

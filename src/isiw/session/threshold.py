@@ -10,9 +10,9 @@ from typing import Any
 from isiw.checks import number, text, whole
 from isiw.decision import StopDecision
 from isiw.devices.clock import Clock, MonotonicClock, Pacing, VirtualClock
+from isiw.devices.info import DeviceInfo
 from isiw.devices.limited import require_real_time
 from isiw.devices.limits import PulseLimits
-from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DamagedLogError, InvalidValueError, LimitExceededError
 from isiw.log.headers import StrategyRecipe, ThresholdHeader
 from isiw.log.kinds import LogKind, of_another_kind

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from isiw.decision import StopDecision
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 from isiw.errors import ConfigError
 from isiw.log.headers import ThresholdHeader
 from isiw.session.threshold import ThresholdRecorder, open_threshold

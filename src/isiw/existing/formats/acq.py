@@ -11,7 +11,7 @@ import numpy as np
 
 from isiw.existing.formats.contents import Contents, Track, events_of, parted, time_of
 from isiw.existing.layout import Layout
-from isiw.files import opened
+from isiw.opening import opened
 from isiw.text.named_code import library
 from isiw.types import FloatArray
 

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from isiw.devices.protocol import Readiness, unprotected
+from isiw.devices.info import Readiness, unprotected
 from isiw.log.kinds import continued_by
 from isiw.log.reader import SessionRecord
 from isiw.log.schema import EstimateRecord, Event, Intent, Record, Waveform
