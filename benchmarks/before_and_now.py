@@ -46,7 +46,7 @@ import isiw
 from benchmarks.earlier import logged_session
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
-from isiw import window
+from isiw import summary
 from isiw.studies import (
     Processes,
     Study,
@@ -146,9 +146,9 @@ def honesty(before: Path, now: Path) -> pd.DataFrame:
         rows[f"false_sure_{which}"] = (both[f"probability_{which}"] >= 0.9).astype(float).mask(there)
     factor = both["bayes_factor_now" if "bayes_factor_now" in both else "bayes_factor"]  # which earlier versions lack
     unclear = both["reported_window_now"].astype(bool) & (factor < window.LEAST_FACTOR)
-    undecided = unclear & (both["probability_now"] < window.SURE)
+    undecided = unclear & (both["probability_now"] < summary.SURE)
     rows["undecided_now"] = undecided.astype(float)
-    left_open = ~both["reported_window_now"].astype(bool) & (1.0 - both["probability_now"] < window.SURE)
+    left_open = ~both["reported_window_now"].astype(bool) & (1.0 - both["probability_now"] < summary.SURE)
     rows["said_and_wrong_now"] = rows["sure_and_wrong_now"].where(~(undecided | left_open), 0.0)
     rows["false_stated_now"] = (both["reported_window_now"].astype(bool) & ~undecided).astype(float).mask(there)
     groups = pd.DataFrame(rows).groupby([both["cohort"], both["trial"]])

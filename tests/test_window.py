@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
-from isiw.window import EDGE_LEVEL, Window, window_from_excess
+from isiw.excess import EDGE_LEVEL, window_from_excess
+from isiw.window import Window
 from known import known
 
 GRID_MS = np.arange(0.0, 100.0, 2.0)

@@ -16,7 +16,7 @@ from isiw.findings import lacking
 from isiw.lazy import WorkedOut
 from isiw.summary import summary
 from isiw.types import ArrayLike, FloatArray, IntArray
-from isiw.window import Enhancement, Interval, Magnitude, Window
+from isiw.window import Interval, Window
 
 _NOTHING: Final[Mapping[str, float]] = {}
 
@@ -31,6 +31,25 @@ class ProfileBand(NamedTuple):
     median_mv: FloatArray
     low_mv: FloatArray
     high_mv: FloatArray
+
+
+class Enhancement(NamedTuple):
+    """By how much the tap enlarges the expected MEP [mV], and the shift of the recruitment curve's input [% RMT]."""
+
+    mep_mv: float
+    shift_pct_rmt: float | None = None
+
+
+class Magnitude(NamedTuple):
+    """The size of the enhancement at the best ISI, given that there is a window: medians and 90 % intervals.
+
+    Args:
+        mep_mv: by how much the expected MEP is larger than without a tap [mV].
+        ratio: how many times as large as that of TMS alone it is, the EMG floor in both.
+    """
+
+    mep_mv: tuple[float, float, float]
+    ratio: tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)

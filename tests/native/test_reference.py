@@ -10,6 +10,7 @@ import scipy.special
 from hatch_build import SOURCES
 
 from isiw.design import VALVE_SPACE, DesignSpace
+from isiw.excess import LEAST_DEPRESSED_MV, least_excess_mv
 from isiw.models.particles import records
 from isiw.models.particles.latents import BLOCKS
 from isiw.models.particles.model import ParticleModel
@@ -23,7 +24,6 @@ from isiw.native import engine
 from isiw.native.arrays import COLUMNS, FIELDS, UNKNOWN
 from isiw.native.engine import log_likelihoods
 from isiw.native.law import Crowd
-from isiw.window import LEAST_DEPRESSED_MV, least_excess_mv
 from native import reference
 from native.drawn import CASES, PLACES, Case, columns, seeds, trials
 

@@ -14,10 +14,11 @@ from isiw.design import DesignSpace
 from isiw.dissertation.regression import curve_masks
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
+from isiw.excess import EDGE_LEVEL
 from isiw.models.protocol import Observation
 from isiw.models.shared.history import AmplitudeHistory, FloorTreatment, OfAmplitudes, PersonTrials
 from isiw.types import FloatArray, Singles
-from isiw.window import EDGE_LEVEL, Window
+from isiw.window import Window
 
 SweepRule = Literal["baseline", "share"]
 

@@ -35,8 +35,9 @@ from isiw.studies.execution import one_thread
 from isiw.studies.players import Alone, OwnCode, Player, Reported
 from isiw.subjects.cohorts import COHORTS, person_of
 from isiw.subjects.subject import Response, SimulatedSubject
+from isiw.summary import bayes_factor
 from isiw.types import Array
-from isiw.window import Window, bayes_factor
+from isiw.window import Window
 
 TIMES = ("ask_ms", "tell_ms")
 """Columns that differ each time a session is run."""
