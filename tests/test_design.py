@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
+from isiw.devices.allowed import require_isi
 from isiw.devices.limits import Limits
 from isiw.errors import InvalidValueError, LimitExceededError, OutOfSpaceError
 from isiw.strategy.choice import candidate_isis
@@ -172,10 +173,10 @@ def test_a_space_can_be_a_list_of_isis_in_any_order() -> None:
 
 def test_the_limits_of_a_list_allow_its_isis_alone() -> None:
     limits = Limits.of_space(LISTED)
-    limits.require_isi(30)
+    require_isi(limits, 30)
     for isi_ms in (25, 60):
         with pytest.raises(LimitExceededError):
-            limits.require_isi(isi_ms)
+            require_isi(limits, isi_ms)
 
 
 @pytest.mark.parametrize(("isis_ms", "reference"), [([10], "impact"), ([10, math.nan], "impact"), ([10, 20], "")])

@@ -22,7 +22,7 @@ from isiw.checks import (
     share,
 )
 from isiw.errors import InvalidValueError
-from isiw.findings import INTERVAL_S, require_percent
+from isiw.findings import INTERVAL_S
 
 _ITI_DRAWS, _CONTROL_DRAWS = 1, 2
 """What is drawn, so that the two never share their draws."""
@@ -70,29 +70,6 @@ class Visit(Checked):
     age_years: Annotated[float, partial(number, least=1, most=120)] | None = None
     height_cm: Annotated[float, partial(number, least=50, most=260)] | None = None
     tap_n: Annotated[float, partial(number, least=0.1, most=1000)] | None = None
-
-    def require_intensity(self, assumed_pct_rmt: float | None = None) -> None:
-        """Raise if an intensity is probably in another unit, or not the one that the strategy assumes.
-
-        It is for a visit that somebody states: those of earlier logs stay readable.
-
-        Args:
-            assumed_pct_rmt: the intensity that the strategy assumes [% RMT]; None if it assumes none.
-
-        Raises:
-            InvalidValueError: an intensity below 3 %, or one other than the strategy's.
-        """
-        noted = self.intensity_pct_rmt
-        require_percent("the visit's intensity_pct_rmt", noted)
-        require_percent("the visit's intensity_pct_mso", self.intensity_pct_mso)
-        if noted is not None and assumed_pct_rmt is not None and not math.isclose(noted, assumed_pct_rmt):
-            raise InvalidValueError(
-                "the visit and the strategy state different intensities of the pulse",
-                got=f"{assumed_pct_rmt:g} % of RMT in the strategy",
-                expected=f"{noted:g}, as the visit says",
-                remedy="Correct intensity_pct_rmt under [visit] or under [strategy.settings] (in Python of isiw.Visit "
-                f"or make_strategy(..., intensity_pct_rmt={noted:g})).",
-            )
 
     def unlike(self, other: Visit) -> str | None:
         """Why the window of the person's other visit is not this one's, in words; None if nothing noted says so."""
@@ -175,42 +152,6 @@ class VisitProtocol(Checked):
     @property
     def _share(self) -> Fraction:
         return _exact(self.tms_alone) + _exact(self.tap_alone)
-
-    def require_effect(self, min_iti_s: float) -> None:
-        """Raise if the intervals are as long as the rests, so that these are none, or no longer than the limits' own.
-
-        It is for a protocol that somebody states: those of earlier logs stay readable.
-
-        Args:
-            min_iti_s: the interval of the limits, which holds if the protocol has none [s].
-
-        Raises:
-            InvalidValueError: a rest that is no longer than the longest interval, intervals that the limits replace, or
-                an intensity of TMS alone where there is none, or in another unit.
-        """
-        require_percent("the protocol's alone_pct_rmt", self.alone_pct_rmt)
-        if self.alone_pct_rmt is not None and not self.tms_alone:
-            raise InvalidValueError(
-                "an intensity of TMS alone has no effect in a protocol without TMS alone",
-                got=f"alone_pct_rmt = {self.alone_pct_rmt:g}",
-                remedy="Set a share tms_alone, or leave out alone_pct_rmt.",
-            )
-        if self.iti_s is not None and self.iti_s[1] <= min_iti_s and self.iti_s != (min_iti_s, min_iti_s):
-            raise InvalidValueError(
-                "the protocol's intervals are no longer than the limits allow at least, so they would have no effect",
-                got=f"iti_s {self.iti_s[0]:g} to {self.iti_s[1]:g}, min_iti_s {min_iti_s:g}",
-                expected=f"intervals up to more than {min_iti_s:g} s",
-                remedy="Set a longer iti_s [s] in the protocol, or a shorter min_iti_s in the limits.",
-            )
-        longest_s = min_iti_s if self.iti_s is None else self.iti_s[1]
-        if self.block_trials is not None and self.rest_s <= longest_s:
-            raise InvalidValueError(
-                "the protocol's rest is no longer than the longest interval between two trials, so it would have no "
-                "effect",
-                got=f"rest_s {self.rest_s:g}, longest interval {longest_s:g}",
-                expected=f"rest_s above {longest_s:g}",
-                remedy="Set a longer rest_s [s], or leave out block_trials and rest_s.",
-            )
 
     def rests_before(self, trial: int) -> bool:
         """True if a rest comes before this trial."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from isiw.devices.allowed import earliest_s
 from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import Limits
 from isiw.errors import InvalidValueError
@@ -100,7 +101,7 @@ def _require_times(plan: Plan, limits: Limits, seed: int) -> None:
         if slot.due_s is not None and slot.first:
             _require_over(slot, planned_s - last_pair_s, plan)
             planned_s = max(planned_s, last_pair_s + slot.due_s)
-        allowed_s = limits.earliest_s(times_s, 0.0)
+        allowed_s = earliest_s(limits, times_s, 0.0)
         if times_s and allowed_s > planned_s + _ROUNDING_S:
             raise InvalidValueError(
                 "the limits do not allow the times of the plan",

@@ -32,6 +32,7 @@ from isiw.session.intensities import has_several, require_intensities
 from isiw.session.pausing import Pausing
 from isiw.session.rig import Rig, Safeguards, require_matching
 from isiw.session.sink import SessionUpdate, Sink
+from isiw.session.stated import require_visit
 from isiw.session.steps import Steps
 from isiw.signals.limits import SignalLimits
 from isiw.signals.tap import TapResponses
@@ -93,7 +94,7 @@ def require_new(strategy: Strategy, trials: int = 0) -> None:
 
 def require_fitting(strategy: Strategy, header: Header) -> None:
     """Raise if the visit states another intensity than the strategy, or the limits end the strategy's plan early."""
-    header.visit.require_intensity(header.strategy.settings.get("intensity_pct_rmt"))
+    require_visit(header.visit, header.strategy.settings.get("intensity_pct_rmt"))
     require_intensities(strategy, header)
     planned, most, before = strategy.stimuli_planned, header.limits.max_pulses, header.given_before
     if before >= most:

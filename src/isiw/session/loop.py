@@ -24,6 +24,7 @@ from isiw.session.judging import Judging
 from isiw.session.pausing import Pause
 from isiw.session.sink import Follower, SessionResult, Wait
 from isiw.session.state import Fault, State, state_of
+from isiw.session.stated import require_limits, require_protocol, require_signals
 from isiw.session.steps import ended, paused
 from isiw.session.terminal import goes_on, is_attended, is_terminal
 from isiw.strategy.strategy import Strategy
@@ -257,9 +258,9 @@ class Session(Judging):
                 the plan of the strategy.
         """
         if not self._earlier.first_records:  # what an earlier log says goes on as it was
-            self._limits.require_effect()
-            self._header.protocol.require_effect(self._limits.iti_s)
-            self._header.signals.require_behind_artefact()
+            require_limits(self._limits)
+            require_protocol(self._header.protocol, self._limits.iti_s)
+            require_signals(self._header.signals)
             require_fitting(self.strategy, self._header)
 
     def _judge(self, verdict: Callable[[TrialTable], Event]) -> None:

@@ -9,6 +9,7 @@ from typing import Any, Generic, Self, TypeVar
 
 from isiw.checks import flag, number
 from isiw.decision import StopDecision
+from isiw.devices.allowed import require_intensity, require_isi, require_left, require_state
 from isiw.devices.clock import ROUNDING_S, Clock, Pacing
 from isiw.devices.info import Readiness
 from isiw.errors import ClockWarning, InvalidValueError
@@ -170,13 +171,13 @@ class Recorder(Recording[Trial], Judging):
                 return self.asked.isi_ms
             if self.asked is not None:  # TMS alone that was given, and never told
                 self._conclude(Trial.unknown(self.asked))
-            self._limits.require_left(self._given_before + len(self.trials))
-            self._limits.require_state(Readiness())
+            require_left(self._limits, self._given_before + len(self.trials))
+            require_state(self._limits, Readiness())
             if self.wait_s() > ROUNDING_S:
                 return None
             isi_ms = self.strategy.ask(deadline_s)
-            self._limits.require_isi(isi_ms)
-            self._limits.require_intensity(self.intensity_pct_rmt)
+            require_isi(self._limits, isi_ms)
+            require_intensity(self._limits, self.intensity_pct_rmt)
             self._begin(isi_ms, self.strategy.fallback_reason)
             return isi_ms
 

@@ -36,6 +36,7 @@ from isiw.session.intensities import stimulus_of
 from isiw.session.loop import Session
 from isiw.session.recorder import Recorder
 from isiw.session.replay import require_as_real, require_same_person, taken_up
+from isiw.session.stated import require_limits, require_protocol, require_visit
 from isiw.session.threshold import ThresholdRecorder, resume_threshold
 from isiw.signals.limits import SignalLimits
 from isiw.strategy.strategy import Strategy
@@ -109,8 +110,8 @@ def _stated(space: DesignSpace, options: OwnLoopOptions) -> dict[str, Any]:
         )
     limits = limits.stated(0.0)
     _require_reported(limits)
-    limits.require_effect()
-    protocol.require_effect(limits.iti_s)
+    require_limits(limits)
+    require_protocol(protocol, limits.iti_s)
     subject, visit = text("subject", options.get("subject", "")), options.get("visit") or Visit()
     config = dict(options.get("config") or {})
     return {"subject": subject, "visit": visit, "protocol": protocol, "limits": limits, "config": config}
@@ -140,7 +141,7 @@ def _own_loop_resumed(
     strategy, earlier = taken_up(salvaged, record, strategy, details["limits"], options)
     header = _header(strategy, **details).model_copy(update=dict(earlier.kept))
     if "visit" in changes:
-        header.visit.require_intensity(header.strategy.settings.get("intensity_pct_rmt"))
+        require_visit(header.visit, header.strategy.settings.get("intensity_pct_rmt"))
     writer = earlier.open_log(header)
     for first in earlier.first_records:
         writer.append(first)
@@ -233,7 +234,7 @@ def _session_resumed(
     if (limits := options.get("limits")) is None:
         limits = limits_of_log(header)
     else:
-        limits.require_effect()
+        require_limits(limits)
     require_as_real(info_of(device), header.device)
     strategy = strategy.restarted() if strategy else None
     strategy, earlier = taken_up(salvaged, record, strategy, limits, options)
