@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from isiw import schedule
 from isiw.errors import InvalidValueError
 from isiw.session.stated import require_protocol
 from isiw.visit import Control, Visit, VisitProtocol
@@ -15,7 +16,7 @@ MIXED = VisitProtocol(tms_alone=0.1, tap_alone=0.05)
 
 
 def controls(protocol: VisitProtocol, seed: int, trials: int = 600) -> dict[int, Control]:
-    drawn = {trial: protocol.control(trial, seed) for trial in range(trials)}
+    drawn = {trial: schedule.control(protocol, trial, seed) for trial in range(trials)}
     return {trial: control for trial, control in drawn.items() if control is not None}
 
 
@@ -49,18 +50,18 @@ def test_without_shares_there_are_no_controls() -> None:
 
 def test_intervals_are_drawn_from_their_range_for_each_trial() -> None:
     protocol = VisitProtocol(iti_s=(5.0, 8.0))
-    drawn = [protocol.interval_s(trial, 3) for trial in range(200)]
+    drawn = [schedule.interval_s(protocol, trial, 3) for trial in range(200)]
     assert all(5.0 <= interval_s <= 8.0 for interval_s in drawn)
     assert (min(drawn) < 5.2, max(drawn) > 7.8) == (True, True)
     assert len(set(drawn)) == 200
-    assert drawn == [protocol.interval_s(trial, 3) for trial in range(200)]
-    assert drawn != [protocol.interval_s(trial, 4) for trial in range(200)]
+    assert drawn == [schedule.interval_s(protocol, trial, 3) for trial in range(200)]
+    assert drawn != [schedule.interval_s(protocol, trial, 4) for trial in range(200)]
 
 
 def test_a_rest_comes_after_each_block_and_never_first() -> None:
     protocol = VisitProtocol(iti_s=(5.0, 8.0), block_trials=12, rest_s=120.0)
-    rests = [trial for trial in range(40) if protocol.interval_s(trial, 0) == 120.0]
-    assert rests == [12, 24, 36] == [trial for trial in range(40) if protocol.rests_before(trial)]
+    rests = [trial for trial in range(40) if schedule.interval_s(protocol, trial, 0) == 120.0]
+    assert rests == [12, 24, 36] == [trial for trial in range(40) if schedule.rests_before(protocol, trial)]
 
 
 @pytest.mark.parametrize(

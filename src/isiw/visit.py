@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from fractions import Fraction
 from functools import partial
 from typing import Annotated, Final
-
-import numpy as np
 
 from isiw.checks import (
     Checked,
@@ -23,9 +20,6 @@ from isiw.checks import (
 )
 from isiw.errors import InvalidValueError
 from isiw.findings import INTERVAL_S
-
-_ITI_DRAWS, _CONTROL_DRAWS = 1, 2
-"""What is drawn, so that the two never share their draws."""
 
 _FINEST_SHARE = 1000
 
@@ -142,7 +136,7 @@ class VisitProtocol(Checked):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self._share >= 1:
+        if self.control_share >= 1:
             raise InvalidValueError(
                 "the control trials leave no pairs of stimuli",
                 got=(self.tms_alone, self.tap_alone),
@@ -150,56 +144,11 @@ class VisitProtocol(Checked):
             )
 
     @property
-    def _share(self) -> Fraction:
-        return _exact(self.tms_alone) + _exact(self.tap_alone)
-
-    def rests_before(self, trial: int) -> bool:
-        """True if a rest comes before this trial."""
-        return self.block_trials is not None and trial > 0 and trial % self.block_trials == 0
-
-    def interval_s(self, trial: int, seed: int) -> float:
-        """Shortest interval between the trial before and this one [s].
-
-        Args:
-            trial: its number.
-            seed: the session's.
-        """
-        rest_s = self.rest_s if self.rests_before(trial) else 0.0
-        if self.iti_s is None:
-            return rest_s
-        return max(rest_s, float(_draws(seed, trial, _ITI_DRAWS).uniform(*self.iti_s)))
-
-    def stimuli_for(self, pairs: int) -> int:
-        """The number of stimuli that so many pairs take at most, their control trials among them."""
-        return math.ceil((pairs + 1) / (1 - self._share)) if self._share else pairs
-
-    def control(self, trial: int, seed: int) -> Control | None:
-        """Which control trial this is; None for a pair of stimuli.
-
-        The trials are cut into stretches with one control each, at a random place, so that controls are spread over the
-        session and nobody can predict them. Their kinds alternate as their shares say.
-
-        Args:
-            trial: its number.
-            seed: the session's.
-        """
-        share = self._share
-        if not share:
-            return None
-        stretch = math.floor(trial * share)
-        first, behind = (math.ceil(number / share) for number in (stretch, stretch + 1))
-        if trial != _draws(seed, stretch, _CONTROL_DRAWS).integers(first, behind):
-            return None
-        before, after = (
-            math.floor(number * _exact(self.tms_alone) / share + Fraction(1, 2)) for number in (stretch, stretch + 1)
-        )
-        return Control.TMS_ALONE if after > before else Control.TAP_ALONE
+    def control_share(self) -> Fraction:
+        """The share of control trials."""
+        return exact_share(self.tms_alone) + exact_share(self.tap_alone)
 
 
-def _draws(seed: int, number: int, kind: int) -> np.random.Generator:
-    return np.random.default_rng([abs(seed), number, kind])
-
-
-def _exact(share: float) -> Fraction:
+def exact_share(share: float) -> Fraction:
     """A share as a fraction, so that no stretch gains or loses a trial by rounding."""
     return Fraction(share).limit_denominator(_FINEST_SHARE)

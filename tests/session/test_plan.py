@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from isiw import schedule
 from isiw.decision import StopKind
 from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
@@ -57,8 +58,8 @@ def test_limits_that_end_a_plan_are_refused_beforehand_with_the_line_to_write(
 def test_the_stimuli_that_pairs_take_hold_the_controls_between_them(share: float) -> None:
     protocol = VisitProtocol(tms_alone=share)
     for seed in range(5):
-        given = protocol.stimuli_for(60)
-        assert sum(protocol.control(trial, seed) is None for trial in range(given)) >= 60
+        given = schedule.stimuli_for(protocol, 60)
+        assert sum(schedule.control(protocol, trial, seed) is None for trial in range(given)) >= 60
 
 
 @pytest.mark.slow

@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import Any, Final, NamedTuple, TypedDict
 
 import isiw
+from isiw import schedule
 from isiw.checks import deadline, patience, text
 from isiw.devices.clock import Clock
 from isiw.devices.limits import USUAL_ITI_S, Limits
@@ -110,7 +111,7 @@ def require_fitting(strategy: Strategy, header: Header) -> None:
         return
     if planned is None and any(trial.intensity_pct_rmt is not None for trial in strategy.earlier):
         planned = stimuli_left(strategy.stopping, 0)  # who plans pulses over the curve plans the pairs after them
-    if planned is None or (needed := header.protocol.stimuli_for(planned) + before) <= most:
+    if planned is None or (needed := schedule.stimuli_for(header.protocol, planned) + before) <= most:
         return
     name, planned = strategy.recipe.name or type(strategy.acquisition).__name__, planned + before
     raise InvalidValueError(

@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable
 from typing import Any, Generic, Self, TypeVar
 
+from isiw import schedule
 from isiw.checks import flag, number
 from isiw.decision import StopDecision
 from isiw.devices.allowed import require_intensity, require_isi, require_left, require_state
@@ -140,12 +141,12 @@ class Recorder(Recording[Trial], Judging):
         """Time that `ask` would wait now until limits and protocol allow the next stimulus [s]."""
         if self.asked is not None:
             return 0.0
-        return self._pacing.wait_s(self._protocol.interval_s(len(self.trials), self._seed))
+        return self._pacing.wait_s(schedule.interval_s(self._protocol, len(self.trials), self._seed))
 
     @property
     def rests(self) -> bool:
         """True if the protocol has a rest before the next trial, and it is not over."""
-        return self._protocol.rests_before(len(self.trials)) and self.wait_s() > 0
+        return schedule.rests_before(self._protocol, len(self.trials)) and self.wait_s() > 0
 
     def ask(self, deadline_s: float | None = None) -> float:
         """The next ISI [ms], the same until its outcome; on disk as about to be delivered before this returns.

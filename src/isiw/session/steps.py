@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Iterable
 from typing import Final
 
+from isiw import schedule
 from isiw.decision import StopDecision, StopKind
 from isiw.devices.protocol import Answer
 from isiw.errors import DeviceError, DeviceTimeoutError, IsiwError, LimitExceededError, NotDelivered, error_text
@@ -153,8 +154,8 @@ class Steps:
         first, pairs = len(self._examination.trials), 0
         while pairs < min(left, _FORESEEN) and len(intervals_s) < self._rig.limited.pulses_left:
             number = first + len(intervals_s)
-            intervals_s.append(max(usual_s, protocol.rest_s) if protocol.rests_before(number) else usual_s)
-            pairs += protocol.control(number, seed) is None
+            intervals_s.append(max(usual_s, protocol.rest_s) if schedule.rests_before(protocol, number) else usual_s)
+            pairs += schedule.control(protocol, number, seed) is None
         return self._rig.limited.ahead_s(intervals_s) * (left / pairs if pairs == _FORESEEN else 1)
 
     def _decision(self) -> StopDecision:
@@ -223,7 +224,7 @@ class Steps:
             return self._agenda.control(len(self._examination.trials))
         if self._own_response.wants_tap:
             return Control.TAP_ALONE
-        return self._header.protocol.control(len(self._examination.trials), self._header.seed)
+        return schedule.control(self._header.protocol, len(self._examination.trials), self._header.seed)
 
     def _next_isi_ms(self) -> float | None:
         """The ISI that is asked next [ms]; None if a control trial comes next."""
@@ -254,8 +255,8 @@ class Steps:
         if self._agenda is not None:
             rests, interval_s = self._agenda.rests_before(number), self._agenda.interval_s(number)
         else:
-            rests = self._header.protocol.rests_before(number)
-            interval_s = self._header.protocol.interval_s(number, self._header.seed)
+            rests = schedule.rests_before(self._header.protocol, number)
+            interval_s = schedule.interval_s(self._header.protocol, number, self._header.seed)
         try:
             while not self._disturbed and (wait_s := self._rig.limited.wait_s(interval_s)) > 0:
                 text = f"Rest after {number} trials" if rests else "Next stimulus"
