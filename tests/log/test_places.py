@@ -158,7 +158,7 @@ def test_a_log_that_a_session_went_on_with_while_its_names_were_looked_at_does_n
         longer.replace(target)
         return found.fingerprint
 
-    monkeypatch.setattr("isiw.log.writer._own_file", meanwhile)
+    monkeypatch.setattr("isiw.log.writer.own_file", meanwhile)
     with pytest.raises(LogError, match="has changed since"):
         go_on(finished_log)
     assert finished_log.read_bytes() == another

@@ -24,11 +24,8 @@ from isiw.log.schema import (
     ThresholdEstimateRecord,
     Waveform,
     decode,
-    encode,
-    json_schema,
-    topic_of,
 )
-from isiw.log.writer import LogWriter
+from isiw.log.writer import LogWriter, encode, json_schema, topic_of
 from isiw.session.examination import recorded
 from isiw.strategy.threshold import ThresholdEstimate
 from isiw.summary import summary

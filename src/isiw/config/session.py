@@ -30,11 +30,11 @@ from isiw.devices.simulated import RecordedPerson, SimulatedDevice, SimulatedPer
 from isiw.errors import ConfigError, StrategyError
 from isiw.files import write_output
 from isiw.intervention import Intervention
+from isiw.log.continuing import imported_sentence, require_search
 from isiw.log.headers import RUN_KEY, FirstStep
-from isiw.log.kinds import imported_sentence, require_search
 from isiw.log.places import log_exists
 from isiw.log.reader import SessionRecord, ThresholdRecord, read_session
-from isiw.log.schema import now
+from isiw.log.writer import now
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.supra.prior import SupraPrior
 from isiw.priors import above, after, read_lab_prior

@@ -26,8 +26,8 @@ from isiw.log.headers import Header
 from isiw.log.names import require_free
 from isiw.log.places import log_of
 from isiw.log.reader import SessionRecord
-from isiw.log.schema import Event, Record, Waveform, clock_ns
-from isiw.log.writer import LogWriter
+from isiw.log.schema import Event, Record, Waveform
+from isiw.log.writer import LogWriter, clock_ns
 from isiw.plots.session import session_figure
 from isiw.plots.style import inline_svg, save_figure
 from isiw.report.page import save_report

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar, cast
 
 from isiw.decision import StopDecision
-from isiw.errors import DamagedLogError, InvalidValueError, LogError
+from isiw.errors import InvalidValueError, LogError
 from isiw.findings import is_silent, lacking
 from isiw.log.headers import SCHEMA_VERSION, Header, ThresholdHeader
-from isiw.log.kinds import LogKind, continued_by, of_another_kind
+from isiw.log.kinds import LogKind, of_another_kind
 from isiw.log.records import Onset, Records, unknown_of
 from isiw.log.salvage import Salvage, salvage
 from isiw.log.schema import EstimateRecord, Event, Intent, PulseOutcome, Record, waveform_topic
@@ -119,16 +119,6 @@ class SessionRecord(_StimuliRecord[Header]):
         """All trials whose outcome was logged, as they count after what an operator said about them."""
         trials = sorted((r for r in self.history if isinstance(r, Trial)), key=lambda trial: trial.index)
         return under_all(TrialTable(tuple(trials)), self.events)
-
-    def require_end(self) -> None:
-        """Raise if nobody knows how many stimuli were given."""
-        if self.end_lost:
-            raise DamagedLogError(
-                "the log's end is missing, so the number of stimuli given is unknown",
-                got=str(self.path),
-                remedy="Look at the stimulator's counter, and resume with the number N of pulses that isiw show does "
-                f"not list: {continued_by(self.path, self.header, end_lost=True)}",
-            )
 
     @property
     def rests_on_data(self) -> bool:

@@ -15,8 +15,8 @@ from isiw.errors import InvalidValueError
 from isiw.figures import Estimate
 from isiw.findings import Kind
 from isiw.intervention import Intervention, concealed
+from isiw.log.continuing import continued_by
 from isiw.log.headers import Header
-from isiw.log.kinds import continued_by
 from isiw.log.reader import SessionRecord, require_records
 from isiw.metrics import f1, profile_correlation
 from isiw.pairing import words

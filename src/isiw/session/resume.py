@@ -15,8 +15,9 @@ from isiw.devices.limits import USUAL_ITI_S, Limits
 from isiw.devices.protocol import Device, HasMemory, info_of
 from isiw.errors import InvalidValueError, LogError
 from isiw.findings import require_percent
+from isiw.log.continuing import OWN_LOOP, continued_by, require_session
 from isiw.log.headers import Header
-from isiw.log.kinds import OWN_LOOP, LogKind, continued_by, of_another_kind, require_session
+from isiw.log.kinds import LogKind, of_another_kind
 from isiw.log.places import log_exists
 from isiw.log.reader import SessionRecord, read_any, read_salvaged
 from isiw.log.salvage import Salvage, salvage
