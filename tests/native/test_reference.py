@@ -21,9 +21,9 @@ from isiw.models.particles.supra.predictions import SupraSample
 from isiw.models.shared.draws import LEVELS
 from isiw.models.shared.history import Circumstances
 from isiw.native import engine
-from isiw.native.arrays import COLUMNS, FIELDS, UNKNOWN
 from isiw.native.engine import log_likelihoods
 from isiw.native.law import Crowd
+from isiw.native.library import COLUMNS, FIELDS, UNKNOWN
 from native import reference
 from native.drawn import CASES, PLACES, Case, columns, seeds, trials
 

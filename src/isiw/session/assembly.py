@@ -219,7 +219,7 @@ def assembled(
     safeguards, protocol = options.get("safeguards") or Safeguards(), options.get("protocol") or VisitProtocol()
     limits = (options.get("limits") or Limits.of_space(strategy.space)).stated(USUAL_ITI_S)
     intervention = options.get("intervention")
-    sink = Sink(options.get("on_trial"), hides=intervention.hides if intervention else lambda _: False)
+    sink = Sink(options.get("on_trial"), hides=intervention.hides if intervention else None)
     noted = options.get("visit") or Visit()
     rig = Rig(device, limits, options.get("clock"), safeguards, sink, away=console.away, noted=noted)
     require_matching(rig.info, strategy, protocol)

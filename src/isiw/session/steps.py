@@ -19,7 +19,7 @@ from isiw.log.schema import Event, Intent, Waveform
 from isiw.pairing.agenda import Agenda
 from isiw.session.blocks import AHEAD_S, Blocks
 from isiw.session.examination import WindowExamination
-from isiw.session.intensities import noted, set_for
+from isiw.session.intensities import set_for
 from isiw.session.own_response import LONGER, OwnResponse
 from isiw.session.pausing import Pausing
 from isiw.session.rig import Rig
@@ -287,10 +287,10 @@ class Steps:
         try:
             self._sink.log.require_in_place()
             # From here on it may have been given, whatever fails.
-            trial = self._as_planned(noted(Trial.unknown(stimulus), stimulus, self._header))
+            trial = self._with_intensity(Trial.unknown(stimulus), stimulus)
             self._at = stimulus.trial, True
             answer = self._answer(stimulus)
-            trial = noted(self._judged(stimulus, answer), stimulus, self._header)
+            trial = self._with_intensity(self._judged(stimulus, answer), stimulus)
             if isinstance(answer, Sweep):
                 trial = self._own_response.after(trial, answer)
             self._watch = self._watch.after(trial, answer)
@@ -342,18 +342,20 @@ class Steps:
     def _judged(self, stimulus: Stimulus, answer: Answer) -> Trial:
         space, signals = self._header.space, self._header.signals
         if isinstance(answer, Sweep):
-            return self._as_planned(judge(answer, stimulus, space, signals))
+            return judge(answer, stimulus, space, signals)
         if isinstance(answer, Measurement):
-            return self._as_planned(judge_measurement(answer, stimulus, space, signals))
+            return judge_measurement(answer, stimulus, space, signals)
         raise DeviceError(
             f"the device's deliver returned {shown(answer)}",
             expected="an isiw.Sweep or an isiw.Measurement",
             remedy="Let it return what it recorded, or the MEP that it measured: isiw.Measurement(mep_mv, isi_ms).",
         )
 
-    def _as_planned(self, trial: Trial) -> Trial:
-        """A trial with the intensity that the plan has for it, where that is another than the visit's."""
+    def _with_intensity(self, trial: Trial, stimulus: Stimulus) -> Trial:
+        """A trial with the intensity of its pulse, the plan's or the one to be set; none where it is the usual one."""
         slot = None if self._agenda is None else self._agenda.slot(trial.index)
-        if slot is None or slot.intensity_pct_rmt is None:
-            return trial
-        return dataclasses.replace(trial, intensity_pct_rmt=slot.intensity_pct_rmt)
+        planned = None if slot is None else slot.intensity_pct_rmt
+        if stimulus.intensity_pct_rmt is not None:
+            usual = self._header.visit.intensity_pct_rmt
+            planned = None if stimulus.intensity_pct_rmt == usual else stimulus.intensity_pct_rmt
+        return trial if trial.intensity_pct_rmt == planned else dataclasses.replace(trial, intensity_pct_rmt=planned)
