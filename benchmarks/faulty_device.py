@@ -18,7 +18,7 @@ from isiw.devices.info import DeviceInfo, Readiness
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Answer, Device, require_staged
 from isiw.errors import DeviceError, NotDelivered
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.log.schema import Event, Intent
 from isiw.sweeps import Channel, Measurement, Sweep
 from isiw.testing.suites import require

@@ -31,7 +31,7 @@ import isiw
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
 from isiw.devices.simulated import SimulatedPerson
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.log.schema import EstimateRecord, Event
 from isiw.report.evidence import ENOUGH_ON_EACH_SIDE, changed_with_time
 from isiw.report.words import Role, Said, in_lines, statement

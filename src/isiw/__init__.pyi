@@ -52,7 +52,7 @@ from .dissertation import response_counts as response_counts
 from .estimate import WindowEstimate as WindowEstimate
 from .existing.analysis import Analysis as Analysis
 from .existing.analysis import analyse as analyse
-from .log.frames import read_session as read_session
+from .log.record import read_session as read_session
 from .server.live.page import watch as watch
 from .session.afterwards import exclude as exclude
 from .session.afterwards import include as include

@@ -21,7 +21,7 @@ from isiw.errors import ConfigError, InvalidValueError
 from isiw.export import export_logs
 from isiw.export.emg import Layout, Run
 from isiw.findings import Kind
-from isiw.log.frames import read_session
+from isiw.log.record import read_session
 from isiw.sweeps import Channel
 from isiw.text.stimuli import STIMULI
 from isiw.trials import Status, Stimulus, Trial

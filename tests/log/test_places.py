@@ -16,7 +16,7 @@ from isiw.devices.clock import VirtualClock
 from isiw.errors import LogError
 from isiw.log.headers import Header
 from isiw.log.places import Fingerprint
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.log.salvage import Salvage, salvage, salvage_file
 from isiw.log.schema import Event
 from isiw.log.writer import LogWriter

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import isiw
-from isiw.log.frames import read_session
+from isiw.log.record import read_session
 from isiw.log.schema import Waveform, without_samples
 from isiw.log.writer import LogWriter, encode
 from isiw.sweeps import Channel

@@ -12,9 +12,8 @@ from isiw import sentences
 from isiw.change import Misfit
 from isiw.decision import StopKind
 from isiw.design import DesignSpace
-from isiw.log.frames import read_session
 from isiw.log.headers import StrategyRecipe
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord, read_session
 from isiw.log.schema import EstimateRecord, Event, Intent
 from isiw.report.words import TRIAL_HEADINGS, counts_sentence, final_statement, trial_rows, truth_sentence
 from isiw.session.afterwards import exclude

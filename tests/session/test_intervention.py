@@ -21,7 +21,7 @@ from isiw.existing.reading import read_people
 from isiw.export.collection import read_logs
 from isiw.intervention import Arm
 from isiw.log import moments, writer
-from isiw.log.frames import read_session
+from isiw.log.record import read_session
 from isiw.log.schema import EstimateRecord, Intent, Waveform
 from isiw.pairing.agenda import Agenda
 from isiw.pairing.pulses import pairing_of

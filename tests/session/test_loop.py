@@ -19,9 +19,8 @@ from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import Limits
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, LogError, StrategyError
 from isiw.findings import Kind
-from isiw.log.frames import read_session
 from isiw.log.places import log_exists
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord, read_session
 from isiw.log.schema import EstimateRecord, Intent
 from isiw.models.particles import ParticleModel
 from isiw.session.loop import Session

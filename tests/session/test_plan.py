@@ -14,7 +14,7 @@ from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import InvalidValueError
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.report.words import final_statement, truth_sentence
 from isiw.session.loop import Session
 from isiw.session.resume import open_session

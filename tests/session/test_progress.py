@@ -12,7 +12,7 @@ import pytest
 from isiw.decision import StopDecision
 from isiw.estimate import WindowEstimate
 from isiw.findings import Kind
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.session.console import PROGRESS_HEADINGS, PROGRESS_LEGEND, fitted, progress_row, standing
 from isiw.session.loop import Session
 from isiw.session.sink import SessionUpdate

@@ -17,7 +17,7 @@ from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.findings import Kind
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.session.loop import Session
 from isiw.session.resume import open_session, resume
 from isiw.session.sink import SessionUpdate

@@ -15,7 +15,7 @@ import pytest
 
 from forked import Forked
 from isiw.decision import StopKind
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.session.interrupts import INTERRUPTED, Interrupts
 from isiw.session.loop import Session
 from isiw.session.resume import resume

@@ -15,7 +15,7 @@ from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import CallbackDevice
 from isiw.findings import Kind, Severity
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.plots.session import session_figure
 from isiw.report import final_statement
 from isiw.session import progress_row

@@ -15,7 +15,7 @@ from isiw.devices.clock import VirtualClock
 from isiw.devices.info import Readiness
 from isiw.devices.limits import Limits
 from isiw.errors import DeviceError, NotDelivered
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.record import SessionRecord, read_session
 from isiw.session.loop import Session
 from isiw.trials import Stimulus
 from scripted import ScriptedDevice, scripted_strategy

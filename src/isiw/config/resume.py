@@ -19,7 +19,7 @@ from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import ConfigError, InvalidValueError, IsiwError, LimitExceededError, LogError
 from isiw.log.continuing import continued_by, require_session
 from isiw.log.headers import RUN_KEY, Header
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.record import SessionRecord, read_session
 from isiw.session.loop import Session
 from isiw.session.resume import limits_of_log
 from isiw.strategy.catalogue import make_strategy

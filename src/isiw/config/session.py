@@ -33,7 +33,8 @@ from isiw.intervention import Intervention
 from isiw.log.continuing import imported_sentence, require_search
 from isiw.log.headers import RUN_KEY, FirstStep
 from isiw.log.places import log_exists
-from isiw.log.reader import SessionRecord, ThresholdRecord, read_session
+from isiw.log.reader import ThresholdRecord
+from isiw.log.record import SessionRecord, read_session
 from isiw.log.writer import now
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.supra.prior import SupraPrior

@@ -25,7 +25,7 @@ from isiw.findings import Kind
 from isiw.log.headers import Header
 from isiw.log.names import require_free
 from isiw.log.places import log_of
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.log.schema import Event, Record, Waveform
 from isiw.log.writer import LogWriter, clock_ns
 from isiw.plots.session import session_figure

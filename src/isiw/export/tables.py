@@ -14,7 +14,7 @@ from isiw.figures import Estimate
 from isiw.files import write_output
 from isiw.lazy import pd
 from isiw.log.frames import trial_columns, trial_frame
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.text.sanitize import one_line
 from isiw.text.stimuli import STIMULI, TAP, StimulusWords, meanings
 

@@ -3,69 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any, Final
 
-from isiw.checks import fields_of
 from isiw.lazy import pd
-from isiw.log import reader
-from isiw.log.reader import SessionRecord
+from isiw.log.reader import LoggedSession
 from isiw.log.schema import EstimateRecord
 from isiw.signals.measures import Measures, measures
 from isiw.signals.tap import TapResponses
-from isiw.summary import JUDGED_SINCE, summary
 from isiw.sweeps import Sweep
 from isiw.text.stimuli import TAP, StimulusWords, meanings
 from isiw.trials import Trial
 
 
-class FramedRecord(SessionRecord):
-    """A session as its log has it, with its trials as a DataFrame, which prints itself in a few lines."""
-
-    def __str__(self) -> str:
-        header, last = self.header, self.estimates[-1] if self.estimates else None
-        if self.conceals:
-            return f"An intervention with {header.subject or 'an unnamed subject'}, its arm concealed\nLog: {self.path}"
-        kind = "Imported trials" if header.imported else "Session"
-        strategy = header.strategy.name or "of a user's own objects"
-        lines = [
-            f"{kind} of {header.subject or 'an unnamed subject'}, {header.created}",
-            f"Strategy: {strategy}, seed {header.strategy.seed}, {header.space.in_words(header.stimulus)}",
-            f"Trials: {self.table.counted(header.stimulus)}"
-            + (f", {len(self.unknown)} of unknown outcome" if self.unknown else ""),
-        ]
-        if last is not None:
-            lines += [self.too_little or summary(last), f"{'Ended' if last.stop else 'Not over'}: {last.reason}"]
-            if self.is_judged_since:
-                lines.append(JUDGED_SINCE)
-        return "\n".join([*lines, *self.unread_said, *(f"Lost: {loss}" for loss in self.losses), f"Log: {self.path}"])
-
-    @property
-    def trials(self) -> pd.DataFrame:
-        """All trials as a DataFrame, a row a trial, indexed by their number: onset, outcome, and the estimate after it.
-
-        The columns are those of `isiw.log.frames.TRIAL_COLUMNS`.
-        """
-        return trial_frame(self)
-
-
-def read_session(path: str | Path, *, channels: Iterable[str] | None = None) -> FramedRecord:
-    """Read a log, finished or not, whole or damaged; `losses` says what is missing.
-
-    Args:
-        path: the log, with or without `.part`.
-        channels: the channels whose samples are wanted, such as `["emg"]`; waveforms of others have none. All by
-            default; with fewer a log is read faster, and in less memory.
-
-    Raises:
-        LogError: no such file, not a log, or one from a newer version.
-        DamagedLogError: a log of which not even the header can be read.
-    """
-    return FramedRecord(**fields_of(SessionRecord, reader.read_session(path, channels=channels)))
-
-
-def measures_of(record: SessionRecord) -> Mapping[int, Measures]:
+def measures_of(record: LoggedSession) -> Mapping[int, Measures]:
     """Measures of the sweeps of trials that count, beside the amplitude, by the trial's number."""
     emg = {trial: channel for (trial, name), channel in record.waveforms.items() if name == "emg"}
     signals, taps = record.header.signals, TapResponses(record.header.signals.mep_window_ms)
@@ -131,7 +82,7 @@ _NUMBERS: Final = tuple(name for name in TRIAL_COLUMNS if name not in {*_TEXTS, 
 _ESTIMATE: Final = tuple(TRIAL_COLUMNS)[tuple(TRIAL_COLUMNS).index("p_window") :]
 
 
-def trial_frame(record: SessionRecord) -> pd.DataFrame:
+def trial_frame(record: LoggedSession) -> pd.DataFrame:
     """All trials as a DataFrame, a row a trial, columns as in `TRIAL_COLUMNS`, indexed by `index`."""
     estimates_by_trial = {estimate.trial: estimate for estimate in record.estimates}
     times = {trial: {"onset_s": onset.onset_s, "intent_utc": onset.at_ns} for trial, onset in record.onsets.items()}

@@ -9,7 +9,7 @@ from isiw import schedule
 from isiw.checks import Amplitude, Checked, Number, Positive, Text
 from isiw.intervention import Arm, Plan
 from isiw.log.kinds import LogKind, kind_of, of_another_kind
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.schedule import Part
 
 USUAL_PCT_RMT: Final = 110.0

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from isiw.figures import Estimate
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.plots.style import (
     BLUE,
     FAINT,

@@ -11,7 +11,7 @@ from isiw.dissertation.response_counts import by_isi, count_trials, measured_pro
 from isiw.errors import InvalidValueError
 from isiw.figures import Edge, Estimate
 from isiw.log.continuing import imported_sentence
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.metrics import profile_correlation
 from isiw.plots.comparison import comparison_figure
 from isiw.plots.style import inline_svg, session_name

@@ -9,7 +9,7 @@ import numpy as np
 
 from isiw.figures import Edge
 from isiw.findings import lacking
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.log.schema import EstimateRecord
 from isiw.report.tables import trial_row
 from isiw.report.words import answer_and_warnings

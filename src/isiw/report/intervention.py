@@ -10,7 +10,7 @@ from typing import Final
 from isiw import schedule
 from isiw.errors import InvalidValueError, IsiwError
 from isiw.intervention import Arm, Plan
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.pairing import words
 from isiw.pairing.agenda import Agenda
 from isiw.pairing.course import FollowedPair, course_of

@@ -17,7 +17,7 @@ from isiw.findings import Kind
 from isiw.intervention import Intervention, concealed
 from isiw.log.continuing import continued_by
 from isiw.log.headers import Header
-from isiw.log.reader import SessionRecord, require_records
+from isiw.log.record import SessionRecord, require_records
 from isiw.metrics import f1, profile_correlation
 from isiw.pairing import words
 from isiw.pairing.effect import change_of

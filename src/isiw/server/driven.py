@@ -13,7 +13,7 @@ from isiw.errors import InvalidValueError, LimitExceededError, LogError
 from isiw.figures import Estimate
 from isiw.findings import Kind
 from isiw.log.new_verdicts import KeyTakenError
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.log.schema import Event
 from isiw.server.answers import AskAnswer, EstimateAnswer, Refusal, SessionAnswer, TrialAnswer, failed
 from isiw.server.clients import driven_from_here, given_once, logged_client, require_own

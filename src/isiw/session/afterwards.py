@@ -11,7 +11,7 @@ from isiw.intervention import Arm
 from isiw.log.continuing import require_session
 from isiw.log.kinds import LogKind, kind_of, of_another_kind
 from isiw.log.new_verdicts import exclusion, inclusion
-from isiw.log.reader import read_salvaged
+from isiw.log.record import read_salvaged
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event
 from isiw.log.verdicts import changed_after

@@ -25,7 +25,7 @@ from isiw.log.headers import SCHEMA_VERSION, Header, StrategyRecipe
 from isiw.log.moments import Ages, Moment
 from isiw.log.new_verdicts import MANY_CHANGES
 from isiw.log.pulses import pulse_ages
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.log.salvage import Salvage
 from isiw.log.schema import Event, Intent
 from isiw.log.verdicts import VERDICTS, changed_after, under

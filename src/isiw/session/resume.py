@@ -19,7 +19,7 @@ from isiw.log.continuing import OWN_LOOP, continued_by, require_session
 from isiw.log.headers import Header
 from isiw.log.kinds import LogKind, of_another_kind
 from isiw.log.places import log_exists
-from isiw.log.reader import SessionRecord, read_any, read_salvaged
+from isiw.log.record import SessionRecord, read_any, read_salvaged
 from isiw.log.salvage import Salvage, salvage
 from isiw.log.writer import LogWriter
 from isiw.session.assembly import (

@@ -17,7 +17,8 @@ from isiw.errors import DamagedLogError, InvalidValueError, LimitExceededError
 from isiw.log.headers import StrategyRecipe, ThresholdHeader
 from isiw.log.kinds import LogKind, of_another_kind
 from isiw.log.pulses import pulse_ages
-from isiw.log.reader import SessionRecord, ThresholdRecord, read_any
+from isiw.log.reader import ThresholdRecord
+from isiw.log.record import SessionRecord, read_any
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Intent, PulseOutcome, ThresholdEstimateRecord
 from isiw.log.writer import LogWriter

@@ -14,7 +14,7 @@ import httpx
 import numpy as np
 
 from isiw.devices.info import DeviceInfo
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.record import SessionRecord, read_session
 from isiw.server.live.page import LivePage, watch
 from isiw.session.loop import Session
 from isiw.sweeps import Channel, Sweep
