@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from isiw.acquisition.fixed import stops_ms
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
 from isiw.devices.allowed import require_isi
 from isiw.devices.limits import Limits
@@ -167,7 +168,7 @@ def test_a_space_can_be_a_list_of_isis_in_any_order() -> None:
     assert (LISTED.low_ms, LISTED.high_ms) == (10, 50)
     assert str(LISTED) == "10, 15, 20, 30 and 50 ms after the impact"
     assert [LISTED.snap(isi_ms) for isi_ms in (0, 12, 13, 41, 99)] == [10, 10, 15, 50, 50]
-    assert LISTED.stops_ms(10).tolist() == [10, 20, 30, 50]
+    assert stops_ms(LISTED, 10).tolist() == [10, 20, 30, 50]
     assert DesignSpace.of([10, 15, 20, 30, 50], reference="impact") == LISTED
 
 

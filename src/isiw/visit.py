@@ -7,17 +7,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 from fractions import Fraction
 from functools import partial
-from typing import Annotated, Final
+from typing import Annotated
 
-from isiw.checks import (
-    Checked,
-    Count,
-    Natural,
-    Positive,
-    Text,
-    number,
-    share,
-)
+from isiw.checks import Checked, Count, Natural, Positive, Text, number, share
 from isiw.errors import InvalidValueError
 from isiw.findings import INTERVAL_S
 
@@ -79,10 +71,6 @@ def different_muscles(noted: Iterable[str]) -> list[str]:
     """The muscles that visits note, if these are more than one; else none. Capitals make no difference."""
     muscles = {muscle.strip().casefold(): muscle.strip() for muscle in noted if muscle.strip()}
     return list(muscles.values()) if len(muscles) > 1 else []
-
-
-PAIRS_FIRST: Final = 4
-"""So many trials show whether a rig works, before taps alone are given."""
 
 
 def interval_s(what: str, value: object) -> float:

@@ -14,7 +14,9 @@ from isiw.signals.tap import TapResponses
 from isiw.strategy.decisions import stimuli_left
 from isiw.sweeps import Sweep
 from isiw.trials import Trial
-from isiw.visit import PAIRS_FIRST
+
+PAIRS_FIRST: Final = 4
+"""So many trials show whether a rig works, before taps alone are given."""
 
 KNOWN: Final = "What the first stimulus alone does to the EMG is known now, and was subtracted."
 LONGER: Final = "A longer ISI shows the first stimulus's own response, which may explain the enhancement so far."

@@ -26,8 +26,7 @@ from isiw.session.examination import Examination, examination_of
 from isiw.session.judging import Judging
 from isiw.session.sink import Sink
 from isiw.signals.amplitudes import Doubts, counted_of, odd_amplitudes
-from isiw.signals.plausible import isi_far, require_plausible, require_plausible_range
-from isiw.signals.reported import unconfirmed
+from isiw.signals.plausible import isi_far, require_plausible, require_plausible_range, unconfirmed
 from isiw.strategy.outcomes import Outcome
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Status, Stimulus, Trial, TrialTable, require_pulse

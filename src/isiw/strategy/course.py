@@ -16,14 +16,7 @@ from isiw.decision import StopDecision
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
 from isiw.lazy import Later, WorkedOut
-from isiw.models.protocol import (
-    ExpectsTheUsual,
-    NotesChanges,
-    Observation,
-    Posterior,
-    ProposesIsi,
-    ResponseModel,
-)
+from isiw.models.protocol import ExpectsTheUsual, NotesChanges, Observation, Posterior, ProposesIsi, ResponseModel
 from isiw.strategy.choice import Choice, Cost, best_choices, evenly_spaced
 from isiw.strategy.decisions import Progress, StoppingRule, looks_back
 from isiw.strategy.intensities import NONE, Intensities

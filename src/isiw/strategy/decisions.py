@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 from isiw.checks import can
-from isiw.decision import StopDecision, StopKind
+from isiw.decision import StopDecision
 from isiw.estimate import WindowEstimate
-from isiw.findings import Finding, Kind
 
 
 @dataclass(frozen=True)
@@ -19,13 +18,6 @@ class Progress:
     told: int
     estimate: WindowEstimate
     past: tuple[WindowEstimate, ...] = ()
-
-
-def for_lack(decision: StopDecision, found: Finding | None) -> StopDecision:
-    """The decision if something is lacking to speak of a window; in doubt none but a budget stops."""
-    if found is None or (decision.stop and (found.kind is not Kind.ISIS_FAR or decision.kind is StopKind.BUDGET)):
-        return decision
-    return StopKind.TOO_LITTLE.go_on(f"{found}")
 
 
 class StoppingRule(Protocol):

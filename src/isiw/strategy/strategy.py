@@ -18,9 +18,8 @@ from isiw.strategy.course import Method
 from isiw.strategy.decisions import StoppingRule, stimuli_left
 from isiw.strategy.intensities import NONE, Intensities
 from isiw.strategy.known import Known
-from isiw.strategy.outcomes import Outcome, Outcomes
+from isiw.strategy.outcomes import Outcome, Outcomes, Reported
 from isiw.strategy.recipe import Recipe
-from isiw.strategy.reported import Reported
 from isiw.trials import Trial, require_pulse
 from isiw.types import FloatArray
 
