@@ -46,7 +46,7 @@ import isiw
 from benchmarks.earlier import logged_session
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
-from isiw import window
+from isiw import summary as odds
 from isiw.studies import (
     Processes,
     Study,
@@ -115,7 +115,7 @@ def honest(
 ) -> None:
     """Compare how often each version is sure and wrong, on the people that both measured."""
     tables = [honesty(before / path.name, path) for path in sorted(now.glob("*.parquet"))]
-    sure_f1, wrong_f1 = summary.SURE_F1, summary.WRONG_F1
+    sure_f1, wrong_f1 = odds.SURE_F1, summary.WRONG_F1
     how = f"sure and wrong: an expected F1 of at least {sure_f1:g}, and at least {wrong_f1:g} above the actual one"
     _write(pd.concat(tables), now, out, how)
 
@@ -140,15 +140,15 @@ def honesty(before: Path, now: Path) -> pd.DataFrame:
         # How often it itself expects that what it is sure of is wrong altogether.
         window_told, probability = both[f"reported_window_{which}"].astype(bool), both[f"probability_{which}"]
         doubt = (1.0 - probability).where(window_told, probability)
-        rows[f"own_doubt_{which}"] = doubt.where(expected >= summary.SURE_F1, 0.0)
+        rows[f"own_doubt_{which}"] = doubt.where(expected >= odds.SURE_F1, 0.0)
         rows[f"start_{which}"], rows[f"end_{which}"] = both[f"start_covered_{which}"], both[f"end_covered_{which}"]
         rows[f"false_window_{which}"] = both[f"reported_window_{which}"].astype(float).mask(there)
         rows[f"false_sure_{which}"] = (both[f"probability_{which}"] >= 0.9).astype(float).mask(there)
     factor = both["bayes_factor_now" if "bayes_factor_now" in both else "bayes_factor"]  # which earlier versions lack
-    unclear = both["reported_window_now"].astype(bool) & (factor < window.LEAST_FACTOR)
-    undecided = unclear & (both["probability_now"] < window.SURE)
+    unclear = both["reported_window_now"].astype(bool) & (factor < odds.LEAST_FACTOR)
+    undecided = unclear & (both["probability_now"] < odds.SURE)
     rows["undecided_now"] = undecided.astype(float)
-    left_open = ~both["reported_window_now"].astype(bool) & (1.0 - both["probability_now"] < window.SURE)
+    left_open = ~both["reported_window_now"].astype(bool) & (1.0 - both["probability_now"] < odds.SURE)
     rows["said_and_wrong_now"] = rows["sure_and_wrong_now"].where(~(undecided | left_open), 0.0)
     rows["false_stated_now"] = (both["reported_window_now"].astype(bool) & ~undecided).astype(float).mask(there)
     groups = pd.DataFrame(rows).groupby([both["cohort"], both["trial"]])

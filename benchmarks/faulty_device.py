@@ -12,11 +12,13 @@ from enum import StrEnum
 import numpy as np
 
 from isiw.checks import number
+from isiw.devices.allowed import require_isi
 from isiw.devices.clock import Clock
+from isiw.devices.info import DeviceInfo, Readiness
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, require_staged
+from isiw.devices.protocol import Answer, Device, require_staged
 from isiw.errors import DeviceError, NotDelivered
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.log.schema import Event, Intent
 from isiw.sweeps import Channel, Measurement, Sweep
 from isiw.testing.suites import require
@@ -256,7 +258,7 @@ def check_ledger(ledger: Iterable[Fired], record: SessionRecord, limits: Limits)
         intended, promise = open_isis[each.trial], f"what is fired is what the intent says, in trial {each.trial}"
         require(intended == each.isi_ms, promise, f"{each.isi_ms} ms instead of {intended} ms")
         if each.isi_ms is not None:
-            limits.require_isi(each.isi_ms)
+            require_isi(limits, each.isi_ms)
     known = {intent.trial for intent in record.unknown} | set(trials)
     require(set(counts) <= known, "every pair that was fired is in the log", f"not {set(counts) - known}")
     accepted = {index for index, trial in trials.items() if trial.status is Status.ACCEPTED}

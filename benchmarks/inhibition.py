@@ -28,7 +28,7 @@ from benchmarks.opposed_oracle import OpposedOracle
 from benchmarks.provenance import facts_of
 from benchmarks.quick import understood
 from benchmarks.tables import write_tables
-from isiw import DesignSpace, VisitProtocol, make_strategy
+from isiw import DesignSpace, VisitProtocol, make_strategy, schedule
 from isiw.metrics import f1
 from isiw.subjects import RecruitmentResponse, SimulatedSubject, cohort
 from isiw.subjects.responses import OpposedProfile
@@ -62,7 +62,7 @@ def by_strategy(subject: SimulatedSubject, name: str, seed: int) -> Iterator[dic
     """A session with a strategy, at each mark."""
     strategy, person = make_strategy(name, SPACE, seed=seed), subject.begin(seed)
     for trial in range(MARKS[-1]):
-        isi_ms = strategy.ask() if PROTOCOL.control(trial, seed) is None else None
+        isi_ms = strategy.ask() if schedule.control(PROTOCOL, trial, seed) is None else None
         response = person.respond(isi_ms, SPACE.reference)
         strategy.learn(Trial.of(response.isi_ms, response.mep_mv))
         if trial + 1 in MARKS:

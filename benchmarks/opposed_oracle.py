@@ -14,11 +14,12 @@ from scipy.stats import norm, qmc
 
 from benchmarks.oracle import outcome_table
 from isiw.design import DesignSpace
+from isiw.excess import least_excess_mv
 from isiw.subjects.measured import RANGE_MS, WIDTH_LIMITS_MS
 from isiw.subjects.responses import OpposedProfile, RecruitmentResponse
 from isiw.subjects.subject import SimulatedSubject
 from isiw.types import BoolArray, FloatArray
-from isiw.window import Window, least_excess_mv
+from isiw.window import Window
 
 HYPOTHESES = 2**16
 LEVELS = 61

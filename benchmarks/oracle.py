@@ -20,12 +20,13 @@ import pandas as pd
 from scipy.stats import gamma, norm
 
 from isiw.design import DesignSpace
+from isiw.excess import least_excess_mv
 from isiw.studies import SimulatedSession, play
 from isiw.subjects.measured import LABS, MEASURED_KIM, WIDTHS_KIM_MS, MeasuredPerson, lab
 from isiw.subjects.responses import GainResponse, PeakProfile, RecruitmentResponse, ResponseCurve
 from isiw.subjects.subject import OUTLIERS_MV, SimulatedSubject
 from isiw.types import BoolArray, FloatArray, IntArray
-from isiw.window import Window, least_excess_mv
+from isiw.window import Window
 
 P_WINDOW: Final = 0.72
 """How probable a window is to the second oracle, where the cohort itself does not say: all have one."""

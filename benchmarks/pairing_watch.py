@@ -25,6 +25,7 @@ import isiw
 from benchmarks.provenance import facts_of
 from benchmarks.quick import understood
 from benchmarks.tables import write_table
+from isiw import schedule
 from isiw.intervention import Arm, Intervention, Plan, sealed
 from isiw.pairing.agenda import Agenda
 from isiw.strategy.strategy import Strategy
@@ -82,7 +83,7 @@ def paired(strategy: Strategy, subject: SimulatedSubject, plan: Plan, seed: int)
     agenda = Agenda(Intervention(plan, sealed(Arm.WINDOW)), strategy, seed)
     person, trials, inside = subject.begin(seed + 1_000_000), [], []
     window = subject.window(strategy.space)
-    for slot in plan.slots[: plan.last_pair + 1]:
+    for slot in schedule.slots(plan)[: plan.last_pair + 1]:
         alone = agenda.control(slot.number) is not None
         isi_ms = None if alone else agenda.isi_ms(trials)
         response = person.respond(isi_ms, strategy.space.reference)
@@ -91,7 +92,7 @@ def paired(strategy: Strategy, subject: SimulatedSubject, plan: Plan, seed: int)
             if subject.change is not None:
                 window = subject.window(strategy.space, slot.place + 1)
             is_in = window is not None and bool(window.mask([response.isi_ms])[0])
-            inside.append((is_in, plan.is_probe(slot, seed)))
+            inside.append((is_in, schedule.is_probe(plan, slot, seed)))
     usual = [is_in for is_in, probe in inside if not probe]
     return sum(is_in for is_in, _ in inside) / len(inside), sum(usual) / len(usual)
 

@@ -26,8 +26,8 @@ from benchmarks.provenance import facts_of
 from benchmarks.quick import understood
 from benchmarks.tables import kept, write_tables
 from benchmarks.zero_trials import without_any_trial
+from isiw.decision import StopKind
 from isiw.models.particles.prior import Prior
-from isiw.strategy.decisions import StopKind
 from isiw.studies import Study, StudyStrategy
 
 MARKS = (5, 10, 15, 20, 25, 30, 40, 50, 60, 80)

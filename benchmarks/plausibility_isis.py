@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 import isiw
-from isiw.signals.reported import AMONG, FAR_ONES, doubtful_from, far_ms, is_far
+from isiw.signals.plausible import AMONG, FAR_ONES, doubtful_from, far_ms, is_far
 
 Rig = Callable[[Sequence[float], np.random.Generator], float]
 """The realised ISI [ms] of the last trial, by all that were asked for."""

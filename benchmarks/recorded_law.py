@@ -16,9 +16,9 @@ from benchmarks.oracle import LEVELS, Hypotheses, every_5_ms, nearest_levels
 from benchmarks.recorded_people import STARTS_MS, WIDTHS_MS, Bank, RecordedResponse
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
+from isiw.excess import least_excess_mv
 from isiw.subjects import SimulatedSubject
 from isiw.types import FloatArray
-from isiw.window import least_excess_mv
 
 BINS = 24
 ADDED_MV = 0.002

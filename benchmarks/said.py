@@ -31,10 +31,11 @@ import isiw
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
 from isiw.devices.simulated import SimulatedPerson
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.log.schema import EstimateRecord, Event
 from isiw.report.evidence import ENOUGH_ON_EACH_SIDE, changed_with_time
 from isiw.report.words import Role, Said, in_lines, statement
+from isiw.session.examination import recorded
 from isiw.session.loop import Session
 from isiw.signals.amplitudes import Doubts, counted_of
 from isiw.signals.rig import Evidence
@@ -84,7 +85,7 @@ def session(cohort: str, seed: int) -> dict[str, Any]:
             findings(Evidence(told=counted_of(trials), detection_limit_mv=strategy.detection_limit_mv))
         )
         raised += [] if doubts.new is None else [(trial.index, f"{doubts.new}")]
-    last = EstimateRecord.after(len(trials) - 1, strategy.estimate(), strategy.decision(), None)
+    last = recorded(strategy.estimate(), len(trials) - 1, strategy.decision(), None)
     return {
         "cohort": cohort,
         "seed": seed,

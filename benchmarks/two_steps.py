@@ -22,7 +22,7 @@ import typer
 import isiw
 from benchmarks.provenance import command_of, made_with
 from benchmarks.quick import understood
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.metrics import f1
 from isiw.strategy.strategy import Strategy
 from isiw.subjects.responses import RecruitmentResponse

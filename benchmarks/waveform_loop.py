@@ -33,6 +33,7 @@ from rich.progress import track
 import isiw
 from benchmarks.provenance import made_with
 from benchmarks.quick import understood
+from isiw import schedule
 from isiw.config.sections import own_wrist
 from isiw.devices.robot.tapper import Trigger
 from isiw.subjects.cohorts import cohort
@@ -116,7 +117,7 @@ def examine(strategy: isiw.Strategy, deliver: Deliver) -> Counter[str]:
 def session_of(device: isiw.Device, strategy: isiw.Strategy) -> isiw.SessionResult:
     """A session whose pauses are answered with going on, and whose plan fits its limits."""
     protocol = isiw.VisitProtocol()
-    pulses = max(protocol.stimuli_for(strategy.stimuli_planned or 0), 200)
+    pulses = max(schedule.stimuli_for(protocol, strategy.stimuli_planned or 0), 200)
     with tempfile.TemporaryDirectory() as folder:
         return isiw.Session(
             device,

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from isiw.design import DesignSpace
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 from isiw.estimate import WindowEstimate
 from isiw.models.protocol import Observation
 from isiw.strategy.stopping import Budget

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from isiw.design import DesignSpace
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 from isiw.signals import judge
 from isiw.signals.tap import TapResponses
 from isiw.subjects.changes import TapResponse

@@ -11,7 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from isiw.acquisition.fixed import stops_ms
 from isiw.design import IMPACT_SPACE, VALVE_SPACE, DesignSpace
+from isiw.devices.allowed import require_isi
 from isiw.devices.limits import Limits
 from isiw.errors import InvalidValueError, LimitExceededError, OutOfSpaceError
 from isiw.strategy.choice import candidate_isis
@@ -166,16 +168,16 @@ def test_a_space_can_be_a_list_of_isis_in_any_order() -> None:
     assert (LISTED.low_ms, LISTED.high_ms) == (10, 50)
     assert str(LISTED) == "10, 15, 20, 30 and 50 ms after the impact"
     assert [LISTED.snap(isi_ms) for isi_ms in (0, 12, 13, 41, 99)] == [10, 10, 15, 50, 50]
-    assert LISTED.stops_ms(10).tolist() == [10, 20, 30, 50]
+    assert stops_ms(LISTED, 10).tolist() == [10, 20, 30, 50]
     assert DesignSpace.of([10, 15, 20, 30, 50], reference="impact") == LISTED
 
 
 def test_the_limits_of_a_list_allow_its_isis_alone() -> None:
     limits = Limits.of_space(LISTED)
-    limits.require_isi(30)
+    require_isi(limits, 30)
     for isi_ms in (25, 60):
         with pytest.raises(LimitExceededError):
-            limits.require_isi(isi_ms)
+            require_isi(limits, isi_ms)
 
 
 @pytest.mark.parametrize(("isis_ms", "reference"), [([10], "impact"), ([10, math.nan], "impact"), ([10, 20], "")])
@@ -190,7 +192,7 @@ def test_a_list_whose_range_says_otherwise_is_refused() -> None:
 
 
 def test_a_sweep_of_a_list_leaves_out_what_is_nearer_than_its_step() -> None:
-    assert DesignSpace.of([10, 19, 20, 30], reference="impact").stops_ms(10).tolist() == [10, 20, 30]
+    assert stops_ms(DesignSpace.of([10, 19, 20, 30], reference="impact"), 10).tolist() == [10, 20, 30]
 
 
 def test_a_long_list_is_shown_by_its_first_twelve_and_its_last() -> None:

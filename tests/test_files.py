@@ -11,7 +11,8 @@ import pytest
 
 from disks import no_room
 from hostile import IN_THE_WAY, at_once
-from isiw.files import in_the_way, is_reserved, new_file, opened, put, take_free_place
+from isiw.files import in_the_way, is_reserved, new_file, put, take_free_place
+from isiw.opening import opened
 
 
 def _no_links(new: Any, old: Any) -> Never:

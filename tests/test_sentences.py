@@ -10,7 +10,7 @@ import pytest
 
 from isiw import sentences, summary
 from isiw.design import DesignSpace
-from isiw.estimate import Edge, Estimate
+from isiw.figures import Edge, Estimate
 from isiw.findings import NO_MEP, Kind
 from isiw.report.words import counts
 from isiw.text.stimuli import STIMULI, TAP

@@ -7,14 +7,16 @@ from typing import Any
 
 import pytest
 
+from isiw import schedule
 from isiw.errors import InvalidValueError
+from isiw.session.stated import require_protocol
 from isiw.visit import Control, Visit, VisitProtocol
 
 MIXED = VisitProtocol(tms_alone=0.1, tap_alone=0.05)
 
 
 def controls(protocol: VisitProtocol, seed: int, trials: int = 600) -> dict[int, Control]:
-    drawn = {trial: protocol.control(trial, seed) for trial in range(trials)}
+    drawn = {trial: schedule.control(protocol, trial, seed) for trial in range(trials)}
     return {trial: control for trial, control in drawn.items() if control is not None}
 
 
@@ -48,18 +50,18 @@ def test_without_shares_there_are_no_controls() -> None:
 
 def test_intervals_are_drawn_from_their_range_for_each_trial() -> None:
     protocol = VisitProtocol(iti_s=(5.0, 8.0))
-    drawn = [protocol.interval_s(trial, 3) for trial in range(200)]
+    drawn = [schedule.interval_s(protocol, trial, 3) for trial in range(200)]
     assert all(5.0 <= interval_s <= 8.0 for interval_s in drawn)
     assert (min(drawn) < 5.2, max(drawn) > 7.8) == (True, True)
     assert len(set(drawn)) == 200
-    assert drawn == [protocol.interval_s(trial, 3) for trial in range(200)]
-    assert drawn != [protocol.interval_s(trial, 4) for trial in range(200)]
+    assert drawn == [schedule.interval_s(protocol, trial, 3) for trial in range(200)]
+    assert drawn != [schedule.interval_s(protocol, trial, 4) for trial in range(200)]
 
 
 def test_a_rest_comes_after_each_block_and_never_first() -> None:
     protocol = VisitProtocol(iti_s=(5.0, 8.0), block_trials=12, rest_s=120.0)
-    rests = [trial for trial in range(40) if protocol.interval_s(trial, 0) == 120.0]
-    assert rests == [12, 24, 36] == [trial for trial in range(40) if protocol.rests_before(trial)]
+    rests = [trial for trial in range(40) if schedule.interval_s(protocol, trial, 0) == 120.0]
+    assert rests == [12, 24, 36] == [trial for trial in range(40) if schedule.rests_before(protocol, trial)]
 
 
 @pytest.mark.parametrize(
@@ -89,9 +91,9 @@ def test_a_rest_that_is_no_longer_than_the_longest_interval_is_refused_where_it_
     for rest_s in (2.0, 7.0, 8.0):
         protocol = VisitProtocol(iti_s=iti_s, block_trials=3, rest_s=rest_s)
         with pytest.raises(InvalidValueError, match=r"rest_s above 8"):
-            protocol.require_effect(min_iti_s)
-    VisitProtocol(iti_s=iti_s, block_trials=3, rest_s=8.1).require_effect(min_iti_s)
-    VisitProtocol(iti_s=iti_s, rest_s=2.0).require_effect(min_iti_s)
+            require_protocol(protocol, min_iti_s)
+    require_protocol(VisitProtocol(iti_s=iti_s, block_trials=3, rest_s=8.1), min_iti_s)
+    require_protocol(VisitProtocol(iti_s=iti_s, rest_s=2.0), min_iti_s)
 
 
 @pytest.mark.parametrize("wrong", [{"day": 0}, {"operator": 7}, {"intensity_pct_rmt": 0.0}, {"muscle": None}])
@@ -112,14 +114,14 @@ def test_visits_are_unlike_where_both_note_another_muscle_or_a_clearly_different
 @pytest.mark.parametrize("iti_s", [(2.0, 4.0), (2.0, 5.0), (3.0, 3.0)])
 def test_intervals_that_the_limits_replace_are_refused_where_they_are_stated(iti_s: tuple[float, float]) -> None:
     with pytest.raises(InvalidValueError, match="intervals up to more than 5 s"):
-        VisitProtocol(iti_s=iti_s).require_effect(5.0)
+        require_protocol(VisitProtocol(iti_s=iti_s), 5.0)
 
 
 def test_an_intensity_of_tms_alone_in_another_unit_is_refused_where_it_is_stated() -> None:
     with pytest.raises(InvalidValueError, match=r"alone_pct_rmt is probably in another unit.*Multiply by 100"):
-        VisitProtocol(tms_alone=0.2, alone_pct_rmt=1.0).require_effect(5.0)
+        require_protocol(VisitProtocol(tms_alone=0.2, alone_pct_rmt=1.0), 5.0)
 
 
 @pytest.mark.parametrize("iti_s", [(2.0, 6.0), (5.0, 5.0), None])
 def test_intervals_of_which_some_are_longer_than_the_limits_are_kept(iti_s: tuple[float, float] | None) -> None:
-    VisitProtocol(iti_s=iti_s).require_effect(5.0)
+    require_protocol(VisitProtocol(iti_s=iti_s), 5.0)

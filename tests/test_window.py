@@ -13,8 +13,10 @@ from hypothesis import strategies as st
 
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
-from isiw.summary import chance
-from isiw.window import EDGE_LEVEL, Window, bayes_factor, window_from_excess
+from isiw.excess import EDGE_LEVEL, window_from_excess
+from isiw.figures import Estimate
+from isiw.summary import bayes_factor, chance
+from isiw.window import Window
 from known import known
 
 GRID_MS = np.arange(0.0, 100.0, 2.0)
@@ -301,4 +303,4 @@ def test_of_what_is_not_known_or_was_certain_there_is_no_bayes_factor(
 )
 def test_a_bayes_factor_is_said_as_far_as_it_matters(probability: float, beforehand: float, said: str) -> None:
     estimate = WindowEstimate(probability, None, beforehand=beforehand)
-    assert chance(estimate) == f" (probability of a window: {probability:.2f}, Bayes factor {said})"
+    assert chance(estimate.in_figures(Estimate)) == f" (probability of a window: {probability:.2f}, Bayes factor {said})"

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from isiw.design import DesignSpace
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 from isiw.devices.robot.tapper import Tapper, TapperSettings
 from isiw.devices.simulated import SimulatedDevice
 from isiw.findings import Kind

@@ -40,5 +40,5 @@ def pages() -> Iterator[tuple[str, str]]:
 
 def kinds() -> dict[str, Any]:
     """The kind of record of each topic, by the title of its section."""
-    own = {f"`{topic}`": kind for topic, kind in schema._KINDS.items()}  # noqa: SLF001 - the list of topics itself
+    own = {f"`{topic}`": kind for topic, kind in schema.KINDS.items()}
     return own | {"`/header` of a motor threshold": ThresholdHeader, "Any other topic: a channel's waveforms": Waveform}

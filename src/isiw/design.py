@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -163,21 +162,6 @@ class DesignSpace(Checked):
             return float(self.grid_ms[np.abs(self.grid_ms - inside).argmin()])
         steps = round((inside - self.low_ms) / self.step_ms)
         return float(self.grid_ms[steps])
-
-    def stops_ms(self, step_ms: float) -> FloatArray:
-        """The ISIs of a sweep from the first one on [ms], shape (t,).
-
-        Args:
-            step_ms: from one to the next [ms]; if that is none of the grid's, the next multiple of its step.
-        """
-        if self.isis_ms:
-            stops_ms = [self.isis_ms[0]]
-            stops_ms += [i for i in self.isis_ms if i - stops_ms[-1] >= step_ms - 1e-9]
-            return np.array(stops_ms)
-        whole_ms = self.step_ms * math.ceil(step_ms / self.step_ms - 1e-9)
-        stops = math.floor((self.high_ms - self.low_ms) / whole_ms + 1e-9) + 1
-        isis_ms: FloatArray = self.low_ms + whole_ms * np.arange(stops, dtype=np.float64)
-        return isis_ms
 
     def admits(self, isi_ms: float) -> bool:
         """True if a realised ISI [ms] can have come from this space."""

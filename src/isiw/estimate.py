@@ -1,45 +1,28 @@
-"""The estimate of one person's window: as a model knows it, with samples, and as it is logged, drawn and said."""
+"""The estimate of one person's window as a model has it, with posterior samples; `figures` is what logs keep of it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any, Final, NamedTuple, Self
+from typing import Any, Final, NamedTuple, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
 
-from isiw import summary
 from isiw.change import Change, Misfit
 from isiw.checks import Checked, Share, number
 from isiw.errors import InvalidValueError
+from isiw.figures import BestISI, Edge, Estimate
 from isiw.findings import lacking
 from isiw.lazy import WorkedOut
-from isiw.types import ArrayLike, FloatArray, IntArray, Number, Numbers
-from isiw.window import Enhancement, Interval, Magnitude, Window
+from isiw.summary import summary
+from isiw.types import ArrayLike, FloatArray, IntArray
+from isiw.window import Interval, Window
 
 _NOTHING: Final[Mapping[str, float]] = {}
 
+FiguresT = TypeVar("FiguresT", bound=Estimate)
+
 PROFILE_DECIMALS: Final = 6  # a nanovolt; the profile is a picture of the posterior, not a measurement
-
-
-class Edge(NamedTuple):
-    """An edge, given a window: median, 90 % interval [ms], ±inf beyond the range, and how probably it is there."""
-
-    median_ms: float | None = None
-    low_ms: float | None = None
-    high_ms: float | None = None
-    beyond: float | None = None
-
-    @property
-    def is_known(self) -> bool:
-        """True if it has an interval."""
-        return self.low_ms is not None and self.high_ms is not None
-
-    def within(self, low_ms: float, high_ms: float) -> Interval:
-        """The ends of its interval, those beyond a range at the range's ends [ms]."""
-        low, high = np.clip(np.array([self.low_ms, self.high_ms], dtype=float), low_ms, high_ms).tolist()
-        return low, high
 
 
 class ProfileBand(NamedTuple):
@@ -50,12 +33,23 @@ class ProfileBand(NamedTuple):
     high_mv: FloatArray
 
 
-class BestISI(NamedTuple):
-    """The ISI of the largest expected MEP, given that there is a window: posterior median and 90 % interval [ms]."""
+class Enhancement(NamedTuple):
+    """By how much the tap enlarges the expected MEP [mV], and the shift of the recruitment curve's input [% RMT]."""
 
-    isi_ms: float
-    low_ms: float
-    high_ms: float
+    mep_mv: float
+    shift_pct_rmt: float | None = None
+
+
+class Magnitude(NamedTuple):
+    """The size of the enhancement at the best ISI, given that there is a window: medians and 90 % intervals.
+
+    Args:
+        mep_mv: by how much the expected MEP is larger than without a tap [mV].
+        ratio: how many times as large as that of TMS alone it is, the EMG floor in both.
+    """
+
+    mep_mv: tuple[float, float, float]
+    ratio: tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +158,7 @@ class WindowEstimate(Checked):
         return dict(zip(self.hypothesis_names, shares, strict=True))
 
     def __str__(self) -> str:
-        return self.too_little or str(Estimate.of(self))
+        return self.too_little or summary(self.in_figures(Estimate))
 
     @property
     def has_answer(self) -> bool:
@@ -262,6 +256,33 @@ class WindowEstimate(Checked):
         low, median, high = (np.interp(isi, self.grid_ms, row) for row in self.profile_quantiles_mv)
         return ProfileBand(median, low, high)
 
+    def in_figures(self, kind: type[FiguresT], **more: Any) -> FiguresT:
+        """The estimate in figures of a kind, with its 90 % intervals, and more fields of that kind."""
+        edges: dict[str, Any] = {
+            f"{name}_{part}": value
+            for name, edge in zip(("start", "end"), self.edges, strict=True)
+            for part, value in zip(("ms", "low_ms", "high_ms", "beyond"), edge, strict=True)
+        }
+        excluded, (size_mv, ratio) = self.largest_excluded, self.magnitude or ((), ())
+        figures: dict[str, Any] = {name: getattr(self, name) for name in _SAME} | {
+            "segments_ms": () if self.window is None else self.window.edges_ms,
+            "split": self.split_probability,
+            "hypotheses": self.hypotheses or {},
+            "unusual": dict(self.unusual),
+            "best_isi_ms": tuple(self.best_isi or ()),
+            "enhancement_mv": tuple(round(size, PROFILE_DECIMALS) for size in size_mv),
+            "enhancement_ratio": tuple(round(size, PROFILE_DECIMALS) for size in ratio),
+            "excluded_mv": None if excluded is None else excluded.mep_mv,
+            "excluded_pct_rmt": None if excluded is None else excluded.shift_pct_rmt,
+            "depressed_ms": () if self.depressed is None else self.depressed.edges_ms,
+        }
+        return kind(**figures, **edges, **_profile(self), **more)
+
+
+_SAME: Final = ("probability", "expected_f1", "depressed_probability", "change", "beforehand", "tap_may_explain",
+                "tap_is_likely", "misfit")  # fmt: skip
+"""Figures that an estimate with samples has by the same names."""
+
 
 def _central(edges_ms: FloatArray, level: float) -> FloatArray:
     """Lower and upper quantile of start and end, shape (2, 2)."""
@@ -270,124 +291,6 @@ def _central(edges_ms: FloatArray, level: float) -> FloatArray:
     picks = [round((len(edges_ms) - 1) * share) for share in (tail, 1.0 - tail)]
     central_ms: FloatArray = np.sort(edges_ms, axis=0)[picks]
     return central_ms
-
-
-class Reported(BaseModel):
-    """Reported figures of a window: `segments_ms` are starts and ends in turn, `best_isi_ms` a median and interval.
-
-    `hypotheses` are probabilities by name, given a window; the band is that of the expected MEP at `grid_ms`.
-    """
-
-    model_config = ConfigDict(frozen=True, ser_json_inf_nan="strings", extra="ignore")
-
-    probability: float | None = Field(description="That there is a window.")
-    segments_ms: tuple[float, ...] = Field(
-        default=(), description="The reported window: starts and ends in turn; empty if none."
-    )
-    start_ms: Number | None = None
-    start_low_ms: Number | None = None
-    start_high_ms: Number | None = None
-    end_ms: Number | None = None
-    end_low_ms: Number | None = None
-    end_high_ms: Number | None = None
-    expected_f1: float | None = None
-    best_isi_ms: tuple[float, ...] = ()
-    hypotheses: dict[str, float] = Field(default_factory=dict)
-    grid_ms: tuple[float, ...] = ()
-    profile_mv: Numbers = ()
-    band_low_mv: Numbers = ()
-    band_high_mv: Numbers = ()
-
-
-_SAME: Final = ("probability", "expected_f1", "depressed_probability", "change", "beforehand", "tap_may_explain",
-                "tap_is_likely", "misfit")  # fmt: skip
-"""Figures that an estimate with samples has by the same names."""
-
-
-class Estimate(Reported):
-    """An estimate of a window in figures: logs keep them, and pictures and sentences are made of them.
-
-    `start_beyond`, `end_beyond` and `split` are probabilities given a window: that an edge lies beyond the range, and
-    that there is more than one segment. `unusual` are probabilities by name; `excluded_mv` and `excluded_pct_rmt` are
-    the largest enhancement that is excluded with 90 % probability. `depressed_ms` are the segments in which the tap
-    depresses the MEP, and `depressed_probability` is that there are any; None if nobody looked for them. `change` is
-    what probably changed during the session, whatever the ISI. `beforehand` is the probability of a window before the
-    first trial. `tap_may_explain` says whether the tap's own response may be what is larger within the window, and
-    `tap_is_likely` that the tap alone was measured there and evokes as much; `misfit` what speaks against the law.
-    `enhancement_mv` and `enhancement_ratio` are medians and intervals of the `Magnitude`.
-    """
-
-    start_beyond: float | None = None
-    end_beyond: float | None = None
-    split: float | None = None
-    unusual: dict[str, float] = Field(default_factory=dict)
-    excluded_mv: float | None = None
-    excluded_pct_rmt: float | None = None
-    depressed_ms: tuple[float, ...] = ()
-    depressed_probability: float | None = None
-    change: Change | None = None
-    beforehand: float | None = None
-    tap_may_explain: bool = False
-    tap_is_likely: bool = False
-    misfit: Misfit | None = None
-    enhancement_mv: tuple[float, ...] = ()
-    enhancement_ratio: tuple[float, ...] = ()
-
-    @classmethod
-    def of(cls, estimate: WindowEstimate, **more: Any) -> Self:
-        """The figures of an estimate, with its 90 % intervals."""
-        edges: dict[str, Any] = {
-            f"{name}_{part}": value
-            for name, edge in zip(("start", "end"), estimate.edges, strict=True)
-            for part, value in zip(("ms", "low_ms", "high_ms", "beyond"), edge, strict=True)
-        }
-        excluded, (size_mv, ratio) = estimate.largest_excluded, estimate.magnitude or ((), ())
-        figures: dict[str, Any] = {name: getattr(estimate, name) for name in _SAME} | {
-            "segments_ms": () if estimate.window is None else estimate.window.edges_ms,
-            "split": estimate.split_probability,
-            "hypotheses": estimate.hypotheses or {},
-            "unusual": dict(estimate.unusual),
-            "best_isi_ms": tuple(estimate.best_isi or ()),
-            "enhancement_mv": tuple(round(size, PROFILE_DECIMALS) for size in size_mv),
-            "enhancement_ratio": tuple(round(size, PROFILE_DECIMALS) for size in ratio),
-            "excluded_mv": None if excluded is None else excluded.mep_mv,
-            "excluded_pct_rmt": None if excluded is None else excluded.shift_pct_rmt,
-            "depressed_ms": () if estimate.depressed is None else estimate.depressed.edges_ms,
-        }
-        return cls(**figures, **edges, **_profile(estimate), **more)
-
-    def __str__(self) -> str:
-        return summary.summary(self)
-
-    @property
-    def has_answer(self) -> bool:
-        """True if the method has one: some have none before they have measured enough."""
-        return self.probability is not None or self.window is not None or bool(self.grid_ms)
-
-    @property
-    def window(self) -> Window | None:
-        """The reported window."""
-        return Window.of_edges(self.segments_ms)
-
-    @property
-    def depressed(self) -> Window | None:
-        """The reported ISIs that depress the MEP."""
-        return Window.of_edges(self.depressed_ms)
-
-    @property
-    def start(self) -> Edge:
-        """The start of the window's hull."""
-        return Edge(self.start_ms, self.start_low_ms, self.start_high_ms, self.start_beyond)
-
-    @property
-    def end(self) -> Edge:
-        """The end of the window's hull."""
-        return Edge(self.end_ms, self.end_low_ms, self.end_high_ms, self.end_beyond)
-
-    @property
-    def best_isi(self) -> BestISI | None:
-        """The ISI of the largest expected MEP."""
-        return BestISI(*self.best_isi_ms) if self.best_isi_ms else None
 
 
 def _profile(estimate: WindowEstimate) -> Mapping[str, Any]:

@@ -1,7 +1,7 @@
-"""Creates, replaces and opens files in folders that others can write to: whole, synced, and through no link.
+"""Creates and replaces files in folders that others can write to: whole, synced, and through no link.
 
-A file is written under a new random name, and takes its place in one step. What is opened to be read is a regular file,
-since a pipe in its place would keep isiw waiting for ever. A folder that its disk cannot sync is said once, and used.
+A file is written under a new random name, and takes its place in one step. A folder that its disk cannot sync is said
+once, and used.
 
 On Windows the names of devices are refused. On macOS a disk is asked to empty its cache, which `fsync` alone does not.
 These branches have been type-checked, and have not been run.
@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import IO, Final
 
 from isiw.errors import DiskWarning, InvalidValueError, warn
+from isiw.opening import is_mcap
 
 if sys.platform == "darwin":
     import fcntl
@@ -69,16 +70,6 @@ def in_the_way(path: Path) -> str | None:
             return None
         raise
     return None if stat.S_ISREG(mode) else _KINDS.get(stat.S_IFMT(mode), "something else")
-
-
-def opened(path: Path, *, links: bool = True) -> IO[bytes]:
-    """A regular file, open for reading."""
-    without_waiting = getattr(os, "O_NONBLOCK", 0) | (0 if links else getattr(os, "O_NOFOLLOW", 0))
-    file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | without_waiting))  # noqa: SIM115 - pathlib has no opener; the caller closes it
-    if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-        return file
-    file.close()
-    raise OSError(errno.EINVAL, "it is no regular file", str(path))
 
 
 def new_file(path: Path) -> IO[bytes]:
@@ -199,10 +190,6 @@ def force(handle: int) -> None:
     os.fsync(handle)
 
 
-_LOG: Final = b"\x89MCAP"
-"""What every log begins with."""
-
-
 def write_output(path: str | Path, content: bytes, *, overwrite: bool = False) -> Path:
     """Write a file that is no log, as a whole or not at all; its folder is made if it is missing."""
     target = Path(path)
@@ -251,11 +238,3 @@ def _taken(target: Path) -> InvalidValueError:
         got=str(target),
         remedy="Choose another path, or replace it: --overwrite, or overwrite=True.",
     )
-
-
-def is_mcap(path: Path) -> bool:
-    """True if a file begins as every log does, whatever its name."""
-    if not path.is_file():
-        return False
-    with opened(path) as file:
-        return file.read(len(_LOG)) == _LOG

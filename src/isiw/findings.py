@@ -203,9 +203,6 @@ class UnitScale:
 AMPLITUDE_MV: Final = UnitScale(2e-4, 30.0, ("V", 1000), ("µV", 1000))
 """Of an MEP: the noise of the electrodes alone has more than the least, and no muscle gives more than the most."""
 
-REST_UV: Final = UnitScale(0.05, 400.0, usual=2.0)
-"""RMS of EMG before the pulse: no amplifier is so quiet, and no muscle so loud, at rest or at work."""
-
 BACKGROUND_LIMIT_UV: Final = UnitScale(0.2, too_small=("mV", 1000))
 """The most EMG at rest that somebody allows; no amplifier is so quiet as the least."""
 
@@ -229,7 +226,3 @@ def require_percent(what: str, intensity_pct: float | None) -> None:
     if intensity_pct is not None:
         scale = INTENSITY_PCT
         scale.require(f"{what} is probably in another unit", intensity_pct, f"at least {scale.least:g} %")
-
-
-STOP_WIDTH_MS: Final = UnitScale(1.0, too_small=("s", 1000))
-"""No interval of an edge is as narrow as the least; a width of 0.005 and less is meant to stop nothing."""

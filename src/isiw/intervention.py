@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import hashlib
 import secrets
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import cached_property, partial
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -21,7 +21,7 @@ from isiw.checks import Checked, Count, Flag, NonNegative, Positive, Text, ascen
 from isiw.errors import InvalidValueError
 from isiw.findings import require_percent
 from isiw.text.sanitize import command
-from isiw.visit import Control, VisitProtocol, interval_ends
+from isiw.visit import Control, interval_ends
 
 LEAST_PAIRS, MOST_PAIRS = 50, 300
 """What a plan may have: fewer pairs change nobody, and more are not foreseen."""
@@ -57,44 +57,6 @@ _WORDS: Final = {
     Arm.TMS_ALONE: "TMS alone",
     Arm.TAP_ALONE: "taps alone",
 }
-
-
-class Part(StrEnum):
-    """The parts of an intervention, in their order."""
-
-    BEFORE = "before"
-    PAIRS = "pairs"
-    AFTER = "after"
-
-
-@dataclass(frozen=True)
-class Slot:
-    """The place of one stimulus in a plan.
-
-    Args:
-        number: the number of its trial, from 0.
-        part: the part of the plan.
-        block: the number of its block within the part, from 0.
-        place: its number within the part, from 0.
-        first: whether a block begins with it.
-        last: whether a block ends with it.
-        intensity_pct_rmt: intensity of a pulse of TMS alone [% RMT]; None for that of the visit.
-        due_s: when its block is due, after the last pair [s]; None before that.
-    """
-
-    number: int
-    part: Part
-    block: int
-    place: int
-    first: bool
-    last: bool
-    intensity_pct_rmt: float | None = None
-    due_s: float | None = None
-
-    @property
-    def name(self) -> str:
-        """The name of its block."""
-        return f"after {self.due_s / 60:g} min" if self.due_s is not None else str(self.part)
 
 
 def _arms(what: str, arms: object) -> tuple[Arm, ...]:
@@ -188,49 +150,10 @@ class Plan(Checked):
         """The intensities of a block before or after [% RMT]; None is that of the visit."""
         return self.intensities_pct_rmt or (None,)
 
-    @cached_property
-    def slots(self) -> tuple[Slot, ...]:
-        """The places of all stimuli, in order."""
-        parts = [Slot(0, Part.BEFORE, *rest) for rest in self._tests(self.before)]
-        for place in range(self.pairs):
-            block, within = divmod(place, self.block_pairs)
-            last = within == self.block_pairs - 1 or place == self.pairs - 1
-            parts.append(Slot(0, Part.PAIRS, block, place, within == 0, last))
-        for block, minutes in enumerate(self.after_min):
-            parts += [
-                Slot(0, Part.AFTER, block, place, first, last, intensity, 60.0 * minutes)
-                for _, place, first, last, intensity in self._tests(self.after)
-            ]
-        return tuple(
-            Slot(number, s.part, s.block, s.place, s.first, s.last, s.intensity_pct_rmt, s.due_s)
-            for number, s in enumerate(parts)
-        )
-
-    def _tests(self, each: int) -> Iterator[tuple[int, int, bool, bool, float | None]]:
-        """Block, place, whether first and last, and intensity of each pulse of a block."""
-        all_of_them = [intensity for intensity in self.tests for _ in range(each)]
-        for place, intensity in enumerate(all_of_them):
-            yield 0, place, place == 0, place == len(all_of_them) - 1, intensity
-
     @property
     def last_pair(self) -> int:
         """The number of the trial of the last pair, from which the clock counts."""
         return self.before * len(self.tests) + self.pairs - 1
-
-    def is_probe(self, slot: Slot, seed: int) -> bool:
-        """True if a pair is one that watches the window: one at a random place in each stretch of them."""
-        probes = VisitProtocol(tms_alone=self.probes)
-        return slot.part is Part.PAIRS and probes.control(slot.place, seed) is not None
-
-    def interval_s(self, slot: Slot, seed: int) -> float:
-        """Shortest interval between the stimulus before and this one [s]."""
-        ends_s = self.iti_s if slot.part is Part.PAIRS else self.test_iti_s
-        drawn_s = VisitProtocol(iti_s=ends_s).interval_s(slot.number, seed)
-        return max(drawn_s, self.rest_s) if self.rests_before(slot) else drawn_s
-
-    def rests_before(self, slot: Slot) -> bool:
-        """True if a rest comes before a stimulus: between two blocks of pairs."""
-        return slot.part is Part.PAIRS and slot.first and slot.block > 0
 
 
 @dataclass(frozen=True)

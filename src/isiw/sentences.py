@@ -7,14 +7,15 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
 from isiw.design import DesignSpace
-from isiw.summary import chance, is_guess, is_sure, law_is_doubted
+from isiw.excess import MIN_EXCESS_MV
+from isiw.summary import SURE, chance, is_guess, is_sure, law_is_doubted, rules_out
 from isiw.text.sanitize import counted
 from isiw.text.stimuli import TAP, StimulusWords
 from isiw.trials import Trial
-from isiw.window import MIN_EXCESS_MV, SURE, Window, rules_out
+from isiw.window import Window
 
 if TYPE_CHECKING:  # an estimate prints itself in these words
-    from isiw.estimate import Edge, Estimate
+    from isiw.figures import Edge, Estimate
 
 WORTH_SAYING: Final = 0.1
 """Probability from which on an unusual window is mentioned."""

@@ -3,18 +3,34 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from isiw.change import Change
+from isiw.figures import Estimate
 from isiw.text.stimuli import STIMULI, StimulusWords, words_of
-from isiw.window import LEAST_FACTOR, SURE, bayes_factor, rules_out
-
-if TYPE_CHECKING:
-    from isiw.estimate import Estimate
 
 _EITHER: Final = words_of(STIMULI)
 
+SURE = 0.95
+"""Probability from which on it is said outright that there is a window, or none; below it "probably", or undecided."""
+
+LEAST_FACTOR = 3.0
+"""Bayes factor below which trials hardly speak for a window: "not worth more than a bare mention" [Kass1995]."""
+
 JUDGED_SINCE: Final = "Trials were excluded or included after this estimate; isiw estimate LOG computes it again."
+
+
+def rules_out(probability: float | None) -> bool:
+    """True if nothing reported means that there is none; with more probability than this it is undecided."""
+    return probability is None or 1 - probability >= SURE
+
+
+def bayes_factor(probability: float | None, beforehand: float | None) -> float | None:
+    """By what the trials multiplied the odds of a window; None if one of the probabilities is not known."""
+    if probability is None or beforehand is None or not 0 < beforehand < 1:
+        return None
+    odds = math.inf if probability == 1 else probability / (1 - probability)
+    return odds * (1 - beforehand) / beforehand
 
 
 def edge_text(edge_ms: float) -> str:

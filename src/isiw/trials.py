@@ -10,16 +10,7 @@ from enum import StrEnum
 from functools import cached_property
 from typing import Any, ClassVar, Final
 
-from isiw.checks import (
-    Amplitude,
-    AmplitudeInterval,
-    Checked,
-    Natural,
-    NonNegative,
-    Number,
-    Positive,
-    choice,
-)
+from isiw.checks import Amplitude, AmplitudeInterval, Checked, Natural, NonNegative, Number, Positive, choice
 from isiw.errors import InvalidValueError
 from isiw.findings import MISTRIALS, Kind
 from isiw.text.stimuli import TAP, StimulusWords

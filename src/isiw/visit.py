@@ -2,30 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from fractions import Fraction
 from functools import partial
-from typing import Annotated, Final
+from typing import Annotated
 
-import numpy as np
-
-from isiw.checks import (
-    Checked,
-    Count,
-    Natural,
-    Positive,
-    Text,
-    number,
-    share,
-)
+from isiw.checks import Checked, Count, Natural, Positive, Text, number, share
 from isiw.errors import InvalidValueError
-from isiw.findings import INTERVAL_S, require_percent
-
-_ITI_DRAWS, _CONTROL_DRAWS = 1, 2
-"""What is drawn, so that the two never share their draws."""
+from isiw.findings import INTERVAL_S
 
 _FINEST_SHARE = 1000
 
@@ -71,29 +57,6 @@ class Visit(Checked):
     height_cm: Annotated[float, partial(number, least=50, most=260)] | None = None
     tap_n: Annotated[float, partial(number, least=0.1, most=1000)] | None = None
 
-    def require_intensity(self, assumed_pct_rmt: float | None = None) -> None:
-        """Raise if an intensity is probably in another unit, or not the one that the strategy assumes.
-
-        It is for a visit that somebody states: those of earlier logs stay readable.
-
-        Args:
-            assumed_pct_rmt: the intensity that the strategy assumes [% RMT]; None if it assumes none.
-
-        Raises:
-            InvalidValueError: an intensity below 3 %, or one other than the strategy's.
-        """
-        noted = self.intensity_pct_rmt
-        require_percent("the visit's intensity_pct_rmt", noted)
-        require_percent("the visit's intensity_pct_mso", self.intensity_pct_mso)
-        if noted is not None and assumed_pct_rmt is not None and not math.isclose(noted, assumed_pct_rmt):
-            raise InvalidValueError(
-                "the visit and the strategy state different intensities of the pulse",
-                got=f"{assumed_pct_rmt:g} % of RMT in the strategy",
-                expected=f"{noted:g}, as the visit says",
-                remedy="Correct intensity_pct_rmt under [visit] or under [strategy.settings] (in Python of isiw.Visit "
-                f"or make_strategy(..., intensity_pct_rmt={noted:g})).",
-            )
-
     def unlike(self, other: Visit) -> str | None:
         """Why the window of the person's other visit is not this one's, in words; None if nothing noted says so."""
         if muscles := different_muscles((self.muscle, other.muscle)):
@@ -108,10 +71,6 @@ def different_muscles(noted: Iterable[str]) -> list[str]:
     """The muscles that visits note, if these are more than one; else none. Capitals make no difference."""
     muscles = {muscle.strip().casefold(): muscle.strip() for muscle in noted if muscle.strip()}
     return list(muscles.values()) if len(muscles) > 1 else []
-
-
-PAIRS_FIRST: Final = 4
-"""So many trials show whether a rig works, before taps alone are given."""
 
 
 def interval_s(what: str, value: object) -> float:
@@ -165,7 +124,7 @@ class VisitProtocol(Checked):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self._share >= 1:
+        if self.control_share >= 1:
             raise InvalidValueError(
                 "the control trials leave no pairs of stimuli",
                 got=(self.tms_alone, self.tap_alone),
@@ -173,92 +132,11 @@ class VisitProtocol(Checked):
             )
 
     @property
-    def _share(self) -> Fraction:
-        return _exact(self.tms_alone) + _exact(self.tap_alone)
-
-    def require_effect(self, min_iti_s: float) -> None:
-        """Raise if the intervals are as long as the rests, so that these are none, or no longer than the limits' own.
-
-        It is for a protocol that somebody states: those of earlier logs stay readable.
-
-        Args:
-            min_iti_s: the interval of the limits, which holds if the protocol has none [s].
-
-        Raises:
-            InvalidValueError: a rest that is no longer than the longest interval, intervals that the limits replace, or
-                an intensity of TMS alone where there is none, or in another unit.
-        """
-        require_percent("the protocol's alone_pct_rmt", self.alone_pct_rmt)
-        if self.alone_pct_rmt is not None and not self.tms_alone:
-            raise InvalidValueError(
-                "an intensity of TMS alone has no effect in a protocol without TMS alone",
-                got=f"alone_pct_rmt = {self.alone_pct_rmt:g}",
-                remedy="Set a share tms_alone, or leave out alone_pct_rmt.",
-            )
-        if self.iti_s is not None and self.iti_s[1] <= min_iti_s and self.iti_s != (min_iti_s, min_iti_s):
-            raise InvalidValueError(
-                "the protocol's intervals are no longer than the limits allow at least, so they would have no effect",
-                got=f"iti_s {self.iti_s[0]:g} to {self.iti_s[1]:g}, min_iti_s {min_iti_s:g}",
-                expected=f"intervals up to more than {min_iti_s:g} s",
-                remedy="Set a longer iti_s [s] in the protocol, or a shorter min_iti_s in the limits.",
-            )
-        longest_s = min_iti_s if self.iti_s is None else self.iti_s[1]
-        if self.block_trials is not None and self.rest_s <= longest_s:
-            raise InvalidValueError(
-                "the protocol's rest is no longer than the longest interval between two trials, so it would have no "
-                "effect",
-                got=f"rest_s {self.rest_s:g}, longest interval {longest_s:g}",
-                expected=f"rest_s above {longest_s:g}",
-                remedy="Set a longer rest_s [s], or leave out block_trials and rest_s.",
-            )
-
-    def rests_before(self, trial: int) -> bool:
-        """True if a rest comes before this trial."""
-        return self.block_trials is not None and trial > 0 and trial % self.block_trials == 0
-
-    def interval_s(self, trial: int, seed: int) -> float:
-        """Shortest interval between the trial before and this one [s].
-
-        Args:
-            trial: its number.
-            seed: the session's.
-        """
-        rest_s = self.rest_s if self.rests_before(trial) else 0.0
-        if self.iti_s is None:
-            return rest_s
-        return max(rest_s, float(_draws(seed, trial, _ITI_DRAWS).uniform(*self.iti_s)))
-
-    def stimuli_for(self, pairs: int) -> int:
-        """The number of stimuli that so many pairs take at most, their control trials among them."""
-        return math.ceil((pairs + 1) / (1 - self._share)) if self._share else pairs
-
-    def control(self, trial: int, seed: int) -> Control | None:
-        """Which control trial this is; None for a pair of stimuli.
-
-        The trials are cut into stretches with one control each, at a random place, so that controls are spread over the
-        session and nobody can predict them. Their kinds alternate as their shares say.
-
-        Args:
-            trial: its number.
-            seed: the session's.
-        """
-        share = self._share
-        if not share:
-            return None
-        stretch = math.floor(trial * share)
-        first, behind = (math.ceil(number / share) for number in (stretch, stretch + 1))
-        if trial != _draws(seed, stretch, _CONTROL_DRAWS).integers(first, behind):
-            return None
-        before, after = (
-            math.floor(number * _exact(self.tms_alone) / share + Fraction(1, 2)) for number in (stretch, stretch + 1)
-        )
-        return Control.TMS_ALONE if after > before else Control.TAP_ALONE
+    def control_share(self) -> Fraction:
+        """The share of control trials."""
+        return exact_share(self.tms_alone) + exact_share(self.tap_alone)
 
 
-def _draws(seed: int, number: int, kind: int) -> np.random.Generator:
-    return np.random.default_rng([abs(seed), number, kind])
-
-
-def _exact(share: float) -> Fraction:
+def exact_share(share: float) -> Fraction:
     """A share as a fraction, so that no stretch gains or loses a trial by rounding."""
     return Fraction(share).limit_denominator(_FINEST_SHARE)

@@ -1,4 +1,4 @@
-"""The window: the ISIs that enhance the MEP, and the least-excess rule that defines it."""
+"""The window: the ISIs that enhance the MEP, as `excess` defines it."""
 
 from __future__ import annotations
 
@@ -6,42 +6,14 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.types import ArrayLike, BoolArray, FloatArray
-
-EDGE_LEVEL = 0.135
-"""The share of the largest excess that a window's edge has: two SDs down a Gaussian [Kim2020, 4.3]."""
-
-MIN_EXCESS_MV = 0.002
-MIN_EXCESS_OF_BASELINE = 0.10
-
-LEAST_DEPRESSED_MV = 0.05
-"""Where the expected MEP without a tap is smaller there is none to depress: what counts as an MEP [Rossini2015]."""
-
-SURE = 0.95
-"""Probability from which on it is said outright that there is a window, or none; below it "probably", or undecided."""
-
-LEAST_FACTOR = 3.0
-"""Bayes factor below which trials hardly speak for a window: "not worth more than a bare mention" [Kass1995]."""
+from isiw.types import ArrayLike, BoolArray
 
 Interval: TypeAlias = tuple[float, float]
-
-
-def rules_out(probability: float | None) -> bool:
-    """True if nothing reported means that there is none; with more probability than this it is undecided."""
-    return probability is None or 1 - probability >= SURE
-
-
-def bayes_factor(probability: float | None, beforehand: float | None) -> float | None:
-    """By what the trials multiplied the odds of a window; None if one of the probabilities is not known."""
-    if probability is None or beforehand is None or not 0 < beforehand < 1:
-        return None
-    odds = math.inf if probability == 1 else probability / (1 - probability)
-    return odds * (1 - beforehand) / beforehand
 
 
 @dataclass(frozen=True)
@@ -135,41 +107,3 @@ class Window:
 
     def __str__(self) -> str:
         return " and ".join(f"{a:g}–{b:g} ms" for a, b in self.segments)
-
-
-class Enhancement(NamedTuple):
-    """By how much the tap enlarges the expected MEP [mV], and the shift of the recruitment curve's input [% RMT]."""
-
-    mep_mv: float
-    shift_pct_rmt: float | None = None
-
-
-class Magnitude(NamedTuple):
-    """The size of the enhancement at the best ISI, given that there is a window: medians and 90 % intervals.
-
-    Args:
-        mep_mv: by how much the expected MEP is larger than without a tap [mV].
-        ratio: how many times as large as that of TMS alone it is, the EMG floor in both.
-    """
-
-    mep_mv: tuple[float, float, float]
-    ratio: tuple[float, float, float]
-
-
-def least_excess_mv(peak_mv: ArrayLike, baseline_mv: ArrayLike, share: float = EDGE_LEVEL) -> FloatArray:
-    """The least-excess rule: what the expected MEP at an ISI inside the window exceeds the baseline by, at least [mV].
-
-    It is a share of the largest excess. Where that is below 10 % of the baseline or below 2 µV nothing is enhanced, and
-    the least excess is infinite.
-    """
-    peak = np.asarray(peak_mv, dtype=float)
-    enough_mv = np.maximum(MIN_EXCESS_OF_BASELINE * np.asarray(baseline_mv, dtype=float), MIN_EXCESS_MV)
-    return np.where(peak >= enough_mv, share * peak, np.inf)
-
-
-def window_from_excess(grid_ms: ArrayLike, excess_mv: ArrayLike, baseline_mv: float) -> Window | None:
-    """The window by the least-excess rule, or None if nothing is enhanced."""
-    excess = np.asarray(excess_mv, dtype=float)
-    if not (np.isfinite(excess).all() and math.isfinite(baseline_mv)):
-        raise InvalidValueError("the expected MEP must be finite at every ISI", got=(float(excess.max()), baseline_mv))
-    return Window.from_mask(grid_ms, excess >= least_excess_mv(excess.max(), baseline_mv))

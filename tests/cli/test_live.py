@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 import isiw
 from isiw.cli import app
 from isiw.errors import ConfigError
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 
 
 def test_where_the_page_cannot_be_opened_nothing_else_is_said_than_why(

@@ -12,7 +12,7 @@ from cli.conftest import COMMAND, Command
 from export.recorded import note, sweep, write_sweeps
 from isiw import __version__
 from isiw.config.resume import Truth, truth_of
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event
 from isiw.log.writer import LogWriter

@@ -36,6 +36,6 @@ def test_a_traceback_would_be_found(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     def broken(*_: object) -> None:
         raise RuntimeError("a fault of isiw")
 
-    monkeypatch.setattr("isiw.log.reader.salvage", broken)
+    monkeypatch.setattr("isiw.log.record.salvage", broken)
     assert "a fault of isiw" in outcome_of("show", str(tmp_path / "s.mcap"))
     assert log_mutations.ABSURD

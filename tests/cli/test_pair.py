@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from cli.conftest import Command
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 
 SEARCH = """
 seed = 5

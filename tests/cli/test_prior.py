@@ -8,7 +8,7 @@ import pytest
 from cli.conftest import Command
 from isiw import priors
 from isiw.cli.console import DAMAGED
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from logs import damage
 
 pytestmark = pytest.mark.usefixtures("few_sweeps")

@@ -16,7 +16,7 @@ from typer.testing import CliRunner, Result
 from cli.conftest import Command
 from isiw.cli import app
 from isiw.config import load_config, session_for
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 
 
 @pytest.fixture

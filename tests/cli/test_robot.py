@@ -13,7 +13,7 @@ from cli.conftest import COMMAND, Command
 from isiw.config import load_config, session_for
 from isiw.config.resume import device_of_log, truth_of
 from isiw.errors import ConfigError, DeviceError
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.record import SessionRecord, read_session
 from isiw.trials import Status
 from known import known
 from logs import blocks_of

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from cli.conftest import COMMAND, Command
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.session.loop import Session
 from known import known
 from scripted import ScriptedDevice, scripted_strategy

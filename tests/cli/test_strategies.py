@@ -3,7 +3,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from cli.conftest import Command
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.strategy.catalogue import list_strategies
 
 

@@ -14,7 +14,7 @@ from isiw.config import device_for, load_config, session_for
 from isiw.config.session import TEMPLATE_FILES, device_from_factory, write_rig_template
 from isiw.design import IMPACT_SPACE
 from isiw.errors import ConfigError, LimitExceededError
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.visit import Visit
 from known import known
 from priors.logged import write_log

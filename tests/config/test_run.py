@@ -13,7 +13,7 @@ from isiw.config.session import assumed_space, fresh_log_path, imported_said
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import ConfigError, DeviceError, InvalidValueError, StrategyError
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.session.loop import Session
 from isiw.session.threshold import open_threshold, resume_threshold
 from isiw.strategy.threshold import IntensityRange, make_threshold_search

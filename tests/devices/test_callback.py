@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from isiw.devices.protocol import CallbackDevice, DeviceInfo
+from isiw.devices.info import DeviceInfo
+from isiw.devices.protocol import CallbackDevice
 from isiw.errors import DeviceError
 from isiw.sweeps import Measurement
 from isiw.trials import Stimulus

@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 
 from isiw.design import DesignSpace
+from isiw.devices.info import Readiness
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import Readiness
 from isiw.devices.simulated import DryRun
 from isiw.errors import LimitExceededError
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.session.loop import Session
 from isiw.testing import check_device
 from scripted import ScriptedDevice, scripted_strategy

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 from isiw.errors import DeviceError
 from isiw.session.rig import exclusive
 from known import known
@@ -60,7 +60,7 @@ def test_a_lock_that_cannot_be_taken_is_told_with_the_way_out(tmp_path: Path, mo
 HOLDER = """
 import sys
 from isiw.session.rig import exclusive
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 with exclusive(object(), DeviceInfo("rig", "valve", address="port of this test")):
     print("held", flush=True)
     sys.stdin.read()

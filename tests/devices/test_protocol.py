@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 from isiw.errors import InvalidValueError
 
 

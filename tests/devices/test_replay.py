@@ -10,7 +10,7 @@ from isiw.devices.limits import Limits
 from isiw.devices.simulated import RecordedTrials, SimulatedDevice, SimulatedPerson
 from isiw.errors import DeviceError
 from isiw.findings import Kind
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.record import SessionRecord, read_session
 from isiw.metrics import f1
 from isiw.session.loop import Session
 from isiw.session.sink import SessionResult

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import DeviceError
 from isiw.subjects.subject import Response

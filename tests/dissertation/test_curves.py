@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from isiw.dissertation.regression import FittedCurve, curve_masks
-from isiw.window import Window, window_from_excess
+from isiw.excess import window_from_excess
+from isiw.window import Window
 
 GRID = np.arange(0.0, 501.0)
 

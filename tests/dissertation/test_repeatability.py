@@ -25,7 +25,7 @@ from isiw.dissertation.repeatability import (
     timing_report,
 )
 from isiw.errors import InvalidValueError
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.session.loop import Session
 from isiw.signals import TapEvents
 from isiw.signals.impact import VALVE_MS

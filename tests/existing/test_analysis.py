@@ -8,11 +8,11 @@ import pytest
 
 import isiw
 from isiw.errors import InvalidValueError, LogError, StrategyError
-from isiw.estimate import Estimate
 from isiw.existing.analysis import analysed
 from isiw.existing.delivered import Delivered
 from isiw.existing.layout import Layout
 from isiw.existing.reading import read_people
+from isiw.figures import Estimate
 from isiw.trials import Trial
 
 SPACE = isiw.DesignSpace(0, 200, 5, reference="impact")

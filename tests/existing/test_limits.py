@@ -20,8 +20,8 @@ from isiw.existing.layout import letters
 from isiw.existing.limits import LARGEST_FACTOR, require_file, seconds_for
 from isiw.existing.quantities import Columns, unit_said
 from isiw.sweeps import Channel
+from isiw.text.parsing import DoubledKeyError, once_each
 from isiw.text.sanitize import read_number
-from isiw.text.toml_files import DoubledKeyError, once_each
 from isiw.trials import Status, Trial, TrialTable
 from isiw.visit import Visit
 

@@ -16,13 +16,13 @@ import pandas as pd
 import pytest
 
 from export.recorded import SAMPLES, alone, emg_mv, sweep, write_sweeps
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 from isiw.errors import ConfigError, InvalidValueError
 from isiw.export import export_logs
 from isiw.export.bids import TASK
 from isiw.export.emg import Layout, Run
 from isiw.findings import Kind
-from isiw.log.frames import read_session
+from isiw.log.record import read_session
 from isiw.signals.limits import SignalLimits
 from isiw.sweeps import Channel
 from isiw.text.stimuli import STIMULI

@@ -12,7 +12,7 @@ import pytest
 
 from export.recorded import sweep, write_sweeps
 from isiw.export import Exported, export_logs
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.session.afterwards import exclude
 from isiw.session.loop import Session
 from isiw.session.resume import open_session, resume

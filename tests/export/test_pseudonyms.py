@@ -9,10 +9,11 @@ import pandas as pd
 import pytest
 
 from export.recorded import note, sweep, write_sweeps
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 from isiw.export import export_logs
 from isiw.export.collection import pseudonymised
-from isiw.log.frames import read_session, trial_frame
+from isiw.log.frames import trial_frame
+from isiw.log.record import read_session
 
 SECRETS = ("Meier", "Anna", "cough", "2026", "COM3", "ward 7", "meier_monday")
 

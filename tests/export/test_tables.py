@@ -12,12 +12,13 @@ import pandas as pd
 import pytest
 
 from export.recorded import note, sweep, write_sweeps
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 from isiw.errors import InvalidValueError, LogError
 from isiw.export import export_logs
 from isiw.export.tables import session_facts
-from isiw.log.frames import TRIAL_COLUMNS, read_session
+from isiw.log.frames import TRIAL_COLUMNS
 from isiw.log.headers import StrategyRecipe
+from isiw.log.record import read_session
 from isiw.session.afterwards import exclude
 from isiw.session.loop import Session
 from isiw.session.resume import open_session

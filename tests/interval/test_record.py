@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 from isiw.dissertation.interval.task import answer, begin_log, continue_log, read_productions, session_blocks
 from isiw.errors import DamagedLogError, InvalidValueError, LogError
 from isiw.log.headers import AnyHeader, Block, StrategyRecipe, ThresholdHeader
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.log.writer import LogWriter
 from isiw.session import read_threshold
 from isiw.strategy.threshold import IntensityRange

@@ -13,7 +13,7 @@ from disks import is_folder, over_a_file, refusing
 from isiw.errors import DiskWarning, LogError
 from isiw.files import folded, put, twin
 from isiw.log.headers import Header
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.log.salvage import salvage
 from isiw.log.writer import LogWriter
 from log.written import write_trials

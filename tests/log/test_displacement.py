@@ -14,7 +14,7 @@ import pytest
 from isiw.errors import LogError
 from isiw.log.durable import DurableFile
 from isiw.log.headers import Header
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.log.salvage import salvage
 from isiw.log.writer import LogWriter
 from known import known

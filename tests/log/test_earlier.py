@@ -4,10 +4,11 @@ import json
 
 import pytest
 
+from isiw.decision import StopKind
 from isiw.findings import Kind
 from isiw.log.records import with_kinds
-from isiw.log.schema import EstimateRecord, Event, EventKind, Record, decode, encode
-from isiw.strategy.decisions import StopKind
+from isiw.log.schema import EstimateRecord, Event, EventKind, Record, decode
+from isiw.log.writer import encode
 
 
 def earlier(topic: str, record: Record, lacking: str) -> Record:

@@ -14,9 +14,10 @@ from mcap.writer import CompressionType, Writer
 from isiw.checks import MOST_TRIALS
 from isiw.design import DesignSpace
 from isiw.errors import LogError
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.log.records import MOST_LOSSES
-from isiw.log.schema import CHANNEL_IDS, encode
+from isiw.log.schema import CHANNEL_IDS
+from isiw.log.writer import encode
 from isiw.report import final_statement
 
 ALLOWED_S = 2.0

@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 
-from isiw.log.schema import CHANNEL_IDS, json_schema
+from isiw.log.schema import CHANNEL_IDS
+from isiw.log.writer import json_schema
 
 LAYOUT: dict[str, Any] = json.loads(
     (Path(__file__).parents[2] / "clients" / "foxglove" / "isiw.json").read_text(encoding="utf-8")

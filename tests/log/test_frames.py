@@ -8,8 +8,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from isiw.log.frames import TRIAL_COLUMNS, read_session
+from isiw.log.frames import TRIAL_COLUMNS
 from isiw.log.headers import Header
+from isiw.log.record import read_session
 from isiw.log.records import Onsets
 from isiw.log.schema import Event, Intent
 from isiw.log.writer import LogWriter

@@ -16,7 +16,7 @@ from isiw.devices.clock import VirtualClock
 from isiw.errors import LogError
 from isiw.log.headers import Header
 from isiw.log.places import Fingerprint
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.log.salvage import Salvage, salvage, salvage_file
 from isiw.log.schema import Event
 from isiw.log.writer import LogWriter
@@ -158,7 +158,7 @@ def test_a_log_that_a_session_went_on_with_while_its_names_were_looked_at_does_n
         longer.replace(target)
         return found.fingerprint
 
-    monkeypatch.setattr("isiw.log.writer._own_file", meanwhile)
+    monkeypatch.setattr("isiw.log.writer.own_file", meanwhile)
     with pytest.raises(LogError, match="has changed since"):
         go_on(finished_log)
     assert finished_log.read_bytes() == another

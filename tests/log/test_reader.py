@@ -10,8 +10,8 @@ import pytest
 
 from isiw.devices.limits import Limits
 from isiw.errors import LogError
-from isiw.log.frames import read_session
 from isiw.log.headers import SCHEMA_VERSION, Header
+from isiw.log.record import read_session
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Intent, Waveform
 from isiw.log.writer import LogWriter

@@ -10,7 +10,7 @@ import pytest
 
 from isiw.errors import DamagedLogError, LogError
 from isiw.log.headers import Header
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.record import SessionRecord, read_session
 from isiw.log.salvage import current_file, holds, only_in, salvage
 from isiw.log.schema import Intent, Waveform
 from isiw.log.writer import LogWriter

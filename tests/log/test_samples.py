@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import isiw
-from isiw.log.frames import read_session
-from isiw.log.schema import Waveform, encode, without_samples
-from isiw.log.writer import LogWriter
+from isiw.log.record import read_session
+from isiw.log.schema import Waveform, without_samples
+from isiw.log.writer import LogWriter, encode
 from isiw.sweeps import Channel
 from log.written import make_header, write_trials
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from isiw.decision import StopDecision
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
 from isiw.findings import Kind
@@ -23,14 +24,11 @@ from isiw.log.schema import (
     ThresholdEstimateRecord,
     Waveform,
     decode,
-    encode,
-    json_schema,
-    log_time_ns,
-    topic_of,
 )
-from isiw.log.writer import LogWriter
-from isiw.strategy.decisions import StopDecision
+from isiw.log.writer import LogWriter, encode, json_schema, log_time_ns, topic_of
+from isiw.session.examination import recorded
 from isiw.strategy.threshold import ThresholdEstimate
+from isiw.summary import summary
 from isiw.sweeps import Channel
 from isiw.trials import Status, Trial
 from isiw.window import Window
@@ -141,7 +139,7 @@ def test_an_estimate_keeps_window_intervals_and_profile() -> None:
         profile_quantiles_mv=np.stack([grid, grid + 1, grid + 2]),
         split_probability=0.25,
     )
-    written = encode("/estimate", EstimateRecord.after(4, estimate, StopDecision(stop=False, reason="r"), 7.0))
+    written = encode("/estimate", recorded(estimate, 4, StopDecision(stop=False, reason="r"), 7.0))
     record = instance(EstimateRecord, decode("/estimate", written))
     assert record.window == estimate.window
     assert (record.start_low_ms, record.start_high_ms, record.end_low_ms, record.end_high_ms) == (9, 11, 38, math.inf)
@@ -154,21 +152,21 @@ def test_an_estimate_keeps_window_intervals_and_profile() -> None:
 
 def test_an_estimate_keeps_the_isis_that_depress_the_mep() -> None:
     estimate = WindowEstimate(0.9, Window(50, 80), depressed=Window(10, 35), depressed_probability=0.7)
-    written = encode("/estimate", EstimateRecord.after(4, estimate, StopDecision(stop=False, reason="r"), 7.0))
+    written = encode("/estimate", recorded(estimate, 4, StopDecision(stop=False, reason="r"), 7.0))
     record = instance(EstimateRecord, decode("/estimate", written))
     assert (record.depressed, record.depressed_probability) == (Window(10, 35), 0.7)
-    assert str(record) == str(estimate)
-    assert "Depressed: 10–35 ms (probability of it: 0.70)" in str(record)
+    assert summary(record) == str(estimate)
+    assert "Depressed: 10–35 ms (probability of it: 0.70)" in summary(record)
 
 
 def test_an_estimate_of_a_strategy_that_looks_for_enhancement_alone_says_nothing_of_depression() -> None:
-    record = EstimateRecord.after(4, WindowEstimate(0.9, Window(50, 80)), StopDecision(stop=False, reason="r"), 7.0)
+    record = recorded(WindowEstimate(0.9, Window(50, 80)), 4, StopDecision(stop=False, reason="r"), 7.0)
     assert (record.depressed, record.depressed_probability) == (None, None)
-    assert "epressed" not in str(record)
+    assert "epressed" not in summary(record)
 
 
 def test_an_estimate_of_a_method_without_posterior_has_gaps() -> None:
-    record = EstimateRecord.after(0, WindowEstimate(None, Window(1, 2)), StopDecision(stop=True, reason=""), None)
+    record = recorded(WindowEstimate(None, Window(1, 2)), 0, StopDecision(stop=True, reason=""), None)
     assert record.window == Window(1, 2)
     assert record.start_low_ms is None
     assert record.grid_ms == ()
@@ -192,5 +190,5 @@ def test_a_logged_space_without_a_reference_counts_from_the_impact() -> None:
 
 @pytest.mark.parametrize(("now_ns", "held_ns"), [(0, 0), (2**64 - 1, 2**64 - 1), (2**64, 0), (-1, 0)])
 def test_every_time_is_held_that_fits_into_a_record(now_ns: int, held_ns: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("isiw.log.schema.time.time_ns", lambda: now_ns)
+    monkeypatch.setattr("isiw.log.writer.time.time_ns", lambda: now_ns)
     assert log_time_ns() == held_ns

@@ -12,7 +12,7 @@ from mcap.reader import make_reader
 
 from isiw.errors import LogError
 from isiw.log.headers import Header
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Waveform
 from isiw.log.writer import LogWriter

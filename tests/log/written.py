@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from isiw.design import DesignSpace
+from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import DeviceInfo
 from isiw.log.headers import Header, StrategyRecipe
 from isiw.log.schema import Intent, Waveform
 from isiw.log.writer import LogWriter

@@ -19,8 +19,8 @@ from isiw.models.particles.supra import jumps as supra_jumps
 from isiw.models.particles.supra import prior as supra_prior
 from isiw.models.shared.history import Circumstances, History
 from isiw.models.shared.scales import Scale
-from isiw.native.arrays import COLUMNS
 from isiw.native.law import Law
+from isiw.native.library import COLUMNS
 from isiw.types import Singles
 from native import reference
 

@@ -11,9 +11,9 @@ from benchmarks import sanitized
 BEYOND = """
 import numpy as np
 from benchmarks import sanitized
-from isiw.native import arrays, library
+from isiw.native import library
 sanitized.take()
-sizes = arrays.FIELDS, 23, 24
+sizes = library.FIELDS, 23, 24
 given = [np.zeros(size, dtype=np.float32) for size in sizes]
 library.call("evoked_means", 1, 24, *(array.__array_interface__["data"][0] for array in given))
 """

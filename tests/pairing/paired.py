@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from isiw.design import DesignSpace
+from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import DeviceInfo
 from isiw.estimate import WindowEstimate
 from isiw.intervention import Arm, Intervention, Plan, sealed
 from isiw.models.protocol import Observation

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
+from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import DeviceInfo
 from isiw.errors import InvalidValueError
 from isiw.intervention import Arm, Plan
 from isiw.pairing.agenda import Agenda

@@ -6,30 +6,33 @@ from typing import Any
 
 import pytest
 
+from isiw import schedule
 from isiw.errors import InvalidValueError
-from isiw.intervention import Arm, Intervention, Part, drawn_arm, opened, sealed
+from isiw.intervention import Arm, Intervention, drawn_arm, opened, sealed
+from isiw.schedule import Part
 from pairing.paired import planned
 
 
 def test_every_stimulus_has_its_place_by_its_number() -> None:
     plan = planned(intensities_pct_rmt=(100.0, 120.0))
-    parts = [slot.part for slot in plan.slots]
+    parts = [slot.part for slot in schedule.slots(plan)]
     assert parts == [Part.BEFORE] * 6 + [Part.PAIRS] * 50 + [Part.AFTER] * 12
-    assert [slot.number for slot in plan.slots] == list(range(68))
-    assert [slot.number for slot in plan.slots if slot.first] == [0, 6, 26, 46, 56, 62]
-    assert [slot.number for slot in plan.slots if slot.last] == [5, 25, 45, 55, 61, 67]
-    assert plan.slots[plan.last_pair].last
-    assert plan.slots[plan.last_pair].part is Part.PAIRS
-    assert [slot.intensity_pct_rmt for slot in plan.slots[:6]] == [100.0] * 3 + [120.0] * 3
-    assert [slot.name for slot in plan.slots[-4:]] == ["after 2 min"] * 4
+    slots = schedule.slots(plan)
+    assert [slot.number for slot in slots] == list(range(68))
+    assert [slot.number for slot in slots if slot.first] == [0, 6, 26, 46, 56, 62]
+    assert [slot.number for slot in slots if slot.last] == [5, 25, 45, 55, 61, 67]
+    assert slots[plan.last_pair].last
+    assert slots[plan.last_pair].part is Part.PAIRS
+    assert [slot.intensity_pct_rmt for slot in slots[:6]] == [100.0] * 3 + [120.0] * 3
+    assert [slot.name for slot in slots[-4:]] == ["after 2 min"] * 4
 
 
 def test_one_pair_in_each_stretch_is_a_probe() -> None:
     plan = planned(pairs=100)
-    places = [slot.place for slot in plan.slots if plan.is_probe(slot, 7)]
+    places = [slot.place for slot in schedule.slots(plan) if schedule.is_probe(plan, slot, 7)]
     assert [place // 10 for place in places] == list(range(10))
     assert len({place % 10 for place in places}) > 1
-    assert not any(planned(probes=0.0).is_probe(slot, 7) for slot in plan.slots)
+    assert not any(schedule.is_probe(planned(probes=0.0), slot, 7) for slot in schedule.slots(plan))
 
 
 def test_a_seed_draws_the_same_arm_for_a_person_and_all_arms_for_many() -> None:

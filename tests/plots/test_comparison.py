@@ -8,7 +8,7 @@ import pytest
 
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.record import SessionRecord, read_session
 from isiw.plots.comparison import comparison_figure
 from isiw.plots.style import save_figure
 from isiw.session.loop import Session

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.plots.session import session_figure
 from isiw.plots.style import inline_svg
 from isiw.plots.timeline import course_figure, sweeps_figure, timeline_figure

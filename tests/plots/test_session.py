@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from isiw.errors import InvalidValueError
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.record import SessionRecord, read_session
 from isiw.log.schema import EstimateRecord
 from isiw.plots.session import BELOW_THE_MEAN, save_session_plot, session_figure
 from isiw.session.afterwards import exclude

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from isiw.design import VALVE_SPACE, DesignSpace
+from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import DeviceInfo
 from isiw.log.headers import Header, StrategyRecipe
 from isiw.log.writer import LogWriter
 from isiw.signals.limits import SignalLimits

@@ -7,7 +7,7 @@ import pytest
 
 import isiw
 from isiw.errors import InvalidValueError
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.models.particles.supra.prior import SupraPrior
 from isiw.priors.above import SAME_VISIT, above
 from isiw.visit import Visit

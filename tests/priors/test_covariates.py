@@ -16,7 +16,7 @@ from isiw import priors
 from isiw.cli import app
 from isiw.config.run import RunConfig
 from isiw.config.session import settings_with_prior
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 from isiw.errors import InvalidValueError
 from isiw.models.particles.places import Place
 from isiw.models.shared.scales import Scale

@@ -13,7 +13,7 @@ from scipy.special import softmax
 from isiw import priors
 from isiw.design import IMPACT_SPACE, VALVE_SPACE
 from isiw.errors import DamagedLogError, InvalidValueError, LogError
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event
 from isiw.log.writer import LogWriter

@@ -11,7 +11,7 @@ import pytest
 
 from isiw.design import IMPACT_SPACE
 from isiw.errors import InvalidValueError
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.record import SessionRecord, read_session
 from isiw.priors import Difference, differences
 from isiw.subjects.responses import GainResponse, PeakProfile
 from isiw.subjects.subject import SimulatedSubject

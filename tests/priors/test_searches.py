@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from isiw import priors
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 from isiw.errors import DamagedLogError, LogError
 from isiw.models.particles.prior import Prior
 from isiw.priors.comparison import compared

@@ -10,7 +10,7 @@ from typing import Any
 from isiw.design import DesignSpace
 from isiw.devices.robot.tapper import Tapper, TapperSettings
 from isiw.devices.simulated import SimulatedDevice
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.record import SessionRecord, read_session
 from isiw.session.loop import Session
 from isiw.session.sink import SessionUpdate
 from isiw.trials import Status, Trial

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from isiw.findings import Kind
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.record import SessionRecord, read_session
 from isiw.log.schema import EstimateRecord, Event, Intent, Record
 from isiw.report.answers import Answer, _in_words, answers
 from isiw.session.loop import Session

@@ -17,7 +17,7 @@ import pytest
 from playwright.sync_api import Page, ViewportSize
 
 from browsing import IN_CHROMIUM, broken_rules, chromium, hard_to_read, screenshots
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.record import SessionRecord, read_session
 from isiw.priors import Difference
 from isiw.report.comparison import save_comparison
 from isiw.report.page import save_report

@@ -7,7 +7,7 @@ import pytest
 
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.record import SessionRecord, read_session
 from isiw.priors import Difference
 from isiw.report.comparison import comparison_page, save_comparison
 from isiw.session.loop import Session

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.record import SessionRecord, read_session
 from isiw.log.schema import EstimateRecord
 from isiw.plots.comparison import comparison_figure
 from isiw.plots.session import session_figure

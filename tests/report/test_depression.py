@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.record import SessionRecord, read_session
 from isiw.log.schema import EstimateRecord
 from isiw.report.words import final_statement
 from isiw.sentences import depression

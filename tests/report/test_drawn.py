@@ -11,7 +11,7 @@ import pytest
 
 from isiw.change import Change
 from isiw.findings import TOO_FEW
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.log.schema import EstimateRecord
 from isiw.report.drawn import MOST_NEAR, MOST_WHOLE, drawn
 from isiw.report.words import final_statement

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from isiw.devices.limits import Limits
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.record import SessionRecord, read_session
 from isiw.report.tables import first_facts, further_facts, settings_facts
 from isiw.session.loop import Session
 from isiw.visit import Visit

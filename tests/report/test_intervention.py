@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from isiw.intervention import Arm
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.pairing import Delivered
 from isiw.pairing.agenda import Agenda
 from isiw.pairing.course import FollowedPair, course_of

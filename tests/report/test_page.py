@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from isiw.errors import ConfigError, InvalidValueError
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.record import SessionRecord, read_session
 from isiw.report.page import report_page, save_report
 from isiw.report.words import finding_sentences
 from isiw.session.afterwards import exclude

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from isiw.findings import Kind
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.record import SessionRecord, read_session
 from isiw.log.schema import Event, Intent, Record
 from isiw.report.tables import counted_rows, event_rows, lost_rows, trial_row
 from isiw.session.afterwards import exclude

@@ -10,15 +10,16 @@ import pytest
 
 from isiw import sentences
 from isiw.change import Misfit
+from isiw.decision import StopKind
 from isiw.design import DesignSpace
 from isiw.log.headers import StrategyRecipe
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.record import SessionRecord, read_session
 from isiw.log.schema import EstimateRecord, Event, Intent
 from isiw.report.words import TRIAL_HEADINGS, counts_sentence, final_statement, trial_rows, truth_sentence
 from isiw.session.afterwards import exclude
 from isiw.session.loop import Session
 from isiw.strategy.catalogue import measured_of
-from isiw.strategy.decisions import StopKind
+from isiw.summary import summary
 from isiw.sweeps import Channel, Measurement
 from isiw.trials import Status, Trial
 from isiw.types import Reference
@@ -168,7 +169,7 @@ def test_a_window_that_trials_hardly_speak_for_is_undecided(
 ) -> None:
     changed = with_estimate(record, probability=probability, beforehand=beforehand)
     assert final_statement(changed).startswith(said)
-    assert ("Undecided, if there is a window: 33–93 ms" in str(changed.estimates[-1])) == ("undecided" in said)
+    assert ("Undecided, if there is a window: 33–93 ms" in summary(changed.estimates[-1])) == ("undecided" in said)
 
 
 def test_a_strategy_that_was_not_told_the_stated_intensity_is_named(record: SessionRecord) -> None:

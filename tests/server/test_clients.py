@@ -13,7 +13,7 @@ import httpx
 import pytest
 
 from isiw.findings import Kind
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from server.serving import BEARER, NOBODY, PLAN, client_of, created, done, mep_mv, refused, server
 
 PAUSE_S = 0.3

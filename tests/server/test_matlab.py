@@ -10,7 +10,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from server.serving import TOKEN, client_of
 
 CLIENT = Path(__file__).parents[2] / "clients" / "matlab"

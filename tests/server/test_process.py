@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 
 from isiw.cli import app
 from isiw.errors import ConfigError, InvalidValueError
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.server import ServerSettings
 from server.serving import BEARER, NOBODY, SEVERAL, client_of, created, done, refused, server, told
 

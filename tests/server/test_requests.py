@@ -9,7 +9,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from server.serving import PLAN, SETTINGS, SPACE, client_of, created, done, refused
 
 ARABIC_12 = "\u0661\u0662"

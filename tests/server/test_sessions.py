@@ -14,8 +14,9 @@ import pytest
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError, LogError
 from isiw.findings import IN_DOUBT, TOO_FEW, Kind
-from isiw.log.reader import read_session
-from isiw.log.schema import Record, encode
+from isiw.log.record import read_session
+from isiw.log.schema import Record
+from isiw.log.writer import encode
 from isiw.server.answers import Refusal
 from isiw.server.driven import DrivenSession
 from isiw.server.requests import AskRequest, CreateRequest, TellRequest

@@ -14,7 +14,7 @@ from isiw.devices.limits import Limits
 from isiw.errors import ClockWarning, InvalidValueError, LimitExceededError, LogError
 from isiw.findings import Kind
 from isiw.log import moments, writer
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.session.loop import Session
 from isiw.session.resume import open_session, resume
 from isiw.session.rig import Safeguards

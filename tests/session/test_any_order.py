@@ -18,7 +18,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 from isiw.devices.clock import VirtualClock
 from isiw.devices.limits import Limits
 from isiw.errors import DeviceError, NotDelivered
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.session.afterwards import exclude
 from isiw.session.loop import Session
 from isiw.session.resume import resume

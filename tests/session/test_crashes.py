@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from isiw.errors import LogError
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.record import SessionRecord, read_session
 from isiw.session.afterwards import exclude
 from isiw.session.loop import Session
 from isiw.session.resume import resume

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from isiw.log.reader import SessionRecord, read_session
-from isiw.log.schema import EstimateRecord, decode, encode
+from isiw.log.record import SessionRecord, read_session
+from isiw.log.schema import EstimateRecord, decode
+from isiw.log.writer import encode
 from isiw.session.examination import estimate_record
 from isiw.session.loop import Session
 from isiw.session.resume import open_session

@@ -12,7 +12,7 @@ import pytest
 import isiw
 from isiw.errors import LogError
 from isiw.log.new_verdicts import exclusion
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Intent
 from isiw.log.writer import LogWriter

@@ -16,7 +16,7 @@ from isiw.devices.limits import Limits
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, LogError, NotDelivered
 from isiw.findings import Kind
 from isiw.log.pulses import pulse_ages
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.log.salvage import salvage
 from isiw.session.interrupts import STILL_ARMED
 from isiw.session.loop import Session

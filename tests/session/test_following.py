@@ -11,7 +11,7 @@ import pytest
 from isiw.devices.clock import VirtualClock
 from isiw.devices.limits import Limits
 from isiw.errors import InvalidValueError
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.log.schema import Intent, Record
 from isiw.session.interrupts import Interrupts
 from isiw.session.loop import Session

@@ -14,14 +14,15 @@ from typing import Any
 
 import pytest
 
+from isiw import schedule
 from isiw.devices.clock import VirtualClock
-from isiw.devices.protocol import Readiness
+from isiw.devices.info import Readiness
 from isiw.errors import InvalidValueError, LogError, StrategyError
 from isiw.existing.reading import read_people
 from isiw.export.collection import read_logs
-from isiw.intervention import Arm, Part
+from isiw.intervention import Arm
 from isiw.log import moments, writer
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.log.schema import EstimateRecord, Intent, Waveform
 from isiw.pairing.agenda import Agenda
 from isiw.pairing.pulses import pairing_of
@@ -29,6 +30,7 @@ from isiw.plots.session import session_figure
 from isiw.plots.timeline import timeline_figure
 from isiw.report.comparison import comparison_rows, correlation_sentence, counts_table
 from isiw.report.words import final_statement, trial_rows
+from isiw.schedule import Part
 from isiw.server.live.view import View
 from isiw.session.afterwards import open_arm
 from isiw.session.blocks import Blocks
@@ -42,7 +44,7 @@ from scripted import FakeRealClock, scripted_strategy
 from session.test_following import Remembering
 
 PLAN = planned()
-PAIRS = [slot.number for slot in PLAN.slots if slot.part is Part.PAIRS]
+PAIRS = [slot.number for slot in schedule.slots(PLAN) if slot.part is Part.PAIRS]
 
 
 def kinds(given: list[Stimulus]) -> Counter[str]:
@@ -174,8 +176,8 @@ def test_killed_at_any_stimulus_and_resumed_none_is_lost_or_doubled(
     delivered, logs = killed
     rig = device()
     result = resume(logs[at], rig, knowing()).run()
-    assert [one.trial for one in rig.delivered] == list(range(at + 1, len(PLAN.slots)))
-    assert [trial.index for trial in result.trials] == list(range(len(PLAN.slots)))
+    assert [one.trial for one in rig.delivered] == list(range(at + 1, len(schedule.slots(PLAN))))
+    assert [trial.index for trial in result.trials] == list(range(len(schedule.slots(PLAN))))
     assert [one.tap_alone for one in rig.delivered] == [one.tap_alone for one in delivered[at + 1 :]]
     assert [one.isi_ms is None for one in rig.delivered] == [one.isi_ms is None for one in delivered[at + 1 :]]
     record = read_session(logs[at])
@@ -380,7 +382,7 @@ def test_nothing_is_made_of_a_concealed_log_until_somebody_opens_it_which_is_log
     after = read_session(log)
     assert [event.text for event in after.events if event.kind == "opening"] == ["The arm was opened: taps alone."]
     assert "Arm: taps alone." in final_statement(after)
-    assert len(SHOWING["table"](log)) == len(PLAN.slots)  # type: ignore[arg-type]
+    assert len(SHOWING["table"](log)) == len(schedule.slots(PLAN))  # type: ignore[arg-type]
     assert len(SHOWING["comparison"](log)) == 1  # type: ignore[arg-type]
 
 
@@ -486,4 +488,4 @@ def test_a_screen_that_is_gone_ends_no_intervention(log: Path, monkeypatch: pyte
 
     monkeypatch.setattr(sys.stdout, "write", gone)
     session(log, intervention(Arm.WINDOW)).run(progress=True)
-    assert len(read_session(log).table) == len(PLAN.slots)
+    assert len(read_session(log).table) == len(schedule.slots(PLAN))

@@ -13,7 +13,7 @@ from typing import Self
 import pytest
 
 from forked import run_and_end
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.record import SessionRecord, read_session
 from isiw.session.resume import resume
 from known import known
 from scripted import ScriptedDevice, scripted_strategy

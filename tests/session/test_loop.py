@@ -15,12 +15,12 @@ import pytest
 
 from isiw.design import IMPACT_SPACE, DesignSpace
 from isiw.devices.clock import VirtualClock
+from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, LogError, StrategyError
 from isiw.findings import Kind
 from isiw.log.places import log_exists
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.record import SessionRecord, read_session
 from isiw.log.schema import EstimateRecord, Intent
 from isiw.models.particles import ParticleModel
 from isiw.session.loop import Session

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 from isiw.errors import LogError
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.session.loop import Session
 from isiw.session.resume import open_session, resume
 from isiw.session.sink import SessionUpdate

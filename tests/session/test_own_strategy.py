@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 from isiw.errors import StrategyError
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.session.loop import Session
 from isiw.session.resume import open_session
 from isiw.session.sink import SessionUpdate

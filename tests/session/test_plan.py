@@ -8,16 +8,17 @@ from typing import Any
 
 import pytest
 
+from isiw import schedule
+from isiw.decision import StopKind
 from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import InvalidValueError
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.report.words import final_statement, truth_sentence
 from isiw.session.loop import Session
 from isiw.session.resume import open_session
 from isiw.strategy.catalogue import list_strategies, make_strategy
-from isiw.strategy.decisions import StopKind
 from isiw.subjects.cohorts import person_of
 from isiw.visit import VisitProtocol
 from isiw.window import Window
@@ -57,8 +58,8 @@ def test_limits_that_end_a_plan_are_refused_beforehand_with_the_line_to_write(
 def test_the_stimuli_that_pairs_take_hold_the_controls_between_them(share: float) -> None:
     protocol = VisitProtocol(tms_alone=share)
     for seed in range(5):
-        given = protocol.stimuli_for(60)
-        assert sum(protocol.control(trial, seed) is None for trial in range(given)) >= 60
+        given = schedule.stimuli_for(protocol, 60)
+        assert sum(schedule.control(protocol, trial, seed) is None for trial in range(given)) >= 60
 
 
 @pytest.mark.slow

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from isiw.decision import StopDecision
 from isiw.estimate import WindowEstimate
 from isiw.findings import Kind
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.session.console import PROGRESS_HEADINGS, PROGRESS_LEGEND, fitted, progress_row, standing
 from isiw.session.loop import Session
 from isiw.session.sink import SessionUpdate
 from isiw.session.terminal import COLUMNS
-from isiw.strategy.decisions import StopDecision
 from isiw.text.stimuli import STIMULI
 from isiw.trials import Status, Trial
 from isiw.window import Window

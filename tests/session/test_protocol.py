@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 import isiw
+from isiw import schedule
 from isiw.design import DesignSpace
 from isiw.devices.clock import VirtualClock
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import Device
 from isiw.errors import DeviceError, InvalidValueError
 from isiw.findings import Kind
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.session.loop import Session
 from isiw.session.resume import open_session, resume
 from isiw.session.sink import SessionUpdate
@@ -50,7 +51,7 @@ def test_intervals_and_rests_are_those_of_the_protocol(log: Path) -> None:
     session(log).run()
     t_s = [intent.t_s for intent in read_session(log).intents]
     gaps = [after - before for before, after in pairwise(t_s)]
-    wanted = [MIXED.interval_s(trial, 5) for trial in range(1, len(t_s))]
+    wanted = [schedule.interval_s(MIXED, trial, 5) for trial in range(1, len(t_s))]
     assert gaps == pytest.approx(wanted)
     assert gaps[11] == pytest.approx(120.0)
 
@@ -70,7 +71,7 @@ def test_controls_come_where_the_protocol_says_with_their_intents_first(log: Pat
     record = read_session(log)
     assert [intent.trial for intent in record.intents] == list(range(len(result.trials)))
     for trial, (isi_ms, tap_alone) in zip(result.trials, given(log), strict=True):
-        control = MIXED.control(trial.index, 5)
+        control = schedule.control(MIXED, trial.index, 5)
         assert (isi_ms is None, tap_alone) == (control is not None, control is Control.TAP_ALONE)
         assert (trial.commanded_isi_ms, trial.tap_alone) == (isi_ms, tap_alone)
         assert trial.told is (control is not Control.TAP_ALONE)
@@ -82,7 +83,7 @@ def test_controls_use_up_no_budget_and_tms_alone_is_learnt(log: Path) -> None:
     result = Session(
         device(), scripted_strategy(10, seed=5), log=log, protocol=MIXED, on_trial=lambda u: left.append(u.stimuli_left)
     ).run()
-    kinds = [MIXED.control(trial.index, 5) for trial in result.trials]
+    kinds = [schedule.control(MIXED, trial.index, 5) for trial in result.trials]
     assert kinds.count(None) == 10
     assert len(kinds) > 10
     assert result.decision.reason == "The budget of 10 stimuli is used up."
@@ -242,7 +243,7 @@ def test_a_loop_of_ones_own_waits_as_the_protocol_says(log: Path) -> None:
     record = read_session(log)
     assert (record.header.protocol, record.header.visit) == (protocol, visit)
     gaps = [b.t_s - a.t_s for a, b in pairwise(record.intents)]
-    assert gaps[:2] == pytest.approx([protocol.interval_s(trial, 2) for trial in (1, 2)])
+    assert gaps[:2] == pytest.approx([schedule.interval_s(protocol, trial, 2) for trial in (1, 2)])
     assert gaps[3] == pytest.approx(60.0)
 
 

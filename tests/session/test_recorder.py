@@ -30,7 +30,7 @@ from isiw.errors import (
     StrategyError,
 )
 from isiw.findings import Kind
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.log.schema import EstimateRecord, Event, Intent
 from isiw.log.writer import LogWriter
 from isiw.report import final_statement

@@ -10,7 +10,7 @@ import pytest
 
 from isiw.devices.deadlines import Deadlines
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, LogError
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.session.loop import Session
 from isiw.session.resume import open_session
 from isiw.session.rig import Safeguards

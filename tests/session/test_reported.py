@@ -12,7 +12,7 @@ from isiw.design import DesignSpace
 from isiw.devices.clock import VirtualClock
 from isiw.errors import ImplausibleDataWarning, InvalidValueError
 from isiw.findings import IN_DOUBT, Kind
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.record import SessionRecord, read_session
 from isiw.plots import session_figure
 from isiw.report import final_statement
 from isiw.session.afterwards import estimate_again, exclude

@@ -12,13 +12,13 @@ import pytest
 
 from forked import Forked
 from isiw.design import VALVE_SPACE, DesignSpace
+from isiw.devices.info import Readiness
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import Readiness
 from isiw.devices.simulated import SimulatedDevice, SimulatedPerson
 from isiw.errors import DamagedLogError, DeviceError, InvalidValueError, LimitExceededError, LogError, StrategyError
 from isiw.findings import Kind
 from isiw.log.headers import StrategyRecipe
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Intent, decode
 from isiw.log.writer import LogWriter

@@ -14,13 +14,13 @@ from typing import Any
 import pytest
 
 from forked import Forked
-from isiw.log.reader import read_session
+from isiw.decision import StopKind
+from isiw.log.record import read_session
 from isiw.session.interrupts import INTERRUPTED, Interrupts
 from isiw.session.loop import Session
 from isiw.session.resume import resume
 from isiw.session.rig import Safeguards
 from isiw.session.sink import SessionUpdate
-from isiw.strategy.decisions import StopKind
 from isiw.sweeps import Measurement
 from isiw.trials import Stimulus
 from scripted import ScriptedDevice, scripted_strategy

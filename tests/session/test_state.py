@@ -10,7 +10,7 @@ import pytest
 
 from isiw.devices.protocol import Answer
 from isiw.errors import DeviceError
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.session.loop import Session
 from isiw.session.rig import Safeguards
 from isiw.session.sink import Sink

@@ -11,7 +11,7 @@ import pytest
 
 from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.log.schema import Event, Intent
 from isiw.session import own_response
 from isiw.session.loop import Session

@@ -11,7 +11,7 @@ import pytest
 
 import isiw
 from isiw.devices.clock import VirtualClock
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 from isiw.errors import DeviceError, InvalidValueError, LimitExceededError, LogError
 from isiw.log.pulses import earlier_pulse_ages
 from isiw.log.schema import Intent, PulseOutcome, ThresholdEstimateRecord

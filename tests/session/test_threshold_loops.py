@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 from isiw.errors import ConfigError, InvalidValueError, LimitExceededError
 from isiw.log.pulses import pulse_ages
 from isiw.log.salvage import salvage

@@ -17,8 +17,8 @@ from forked import Forked
 from isiw.devices.limits import Limits
 from isiw.errors import InvalidValueError
 from isiw.findings import Kind
-from isiw.log.frames import read_session
 from isiw.log.new_verdicts import LOOKED_AT
+from isiw.log.record import read_session
 from isiw.log.schema import EstimateRecord, Event, Intent
 from isiw.report import final_statement
 from isiw.session.afterwards import exclude, include

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from isiw.design import DesignSpace
+from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import CallbackDevice, DeviceInfo
+from isiw.devices.protocol import CallbackDevice
 from isiw.findings import Kind, Severity
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.plots.session import session_figure
 from isiw.report import final_statement
 from isiw.session import progress_row

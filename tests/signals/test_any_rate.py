@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from isiw.design import DesignSpace
-from isiw.devices.protocol import CallbackDevice, DeviceInfo
+from isiw.devices.info import DeviceInfo
+from isiw.devices.protocol import CallbackDevice
 from isiw.session.loop import Session
 from isiw.signals import judge
 from isiw.strategy.catalogue import make_strategy

@@ -12,6 +12,7 @@ from found import doubt_of, fault_of
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.findings import Finding, Kind, Severity
+from isiw.session.stated import require_signals
 from isiw.signals import SignalLimits, judge
 from isiw.signals.watch import Watch
 from isiw.sweeps import Channel, Sweep
@@ -148,8 +149,8 @@ def test_a_window_that_begins_in_the_pulses_artefact_is_refused_where_it_is_stat
 ) -> None:
     stated = SignalLimits(mep_window_ms=window_ms)
     with pytest.raises(InvalidValueError, match="the pulse's artefact"):
-        stated.require_behind_artefact()
-    LIMITS.require_behind_artefact()
+        require_signals(stated)
+    require_signals(LIMITS)
 
 
 @pytest.mark.parametrize("values", [["1,5", "2,5"], [[1.0, 2.0], [1.0]], [1j, 2j]])

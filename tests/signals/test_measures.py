@@ -11,7 +11,8 @@ import pytest
 
 from isiw.design import DesignSpace
 from isiw.findings import Kind
-from isiw.log.frames import measures_of, read_session
+from isiw.log.frames import measures_of
+from isiw.log.record import read_session
 from isiw.session.loop import Session
 from isiw.session.rig import Safeguards
 from isiw.signals import MEP_WINDOWS_MS, SignalLimits, judge

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from isiw.design import DesignSpace
-from isiw.signals.reported import doubtful_from, far_ms, is_far
+from isiw.signals.plausible import doubtful_from, far_ms, is_far
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from isiw.existing.analysis import analysed
 from isiw.existing.delivered import Delivered
 from isiw.findings import Kind
 from isiw.log.new_verdicts import correction
-from isiw.log.reader import read_session
+from isiw.log.record import read_session
 from isiw.log.schema import Correction
 from isiw.log.writer import LogWriter
 from isiw.session.examination import examination_of, relearned

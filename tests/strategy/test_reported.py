@@ -7,12 +7,12 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
+from isiw.decision import StopKind
 from isiw.design import DesignSpace
 from isiw.errors import ImplausibleDataWarning, InvalidValueError
 from isiw.estimate import WindowEstimate
 from isiw.findings import IN_DOUBT, Kind
 from isiw.strategy.catalogue import make_strategy
-from isiw.strategy.decisions import StopKind
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Trial
 

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from isiw.decision import StopDecision, StopKind
 from isiw.dissertation.strategies import Converging, Passing, Settling
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
 from isiw.findings import NO_MEP
 from isiw.strategy.catalogue import make_strategy
-from isiw.strategy.decisions import Progress, StopDecision, StopKind, StoppingRule, looks_back, stimuli_left
+from isiw.strategy.decisions import Progress, StoppingRule, looks_back, stimuli_left
 from isiw.strategy.stopping import AnyOf, Budget, CredibleWidth, ExpectedF1, NoWindow, SmallGain
 from isiw.strategy.strategy import Strategy
 

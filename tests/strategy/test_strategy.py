@@ -13,12 +13,13 @@ import pytest
 
 from isiw.acquisition.fixed import IncrementalSweep
 from isiw.acquisition.information import MutualInformation, WindowGain
+from isiw.decision import StopDecision
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.dissertation.strategies import Settling
 from isiw.errors import InvalidValueError, OutOfSpaceError, StrategyError
 from isiw.models.protocol import Posterior
 from isiw.strategy.catalogue import make_strategy
-from isiw.strategy.decisions import Progress, StopDecision
+from isiw.strategy.decisions import Progress
 from isiw.strategy.recipe import Recipe
 from isiw.strategy.stopping import Budget
 from isiw.strategy.strategy import Strategy

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from isiw.errors import InvalidValueError
+from isiw.excess import EDGE_LEVEL
 from isiw.studies import InterventionPlan, intervene
 from isiw.subjects import Change, Plasticity, cohort
-from isiw.window import EDGE_LEVEL
 from pairing.tested import BEST_MS, person
 
 PLAN = InterventionPlan(before=5, pairs=60, after=4, after_min=(0.0, 30.0))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from isiw.errors import InvalidValueError
+from isiw.excess import EDGE_LEVEL
 from isiw.subjects import (
     AFTER_EFFECTS,
     EmgFloor,
@@ -19,7 +20,6 @@ from isiw.subjects import (
     cohort,
     with_after_effects,
 )
-from isiw.window import EDGE_LEVEL
 
 INSIDE_MS, OUTSIDE_MS = 90.0, 300.0
 PERSON = SimulatedSubject(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from isiw.text.toml_files import read_json, refuse_doubled
+from isiw.text.parsing import read_json, refuse_doubled
 
 
 @pytest.mark.parametrize("text", ['{"a": 1, "a": 1}', '[{"x": {"b": [1, 2], "b": [1]}}]', '{"a\\u0062": 1, "ab": 2}'])

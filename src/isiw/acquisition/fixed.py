@@ -13,7 +13,7 @@ from isiw.checks import Checked, Count, Positive
 from isiw.design import DesignSpace
 from isiw.lazy import scipy
 from isiw.models.protocol import Posterior, ProposesIsi
-from isiw.types import Array, Singles
+from isiw.types import Array, FloatArray, Singles
 
 
 def _only(index: int, isi_ms: Array) -> Singles:
@@ -86,8 +86,8 @@ class IncrementalSweep(Checked):
 
     def planned_isi_ms(self, space: DesignSpace, pairs: int) -> float:
         """The ISI [ms] of the pair of stimuli after so many pairs; see `FollowsPlan`."""
-        stops_ms = space.stops_ms(self.step_ms)
-        return space.snap(float(stops_ms[pairs // self.trials_per_isi % len(stops_ms)]))
+        isis_ms = stops_ms(space, self.step_ms)
+        return space.snap(float(isis_ms[pairs // self.trials_per_isi % len(isis_ms)]))
 
     def __call__(self, posterior: Posterior, isi_ms: Array) -> Array:
         """Score the ISI nearest to the one whose turn it is after so many trials 1 and all others 0, shape (1, t)."""
@@ -106,3 +106,20 @@ class OwnProposal:
     def __call__(self, posterior: ProposesIsi, isi_ms: Array) -> Array:
         """Score ISIs by their distance [ms] from the one it wants, negative, shape (b, t)."""
         return -np.abs(isi_ms - posterior.proposed_isis_ms()[:, :1])
+
+
+def stops_ms(space: DesignSpace, step_ms: float) -> FloatArray:
+    """The ISIs of a sweep from the first one on [ms], shape (t,).
+
+    Args:
+        space: the design space.
+        step_ms: from one to the next [ms]; if that is none of the grid's, the next multiple of its step.
+    """
+    if space.isis_ms:
+        stops_ms = [space.isis_ms[0]]
+        stops_ms += [i for i in space.isis_ms if i - stops_ms[-1] >= step_ms - 1e-9]
+        return np.array(stops_ms)
+    whole_ms = space.step_ms * math.ceil(step_ms / space.step_ms - 1e-9)
+    stops = math.floor((space.high_ms - space.low_ms) / whole_ms + 1e-9) + 1
+    isis_ms: FloatArray = space.low_ms + whole_ms * np.arange(stops, dtype=np.float64)
+    return isis_ms

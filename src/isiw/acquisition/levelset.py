@@ -15,10 +15,10 @@ import numpy as np
 from isiw.acquisition.protocol import ForeseesProfiles
 from isiw.acquisition.twostep import lookahead
 from isiw.checks import Checked, Positive
+from isiw.excess import EDGE_LEVEL
 from isiw.lazy import scipy
 from isiw.models.protocol import PredictsOutcomes, SamplesProfiles
 from isiw.types import Array
-from isiw.window import EDGE_LEVEL
 
 _INV_SQRT_2PI = 0.3989422804014327
 

@@ -21,7 +21,7 @@ import isiw
 from isiw.text.sanitize import counted, plain
 
 if TYPE_CHECKING:
-    from isiw.log.reader import SessionRecord
+    from isiw.log.record import SessionRecord
 
 _SILENT_S = 1.5
 _AGAIN_S = 0.05

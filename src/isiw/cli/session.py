@@ -26,7 +26,7 @@ from isiw.text.sanitize import command
 
 if TYPE_CHECKING:
     from isiw.devices.protocol import Device
-    from isiw.log.reader import SessionRecord
+    from isiw.log.record import SessionRecord
     from isiw.session.loop import Session
     from isiw.window import Window
 

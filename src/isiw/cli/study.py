@@ -32,7 +32,7 @@ from isiw.text.sanitize import command, counted, plain, read_whole
 if TYPE_CHECKING:
     import pandas as pd
 
-    from isiw.log.reader import SessionRecord
+    from isiw.log.record import SessionRecord
     from isiw.priors import LabPrior
     from isiw.strategy.settings.common import DescribedSetting
     from isiw.studies import Store, Unit

@@ -10,7 +10,8 @@ from typing import Final, NamedTuple
 from isiw.config.run import RunConfig
 from isiw.errors import ConfigError
 from isiw.findings import require_percent
-from isiw.log.reader import SessionRecord, ThresholdRecord, read_any
+from isiw.log.reader import ThresholdRecord
+from isiw.log.record import SessionRecord, read_any
 from isiw.log.salvage import salvage
 from isiw.log.verdicts import changed_after
 from isiw.session.threshold import search_of

@@ -17,9 +17,9 @@ from isiw.config.session import learns_from_earlier, simulated_device
 from isiw.devices.limits import USUAL_ITI_S
 from isiw.devices.simulated import SimulatedDevice
 from isiw.errors import ConfigError, InvalidValueError, IsiwError, LimitExceededError, LogError
+from isiw.log.continuing import continued_by, require_session
 from isiw.log.headers import RUN_KEY, Header
-from isiw.log.kinds import continued_by, require_session
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.record import SessionRecord, read_session
 from isiw.session.loop import Session
 from isiw.session.resume import limits_of_log
 from isiw.strategy.catalogue import make_strategy

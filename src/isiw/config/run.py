@@ -35,6 +35,7 @@ from isiw.config.sections import (
 from isiw.design import VALVE_SPACE, DesignSpace, missing_reference
 from isiw.devices.limits import USUAL_ITI_S, Limits, PulseLimits
 from isiw.errors import ConfigError, did_you_mean
+from isiw.session.stated import require_limits, require_protocol, require_visit
 from isiw.signals.limits import SignalLimits
 from isiw.text.toml_files import checked, read_toml
 from isiw.visit import Visit, VisitProtocol
@@ -183,10 +184,10 @@ def load_config(path: str | Path | None = None) -> RunConfig:
         values["device"] = {"folder": folder} | device
     config = _read_from(folder, checked(RunConfig, values, str(path)))
     require_units(values)
-    config.visit.noted().require_intensity()
+    require_visit(config.visit.noted())
     require_together(values)
-    limits_for(config).require_effect()
-    config.protocol.require_effect(config.limits.iti_s)
+    require_limits(limits_for(config))
+    require_protocol(config.protocol, config.limits.iti_s)
     return config
 
 

@@ -27,7 +27,7 @@ from isiw.devices.robot.tapper import Tapper, TapperSettings, preset
 from isiw.devices.robot.vane.rotation import Vane
 from isiw.devices.robot.vane.tapper import WAIT_MS, RotatingTapper
 from isiw.errors import ConfigError
-from isiw.findings import STOP_WIDTH_MS
+from isiw.findings import UnitScale
 from isiw.intervention import Intervention, Plan
 from isiw.strategy.catalogue import list_strategies, settings_for
 from isiw.strategy.threshold.curve import NamedPulses
@@ -36,6 +36,9 @@ from isiw.subjects.cohorts import COHORTS, person_of
 from isiw.subjects.subject import SimulatedSubject
 from isiw.text.toml_files import checked
 from isiw.visit import Visit
+
+STOP_WIDTH_MS: Final = UnitScale(1.0, too_small=("s", 1000))
+"""No interval of an edge is as narrow as the least; a width of 0.005 and less is meant to stop nothing."""
 
 STOPS_NOTHING_MS: Final = 0.005
 """A smaller width to stop at is there to stop nothing."""

@@ -24,16 +24,18 @@ from isiw.config.given import (
 from isiw.config.run import RunConfig, limits_for
 from isiw.config.sections import RobotConfig, SimulatedConfig, SubjectConfig, robot_for
 from isiw.design import DesignSpace
-from isiw.devices.protocol import Device, DeviceInfo, info_of
+from isiw.devices.info import DeviceInfo
+from isiw.devices.protocol import Device, info_of
 from isiw.devices.simulated import RecordedPerson, SimulatedDevice, SimulatedPerson, load_recordings
 from isiw.errors import ConfigError, StrategyError
 from isiw.files import write_output
 from isiw.intervention import Intervention
+from isiw.log.continuing import imported_sentence, require_search
 from isiw.log.headers import RUN_KEY, FirstStep
-from isiw.log.kinds import imported_sentence, require_search
 from isiw.log.places import log_exists
-from isiw.log.reader import SessionRecord, ThresholdRecord, read_session
-from isiw.log.schema import now
+from isiw.log.reader import ThresholdRecord
+from isiw.log.record import SessionRecord, read_session
+from isiw.log.writer import now
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.supra.prior import SupraPrior
 from isiw.priors import above, after, read_lab_prior

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Protocol, runtime_checkable
 
+from isiw.devices.allowed import earliest_s
 from isiw.devices.limits import PulseLimits
 from isiw.errors import LimitExceededError, NotDelivered
 
@@ -75,7 +76,7 @@ class Pacing:
         now_s, times_s = self._clock.now_s(), list(self._times_s)
         for interval_s in intervals_s:
             last_s = times_s[-1] if times_s else self._since_s
-            times_s.append(max(now_s, last_s + interval_s, self._limits.earliest_s(times_s, self._since_s)))
+            times_s.append(max(now_s, last_s + interval_s, earliest_s(self._limits, times_s, self._since_s)))
         return times_s[-1] - now_s if intervals_s else 0.0
 
     def begin_again(self) -> None:

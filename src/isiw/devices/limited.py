@@ -6,9 +6,11 @@ import dataclasses
 import threading
 from collections.abc import Callable, Sequence
 
+from isiw.devices.allowed import require_intensity, require_isi, require_left, require_state
 from isiw.devices.clock import ROUNDING_S, Clock, Pacing, VirtualClock
+from isiw.devices.info import DeviceInfo, Readiness
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import Answer, Device, DeviceInfo, Readiness, readiness_of, require_staged
+from isiw.devices.protocol import Answer, Device, readiness_of, require_staged
 from isiw.errors import DeviceError, LimitExceededError, NotDelivered
 from isiw.trials import Stimulus
 from isiw.visit import Visit
@@ -114,10 +116,10 @@ class LimitedDevice:
 
     def check(self, stimulus: Stimulus) -> None:
         """Raise if this stimulus must not be delivered now."""
-        self._limits.require_left(self._delivered)
+        require_left(self._limits, self._delivered)
         if stimulus.isi_ms is not None:
-            self._limits.require_isi(stimulus.isi_ms)
-        self._limits.require_intensity(stimulus.intensity_pct_rmt)
+            require_isi(self._limits, stimulus.isi_ms)
+        require_intensity(self._limits, stimulus.intensity_pct_rmt)
         self._require_given(stimulus)
         if (wait_s := self.wait_s()) > ROUNDING_S:
             raise LimitExceededError(
@@ -132,7 +134,7 @@ class LimitedDevice:
                 f"the device is not ready: {state.reason or 'it does not say why'}",
                 remedy="This stimulus was not delivered. Continue when the device is ready.",
             )
-        self._limits.require_state(state)
+        require_state(self._limits, state)
         require_set(self._noted, self._last_set_pct_rmt, state)
         if self._dead_man is not None and self._dead_man() is not True:
             raise LimitExceededError(

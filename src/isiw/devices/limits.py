@@ -1,27 +1,16 @@
-"""Limits that no strategy, session or mistake can exceed, and what they say about the next stimulus."""
+"""Limits that no strategy, session or mistake can exceed, as somebody states them and logs keep them."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from typing import Any, Self
 
 from isiw.checks import Checked, Count, NonNegative, Number, Positive, fields_of
 from isiw.design import DesignSpace, require_space
-from isiw.devices.protocol import Readiness
-from isiw.errors import InvalidValueError, LimitExceededError
-from isiw.visit import interval_s
-
-_GRID_TOLERANCE_MS = 1e-6
-_SAME_PCT_MSO = 0.01  # what a conversion on the way may lose
+from isiw.errors import InvalidValueError
 
 USUAL_ITI_S = 5.0
 """Between two stimuli that isiw delivers, if nobody states another interval [s]."""
-
-MOST_COIL_C = 60.0
-"""No coil that touches a person may be as hot as that [°C]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,102 +70,11 @@ class PulseLimits(Checked):
         """The same with this interval [s], unless another one is stated."""
         return replace(self, min_iti_s=iti_s) if self.min_iti_s is None else self
 
-    def require_effect(self) -> None:
-        """Raise InvalidValueError if a limit limits nothing, or is probably in another unit.
-
-        The interval alone may keep what a rest or a period asks for, or be in ms, and no coil be as hot as its limit.
-
-        It is for limits that somebody states: those of earlier logs stay readable.
-        """
-        interval_s("Limits.min_iti_s", self.iti_s)
-        if self.max_coil_c is not None and self.max_coil_c > MOST_COIL_C:
-            raise InvalidValueError(
-                "Limits.max_coil_c is hotter than a coil may be that touches a person, so it would have no effect",
-                got=self.max_coil_c,
-                expected=f"at most {MOST_COIL_C:g} °C",
-                remedy="Is it in °F, or in tenths of a degree? Write it in °C, such as 40.",
-            )
-        if self.max_block_pulses is not None and self.rest_s <= self.iti_s:
-            raise InvalidValueError(
-                "the rest of the limits is no longer than the interval between two stimuli, so it would have no effect",
-                got=f"rest_s {self.rest_s:g}, min_iti_s {self.iti_s:g}",
-                expected=f"rest_s above {self.iti_s:g}",
-                remedy="Set a longer rest_s [s], or leave out max_block_pulses and rest_s.",
-            )
-        # At the shortest interval n stimuli take so long that the next one comes when the first is n intervals old.
-        if self.max_period_pulses is not None and self.period_s <= self.max_period_pulses * self.iti_s:
-            raise InvalidValueError(
-                "the period limit has no effect: at the shortest interval no more than max_period_pulses fit into it",
-                got=f"period_s {self.period_s:g}, max_period_pulses {self.max_period_pulses}, min_iti_s {self.iti_s:g}",
-                expected=f"period_s above {self.max_period_pulses * self.iti_s:g}",
-                remedy="Set a longer period_s [s] or fewer max_period_pulses, or leave out both.",
-            )
-
     def within(self, space: DesignSpace) -> Limits:
         """The same, with exactly the ISIs of a design space."""
         require_space(space)
         own, step_ms = fields_of(PulseLimits, self), None if space.isis_ms else space.step_ms
         return Limits(space.low_ms, space.high_ms, step_ms=step_ms, isis_ms=space.isis_ms, **own)
-
-    def require_left(self, delivered: int) -> None:
-        """Raise LimitExceededError if so many deliveries leave none."""
-        if delivered >= self.max_pulses:
-            raise LimitExceededError(
-                f"the limit of {self.max_pulses} pulses is reached",
-                remedy="This stimulus was not delivered. For more pulses raise max_pulses in the limits.",
-            )
-
-    def require_intensity(self, pct_rmt: float | None) -> None:
-        """Raise LimitExceededError if an intensity to be set [% RMT] is beyond the limits; None sets none."""
-        most = self.max_intensity_pct_rmt
-        if pct_rmt is not None and not (most is not None and pct_rmt <= most):
-            raise LimitExceededError(
-                "the intensity is beyond the limits",
-                got=f"{pct_rmt:g} % RMT",
-                expected="no intensity to be set" if most is None else f"at most {most:g} % RMT",
-                remedy="This stimulus was not delivered. Write max_intensity_pct_rmt under [limits] if your ethics "
-                "approval allows it.",
-            )
-
-    def require_state(self, state: Readiness) -> None:
-        """Raise LimitExceededError if the device reports a hot coil or another intensity, or lacks what is limited."""
-        coil_c, intensity, own = state.coil_c, state.intensity_pct_mso, self.intensity_pct_mso
-        if self.max_coil_c is not None and not (coil_c is not None and coil_c <= self.max_coil_c):
-            way_on = "Let the device's readiness() report coil_c" if coil_c is None else "Let the coil cool"
-            raise LimitExceededError(
-                "the coil is too hot, or its temperature is not known",
-                got="no temperature" if coil_c is None else f"{coil_c:g} °C",
-                expected=f"at most {self.max_coil_c:g} °C",
-                remedy=f"This stimulus was not delivered. {way_on}, then resume the session.",
-            )
-        if own is not None and (intensity is None or abs(intensity - own) > _SAME_PCT_MSO):
-            reporting = "Let the device's readiness() report intensity_pct_mso"
-            raise LimitExceededError(
-                "the intensity is not the session's, or is not known",
-                got="no intensity" if intensity is None else f"{intensity:g} % MSO",
-                expected=f"{own:g} % MSO",
-                remedy="This stimulus was not delivered. "
-                f"{reporting if intensity is None else 'Set the intensity back'}, then resume the session.",
-            )
-
-    def earliest_s(self, times_s: Sequence[float], since_s: float) -> float:
-        """When the next stimulus may come at the earliest [s].
-
-        Args:
-            times_s: when the earlier ones came [s], ascending, shape (n,).
-            since_s: when the session began, or went on [s]; it waits a whole interval before its first stimulus.
-        """
-        if not times_s:
-            return since_s + self.iti_s
-        earliest = [max(since_s, times_s[-1]) + self.iti_s]
-        if self.max_block_pulses is not None:
-            last = times_s[-self.max_block_pulses :]
-            is_block = all(after - before < self.rest_s for before, after in pairwise(last))
-            if is_block and len(last) == self.max_block_pulses:
-                earliest.append(times_s[-1] + self.rest_s)
-        if self.max_period_pulses is not None and len(times_s) >= self.max_period_pulses:
-            earliest.append(times_s[-self.max_period_pulses] + self.period_s)
-        return max(earliest)
 
 
 @dataclass(frozen=True)
@@ -215,29 +113,3 @@ class Limits(PulseLimits):
             InvalidValueError: no design space, or values that are not finite or limit nothing.
         """
         return PulseLimits(**limits).within(space)
-
-    def require_isi(self, isi_ms: float) -> None:
-        """Raise LimitExceededError if an ISI is beyond the range, or off the grid."""
-        if not self.low_ms <= isi_ms <= self.high_ms:
-            raise LimitExceededError(
-                "the ISI is beyond the limits",
-                got=isi_ms,
-                expected=f"{self.low_ms:g} to {self.high_ms:g} ms",
-                remedy="This stimulus was not delivered. Narrow the design space to the limits; widen the limits only "
-                "if your ethics approval allows it.",
-            )
-        if self.isis_ms and isi_ms not in self.isis_ms:
-            raise LimitExceededError(
-                "the ISI is not one of those that the limits list",
-                got=isi_ms,
-                expected=f"one of {', '.join(f'{one:g}' for one in self.isis_ms)} ms",
-                remedy="This stimulus was not delivered. Use the same list in the design space and in the limits.",
-            )
-        if self.step_ms and math.fabs(math.remainder(isi_ms - self.low_ms, self.step_ms)) > _GRID_TOLERANCE_MS:
-            raise LimitExceededError(
-                "the ISI is not on the grid of the limits",
-                got=isi_ms,
-                expected=f"{self.low_ms:g} ms and steps of {self.step_ms:g} ms",
-                remedy="This stimulus was not delivered. Use the same low_ms and step_ms in the design space and in "
-                "the limits.",
-            )

@@ -1,109 +1,17 @@
-"""The protocol of a device in terms familiar from instrument control, its description, and a device of functions."""
+"""The protocol of a device in terms familiar from instrument control, and a device of functions."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Final, Literal, Protocol, TypeAlias, runtime_checkable
+from collections.abc import Callable, Sequence
+from typing import Protocol, TypeAlias, runtime_checkable
 
-from isiw.checks import (
-    Checked,
-    Count,
-    Flag,
-    MeanAndSd,
-    NonNegative,
-    Number,
-    Positive,
-    Text,
-    text,
-)
-from isiw.errors import DeviceError, InvalidValueError, NotDelivered
+from isiw.devices.info import DeviceInfo, Readiness
+from isiw.errors import DeviceError, NotDelivered
 from isiw.sweeps import Measurement, Sweep
 from isiw.trials import Stimulus
-from isiw.types import Conditioning, Reference
 
 Answer: TypeAlias = Sweep | Measurement
 """What came of a stimulus: waveforms, or the MEP as the device measured it."""
-
-
-Guard: TypeAlias = Literal["watchdog", "heartbeat"]
-"""What disarms a device if isiw dies."""
-
-NOT_PROTECTED: Final = "not protected if isiw dies"
-
-
-@dataclass(frozen=True)
-class DeviceInfo(Checked):
-    """A device's description of itself; the log keeps it.
-
-    Args:
-        name: what it is, in a few words.
-        reference: the event that its ISIs count from.
-        simulated: True if nothing is delivered to anybody; such a session does not wait between trials.
-        channels: the unit of each waveform by the channel's name; empty for a device that measures the MEP itself.
-        version: firmware or software version, as text.
-        detection_limit_mv: amplitudes below it are reported as 0 [mV]; None if there is no such limit.
-        hit_delay_ms: from the valve command to the impact, mean and SD over people [ms]; `isiw timing LOG` measures it.
-            None if it is not known, or if ISIs count from the impact.
-        conditioning: what it delivers first: a tap on the tendon, or an electrical pulse to the nerve, as an impact.
-        address: what it is connected to, such as "COM3"; no two sessions of a computer drive a device of one address.
-        tap_alone: whether it can deliver a tap without the magnetic pulse, which `Stimulus.tap_alone` asks for.
-        sets_intensity: whether it sets the intensity that `Stimulus.intensity_pct_rmt` asks for, before the pulse.
-        if_isiw_dies: what disarms it if isiw dies while it is armed: "watchdog", a process beside isiw, such as
-            `isiw.Watchdog`, or "heartbeat", a sign of life without which it disarms itself; None if nothing does.
-        shortest_iti_s: the shortest time between two stimuli that it gives [s], which binds the limits; None if any.
-        most_pulses: the most stimuli that it gives from one start to the next; None if any number.
-
-    Raises:
-        InvalidValueError: an unknown reference, conditioning stimulus or guard, a detection limit or a hit delay that
-            is not positive, a limit below 0, a name, version, address or unit that is no text, or a word where True or
-            False is due.
-    """
-
-    name: Text
-    reference: Reference
-    simulated: Flag = False
-    channels: Mapping[str, str] = field(default_factory=dict)
-    version: Text = ""
-    detection_limit_mv: Positive | None = None
-    hit_delay_ms: MeanAndSd | None = None
-    address: Text = ""
-    tap_alone: Flag = False
-    conditioning: Conditioning = "tap"
-    if_isiw_dies: Guard | None = None
-    shortest_iti_s: NonNegative | None = None
-    most_pulses: Count | None = None
-    sets_intensity: Flag = False
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not isinstance(self.channels, Mapping):
-            raise InvalidValueError(
-                "DeviceInfo.channels must be a table of units", got=self.channels, expected='such as {"emg": "mV"}'
-            )
-        for channel, unit in self.channels.items():
-            text("the name of a channel in DeviceInfo.channels", channel)
-            text(f"the unit of {channel!r} in DeviceInfo.channels", unit)
-
-
-@dataclass(frozen=True)
-class Readiness(Checked):
-    """A device's state before a stimulus, as it reports it.
-
-    Args:
-        ready: whether it could fire now.
-        reason: why it is not ready.
-        coil_c: temperature of the coil [°C]; None if it is not measured.
-        intensity_pct_mso: intensity that is set [% of the maximum stimulator output]; None if it is not known.
-
-    Raises:
-        InvalidValueError: `ready` that is neither True nor False, a value that is not finite, or an intensity below 0.
-    """
-
-    ready: Flag = True
-    reason: str = ""
-    coil_c: Number | None = None
-    intensity_pct_mso: NonNegative | None = None
 
 
 @runtime_checkable
@@ -185,13 +93,6 @@ def info_of(device: Device) -> DeviceInfo:
             remedy='Return DeviceInfo("what it is", "impact"), or "valve", the event that its ISIs count from.',
         )
     return info
-
-
-def unprotected(info: DeviceInfo) -> str | None:
-    """A sentence for whoever arms a device that stays armed if isiw dies; None for any other."""
-    if info.simulated or info.if_isiw_dies is not None:
-        return None
-    return f"{info.name} is {NOT_PROTECTED}: what is armed then stays armed. Keep the switch of the stimulator at hand."
 
 
 def readiness_of(device: Device) -> Readiness:

@@ -9,15 +9,17 @@ from typing import Literal
 
 import numpy as np
 
+from isiw.acquisition.fixed import stops_ms
 from isiw.checks import Checked, Count, Natural, NonNegative, Positive, whole
 from isiw.design import DesignSpace
 from isiw.dissertation.regression import curve_masks
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
+from isiw.excess import EDGE_LEVEL
 from isiw.models.protocol import Observation
 from isiw.models.shared.history import AmplitudeHistory, FloorTreatment, OfAmplitudes, PersonTrials
 from isiw.types import FloatArray, Singles
-from isiw.window import EDGE_LEVEL, Window
+from isiw.window import Window
 
 SweepRule = Literal["baseline", "share"]
 
@@ -73,7 +75,7 @@ class SweepPosterior(OfAmplitudes):
 
     @cached_property
     def _stops_ms(self) -> FloatArray:
-        return self.space.stops_ms(self.model.step_ms)
+        return stops_ms(self.space, self.model.step_ms)
 
     def proposed_isis_ms(self) -> Singles:
         """One sweep, from where it has come to; see `ProposesIsi`."""

@@ -17,11 +17,12 @@ from threadpoolctl import ThreadpoolController
 from isiw.checks import Checked, Count, NonNegative, Number, Positive, number, whole
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
+from isiw.excess import EDGE_LEVEL, least_excess_mv
 from isiw.lazy import scipy, sklearn
 from isiw.models.protocol import Observation
 from isiw.models.shared.history import AmplitudeHistory, FloorTreatment, OfAmplitudes
 from isiw.types import Array, BoolArray, FloatArray, IntArray, Singles
-from isiw.window import EDGE_LEVEL, Window, least_excess_mv
+from isiw.window import Window
 
 Segments = Literal["peak", "all"]
 
@@ -56,7 +57,7 @@ class FittedCurve:
 def curve_masks(
     curves_mv: FloatArray, floor_mv: float, segments: Segments = "peak", level: float = EDGE_LEVEL
 ) -> BoolArray:
-    """Which grid points lie in the windows of some curves, by the rule of `isiw.window.window_from_excess`."""
+    """Which grid points lie in the windows of some curves, by the rule of `isiw.excess.window_from_excess`."""
     peak = curves_mv.max(axis=-1, keepdims=True)
     masks: BoolArray = curves_mv >= least_excess_mv(peak, floor_mv, level)
     if segments == "all":

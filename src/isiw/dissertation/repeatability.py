@@ -21,7 +21,7 @@ from isiw.devices.robot.vane.tapper import RATE_HZ, draw_strokes, record_strokes
 from isiw.devices.robot.waveforms import record_emg, record_robot, sample_times_ms
 from isiw.errors import InvalidValueError
 from isiw.lazy import pd, scipy
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.signals.events import (
     EMG_DELAY_MS,
     TapEvents,

@@ -13,13 +13,14 @@ from isiw.acquisition.fixed import OwnProposal
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.acquisition.registry import acquisition_named
 from isiw.checks import Checked, Count, NonNegative, Positive, whole
+from isiw.decision import StopDecision, StopKind
 from isiw.design import DesignSpace
 from isiw.dissertation.bootstrap import BootstrapFilter
 from isiw.dissertation.incremental import SweepModel
 from isiw.dissertation.nonlinear import NonlinearRegression
 from isiw.dissertation.regression import GaussianProcessRegression, RegressionModel, SupportVectorRegression
 from isiw.models.shared.history import FloorTreatment
-from isiw.strategy.decisions import Progress, StopDecision, StopKind, StoppingRule
+from isiw.strategy.decisions import Progress, StoppingRule
 from isiw.strategy.settings.common import AcquisitionName, Settings
 from isiw.strategy.stopping import AnyOf, Budget
 

@@ -13,9 +13,10 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 
+from isiw.decision import StopKind
 from isiw.design import DesignSpace, require_space
+from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import DeviceInfo
 from isiw.errors import InvalidValueError, LogError, os_errors
 from isiw.estimate import WindowEstimate
 from isiw.existing.delivered import Delivered
@@ -24,9 +25,9 @@ from isiw.findings import Kind
 from isiw.log.headers import Header
 from isiw.log.names import require_free
 from isiw.log.places import log_of
-from isiw.log.reader import SessionRecord
-from isiw.log.schema import Event, Record, Waveform, clock_ns
-from isiw.log.writer import LogWriter
+from isiw.log.record import SessionRecord
+from isiw.log.schema import Event, Record, Waveform
+from isiw.log.writer import LogWriter, clock_ns
 from isiw.plots.session import session_figure
 from isiw.plots.style import inline_svg, save_figure
 from isiw.report.page import save_report
@@ -36,7 +37,6 @@ from isiw.session.examination import estimate_record
 from isiw.signals.plausible import before_impact
 from isiw.signals.watch import Watch
 from isiw.strategy.catalogue import make_strategy
-from isiw.strategy.decisions import StopKind
 from isiw.strategy.strategy import Strategy
 from isiw.sweeps import Measurement, Sweep
 from isiw.trials import Status, Trial, TrialTable

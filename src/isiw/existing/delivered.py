@@ -16,7 +16,7 @@ from isiw.design import MOST_ISIS, DesignSpace
 from isiw.errors import InvalidValueError, LogError
 from isiw.existing.layout import EMG_UNITS, ISI_UNITS_MS
 from isiw.findings import AMPLITUDE_MV, Kind
-from isiw.log.kinds import require_search
+from isiw.log.continuing import require_search
 from isiw.signals.limits import SignalLimits
 from isiw.signals.plausible import implausible_scale
 from isiw.sweeps import Channel

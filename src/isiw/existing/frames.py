@@ -19,8 +19,8 @@ from isiw.existing.cells import is_missing
 from isiw.existing.doubts import LEFT_OUT
 from isiw.existing.layout import COLUMNS, UNIT_WORDS, Layout, letters
 from isiw.existing.quantities import require_one
-from isiw.files import opened
 from isiw.lazy import pd, scipy
+from isiw.opening import opened
 from isiw.text.named_code import library
 from isiw.text.sanitize import counted
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Final, cast
 
 from isiw.errors import ConfigError, InvalidValueError
-from isiw.files import opened
+from isiw.opening import opened
 from isiw.text.named_code import library
 
 _HDF5: Final = b"\x89HDF\r\n\x1a\n"

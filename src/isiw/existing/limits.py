@@ -16,8 +16,8 @@ from typing import IO, Final
 
 from isiw.checks import Checked, Count, Positive, number
 from isiw.errors import InvalidValueError
-from isiw.files import opened
 from isiw.lazy import pd
+from isiw.opening import opened
 
 try:
     import resource

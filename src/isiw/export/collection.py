@@ -18,7 +18,8 @@ from isiw.errors import InvalidValueError, LogError
 from isiw.findings import Kind
 from isiw.log.headers import Header
 from isiw.log.places import kept_for, part_of
-from isiw.log.reader import SessionRecord, read_salvaged, read_session, topics_of
+from isiw.log.reader import topics_of
+from isiw.log.record import SessionRecord, read_salvaged, read_session
 from isiw.log.records import Onset
 from isiw.log.salvage import only_in, salvage_file
 from isiw.log.schema import Event

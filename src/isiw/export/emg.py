@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.sweeps import Channel
 from isiw.text.named_code import library
 from isiw.text.stimuli import TAP, StimulusWords, meanings

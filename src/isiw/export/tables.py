@@ -9,12 +9,12 @@ from typing import Any, Final
 
 from isiw.dissertation.response_counts import by_isi, count_trials
 from isiw.errors import InvalidValueError
-from isiw.estimate import Estimate
 from isiw.export.collection import Part, log_losses, stimulus_of
+from isiw.figures import Estimate
 from isiw.files import write_output
 from isiw.lazy import pd
 from isiw.log.frames import trial_columns, trial_frame
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.text.sanitize import one_line
 from isiw.text.stimuli import STIMULI, TAP, StimulusWords, meanings
 

@@ -1,2 +1,2 @@
+from .continuing import imported_sentence as imported_sentence
 from .kinds import LogKind as LogKind
-from .kinds import imported_sentence as imported_sentence

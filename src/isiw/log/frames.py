@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any, Final
 
-from isiw.checks import fields_of
 from isiw.lazy import pd
-from isiw.log import reader
-from isiw.log.reader import SessionRecord
+from isiw.log.reader import LoggedSession
 from isiw.log.schema import EstimateRecord
 from isiw.signals.measures import Measures, measures
 from isiw.signals.tap import TapResponses
@@ -19,34 +16,7 @@ from isiw.text.stimuli import TAP, StimulusWords, meanings
 from isiw.trials import Trial
 
 
-class FramedRecord(SessionRecord):
-    """A session as its log has it, with its trials as a DataFrame."""
-
-    @property
-    def trials(self) -> pd.DataFrame:
-        """All trials as a DataFrame, a row a trial, indexed by their number: onset, outcome, and the estimate after it.
-
-        The columns are those of `isiw.log.frames.TRIAL_COLUMNS`.
-        """
-        return trial_frame(self)
-
-
-def read_session(path: str | Path, *, channels: Iterable[str] | None = None) -> FramedRecord:
-    """Read a log, finished or not, whole or damaged; `losses` says what is missing.
-
-    Args:
-        path: the log, with or without `.part`.
-        channels: the channels whose samples are wanted, such as `["emg"]`; waveforms of others have none. All by
-            default; with fewer a log is read faster, and in less memory.
-
-    Raises:
-        LogError: no such file, not a log, or one from a newer version.
-        DamagedLogError: a log of which not even the header can be read.
-    """
-    return FramedRecord(**fields_of(SessionRecord, reader.read_session(path, channels=channels)))
-
-
-def measures_of(record: SessionRecord) -> Mapping[int, Measures]:
+def measures_of(record: LoggedSession) -> Mapping[int, Measures]:
     """Measures of the sweeps of trials that count, beside the amplitude, by the trial's number."""
     emg = {trial: channel for (trial, name), channel in record.waveforms.items() if name == "emg"}
     signals, taps = record.header.signals, TapResponses(record.header.signals.mep_window_ms)
@@ -112,7 +82,7 @@ _NUMBERS: Final = tuple(name for name in TRIAL_COLUMNS if name not in {*_TEXTS, 
 _ESTIMATE: Final = tuple(TRIAL_COLUMNS)[tuple(TRIAL_COLUMNS).index("p_window") :]
 
 
-def trial_frame(record: SessionRecord) -> pd.DataFrame:
+def trial_frame(record: LoggedSession) -> pd.DataFrame:
     """All trials as a DataFrame, a row a trial, columns as in `TRIAL_COLUMNS`, indexed by `index`."""
     estimates_by_trial = {estimate.trial: estimate for estimate in record.estimates}
     times = {trial: {"onset_s": onset.onset_s, "intent_utc": onset.at_ns} for trial, onset in record.onsets.items()}

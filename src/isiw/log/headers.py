@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Any, Final, Literal, TypeAlias
 
-import tomli_w
 from pydantic import (
     BaseModel,
     BeforeValidator,
@@ -32,12 +31,12 @@ from pydantic import (
 
 from isiw.checks import Checked, choice, mean_and_sd, number, whole
 from isiw.design import DesignSpace
+from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import DeviceInfo
-from isiw.errors import InvalidValueError, LogError
+from isiw.errors import InvalidValueError
 from isiw.intervention import Intervention
 from isiw.signals.limits import SignalLimits
-from isiw.strategy.threshold.pulses import IntensityRange
+from isiw.strategy.threshold.estimate import IntensityRange
 from isiw.text.stimuli import STIMULI, StimulusWords
 from isiw.trials import Trial
 from isiw.types import Conditioning, Reference
@@ -341,14 +340,3 @@ def first_fault(error: ValueError) -> str:
         where = first["loc"][first["loc"][:1] in {(kind,) for kind in _KIND_TAGS} :]  # without the kind
         return f"{'.'.join(map(str, where))}: {first['msg']}"
     return str(error)
-
-
-def as_toml(header: AnyHeader) -> bytes:
-    """A header as a log has it once more, as TOML."""
-    try:
-        return tomli_w.dumps(header.model_dump(mode="json", exclude_none=True)).encode()
-    except (TypeError, ValueError) as error:
-        raise LogError(
-            f"the header cannot be written: {error}",
-            remedy="Give subject, config and the strategy's settings as TOML values, and leave out what is None.",
-        ) from error

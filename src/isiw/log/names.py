@@ -1,18 +1,19 @@
-"""Whether a log can begin at a path: what it can be called, and what may have its name already."""
+"""Whether a log can begin, or continue, at a path: what it can be called, and what may have its name already."""
 
 from __future__ import annotations
 
 import os
 from contextlib import suppress
 from pathlib import Path
-from typing import Final, cast
+from typing import IO, Final, cast
 
 from isiw.errors import LogError
 from isiw.files import in_the_way, is_reserved, twin
+from isiw.log.continuing import continued_by
+from isiw.log.durable import claimed
 from isiw.log.headers import AnyHeader
-from isiw.log.kinds import continued_by
-from isiw.log.places import log_of, part_of
-from isiw.log.salvage import salvage_file
+from isiw.log.places import Fingerprint, log_of, part_of
+from isiw.log.salvage import Salvage, holds, salvage_file
 from isiw.log.schema import decode
 
 COPYING: Final = ".resuming"
@@ -81,3 +82,40 @@ def _way_on(existing: Path) -> str:
                 header = cast("AnyHeader", decode(message.topic, message.data))
                 return f"Choose another path, or continue it: {continued_by(log_of(existing), header)}"
     return "Choose another path; nothing of this log can be continued."
+
+
+def require_unchanged(source: IO[bytes], salvage: Salvage) -> None:
+    """Raise if a file is no longer the one that was salvaged."""
+    there = None
+    with suppress(FileNotFoundError):  # of a session that has just finished it, which may be between any two calls
+        there = Fingerprint.of(salvage.path)
+    if not Fingerprint.of(source) == salvage.fingerprint == there:
+        raise LogError(
+            "the log has changed since it was read", got=str(salvage.path), remedy="Begin again by reading it."
+        )
+
+
+def own_file(target: Path, salvage: Salvage) -> Fingerprint | None:
+    """The file at a log's final name, which its continuation may replace; None if there is none."""
+    if salvage.path == target:
+        if part_of(target).exists():
+            with claimed(part_of(target)):  # which raises if a session writes to it
+                raise _foreign(part_of(target), salvage)
+        return salvage.fingerprint
+    if not target.exists():
+        return None
+    try:
+        earlier = salvage_file(target)
+    except LogError as error:
+        raise _foreign(target, salvage) from error
+    if not holds(salvage, earlier):
+        raise _foreign(target, salvage)
+    return earlier.fingerprint
+
+
+def _foreign(path: Path, salvage: Salvage) -> LogError:
+    return LogError(
+        "another session's file is where this log would be, and it is never replaced",
+        got=str(path),
+        remedy=f"Give {salvage.path.name} or {path.name} another name or folder, and continue from there.",
+    )

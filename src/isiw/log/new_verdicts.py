@@ -12,8 +12,7 @@ from isiw.errors import InvalidValueError
 from isiw.findings import Finding, Kind, Severity
 from isiw.log.schema import Correction, Event, EventKind
 from isiw.log.verdicts import CHANGE, VERDICTS, changed_after, doubted_by
-from isiw.signals.plausible import implausible_amplitude
-from isiw.signals.reported import doubtful_from, is_far
+from isiw.signals.plausible import doubtful_from, implausible_amplitude, is_far
 from isiw.trials import Trial, TrialTable
 
 LOOKED_AT: Final = "Rejected by the operator after looking at the MEP."

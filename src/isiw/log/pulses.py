@@ -14,13 +14,14 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from isiw.errors import DamagedLogError, LogError
-from isiw.files import is_mcap, opened
 from isiw.log.headers import Header
+from isiw.log.kinds import LogKind
 from isiw.log.moments import Ages, Moment
 from isiw.log.places import kept_for, log_exists, log_of
-from isiw.log.reader import of_production, read_any
+from isiw.log.reader import LoggedSession, of_production, read_any
 from isiw.log.salvage import Salvage, holds, salvage
 from isiw.log.schema import Event, Intent, Message, Record, decode
+from isiw.opening import is_mcap, opened
 from isiw.text.sanitize import counted
 from isiw.trials import Trial
 
@@ -180,7 +181,7 @@ def _of_subject(log: Path, subject: str) -> list[Given]:
     salvaged = salvage(log)
     if of_production(salvaged) and not _given(salvaged):  # nobody is stimulated in such a task
         return []
-    record = read_any(salvaged)
+    record = read_any(salvaged, LogKind.SEARCH, LoggedSession)
     record.require_read("subject", "device")
     header = record.header
     if header.subject != subject or header.device.simulated:

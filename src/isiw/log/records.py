@@ -16,6 +16,7 @@ from typing import Final, NamedTuple, TypeVar
 from pydantic import ValidationError
 
 from isiw.checks import MOST_TRIALS
+from isiw.decision import StopKind
 from isiw.errors import DamagedLogError, LogError
 from isiw.findings import Kind
 from isiw.log.headers import AnyHeader, Production, first_fault, header_in_parts
@@ -32,10 +33,9 @@ from isiw.log.schema import (
     Waveform,
     decode,
 )
-from isiw.strategy.decisions import StopKind
 from isiw.sweeps import Channel
+from isiw.text.parsing import parsed, read_json
 from isiw.text.sanitize import counted
-from isiw.text.toml_files import parsed, read_json
 from isiw.trials import Trial
 
 

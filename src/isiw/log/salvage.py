@@ -16,10 +16,10 @@ from mcap.exceptions import EndOfFile
 from mcap.stream_reader import CRCValidationError, StreamReader
 
 from isiw.errors import DamagedLogError, LogError, os_errors
-from isiw.files import opened
 from isiw.log.blocks import RECORD_HEAD_BYTES, UNREADABLE, LostBlockError, Unpacking, counted_records, marked
 from isiw.log.places import Fingerprint, log_of, part_of
 from isiw.log.schema import ANNOUNCEMENT, CHANNEL_IDS, Message, is_of_isiw, without_samples
+from isiw.opening import opened
 from isiw.text.sanitize import counted
 
 _PERMISSIONS: Final = "Check its permissions and those of its folder."

@@ -17,10 +17,7 @@ JSON knows no infinity: where a number is not finite it is one of the strings "I
 
 from __future__ import annotations
 
-import datetime as dt
-import json
 import re
-import time
 from dataclasses import dataclass
 from functools import cache
 from types import MappingProxyType
@@ -28,18 +25,17 @@ from typing import Annotated, Any, Final, Literal, Self, TypeAlias
 
 import numpy as np
 from pydantic import ConfigDict, Field, FiniteFloat, TypeAdapter
-from pydantic_core import PydanticSerializationError
 
 from isiw.checks import MOST_MEP_MV, MOST_TRIALS
-from isiw.errors import InvalidValueError, LogError, error_text
-from isiw.estimate import Estimate, WindowEstimate
+from isiw.decision import StopDecision, StopKind
+from isiw.errors import InvalidValueError
+from isiw.figures import Estimate
 from isiw.findings import Kind
-from isiw.log.headers import ANY_HEADER, AnyHeader, Header, LogRecord, Production, ProductionHeader, ThresholdHeader
+from isiw.log.headers import ANY_HEADER, AnyHeader, Header, LogRecord, Production, ProductionHeader
 from isiw.log.moments import Moment
-from isiw.strategy.decisions import StopDecision, StopKind
-from isiw.strategy.threshold.pulses import ThresholdEstimate
+from isiw.strategy.threshold.estimate import ThresholdEstimate
 from isiw.sweeps import Channel
-from isiw.text.toml_files import refuse_doubled
+from isiw.text.parsing import refuse_doubled
 from isiw.trials import Stimulus, Trial
 from isiw.types import Numbers
 
@@ -147,12 +143,6 @@ class EstimateRecord(Estimate):
     reason: str = ""
     stop_kind: StopKind = StopKind.OWN
 
-    @classmethod
-    def after(cls, trial: int, estimate: WindowEstimate, decision: StopDecision, next_isi_ms: float | None) -> Self:
-        """The record of an estimate."""
-        stops = {"stop": decision.stop, "reason": decision.reason, "stop_kind": decision.kind}
-        return cls.of(estimate, trial=trial, next_isi_ms=next_isi_ms, **stops)
-
     @property
     def decision(self) -> StopDecision:
         """The decision to stop here or not, with its reason."""
@@ -220,7 +210,7 @@ Record: TypeAlias = (
 )
 
 
-_KINDS: dict[str, type[Any]] = {
+KINDS: dict[str, type[Any]] = {
     "/header": Header,
     "/intent": Intent,
     "/trial": Trial,
@@ -231,8 +221,6 @@ _KINDS: dict[str, type[Any]] = {
     "/production_header": ProductionHeader,
     "/production": Production,
 }
-_TOPIC_OF_KIND = {kind: topic for topic, kind in _KINDS.items()} | {ThresholdHeader: "/header"}
-
 _FROZEN: Final = "header intent trial estimate event emg acceleration pressure force valve"
 
 CHANNEL_IDS: Final = MappingProxyType({f"/{topic}": number for number, topic in enumerate(_FROZEN.split(), start=1)})
@@ -248,39 +236,22 @@ ANNOUNCEMENT = "channel "
 @cache
 def adapter(topic: str) -> TypeAdapter[Any]:
     """The converter of a topic's records into JSON and back; any topic that is not isiw's own holds waveforms."""
-    return ANY_HEADER if topic == "/header" else TypeAdapter(_KINDS.get(topic, Waveform))
+    return ANY_HEADER if topic == "/header" else TypeAdapter(KINDS.get(topic, Waveform))
 
 
 def is_of_isiw(topic: str) -> bool:
     """True if a topic carries records of isiw's own, and not the waveforms of a channel."""
-    return topic in _KINDS
-
-
-def topic_of(record: Record, channel_name: str | None = None) -> str:
-    """The topic of a record."""
-    return waveform_topic(channel_name or "") if isinstance(record, Waveform) else _TOPIC_OF_KIND[type(record)]
+    return topic in KINDS
 
 
 def waveform_topic(channel_name: str) -> str:
     """The topic of a channel's waveforms."""
     topic = f"/{channel_name}"
-    if topic == "/" or topic in _KINDS or not channel_name.isprintable():  # half a surrogate pair is not printable
+    if topic == "/" or topic in KINDS or not channel_name.isprintable():  # half a surrogate pair is not printable
         raise InvalidValueError(
             "a waveform's channel cannot have this name", got=channel_name, remedy="Rename it in the device."
         )
     return topic
-
-
-def encode(topic: str, record: Record) -> bytes:
-    """A record as JSON."""
-    try:
-        return adapter(topic).dump_json(record)
-    except (PydanticSerializationError, UnicodeEncodeError) as error:
-        raise InvalidValueError(
-            f"a record of {topic} cannot be written as JSON",
-            got=error_text(error),
-            remedy="Look at the names, units and texts that the device gives.",
-        ) from error
 
 
 _WAVEFORM: Final = re.compile(
@@ -307,14 +278,6 @@ def decode(topic: str, data: bytes) -> Record:
     return record
 
 
-@cache
-def json_schema(topic: str) -> tuple[str, bytes]:
-    """Name and JSON schema of a topic's records; the root is an object."""
-    kind = _KINDS.get(topic, Waveform)
-    schema = {"type": "object"} | adapter(topic).json_schema(mode="serialization")
-    return f"isiw.{schema.get('title', kind.__name__)}", json.dumps(schema).encode()
-
-
 @dataclass(frozen=True)
 class Message:
     """One record, still as bytes of JSON; `sequence` is its number in the file."""
@@ -323,29 +286,3 @@ class Message:
     data: bytes
     log_time_ns: int
     sequence: int = 0
-
-
-_END_NS: Final = 2**64
-
-
-def clock_ns() -> int:
-    """The time by the computer's clock [ns since 1970]."""
-    now_ns = time.time_ns()
-    if not 0 <= now_ns < _END_NS:
-        raise LogError(
-            "the computer's clock is wrong: no log can hold its time",
-            got=f"{now_ns // 10**9} s from the beginning of 1970",
-            expected="a time from 1970 to 2554",
-            remedy="Set the clock, then begin again.",
-        )
-    return now_ns
-
-
-def log_time_ns() -> int:
-    """The same for a record; 0 if the clock of a running session has been set to a time that no log can hold."""
-    return now_ns if 0 <= (now_ns := time.time_ns()) < _END_NS else 0
-
-
-def now() -> dt.datetime:
-    """The same as date and time, in UTC."""
-    return dt.datetime.fromtimestamp(clock_ns() // 10**9, dt.UTC)

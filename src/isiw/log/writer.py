@@ -2,38 +2,108 @@
 
 from __future__ import annotations
 
+import datetime as dt
+import json
 import threading
+import time
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import IO, Final, Self, cast
 
+import tomli_w
 from mcap.writer import Writer
+from pydantic_core import PydanticSerializationError
 
-from isiw.errors import LogError, os_errors
+from isiw.errors import InvalidValueError, LogError, error_text, os_errors
 from isiw.files import beside
 from isiw.log.durable import DurableFile, begun, claimed, keep_damaged
-from isiw.log.headers import AnyHeader, as_toml
+from isiw.log.headers import AnyHeader, ThresholdHeader
 from isiw.log.moments import boot_id
-from isiw.log.names import COPYING, require_free
+from isiw.log.names import COPYING, own_file, require_free, require_unchanged
 from isiw.log.places import Fingerprint, log_of, part_of
-from isiw.log.salvage import Salvage, holds, salvage_file
+from isiw.log.salvage import Salvage, salvage_file
 from isiw.log.schema import (
     ANNOUNCEMENT,
     CHANNEL_IDS,
     CONFIGURATION,
+    KINDS,
     Event,
     Message,
     Record,
-    clock_ns,
-    encode,
+    Waveform,
+    adapter,
     is_of_isiw,
-    json_schema,
-    log_time_ns,
-    topic_of,
+    waveform_topic,
 )
 
 _FROM_MEMORY = "Header, trials and events are written from memory; waveforms and estimates may be lost."
+
+
+_TOPIC_OF_KIND = {kind: topic for topic, kind in KINDS.items()} | {ThresholdHeader: "/header"}
+
+
+def topic_of(record: Record, channel_name: str | None = None) -> str:
+    """The topic of a record."""
+    return waveform_topic(channel_name or "") if isinstance(record, Waveform) else _TOPIC_OF_KIND[type(record)]
+
+
+def encode(topic: str, record: Record) -> bytes:
+    """A record as JSON."""
+    try:
+        return adapter(topic).dump_json(record)
+    except (PydanticSerializationError, UnicodeEncodeError) as error:
+        raise InvalidValueError(
+            f"a record of {topic} cannot be written as JSON",
+            got=error_text(error),
+            remedy="Look at the names, units and texts that the device gives.",
+        ) from error
+
+
+@cache
+def json_schema(topic: str) -> tuple[str, bytes]:
+    """Name and JSON schema of a topic's records; the root is an object."""
+    kind = KINDS.get(topic, Waveform)
+    schema = {"type": "object"} | adapter(topic).json_schema(mode="serialization")
+    return f"isiw.{schema.get('title', kind.__name__)}", json.dumps(schema).encode()
+
+
+_END_NS: Final = 2**64
+
+
+def clock_ns() -> int:
+    """The time by the computer's clock [ns since 1970]."""
+    now_ns = time.time_ns()
+    if not 0 <= now_ns < _END_NS:
+        raise LogError(
+            "the computer's clock is wrong: no log can hold its time",
+            got=f"{now_ns // 10**9} s from the beginning of 1970",
+            expected="a time from 1970 to 2554",
+            remedy="Set the clock, then begin again.",
+        )
+    return now_ns
+
+
+def log_time_ns() -> int:
+    """The same for a record; 0 if the clock of a running session has been set to a time that no log can hold."""
+    return now_ns if 0 <= (now_ns := time.time_ns()) < _END_NS else 0
+
+
+def now() -> dt.datetime:
+    """The same as date and time, in UTC."""
+    return dt.datetime.fromtimestamp(clock_ns() // 10**9, dt.UTC)
+
+
+def as_toml(header: AnyHeader) -> bytes:
+    """A header as a log has it once more, as TOML."""
+    try:
+        return tomli_w.dumps(header.model_dump(mode="json", exclude_none=True)).encode()
+    except (TypeError, ValueError) as error:
+        raise LogError(
+            f"the header cannot be written: {error}",
+            remedy="Give subject, config and the strategy's settings as TOML values, and leave out what is None.",
+        ) from error
 
 
 class LogWriter:
@@ -84,9 +154,9 @@ class LogWriter:
         target = log_of(Path(path))
         in_words = os_errors(LogError, "the log cannot be continued", target, "It stays as it was.")
         with claimed(salvage.path) as source, in_words:
-            _require_unchanged(source, salvage)
-            replaces = _own_file(target, salvage)
-            _require_unchanged(source, salvage)  # again, for a session that went on with it and ended just now
+            require_unchanged(source, salvage)
+            replaces = own_file(target, salvage)
+            require_unchanged(source, salvage)  # again, for a session that went on with it and ended just now
             copy = target.with_name(f"{target.name}{COPYING}")
             copy.unlink(missing_ok=True)  # of an earlier attempt that was killed; its source is still whole
             with begun(copy) as file:
@@ -253,42 +323,6 @@ class LogWriter:
                 self._writer.add_metadata(f"{ANNOUNCEMENT}{number}", {"id": str(number), "topic": topic})
             self._channels[topic] = number
         return self._channels[topic]
-
-
-def _require_unchanged(source: IO[bytes], salvage: Salvage) -> None:
-    there = None
-    with suppress(FileNotFoundError):  # of a session that has just finished it, which may be between any two calls
-        there = Fingerprint.of(salvage.path)
-    if not Fingerprint.of(source) == salvage.fingerprint == there:
-        raise LogError(
-            "the log has changed since it was read", got=str(salvage.path), remedy="Begin again by reading it."
-        )
-
-
-def _own_file(target: Path, salvage: Salvage) -> Fingerprint | None:
-    """The file at a log's final name, which its continuation may replace; None if there is none."""
-    if salvage.path == target:
-        if part_of(target).exists():
-            with claimed(part_of(target)):  # which raises if a session writes to it
-                raise _foreign(part_of(target), salvage)
-        return salvage.fingerprint
-    if not target.exists():
-        return None
-    try:
-        earlier = salvage_file(target)
-    except LogError as error:
-        raise _foreign(target, salvage) from error
-    if not holds(salvage, earlier):
-        raise _foreign(target, salvage)
-    return earlier.fingerprint
-
-
-def _foreign(path: Path, salvage: Salvage) -> LogError:
-    return LogError(
-        "another session's file is where this log would be, and it is never replaced",
-        got=str(path),
-        remedy=f"Give {salvage.path.name} or {path.name} another name or folder, and continue from there.",
-    )
 
 
 _LAST_ONLY: Final = frozenset({"/estimate", "/threshold/belief"})

@@ -10,11 +10,13 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from isiw.design import DesignSpace
-from isiw.estimate import BestISI, WindowEstimate
+from isiw.estimate import Enhancement, Magnitude, WindowEstimate
+from isiw.excess import least_excess_mv
+from isiw.figures import BestISI
 from isiw.lazy import Later
 from isiw.native.engine import expected_f1
 from isiw.types import Array, BoolArray, FloatArray, IntArray, Singles
-from isiw.window import Enhancement, Magnitude, Window, least_excess_mv
+from isiw.window import Window
 
 PROFILE_POINTS = 101
 """ISIs at which the expected MEP and its band are reported, at least."""

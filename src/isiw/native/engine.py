@@ -7,8 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from isiw.native.arrays import COLUMNS, DOUBLE, FIELDS, FLAG, SINGLE, WHOLE, address
-from isiw.native.library import call
+from isiw.native.library import COLUMNS, DOUBLE, FIELDS, FLAG, SINGLE, WHOLE, address, call
 from isiw.types import BoolArray, FloatArray, IntArray, Singles
 
 

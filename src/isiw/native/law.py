@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from isiw.native.arrays import (
+from isiw.native.library import (
     COLUMNS,
     DOUBLE,
     FIELDS,
@@ -22,8 +22,8 @@ from isiw.native.arrays import (
     WHOLE,
     Seeds,
     address,
+    call,
 )
-from isiw.native.library import call
 from isiw.types import Array, BoolArray, FloatArray, IntArray, Singles
 
 _MOST_OF_BLOCK: Final = 32

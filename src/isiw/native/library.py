@@ -1,4 +1,4 @@
-"""The library of compiled code: which level of it this processor gets, and its functions."""
+"""The library of compiled code: its level for this processor, its functions, and arrays as they take them."""
 
 from __future__ import annotations
 
@@ -7,16 +7,47 @@ import os
 import platform
 from functools import cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
 
 from isiw.errors import InvalidValueError, IsiwError
-from isiw.native.stamp import require_built_of, stated
+from isiw.native.sources import digest
 
 LEVELS: Final = ("x86-64-v4", "x86-64-v3", "x86-64-v2", "base")
 """What the library is compiled for, the fastest first: AVX-512, AVX2, SSE4.2, and processors that are no x86."""
 
 VERSION: Final = 6
 """Of the engine: it grows if the same draws come to other numbers."""
+
+_LONGEST: Final = 200
+"""Of a library's statement of how it was made [bytes]."""
+
+
+FIELDS: Final = 27
+"""Of a particle; their names and order are those of `isiw.models.particles.records`."""
+
+COLUMNS: Final = 11
+"""Of a trial, likewise."""
+
+KINDS: Final = 5
+"""Of a particle: its profile's shape, its noise, whether there is an enhancement, and a depression, and its change."""
+
+MEANINGS: Final = 32
+"""Latents that mean anything: those of the default in their order, then three of a depression."""
+
+LANES: Final = 16
+"""Latents that do not move are padded to whole vectors of any processor."""
+
+UNKNOWN: Final = np.float32(1e30)
+"""In place of the log density of a block that was not worked out yet."""
+
+SINGLE, DOUBLE = np.dtype(np.float32), np.dtype(np.float64)
+WHOLE, NATURAL, FLAG = np.dtype(np.int64), np.dtype(np.uint64), np.dtype(np.bool_)
+
+Seeds: TypeAlias = NDArray[np.uint64]
+
 
 _FILES: Final = {"Darwin": "_engine.dylib", "Windows": "_engine.dll"}
 _PATH: Final = Path(__file__).with_name(_FILES.get(platform.system(), "_engine.so.1"))
@@ -95,7 +126,7 @@ def version() -> str:
 
 def sources() -> str:
     """The digest of the sources that the engine was compiled from, wherever that was."""
-    return stated(_library())[1]
+    return _stated(_library())[1]
 
 
 def call(name: str, *arguments: object) -> None:
@@ -134,3 +165,33 @@ def _library() -> ctypes.CDLL:
         ) from error
     require_built_of(loaded, Path(__file__).with_name("source"))
     return loaded
+
+
+def address(array: NDArray[np.generic], dtype: np.dtype[np.generic], *shape: int) -> int:
+    """Where an array begins, if it is what the engine takes it for: C reads and writes all of the shape."""
+    if array.dtype != dtype or array.shape != shape or not array.flags.c_contiguous:
+        raise ValueError(f"the engine needs {dtype} {shape} side by side, not {array.dtype} {array.shape}")
+    return int(array.__array_interface__["data"][0])
+
+
+def _stated(library: ctypes.CDLL) -> list[str]:
+    """How a library says that it was made: a word, the digest of its sources, and that of everything else."""
+    return (ctypes.c_char * _LONGEST).in_dll(library, "isiw_sources").value.decode().split(":")
+
+
+def require_built_of(library: ctypes.CDLL, folder: Path) -> None:
+    """Have a library be of the sources in a folder; an installed package has no such folder, and nothing to compare.
+
+    Raises:
+        IsiwError: it was compiled from other sources.
+    """
+    if not folder.is_dir():
+        return
+    stated, expected = _stated(library), digest(folder)
+    if expected not in stated:
+        raise IsiwError(
+            "the compiled engine was made of other sources than those beside it",
+            got=":".join(stated),
+            expected=f"isiw-sources:{expected}",
+            remedy="Run pip install -e . again, in the folder of isiw.",
+        )

@@ -7,11 +7,13 @@ from typing import Final
 
 import numpy as np
 
+from isiw import schedule
 from isiw.acquisition.protocol import golden_index
+from isiw.decision import StopDecision, StopKind
 from isiw.errors import InvalidValueError
-from isiw.intervention import Arm, Intervention, Part, Slot
+from isiw.intervention import Arm, Intervention
 from isiw.pairing.following import Followed
-from isiw.strategy.decisions import StopDecision, StopKind
+from isiw.schedule import Part, Slot
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Trial
 from isiw.types import FloatArray
@@ -40,6 +42,7 @@ class Agenda:
 
     def __init__(self, intervention: Intervention, strategy: Strategy, seed: int) -> None:
         self.plan, self._arm, self._seed = intervention.plan, intervention.arm, seed
+        self._slots = schedule.slots(self.plan)
         self._begun = Followed.begin(strategy.posterior, strategy.space, strategy.earlier)
         self._space, self._window = strategy.space, _window_of(strategy)
         allowed = self._begun.isi_ms
@@ -72,17 +75,17 @@ class Agenda:
 
     def slot(self, number: int) -> Slot | None:
         """The place of a trial in the plan; None behind its end."""
-        return self.plan.slots[number] if number < len(self.plan.slots) else None
+        return self._slots[number] if number < len(self._slots) else None
 
     def decision(self, delivered: int) -> StopDecision:
         """Whether the plan is over after so many stimuli."""
-        if delivered >= len(self.plan.slots):
+        if delivered >= len(self._slots):
             return StopKind.PLAN.stop("The plan of the intervention is complete.")
-        return StopKind.PLAN.go_on(f"{len(self.plan.slots) - delivered} stimuli of the plan are left.")
+        return StopKind.PLAN.go_on(f"{len(self._slots) - delivered} stimuli of the plan are left.")
 
     def left(self, delivered: int) -> int:
         """The number of stimuli that the plan still has after so many."""
-        return len(self.plan.slots) - delivered
+        return len(self._slots) - delivered
 
     def control(self, number: int) -> Control | None:
         """Which control trial this is; None for a pair."""
@@ -92,12 +95,12 @@ class Agenda:
     def interval_s(self, number: int) -> float:
         """Shortest interval between the trial before and this one [s]."""
         slot = self.slot(number)
-        return 0.0 if slot is None else self.plan.interval_s(slot, self._seed)
+        return 0.0 if slot is None else schedule.slot_interval_s(self.plan, slot, self._seed)
 
     def rests_before(self, number: int) -> bool:
         """True if a rest comes before this trial."""
         slot = self.slot(number)
-        return slot is not None and self.plan.rests_before(slot)
+        return slot is not None and schedule.rests_before_slot(slot)
 
     def isi_ms(self, trials: Iterable[Trial]) -> float:
         """The ISI of the next pair [ms]; the same for the same trials.
@@ -106,12 +109,12 @@ class Agenda:
             trials: all before it, as they count now.
         """
         trials = tuple(trials)
-        slot = self.plan.slots[len(trials)]
+        slot = self._slots[len(trials)]
         if self.plan.probes or self.plan.follow_ms:
             self._learn(trials)
         if self._arm is Arm.OUTSIDE:
             return _turn(self._outside_ms, slot.place)
-        if self.plan.is_probe(slot, self._seed):
+        if schedule.is_probe(self.plan, slot, self._seed):
             return self._followed.news(self._allowed_ms)
         return self._space.snap(_turn(self._used_ms(), slot.place))
 
@@ -129,7 +132,7 @@ class Agenda:
         if tuple(trials[: len(self._learnt)]) != self._learnt:
             self._restart()
         for trial in trials[len(self._learnt) :]:
-            slot = self.plan.slots[trial.index]
+            slot = self._slots[trial.index]
             if slot.part is Part.PAIRS and slot.last:  # what the next block may follow from
                 self._centre_ms = _centre(self._used_ms())
             if slot.part is not Part.AFTER and slot.intensity_pct_rmt is None:

@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from isiw.intervention import Part
+from isiw import schedule
 from isiw.pairing.agenda import Agenda
+from isiw.schedule import Part
 from isiw.trials import Trial
 
 
@@ -43,7 +44,7 @@ def course_of(agenda: Agenda, trials: Iterable[Trial], seed: int) -> tuple[Follo
         if slot is not None and slot.part is Part.PAIRS and trial.wanted_isi_ms is not None:
             followed = agenda.followed(before)
             inside = float(np.interp(trial.wanted_isi_ms, followed.isi_ms, followed.p_inside))
-            probe = agenda.plan.is_probe(slot, seed)
+            probe = schedule.is_probe(agenda.plan, slot, seed)
             at = slot.place + 1, slot.block, trial.wanted_isi_ms, probe
             pairs.append(FollowedPair(*at, *followed.best_ms(), inside))
         before.append(trial)

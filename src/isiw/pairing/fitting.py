@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from typing import Final
 
+from isiw import schedule
+from isiw.devices.allowed import earliest_s
+from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import DeviceInfo
 from isiw.errors import InvalidValueError
-from isiw.intervention import Arm, Part, Plan, Slot
+from isiw.intervention import Arm, Plan
+from isiw.schedule import Part, Slot
 
 _ROUNDING_S: Final = 1e-6
 
@@ -27,7 +30,7 @@ def require_possible(plan: Plan, limits: Limits, given_before: int, seed: int) -
     """
     tests, blocks = plan.before * len(plan.tests), len(plan.after_min)
     after = plan.after * len(plan.tests)
-    needed = given_before + len(plan.slots)
+    needed = given_before + len(schedule.slots(plan))
     if needed > limits.max_pulses:
         before = f"{given_before} given before + " if given_before else ""
         raise InvalidValueError(
@@ -95,12 +98,12 @@ def _require_times(plan: Plan, limits: Limits, seed: int) -> None:
     """Raise if one stimulus of the plan cannot come at its time, even if nobody loses any."""
     times_s: list[float] = []
     last_pair_s = 0.0
-    for slot in plan.slots:
-        planned_s = (times_s[-1] if times_s else 0.0) + plan.interval_s(slot, seed)
+    for slot in schedule.slots(plan):
+        planned_s = (times_s[-1] if times_s else 0.0) + schedule.slot_interval_s(plan, slot, seed)
         if slot.due_s is not None and slot.first:
             _require_over(slot, planned_s - last_pair_s, plan)
             planned_s = max(planned_s, last_pair_s + slot.due_s)
-        allowed_s = limits.earliest_s(times_s, 0.0)
+        allowed_s = earliest_s(limits, times_s, 0.0)
         if times_s and allowed_s > planned_s + _ROUNDING_S:
             raise InvalidValueError(
                 "the limits do not allow the times of the plan",

@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
+from isiw import schedule
 from isiw.checks import Amplitude, Checked, Number, Positive, Text
-from isiw.intervention import Arm, Part, Plan
+from isiw.intervention import Arm, Plan
 from isiw.log.kinds import LogKind, kind_of, of_another_kind
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
+from isiw.schedule import Part
 
 USUAL_PCT_RMT: Final = 110.0
 """The intensity of a visit that nobody has stated [% RMT]."""
@@ -81,7 +83,8 @@ def pairing_of(record: SessionRecord) -> Pairing:
     if intervention is None:
         raise of_another_kind(record.path, kind_of(record.header), LogKind.INTERVENTION)
     plan, onsets = intervention.plan, record.onsets
-    slots = {trial.index: plan.slots[trial.index] for trial in record.table if trial.index < len(plan.slots)}
+    planned = schedule.slots(plan)
+    slots = {trial.index: planned[trial.index] for trial in record.table if trial.index < len(planned)}
     given = [number for number, slot in slots.items() if slot.part is Part.PAIRS and number in onsets]
     first_s = onsets[given[0]].onset_s if given else 0.0
     last_s = onsets[given[-1]].onset_s if given else max((onset.onset_s for onset in onsets.values()), default=0.0)
@@ -95,7 +98,7 @@ def pairing_of(record: SessionRecord) -> Pairing:
             if trial.wanted_isi_ms is not None and not trial.tap_alone:
                 mep_mv = trial.mep_mv if trial.counts else None
                 at_s = onset.onset_s - first_s
-                probe = intervention.arm is Arm.WINDOW and plan.is_probe(slot, record.header.seed)
+                probe = intervention.arm is Arm.WINDOW and schedule.is_probe(plan, slot, record.header.seed)
                 pairs.append(Delivered(trial.wanted_isi_ms, at_s, mep_mv, probe))
         elif trial.told and trial.mep_mv is not None:
             pct = slot.intensity_pct_rmt or usual_pct
@@ -110,7 +113,7 @@ def _begun(record: SessionRecord, plan: Plan) -> dict[str, tuple[int, float]]:
     for event in record.events:
         number = -1 if event.trial is None else event.trial + 1
         if event.kind == "block" and event.late_s is not None and number in record.onsets:
-            slot = plan.slots[number]
+            slot = schedule.slots(plan)[number]
             begun[slot.name] = number, (slot.due_s or 0.0) + event.late_s
     return begun
 

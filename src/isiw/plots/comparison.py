@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator
 from isiw.checks import choice
 from isiw.errors import InvalidValueError
 from isiw.lazy import pd
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.plots.style import (
     BLUE,
     FAINT,

@@ -17,9 +17,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from isiw.errors import InvalidValueError
-from isiw.estimate import Estimate
+from isiw.figures import Estimate
 from isiw.files import write_output
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.text.sanitize import one_line
 from isiw.window import Interval
 

@@ -13,8 +13,8 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from isiw.estimate import Estimate
-from isiw.log.reader import SessionRecord
+from isiw.figures import Estimate
+from isiw.log.record import SessionRecord
 from isiw.plots.style import (
     BLUE,
     FAINT,

@@ -13,7 +13,7 @@ from typing import Final
 
 from isiw.errors import InvalidValueError
 from isiw.log.headers import FirstStep
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.models.particles.places import Place
 from isiw.models.particles.prior import Prior
 from isiw.models.particles.profile import Width

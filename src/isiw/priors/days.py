@@ -18,8 +18,9 @@ import numpy as np
 from isiw.checks import Checked, Positive, Share, mean_and_sd, share
 from isiw.errors import DamagedLogError, InvalidValueError, LogError
 from isiw.lazy import sklearn
-from isiw.log.kinds import require_search
-from isiw.log.reader import SessionRecord, ThresholdRecord, require_records
+from isiw.log.continuing import require_search
+from isiw.log.reader import ThresholdRecord
+from isiw.log.record import SessionRecord, require_records
 from isiw.log.verdicts import changed_after
 from isiw.models.particles import ParticleModel, ParticlePosterior
 from isiw.models.particles.latents import LATENTS, Latents, used_by

@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.log.reader import SessionRecord, require_records
+from isiw.log.record import SessionRecord, require_records
 from isiw.models.particles.prior import Prior
 from isiw.priors.days import moved, recalled, too_far_apart_ms
 from isiw.types import FloatArray

@@ -15,7 +15,8 @@ import isiw
 from isiw.checks import MOST_OF_A_KIND, Checked, share, whole
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, LogError
-from isiw.log.reader import SessionRecord, ThresholdRecord, read_any
+from isiw.log.reader import ThresholdRecord
+from isiw.log.record import SessionRecord, read_any
 from isiw.log.salvage import salvage
 from isiw.models.particles import ParticleModel
 from isiw.models.particles.laws import Floor, Gain, Muscle, NoiseShares

@@ -17,7 +17,7 @@ from isiw.dissertation.regression import curve_masks
 from isiw.dissertation.response_counts import TrialsByIsi, by_isi, count_trials, measured_profile
 from isiw.errors import InvalidValueError
 from isiw.findings import Kind
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.log.schema import EstimateRecord, Event, EventKind
 from isiw.report.tables import lost_rows
 from isiw.report.words import counts_sentence

@@ -9,9 +9,9 @@ from pathlib import Path
 from isiw import sentences, summary
 from isiw.dissertation.response_counts import by_isi, count_trials, measured_profile
 from isiw.errors import InvalidValueError
-from isiw.estimate import Edge, Estimate
-from isiw.log.kinds import imported_sentence
-from isiw.log.reader import SessionRecord
+from isiw.figures import Edge, Estimate
+from isiw.log.continuing import imported_sentence
+from isiw.log.record import SessionRecord
 from isiw.metrics import profile_correlation
 from isiw.plots.comparison import comparison_figure
 from isiw.plots.style import inline_svg, session_name

@@ -7,9 +7,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from isiw.estimate import Edge
+from isiw.figures import Edge
 from isiw.findings import lacking
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.log.schema import EstimateRecord
 from isiw.report.tables import trial_row
 from isiw.report.words import answer_and_warnings

@@ -12,7 +12,7 @@ import numpy as np
 
 from isiw import sentences
 from isiw.findings import IN_DOUBT, NO_MEP
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.signals.amplitudes import counted_of, stopped_after
 from isiw.trials import Trial
 from isiw.types import ArrayLike, FloatArray

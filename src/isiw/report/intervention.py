@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from isiw import schedule
 from isiw.errors import InvalidValueError, IsiwError
-from isiw.intervention import Arm, Part, Plan
-from isiw.log.reader import SessionRecord
+from isiw.intervention import Arm, Plan
+from isiw.log.record import SessionRecord
 from isiw.pairing import words
 from isiw.pairing.agenda import Agenda
 from isiw.pairing.course import FollowedPair, course_of
@@ -19,6 +20,7 @@ from isiw.plots.intervention import change_figure, course_figure, dose_figure
 from isiw.plots.style import inline_svg
 from isiw.report.html import rendered, write_page
 from isiw.report.tables import Fact, first_facts
+from isiw.schedule import Part
 from isiw.session.replay import strategy_of
 
 _OF_A_SEARCH: Final = frozenset({"strategy"})
@@ -87,9 +89,9 @@ def contents_of(record: SessionRecord, states: Sequence[str] = ()) -> Interventi
     """
     pairing, intervention = pairing_of(record), record.header.intervention
     arm = "concealed" if record.conceals or intervention is None else intervention.arm.words
-    plan, unfinished = pairing.plan, record.given < len(pairing.plan.slots)
+    plan, unfinished = pairing.plan, record.given < len(schedule.slots(pairing.plan))
     waits = record.conceals and unfinished
-    given = [f"{record.given} of {len(plan.slots)} stimuli of the plan were given."] if unfinished else []
+    given = [f"{record.given} of {len(schedule.slots(plan))} stimuli of the plan were given."] if unfinished else []
     course, unknown = ((), []) if record.conceals else _course(record)
     facts = [fact for fact in first_facts(record) if fact.name not in _OF_A_SEARCH]
     more = Fact(
@@ -125,7 +127,7 @@ def _course(record: SessionRecord) -> tuple[tuple[FollowedPair, ...], list[str]]
 
 def _window_course(record: SessionRecord, plan: Plan) -> list[tuple[float, float, float]]:
     """When the window was known to lie where, while it was used."""
-    slots, onsets = plan.slots, record.onsets
+    slots, onsets = schedule.slots(plan), record.onsets
     used = [trial.index for trial in record.table if trial.index in onsets and slots[trial.index].part is Part.PAIRS]
     windows = {estimate.trial: estimate.window for estimate in record.estimates if estimate.window is not None}
     first_s = onsets[used[0]].onset_s if used else 0.0

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from isiw.log.frames import measures_of
-from isiw.log.reader import SessionRecord, require_records
+from isiw.log.record import SessionRecord, require_records
 from isiw.plots.session import session_figure
 from isiw.plots.style import inline_svg
 from isiw.plots.timeline import course_figure, sweeps_figure, timeline_figure

@@ -8,23 +8,24 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from isiw import sentences, summary
+from isiw import schedule, sentences, summary
 from isiw.change import Misfit
+from isiw.decision import OF_THE_WINDOW, StopKind
 from isiw.errors import InvalidValueError
-from isiw.estimate import Estimate
+from isiw.figures import Estimate
 from isiw.findings import Kind
-from isiw.intervention import Intervention, Part, concealed
+from isiw.intervention import Intervention, concealed
+from isiw.log.continuing import continued_by
 from isiw.log.headers import Header
-from isiw.log.kinds import continued_by
-from isiw.log.reader import SessionRecord, require_records
+from isiw.log.record import SessionRecord, require_records
 from isiw.metrics import f1, profile_correlation
 from isiw.pairing import words
 from isiw.pairing.effect import change_of
 from isiw.pairing.pulses import pairing_of
 from isiw.report.evidence import changed_with_time, contradiction, no_comparison, nothing_measured, nothing_stood_out
+from isiw.schedule import Part
 from isiw.session.examination import change_found
 from isiw.strategy.catalogue import known_settings, list_strategies, measured_of
-from isiw.strategy.decisions import OF_THE_WINDOW, StopKind
 from isiw.text.sanitize import command, counted
 from isiw.text.stimuli import TAP, StimulusWords
 from isiw.trials import Trial
@@ -69,7 +70,7 @@ def final_statement(record: SessionRecord, config: Path | None = None) -> str:
 
 def intervention_statement(record: SessionRecord, intervention: Intervention, config: Path | None = None) -> str:
     """How far an intervention came, and which arm it had if that is not concealed."""
-    slots, last = intervention.plan.slots, record.estimates[-1] if record.estimates else None
+    slots, last = schedule.slots(intervention.plan), record.estimates[-1] if record.estimates else None
     given = Counter(slots[trial.index].part for trial in record.table if trial.index < len(slots))
     done = ", ".join(f"{given[part]} {name}" for part, name in _PARTS.items())
     stop = next((event.text for event in record.events if event.kind == "stop"), None)
@@ -85,7 +86,7 @@ def intervention_statement(record: SessionRecord, intervention: Intervention, co
 def _change(record: SessionRecord) -> list[str]:
     """What pulses of TMS alone say of a change, if there are enough of them."""
     pairing = pairing_of(record)
-    if record.conceals and record.given < len(pairing.plan.slots):
+    if record.conceals and record.given < len(schedule.slots(pairing.plan)):
         return [words.NOT_YET]
     try:
         effect = change_of(pairing.tests, pairs=pairing.plan.pairs)

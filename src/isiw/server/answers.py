@@ -9,12 +9,12 @@ from typing import Any, Final, Literal, Self
 from fastapi import Response
 from pydantic import BaseModel, ConfigDict, Field
 
+from isiw.decision import StopDecision
 from isiw.errors import IsiwError, LimitExceededError, LogError, RequestError, error_text
-from isiw.estimate import Estimate, Reported
+from isiw.figures import Estimate, Reported
 from isiw.findings import Kind
 from isiw.session.state import State
-from isiw.strategy.decisions import StopDecision
-from isiw.summary import JUDGED_SINCE
+from isiw.summary import JUDGED_SINCE, summary
 from isiw.text.sanitize import plain
 from isiw.trials import Status, Trial
 
@@ -225,7 +225,7 @@ class EstimateAnswer(Reported, OkAnswer):
         """The answer of an estimate; if too little was measured, without what is said of a window."""
         known = estimate.model_dump(include={*Reported.model_fields})
         if too_little is None:
-            text = f"{estimate}\n{JUDGED_SINCE}" if judged_since else str(estimate)
+            text = f"{summary(estimate)}\n{JUDGED_SINCE}" if judged_since else summary(estimate)
             return cls(text=text, judged_since=judged_since, **known)
         profile = ("grid_ms", "profile_mv", "band_low_mv", "band_high_mv")
         kept = {name: known[name] for name in profile}

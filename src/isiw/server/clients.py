@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.log.schema import Event
 from isiw.server.answers import Refusal
 

@@ -8,11 +8,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Final
 
+from isiw.decision import StopDecision, StopKind
 from isiw.errors import InvalidValueError, LimitExceededError, LogError
-from isiw.estimate import Estimate
+from isiw.figures import Estimate
 from isiw.findings import Kind
 from isiw.log.new_verdicts import KeyTakenError
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.log.schema import Event
 from isiw.server.answers import AskAnswer, EstimateAnswer, Refusal, SessionAnswer, TrialAnswer, failed
 from isiw.server.clients import driven_from_here, given_once, logged_client, require_own
@@ -26,7 +27,6 @@ from isiw.server.requests import (
 )
 from isiw.session.recorder import Recorder
 from isiw.session.state import State, state_of
-from isiw.strategy.decisions import StopDecision, StopKind
 from isiw.trials import Status, Trial
 
 BUSY_S: Final = 5.0
@@ -110,7 +110,7 @@ class DrivenSession:
     def estimate(self) -> EstimateAnswer:
         """The estimate of the window now."""
         estimate = self.recorder.estimate()
-        return EstimateAnswer.about(Estimate.of(estimate), estimate.too_little)
+        return EstimateAnswer.about(estimate.in_figures(Estimate), estimate.too_little)
 
     def require_no_wait(self, most_s: float) -> None:
         """Raise if the next stimulus is not allowed soon."""

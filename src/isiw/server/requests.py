@@ -18,16 +18,8 @@ from isiw.errors import InvalidValueError, IsiwError
 from isiw.log.schema import TrialNumber
 from isiw.server.answers import Refusal
 from isiw.server.clients import KEY
-from isiw.text.toml_files import (
-    UNKNOWN,
-    DoubledKeyError,
-    expected_instead,
-    first_to_tell,
-    known_keys,
-    meant_instead,
-    once_each,
-    read_json,
-)
+from isiw.text.parsing import DoubledKeyError, once_each, read_json
+from isiw.text.toml_files import UNKNOWN, expected_instead, first_to_tell, known_keys, meant_instead
 from isiw.trials import Status, Trial
 from isiw.visit import VisitProtocol
 

@@ -14,7 +14,7 @@ from isiw.errors import error_text
 from isiw.files import made_folder, twin
 from isiw.log.headers import SERVED_KEY
 from isiw.log.places import log_exists, log_of, part_of
-from isiw.log.reader import SessionRecord, read_session
+from isiw.log.record import SessionRecord, read_session
 from isiw.log.schema import Event
 from isiw.server.answers import EstimateAnswer, Refusal, SessionAnswer, SessionEntry, TrialRow
 from isiw.server.clients import logged_client, require_free

@@ -8,15 +8,16 @@ from pathlib import Path
 import isiw
 from isiw.errors import LogError
 from isiw.intervention import Arm
-from isiw.log.kinds import LogKind, kind_of, of_another_kind, require_session
+from isiw.log.continuing import require_session
+from isiw.log.kinds import LogKind, kind_of, of_another_kind
 from isiw.log.new_verdicts import exclusion, inclusion
-from isiw.log.reader import read_salvaged
+from isiw.log.record import read_salvaged
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event
 from isiw.log.verdicts import changed_after
 from isiw.log.writer import LogWriter
 from isiw.session.examination import estimate_record
-from isiw.session.replay import strategy_of
+from isiw.session.replay import require_end, strategy_of
 from isiw.strategy.strategy import Strategy
 from isiw.trials import TrialTable
 
@@ -38,7 +39,7 @@ def estimate_again(
     """
     salvaged = salvage(path)
     record = read_salvaged(salvaged)
-    record.require_end()
+    require_end(record)
     record.require_read()
     if not record.table:
         raise LogError("there is no trial to estimate from", got=str(record.path))
@@ -105,7 +106,7 @@ def open_arm(path: str | Path) -> Arm:
     if intervention is None:
         raise of_another_kind(record.path, kind_of(record.header), LogKind.INTERVENTION)
     if record.conceals:
-        record.require_end()
+        require_end(record)
         record.require_read()
         last = record.table[-1].index if record.table else None
         text = f"The arm was opened: {intervention.arm.words}."
@@ -119,7 +120,7 @@ def _judge(path: str | Path, verdict: Callable[[TrialTable, Sequence[Event]], Ev
     record = read_salvaged(salvaged)
     require_session(record.path, record.header)
     event = verdict(record.table, record.events)
-    record.require_end()
+    require_end(record)
     if record.losses:  # then the header may be written again
         record.require_read()
     with LogWriter.continuing(path, salvaged, record.header) as log:

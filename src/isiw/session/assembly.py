@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import Any, Final, NamedTuple, TypedDict
 
 import isiw
+from isiw import schedule
 from isiw.checks import deadline, patience, text
 from isiw.devices.clock import Clock
 from isiw.devices.limits import USUAL_ITI_S, Limits
@@ -20,7 +21,7 @@ from isiw.errors import InvalidValueError, StrategyError
 from isiw.intervention import Intervention
 from isiw.log.headers import FirstStep, Header, StrategyRecipe
 from isiw.log.places import log_of
-from isiw.log.schema import now
+from isiw.log.writer import now
 from isiw.native.library import version as engine_version
 from isiw.pairing.agenda import Agenda
 from isiw.pairing.fitting import require_possible, require_settable
@@ -32,6 +33,7 @@ from isiw.session.intensities import has_several, require_intensities
 from isiw.session.pausing import Pausing
 from isiw.session.rig import Rig, Safeguards, require_matching
 from isiw.session.sink import SessionUpdate, Sink
+from isiw.session.stated import require_visit
 from isiw.session.steps import Steps
 from isiw.signals.limits import SignalLimits
 from isiw.signals.tap import TapResponses
@@ -93,7 +95,7 @@ def require_new(strategy: Strategy, trials: int = 0) -> None:
 
 def require_fitting(strategy: Strategy, header: Header) -> None:
     """Raise if the visit states another intensity than the strategy, or the limits end the strategy's plan early."""
-    header.visit.require_intensity(header.strategy.settings.get("intensity_pct_rmt"))
+    require_visit(header.visit, header.strategy.settings.get("intensity_pct_rmt"))
     require_intensities(strategy, header)
     planned, most, before = strategy.stimuli_planned, header.limits.max_pulses, header.given_before
     if before >= most:
@@ -109,7 +111,7 @@ def require_fitting(strategy: Strategy, header: Header) -> None:
         return
     if planned is None and any(trial.intensity_pct_rmt is not None for trial in strategy.earlier):
         planned = stimuli_left(strategy.stopping, 0)  # who plans pulses over the curve plans the pairs after them
-    if planned is None or (needed := header.protocol.stimuli_for(planned) + before) <= most:
+    if planned is None or (needed := schedule.stimuli_for(header.protocol, planned) + before) <= most:
         return
     name, planned = strategy.recipe.name or type(strategy.acquisition).__name__, planned + before
     raise InvalidValueError(
@@ -217,7 +219,7 @@ def assembled(
     safeguards, protocol = options.get("safeguards") or Safeguards(), options.get("protocol") or VisitProtocol()
     limits = (options.get("limits") or Limits.of_space(strategy.space)).stated(USUAL_ITI_S)
     intervention = options.get("intervention")
-    sink = Sink(options.get("on_trial"), hides=intervention.hides if intervention else lambda _: False)
+    sink = Sink(options.get("on_trial"), hides=intervention.hides if intervention else None)
     noted = options.get("visit") or Visit()
     rig = Rig(device, limits, options.get("clock"), safeguards, sink, away=console.away, noted=noted)
     require_matching(rig.info, strategy, protocol)

@@ -10,10 +10,10 @@ from collections.abc import Callable
 from typing import Final
 
 from isiw.devices.clock import ROUNDING_S, Clock
-from isiw.intervention import Part, Slot
 from isiw.log.moments import Moment
 from isiw.log.schema import Event
 from isiw.pairing.agenda import Agenda
+from isiw.schedule import Part, Slot
 
 AHEAD_S: Final = 30.0
 """So long before it is due a block is announced, so that it begins in time [s]."""

@@ -15,14 +15,15 @@ import numpy as np
 
 from isiw import checks, summary
 from isiw.change import Change
+from isiw.decision import StopDecision
 from isiw.errors import LimitExceededError, StrategyError, error_text
+from isiw.estimate import WindowEstimate
 from isiw.findings import Finding, Kind, Severity
 from isiw.log.new_verdicts import is_logged, or_remark
 from isiw.log.schema import EstimateRecord, Event, EventKind, Intent, Record
 from isiw.log.verdicts import changed_after, doubted_by, excluded_by, under_all
 from isiw.session.sink import Sink
 from isiw.strategy.choice import candidate_isis
-from isiw.strategy.decisions import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Trial, TrialTable
 from isiw.types import FloatArray
@@ -322,7 +323,7 @@ def estimate_record(
     strategy: Strategy, trial: int, decision: StopDecision, next_isi_ms: float | None
 ) -> EstimateRecord:
     """The record of what a strategy knows after a trial; scores are those that it has worked out anyway."""
-    record = EstimateRecord.after(trial, strategy.estimate(), decision, next_isi_ms)
+    record = recorded(strategy.estimate(), trial, decision, next_isi_ms)
     more: dict[str, Any] = {}
     if record.grid_ms and (band := strategy.prediction_mv()) is not None:
         more = {"predicted_low_mv": _rounded(band[0]), "predicted_high_mv": _rounded(band[1])}
@@ -332,6 +333,12 @@ def estimate_record(
             more["scored_ms"] = tuple(candidate_isis(strategy.space).tolist())
             more["scores"] = _rounded(choice.scores.astype(float))
     return record.model_copy(update=more)
+
+
+def recorded(estimate: WindowEstimate, trial: int, decision: StopDecision, next_isi_ms: float | None) -> EstimateRecord:
+    """The record of an estimate after a trial, by itself."""
+    stops = {"stop": decision.stop, "reason": decision.reason, "stop_kind": decision.kind}
+    return estimate.in_figures(EstimateRecord, trial=trial, next_isi_ms=next_isi_ms, **stops)
 
 
 def _rounded(values: FloatArray) -> tuple[float, ...]:

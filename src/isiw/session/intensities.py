@@ -1,9 +1,8 @@
-"""The intensities of a session's pulses, where a device sets them: what is set for each, and what the log notes."""
+"""The intensities of a session's pulses, where a device sets them: what is set for each."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 from isiw.errors import InvalidValueError
 from isiw.log.headers import Header
@@ -62,15 +61,6 @@ def _sets_usual(header: Header) -> bool:
     by_hand = header.intervention is not None and bool(header.intervention.plan.intensities_pct_rmt)
     sets = header.device.sets_intensity and not by_hand
     return sets and usual is not None and most is not None and usual <= most
-
-
-def noted(trial: Trial, stimulus: Stimulus, header: Header) -> Trial:
-    """A trial with the intensity that its pulse was to be set to; none is noted where it is the usual one."""
-    pct_rmt = stimulus.intensity_pct_rmt
-    if pct_rmt is None:
-        return trial
-    own = None if pct_rmt == header.visit.intensity_pct_rmt else pct_rmt
-    return trial if trial.intensity_pct_rmt == own else replace(trial, intensity_pct_rmt=own)
 
 
 def stimulus_of(trial: Trial, strategy: Strategy, header: Header) -> Stimulus:

@@ -9,7 +9,9 @@ from functools import partial
 from pathlib import Path
 from typing import Unpack
 
-from isiw.devices.protocol import Device, Readiness
+from isiw.decision import StopDecision
+from isiw.devices.info import Readiness
+from isiw.devices.protocol import Device
 from isiw.errors import ClockWarning, NotDelivered, warn
 from isiw.log.headers import Header
 from isiw.log.pulses import earlier_pulse_ages
@@ -24,9 +26,9 @@ from isiw.session.judging import Judging
 from isiw.session.pausing import Pause
 from isiw.session.sink import Follower, SessionResult, Wait
 from isiw.session.state import Fault, State, state_of
+from isiw.session.stated import require_limits, require_protocol, require_signals
 from isiw.session.steps import ended, paused
 from isiw.session.terminal import goes_on, is_attended, is_terminal
-from isiw.strategy.decisions import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.trials import TrialTable
 
@@ -258,9 +260,9 @@ class Session(Judging):
                 the plan of the strategy.
         """
         if not self._earlier.first_records:  # what an earlier log says goes on as it was
-            self._limits.require_effect()
-            self._header.protocol.require_effect(self._limits.iti_s)
-            self._header.signals.require_behind_artefact()
+            require_limits(self._limits)
+            require_protocol(self._header.protocol, self._limits.iti_s)
+            require_signals(self._header.signals)
             require_fitting(self.strategy, self._header)
         require_intensities(self.strategy, self._header)
 

@@ -5,15 +5,18 @@ from __future__ import annotations
 from functools import partial
 from typing import Final
 
+from isiw.decision import OF_THE_WINDOW, StopDecision
 from isiw.log.headers import Header
 from isiw.log.new_verdicts import correction
 from isiw.log.schema import Correction
 from isiw.session.examination import WindowExamination
 from isiw.signals.tap import TapResponses
-from isiw.strategy.decisions import OF_THE_WINDOW, StopDecision, stimuli_left
+from isiw.strategy.decisions import stimuli_left
 from isiw.sweeps import Sweep
 from isiw.trials import Trial
-from isiw.visit import PAIRS_FIRST
+
+PAIRS_FIRST: Final = 4
+"""So many trials show whether a rig works, before taps alone are given."""
 
 KNOWN: Final = "What the first stimulus alone does to the EMG is known now, and was subtracted."
 LONGER: Final = "A longer ISI shows the first stimulus's own response, which may explain the enhancement so far."

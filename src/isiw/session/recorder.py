@@ -7,9 +7,12 @@ import threading
 from collections.abc import Callable
 from typing import Any, Generic, Self, TypeVar
 
+from isiw import schedule
 from isiw.checks import flag, number
+from isiw.decision import StopDecision
+from isiw.devices.allowed import require_intensity, require_isi, require_left, require_state
 from isiw.devices.clock import ROUNDING_S, Clock, Pacing
-from isiw.devices.protocol import Readiness
+from isiw.devices.info import Readiness
 from isiw.errors import ClockWarning, InvalidValueError
 from isiw.estimate import WindowEstimate
 from isiw.findings import IN_DOUBT, REMEDIES, Finding, Kind, Severity
@@ -23,9 +26,7 @@ from isiw.session.examination import Examination, examination_of
 from isiw.session.judging import Judging
 from isiw.session.sink import Sink
 from isiw.signals.amplitudes import Doubts, counted_of, odd_amplitudes
-from isiw.signals.plausible import isi_far, require_plausible, require_plausible_range
-from isiw.signals.reported import unconfirmed
-from isiw.strategy.decisions import StopDecision
+from isiw.signals.plausible import isi_far, require_plausible, require_plausible_range, unconfirmed
 from isiw.strategy.outcomes import Outcome
 from isiw.strategy.strategy import Strategy
 from isiw.trials import Status, Stimulus, Trial, TrialTable, require_pulse
@@ -139,12 +140,12 @@ class Recorder(Recording[Trial], Judging):
         """Time that `ask` would wait now until limits and protocol allow the next stimulus [s]."""
         if self.asked is not None:
             return 0.0
-        return self._pacing.wait_s(self._protocol.interval_s(len(self.trials), self._seed))
+        return self._pacing.wait_s(schedule.interval_s(self._protocol, len(self.trials), self._seed))
 
     @property
     def rests(self) -> bool:
         """True if the protocol has a rest before the next trial, and it is not over."""
-        return self._protocol.rests_before(len(self.trials)) and self.wait_s() > 0
+        return schedule.rests_before(self._protocol, len(self.trials)) and self.wait_s() > 0
 
     def ask(self, deadline_s: float | None = None) -> float:
         """The next ISI [ms], the same until its outcome; on disk as about to be delivered before this returns.
@@ -170,13 +171,13 @@ class Recorder(Recording[Trial], Judging):
                 return self.asked.isi_ms
             if self.asked is not None:  # TMS alone that was given, and never told
                 self._conclude(Trial.unknown(self.asked))
-            self._limits.require_left(self._given_before + len(self.trials))
-            self._limits.require_state(Readiness())
+            require_left(self._limits, self._given_before + len(self.trials))
+            require_state(self._limits, Readiness())
             if self.wait_s() > ROUNDING_S:
                 return None
             isi_ms = self.strategy.ask(deadline_s)
-            self._limits.require_isi(isi_ms)
-            self._limits.require_intensity(self.intensity_pct_rmt)
+            require_isi(self._limits, isi_ms)
+            require_intensity(self._limits, self.intensity_pct_rmt)
             self._begin(isi_ms, self.strategy.fallback_reason)
             return isi_ms
 

@@ -9,15 +9,23 @@ from typing import Any, Final, NamedTuple
 
 from isiw.change import MOST_NOTED
 from isiw.checks import MOST_TRIALS, whole
+from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import DeviceInfo
-from isiw.errors import ConfigError, DeviceError, InvalidValueError, OtherVersionsWarning, StrategyError, warn
+from isiw.errors import (
+    ConfigError,
+    DamagedLogError,
+    DeviceError,
+    InvalidValueError,
+    OtherVersionsWarning,
+    StrategyError,
+    warn,
+)
+from isiw.log.continuing import OWN_LOOP, continued_by
 from isiw.log.headers import SCHEMA_VERSION, Header, StrategyRecipe
-from isiw.log.kinds import OWN_LOOP
 from isiw.log.moments import Ages, Moment
 from isiw.log.new_verdicts import MANY_CHANGES
 from isiw.log.pulses import pulse_ages
-from isiw.log.reader import SessionRecord
+from isiw.log.record import SessionRecord
 from isiw.log.salvage import Salvage
 from isiw.log.schema import Event, Intent
 from isiw.log.verdicts import VERDICTS, changed_after, under
@@ -246,7 +254,7 @@ def _taps(record: SessionRecord, signals: SignalLimits) -> TapResponses:
 def _with_lost_pulses(record: SessionRecord, lost_pulses: int | None) -> SessionRecord:
     """A log with the stimuli that its missing end told of."""
     if lost_pulses is None:
-        record.require_end()
+        require_end(record)
         return record
     lost_pulses = whole("lost_pulses", lost_pulses, least=0, below=MOST_TRIALS)
     if not record.end_lost:
@@ -254,6 +262,17 @@ def _with_lost_pulses(record: SessionRecord, lost_pulses: int | None) -> Session
             "lost_pulses is for a log whose end is missing, and this one's is there", got=lost_pulses
         )
     return dataclasses.replace(record, delivered=record.given + lost_pulses)
+
+
+def require_end(record: SessionRecord) -> None:
+    """Raise if nobody knows how many stimuli were given."""
+    if record.end_lost:
+        raise DamagedLogError(
+            "the log's end is missing, so the number of stimuli given is unknown",
+            got=str(record.path),
+            remedy="Look at the stimulator's counter, and resume with the number N of pulses that isiw show does not "
+            f"list: {continued_by(record.path, record.header, end_lost=True)}",
+        )
 
 
 def require_as_real(info: DeviceInfo, was: DeviceInfo) -> None:

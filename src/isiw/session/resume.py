@@ -10,14 +10,16 @@ from typing import Any, Unpack, overload
 from isiw.checks import text
 from isiw.design import DesignSpace
 from isiw.devices.clock import MonotonicClock
+from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import USUAL_ITI_S, Limits
-from isiw.devices.protocol import Device, DeviceInfo, HasMemory, info_of
+from isiw.devices.protocol import Device, HasMemory, info_of
 from isiw.errors import InvalidValueError, LogError
 from isiw.findings import require_percent
+from isiw.log.continuing import OWN_LOOP, continued_by, require_session
 from isiw.log.headers import Header
-from isiw.log.kinds import OWN_LOOP, LogKind, continued_by, of_another_kind, require_session
+from isiw.log.kinds import LogKind, of_another_kind
 from isiw.log.places import log_exists
-from isiw.log.reader import SessionRecord, read_any, read_salvaged
+from isiw.log.record import SessionRecord, read_any, read_salvaged
 from isiw.log.salvage import Salvage, salvage
 from isiw.log.writer import LogWriter
 from isiw.session.assembly import (
@@ -35,6 +37,7 @@ from isiw.session.intensities import stimulus_of
 from isiw.session.loop import Session
 from isiw.session.recorder import Recorder
 from isiw.session.replay import require_as_real, require_same_person, taken_up
+from isiw.session.stated import require_limits, require_protocol, require_visit
 from isiw.session.threshold import ThresholdRecorder, resume_threshold
 from isiw.signals.limits import SignalLimits
 from isiw.strategy.strategy import Strategy
@@ -108,8 +111,8 @@ def _stated(space: DesignSpace, options: OwnLoopOptions) -> dict[str, Any]:
         )
     limits = limits.stated(0.0)
     _require_reported(limits)
-    limits.require_effect()
-    protocol.require_effect(limits.iti_s)
+    require_limits(limits)
+    require_protocol(protocol, limits.iti_s)
     subject, visit = text("subject", options.get("subject", "")), options.get("visit") or Visit()
     config = dict(options.get("config") or {})
     return {"subject": subject, "visit": visit, "protocol": protocol, "limits": limits, "config": config}
@@ -139,7 +142,7 @@ def _own_loop_resumed(
     strategy, earlier = taken_up(salvaged, record, strategy, details["limits"], options)
     header = _header(strategy, **details).model_copy(update=dict(earlier.kept))
     if "visit" in changes:
-        header.visit.require_intensity(header.strategy.settings.get("intensity_pct_rmt"))
+        require_visit(header.visit, header.strategy.settings.get("intensity_pct_rmt"))
     writer = earlier.open_log(header)
     for first in earlier.first_records:
         writer.append(first)
@@ -232,7 +235,7 @@ def _session_resumed(
     if (limits := options.get("limits")) is None:
         limits = limits_of_log(header)
     else:
-        limits.require_effect()
+        require_limits(limits)
     require_as_real(info_of(device), header.device)
     strategy = strategy.restarted() if strategy else None
     strategy, earlier = taken_up(salvaged, record, strategy, limits, options)

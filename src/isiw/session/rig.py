@@ -17,9 +17,10 @@ from typing import IO, Annotated, Never
 from isiw.checks import Checked, NonNegative, choice, function, whole
 from isiw.devices.clock import Clock, MonotonicClock, VirtualClock
 from isiw.devices.deadlines import Deadlines, PunctualDevice
+from isiw.devices.info import DeviceInfo
 from isiw.devices.limited import LimitedDevice
 from isiw.devices.limits import Limits
-from isiw.devices.protocol import Answer, Device, DeviceInfo
+from isiw.devices.protocol import Answer, Device
 from isiw.errors import DeviceError, StillArmedError, error_text, os_errors
 from isiw.files import shared_file
 from isiw.log.durable import claim

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple, Protocol
 
+from isiw.decision import StopDecision
 from isiw.errors import InvalidValueError, error_text
 from isiw.estimate import WindowEstimate
 from isiw.intervention import concealed
 from isiw.log.schema import Event, Record
 from isiw.log.writer import LogWriter
-from isiw.strategy.decisions import StopDecision
 from isiw.trials import Trial, TrialTable
 
 
@@ -115,7 +115,7 @@ class Sink:
         self,
         on_trial: Callable[[SessionUpdate], None] | None = None,
         log: LogWriter | None = None,
-        hides: Callable[[int], bool] = lambda _: False,
+        hides: Callable[[int], bool] | None = None,
     ) -> None:
         self.on_trial, self._hides = on_trial, hides
         self.followers: list[Follower] = []
@@ -156,12 +156,15 @@ class Sink:
         if not self._is_hidden(record):
             self._each(lambda follower: follower.logged(record, channel_name))
 
+    def _shows_arm(self, trial: int) -> bool:
+        return self._hides is not None and self._hides(trial)
+
     def _is_hidden(self, record: Record) -> bool:
         """True of what would show a concealed arm; what a person has to act on is never hidden."""
         if isinstance(record, Event) and record.kind in _NEVER_HIDDEN:
             return False
         number = record.index if isinstance(record, Trial) else getattr(record, "trial", None)
-        return number is not None and self._hides(number)
+        return number is not None and self._shows_arm(number)
 
     def say(self, text: str) -> None:
         """Say something to the operator at the screen."""
@@ -170,7 +173,7 @@ class Sink:
 
     def updated(self, update: SessionUpdate) -> None:
         """A trial is concluded."""
-        if self._hides(update.trial.index):
+        if self._shows_arm(update.trial.index):
             return
         self._each(lambda follower: follower.updated(update))
         if self._screen is not None:

@@ -9,6 +9,8 @@ from collections import deque
 from collections.abc import Iterable
 from typing import Final
 
+from isiw import schedule
+from isiw.decision import StopDecision, StopKind
 from isiw.devices.protocol import Answer
 from isiw.errors import DeviceError, DeviceTimeoutError, IsiwError, LimitExceededError, NotDelivered, error_text
 from isiw.findings import Finding
@@ -17,7 +19,7 @@ from isiw.log.schema import Event, Intent, Waveform
 from isiw.pairing.agenda import Agenda
 from isiw.session.blocks import AHEAD_S, Blocks
 from isiw.session.examination import WindowExamination
-from isiw.session.intensities import noted, set_for
+from isiw.session.intensities import set_for
 from isiw.session.own_response import LONGER, OwnResponse
 from isiw.session.pausing import Pausing
 from isiw.session.rig import Rig
@@ -26,7 +28,7 @@ from isiw.session.state import Fault
 from isiw.signals.judgement import judge, judge_measurement
 from isiw.signals.tap import TapResponses
 from isiw.signals.watch import Watch
-from isiw.strategy.decisions import StopDecision, StopKind, stimuli_left
+from isiw.strategy.decisions import stimuli_left
 from isiw.strategy.strategy import Strategy
 from isiw.sweeps import Measurement, Sweep
 from isiw.text.sanitize import shown
@@ -152,8 +154,8 @@ class Steps:
         first, pairs = len(self._examination.trials), 0
         while pairs < min(left, _FORESEEN) and len(intervals_s) < self._rig.limited.pulses_left:
             number = first + len(intervals_s)
-            intervals_s.append(max(usual_s, protocol.rest_s) if protocol.rests_before(number) else usual_s)
-            pairs += protocol.control(number, seed) is None
+            intervals_s.append(max(usual_s, protocol.rest_s) if schedule.rests_before(protocol, number) else usual_s)
+            pairs += schedule.control(protocol, number, seed) is None
         return self._rig.limited.ahead_s(intervals_s) * (left / pairs if pairs == _FORESEEN else 1)
 
     def _decision(self) -> StopDecision:
@@ -222,7 +224,7 @@ class Steps:
             return self._agenda.control(len(self._examination.trials))
         if self._own_response.wants_tap:
             return Control.TAP_ALONE
-        return self._header.protocol.control(len(self._examination.trials), self._header.seed)
+        return schedule.control(self._header.protocol, len(self._examination.trials), self._header.seed)
 
     def _next_isi_ms(self) -> float | None:
         """The ISI that is asked next [ms]; None if a control trial comes next."""
@@ -253,8 +255,8 @@ class Steps:
         if self._agenda is not None:
             rests, interval_s = self._agenda.rests_before(number), self._agenda.interval_s(number)
         else:
-            rests = self._header.protocol.rests_before(number)
-            interval_s = self._header.protocol.interval_s(number, self._header.seed)
+            rests = schedule.rests_before(self._header.protocol, number)
+            interval_s = schedule.interval_s(self._header.protocol, number, self._header.seed)
         try:
             while not self._disturbed and (wait_s := self._rig.limited.wait_s(interval_s)) > 0:
                 text = f"Rest after {number} trials" if rests else "Next stimulus"
@@ -285,10 +287,10 @@ class Steps:
         try:
             self._sink.log.require_in_place()
             # From here on it may have been given, whatever fails.
-            trial = self._as_planned(noted(Trial.unknown(stimulus), stimulus, self._header))
+            trial = self._with_intensity(Trial.unknown(stimulus), stimulus)
             self._at = stimulus.trial, True
             answer = self._answer(stimulus)
-            trial = noted(self._judged(stimulus, answer), stimulus, self._header)
+            trial = self._with_intensity(self._judged(stimulus, answer), stimulus)
             if isinstance(answer, Sweep):
                 trial = self._own_response.after(trial, answer)
             self._watch = self._watch.after(trial, answer)
@@ -340,18 +342,20 @@ class Steps:
     def _judged(self, stimulus: Stimulus, answer: Answer) -> Trial:
         space, signals = self._header.space, self._header.signals
         if isinstance(answer, Sweep):
-            return self._as_planned(judge(answer, stimulus, space, signals))
+            return judge(answer, stimulus, space, signals)
         if isinstance(answer, Measurement):
-            return self._as_planned(judge_measurement(answer, stimulus, space, signals))
+            return judge_measurement(answer, stimulus, space, signals)
         raise DeviceError(
             f"the device's deliver returned {shown(answer)}",
             expected="an isiw.Sweep or an isiw.Measurement",
             remedy="Let it return what it recorded, or the MEP that it measured: isiw.Measurement(mep_mv, isi_ms).",
         )
 
-    def _as_planned(self, trial: Trial) -> Trial:
-        """A trial with the intensity that the plan has for it, where that is another than the visit's."""
+    def _with_intensity(self, trial: Trial, stimulus: Stimulus) -> Trial:
+        """A trial with the intensity of its pulse, the plan's or the one to be set; none where it is the usual one."""
         slot = None if self._agenda is None else self._agenda.slot(trial.index)
-        if slot is None or slot.intensity_pct_rmt is None:
-            return trial
-        return dataclasses.replace(trial, intensity_pct_rmt=slot.intensity_pct_rmt)
+        planned = None if slot is None else slot.intensity_pct_rmt
+        if stimulus.intensity_pct_rmt is not None:
+            usual = self._header.visit.intensity_pct_rmt
+            planned = None if stimulus.intensity_pct_rmt == usual else stimulus.intensity_pct_rmt
+        return trial if trial.intensity_pct_rmt == planned else dataclasses.replace(trial, intensity_pct_rmt=planned)

@@ -8,24 +8,26 @@ from pathlib import Path
 from typing import Any
 
 from isiw.checks import number, text, whole
+from isiw.decision import StopDecision
 from isiw.devices.clock import Clock, MonotonicClock, Pacing, VirtualClock
+from isiw.devices.info import DeviceInfo
 from isiw.devices.limited import require_real_time
 from isiw.devices.limits import PulseLimits
-from isiw.devices.protocol import DeviceInfo
 from isiw.errors import DamagedLogError, InvalidValueError, LimitExceededError
 from isiw.log.headers import StrategyRecipe, ThresholdHeader
 from isiw.log.kinds import LogKind, of_another_kind
 from isiw.log.pulses import pulse_ages
-from isiw.log.reader import SessionRecord, ThresholdRecord, read_any
+from isiw.log.reader import ThresholdRecord
+from isiw.log.record import SessionRecord, read_any
 from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Intent, PulseOutcome, ThresholdEstimateRecord
 from isiw.log.writer import LogWriter
 from isiw.session.assembly import begun, require_parts
 from isiw.session.examination import Examination
 from isiw.session.recorder import Recording
-from isiw.strategy.decisions import StopDecision
 from isiw.strategy.threshold.curve import CurvePulses
-from isiw.strategy.threshold.pulses import Pulse, ThresholdEstimate
+from isiw.strategy.threshold.estimate import ThresholdEstimate
+from isiw.strategy.threshold.pulses import Pulse
 from isiw.strategy.threshold.search import ThresholdSearch, make_threshold_search
 from isiw.trials import Stimulus
 from isiw.visit import interval_s

@@ -8,10 +8,10 @@ from contextlib import suppress
 from typing import Final
 
 from isiw.checks import text
+from isiw.decision import StopDecision
 from isiw.errors import InvalidValueError, LimitExceededError
 from isiw.session.threshold import ThresholdRecorder
-from isiw.strategy.decisions import StopDecision
-from isiw.strategy.threshold.pulses import place_text
+from isiw.strategy.threshold.estimate import place_text
 
 ANSWERS: Final = (
     "After each pulse type the MEP's amplitude in mV (0.08, or 80 uV); y or n if you only saw on the screen whether it "

@@ -16,7 +16,7 @@ from isiw.errors import DeviceError, InvalidValueError
 from isiw.findings import MISTRIALS, Kind
 from isiw.signals.agreement import pulse_with_tap_alone, require_agreement, tap_with_tms_alone
 from isiw.signals.impact import impact_time
-from isiw.signals.limits import ACCELERATION_UNITS, EMG_UNITS_MV, SignalLimits
+from isiw.signals.limits import EMG_UNITS_MV, SignalLimits
 from isiw.signals.mep import TAP_SPAN_MS, at_rest, disturbance, known_background_rms, mep_amplitudes
 from isiw.signals.plausible import before_impact, implausible_amplitude
 from isiw.signals.spans import TAP_MS
@@ -24,6 +24,9 @@ from isiw.signals.waveforms import is_blanked, is_recording, is_saturated
 from isiw.sweeps import Channel, Measurement, Sweep
 from isiw.trials import Status, Stimulus, Trial
 from isiw.types import FloatArray
+
+ACCELERATION_UNITS = frozenset({"m/s^2", "m/s²", "g", "V", "mV"})
+"""Units of the acceleration; the impact is found in any of them."""
 
 
 def judge(sweep: Sweep, stimulus: Stimulus, space: DesignSpace, limits: SignalLimits | None = None) -> Trial:

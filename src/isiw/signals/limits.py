@@ -53,22 +53,6 @@ class SignalLimits(Checked):
         too_quiet = "SignalLimits.background_uv is less than any amplifier's noise"
         BACKGROUND_LIMIT_UV.require(too_quiet, self.background_uv, "µV RMS, such as 10")
 
-    def require_behind_artefact(self) -> None:
-        """Raise where the window would hold the pulse's own artefact.
-
-        It is for limits that somebody states: those of earlier logs stay readable.
-
-        Raises:
-            InvalidValueError: the MEP window begins less than 3 ms after the pulse, as also where its first ms is in s.
-        """
-        if self.mep_window_ms[0] < ARTEFACT_MS:
-            raise InvalidValueError(
-                "SignalLimits.mep_window_ms begins in the pulse's artefact, which would be measured as an MEP",
-                got=self.mep_window_ms,
-                expected=f"from {ARTEFACT_MS:g} ms after the pulse on, such as {MEP_WINDOW_MS}",
-                remedy="Set when MEPs of this muscle begin [ms].",
-            )
-
     @property
     def most_background_uv(self) -> float:
         """The most EMG before the pulse [µV RMS]; infinite if the muscle is to be contracted."""
@@ -81,6 +65,3 @@ class SignalLimits(Checked):
 
 EMG_UNITS_MV: Mapping[str, float] = MappingProxyType({"V": 1e3, "mV": 1.0, "uV": 1e-3, "µV": 1e-3, "μV": 1e-3})
 """One of each unit in mV; both of Unicode's micro signs are known."""
-
-ACCELERATION_UNITS = frozenset({"m/s^2", "m/s²", "g", "V", "mV"})
-"""Units of the acceleration; the impact is found in any of them."""

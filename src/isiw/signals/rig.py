@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from isiw.design import DesignSpace
-from isiw.findings import REMEDIES, REST_UV, Finding, Kind, Severity
+from isiw.findings import REMEDIES, Finding, Kind, Severity, UnitScale
 from isiw.signals.amplitudes import Counted
 from isiw.signals.impact import impact_time
 from isiw.signals.judgement import of_one_length
@@ -23,6 +23,9 @@ from isiw.signals.plausible import implausible_amplitude
 from isiw.signals.waveforms import PULSE_GUARD_MS, is_recording, samples
 from isiw.sweeps import Channel, Measurement, Sweep
 from isiw.trials import Trial
+
+REST_UV: Final = UnitScale(0.05, 400.0, usual=2.0)
+"""RMS of EMG before the pulse: no amplifier is so quiet, and no muscle so loud, at rest or at work."""
 
 _USUAL_LIMITS: Final = SignalLimits()
 

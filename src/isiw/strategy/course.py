@@ -12,19 +12,13 @@ import numpy as np
 
 from isiw.acquisition.protocol import AcquisitionFunction, FollowsPlan, own_plan
 from isiw.checks import can
+from isiw.decision import StopDecision
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
 from isiw.lazy import Later, WorkedOut
-from isiw.models.protocol import (
-    ExpectsTheUsual,
-    NotesChanges,
-    Observation,
-    Posterior,
-    ProposesIsi,
-    ResponseModel,
-)
+from isiw.models.protocol import ExpectsTheUsual, NotesChanges, Observation, Posterior, ProposesIsi, ResponseModel
 from isiw.strategy.choice import Choice, Cost, best_choices, evenly_spaced
-from isiw.strategy.decisions import Progress, StopDecision, StoppingRule, looks_back
+from isiw.strategy.decisions import Progress, StoppingRule, looks_back
 from isiw.strategy.intensities import NONE, Intensities
 
 

@@ -1,59 +1,13 @@
-"""When to stop: a rule answers a `Progress` with a decision and its reason; those of isiw are in `stopping`."""
+"""Rules of when to stop: one answers a `Progress` with a decision; those of isiw are in `stopping`."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import StrEnum
-from typing import Final, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 from isiw.checks import can
+from isiw.decision import StopDecision
 from isiw.estimate import WindowEstimate
-from isiw.findings import Finding, Kind
-
-
-class StopKind(StrEnum):
-    """The grounds of a decision."""
-
-    BUDGET = "budget"
-    LIMIT = "limit"
-    KNOWN = "window known"
-    ABSENT = "no window"
-    SMALL_GAIN = "small gain"
-    SETTLED = "settled"
-    TOO_LITTLE = "too little measured"
-    PAUSED = "paused"
-    THRESHOLD = "threshold"
-    PLAN = "plan"
-    OWN = "a user's own rule"
-
-    def stop(self, reason: str) -> StopDecision:
-        """The decision to stop, for this reason."""
-        return StopDecision(stop=True, reason=reason, kind=self)
-
-    def go_on(self, reason: str) -> StopDecision:
-        """The decision to continue, for this reason."""
-        return StopDecision(stop=False, reason=reason, kind=self)
-
-
-OF_THE_WINDOW: Final = frozenset(
-    {StopKind.KNOWN, StopKind.ABSENT, StopKind.SMALL_GAIN, StopKind.SETTLED, StopKind.TOO_LITTLE}
-)
-"""Decisions that say something about the window; they mean nothing if too little was measured."""
-
-
-@dataclass(frozen=True)
-class StopDecision:
-    """The decision to stop or not, with its reason.
-
-    Args:
-        stop: whether to stop.
-        reason: why, or why not, in full sentences.
-        kind: what it rests on.
-    """
-
-    stop: bool
-    reason: str
-    kind: StopKind = StopKind.OWN
 
 
 @dataclass(frozen=True)
@@ -64,13 +18,6 @@ class Progress:
     told: int
     estimate: WindowEstimate
     past: tuple[WindowEstimate, ...] = ()
-
-
-def for_lack(decision: StopDecision, found: Finding | None) -> StopDecision:
-    """The decision if something is lacking to speak of a window; in doubt none but a budget stops."""
-    if found is None or (decision.stop and (found.kind is not Kind.ISIS_FAR or decision.kind is StopKind.BUDGET)):
-        return decision
-    return StopKind.TOO_LITTLE.go_on(f"{found}")
 
 
 class StoppingRule(Protocol):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from isiw.decision import StopDecision, StopKind
 from isiw.estimate import WindowEstimate
-from isiw.findings import is_silent, lacking
+from isiw.findings import Finding, Kind, is_silent, lacking
 from isiw.strategy.course import Course
-from isiw.strategy.decisions import StopDecision, for_lack
 from isiw.strategy.outcomes import Outcomes
 
 
@@ -36,9 +36,16 @@ class Known:
         """The decision to stop now or not, with its reason."""
         silent = self._is_silent
         decision = self.course.decision(self.person, self.mistrials, silent=silent)
-        return for_lack(decision, lacking(None, silent=silent, in_doubt=self.in_doubt))
+        return _for_lack(decision, lacking(None, silent=silent, in_doubt=self.in_doubt))
 
     @property
     def _is_silent(self) -> bool:
         meps_mv = [one.mep_mv for one in self.outcomes.pulses if one.mep_mv is not None]
         return is_silent(meps_mv, self.detection_limit_mv)
+
+
+def _for_lack(decision: StopDecision, found: Finding | None) -> StopDecision:
+    """The decision if something is lacking to speak of a window; in doubt none but a budget stops."""
+    if found is None or (decision.stop and (found.kind is not Kind.ISIS_FAR or decision.kind is StopKind.BUDGET)):
+        return decision
+    return StopKind.TOO_LITTLE.go_on(f"{found}")

@@ -8,19 +8,12 @@ from functools import partial
 from typing import Annotated, Final
 
 from isiw.checks import Checked, Count, Positive, Share, number
+from isiw.decision import OF_THE_WINDOW, StopDecision, StopKind
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
-from isiw.strategy.decisions import (
-    OF_THE_WINDOW,
-    Progress,
-    StopDecision,
-    StopKind,
-    StoppingRule,
-    looks_back,
-    stimuli_left,
-)
+from isiw.strategy.decisions import Progress, StoppingRule, looks_back, stimuli_left
+from isiw.summary import SURE
 from isiw.text.sanitize import counted
-from isiw.window import SURE
 
 MOST_BY_TIME: Final = 0.05
 """No session stops on a window while changes with time explain it all with more probability than this."""

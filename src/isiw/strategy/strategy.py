@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from isiw.acquisition.protocol import AcquisitionFunction, greedy_batch, require_acquisition, require_capabilities
 from isiw.checks import amplitude, deadline, flag, number, whole
+from isiw.decision import StopDecision
 from isiw.design import DesignSpace, require_space
 from isiw.errors import ImplausibleDataWarning, InvalidValueError, StrategyError, warn
 from isiw.estimate import WindowEstimate
@@ -14,12 +15,11 @@ from isiw.models.protocol import Posterior, PredictsMeps, ReportsTrouble, Respon
 from isiw.signals.plausible import require_plausible, require_plausible_range
 from isiw.strategy.choice import Asked, Choice, Cost, instead_of_lost
 from isiw.strategy.course import Method
-from isiw.strategy.decisions import StopDecision, StoppingRule, stimuli_left
+from isiw.strategy.decisions import StoppingRule, stimuli_left
 from isiw.strategy.intensities import NONE, Intensities
 from isiw.strategy.known import Known
-from isiw.strategy.outcomes import Outcome, Outcomes
+from isiw.strategy.outcomes import Outcome, Outcomes, Reported
 from isiw.strategy.recipe import Recipe
-from isiw.strategy.reported import Reported
 from isiw.trials import Trial, require_pulse
 from isiw.types import FloatArray
 

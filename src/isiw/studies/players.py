@@ -15,13 +15,14 @@ from pathlib import Path
 from typing import Any, Final, Protocol, TypeAlias
 
 from isiw.acquisition.protocol import AcquisitionFunction
+from isiw.decision import StopDecision, StopKind
 from isiw.design import DesignSpace
 from isiw.errors import ConfigError, StudyError
 from isiw.estimate import WindowEstimate
 from isiw.models.protocol import ResponseModel
 from isiw.strategy.catalogue import make_strategy
 from isiw.strategy.choice import Choice
-from isiw.strategy.decisions import StopDecision, StopKind, StoppingRule
+from isiw.strategy.decisions import StoppingRule
 from isiw.strategy.strategy import Strategy
 from isiw.subjects.subject import Response
 from isiw.text.named_code import named_code, require_fitting

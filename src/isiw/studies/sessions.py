@@ -15,6 +15,7 @@ import numpy as np
 
 from isiw.acquisition.protocol import AcquisitionFunction, require_scores
 from isiw.checks import Checked, Count, Natural, Positive, whole
+from isiw.decision import StopDecision
 from isiw.design import VALVE_SPACE, DesignSpace
 from isiw.errors import InvalidValueError, StudyError
 from isiw.estimate import WindowEstimate
@@ -25,7 +26,7 @@ from isiw.signals import wrong_isi
 from isiw.strategy.catalogue import known_settings, make_strategy
 from isiw.strategy.choice import Choice, instead_of_lost
 from isiw.strategy.course import Course, Method
-from isiw.strategy.decisions import StopDecision, stimuli_left
+from isiw.strategy.decisions import stimuli_left
 from isiw.strategy.known import Known
 from isiw.strategy.outcomes import Outcome, Outcomes
 from isiw.strategy.stopping import Budget
@@ -34,8 +35,9 @@ from isiw.studies.execution import one_thread
 from isiw.studies.players import Alone, OwnCode, Player, Reported
 from isiw.subjects.cohorts import COHORTS, person_of
 from isiw.subjects.subject import Response, SimulatedSubject
+from isiw.summary import bayes_factor
 from isiw.types import Array
-from isiw.window import Window, bayes_factor
+from isiw.window import Window
 
 TIMES = ("ask_ms", "tell_ms")
 """Columns that differ each time a session is run."""

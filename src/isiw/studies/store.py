@@ -25,10 +25,11 @@ import tomli_w
 
 import isiw
 from isiw.errors import StudyError, os_errors
-from isiw.files import TEMPORARY, opened, put
+from isiw.files import TEMPORARY, put
 from isiw.lazy import pa, parquet, pd
 from isiw.log.durable import claim
 from isiw.native import library
+from isiw.opening import opened
 from isiw.studies.execution import Failure
 from isiw.studies.plan import Study, Unit, begun_study, study_values
 from isiw.text.sanitize import command

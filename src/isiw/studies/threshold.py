@@ -6,12 +6,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from isiw.devices.protocol import DeviceInfo
+from isiw.decision import StopDecision
+from isiw.devices.info import DeviceInfo
 from isiw.errors import ConfigError
 from isiw.log.headers import ThresholdHeader
 from isiw.session.threshold import ThresholdRecorder, open_threshold
 from isiw.session.threshold_loops import at_place
-from isiw.strategy.decisions import StopDecision
 from isiw.strategy.threshold.search import ThresholdSearch
 from isiw.subjects.thresholds import StimulatedPerson, threshold_cohort
 

@@ -17,10 +17,10 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from isiw.checks import choice, whole
+from isiw.excess import EDGE_LEVEL
 from isiw.subjects.changes import Plasticity
 from isiw.subjects.responses import log_normal
 from isiw.subjects.subject import SimulatedSubject
-from isiw.window import EDGE_LEVEL
 
 RESPONDERS: Final = 0.5
 """Share of people of "mixed" in whom pairs change anything: an assumption."""

@@ -25,10 +25,11 @@ from isiw.checks import (
 )
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
+from isiw.excess import EDGE_LEVEL, LEAST_DEPRESSED_MV, window_from_excess
 from isiw.subjects.changes import Change, Plasticity, TapResponse, amplitude_of_both_mv
 from isiw.subjects.responses import OpposedProfile, Profile, RecruitmentResponse, ResponseCurve, TrialNoise
 from isiw.types import Conditioning, FloatArray, Reference
-from isiw.window import EDGE_LEVEL, LEAST_DEPRESSED_MV, Window, window_from_excess
+from isiw.window import Window
 
 _Numbers: TypeAlias = Annotated[tuple[float, ...], lambda what, given: tuple(number(what, each) for each in given)]
 

@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from isiw.acquisition.protocol import AcquisitionFunction
+from isiw.decision import StopDecision
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError, StrategyError
 from isiw.estimate import WindowEstimate
@@ -25,7 +26,6 @@ from isiw.models.protocol import (
     SamplesProfiles,
     SamplesWindows,
 )
-from isiw.strategy.decisions import StopDecision
 from isiw.strategy.strategy import Strategy
 from isiw.text.sanitize import shown
 from isiw.trials import Trial

@@ -1,12 +1,9 @@
-"""TOML and JSON from elsewhere, read and checked: what is wrong is told by file, key and value, with the way out."""
+"""TOML files, read and checked: what is wrong is told by file, key and value, with the way out."""
 
 from __future__ import annotations
 
-import json
 import re
-import tomllib
-from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from functools import cache
 from pathlib import Path
@@ -17,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 from pydantic_core import ErrorDetails
 
 from isiw.errors import ConfigError, IsiwError, did_you_mean, os_errors
+from isiw.text.parsing import LARGEST, parsed
 
 UNKNOWN: Final = {"extra_forbidden", "unexpected_keyword_argument"}
 """Pydantic's types of error for a key that there is not."""
@@ -69,38 +67,6 @@ def known_keys(kind: Any, section: Sequence[int | str]) -> list[str]:
 
 _T = TypeVar("_T")
 
-_LARGEST: Final = 2**20
-"""Of a text [characters]; what isiw itself writes has some ten thousand."""
-
-_TOO_MANY_PARTS: Final = re.compile(r"""(?:\.[ \t]*+(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+){100}""")
-
-_MOST_BITS: Final = 256
-"""Of a whole number; TOML asks for 64, and some seeds have 128."""
-
-
-def parsed(text: str) -> dict[str, Any]:
-    """The values of a TOML text."""
-    if len(text) > _LARGEST:
-        raise ValueError(f"it is longer than {_LARGEST} characters")
-    if _TOO_MANY_PARTS.search(text):
-        raise ValueError("a key has more than a hundred parts")
-    values = tomllib.loads(text)
-    _require_moderate(values)
-    return values
-
-
-def _require_moderate(value: object, key: str = "") -> None:
-    """Raise if a whole number is too large even to be printed."""
-    if isinstance(value, int) and value.bit_length() > _MOST_BITS:
-        raise ValueError(f"{key} is a whole number of {value.bit_length()} bits, at most {_MOST_BITS} can be read")
-    items: Iterable[tuple[object, object]] = ()
-    if isinstance(value, dict):
-        items = value.items()
-    elif isinstance(value, list):
-        items = enumerate(value)
-    for name, inner in items:
-        _require_moderate(inner, f"{key}.{name}".lstrip("."))
-
 
 def read_toml(path: str | Path) -> dict[str, Any]:
     """The values of a TOML file."""
@@ -109,7 +75,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
             os_errors(ConfigError, "the TOML file cannot be read", path, "Check the path."),
             Path(path).open(encoding="utf-8-sig") as file,  # with the mark that Windows puts first
         ):
-            text = file.read(_LARGEST + 1)
+            text = file.read(LARGEST + 1)
         return parsed(text)
     except ConfigError:
         raise
@@ -163,37 +129,3 @@ def _explained(kind: Any, error: ErrorDetails, source: str) -> ConfigError:
 
 def _sentences(*sentences: str) -> str:
     return " ".join(filter(None, sentences))
-
-
-_NUMBERS: Final = re.compile(rb":\s*\[[^\[\]{}\"]*\]")
-"""Lists of numbers: they make up most of a waveform, and have no keys."""
-
-
-class DoubledKeyError(ValueError):
-    """A key is there twice."""
-
-
-def read_json(text: str | bytes) -> Any:
-    """The values of a JSON text."""
-    try:
-        return json.loads(text, object_pairs_hook=once_each)
-    except RecursionError as error:
-        raise ValueError("it is nested without end") from error
-
-
-def refuse_doubled(text: bytes) -> None:
-    """Raise if a JSON text has a key twice; quick if it is long because of lists of numbers."""
-    try:
-        read_json(_NUMBERS.sub(b":0", text))
-    except ValueError:  # a text may look like such a list
-        read_json(text)
-
-
-def once_each(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """The values by their keys, none of which may be there twice."""
-    values = dict(pairs)
-    if len(values) < len(pairs):
-        times = Counter(key for key, _ in pairs)
-        twice = next(key for key in times if times[key] > 1)
-        raise DoubledKeyError(f"the key {twice[:80]!r} is there twice")
-    return values

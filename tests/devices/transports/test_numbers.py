@@ -7,7 +7,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 from isiw.devices.transports.exchange import Reply
 from isiw.devices.transports.line_table import number_of
 from isiw.errors import DeviceError, InvalidValueError

@@ -8,11 +8,12 @@ import torch
 from botorch.posteriors.gpytorch import GPyTorchPosterior
 
 from isiw.design import DesignSpace
+from isiw.excess import window_from_excess
 from isiw.models.gp.fit import fit as fit_of
 from isiw.models.gp.model import Paths, ProfileSample, draw_paths
 from isiw.models.gp.prior import FixedProcess, HyperparameterPrior, ProcessSettings, Standardisation
 from isiw.models.shared.history import FloorKind, PersonTrials
-from isiw.window import Window, window_from_excess
+from isiw.window import Window
 from known import known
 
 SPACE = DesignSpace(0, 320, reference="impact")

@@ -6,6 +6,7 @@ import torch
 from scipy.stats import kstest
 
 from isiw.design import VALVE_SPACE
+from isiw.excess import EDGE_LEVEL
 from isiw.models.parametric.law import (
     Likelihood,
     Unknowns,
@@ -15,7 +16,6 @@ from isiw.models.parametric.law import (
     levels,
     log_likelihood,
 )
-from isiw.window import EDGE_LEVEL
 from known import known
 
 LIKELIHOODS: tuple[Likelihood, ...] = ("gamma", "log-normal", "input-noise")

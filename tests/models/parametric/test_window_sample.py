@@ -5,10 +5,11 @@ import pytest
 import torch
 
 from isiw.design import VALVE_SPACE, DesignSpace
+from isiw.excess import window_from_excess
 from isiw.metrics import f1
 from isiw.models.parametric import ParametricModel
 from isiw.models.parametric.model import WindowSample
-from isiw.window import Window, window_from_excess
+from isiw.window import Window
 
 
 @pytest.mark.parametrize("space", [VALVE_SPACE, DesignSpace(0, 300, reference="valve")], ids=["whole", "cut off"])

@@ -30,9 +30,9 @@ from isiw.models.particles.records import (
 from isiw.models.protocol import Observation
 from isiw.models.shared.draws import systematic
 from isiw.models.shared.history import Circumstances, History, neutral
-from isiw.native.arrays import UNKNOWN
 from isiw.native.engine import elementary, log_likelihoods
 from isiw.native.law import Crowd
+from isiw.native.library import UNKNOWN
 from isiw.types import FloatArray, Singles
 from native import reference
 from native.drawn import CASES, Case, columns, history, seeds, trials

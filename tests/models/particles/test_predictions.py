@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from isiw.design import VALVE_SPACE, DesignSpace
+from isiw.excess import window_from_excess
 from isiw.metrics import f1
 from isiw.models.particles.model import ParticleModel
 from isiw.models.particles.predictions import PersonSample, _quantile, drawn_mep_mv
@@ -12,7 +13,7 @@ from isiw.models.particles.profile import ProfilePrior
 from isiw.models.protocol import Observation
 from isiw.models.shared.start import StartPrior
 from isiw.models.windows import grid_of, profile_grid
-from isiw.window import Window, window_from_excess
+from isiw.window import Window
 from native.drawn import Case
 
 

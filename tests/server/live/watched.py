@@ -13,8 +13,8 @@ from typing import Any, Self
 import httpx
 import numpy as np
 
-from isiw.devices.protocol import DeviceInfo
-from isiw.log.reader import SessionRecord, read_session
+from isiw.devices.info import DeviceInfo
+from isiw.log.record import SessionRecord, read_session
 from isiw.server.live.page import LivePage, watch
 from isiw.session.loop import Session
 from isiw.sweeps import Channel, Sweep

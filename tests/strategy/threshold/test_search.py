@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
+from isiw.decision import StopDecision
 from isiw.errors import ConfigError, InvalidValueError, LimitExceededError
-from isiw.strategy.decisions import StopDecision
 from isiw.strategy.threshold import (
     IntensityRange,
     Pulse,

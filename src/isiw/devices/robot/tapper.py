@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, Protocol, TypeAlias
 import numpy as np
 
 from isiw.checks import MOST_DELAY_MS, Checked, choice, number
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 from isiw.devices.robot.mechanism import EventTime, Faults, Geometry, Taps, draw_taps
 from isiw.devices.robot.waveforms import UNITS, record_emg, record_robot, sample_times_ms
 from isiw.errors import DeviceError, InvalidValueError

@@ -17,7 +17,8 @@ from enum import StrEnum
 from typing import Any, Final, Protocol, TypeVar, Unpack
 
 from isiw.checks import Bounds, from_table, number
-from isiw.devices.protocol import DeviceInfo, require_staged
+from isiw.devices.info import DeviceInfo
+from isiw.devices.protocol import require_staged
 from isiw.errors import DeviceError, InvalidValueError, NotDelivered
 from isiw.sweeps import Channel, Sweep
 from isiw.text.sanitize import plain, read_number

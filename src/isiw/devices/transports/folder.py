@@ -17,10 +17,12 @@ from typing import Any, Final
 import numpy as np
 
 from isiw.checks import number
-from isiw.devices.protocol import Answer, DeviceInfo
+from isiw.devices.info import DeviceInfo
+from isiw.devices.protocol import Answer
 from isiw.devices.transports.exchange import LONGEST_REPLY, Exchange, Reply, Request, Verb, described, sweep_of
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, os_errors
-from isiw.files import opened, written_beside
+from isiw.files import written_beside
+from isiw.opening import opened
 from isiw.sweeps import Channel, Measurement, Sweep
 from isiw.trials import Stimulus
 from isiw.types import FloatArray

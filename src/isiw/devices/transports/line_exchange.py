@@ -14,14 +14,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Literal, TypeVar
 
-from isiw.checks import (
-    Checked,
-    Count,
-    Flag,
-    NonNegative,
-    Positive,
-    choice,
-)
+from isiw.checks import Checked, Count, Flag, NonNegative, Positive, choice
 from isiw.devices.dying import armed_by_another
 from isiw.devices.transports.line_table import Connection, LineExchange, LineHeartbeat, command_values, crc_of
 from isiw.devices.watchdog import Watchdog

@@ -14,13 +14,13 @@ from functools import partial
 from typing import Any, Final
 
 from isiw.checks import from_table, number, text
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 from isiw.devices.transports.exchange import LONGEST_REPLY, Exchange, Reply, Request, Verb, described, sweep_of
 from isiw.devices.transports.lsl_samples import LATE_S, LslChannel, SampleStream
 from isiw.errors import DeviceError, DeviceTimeoutError, InvalidValueError, NotDelivered
 from isiw.sweeps import Channel, Sweep
 from isiw.text.named_code import library
-from isiw.text.toml_files import read_json
+from isiw.text.parsing import read_json
 from isiw.trials import Stimulus
 
 _GLANCE_S: Final = 0.02

@@ -33,8 +33,8 @@ from isiw.log.headers import (
 from isiw.log.kinds import LogKind, kind_of, of_another_kind
 from isiw.log.records import Records
 from isiw.log.salvage import Salvage, salvage
-from isiw.log.schema import Event, now
-from isiw.log.writer import LogWriter
+from isiw.log.schema import Event
+from isiw.log.writer import LogWriter, now
 from isiw.session.terminal import Keys, Screen, is_attended
 from isiw.text.sanitize import counted
 from isiw.types import ArrayLike, FloatArray

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from isiw.existing.formats.contents import Contents, Track, events_of, part_of, parted, timed
 from isiw.existing.layout import Layout
-from isiw.files import opened
+from isiw.opening import opened
 from isiw.text.named_code import library
 from isiw.types import FloatArray
 

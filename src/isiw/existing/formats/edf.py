@@ -13,7 +13,7 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.existing.formats.contents import Contents, Stretch, Track, with_codes
 from isiw.existing.layout import Layout
-from isiw.files import opened
+from isiw.opening import opened
 from isiw.types import FloatArray
 
 _FIELDS: Final = {"label": 16, "transducer": 80, "unit": 8, "least": 8, "most": 8, "lowest": 8, "highest": 8,

@@ -14,7 +14,7 @@ from isiw.errors import InvalidValueError
 from isiw.existing.formats.columns import require_rate
 from isiw.existing.formats.contents import Contents, Track, events_of, part_of, parted, text_of, timed
 from isiw.existing.layout import EMG_UNITS, Layout
-from isiw.files import opened
+from isiw.opening import opened
 from isiw.text.named_code import library
 from isiw.types import FloatArray
 

@@ -13,7 +13,7 @@ import numpy as np
 from isiw.errors import InvalidValueError
 from isiw.existing.formats.contents import Contents, Stretch, Track, events_of, parted, timed, with_codes
 from isiw.existing.layout import Layout
-from isiw.files import opened
+from isiw.opening import opened
 from isiw.text.named_code import library
 from isiw.types import FloatArray
 

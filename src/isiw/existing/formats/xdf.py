@@ -22,7 +22,7 @@ import numpy as np
 from isiw.existing.formats.contents import Contents, Track, events_of, text_of
 from isiw.existing.formats.stamps import clocked
 from isiw.existing.layout import Layout
-from isiw.files import opened
+from isiw.opening import opened
 from isiw.text.named_code import library
 from isiw.types import FloatArray
 

@@ -16,6 +16,7 @@ from isiw.checks import Checked, Positive, whole
 from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.estimate import WindowEstimate
+from isiw.excess import least_excess_mv
 from isiw.lazy import botorch, torch
 from isiw.models.gp.fit import Fit, fit
 from isiw.models.gp.places import Tensor
@@ -32,7 +33,6 @@ from isiw.models.shared.draws import systematic
 from isiw.models.shared.history import AmplitudeHistory, FloorKind, FloorTreatment, OfAmplitudes, PersonTrials
 from isiw.models.windows import Runs, SampledProfiles, grid_of, profile_grid, sampled_estimate
 from isiw.types import Array, Singles
-from isiw.window import least_excess_mv
 
 PATH_STEP_MS = 5.0
 """Paths are drawn at ISIs this far apart at most, and are straight in between; length scales are 10 ms and more."""

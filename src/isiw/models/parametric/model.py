@@ -16,6 +16,7 @@ import numpy as np
 from isiw.checks import Checked, Positive, whole
 from isiw.design import DesignSpace
 from isiw.estimate import WindowEstimate
+from isiw.excess import least_excess_mv
 from isiw.lazy import torch
 from isiw.models.parametric.importance import Effort
 from isiw.models.parametric.law import Likelihood, Unknowns, WindowPrior, draw_log_mep, levels, log_likelihood
@@ -26,7 +27,7 @@ from isiw.models.shared.draws import OUTCOMES, SIMULATED, systematic
 from isiw.models.shared.history import History, observed, without_known
 from isiw.models.windows import Runs, SampledProfiles, profile_grid, sampled_estimate
 from isiw.types import Array, ArrayLike, FloatArray, Singles
-from isiw.window import Window, least_excess_mv
+from isiw.window import Window
 
 
 @dataclass(frozen=True)

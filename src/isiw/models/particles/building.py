@@ -11,8 +11,8 @@ import numpy as np
 from isiw.design import DesignSpace
 from isiw.models.particles.mixture import Mixture
 from isiw.models.shared.start import StartPrior
-from isiw.native.arrays import MEANINGS
 from isiw.native.law import Tables
+from isiw.native.library import MEANINGS
 from isiw.types import FloatArray, Singles
 
 PART_PROBABILITY: Final = (0.25, 0.30, 0.25, 0.20)

@@ -20,9 +20,9 @@ from isiw.models.particles.mixture import log_sum
 from isiw.models.particles.noise import recruits
 from isiw.models.shared.draws import seeds
 from isiw.models.shared.history import BY_CURVES, COUNTS, SHIFT, History
-from isiw.native.arrays import Seeds
 from isiw.native.engine import log_likelihoods
 from isiw.native.law import Crowd, Law
+from isiw.native.library import Seeds
 from isiw.types import BoolArray, FloatArray, Singles
 
 LEAST_ESS = 0.01

@@ -12,9 +12,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from isiw.devices.protocol import Readiness, unprotected
-from isiw.log.kinds import continued_by
-from isiw.log.reader import SessionRecord
+from isiw.devices.info import Readiness, unprotected
+from isiw.log.continuing import continued_by
+from isiw.log.record import SessionRecord
 from isiw.log.schema import EstimateRecord, Event, Intent, Record, Waveform
 from isiw.report.drawn import drawn
 from isiw.report.tables import first_facts

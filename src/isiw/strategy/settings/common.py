@@ -18,18 +18,7 @@ import numpy as np
 
 from isiw.acquisition.protocol import AcquisitionFunction
 from isiw.acquisition.registry import ACQUISITIONS, acquisition_named
-from isiw.checks import (
-    MOST_OF_A_KIND,
-    Checked,
-    Count,
-    Flag,
-    Natural,
-    Positive,
-    Share,
-    choice,
-    share,
-    whole,
-)
+from isiw.checks import MOST_OF_A_KIND, Checked, Count, Flag, Natural, Positive, Share, choice, share, whole
 from isiw.design import DesignSpace
 from isiw.errors import ConfigError, StrategyError, did_you_mean
 from isiw.models.protocol import ResponseModel

@@ -4,9 +4,9 @@ from .bayes import FiveOfTen as FiveOfTen
 from .bayes import MaximumLikelihood as MaximumLikelihood
 from .bayes import RecruitmentPrior as RecruitmentPrior
 from .curve import CurvePulses as CurvePulses
-from .pulses import IntensityRange as IntensityRange
+from .estimate import IntensityRange as IntensityRange
+from .estimate import ThresholdEstimate as ThresholdEstimate
 from .pulses import Pulse as Pulse
-from .pulses import ThresholdEstimate as ThresholdEstimate
 from .pulses import ThresholdMethod as ThresholdMethod
 from .search import ThresholdSearch as ThresholdSearch
 from .search import list_threshold_methods as list_threshold_methods

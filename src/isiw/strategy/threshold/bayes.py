@@ -18,9 +18,10 @@ from typing import Annotated, Final, TypeAlias
 import numpy as np
 
 from isiw.checks import Checked, Count, Positive, ascending, number, whole
+from isiw.decision import StopDecision, StopKind
 from isiw.lazy import scipy
-from isiw.strategy.decisions import StopDecision, StopKind
-from isiw.strategy.threshold.pulses import IntensityRange, Pulse, ThresholdEstimate
+from isiw.strategy.threshold.estimate import IntensityRange, ThresholdEstimate
+from isiw.strategy.threshold.pulses import Pulse
 from isiw.trials import RESPONSE_MV
 from isiw.types import FloatArray
 

@@ -10,10 +10,11 @@ from typing import Final
 import numpy as np
 
 from isiw.checks import Checked, Count, Natural, Positive
+from isiw.decision import StopDecision, StopKind
 from isiw.errors import InvalidValueError, LimitExceededError
-from isiw.strategy.decisions import StopDecision, StopKind
 from isiw.strategy.threshold.bayes import BayesThreshold
-from isiw.strategy.threshold.pulses import IntensityRange, Pulse, ThresholdEstimate
+from isiw.strategy.threshold.estimate import IntensityRange, ThresholdEstimate
+from isiw.strategy.threshold.pulses import Pulse
 
 _OF_THE_ORDER: Final = 45
 """Its randomness is no other one of the same seed."""

@@ -10,10 +10,11 @@ from typing import Final
 import numpy as np
 
 from isiw.checks import Checked, Count, Positive
+from isiw.decision import StopDecision, StopKind
 from isiw.lazy import scipy
-from isiw.strategy.decisions import StopDecision, StopKind
 from isiw.strategy.threshold.bayes import DISTANCES_PCT, RecruitmentPrior, log_likelihood
-from isiw.strategy.threshold.pulses import IntensityRange, Pulse, ThresholdEstimate
+from isiw.strategy.threshold.estimate import IntensityRange, ThresholdEstimate
+from isiw.strategy.threshold.pulses import Pulse
 from isiw.types import FloatArray
 
 INTENSITIES_PCT: Final = (95.0, 105.0, 115.0, 125.0, 135.0, 150.0)

@@ -7,21 +7,14 @@ from dataclasses import asdict, is_dataclass
 from typing import Any, Final
 
 from isiw.checks import choice, number
+from isiw.decision import StopDecision, StopKind
 from isiw.errors import InvalidValueError
 from isiw.signals.plausible import implausible_scale, require_amplitude
-from isiw.strategy.decisions import StopDecision, StopKind
 from isiw.strategy.threshold.bayes import BayesThreshold, FiveOfTen, MaximumLikelihood
 from isiw.strategy.threshold.curve import CurvePulses
+from isiw.strategy.threshold.estimate import IntensityRange, ThresholdEstimate
 from isiw.strategy.threshold.hotspot import BayesHotSpot
-from isiw.strategy.threshold.pulses import (
-    IntensityRange,
-    Pulse,
-    ThresholdEstimate,
-    ThresholdMethod,
-    hardly_larger,
-    not_growing,
-    one_sided,
-)
+from isiw.strategy.threshold.pulses import Pulse, ThresholdMethod, hardly_larger, not_growing, one_sided
 from isiw.text.toml_files import checked
 
 METHODS: Final[Mapping[str, type[BayesThreshold | MaximumLikelihood | FiveOfTen | CurvePulses]]] = {

@@ -13,7 +13,7 @@ from types import MappingProxyType
 import numpy as np
 
 from isiw.checks import MOST_DELAY_MS, number, whole
-from isiw.devices.protocol import DeviceInfo
+from isiw.devices.info import DeviceInfo
 from isiw.devices.robot.tapper import Tapper
 from isiw.devices.robot.vane.rotation import ATMOSPHERE_BAR, PA_PER_BAR, Rotations, Vane, rotate
 from isiw.signals.impact import VALVE_MS, impact_time

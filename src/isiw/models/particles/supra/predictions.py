@@ -8,9 +8,9 @@ from typing import Final
 
 import numpy as np
 
+from isiw.excess import LEAST_DEPRESSED_MV, least_excess_mv
 from isiw.models.particles.predictions import TabledSample
 from isiw.types import Array, Singles
-from isiw.window import LEAST_DEPRESSED_MV, least_excess_mv
 
 MOST_RANGE_POINTS: Final = 241
 """ISIs at which the largest enhancement and the deepest depression in the range are looked for, at most."""
