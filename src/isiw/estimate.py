@@ -257,7 +257,12 @@ class WindowEstimate(Checked):
         return ProfileBand(median, low, high)
 
     def in_figures(self, kind: type[FiguresT], **more: Any) -> FiguresT:
-        """The estimate in figures of a kind, with its 90 % intervals, and more fields of that kind."""
+        """The estimate in figures, with its 90 % intervals.
+
+        Args:
+            kind: what holds the figures: an `Estimate`, or a kind of it.
+            **more: further fields of that kind.
+        """
         edges: dict[str, Any] = {
             f"{name}_{part}": value
             for name, edge in zip(("start", "end"), self.edges, strict=True)
