@@ -60,7 +60,13 @@ def format_of(path: Path) -> Format:
     """The format of a file, by its name."""
     name = path.name.casefold()
     found = next((one for one in FORMATS if name.endswith(one.suffixes)), None)
-    if found is None or (path.is_dir() and not name.endswith(".mff")):
+    if path.is_dir() and not name.endswith(".mff"):
+        raise InvalidValueError(
+            "a folder is no file of trials",
+            got=str(path),
+            remedy=f"Name its files, all together if the same options hold for them, such as {path}/*.csv.",
+        )
+    if found is None:
         raise InvalidValueError(
             "this cannot be read",
             got=path.name,
