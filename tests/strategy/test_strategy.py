@@ -268,7 +268,7 @@ def test_a_seed_is_a_whole_number_also_of_a_strategy_of_ones_own(seed: Any) -> N
 
 def test_a_stopping_rule_that_answers_with_something_else_is_refused_with_the_way_out() -> None:
     usual = make_strategy(particles=50)
-    strategy = Strategy(usual.space, usual.model, usual.acquisition, lambda _: (True, "Enough."))  # type: ignore[arg-type, return-value]
+    strategy = Strategy(usual.space, usual.model, usual.acquisition, lambda _: (True, "Enough."))  # type: ignore[arg-type]
     with pytest.raises(StrategyError, match=r"isiw\.StopDecision\(stop, reason\)"):
         strategy.decision()
 
