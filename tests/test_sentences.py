@@ -93,7 +93,10 @@ _LOOK = "Did the stimulator fire? Was the EMG recorded? Was the intensity high e
         (summary.tap_unmeasured(SURE, TAP), ""),
         (
             summary.tap_unmeasured(Estimate(**FOUND, tap_may_explain=True), TAP),
-            "Deliver the tap alone at these ISIs too ([protocol] tap_alone); the muscle may answer it.",
+            (
+                "Deliver the tap alone at these ISIs too ([protocol] tap_alone, or tell(…, pulse=False)); the muscle "
+                "may answer it."
+            ),
         ),
         (summary.tap_unmeasured(Estimate(**FOUND, tap_may_explain=True, tap_is_likely=True), TAP), ""),
         (

@@ -109,7 +109,8 @@ def tap_unmeasured(estimate: Estimate, first: StimulusWords = _EITHER) -> str:
     """The way to learn the first stimulus's own response within a window, if it was not measured."""
     if not estimate.tap_may_explain or estimate.tap_is_likely:
         return ""
-    return f"Deliver the {first.alone} at these ISIs too ([protocol] tap_alone); the muscle may answer it."
+    how = "[protocol] tap_alone, or tell(…, pulse=False)"
+    return f"Deliver the {first.alone} at these ISIs too ({how}); the muscle may answer it."
 
 
 def at_a_trial(change: Change, trial: int | None) -> str:

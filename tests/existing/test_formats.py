@@ -270,6 +270,11 @@ def test_a_file_that_is_none_of_its_format_is_refused_in_a_sentence(
     assert "\n" not in str(refused.value)
 
 
+def test_of_a_folder_the_files_in_it_are_to_be_named(tmp_path: Path) -> None:
+    with pytest.raises(IsiwError, match=r"Name its files.*\*\.csv"):
+        read(tmp_path)
+
+
 @pytest.mark.parametrize("inverted", [False, True])
 def test_a_trigger_in_a_channel_is_a_marker_in_any_format(inverted: bool) -> None:  # noqa: FBT001
     rows = [1e-3 * recording()[0], *(pulsed(40, name, 5.0) for name in NAMES.values())]

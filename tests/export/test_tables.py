@@ -49,6 +49,14 @@ def test_what_is_read_back_is_what_was_logged(log: Path, tmp_path: Path, to: str
     assert back.status.tolist() == trials.status.tolist()
 
 
+def test_booleans_of_csv_are_spelt_as_r_reads_them(log: Path, tmp_path: Path) -> None:
+    exclude(log, 2, "cough")
+    export_logs(log, tmp_path / "out")
+    trials = pd.read_csv(tmp_path / "out" / "trials.csv", dtype=str)
+    assert trials.excluded.tolist() == ["FALSE", "FALSE", "TRUE", "FALSE", "FALSE", "FALSE"]
+    assert pd.read_csv(tmp_path / "out" / "sessions.csv", dtype=str).simulated.tolist() == ["TRUE"]
+
+
 @pytest.mark.parametrize("to", READERS)
 def test_a_session_is_a_row_that_says_what_it_is_and_found(log: Path, tmp_path: Path, to: str) -> None:
     export_logs(log, tmp_path / "out", to)
@@ -194,5 +202,5 @@ def test_what_was_judged_since_is_said_and_days_are_whole_numbers(log: Path, tmp
     exclude(log, 2, "cough")
     export_logs(tmp_path / "logs", tmp_path / "out")
     lines = pd.read_csv(tmp_path / "out" / "sessions.csv", dtype=str).set_index("subject")
-    assert lines.judged_since.to_dict()["P07"] == "True"
+    assert lines.judged_since.to_dict()["P07"] == "TRUE"
     assert lines.day.fillna("").to_dict() == {"P07": "", "P08": "", "P09": "3"}

@@ -9,6 +9,7 @@ from typing import Any
 import hypothesis
 import hypothesis.strategies as st
 import numpy as np
+import pandas as pd
 import pytest
 
 import isiw
@@ -68,6 +69,18 @@ def test_a_session_that_goes_on_knows_them_still(tmp_path: Path) -> None:
         asked.append(session.ask())
         session.close()
     assert asked[0] == asked[1]
+    record = isiw.read_session(log)
+    said = f"{len(record.header.earlier)} earlier trials were learnt first."
+    assert isiw.report.words.counts_sentence(record).endswith(said)
+
+
+@pytest.mark.parametrize("no_trials", [pd.DataFrame({"isi_ms": [40.0], "mep_mv": [0.1]}), "P01.mcap", 7])
+def test_what_is_no_sequence_of_trials_is_refused_with_the_way_to_them(no_trials: Any, tmp_path: Path) -> None:
+    strategy = isiw.make_strategy("incremental", space=SPACE)
+    with pytest.raises(isiw.errors.InvalidValueError, match=r"read_session\(log\)\.table"):
+        isiw.open_session(strategy, tmp_path / "a.mcap", earlier=no_trials)
+    with pytest.raises(isiw.errors.InvalidValueError, match=r"read_session\(log\)\.table"):
+        strategy.learn_all(no_trials)
 
 
 def over_the_curve(number: int, seed: int) -> list[tuple[float, float]]:

@@ -267,6 +267,13 @@ def test_a_seed_is_a_whole_number_also_of_a_strategy_of_ones_own(seed: Any) -> N
         Strategy(usual.space, usual.model, usual.acquisition, usual.stopping, seed=seed)
 
 
+def test_a_stopping_rule_that_answers_with_something_else_is_refused_with_the_way_out() -> None:
+    usual = make_strategy(particles=50)
+    strategy = Strategy(usual.space, usual.model, usual.acquisition, lambda _: (True, "Enough."))  # type: ignore[arg-type]
+    with pytest.raises(StrategyError, match=r"isiw\.StopDecision\(stop, reason\)"):
+        strategy.decision()
+
+
 def test_a_tie_is_asked_at_the_first_isi_and_a_score_that_is_not_finite_never() -> None:
     model = scripted_strategy().model
     space = DesignSpace(0, 4, reference="impact")

@@ -93,10 +93,11 @@ def test_its_settings_reach_the_function(tmp_path: Path, module: str) -> None:
     assert player.ask() == 300.0
 
 
-def test_a_setting_that_the_function_does_not_take_is_refused(tmp_path: Path, module: str) -> None:
-    study = load_study(written(tmp_path, {"name": f"{module}:acquisition", "settings": {"twoards": 3.0}}))
+def test_a_setting_that_the_function_does_not_take_is_refused_when_the_study_is_read(
+    tmp_path: Path, module: str
+) -> None:
     with pytest.raises(ConfigError, match="towards"):
-        run_unit(study.units()[0])
+        load_study(written(tmp_path, {"name": f"{module}:acquisition", "settings": {"twoards": 3.0}}))
 
 
 def test_a_function_that_is_not_there_is_refused_when_the_study_is_read(tmp_path: Path, module: str) -> None:

@@ -128,6 +128,13 @@ def test_more_comparisons_have_wider_intervals() -> None:
     assert same["high"] - same["low"] > 1.2 * (one["high"] - one["low"])
 
 
+def test_the_interval_of_a_few_people_is_students() -> None:
+    f1s = np.array([0.4, 0.5, 0.45, 0.3, 0.35, 0.4])
+    compared = pd.concat([rows_of("default", np.full(6, 0.5)), rows_of("b", f1s)])
+    (row,) = differences(compared).to_dict("records")
+    assert (row["low"], row["high"]) == pytest.approx((-0.1 - 2.5706 * row["se"], -0.1 + 2.5706 * row["se"]), abs=1e-5)
+
+
 @pytest.mark.slow
 def test_intervals_hold_for_the_share_of_studies_that_they_say() -> None:
     rng, held = np.random.default_rng(5), 0

@@ -142,6 +142,18 @@ def test_the_suite_finds_a_broken_model(fault: str, promise: str) -> None:
         check_model(lambda: Broken(fault), VALVE_SPACE, order_tolerance_ms=20.0)
 
 
+def test_a_model_that_fails_is_said_after_which_trials() -> None:
+    class Naive(ParticleModel):
+        def update(self, posterior: Any, observation: Observation) -> Any:
+            if np.isnan(observation.isi_ms).any():
+                raise ZeroDivisionError
+            return super().update(posterior, observation)
+
+    with pytest.raises(ZeroDivisionError) as failed:
+        check_model(lambda: Naive(particles=50), VALVE_SPACE)
+    assert "after: baselines only" in failed.value.__notes__[0]
+
+
 def flat(_posterior: object, isi_ms: Array) -> Array:
     return np.zeros(len(isi_ms))
 

@@ -80,7 +80,7 @@ EVENT_COLUMNS: Final[Columns] = {
 """Unit and meaning of what is said about an event."""
 
 _ENCODERS: Final[Mapping[str, Callable[[pd.DataFrame, io.BytesIO], None]]] = {
-    "csv": lambda frame, file: frame.to_csv(file, index=False, na_rep=""),
+    "csv": lambda frame, file: _spelt(frame).to_csv(file, index=False, na_rep=""),
     "parquet": lambda frame, file: frame.to_parquet(file, index=False),
 }
 
@@ -117,6 +117,12 @@ def tidy(frame: pd.DataFrame) -> pd.DataFrame:
     is_object, is_string = pd.api.types.is_object_dtype, pd.api.types.is_string_dtype
     texts = [name for name in frame.columns if is_object(frame[name]) or is_string(frame[name])]
     return frame.assign(**{name: frame[name].map(lambda x: one_line(x) if isinstance(x, str) else x) for name in texts})
+
+
+def _spelt(frame: pd.DataFrame) -> pd.DataFrame:
+    """The same with TRUE and FALSE for booleans, since R reads the True and False of Python as texts."""
+    flags = frame.loc[:, [kind.kind in "bO" for kind in frame.dtypes]]
+    return frame.assign(**flags.map(lambda said: str(said).upper() if isinstance(said, bool) else said))
 
 
 def all_trials(parts: Sequence[Part]) -> pd.DataFrame:

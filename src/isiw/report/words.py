@@ -243,7 +243,9 @@ def finding_sentences(record: SessionRecord) -> list[str]:
 
 def counts_sentence(record: SessionRecord) -> str:
     """The numbers of stimuli that were delivered and that count, and why the others do not."""
-    return counts((*record.table, *record.unknown_trials), record.header.stimulus)
+    said = counts((*record.table, *record.unknown_trials), record.header.stimulus)
+    before = counted(len(record.header.earlier), "earlier trial was", "earlier trials were")
+    return f"{said} {before} learnt first." if record.header.earlier else said
 
 
 def fit_sentence(record: SessionRecord) -> str:

@@ -41,7 +41,7 @@ from isiw.session.stated import require_limits, require_protocol, require_visit
 from isiw.session.threshold import ThresholdRecorder, resume_threshold
 from isiw.signals.limits import SignalLimits
 from isiw.strategy.strategy import Strategy
-from isiw.trials import Trial
+from isiw.trials import Trial, require_trials
 from isiw.visit import Visit, VisitProtocol
 
 
@@ -84,7 +84,7 @@ def open_session(
     require_known("open_session", options, OwnLoopOptions)
     path = require_parts(log, options, strategy=(strategy, Strategy))
     require_new(strategy)
-    if trials := tuple(earlier):
+    if trials := require_trials(earlier):
         for trial in trials:
             require_percent("the intensity of a trial that was given before", trial.intensity_pct_rmt)
         strategy.learn_all(trials)
@@ -106,8 +106,8 @@ def _stated(space: DesignSpace, options: OwnLoopOptions) -> dict[str, Any]:
         raise InvalidValueError(
             "in a loop of one's own the protocol cannot have control trials, as ask() answers with an ISI",
             got=protocol,
-            remedy="Give TMS alone whenever you like, and tell it with tell(None, mep_mv). isiw.Session interleaves "
-            "control trials itself.",
+            remedy="Give them whenever you like, and report TMS alone with tell(None, mep_mv), a tap alone with "
+            "tell(isi_ms, mep_mv, pulse=False). isiw.Session interleaves control trials itself.",
         )
     limits = limits.stated(0.0)
     _require_reported(limits)

@@ -14,6 +14,7 @@ from isiw.acquisition.protocol import AcquisitionFunction, FollowsPlan, own_plan
 from isiw.checks import can
 from isiw.decision import StopDecision
 from isiw.design import DesignSpace
+from isiw.errors import StrategyError
 from isiw.estimate import WindowEstimate
 from isiw.lazy import Later, WorkedOut
 from isiw.models.protocol import ExpectsTheUsual, NotesChanges, Observation, Posterior, ProposesIsi, ResponseModel
@@ -228,4 +229,11 @@ class Course:
         past = tuple(each.estimate(person) for each in self.past)
         estimate = self.estimate(person).noting(silent=silent)
         progress = Progress(self.paired_trials + mistrials, self.paired_trials, estimate, past=past)
-        return self.method.stopping(progress)
+        decision = self.method.stopping(progress)
+        if not isinstance(decision, StopDecision):
+            raise StrategyError(
+                "a stopping rule must answer with a StopDecision",
+                got=decision,
+                remedy="Return isiw.StopDecision(stop, reason).",
+            )
+        return decision

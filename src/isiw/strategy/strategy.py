@@ -20,7 +20,7 @@ from isiw.strategy.intensities import NONE, Intensities
 from isiw.strategy.known import Known
 from isiw.strategy.outcomes import Outcome, Outcomes, Reported
 from isiw.strategy.recipe import Recipe
-from isiw.trials import Trial, require_pulse
+from isiw.trials import Trial, require_pulse, require_trials
 from isiw.types import FloatArray
 
 MOST_OF_A_BATCH = 1000
@@ -327,7 +327,7 @@ class Strategy:
                 "earlier trials are learnt once, before the first ask", remedy="Let a new strategy learn all of them."
             )
         before = len(self.earlier)
-        for place, trial in enumerate(trials):
+        for place, trial in enumerate(require_trials(trials)):
             if trial.told:
                 self._learn(Outcome.of(trial))
                 self.earlier = (*self.earlier, trial)

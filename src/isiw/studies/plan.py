@@ -78,15 +78,15 @@ class StudyStrategy:
         return OwnCode(self.name if ":" in self.name else "", self.folder, self.code)
 
     def __post_init__(self) -> None:
-        if isinstance(self.name, str) and ":" in self.name:
-            object.__setattr__(self, "code", OwnCode.named(self.name, self.folder).checksum)
-            object.__setattr__(self, "label", self.label or self.name.partition(":")[2])
-        elif self.name != OWN:
-            object.__setattr__(self, "code", "")
         if not isinstance(self.settings, Mapping):
             raise InvalidValueError(
                 "settings are a mapping of names to values", got=self.settings, expected="such as {'particles': 500}"
             )
+        if isinstance(self.name, str) and ":" in self.name:
+            object.__setattr__(self, "code", OwnCode.named(self.name, self.folder, self.settings).checksum)
+            object.__setattr__(self, "label", self.label or self.name.partition(":")[2])
+        elif self.name != OWN:
+            object.__setattr__(self, "code", "")
         if not self.code:
             self._check_settings()
         object.__setattr__(self, "label", self.label or self.name)

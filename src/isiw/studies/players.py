@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import inspect
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -111,9 +111,9 @@ class OwnCode:
     checksum: str  # CRC-32 of the module's file, or of all of its package's
 
     @classmethod
-    def named(cls, reference: str, folder: Path | None) -> OwnCode:
-        """The code that a study names, with the checksum that it has now."""
-        named_code(reference, folder, "the strategy's function")
+    def named(cls, reference: str, folder: Path | None, settings: Mapping[str, Any]) -> OwnCode:
+        """The code that a study names, which takes these settings, with the checksum that it has now."""
+        _with_settings(named_code(reference, folder, "the strategy's function"), settings)
         return cls(reference, folder, _checksum(reference.partition(":")[0]))
 
     def player(self, space: DesignSpace, seed: int, settings: Mapping[str, Any]) -> Player:
@@ -131,10 +131,17 @@ class OwnCode:
                 expected=self.checksum,
                 remedy="Go back to that code, or begin in another folder. Workers elsewhere need the same file.",
             )
-        offered = {"space": space, "seed": seed}
-        known = {name: value for name, value in offered.items() if name in inspect.signature(make).parameters}
-        require_fitting(make, {**known, **settings}, "the strategy's settings")
-        return _player(make(**known, **settings), space, seed, self.reference)
+        return _player(make(**_with_settings(make, settings, space, seed)), space, seed, self.reference)
+
+
+def _with_settings(
+    make: Callable[..., object], settings: Mapping[str, Any], space: DesignSpace | None = None, seed: int = 0
+) -> dict[str, Any]:
+    """What a function is called with: the settings, and `space` and `seed` if it has such parameters."""
+    parameters = inspect.signature(make).parameters
+    known = {name: value for name, value in (("space", space), ("seed", seed)) if name in parameters}
+    require_fitting(make, {**known, **settings}, "the strategy's settings")
+    return {**known, **settings}
 
 
 def _player(made: object, space: DesignSpace, seed: int, reference: str) -> Player:

@@ -24,6 +24,9 @@ SURE_F1, WRONG_F1 = 0.7, 0.35
 RESAMPLES: Final = 4999
 """Bootstrap samples of an interval; enough for the tail of ten comparisons at once."""
 
+FEW: Final = 20
+"""Fewer people than these have an interval by Student's t: a bootstrap over so few is too narrow."""
+
 COLUMNS: Final = 100
 """Width of a printed table."""
 
@@ -106,9 +109,9 @@ def differences(rows: pd.DataFrame, reference: str | None = None) -> pd.DataFram
 
     Returns:
         Sorted by cohort, strategy and trial: people (who have rows of both), mean difference of F1 (the strategy minus
-        the reference), its standard error, and its interval by a bootstrap over people. The intervals of a cohort and
-        mark hold together with 95 % probability: each has a level of 1 − .05 / (number of strategies − 1)
-        (Bonferroni). With fewer than two people there is no interval (NaN).
+        the reference), its standard error, and its interval, by a bootstrap over 20 people or more, else by Student's
+        t. The intervals of a cohort and mark hold together with 95 % probability: each has a level of
+        1 − .05 / (number of strategies − 1) (Bonferroni). With fewer than two people there is no interval (NaN).
 
     Raises:
         InvalidValueError: an unknown reference, fewer than two strategies, or two rows of one person, strategy, cohort
@@ -145,8 +148,12 @@ def _difference(paired: FloatArray, comparisons: int) -> dict[str, float]:
     found = {"people": people, "difference": mean, "se": math.nan, "low": math.nan, "high": math.nan}
     if people < 2:
         return found
-    low, high = (mean, mean) if np.ptp(paired) == 0 else _bootstrapped(paired, 1.0 - (1.0 - LEVEL) / comparisons)
-    return found | {"se": float(scipy.stats.sem(paired)), "low": low, "high": high}
+    level, se = 1.0 - (1.0 - LEVEL) / comparisons, float(scipy.stats.sem(paired))
+    if people < FEW or np.ptp(paired) == 0:
+        reach = se * float(scipy.stats.t.ppf(0.5 + level / 2, people - 1))
+        return found | {"se": se, "low": mean - reach, "high": mean + reach}
+    low, high = _bootstrapped(paired, level)
+    return found | {"se": se, "low": low, "high": high}
 
 
 def _bootstrapped(paired: FloatArray, level: float) -> tuple[float, float]:

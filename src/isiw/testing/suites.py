@@ -122,9 +122,13 @@ def check_model(
     once, again = (_after(make(), space, usual) for _ in range(2))
     require(same_estimates(once.estimate(), again.estimate()), "the same seed and trials give the same posterior")
     for what, trials in trials_that_break_things(space).items():
-        posterior = _after(model, space, trials)
-        check_estimate(posterior.estimate(), space, f"after: {what}")
-        _check_capabilities(posterior, space, 1, f"after: {what}")
+        try:
+            posterior = _after(model, space, trials)
+            check_estimate(posterior.estimate(), space, f"after: {what}")
+            _check_capabilities(posterior, space, 1, f"after: {what}")
+        except Exception as error:
+            error.add_note(f"after: {what}, as (ISI [ms], MEP [mV]): {trials}; TMS alone, None, has the ISI NaN")
+            raise
     if people > 1:
         posterior = _after(model, space, usual[:6], people=people)
         for person in range(people):

@@ -60,7 +60,10 @@ def format_of(path: Path) -> Format:
     """The format of a file, by its name."""
     name = path.name.casefold()
     found = next((one for one in FORMATS if name.endswith(one.suffixes)), None)
-    if found is None or (path.is_dir() and not name.endswith(".mff")):
+    if path.is_dir() and not name.endswith(".mff"):
+        remedy = f"Name its files, all together if the same options hold for them, such as {path}/*.csv."
+        raise InvalidValueError("a folder is no file of trials", got=str(path), remedy=remedy)
+    if found is None:
         expected = f"a file of {', '.join(suffix for one in FORMATS for suffix in one.suffixes)}"
         remedy = "Save or export it as one of these, such as CSV; of BrainVision's files name the .vhdr."
         raise InvalidValueError("this cannot be read", got=path.name, expected=expected, remedy=remedy)
