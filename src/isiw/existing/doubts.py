@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.existing.cells import Column, says_alone
-from isiw.existing.dates import times_of
+from isiw.existing.cells import Column, says_alone, times_of
 from isiw.existing.delivered import LONGEST_ISI_MS, Delivered
 from isiw.existing.layout import Layout, letters
 from isiw.findings import AMPLITUDE_MV

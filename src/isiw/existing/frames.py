@@ -45,14 +45,10 @@ def read_frame(path: Path, layout: Layout) -> pd.DataFrame:
     """The table in a file, its cells as they are."""
     suffix = path.suffix.lower()
     if suffix == ".mat":
-        frame = of_vectors(read_arrays(path), layout)
-    elif suffix == ".parquet":
-        frame = named(pd.read_parquet(io.BytesIO(_content(path))))
-    else:
-        frame = (_workbook if suffix in WORKBOOKS else _texts)(_content(path), layout)
-    if not len(frame):
-        raise InvalidValueError("the table has no rows", got=str(path), remedy="Are the lines before it skipped?")
-    return frame
+        return of_vectors(read_arrays(path), layout)
+    if suffix == ".parquet":
+        return named(pd.read_parquet(io.BytesIO(_content(path))))
+    return (_workbook if suffix in WORKBOOKS else _texts)(_content(path), layout)
 
 
 def _content(path: Path) -> bytes:
@@ -145,10 +141,9 @@ def _decoded(content: bytes) -> str:
     for first, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):  # the same without a mark of the order of its bytes
         if content[first:_HEAD:2] and not any(content[first:_HEAD:2]):
             return content.decode(encoding)
-    for encoding in ("utf-8-sig", "cp1252"):
-        with suppress(UnicodeDecodeError):
-            return content.decode(encoding)
-    return content.decode("latin-1")
+    with suppress(UnicodeDecodeError):
+        return content.decode("utf-8-sig")
+    return content.decode("cp1252", errors="replace")
 
 
 def _separator(line: str) -> str:

@@ -53,8 +53,8 @@ class Look:
     figure: Figure | None
 
     def __str__(self) -> str:
-        said = [*self.lines, f"Proposed: {self.command}", f"Missing: {self.missing}" if self.missing else ""]
-        return "\n".join(line for line in said if line)
+        missing = [f"Missing: {self.missing}"] if self.missing else []
+        return "\n".join([*filter(None, self.lines), f"Proposed: {self.command}", *missing])
 
 
 def look(

@@ -16,8 +16,7 @@ from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.existing import doubts, formats, frames, recordings
 from isiw.existing.apart import read_apart
-from isiw.existing.cells import Column, is_missing
-from isiw.existing.dates import dates_of, latest_of
+from isiw.existing.cells import Column, dates_of, is_missing, latest_of
 from isiw.existing.delivered import Delivered, anywhere, read_log, renumbered
 from isiw.existing.formats import mne_files
 from isiw.existing.formats.contents import Contents
