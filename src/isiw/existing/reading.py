@@ -21,7 +21,7 @@ from isiw.existing.delivered import Delivered, anywhere, read_log, renumbered
 from isiw.existing.formats import mne_files
 from isiw.existing.formats.contents import Contents
 from isiw.existing.layout import CHANNELS, EMG_UNITS, Layout
-from isiw.existing.limits import ReadingLimits, require_file, require_table, require_visits
+from isiw.existing.limits import ReadingLimits, require_file, require_most, require_table
 from isiw.existing.quantities import Columns
 from isiw.files import is_mcap
 from isiw.findings import INTENSITY_PCT, Kind
@@ -159,13 +159,12 @@ def _people_of(
         raise InvalidValueError(f"{source} has no trials", remedy="Are the right columns named?")
     doubts.require_codes(columns)
     dates = dates_of(columns["date"], columns.rows)
-    visits = [
-        (own, subject, day)
-        for subject, theirs in _by_text(columns["subject"], columns.rows).items()
-        for day, own in _days(columns, theirs, dates).items()
-    ]
+    people = _by_text(columns["subject"], columns.rows)
+    visits = [(own, subject, day) for subject in people for day, own in _days(columns, people[subject], dates).items()]
     if limits is not None:
-        require_visits(limits, source, [len(own) for own, _, _ in visits])
+        most = max(len(own) for own, _, _ in visits)
+        require_most(source, ("has too many people and days", len(visits), limits.visits),
+                     ("has too many trials of one person and day", most, limits.trials))  # fmt: skip
     found = []
     for own, subject, day in sorted(visits, key=lambda visit: visit[0][0]):
         person = _person(replace(columns, rows=own), reference, subject or name)

@@ -135,7 +135,7 @@ def _pulses_of_rows(contents: Contents, emg: Track, layout: Layout) -> tuple[lis
         raise InvalidValueError(what, got=f"{len(trials)} rows and {len(emg.stretches)} sweeps")
     columns = Columns.found(trials, stated, contents.source, needed=("isi",))
     require_said(columns)
-    marks = {key: np.array(marked(contents.events, key, layout)) for key in (origin_key(layout), "pulse", "alone")}
+    marks = {key: marked(contents.events, key, layout) for key in (origin_key(layout), "pulse", "alone")}
     pulses = list[Pulse]()
     for row in columns.rows:
         if columns.tap_alone(row):
