@@ -153,12 +153,9 @@ def with_decimals(columns: Mapping[str, Column], stated: str | None) -> dict[str
     found = {}
     for key, column in columns.items():
         if stated is not None and signs[key] and stated not in signs[key]:
-            raise InvalidValueError(
-                f"the column {column.name!r} of {column.of} has another decimal sign than the one that is stated",
-                got=stated,
-                expected=f"{''.join(signs[key])!r}, as its numbers have",
-                remedy="Leave --decimal out, or correct it.",
-            )
+            what = f"the column {column.name!r} of {column.of} has another decimal sign than the one that is stated"
+            expected = f"{''.join(signs[key])!r}, as its numbers have"
+            raise InvalidValueError(what, got=stated, expected=expected, remedy="Leave --decimal out, or correct it.")
         if usual is None and not signs[key] and (doubtful := _doubtful(column)):
             raise InvalidValueError(
                 f"the {'comma' if ',' in doubtful else 'point'} in the column {column.name!r} of {column.of} may be a "

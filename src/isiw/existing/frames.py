@@ -183,11 +183,9 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
     filled = [name for name, rows in sheets.items() if len(rows) > 1]
     if not with_trials and len(filled) > 1:
         held = {name: ", ".join(str(cell) for cell in sheets[name][0] if not is_missing(cell)) for name in filled}
-        raise InvalidValueError(
-            "no sheet of the workbook is known to hold ISIs and amplitudes",
-            got="; ".join(f"{name} ({cells})" for name, cells in held.items()),
-            remedy="Say --sheet NAME, and --column isi=NAME --column mep=NAME.",
-        )
+        what = "no sheet of the workbook is known to hold ISIs and amplitudes"
+        remedy = "Say --sheet NAME, and --column isi=NAME --column mep=NAME."
+        raise InvalidValueError(what, got="; ".join(f"{name} ({cells})" for name, cells in held.items()), remedy=remedy)
     chosen = (with_trials or filled or list(sheets))[0]
     rows = sheets[chosen]
     _require_whole(book.book, chosen, heads[chosen])
