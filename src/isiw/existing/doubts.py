@@ -260,8 +260,8 @@ def _require_isis(columns: Columns) -> None:
     if columns.layout.alone is not None or len(paired) < len(columns.rows):
         return
     isis_ms = [isi.number(row) for row in paired]
-    numbers = (list(range(first, first + len(paired))) for first in (0, 1))
-    if "order" not in columns.of and len(paired) >= _FEWEST and isis_ms in numbers:
+    numbered = any(isis_ms == list(range(first, first + len(paired))) for first in (0, 1))
+    if "order" not in columns.of and len(paired) >= _FEWEST and numbered:
         raise InvalidValueError(
             f"the ISIs of {isi.of} in the column {isi.name!r} are the numbers of rows",
             remedy="Name the column of the ISIs: --column isi=NAME; if these are, number the rows in a column called "

@@ -66,7 +66,7 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
         if pulse.lost:
             trials.append(Trial(number, Status.MISTRIAL, None, reason=Kind.NO_IMPACT))
             continue
-        asked_ms = pulse.said.get("commanded_isi_ms")  # what the file says, or else what the events do
+        asked_ms: Any = pulse.said.get("commanded_isi_ms")  # what the file says, or else what the events do
         asked_ms = max(1e3 * (pulse.isi_s or 0.0), 0.0) if is_missing(asked_ms) else float(asked_ms)
         stimulus = Stimulus(number, None if pulse.isi_s is None else asked_ms)
         judged = judge(sweep, stimulus, anywhere(reference), limits)
