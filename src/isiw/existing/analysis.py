@@ -157,7 +157,7 @@ def analyse(
     if isis.shape != meps.shape or isis.ndim != 1:
         raise InvalidValueError("each trial has one ISI and one MEP", got=(isis.shape, meps.shape))
     table = TrialTable(tuple(_trial(n, *pair, space) for n, pair in enumerate(zip(isis, meps, strict=True))))
-    known = {"subject": subject, "visit": visit or Visit(), "source": "arrays", "simulated": simulated}
+    known: dict[str, Any] = {"subject": subject, "visit": visit or Visit(), "source": "arrays", "simulated": simulated}
     return analysed(Delivered(table, space.reference, **known), make_strategy(strategy, space, seed, **settings))
 
 

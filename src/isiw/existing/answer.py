@@ -1,7 +1,4 @@
-"""What the process that reads hands back: trials and settings as JSON, samples as plain numbers, errors in words.
-
-Nothing of it can be code: a reader of another library may have been led astray by the file that it reads.
-"""
+"""What the process that reads hands back: JSON and plain numbers, and nothing that could be code."""
 
 from __future__ import annotations
 

@@ -39,15 +39,8 @@ def read_apart(
     """The people whose trials a file holds, read by a process of its own; or, to `look` into it, what is said of it."""
     is_table = formats.format_of(path).is_table
     seconds = seconds_for(limits, path, table=is_table)
-    request = {
-        "path": str(path),
-        "layout": asdict(layout),
-        "subject": subject,
-        "limits": asdict(limits),
-        "is_table": is_table,
-        "also": [str(other) for other in also],
-        "look": look,
-    }
+    request = {"path": str(path), "layout": asdict(layout), "subject": subject, "limits": asdict(limits),
+               "also": [str(other) for other in also], "look": look}  # fmt: skip
     rows = path.stat().st_size // _BYTES_A_ROW if is_table else 0
     most_s = _START_S + _WAITS * seconds_for(limits, path, table=is_table, rows=rows)
     with tempfile.TemporaryDirectory(prefix="isiw-") as folder:

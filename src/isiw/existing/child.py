@@ -38,7 +38,7 @@ def _answer(request: Mapping[str, Any], folder: Path) -> None:
     own = _load_libraries(path)
     csv.field_size_limit(2**31 - 1)  # a cell that is too long is refused in words later
     limit_memory(limits.memory_mb)
-    limit_time(seconds_for(limits, path, table=request["is_table"]))
+    limit_time(seconds_for(limits, path, table=formats.format_of(path).is_table))
     gate = Gate(path, [Path(other) for other in request["also"]], own)
     sys.addaudithook(gate)
     try:

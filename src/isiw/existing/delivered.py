@@ -153,7 +153,7 @@ def read_log(path: str | Path) -> Delivered:
     if record.losses:
         raise LogError("the log is damaged, so that trials may be missing", got=str(path), remedy=f"{record.losses[0]}")
     header = record.header
-    sweeps: dict[int, dict[str, Channel]] = {}
+    sweeps = dict[int, dict[str, Channel]]()
     for (number, name), channel in record.waveforms.items():
         sweeps.setdefault(number, {})[name] = channel
     given_by, at_ns = header.given_by, [onset.at_ns for onset in record.onsets.values()]
@@ -163,15 +163,11 @@ def read_log(path: str | Path) -> Delivered:
     return Delivered(
         record.table,
         header.space.reference,
-        subject=header.subject,
-        visit=header.visit,
         source=header.source or record.path.name,
-        created=header.created,
         given_by=given_by,
-        signals=header.signals,
         sweeps=sweeps,
-        conditioning=header.conditioning,
         simulated=header.device.simulated,
+        **{name: getattr(header, name) for name in ("subject", "visit", "created", "signals", "conditioning")},
     )
 
 

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from isiw.errors import InvalidValueError
-from isiw.existing.cells import Column, says_alone
-from isiw.existing.dates import times_of
+from isiw.existing.cells import Column, says_alone, times_of
 from isiw.existing.delivered import LONGEST_ISI_MS, Delivered
 from isiw.existing.layout import Layout, letters
 from isiw.findings import AMPLITUDE_MV
@@ -94,10 +93,8 @@ def require_single_trials(mep: Column, isi: Column, frame: pd.DataFrame, source:
     others = {str(name): frame.iloc[:, place].tolist() for place, name in enumerate(frame.columns) if name != mep.name}
     spreads = [name for name in others if set() < {*re.findall(r"\w+", _words(name))} - _BESIDE <= _SPREADS]
     numbers = {name: Column(name, cells).texts for name, cells in others.items() if letters(name) in _NUMBERS}
-    counted_in = [  # whole numbers of trials from 2 on, few of which differ
-        name for name, texts in numbers.items()
-        if 2 * len({*texts}) <= len(texts) and all(text.isdigit() and int(text) > 1 for text in texts)
-    ]  # fmt: skip
+    whole = {name: all(text.isdigit() and int(text) > 1 for text in texts) for name, texts in numbers.items()}
+    counted_in = [name for name, texts in numbers.items() if whole[name] and 2 * len({*texts}) <= len(texts)]
     kinds = [cells for name, cells in others.items() if name != isi.name and 3 * len({*map(str, cells)}) <= len(cells)]
     rows = list(zip(map(str, isi.cells), *(map(str, cells) for cells in kinds), strict=True))
     once = len(rows) > 2 and len({*rows}) == len(rows)
@@ -263,8 +260,8 @@ def _require_isis(columns: Columns) -> None:
     if columns.layout.alone is not None or len(paired) < len(columns.rows):
         return
     isis_ms = [isi.number(row) for row in paired]
-    numbers = (list(range(first, first + len(paired))) for first in (0, 1))
-    if "order" not in columns.of and len(paired) >= _FEWEST and isis_ms in numbers:
+    numbered = any(isis_ms == list(range(first, first + len(paired))) for first in (0, 1))
+    if "order" not in columns.of and len(paired) >= _FEWEST and numbered:
         raise InvalidValueError(
             f"the ISIs of {isi.of} in the column {isi.name!r} are the numbers of rows",
             remedy="Name the column of the ISIs: --column isi=NAME; if these are, number the rows in a column called "
@@ -329,13 +326,8 @@ def _require_one_row_each(columns: Columns) -> None:
         return
     runs = [len([*each]) for _, each in groupby(texts)]
     times, half = math.gcd(*runs), len(texts) // 2
-    again = (
-        texts[:half] == texts[half:]
-        and (  # neither realised ISIs nor amplitudes come again
-            meps[:half] == meps[half:]
-            or not all(round(isi.number(row) or 0.0, 3).is_integer() for row in columns.paired)
-        )
-    )
+    are_whole = all(round(isi.number(row) or 0.0, 3).is_integer() for row in columns.paired)
+    again = texts[:half] == texts[half:] and (meps[:half] == meps[half:] or not are_whole)  # as realised ISIs never do
     if (times > 1 and len(runs) > len({*texts})) or (again and len({*texts}) > 2):
         raise InvalidValueError(
             f"the ISIs of {isi.of} come {times if times > 1 else 2} times each, as if there was a row for "

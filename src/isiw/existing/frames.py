@@ -45,14 +45,10 @@ def read_frame(path: Path, layout: Layout) -> pd.DataFrame:
     """The table in a file, its cells as they are."""
     suffix = path.suffix.lower()
     if suffix == ".mat":
-        frame = of_vectors(read_arrays(path), layout)
-    elif suffix == ".parquet":
-        frame = named(pd.read_parquet(io.BytesIO(_content(path))))
-    else:
-        frame = (_workbook if suffix in WORKBOOKS else _texts)(_content(path), layout)
-    if not len(frame):
-        raise InvalidValueError("the table has no rows", got=str(path), remedy="Are the lines before it skipped?")
-    return frame
+        return of_vectors(read_arrays(path), layout)
+    if suffix == ".parquet":
+        return named(pd.read_parquet(io.BytesIO(_content(path))))
+    return (_workbook if suffix in WORKBOOKS else _texts)(_content(path), layout)
 
 
 def _content(path: Path) -> bytes:
@@ -145,10 +141,9 @@ def _decoded(content: bytes) -> str:
     for first, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):  # the same without a mark of the order of its bytes
         if content[first:_HEAD:2] and not any(content[first:_HEAD:2]):
             return content.decode(encoding)
-    for encoding in ("utf-8-sig", "cp1252"):
-        with suppress(UnicodeDecodeError):
-            return content.decode(encoding)
-    return content.decode("latin-1")
+    with suppress(UnicodeDecodeError):
+        return content.decode("utf-8-sig")
+    return content.decode("cp1252", errors="replace")
 
 
 def _separator(line: str) -> str:
@@ -188,11 +183,9 @@ def _workbook(content: bytes, layout: Layout) -> pd.DataFrame:
     filled = [name for name, rows in sheets.items() if len(rows) > 1]
     if not with_trials and len(filled) > 1:
         held = {name: ", ".join(str(cell) for cell in sheets[name][0] if not is_missing(cell)) for name in filled}
-        raise InvalidValueError(
-            "no sheet of the workbook is known to hold ISIs and amplitudes",
-            got="; ".join(f"{name} ({cells})" for name, cells in held.items()),
-            remedy="Say --sheet NAME, and --column isi=NAME --column mep=NAME.",
-        )
+        what = "no sheet of the workbook is known to hold ISIs and amplitudes"
+        remedy = "Say --sheet NAME, and --column isi=NAME --column mep=NAME."
+        raise InvalidValueError(what, got="; ".join(f"{name} ({cells})" for name, cells in held.items()), remedy=remedy)
     chosen = (with_trials or filled or list(sheets))[0]
     rows = sheets[chosen]
     _require_whole(book.book, chosen, heads[chosen])

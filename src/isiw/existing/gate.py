@@ -22,17 +22,15 @@ _NOTHING: Final = Path(os.devnull)  # which libraries open as they ask the syste
 
 
 class Gate:
-    """An audit hook that sees each file as it is opened for reading, whatever library does it.
-
-    Libraries follow the names in a header wherever they lead. So it is not the names that are checked, which each
-    format writes in its own way, but what is opened.
-    """
+    """An audit hook that sees each file as it is opened for reading, whatever name in a header a library follows."""
 
     def __init__(self, source: Path, also: Iterable[Path] = (), own: Iterable[Path] = ()) -> None:
         self.source, self._is_folder = source, source.is_dir()
         self._folder = _real(source if self._is_folder else source.parent)
         self._named = {_real(source), *map(_real, also)}
-        self._code = [*map(_real, map(Path, _code_folders())), *map(_real, own)]  # a library has settings of its own
+        places = sysconfig.get_paths()  # Python, its libraries, isiw and time zones are loaded while a file is read
+        code = [*(places[key] for key in ("stdlib", "platstdlib", "purelib", "platlib")), *zoneinfo.TZPATH]
+        self._code = [*map(_real, [*map(Path, code), Path(__file__).parents[1], *own])]
         self.read: dict[Path, None] = {}
         self.refused: InvalidValueError | None = None
 
@@ -118,10 +116,3 @@ def require_no_links(path: Path) -> None:
 
 def _real(path: Path) -> Path:
     return Path(os.path.realpath(path))
-
-
-def _code_folders() -> list[str]:
-    """Where Python, its libraries, isiw and the rules of time zones are: they are loaded while a file is read."""
-    paths = sysconfig.get_paths()
-    places = [paths[key] for key in ("stdlib", "platstdlib", "purelib", "platlib")]
-    return [*places, str(Path(__file__).parents[1]), *zoneinfo.TZPATH]

@@ -32,33 +32,30 @@ _WORDS: Final = {
 UNIT_WORDS: Final[Mapping[str, str]] = {word: unit for unit, words in _WORDS.items() for word in words.split()}
 """Units as files write them, in lower case."""
 
-COLUMNS: Final[Mapping[str, tuple[str, ...]]] = {
-    "isi": ("isi", "realisedisi", "isirealised", "actualisi", "interstimulusinterval", "interpulseinterval", "ipi",
-            "interstimulusintervall", "interval", "delay", "soa", "intervall", "reizabstand", "abstand", "verzögerung"),
-    "mep": ("mep", "mepamplitude", "mepamp", "mepp2p", "meppp", "mepptp", "meppeaktopeak", "mepsize", "ptpmep",
-            "mepspitzespitze", "amplitude", "peaktopeak", "peaktopeakamplitude", "emgpeaktopeak", "p2pamplitude",
-            "ptpamplitude", "p2p", "ptp", "amp", "spitzespitze"),
-    "asked": ("commandedisi", "askedisi", "nominalisi", "targetisi", "plannedisi", "isicommanded", "isinominal",
-              "sollisi", "sollintervall"),
-    "isi_sd": ("isisd",),
-    "background": ("backgroundrms", "background", "prestimrms", "rmsbackground", "baselinerms", "hintergrund"),
-    "status": ("status", "accepted", "accept", "valid", "include", "included", "keep", "good", "gültig",
-               "verwertbar"),
-    "exclude": ("excluded", "exclude", "rejected", "reject", "bad", "artefact", "artifact",
-                "ausschluss", "ausgeschlossen", "verworfen", "artefakt"),
-    "reason": ("reason", "grund"),
-    "tap_alone": ("tapalone",),
-    "intensity": ("intensitypctrmt", "pctrmt", "intensityrmt", "percentrmt", "intensitypercentrmt"),
-    "subject": ("subject", "subjectid", "participant", "participantid", "subj", "person", "patient", "sub", "proband",
-                "probandin", "versuchsperson", "vp", "teilnehmer", "teilnehmerin", "id"),
-    "day": ("day", "visit", "session", "sessionid", "ses", "sitzung", "termin", "messtag"),
-    "condition": ("condition", "trialtype", "stimulus", "type", "bedingung", "reizart"),
-    "block": ("block", "run"),
-    "order": ("trial", "trialnumber", "trialno", "trialnr", "index", "onset", "time", "durchgang", "uhrzeit"),
-    "date": ("date", "recordingdate", "datum"),
+_NAMES: Final = {
+    "isi": "isi realisedisi isirealised actualisi interstimulusinterval interpulseinterval ipi "
+           "interstimulusintervall interval delay soa intervall reizabstand abstand verzögerung",
+    "mep": "mep mepamplitude mepamp mepp2p meppp mepptp meppeaktopeak mepsize ptpmep mepspitzespitze amplitude "
+           "peaktopeak peaktopeakamplitude emgpeaktopeak p2pamplitude ptpamplitude p2p ptp amp spitzespitze",
+    "asked": "commandedisi askedisi nominalisi targetisi plannedisi isicommanded isinominal sollisi sollintervall",
+    "isi_sd": "isisd",
+    "background": "backgroundrms background prestimrms rmsbackground baselinerms hintergrund",
+    "status": "status accepted accept valid include included keep good gültig verwertbar",
+    "exclude": "excluded exclude rejected reject bad artefact artifact ausschluss ausgeschlossen verworfen "
+               "artefakt",
+    "reason": "reason grund",
+    "tap_alone": "tapalone",
+    "intensity": "intensitypctrmt pctrmt intensityrmt percentrmt intensitypercentrmt",
+    "subject": "subject subjectid participant participantid subj person patient sub proband probandin "
+               "versuchsperson vp teilnehmer teilnehmerin id",
+    "day": "day visit session sessionid ses sitzung termin messtag",
+    "condition": "condition trialtype stimulus type bedingung reizart",
+    "block": "block run",
+    "order": "trial trialnumber trialno trialnr index onset time durchgang uhrzeit",
+    "date": "date recordingdate datum",
 }  # fmt: skip
+COLUMNS: Final[Mapping[str, tuple[str, ...]]] = {key: tuple(names.split()) for key, names in _NAMES.items()}
 """By what they are called in letters alone, the columns that are found without being named; the first name wins."""
-
 MARKERS: Final = ("pulse", "tap", "valve", "alone")
 CHANNELS: Final = ("emg", "acceleration", "events", *MARKERS)
 """What columns and arrays of a recording hold: those of `MARKERS` are triggers, that of events has texts."""

@@ -8,7 +8,6 @@ import os
 import re
 import time
 import zipfile
-from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import islice
 from pathlib import Path
@@ -80,8 +79,8 @@ class ReadingLimits(Checked):
             InvalidValueError: a factor below 1 or above `LARGEST_FACTOR`.
         """
         factor = number("by how much limits of reading are larger", factor, least=1, most=LARGEST_FACTOR)
-        kinds = {one.name: type(getattr(self, one.name)) for one in fields(self)}
-        return replace(self, **{name: kind(getattr(self, name) * factor) for name, kind in kinds.items()})
+        values = {one.name: getattr(self, one.name) for one in fields(self)}
+        return replace(self, **{name: type(value)(value * factor) for name, value in values.items()})
 
 
 def seconds_for(limits: ReadingLimits, path: Path, *, table: bool, rows: int = 0) -> float:
@@ -127,11 +126,11 @@ def _require_lines(limits: ReadingLimits, source: str, file: IO[bytes]) -> None:
     while chunk := file.read(_CHUNK):
         for end in lines:
             lines[end] += chunk.count(end)
-    _require_most(source, ("has too many lines", max(lines.values()), limits.lines))
+    require_most(source, ("has too many lines", max(lines.values()), limits.lines))
     file.seek(0)
     for line in islice(file, _FIRST_LINES):
         cells = 1 + (max(map(line.count, _SIGNS)) or sum(1 for _ in islice(_BLANKS.finditer(line), limits.columns)))
-        _require_most(source, ("has too many columns", cells, limits.columns))
+        require_most(source, ("has too many columns", cells, limits.columns))
         most = _BYTES_PER_SIGN * limits.cell_length * cells
         if len(line) > most:
             raise passed(source, "has too long a line for its cells", f"{len(line)} bytes", most, " bytes")
@@ -139,7 +138,7 @@ def _require_lines(limits: ReadingLimits, source: str, file: IO[bytes]) -> None:
 
 def require_table(limits: ReadingLimits, frame: pd.DataFrame, source: str) -> None:
     """Raise if a table has too many rows, columns or cells, or too long a name or text."""
-    _require_most(
+    require_most(
         source,
         ("has too many columns", frame.shape[1], limits.columns),
         ("has too many rows", frame.shape[0], limits.rows),
@@ -155,16 +154,8 @@ def require_table(limits: ReadingLimits, frame: pd.DataFrame, source: str) -> No
             raise passed(source, what, f"{longest} characters", most, " characters")
 
 
-def require_visits(limits: ReadingLimits, source: str, trials: Sequence[int]) -> None:
-    """Raise if a table is of too many visits, or has too many trials of one, of which each has so many."""
-    _require_most(
-        source,
-        ("has too many people and days", len(trials), limits.visits),
-        ("has too many trials of one person and day", max(trials, default=0), limits.trials),
-    )
-
-
-def _require_most(source: str, *counts: tuple[str, int, int]) -> None:
+def require_most(source: str, *counts: tuple[str, int, int]) -> None:
+    """Raise if there is more of something than a limit allows: what it has, how much, and at most."""
     for what, got, most in counts:
         if got > most:
             raise passed(source, what, got, most)

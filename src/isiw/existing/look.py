@@ -53,8 +53,8 @@ class Look:
     figure: Figure | None
 
     def __str__(self) -> str:
-        said = [*self.lines, f"Proposed: {self.command}", f"Missing: {self.missing}" if self.missing else ""]
-        return "\n".join(line for line in said if line)
+        missing = [f"Missing: {self.missing}"] if self.missing else []
+        return "\n".join([*filter(None, self.lines), f"Proposed: {self.command}", *missing])
 
 
 def look(
@@ -105,7 +105,7 @@ def seen_in(contents: Contents, path: Path, layout: Layout, limits: ReadingLimit
 
 def _reference(contents: Contents) -> Reference:
     """The reference that is proposed: the valve, if its command is marked and no tap is."""
-    valve, tap = (bool(marked(contents.events, key, Layout())) for key in ("valve", "tap"))
+    valve, tap = (len(marked(contents.events, key, Layout())) > 0 for key in ("valve", "tap"))
     return "valve" if valve and not tap else "impact"
 
 
@@ -156,7 +156,7 @@ def _triggers(contents: Contents) -> Iterator[tuple[str, FloatArray]]:
 def _with_markers(contents: Contents, triggers: Mapping[str, FloatArray], layout: Layout) -> Layout:
     """A layout that says which events, or which triggers, mark tap and pulse, if one kind follows the other."""
     key = "valve" if (layout.reference or _reference(contents)) == "valve" else "tap"
-    known = all(marked(contents.events, one, layout) or one in layout.channels for one in (key, "pulse"))
+    known = all(len(marked(contents.events, one, layout)) or one in layout.channels for one in (key, "pulse"))
     if not contents.tracks or (contents.trials is not None and contents.pulse_at_s is not None) or known:
         return layout
     times = triggers or {name: times_of(contents.events, name) for name in names_of(contents.events)}

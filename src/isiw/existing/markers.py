@@ -50,10 +50,9 @@ def times_of(events: pd.DataFrame, *names: str | None) -> FloatArray:
     return np.sort(events.loc[events["name"].astype(str).isin(names), "onset"].to_numpy(dtype=np.float64))
 
 
-def marked(events: pd.DataFrame, key: str, layout: Layout) -> list[float]:
+def marked(events: pd.DataFrame, key: str, layout: Layout) -> FloatArray:
     """When the events of a key came, if there are any [s]."""
-    times_s: list[float] = times_of(events, *_fitting(events, key, layout)).tolist()
-    return times_s
+    return times_of(events, *_fitting(events, key, layout))
 
 
 def names_of(events: pd.DataFrame) -> list[str]:

@@ -16,13 +16,12 @@ from isiw.design import DesignSpace
 from isiw.errors import InvalidValueError
 from isiw.existing import doubts, formats, frames, recordings
 from isiw.existing.apart import read_apart
-from isiw.existing.cells import Column, is_missing
-from isiw.existing.dates import dates_of, latest_of
+from isiw.existing.cells import dates_of, is_missing, latest_of
 from isiw.existing.delivered import Delivered, anywhere, read_log, renumbered
 from isiw.existing.formats import mne_files
 from isiw.existing.formats.contents import Contents
 from isiw.existing.layout import CHANNELS, EMG_UNITS, Layout
-from isiw.existing.limits import ReadingLimits, require_file, require_table, require_visits
+from isiw.existing.limits import ReadingLimits, require_file, require_most, require_table
 from isiw.existing.quantities import Columns
 from isiw.findings import INTENSITY_PCT, Kind
 from isiw.lazy import pd
@@ -160,13 +159,12 @@ def _people_of(
         raise InvalidValueError(f"{source} has no trials", remedy="Are the right columns named?")
     doubts.require_codes(columns)
     dates = dates_of(columns["date"], columns.rows)
-    visits = [
-        (own, subject, day)
-        for subject, theirs in _by_text(columns["subject"], columns.rows).items()
-        for day, own in _days(columns, theirs, dates).items()
-    ]
+    people = _by_text(map(columns["subject"].text, columns.rows), columns.rows)
+    visits = [(own, subject, day) for subject in people for day, own in _days(columns, people[subject], dates).items()]
     if limits is not None:
-        require_visits(limits, source, [len(own) for own, _, _ in visits])
+        most = max(len(own) for own, _, _ in visits)
+        require_most(source, ("has too many people and days", len(visits), limits.visits),
+                     ("has too many trials of one person and day", most, limits.trials))  # fmt: skip
     found = []
     for own, subject, day in sorted(visits, key=lambda visit: visit[0][0]):
         person = _person(replace(columns, rows=own), reference, subject or name)
@@ -176,24 +174,22 @@ def _people_of(
     return found
 
 
-def _by_text(column: Column, rows: Iterable[int]) -> dict[str, list[int]]:
-    """Rows by the text that a column has there."""
+def _by_text(texts: Iterable[str], rows: Iterable[int]) -> dict[str, list[int]]:
+    """Rows by the texts that they have."""
     found: dict[str, list[int]] = {}
-    for row in rows:
-        found.setdefault(column.text(row), []).append(row)
+    for text, row in zip(texts, rows, strict=True):
+        found.setdefault(text, []).append(row)
     return found
 
 
 def _days(columns: Columns, rows: list[int], dates: Mapping[int, dt.datetime]) -> dict[int | None, list[int]]:
     """The rows of each day, by a column of days, or by several dates; days without a number are counted."""
     named = "day" in columns.of
-    column = columns["day" if named else "date"]
-    if not named:
-        column = replace(column, cells={row: f"{dates[row].date()}" if row in dates else "" for row in rows})
-    days = _by_text(column, rows)
+    texts = [columns["day"].text(row) if named else f"{dates[row].date()}" if row in dates else "" for row in rows]
+    days = _by_text(texts, rows)
     several = len(days.keys() - {""}) > 1
     if "" in days and (several or (named and any(days))):
-        raise column.refused(days[""][0], "is empty", "Write the day into each row.")
+        raise columns["day" if named else "date"].refused(days[""][0], "is empty", "Write the day into each row.")
     if not any(days) or not (named or several):
         return {None: rows}
     numbers = [int(found[-1]) if len(found := re.findall(r"\d+", day[:80])) == 1 else 0 for day in days]

@@ -66,7 +66,7 @@ def of_contents(contents: Contents, layout: Layout, subject: str) -> Delivered:
         if pulse.lost:
             trials.append(Trial(number, Status.MISTRIAL, None, reason=Kind.NO_IMPACT))
             continue
-        asked_ms = pulse.said.get("commanded_isi_ms")  # what the file says, or else what the events do
+        asked_ms: Any = pulse.said.get("commanded_isi_ms")  # what the file says, or else what the events do
         asked_ms = max(1e3 * (pulse.isi_s or 0.0), 0.0) if is_missing(asked_ms) else float(asked_ms)
         stimulus = Stimulus(number, None if pulse.isi_s is None else asked_ms)
         judged = judge(sweep, stimulus, anywhere(reference), limits)
@@ -135,7 +135,7 @@ def _pulses_of_rows(contents: Contents, emg: Track, layout: Layout) -> tuple[lis
         raise InvalidValueError(what, got=f"{len(trials)} rows and {len(emg.stretches)} sweeps")
     columns = Columns.found(trials, stated, contents.source, needed=("isi",))
     require_said(columns)
-    marks = {key: np.array(marked(contents.events, key, layout)) for key in (origin_key(layout), "pulse", "alone")}
+    marks = {key: marked(contents.events, key, layout) for key in (origin_key(layout), "pulse", "alone")}
     pulses = list[Pulse]()
     for row in columns.rows:
         if columns.tap_alone(row):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, Final
@@ -37,15 +36,14 @@ def read(path: Path, _layout: Layout) -> Contents:
         with opened(path) as again:
             return reader.read(again, channel_indexes=[channel]).datafile.channels[channel].raw_data
 
+    def part(channel: int, first: int, last: int) -> FloatArray:
+        return part_of(numbers(channel), first, last)
+
     tracks = []
     for index, channel in enumerate(found.datafile.channels):
         rate_hz = float(channel.samples_per_second)
         stretches = parted((round(at / base_hz * rate_hz) for at in cuts), int(channel.point_count), rate_hz)
-        track = Track(channel.name.strip(), rate_hz, stretches, partial(_part, numbers, index), channel.units)
+        track = Track(channel.name.strip(), rate_hz, stretches, partial(part, index), channel.units)
         tracks.append(track.scaled(float(channel.raw_scale_factor), float(channel.raw_offset)))
     whole = parted(cuts, max([*cuts, *(at for _, at, _ in noted)], default=0) + 1, base_hz)
     return Contents(path.name, tuple(tracks), events_of(timed(noted, whole, base_hz)))
-
-
-def _part(numbers: Callable[[int], Any], index: int, first: int, last: int) -> FloatArray:
-    return part_of(numbers(index), first, last)

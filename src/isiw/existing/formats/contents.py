@@ -23,6 +23,9 @@ _ROWS: Final = 2**20  # of a file beside a recording; without a number pandas op
 _SAME: Final = 1.5  # so many samples apart a code and an event of one name are one event
 
 
+Event = tuple[str, float, float]  # what it is called, when it was, and how long it lasted [s]
+
+
 class Stretch(NamedTuple):
     """Samples without a gap: the first one, how many, and when the first one was taken [s]."""
 
@@ -43,9 +46,7 @@ def parted(
     return tuple(found)
 
 
-def timed(
-    noted: Iterable[tuple[str, float, float]], stretches: Sequence[Stretch], rate_hz: float
-) -> list[tuple[str, float, float]]:
+def timed(noted: Iterable[Event], stretches: Sequence[Stretch], rate_hz: float) -> list[Event]:
     """Events that are noted by their samples, which may be between two, by when these were taken [s]."""
     found = []
     for name, sample, lasts_s in noted:
@@ -162,7 +163,7 @@ def events_of(rows: Iterable[Sequence[Any]]) -> pd.DataFrame:
     return pd.DataFrame(sorted(map(tuple, rows), key=itemgetter(1)), columns=["name", "onset", "duration"])
 
 
-def with_codes(rows: Sequence[tuple[str, float, float]], tracks: Iterable[Track]) -> pd.DataFrame:
+def with_codes(rows: Sequence[Event], tracks: Iterable[Track]) -> pd.DataFrame:
     """Events, and those of channels of codes besides, in the order of their times; one that both have is one."""
     found, times_s = list(rows), dict[str, list[float]]()
     for name, at, _ in rows:

@@ -63,9 +63,8 @@ def read(path: Path, _layout: Layout) -> Contents:
     labels = header.fields["label"]
     noted = [signal for signal, label in enumerate(labels) if label in {"EDF Annotations", "BDF Annotations"}]
     lists = [list(_annotations(header, signal)) for signal in noted]
-    starts = [n * header.record_s for n in range(header.records)]
-    if lists:  # of which the first has the time of each record
-        starts = [row[0][1] if row else usual for row, usual in zip(lists[0], starts, strict=True)]
+    of_records = lists[0] if lists else [[]] * header.records  # the first annotation is of the record
+    starts = [row[0][1] if row else n * header.record_s for n, row in enumerate(of_records)]
     tracks = []
     for signal, label in enumerate(labels):
         if signal not in noted and (count := header.counts[signal]):

@@ -8,14 +8,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
-
 from isiw.errors import InvalidValueError
 from isiw.existing.formats.contents import Contents, Stretch, Track, events_of, parted, timed, with_codes
 from isiw.existing.layout import Layout
 from isiw.opening import opened
 from isiw.text.named_code import library
-from isiw.types import FloatArray
 
 _SCALES_V: Final = {"V": 1.0, "mV": 1e-3, "µV": 1e-6, "uV": 1e-6, "nV": 1e-9}  # numbers in others stay as they are
 _PAUSE: Final = re.compile(r"new segment|\bboundary\b", re.IGNORECASE)  # of unknown length, as annotations say it
@@ -60,10 +57,10 @@ def of_raw(raw: Any, source: str = "the recording") -> Contents:
              for one in raw.annotations]  # fmt: skip
     stretches = parted((round(at) for name, at, _ in noted if _PAUSE.search(name)), raw.n_times, rate_hz)
 
-    def values(index: int, first: int, last: int) -> Any:
+    def part(index: int, first: int, last: int) -> Any:
         return raw.get_data(picks=[index], start=first, stop=last, verbose="ERROR")[0]
 
-    tracks = tuple(_tracks(raw, stretches, values))
+    tracks = tuple(_tracks(raw, stretches, part))
     return Contents(source, tracks, with_codes(timed(noted, stretches, rate_hz), tracks))
 
 
@@ -91,15 +88,11 @@ def of_epochs(epochs: Any, source: str = "the epochs") -> Contents:
     return Contents(source, tracks, events, epochs.metadata, zero_s, empty_is_alone=True)
 
 
-def _tracks(held: Any, stretches: tuple[Stretch, ...], values: Callable[[int, int, int], Any]) -> Iterator[Track]:
+def _tracks(held: Any, stretches: tuple[Stretch, ...], part: Callable[[int, int, int], Any]) -> Iterator[Track]:
     units = getattr(held, "_orig_units", None) or {}
     for index, (name, kind) in enumerate(zip(held.ch_names, held.get_channel_types(), strict=True)):
         said = units.get(name, "V")
         usual = "" if kind == "misc" and said not in {"V", "n/a", ""} else kind
-        part, unit = partial(_part, values, index), "" if said == "n/a" else said
-        track = Track(str(name), float(held.info["sfreq"]), stretches, part, unit, usual)
+        read, unit = partial(part, index), "" if said == "n/a" else said
+        track = Track(str(name), float(held.info["sfreq"]), stretches, read, unit, usual)
         yield track.scaled(1.0 / _SCALES_V.get(said, 1.0))
-
-
-def _part(values: Callable[[int, int, int], Any], index: int, first: int, last: int) -> FloatArray:
-    return np.asarray(values(index, first, last), dtype=np.float64)

@@ -28,10 +28,7 @@ class Clocked(NamedTuple):
 def clocked(
     times_s: FloatArray, nominal_hz: float | None, what: str, index: IntArray | None = None, samples: int = 0
 ) -> Clocked:
-    """Times of samples [s], shape (n,), as stretches without a gap, whatever its length; what is left out is jitter.
-
-    If not all times are known, `index` says of which samples they are, ascending, and `samples` how many there are.
-    """
+    """Times of samples [s], of those at `index` if not of all, as stretches without a gap; what is left is jitter."""
     index = np.arange(len(times_s)) if index is None else index
     ahead = np.diff(index)
     steps_s = np.diff(times_s) / ahead
