@@ -302,5 +302,5 @@ def test_of_what_is_not_known_or_was_certain_there_is_no_bayes_factor(
     ],
 )
 def test_a_bayes_factor_is_said_as_far_as_it_matters(probability: float, beforehand: float, said: str) -> None:
-    estimate = WindowEstimate(probability, None, beforehand=beforehand)
-    assert chance(estimate.in_figures(Estimate)) == f" (probability of a window: {probability:.2f}, Bayes factor {said})"
+    estimate = WindowEstimate(probability, None, beforehand=beforehand).in_figures(Estimate)
+    assert chance(estimate) == f" (probability of a window: {probability:.2f}, Bayes factor {said})"
