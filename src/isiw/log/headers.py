@@ -18,6 +18,7 @@ from typing import Annotated, Any, Final, Literal, TypeAlias
 
 import tomli_w
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -30,7 +31,7 @@ from pydantic import (
     model_validator,
 )
 
-from isiw.checks import Checked, choice, mean_and_sd, number, whole
+from isiw.checks import Checked, choice, code, mean_and_sd, number, whole
 from isiw.design import DesignSpace
 from isiw.devices.limits import Limits
 from isiw.devices.protocol import DeviceInfo
@@ -91,6 +92,9 @@ class LogRecord(BaseModel):
     )
 
 
+PersonsCode: TypeAlias = Annotated[str, AfterValidator(partial(code, "subject"))]
+
+
 class ProductionHeader(LogRecord):
     """The header of a production task; the seed draws the lights of mode 2."""
 
@@ -98,7 +102,7 @@ class ProductionHeader(LogRecord):
     schema_version: int = PRODUCTION_VERSION
     isiw_version: str
     created: str
-    subject: str = ""
+    subject: PersonsCode = ""
     seed: int
     blocks: tuple[Block, ...] = Field(min_length=1)
 
@@ -154,7 +158,7 @@ class _Header(LogRecord):
     schema_version: int = SCHEMA_VERSION
     isiw_version: str
     created: str
-    subject: str = ""
+    subject: PersonsCode = ""
     seed: int
     device: DeviceInfo
     versions: dict[str, str] = Field(default_factory=dict)

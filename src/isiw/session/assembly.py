@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import Any, Final, NamedTuple, TypedDict
 
 import isiw
-from isiw.checks import deadline, patience, text
+from isiw.checks import code, deadline, patience
 from isiw.devices.clock import Clock
 from isiw.devices.limits import USUAL_ITI_S, Limits
 from isiw.devices.protocol import Device
@@ -223,7 +223,7 @@ def assembled(
     require_matching(rig.info, strategy, protocol)
     header = header_of(
         strategy,
-        subject=text("subject", options.get("subject", "")),
+        subject=code("subject", options.get("subject", "")),
         visit=noted,
         protocol=protocol,
         limits=limits,
