@@ -154,6 +154,11 @@ def text(what: str, value: object) -> str:
     return str(value)
 
 
+def code(what: str, value: object) -> str:
+    """A person's code; spaces around it, which nobody sees, make nobody else of the same person."""
+    return text(what, value).strip()
+
+
 def from_table(kind: type[_T], table: _T | Mapping[str, Any], what: str) -> _T:
     """An instance of a dataclass."""
     if isinstance(table, kind):
@@ -225,6 +230,7 @@ MeanAndSd: TypeAlias = Annotated[tuple[float, float], mean_and_sd]
 Count: TypeAlias = Annotated[int, partial(whole, least=1)]
 Natural: TypeAlias = Annotated[int, partial(whole, least=0)]
 Text: TypeAlias = Annotated[str, text]
+Code: TypeAlias = Annotated[str, code]
 Flag: TypeAlias = Annotated[bool, flag]
 
 

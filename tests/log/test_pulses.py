@@ -21,6 +21,7 @@ from isiw.log.salvage import salvage
 from isiw.log.schema import Event, Intent, Message
 from isiw.log.writer import LogWriter
 from isiw.trials import Status, Stimulus, Trial
+from log.written import make_header
 
 HOUR_S = 3600.0
 
@@ -113,6 +114,13 @@ def test_the_subjects_logs_of_a_folder_count_and_no_others(tmp_path: Path, heade
     assert len(ages_s) == 5
     assert ages_s == sorted(ages_s, reverse=True)
     assert len(earlier(tmp_path, "P08")) == 3
+
+
+def test_a_space_behind_a_code_makes_nobody_else_of_the_person(tmp_path: Path) -> None:
+    header = make_header(subject="P07 ")
+    assert header.subject == "P07"
+    make_log(tmp_path / "old.mcap", header.model_copy(update={"subject": " P07 "}))  # as it was written before
+    assert len(earlier(tmp_path)) == 3
 
 
 def test_logs_in_folders_of_the_folder_count_and_the_own_one_never(tmp_path: Path, header: Header) -> None:

@@ -43,6 +43,12 @@ def test_subject_date_device_limits_seed_and_version_come_first(record: SessionR
     assert facts["version"].startswith(f"isiw {record.header.isiw_version} (python ")
 
 
+def test_the_highest_intensity_that_was_allowed_is_among_the_limits(record: SessionRecord) -> None:
+    limits = replace(record.header.limits, max_intensity_pct_rmt=120.0)
+    header = record.header.model_copy(update={"limits": limits})
+    assert dict(first_facts(replace(record, header=header)))["limits"].endswith(", no intensity above 120 % RMT")
+
+
 def test_a_subject_of_several_lines_cannot_pass_for_other_facts(record: SessionRecord) -> None:
     header = record.header.model_copy(update={"subject": "P07\nlimits:   none"})
     assert first_facts(replace(record, header=header))[0].value.startswith("P07 limits: none, day 2")

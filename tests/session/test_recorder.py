@@ -380,7 +380,7 @@ def test_a_session_does_not_go_on_with_the_log_of_another_person(log: Path) -> N
     with pytest.raises(InvalidValueError, match="another person's"):
         open_session(scripted_strategy(9), log, resume=True, subject="P2")
     assert log.read_bytes() == before
-    for subject in ("", "P1"):
+    for subject in ("", "P1", "P1 "):
         with open_session(scripted_strategy(9), log, resume=True, subject=subject):
             pass
         assert read_session(log).header.subject == "P1"

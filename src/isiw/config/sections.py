@@ -20,7 +20,7 @@ from pydantic import (
     model_validator,
 )
 
-from isiw.checks import Flag, Text, choice, fields_of, patience, whole
+from isiw.checks import Code, Flag, choice, fields_of, patience, whole
 from isiw.design import DesignSpace, range_of
 from isiw.devices.robot.mechanism import LINE_DELAY_MS, EventTime, Geometry, SensorNoise
 from isiw.devices.robot.tapper import Tapper, TapperSettings, preset
@@ -243,7 +243,7 @@ class PersonsVisit(Visit):
         subject: the person's code, never a name.
     """
 
-    subject: Text = ""
+    subject: Code = ""
 
     def noted(self) -> Visit:
         """The notes alone, as a log has them."""

@@ -17,6 +17,7 @@ from functools import partial
 from typing import Annotated, Any, Final, Literal, TypeAlias
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -29,7 +30,7 @@ from pydantic import (
     model_validator,
 )
 
-from isiw.checks import Checked, choice, mean_and_sd, number, whole
+from isiw.checks import Checked, choice, code, mean_and_sd, number, whole
 from isiw.design import DesignSpace
 from isiw.devices.info import DeviceInfo
 from isiw.devices.limits import Limits
@@ -90,6 +91,9 @@ class LogRecord(BaseModel):
     )
 
 
+PersonsCode: TypeAlias = Annotated[str, AfterValidator(partial(code, "subject"))]
+
+
 class ProductionHeader(LogRecord):
     """The header of a production task; the seed draws the lights of mode 2."""
 
@@ -97,7 +101,7 @@ class ProductionHeader(LogRecord):
     schema_version: int = PRODUCTION_VERSION
     isiw_version: str
     created: str
-    subject: str = ""
+    subject: PersonsCode = ""
     seed: int
     blocks: tuple[Block, ...] = Field(min_length=1)
 
@@ -153,7 +157,7 @@ class _Header(LogRecord):
     schema_version: int = SCHEMA_VERSION
     isiw_version: str
     created: str
-    subject: str = ""
+    subject: PersonsCode = ""
     seed: int
     device: DeviceInfo
     versions: dict[str, str] = Field(default_factory=dict)

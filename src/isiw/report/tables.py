@@ -120,6 +120,8 @@ def _limits(limits: Limits) -> str:
         said.append(f"a coil of at most {limits.max_coil_c:g} °C")
     if limits.intensity_pct_mso is not None:
         said.append(f"only at {limits.intensity_pct_mso:g} % MSO")
+    if limits.max_intensity_pct_rmt is not None:
+        said.append(f"no intensity above {limits.max_intensity_pct_rmt:g} % RMT")
     return ", ".join(said)
 
 

@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple, TypedDict
 
 import isiw
 from isiw import schedule
-from isiw.checks import deadline, patience, text
+from isiw.checks import code, deadline, patience
 from isiw.devices.clock import Clock
 from isiw.devices.limits import USUAL_ITI_S, Limits
 from isiw.devices.protocol import Device
@@ -225,7 +225,7 @@ def assembled(
     require_matching(rig.info, strategy, protocol)
     header = header_of(
         strategy,
-        subject=text("subject", options.get("subject", "")),
+        subject=code("subject", options.get("subject", "")),
         visit=noted,
         protocol=protocol,
         limits=limits,

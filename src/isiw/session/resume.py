@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Unpack, overload
 
-from isiw.checks import text
+from isiw.checks import code
 from isiw.design import DesignSpace
 from isiw.devices.clock import MonotonicClock
 from isiw.devices.info import DeviceInfo
@@ -113,7 +113,7 @@ def _stated(space: DesignSpace, options: OwnLoopOptions) -> dict[str, Any]:
     _require_reported(limits)
     require_limits(limits)
     require_protocol(protocol, limits.iti_s)
-    subject, visit = text("subject", options.get("subject", "")), options.get("visit") or Visit()
+    subject, visit = code("subject", options.get("subject", "")), options.get("visit") or Visit()
     config = dict(options.get("config") or {})
     return {"subject": subject, "visit": visit, "protocol": protocol, "limits": limits, "config": config}
 
